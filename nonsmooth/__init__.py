@@ -1,0 +1,2 @@
+"""Nonsmooth dynamics on automatic Lie derivatives."""
+from .model import *

@@ -1,0 +1,36 @@
+"""WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
+
+from .errors import (
+    ConvergenceError,
+    DefinitionError,
+    DegenerateError,
+    NonsmoothError,
+    NotSmoothError,
+    OptionError,
+    ParameterError,
+    PointError,
+    explain,
+)
+from .motion import Evaluator, Guard, Motion, motion
+from .system import Array, FilippovSystem, Parameters, Reset, Stop
+
+__all__ = [
+    "Array",
+    "ConvergenceError",
+    "DefinitionError",
+    "DegenerateError",
+    "Evaluator",
+    "FilippovSystem",
+    "Guard",
+    "Motion",
+    "NonsmoothError",
+    "NotSmoothError",
+    "OptionError",
+    "ParameterError",
+    "Parameters",
+    "PointError",
+    "Reset",
+    "Stop",
+    "explain",
+    "motion",
+]

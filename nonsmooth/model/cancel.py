@@ -1,0 +1,198 @@
+"""Cancel what two expressions have in common, so that a removable 0/0 never reaches a number.
+
+While sliding, lambda = -a/b with L_F h = a + b lambda, and the field is F0 - (a/b) G. Where
+F1 - F2 = n(x) g(x) both G and b carry the factor n; with it cancelled the sliding field is smooth
+through n = 0 (two_fold theory, "coincident fields"; every single-contact Coulomb law does this).
+Expressions are put in the form sum of coefficient * product of powers of atoms; sums are flattened
+but products of two sums stay products, so nothing is expanded.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+
+import casadi as ca
+
+from .graph import instructions
+
+Monomial = tuple[tuple[int, int], ...]  # ((atom, power), ...) sorted by atom
+Sum = dict[Monomial, float]
+
+_ROUNDING = 8 * 2.220446049250313e-16
+
+
+def _times(a: Monomial, b: Monomial) -> Monomial:
+    powers = dict(a)
+    for atom, power in b:
+        powers[atom] = powers.get(atom, 0) + power
+    return tuple(sorted((k, v) for k, v in powers.items() if v))
+
+
+def _inverse(a: Monomial) -> Monomial:
+    return tuple((atom, -power) for atom, power in a)
+
+
+def _common(monomials: Sequence[Monomial]) -> Monomial:
+    """Return the greatest common divisor; an atom that is missing counts with power 0."""
+    shared = {atom: power for atom, power in monomials[0]}
+    atoms = set(shared).union(*(dict(m) for m in monomials))
+    low = {k: min(dict(m).get(k, 0) for m in monomials) for k in atoms}
+    return tuple(sorted((k, v) for k, v in low.items() if v))
+
+
+class _Forms:
+    """Normal forms of the nodes of one graph and the atoms they are made of."""
+
+    def __init__(self) -> None:
+        self.atoms: list[ca.SX] = []
+        self._known: dict[Hashable, int] = {}
+
+    def atom(self, key: Hashable, expression: ca.SX) -> Sum:
+        if key not in self._known:
+            self._known[key] = len(self.atoms)
+            self.atoms.append(expression)
+        return {((self._known[key], 1),): 1.0}
+
+    def add(self, a: Sum, b: Sum, sign: float = 1.0) -> Sum:
+        result = dict(a)
+        for monomial, c in b.items():
+            old = result.get(monomial, 0.0)
+            new = old + sign * c
+            if abs(new) <= _ROUNDING * max(abs(old), abs(c)):
+                result.pop(monomial, None)
+            else:
+                result[monomial] = new
+        return result
+
+    def factor(self, a: Sum) -> tuple[float, Monomial]:
+        """Write a nonzero sum as one coefficient times one monomial (a rest becomes an atom)."""
+        if len(a) == 1:
+            ((monomial, c),) = a.items()
+            return c, monomial
+        common = _common(list(a))
+        rest = {_times(m, _inverse(common)): c for m, c in a.items()}
+        lead = rest[min(rest)]
+        rest = {m: c / lead for m, c in sorted(rest.items())}
+        atom = self.atom(("sum", tuple(rest.items())), self.expression(rest))
+        ((monomial, _),) = atom.items()
+        return lead, _times(common, monomial)
+
+    def multiply(self, a: Sum, b: Sum) -> Sum:
+        if not a or not b:
+            return {}
+        if len(a) > 1 and len(b) > 1:
+            (ca_, ma), (cb, mb) = self.factor(a), self.factor(b)
+            return {_times(ma, mb): ca_ * cb}
+        if len(b) > 1:
+            a, b = b, a
+        ((monomial, c),) = b.items()
+        return {_times(m, monomial): c * k for m, k in a.items()}
+
+    def reciprocal(self, a: Sum) -> Sum:
+        c, monomial = self.factor(a)
+        return {_inverse(monomial): 1.0 / c}
+
+    def expression(self, a: Sum) -> ca.SX:
+        total = ca.SX(0)
+        for monomial, c in a.items():
+            total = total + self.product(c, monomial)
+        return total
+
+    def product(self, c: float, monomial: Monomial) -> ca.SX:
+        top, bottom = ca.SX(c), ca.SX(1)
+        for atom, power in monomial:
+            for _ in range(abs(power)):
+                if power > 0:
+                    top = top * self.atoms[atom]
+                else:
+                    bottom = bottom * self.atoms[atom]
+        return top / bottom
+
+
+def _normal_forms(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
+) -> tuple[_Forms, list[list[Sum]]]:
+    nodes, rows = instructions(inputs, outputs)
+    forms, values, exact = _Forms(), list[Sum](), list[ca.SX]()
+    for node in nodes:
+        args = [values[k] for k in node.args]
+        if node.op == "const":
+            value: Sum = {(): node.payload} if node.payload else {}  # type: ignore[dict-item]
+            expression = ca.SX(node.payload)
+        elif node.op == "input":
+            vector, position = node.payload  # type: ignore[misc]
+            expression = inputs[vector][position]
+            value = forms.atom(("input", node.payload), expression)
+        else:
+            expression = _apply(node.op, [exact[k] for k in node.args])
+            value = _combine(forms, node.op, args, expression)
+        values.append(value)
+        exact.append(expression)
+    return forms, [[values[k] for k in row] for row in rows]
+
+
+def _apply(op: str, args: list[ca.SX]) -> ca.SX:
+    code = getattr(ca, "OP_" + op.upper())
+    return ca.SX.unary(code, args[0]) if len(args) == 1 else ca.SX.binary(code, args[0], args[1])
+
+
+def _combine(forms: _Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
+    if op == "add":
+        return forms.add(args[0], args[1])
+    if op == "sub":
+        return forms.add(args[0], args[1], -1.0)
+    if op == "neg":
+        return forms.add({}, args[0], -1.0)
+    if op == "twice":
+        return forms.add(args[0], args[0])
+    if op == "mul":
+        return forms.multiply(args[0], args[1])
+    if op == "sq":
+        return forms.multiply(args[0], args[0])
+    if op == "div" and args[1]:
+        return forms.multiply(args[0], forms.reciprocal(args[1]))
+    if op == "inv" and args[0]:
+        return forms.reciprocal(args[0])
+    return forms.atom((op, *(tuple(sorted(a.items())) for a in args)), expression)
+
+
+def cancel_common_factor(
+    expressions: Sequence[ca.SX], variables: ca.SX, others: ca.SX
+) -> tuple[list[ca.SX], ca.SX]:
+    """Divide scalar expressions by the factors that all of them have.
+
+    Parameters
+    ----------
+    expressions : sequence of scalar SX
+        Zero expressions are passed through.
+    variables, others : SX
+        The two vectors of symbols.
+
+    Returns
+    -------
+    reduced : list of SX
+        ``expressions[i] == factor * reduced[i]``.
+    factor : SX
+        1 when nothing is common; the expressions are then returned as they came.
+
+    Examples
+    --------
+    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
+    >>> (a, b), n = cancel_common_factor([mu * (x + y), 2 * x + 2 * y], ca.vertcat(x, y), mu)
+    >>> n, a, b
+    (SX((x+y)), SX(mu), SX(2))
+    """
+    forms, rows = _normal_forms([variables, others], expressions)
+    sums = [row[0] for row in rows]
+    factored = [forms.factor(s) if s else None for s in sums]
+    monomials = [f[1] for f in factored if f is not None]
+    if not monomials:
+        return list(expressions), ca.SX(1)
+    common = tuple((atom, power) for atom, power in _common(monomials) if power > 0)
+    if not common:
+        return list(expressions), ca.SX(1)
+    reduced = [
+        ca.SX(0) if f is None else forms.product(f[0], _times(f[1], _inverse(common)))
+        for f in factored
+    ]
+    return reduced, forms.product(1.0, common)

@@ -1,0 +1,128 @@
+"""CasADi expressions as value-numbered instruction lists, and the refusal of what is not smooth.
+
+Everything that walks an expression graph (Taylor recurrences, cancellation of common factors,
+the smoothness check) reads it through :func:`instructions`, so CasADi's numbering of operations
+is known here only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from .errors import NotSmoothError
+
+#: CasADi's operation codes by number, e.g. ``OPERATIONS[4] == "mul"``.
+OPERATIONS: dict[int, str] = {
+    getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
+}
+
+#: Operations without derivatives of every order, and the declaration that replaces each.
+NOT_SMOOTH: dict[str, str] = {
+    "sign": "sign",
+    "fabs": "fabs (absolute value)",
+    "fmin": "fmin",
+    "fmax": "fmax",
+    "if_else_zero": "if_else",
+    "lt": "a comparison (<)",
+    "le": "a comparison (<=)",
+    "eq": "a comparison (==)",
+    "ne": "a comparison (!=)",
+    "not": "logic_not",
+    "and": "logic_and",
+    "or": "logic_or",
+    "floor": "floor",
+    "ceil": "ceil",
+    "fmod": "fmod",
+    "remainder": "remainder",
+    "copysign": "copysign",
+}
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operation: its name, its arguments (node numbers) and a payload.
+
+    The payload is the value of a ``const`` node and ``(input, position)`` of an ``input`` node.
+    """
+
+    op: str
+    args: tuple[int, ...]
+    payload: Hashable = None
+
+
+def instructions(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
+) -> tuple[list[Node], list[list[int]]]:
+    """Value-number the graph of dense ``outputs`` over ``inputs``.
+
+    Parameters
+    ----------
+    inputs : sequence of SX
+        Symbol vectors.
+    outputs : sequence of SX
+        Expressions in these symbols, any shape, read column by column.
+
+    Returns
+    -------
+    nodes : list of Node
+        Each node's arguments come before it.
+    rows : list of list of int
+        For each output the node number of each of its entries.
+    """
+    function = ca.Function("graph", list(inputs), [ca.densify(ca.SX(o)) for o in outputs])
+    nodes: list[Node] = []
+    known: dict[Node, int] = {}
+    register: dict[int, int] = {}
+    rows: list[list[int]] = [[-1] * function.numel_out(k) for k in range(function.n_out())]
+
+    def number(node: Node) -> int:
+        if node not in known:
+            known[node] = len(nodes)
+            nodes.append(node)
+        return known[node]
+
+    for k in range(function.n_instructions()):
+        op = OPERATIONS[function.instruction_id(k)]
+        source, target = function.instruction_input(k), function.instruction_output(k)
+        if op == "const":
+            register[target[0]] = number(Node(op, (), float(function.instruction_constant(k))))
+        elif op == "input":
+            register[target[0]] = number(Node(op, (), (source[0], source[1])))
+        elif op == "output":
+            rows[target[0]][target[1]] = register[source[0]]
+        else:
+            register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
+    return nodes, rows
+
+
+def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
+    """Which nodes depend on an input vector marked true in ``variable``."""
+    result: list[bool] = []
+    for node in nodes:
+        if node.op == "input":
+            result.append(variable[node.payload[0]])  # type: ignore[index]
+        else:
+            result.append(any(result[a] for a in node.args))
+    return result
+
+
+def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str) -> None:
+    """Raise NotSmoothError if ``expression`` is not smooth in ``variables``.
+
+    A non-smooth operation on ``others`` alone (parameters) is harmless: it is a constant.
+    """
+    nodes, _ = instructions([variables, others], [expression])
+    moving = depends_on(nodes, [True, False])
+    for node, moves in zip(nodes, moving, strict=True):
+        if moves and node.op in NOT_SMOOTH and any(moving[a] for a in node.args):
+            raise NotSmoothError(
+                f"{what}: expected an expression with derivatives of every order, received one "
+                f"with {NOT_SMOOTH[node.op]} of the states. Declare the switch as a surface: "
+                "give the smooth pieces as above= and below= with surface= the argument whose "
+                "sign decides, or write sign(h) as a multiplier lam with surfaces=[h], "
+                "multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with "
+                "h = a - b)."
+            )

@@ -1,2 +1,3 @@
 """Nonsmooth dynamics on automatic Lie derivatives."""
 from .model import *
+from .flow import *

@@ -11,7 +11,7 @@ from .errors import (
     PointError,
     explain,
 )
-from .motion import Evaluator, Guard, Motion, motion
+from .motion import Evaluator, Guard, Motion, Resets, Surfaces, motion
 from .system import Array, FilippovSystem, Parameters, Reset, Stop
 
 __all__ = [
@@ -30,7 +30,9 @@ __all__ = [
     "Parameters",
     "PointError",
     "Reset",
+    "Resets",
     "Stop",
+    "Surfaces",
     "explain",
     "motion",
 ]

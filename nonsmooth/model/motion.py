@@ -126,15 +126,14 @@ class Motion:
 
         return system.function(("jet", self.mode, order), build)
 
-    def scale_function(self) -> ca.Function:
-        """Return (x, p) -> sum of |d guard/d state|, the yardstick of rounding in a guard."""
+    def gradient_function(self) -> ca.Function:
+        """Return (x, p) -> gradients of the guard functions (m, N), the yardstick of rounding."""
         system = self.system
 
         def build() -> Sequence[ca.SX]:
-            gradient = ca.jacobian(self.functions, system.extended_states)
-            return [ca.sum2(ca.fabs(gradient))]
+            return [ca.jacobian(self.functions, system.extended_states)]
 
-        return system.function(("scale", self.mode), build)
+        return system.function(("gradient", self.mode), build)
 
 
 class Evaluator:
@@ -168,6 +167,52 @@ class Evaluator:
         self._p[:] = p
         self._run()
         return self.outputs
+
+
+class Surfaces:
+    """Values and state gradients of all switching functions; projection onto them."""
+
+    def __init__(self, system: FilippovSystem):
+        self.system = system
+
+        def build() -> Sequence[ca.SX]:
+            h = ca.vertcat(*[system.surface_function(i) for i in range(system.surface_count)])
+            return [h, ca.jacobian(h, system.extended_states)]
+
+        self.evaluator = Evaluator(system.function("surfaces", build))
+
+    def values(self, x: Array, p: Array) -> tuple[Array, Array]:
+        """Return h (m,) and its gradient with respect to the extended state (m, N)."""
+        if not self.system.surface_count:
+            return np.zeros(0), np.zeros((0, x.size))
+        h, gradient = self.evaluator(x, p)
+        return np.array(h).ravel(), np.array(gradient)
+
+    def project(self, x: Array, p: Array, which: Sequence[int], iterations: int = 3) -> Array:
+        """Move the states (not the time) onto h_i = 0 by least-norm Newton steps."""
+        n, chosen = self.system.dimension, list(which)
+        for _ in range(iterations if chosen else 0):
+            h, gradient = self.values(x, p)
+            if not np.any(h[chosen]):
+                break
+            step = np.linalg.lstsq(gradient[chosen, :n], h[chosen], rcond=None)[0]
+            x = x.copy()
+            x[:n] -= step
+        return x
+
+
+class Resets:
+    """The maps of a system's resets as one function of state and parameters."""
+
+    def __init__(self, system: FilippovSystem):
+        self.system = system
+        self.function = system.function("resets", lambda: [system._maps])
+
+    def apply(self, index: int, x: Array, p: Array) -> Array:
+        """Return the state after reset ``index``; the time is kept."""
+        after = x.copy()
+        after[: self.system.dimension] = np.array(self.function(x, p))[:, index]
+        return after
 
 
 def motion(system: FilippovSystem, mode: str) -> Motion:

@@ -1,0 +1,53 @@
+"""Events that accumulate in finite time, recognised by their geometric intervals."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+#: Periods of the pattern of events that are tried (an impact 1, a crossing pair 2, a relay pair 4).
+_LAGS = (1, 2, 3, 4, 6)
+_BLOCKS = 6
+_SPREAD = 0.02
+_REMAINING = 1e-6
+
+
+def remaining_time(intervals: Sequence[float], patterns: Sequence[str], t: float) -> float | None:
+    """Estimate the time left until events accumulate, or None if they do not (yet).
+
+    Blocks of events with a repeating pattern shrink by a steady ratio r < 1 before a Zeno point,
+    so the time left is (last block) r/(1 - r). The estimate is given once it is below 1e-6.
+
+    Parameters
+    ----------
+    intervals : sequence of float
+        Times between successive events.
+    patterns : sequence of str
+        What each event was; same length.
+    t : float
+        Present time, the scale of "small".
+
+    Examples
+    --------
+    >>> remaining_time([2.0**-k for k in range(40)], ["impact"] * 40, 0.0) < 1e-11
+    True
+    """
+    if len(intervals) > 40 and not any(intervals[-40:]):
+        return 0.0
+    for lag in _LAGS:
+        need = lag * _BLOCKS
+        if len(intervals) < need + lag:
+            return None
+        recent = list(patterns[-need:])
+        if recent != list(patterns[-need - lag : -lag]):
+            continue
+        tail = list(intervals[-need:])
+        blocks = [sum(tail[k : k + lag]) for k in range(0, need, lag)]
+        if min(blocks) <= 0.0:
+            continue
+        ratios = [b / a for a, b in zip(blocks, blocks[1:], strict=False)]
+        r = ratios[-1]
+        if max(ratios) < 0.9999 and max(ratios) - min(ratios) <= _SPREAD * (1.0 - r):
+            left = blocks[-1] * r / (1.0 - r)
+            if left < _REMAINING * max(1.0, abs(t)):
+                return left
+    return None

@@ -1,0 +1,49 @@
+"""How a run ends: a named status, and the sentence of advice that goes with it."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Status(IntEnum):
+    """Why a run ended.
+
+    The values are stable: ensembles store them in arrays and checkpoints.
+    """
+
+    REACHED_END = 0
+    STOPPED = 1
+    NON_UNIQUE = 2
+    ACCUMULATION = 3
+    INTERSECTION = 4
+    STEP_TOO_SMALL = 5
+    NOT_FINITE = 6
+    TOO_MANY_EVENTS = 7
+    TOO_MANY_STEPS = 8
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def complete(self) -> bool:
+        """Whether the run did what was asked (reached its end or a stop)."""
+        return self in (Status.REACHED_END, Status.STOPPED)
+
+
+ADVICE: dict[Status, str] = {
+    Status.REACHED_END: "The run reached t_end.",
+    Status.STOPPED: "The run met a stopping surface.",
+    Status.NON_UNIQUE: "The future is not unique from here; continue from the last state with "
+    "start_mode= the mode you mean.",
+    Status.ACCUMULATION: "Events accumulate in finite time (Zeno); continue from the limit with "
+    "the motion that holds there.",
+    Status.INTERSECTION: "The motion would slide on an intersection of surfaces, which is not "
+    "built; the state where it begins is the last one.",
+    Status.STEP_TOO_SMALL: "The solution has a singularity here, or the tolerance is below "
+    "rounding: loosen tol or look at the fields near the last state.",
+    Status.NOT_FINITE: "A field or a switching function is not a finite number here: check "
+    "logarithms, roots and divisions at the last state.",
+    Status.TOO_MANY_EVENTS: "Raise max_events if this many are expected; otherwise the motion "
+    "chatters.",
+    Status.TOO_MANY_STEPS: "Raise max_steps if the run is long; otherwise loosen tol.",
+}

@@ -1,0 +1,193 @@
+"""One Taylor step of one mode: jets, step size, guards, end state.
+
+The order follows from the tolerance and the step from the last two coefficients (Jorba & Zou
+2005); the guards' own series bound the step too, so that their roots are as accurate as the state.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..model import Array, Evaluator, FilippovSystem, Guard, motion
+from .polynomial import first_crossing, first_root
+
+EPSILON = float(np.finfo(float).eps)
+
+#: Two events closer than this, relative to the time, are simultaneous; a stop is then served first.
+_TIE = 1e-13
+
+#: Local errors add up over a run; a tenth keeps the global error near the tolerance.
+_SAFETY = 0.1
+
+_PRIORITY = {"stop": 0, "reset": 1, "surface": 2, "exit": 3}
+
+
+def order_for(tolerance: float) -> int:
+    """Order of the Taylor method for a local tolerance (Jorba & Zou 2005, eq. 3-7)."""
+    return max(6, math.ceil(-0.5 * math.log(tolerance)) + 1)
+
+
+@dataclass(frozen=True)
+class Expansion:
+    """Jets at a point: state coefficients (N, P+1), guard coefficients (m, P+1), guard scales.
+
+    ``scales`` is sum_i |d guard/d x_i| (1 + |x_i|): rounding in a guard is that times epsilon.
+    """
+
+    mode: str
+    states: Array
+    guards: Array
+    scales: Array
+    gradient: Array
+    finite: bool
+
+
+@dataclass(frozen=True)
+class Hit:
+    """A guard that fell through zero at time ``dt`` after the step's start."""
+
+    dt: float
+    number: int
+    guard: Guard
+
+
+class Stepper:
+    """Evaluates modes of one system with fixed parameters and tolerances.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    p : ndarray
+        Parameter values.
+    rtol, atol : float
+        The local error of state i is kept below ``atol + rtol*abs(x_i)``.
+    """
+
+    def __init__(self, system: FilippovSystem, p: Array, rtol: float, atol: float):
+        self.system, self.p = system, p
+        self.rtol, self.atol = rtol, atol
+        self.order = order_for(_SAFETY * min(rtol, atol))
+        self._jets: dict[str, tuple[Evaluator, Evaluator]] = {}
+
+    def guards(self, mode: str) -> tuple[Guard, ...]:
+        """Return the guards of a mode, in the order of the rows of its expansion."""
+        return motion(self.system, mode).guards
+
+    def expand(self, mode: str, x: Array) -> Expansion:
+        """Jets of a mode at x (extended state); a fresh copy."""
+        if mode not in self._jets:
+            m = motion(self.system, mode)
+            self._jets[mode] = (
+                Evaluator(m.jet_function(self.order)),
+                Evaluator(m.gradient_function()),
+            )
+        jets, gradients = self._jets[mode]
+        states, guards = (np.array(a) for a in jets(x, self.p))
+        gradient = np.abs(gradients(x, self.p)[0])
+        finite = bool(np.all(np.isfinite(states)) and np.all(np.isfinite(guards)))
+        return Expansion(mode, states, guards, gradient @ (1.0 + np.abs(x)), gradient, finite)
+
+    def step_size(self, e: Expansion) -> float:
+        """Step for which the last two terms of states and guards stay below the tolerances."""
+        n = self.system.dimension
+        allowed = np.zeros(e.states.shape[0])
+        allowed[:n] = _SAFETY * (self.atol + self.rtol * np.abs(e.states[:n, 0]))
+        h = _bound(e.states[:n], allowed[:n], self.order)
+        if e.guards.size:
+            # A guard without gradient here (a double zero) has no yardstick of its own.
+            guard_allowed = e.gradient @ allowed + self.rtol * np.abs(e.guards[:, 0])
+            known = guard_allowed > 0
+            h = min(h, _bound(e.guards[known], guard_allowed[known], self.order))
+        return h
+
+    def leading(self, e: Expansion, row: int, known_zeros: int) -> tuple[int, float]:
+        """First coefficient of a guard that is not zero to rounding, and its value.
+
+        Returns ``(order + 1, 0.0)`` if there is none.
+        """
+        speed = np.abs(e.states).max(axis=0)
+        for k in range(known_zeros, e.guards.shape[1]):
+            noise = e.scales[row] if k == 0 else e.gradient[row].sum() * speed[k] * (k + 1)
+            if abs(e.guards[row, k]) > 64 * EPSILON * noise:
+                return k, float(e.guards[row, k])
+        return e.guards.shape[1], 0.0
+
+    def first_hit(self, e: Expansion, h: float, drops: dict[int, int], t: float) -> Hit | None:
+        """Earliest guard to end the mode within h; ``drops[row]`` leading coefficients are zero."""
+        hits = []
+        for row, guard in enumerate(self.guards(e.mode)):
+            c = e.guards[row, drops.get(row, 0) :]
+            dt = self._root(e, row, guard, c, h, drops.get(row, 0))
+            if dt is not None:
+                hits.append(Hit(dt, row, guard))
+        if not hits:
+            return None
+        earliest = min(hit.dt for hit in hits)
+        tied = [hit for hit in hits if hit.dt <= earliest + _TIE * max(1.0, abs(t))]
+        return min(tied, key=lambda hit: (_PRIORITY[hit.guard.kind], hit.dt))
+
+    def _root(
+        self, e: Expansion, row: int, guard: Guard, c: Array, h: float, dropped: int
+    ) -> float | None:
+        if guard.kind in ("stop", "reset"):
+            return first_crossing(c.tolist(), h, guard.side)
+        if c.size and c[0] <= 0.0:
+            # Rounding can put a state that has just left a surface on the wrong side of it.
+            k, value = self.leading(e, row, dropped)
+            if value == 0.0:
+                return None
+            c = e.guards[row, k:]
+        return first_root(c.tolist(), h) if c.size else None
+
+    @staticmethod
+    def advance(e: Expansion, dt: float) -> Array:
+        """State after dt, by Horner's rule."""
+        value = e.states[:, -1].copy()
+        for k in range(e.states.shape[1] - 2, -1, -1):
+            value *= dt
+            value += e.states[:, k]
+        return value
+
+    def singular_step(self, e: Expansion, h_max: float) -> tuple[Array, float]:
+        """Short step from a point where high derivatives do not exist (a power law at zero).
+
+        Each state keeps the coefficients before its first non-finite one; the step is shortened
+        until the defect of the equation at its end is below the tolerance.
+
+        Returns
+        -------
+        coefficients (N, P+1), h; h is 0 where not even the field is finite.
+        """
+        c = e.states.copy()
+        for row in c:
+            bad = np.flatnonzero(~np.isfinite(row))
+            row[bad[0] if bad.size else row.size :] = 0.0
+            if bad.size and bad[0] < 2:
+                return c, 0.0
+        allowed = self.atol + self.rtol * np.abs(c[:, 0])
+        kept = Expansion(e.mode, c, e.guards, e.scales, e.gradient, True)
+        h = min(h_max, 1e-3)
+        while h > 1e-15:
+            end = self.advance(kept, h)
+            slope = self.expand(e.mode, end).states[:, 1]
+            defect = np.abs(slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * _powers(h, c)))
+            if np.all(np.isfinite(slope)) and np.all(defect * h <= allowed):
+                return c, h
+            h *= 0.25
+        return c, 0.0
+
+
+def _powers(h: float, c: Array) -> Array:
+    return h ** np.arange(c.shape[1] - 1)
+
+
+def _bound(c: Array, allowed: Array, order: int) -> float:
+    if not c.size:
+        return math.inf
+    last = float((np.abs(c[:, order]) / allowed).max())
+    before = float((np.abs(c[:, order - 1]) / allowed).max())
+    h = math.inf if last == 0.0 else last ** (-1.0 / order)
+    return h if before == 0.0 else min(h, before ** (-1.0 / (order - 1)))

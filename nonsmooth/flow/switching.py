@@ -1,0 +1,167 @@
+"""Filippov's logic at a point of one or several surfaces: which motions can continue from here.
+
+A mode can continue if each of its guards that vanishes here becomes positive at once: its first
+nonzero Taylor coefficient is positive. For a side that is "the field leaves to this side", for
+sliding it is "both fields point at the surface". One such mode: the motion continues in it. More
+than one: the future is not unique. The coefficients that are zero by construction are dropped, so
+there is no push off the surface by an epsilon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+from ..model import Array, motion
+from .status import Status
+from .stepper import Expansion, Stepper
+
+#: Number of leading coefficients of a guard that vanish by construction, by (kind, surface, side).
+Known = Mapping[tuple[str, int, int], int]
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """A mode that can continue, and the coefficients to drop from its guards in the first step."""
+
+    mode: str
+    drops: dict[int, int]
+    strict: bool
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Either one continuation or the reason why there is none."""
+
+    continuation: Continuation | None
+    status: Status = Status.REACHED_END
+    message: str = ""
+
+
+def decide(
+    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
+) -> Decision:
+    """Choose the motion that continues from a point of the surfaces ``active``.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    x : ndarray (N,)
+        Extended state, on the active surfaces.
+    mode : str
+        Letters of the surfaces that are not active; the others are ignored.
+    active : sequence of int
+        Surfaces through the point.
+    known : mapping
+        Coefficients known to vanish, besides the values of h at the active surfaces.
+    """
+    singular = _two_folds(stepper, x, mode, active)
+    if singular:
+        return Decision(None, Status.NON_UNIQUE, _two_fold_message(singular[0]))
+    candidates = list(_candidates(mode, active))
+    found = [
+        c for m in candidates if (c := _continuation(stepper, x, m, active, known)) is not None
+    ]
+    strict = [c for c in found if c.strict]
+    if len(strict) == 1 or (not strict and len(found) == 1):
+        return Decision((strict or found)[0])
+    if len(strict) > 1:
+        return Decision(None, Status.NON_UNIQUE, _ambiguity(strict, active))
+    resting = [c for c in found if "s" in c.mode]
+    if resting:
+        return Decision(resting[0])
+    if len(active) > 1:
+        surfaces = " and ".join(f"h{i}" for i in active)
+        return Decision(
+            None, Status.INTERSECTION, f"No motion with at most one sliding surface leaves {surfaces}."
+        )
+    return Decision(
+        None, Status.NON_UNIQUE, "No mode continues from here to rounding: a degenerate tangency."
+    )
+
+
+def _candidates(mode: str, active: Sequence[int]) -> Iterable[str]:
+    for letters in product("+-s", repeat=len(active)):
+        candidate = list(mode)
+        for i, letter in zip(active, letters, strict=True):
+            candidate[i] = letter
+        if candidate.count("s") <= 1:
+            yield "".join(candidate)
+
+
+def _continuation(
+    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
+) -> Continuation | None:
+    e = stepper.expand(mode, x)
+    if not e.finite:
+        e = _finite_prefix(e)
+    drops, strict = {}, True
+    for row, guard in enumerate(stepper.guards(mode)):
+        if guard.kind in ("stop", "reset") or guard.index not in active:
+            continue
+        zeros = known.get((guard.kind, guard.index, guard.side), 0)
+        zeros = max(zeros, 1 if guard.kind == "surface" else 0)
+        k, value = stepper.leading(e, row, zeros)
+        if value < 0.0:
+            return None
+        if value == 0.0:
+            strict = False
+        drops[row] = min(k, e.guards.shape[1] - 1) if value else e.guards.shape[1]
+    return Continuation(mode, drops, strict)
+
+
+def _finite_prefix(e: Expansion) -> Expansion:
+    """Zero the coefficients that are not finite: they decide nothing."""
+    states, guards = e.states.copy(), e.guards.copy()
+    for c in (states, guards):
+        c[~_finite(c)] = 0.0
+    return Expansion(e.mode, states, guards, e.scales, e.gradient, False)
+
+
+def _finite(c: Array) -> Array:
+    return (c - c) == 0.0
+
+
+def _two_folds(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) -> list[int]:
+    """Active surfaces both of whose fields are tangent here and whose sliding field is 0/0."""
+    found = []
+    for i in active:
+        sliding = "".join("s" if j == i else c.replace("s", "+") for j, c in enumerate(mode))
+        if "s" in mode and mode.index("s") != i and len(active) > 1:
+            continue
+        if motion(stepper.system, sliding).cancelled:
+            continue
+        if is_two_fold(stepper, stepper.expand(sliding, x), i):
+            found.append(i)
+    return found
+
+
+def is_two_fold(stepper: Stepper, e: Expansion, surface: int, tolerance: float = 0.0) -> bool:
+    """Whether both fields are tangent to a surface at a point of sliding mode ``e.mode``.
+
+    ``tolerance`` is on the angles between fields and surface; rounding is always allowed.
+    """
+    rows = [
+        row
+        for row, guard in enumerate(stepper.guards(e.mode))
+        if guard.kind == "exit" and guard.index == surface
+    ]
+    return all(
+        abs(e.guards[row, 0]) <= (tolerance + 2e-14) * e.scales[row] and e.scales[row] > 0
+        for row in rows
+    )
+
+
+def _two_fold_message(surface: int) -> str:
+    return (
+        f"Both fields are tangent to h{surface} = 0: a two-fold, where the sliding field is 0/0 "
+        "and the future is not decided by Filippov's convention."
+    )
+
+
+def _ambiguity(found: Sequence[Continuation], active: Sequence[int]) -> str:
+    modes = ", ".join(repr(c.mode) for c in found)
+    surfaces = " and ".join(f"h{i}" for i in active)
+    where = "repelling sliding or a fold of both fields" if len(active) == 1 else "an intersection"
+    return f"On {surfaces} = 0 ({where}) the motion can continue in each of the modes {modes}."

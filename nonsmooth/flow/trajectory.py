@@ -1,0 +1,142 @@
+"""What a run returns: steps with their Taylor polynomials, events, itinerary, status."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..model import Array, FilippovSystem, PointError
+from .status import Status
+
+
+@dataclass(frozen=True)
+class Event:
+    """Something that happened at one instant.
+
+    Attributes
+    ----------
+    kind : {"crossing", "entry", "exit", "stop", "reset", "zero", "end"}
+        ``entry`` and ``exit`` are of sliding; ``zero`` is a zero found by ``follow``.
+    t : float
+    x : ndarray (n,)
+        State before a reset, on the surface otherwise.
+    mode_before, mode_after : str
+        Equal at a stop, a zero and the end.
+    name : str
+        Of the surface (``h0``, ``h1``, ...), stop, reset or function.
+    """
+
+    kind: str
+    t: float
+    x: Array
+    mode_before: str
+    mode_after: str
+    name: str = ""
+
+
+@dataclass(frozen=True)
+class Segment:
+    """A stretch of motion in one mode: steps ``first`` to ``last`` - 1."""
+
+    mode: str
+    t_start: float
+    t_end: float
+    first: int
+    last: int
+
+
+@dataclass(frozen=True, repr=False)
+class Trajectory:
+    """A solution: call it with times to evaluate its dense output.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+    parameters : dict
+        Name and value of every parameter of the run.
+    t, x : ndarray (m,), (m, n)
+        Accepted steps and events, both ends included; a reset appears twice at its time.
+    events : list of Event
+    itinerary : str
+        Modes in order, separated by blanks.
+    segments : list of Segment
+    status : Status
+    message : str
+        What happened, in words.
+    accumulation_time : float or None
+        Estimated limit of the event times when the status is ACCUMULATION.
+    """
+
+    system: FilippovSystem
+    parameters: dict[str, float]
+    t: Array
+    x: Array
+    events: list[Event]
+    segments: list[Segment]
+    status: Status
+    message: str
+    accumulation_time: float | None = None
+    _starts: Array = field(default_factory=lambda: np.zeros(0))
+    _coefficients: Sequence[Array] = ()
+
+    @property
+    def itinerary(self) -> str:
+        """Modes in order, separated by blanks, e.g. ``"- s -"``."""
+        return " ".join(s.mode or "o" for s in self.segments)
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """Evaluate the dense output.
+
+        Parameters
+        ----------
+        t : array_like (...)
+            Times within the run. At a reset the state after it is returned.
+
+        Returns
+        -------
+        ndarray (..., n)
+
+        Raises
+        ------
+        PointError
+            A time outside the run.
+        """
+        times = np.asarray(t, dtype=float)
+        low, high = sorted((float(self.t[0]), float(self.t[-1])))
+        slack = 1e-12 * max(1.0, abs(low), abs(high))
+        if times.size and not (low - slack <= times.min() and times.max() <= high + slack):
+            raise PointError(
+                f"time: expected values in [{low}, {high}], received values from {times.min()} to "
+                f"{times.max()}. The run ended with status {self.status}: {self.message}"
+            )
+        n = self.x.shape[1]
+        if not len(self._coefficients):
+            return np.broadcast_to(self.x[-1], (*times.shape, n)).copy()
+        flat = times.ravel()
+        forward = self.t[-1] >= self.t[0]
+        starts = self._starts if forward else -self._starts
+        step = np.searchsorted(starts, flat if forward else -flat, side="right") - 1
+        step = np.clip(step, 0, len(starts) - 1)
+        result = np.empty((flat.size, n))
+        for k in np.unique(step):
+            chosen = step == k
+            s = (flat[chosen] - self._starts[k])[:, None]
+            c = self._coefficients[k][:n]
+            value = np.broadcast_to(c[:, -1], (s.shape[0], n))
+            for j in range(c.shape[1] - 2, -1, -1):
+                value = value * s + c[:, j]
+            result[chosen] = value
+        return result.reshape(*times.shape, n)
+
+    def __repr__(self) -> str:
+        return (
+            f"Trajectory(t = {self.t[0]:g} .. {self.t[-1]:g}, {len(self.t)} points, "
+            f"{len(self.events)} events, itinerary {_shorten(self.itinerary)!r}, {self.status})"
+        )
+
+
+def _shorten(text: str, width: int = 40) -> str:
+    return text if len(text) <= width else text[: width - 4] + " ..."

@@ -1,3 +1,85 @@
-"""Nonsmooth dynamics on automatic Lie derivatives."""
-from .model import *
-from .flow import *
+"""Nonsmooth dynamics on automatic Lie derivatives: the front door.
+
+A Filippov system is x' = f(x, lambda; p) with lambda in Sgn(h(x)). The surface h = 0 separates
+the field F1 (h > 0, lambda = +1) from F2 (h < 0, lambda = -1). With L_i = F_i . grad h the surface
+splits into crossing (L1 L2 > 0), attracting sliding (L1 < 0 < L2) and repelling sliding
+(L2 < 0 < L1). On sliding regions lambda takes the value between -1 and +1 that keeps the motion on
+the surface; alpha = (1 - lambda)/2 is the weight of F2, so F_s = (1 - alpha) F1 + alpha F2.
+
+Regions meet at folds, L1 = 0 or L2 = 0: visible where the tangent orbit stays on its own side
+(L11 > 0, respectively L22 < 0), invisible where it does not; where L11 = 0 too, a cusp. Two folds
+meet at a two-fold, h = L1 = L2 = 0, where the sliding field is 0/0 and solutions can lose
+uniqueness forward in time. Its normal form has two signs sigma and two numbers nu; they decide
+which orbits reach it.
+
+Along a smooth flow the Taylor coefficients of h are its Lie derivatives over k!, so one object, the
+jet, integrates, locates events, tells a fold from a cusp and gives the normal form.
+
+Conventions: one letter per surface names a mode, ``+`` ``-`` or ``s`` (sliding), and an itinerary
+is the sequence of modes. States are on the last axis, float64. Every run ends in a named status and
+never guesses where the future is not unique. Every error derives from NonsmoothError.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from .flow import (
+    Event,
+    Segment,
+    Status,
+    Trajectory,
+    first_crossing,
+    first_root,
+    follow,
+    simulate,
+)
+from .model import (
+    ConvergenceError,
+    DefinitionError,
+    DegenerateError,
+    FilippovSystem,
+    NonsmoothError,
+    NotSmoothError,
+    OptionError,
+    ParameterError,
+    PointError,
+    Reset,
+    Stop,
+)
+
+if TYPE_CHECKING:
+    from . import plot
+
+__version__ = "0.1.0.dev0"
+
+__all__ = [
+    "ConvergenceError",
+    "DefinitionError",
+    "DegenerateError",
+    "Event",
+    "FilippovSystem",
+    "NonsmoothError",
+    "NotSmoothError",
+    "OptionError",
+    "ParameterError",
+    "PointError",
+    "Reset",
+    "Segment",
+    "Status",
+    "Stop",
+    "Trajectory",
+    "first_crossing",
+    "first_root",
+    "follow",
+    "plot",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the pictures only when they are asked for (matplotlib is slow to import)."""
+    if name == "plot":
+        return importlib.import_module(".plot", __name__)
+    raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")

@@ -1,8 +1,18 @@
 """MOVING through time: first roots, the event-driven driver, trajectories."""
 
+from .follow import follow
 from .polynomial import first_crossing, first_root
 from .simulate import simulate
 from .status import Status
 from .trajectory import Event, Segment, Trajectory
 
-__all__ = ["Event", "Segment", "Status", "Trajectory", "first_crossing", "first_root", "simulate"]
+__all__ = [
+    "Event",
+    "Segment",
+    "Status",
+    "Trajectory",
+    "first_crossing",
+    "first_root",
+    "follow",
+    "simulate",
+]

@@ -7,11 +7,12 @@ The order follows from the tolerance and the step from the last two coefficients
 from __future__ import annotations
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
 
-from ..model import Array, Evaluator, FilippovSystem, Guard, motion
+from ..model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
 from .polynomial import first_crossing, first_root
 
 EPSILON = float(np.finfo(float).eps)
@@ -64,22 +65,32 @@ class Stepper:
         Parameter values.
     rtol, atol : float
         The local error of state i is kept below ``atol + rtol*abs(x_i)``.
+    motion_of : callable, optional
+        Where the motion of a mode comes from.
     """
 
-    def __init__(self, system: FilippovSystem, p: Array, rtol: float, atol: float):
+    def __init__(
+        self,
+        system: FilippovSystem,
+        p: Array,
+        rtol: float,
+        atol: float,
+        motion_of: Callable[[FilippovSystem, str], Motion] = motion,
+    ):
         self.system, self.p = system, p
+        self._motion_of = motion_of
         self.rtol, self.atol = rtol, atol
         self.order = order_for(_SAFETY * min(rtol, atol))
         self._jets: dict[str, tuple[Evaluator, Evaluator]] = {}
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Return the guards of a mode, in the order of the rows of its expansion."""
-        return motion(self.system, mode).guards
+        return self._motion_of(self.system, mode).guards
 
     def expand(self, mode: str, x: Array) -> Expansion:
         """Jets of a mode at x (extended state); a fresh copy."""
         if mode not in self._jets:
-            m = motion(self.system, mode)
+            m = self._motion_of(self.system, mode)
             self._jets[mode] = (
                 Evaluator(m.jet_function(self.order)),
                 Evaluator(m.gradient_function()),

@@ -11,7 +11,7 @@ from .errors import (
     PointError,
     explain,
 )
-from .motion import Evaluator, Guard, Motion, Resets, Surfaces, motion
+from .motion import Evaluator, Followed, Guard, Motion, Resets, Surfaces, motion
 from .system import Array, FilippovSystem, Parameters, Reset, Stop
 
 __all__ = [
@@ -21,6 +21,7 @@ __all__ = [
     "DegenerateError",
     "Evaluator",
     "FilippovSystem",
+    "Followed",
     "Guard",
     "Motion",
     "NonsmoothError",

@@ -6,7 +6,7 @@ A guard is a function that is positive inside the mode; the mode ends where it f
 - ``exit``: -L_{F+} h_i and L_{F-} h_i for the one that slides. They vanish where sliding stops
   being attracting; the ratio alpha is never used, because it is 0/0 at a two-fold.
 
-Stops and resets follow the guards, each multiplied by nothing: their direction is the driver's.
+Stops and resets follow the guards as they were given; their direction is the driver's business.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from .cancel import cancel_common_factor
 from .errors import DefinitionError
 from .jets import taylor
-from .system import Array, FilippovSystem
+from .system import Array, FilippovSystem, read_function
 
 
 @dataclass(frozen=True)
@@ -66,6 +66,7 @@ class Motion:
             )
         self.sliding = sliding[0] if sliding else None
         self.cancelled = False
+        self._key: tuple[object, ...] = ()
         self.field = self._sliding_field() if sliding else system.field(mode)
         self.guards, self.functions = self._guards()
 
@@ -124,7 +125,7 @@ class Motion:
                 self.field, self.functions, system.extended_states, system.parameter_symbols, order
             )
 
-        return system.function(("jet", self.mode, order), build)
+        return system.function(("jet", self.mode, order, *self._key), build)
 
     def gradient_function(self) -> ca.Function:
         """Return (x, p) -> gradients of the guard functions (m, N), the yardstick of rounding."""
@@ -133,7 +134,7 @@ class Motion:
         def build() -> Sequence[ca.SX]:
             return [ca.jacobian(self.functions, system.extended_states)]
 
-        return system.function(("gradient", self.mode), build)
+        return system.function(("gradient", self.mode, *self._key), build)
 
 
 class Evaluator:
@@ -169,6 +170,29 @@ class Evaluator:
         return self.outputs
 
 
+class Followed(Motion):
+    """A mode whose functions are only watched: its guards' and further ones, all of kind "zero".
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+    watched : sequence of SX scalars
+        Functions of states, parameters and time, named ``f0``, ``f1``, ...
+    """
+
+    def __init__(self, system: FilippovSystem, mode: str, watched: Sequence[ca.SX]):
+        super().__init__(system, mode)
+        own = [Guard("zero", k, 0, g.name) for k, g in enumerate(self.guards)]
+        more = [Guard("zero", len(own) + k, 0, f"f{k}") for k in range(len(watched))]
+        expressions = [read_function(system, w, f"watched function {k}") for k, w in enumerate(watched)]
+        self.guards = (*own, *more)
+        self.functions = ca.densify(ca.vertcat(self.functions, *expressions))
+        inputs = [system.extended_states, system.parameter_symbols]
+        content = ca.Function("watched", inputs, [ca.vertcat(*expressions)]).serialize()
+        self._key = ("followed", hash(content)) if expressions else ()
+
+
 class Surfaces:
     """Values and state gradients of all switching functions; projection onto them."""
 
@@ -188,14 +212,22 @@ class Surfaces:
         h, gradient = self.evaluator(x, p)
         return np.array(h).ravel(), np.array(gradient)
 
-    def project(self, x: Array, p: Array, which: Sequence[int], iterations: int = 3) -> Array:
-        """Move the states (not the time) onto h_i = 0 by least-norm Newton steps."""
+    def project(
+        self,
+        x: Array,
+        p: Array,
+        which: Sequence[int],
+        level: float = 0.0,
+        iterations: int = 3,
+    ) -> Array:
+        """Move the states (not the time) onto h_i = level by least-norm Newton steps."""
         n, chosen = self.system.dimension, list(which)
         for _ in range(iterations if chosen else 0):
             h, gradient = self.values(x, p)
-            if not np.any(h[chosen]):
+            miss = h[chosen] - level
+            if not np.any(miss):
                 break
-            step = np.linalg.lstsq(gradient[chosen, :n], h[chosen], rcond=None)[0]
+            step = np.linalg.lstsq(gradient[chosen, :n], miss, rcond=None)[0]
             x = x.copy()
             x[:n] -= step
         return x

@@ -372,6 +372,22 @@ class FilippovSystem:
             expression = ca.mtimes(gradient, self.field(mode))
         return ca.simplify(expression)
 
+    def gradient(self, expression: Expression) -> ca.SX:
+        """Derivatives of a scalar with respect to the states, then time if it depends on it.
+
+        Returns
+        -------
+        SX row (1, extended dimension)
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+        >>> ns.FilippovSystem([x, v], surface=v, above=[v, -x - 1], below=[v, 1 - x]).gradient(x * v)
+        SX([[v, x]])
+        """
+        return ca.densify(ca.jacobian(_expression(expression, "expression"), self.extended_states))
+
     # numeric -----------------------------------------------------------------------------------
 
     def function(self, key: Any, build: Callable[[], Sequence[ca.SX]]) -> ca.Function:
@@ -535,6 +551,20 @@ def _expression(value: Any, what: str) -> ca.SX:
     if result.shape != (1, 1):
         raise DefinitionError(f"{what}: expected a scalar, received shape {result.shape}.")
     return ca.densify(result)
+
+
+def read_function(system: FilippovSystem, value: Any, what: str) -> ca.SX:
+    """Check a scalar function of states, parameters and time that a user gave.
+
+    Raises
+    ------
+    DefinitionError, NotSmoothError
+    """
+    expression = _expression(value, what)
+    known = ca.vertcat(system.extended_states, system.parameter_symbols)
+    _no_foreign_symbols(expression, known, what, system)
+    require_smooth(expression, system.extended_states, system.parameter_symbols, what)
+    return expression
 
 
 def _column(values: Any, what: str, length: int) -> ca.SX:

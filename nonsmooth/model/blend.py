@@ -1,0 +1,126 @@
+"""The jet of all modes of one surface at once, for trajectories that move in step (lanes).
+
+Lanes of a vector may be in different modes. Instead of expanding every mode and choosing at the
+end, the expansion is shared: subexpressions common to the modes are expanded once, and at every
+order each state takes its next coefficient from the field of its lane's mode. Two symbols carry the
+mode: a mask that is true while sliding, and lambda = +1 or -1 (with a mask of its sign).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi as ca
+
+from .graph import instructions
+from .jets import Coefficient, _Expansion, _scale, _value
+from .motion import motion
+from .system import FilippovSystem
+
+#: A field made of these is as safe to evaluate at lambda = +-1 as at a fixed sign.
+_ENTIRE = {"const", "input", "add", "sub", "mul", "neg", "sq", "twice", "sin", "cos", "not"}
+
+
+@dataclass(frozen=True)
+class Blend:
+    """Symbols and jets.
+
+    Attributes
+    ----------
+    extra : SX (3,)
+        Masks "slides" and "above", and lambda.
+    states : SX (N, P+1)
+    guards : SX (m, P+1)
+        The surface's guard (sliding: the exit to +), the exit to - (only while sliding), stops.
+    affine : list of bool
+        Guards whose gradient is constant in the states.
+    """
+
+    extra: ca.SX
+    states: ca.SX
+    guards: ca.SX
+    affine: list[bool]
+
+
+def blended_jet(system: FilippovSystem, order: int) -> Blend:
+    """Expand the modes ``+``, ``-`` and ``s`` of a system with one surface together.
+
+    A system without surfaces has one mode; its masks are not used.
+    """
+    slides, above, lam = (ca.SX.sym(n) for n in ("slides_", "above_", "lambda_"))
+    extra = ca.vertcat(slides, above, lam)
+    stops = ca.densify(system._guards) if system._guards.numel() else ca.SX(0, 1)
+    if system.surface_count:
+        sides, shared = _side_fields(system, lam)
+        sliding = motion(system, "s")
+        h = system.surface_function(0)
+        plus, minus = system.lie_derivative("+"), system.lie_derivative("-")
+        fields = [*sides, sliding.field]
+        functions = ca.vertcat(lam * h, -plus, minus, stops)
+    else:
+        fields, shared, functions = [system.field("")], True, stops
+    others = ca.vertcat(system.parameter_symbols, extra)
+    expansion = _Expansion(system.extended_states, others, [ca.vertcat(*fields), functions])
+    n = int(system.extended_states.numel())
+    jet: list[list[Coefficient]] = [[system.extended_states[i]] for i in range(n)]
+    values: list[list[Coefficient]] = []
+    for k in range(order + 1):
+        flat, outputs = expansion.advance(k, [c[k] for c in jet])
+        rows = [flat[i : i + n] for i in range(0, len(flat), n)]
+        values.append(_choose_guards(system, outputs, slides))
+        if k < order:
+            for i in range(n):
+                jet[i].append(_scale(_choose([r[i] for r in rows], slides, above), 1.0 / (k + 1)))
+    states = ca.vertcat(*[ca.horzcat(*[_value(c) for c in row]) for row in jet])
+    columns = [ca.vertcat(*[_value(c) for c in column]) for column in values]
+    guards = ca.horzcat(*columns) if columns[0].numel() else ca.SX(0, order + 1)
+    return Blend(extra, states, guards, _affine(system))
+
+
+def _side_fields(system: FilippovSystem, lam: ca.SX) -> tuple[list[ca.SX], bool]:
+    """One field in lambda if that is cheaper than two, and safe; else those of both sides."""
+    inputs = [system.extended_states, ca.vertcat(system.parameter_symbols, lam)]
+    pair = [system.field("+"), system.field("-")]
+    one = system.field_with(lam)
+    nodes, _ = instructions(inputs, [one])
+    separate, _ = instructions(inputs, pair)
+    if len(nodes) < len(separate) and {node.op for node in nodes} <= _ENTIRE:
+        return [one], True
+    return pair, False
+
+
+def _choose(rows: list[Coefficient], slides: ca.SX, above: ca.SX) -> Coefficient:
+    """Coefficient of the lane's mode: rows are [sides, sliding], [+, -, sliding] or [only]."""
+    if len(rows) == 1:
+        return rows[0]
+    side = rows[0] if len(rows) == 2 else _select(above, rows[0], rows[1])
+    return _select(slides, rows[-1], side)
+
+
+def _select(mask: ca.SX, a: Coefficient, b: Coefficient) -> Coefficient:
+    if (a is None and b is None) or (
+        a is not None and b is not None and ca.is_equal(a, b, 1)
+    ):
+        return a
+    return ca.if_else(mask, _value(a), _value(b))
+
+
+def _choose_guards(
+    system: FilippovSystem, outputs: list[Coefficient], slides: ca.SX
+) -> list[Coefficient]:
+    if not system.surface_count:
+        return outputs
+    surface, plus, minus, *stops = outputs
+    return [_select(slides, plus, surface), minus, *stops]
+
+
+def _affine(system: FilippovSystem) -> list[bool]:
+    x = system.extended_states
+    stops = ca.densify(system._guards) if system._guards.numel() else ca.SX(0, 1)
+    flags = [bool(ca.is_linear(stops[k], x)) for k in range(stops.numel())]
+    if not system.surface_count:
+        return flags
+    h = system.surface_function(0)
+    plus, minus = system.lie_derivative("+"), system.lie_derivative("-")
+    first = bool(ca.is_linear(h, x)) and bool(ca.is_linear(plus, x))
+    return [first, bool(ca.is_linear(minus, x)), *flags]

@@ -1,0 +1,249 @@
+"""Expressions printed as C: one statement per instruction, value-numbered over a whole program.
+
+A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces,
+maps) in one graph, so that equal subexpressions are found once. What depends on parameters alone is
+moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
+is printed on a type ``T`` that is ``double`` or a vector of doubles. Which driver includes the
+text, and how it is compiled, is not known here.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from .graph import Node, instructions
+
+#: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
+_ARITHMETIC = {
+    "assign": "{0}",
+    "add": "{0} + {1}",
+    "sub": "{0} - {1}",
+    "mul": "{0} * {1}",
+    "div": "{0} / {1}",
+    "neg": "-{0}",
+    "sq": "{0} * {0}",
+    "twice": "{0} + {0}",
+    "inv": "1.0 / {0}",
+}
+
+#: Functions of the C library, applied lane by lane; the rest of the smooth operations.
+_LIBRARY = {
+    name: name
+    for name in "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh "
+    "atan2 pow erf hypot expm1 log1p".split()
+} | {"constpow": "pow", "erfinv": "ns_erfinv"}
+
+#: What only parameters may go through; always on doubles.
+_PARAMETERS_ONLY = {
+    "sign": "ns_sign({0})",
+    "fabs": "fabs({0})",
+    "fmin": "fmin({0}, {1})",
+    "fmax": "fmax({0}, {1})",
+    "floor": "floor({0})",
+    "ceil": "ceil({0})",
+    "fmod": "fmod({0}, {1})",
+    "remainder": "remainder({0}, {1})",
+    "copysign": "copysign({0}, {1})",
+    "lt": "(double)({0} < {1})",
+    "le": "(double)({0} <= {1})",
+    "eq": "(double)({0} == {1})",
+    "ne": "(double)({0} != {1})",
+    "not": "(double)(!{0})",
+    "and": "(double)({0} && {1})",
+    "or": "(double)({0} || {1})",
+    "if_else_zero": "({0} ? {1} : 0.0)",
+}
+
+
+@dataclass(frozen=True)
+class _Function:
+    name: str
+    arrays: tuple[str, ...]
+    first: int  # of its outputs among all outputs of the program
+
+
+class Program:
+    """C functions ``void name(const T *x, const T *q, [extra,] T *a, ...)`` of one system.
+
+    Parameters
+    ----------
+    states, parameters : SX
+        Symbol vectors: ``x`` and what ``q`` is prepared from.
+    extra : SX, optional
+        Further symbols that differ between lanes and steps: multipliers and masks.
+    extra_types : sequence of str, optional
+        ``"T"`` or ``"I"`` (a mask of all or no bits) for each.
+    """
+
+    def __init__(
+        self,
+        states: ca.SX,
+        parameters: ca.SX,
+        extra: ca.SX | None = None,
+        extra_types: Sequence[str] = (),
+    ):
+        self._inputs = [states, parameters, ca.SX(0, 1) if extra is None else extra]
+        self._types = tuple(extra_types)
+        self._functions: list[_Function] = []
+        self._outputs: list[ca.SX] = []
+
+    def add(self, name: str, **outputs: ca.SX) -> None:
+        """Add a function that stores each output, row by row, in the array of its name."""
+        self._functions.append(_Function(name, tuple(outputs), len(self._outputs)))
+        self._outputs += [ca.densify(ca.SX(e)).T for e in outputs.values()]
+
+    def text(self) -> str:
+        """Return the C text: ``NQ``, ``prepare`` and all functions."""
+        nodes, rows = instructions(self._inputs, self._outputs)
+        graph = _Graph(nodes, rows, self._types)
+        parts = [graph.prepare()]
+        for function in self._functions:
+            outputs = rows[function.first : function.first + len(function.arrays)]
+            parts.append(graph.function(function, outputs))
+        return "\n".join(parts)
+
+
+class _Graph:
+    """A value-numbered program: which nodes are constants, prepared, or computed each time."""
+
+    def __init__(
+        self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]
+    ):
+        self.nodes, self.types = nodes, types
+        self.moving, self.constant = [], []
+        for node in nodes:
+            if node.op == "input":
+                self.moving.append(node.payload[0] != 1)  # type: ignore[index]
+                self.constant.append(False)
+            else:
+                self.moving.append(any(self.moving[a] for a in node.args))
+                self.constant.append(node.op == "const")
+        used = {a for j, n in enumerate(nodes) if self.moving[j] for a in n.args}
+        used |= {j for row in rows for j in row}
+        frontier = sorted(j for j in used if not self.moving[j] and not self.constant[j])
+        self.prepared = {j: k for k, j in enumerate(frontier)}
+
+    def name(self, j: int) -> str:
+        node = self.nodes[j]
+        if node.op == "const":
+            return _literal(node.payload)  # type: ignore[arg-type]
+        if j in self.prepared:
+            return f"q[{self.prepared[j]}]"
+        if node.op == "input":
+            vector, position = node.payload  # type: ignore[misc]
+            return f"x[{position}]" if vector == 0 else f"e{position}"
+        return f"v{j}"
+
+    def prepare(self) -> str:
+        """C of the function from parameters to q."""
+        lines = []
+        for j in self._reachable(list(self.prepared), moving=False):
+            node = self.nodes[j]
+            if node.op == "const":
+                continue
+            if node.op == "input":
+                value = f"p[{node.payload[1]}]"  # type: ignore[index]
+            else:
+                args = [
+                    _literal(self.nodes[a].payload) if self.constant[a] else f"v{a}"  # type: ignore[arg-type]
+                    for a in node.args
+                ]
+                value = _scalar(node.op, args)
+            lines.append(f"  const double v{j} = {value};")
+        lines += [f"  q[{k}] = v{j};" for j, k in self.prepared.items()]
+        return (
+            f"#define NQ {max(1, len(self.prepared))}\n"
+            "static void prepare(const double *p, double *q) {\n  (void)p; (void)q;\n"
+            + "\n".join(lines)
+            + "\n}\n"
+        )
+
+    def function(self, function: _Function, outputs: Sequence[Sequence[int]]) -> str:
+        """C of one function."""
+        stores: dict[int, list[str]] = {}
+        for array, row in zip(function.arrays, outputs, strict=True):
+            for k, j in enumerate(row):
+                stores.setdefault(j, []).append(f"{array}[{k}]")
+        lines = []
+        for j in self._reachable(list(stores), moving=True):
+            if self.nodes[j].op != "input" and self._is_value(j):
+                lines.append(f"  const T {self.name(j)} = {self._value(j)};")
+            lines += [f"  {target} = {self.name(j)};" for target in stores.pop(j, [])]
+        for j, targets in stores.items():
+            value = f"BC({self.name(j)})" if self.constant[j] else self.name(j)
+            lines += [f"  {target} = {value};" for target in targets]
+        extra = "".join(f", const {t} e{k}" for k, t in enumerate(self.types))
+        arrays = "".join(f", T *restrict {a}" for a in function.arrays)
+        return (
+            f"FUNCTION {function.name}(const T *restrict x, const T *restrict q{extra}{arrays}) {{\n"
+            "  (void)x; (void)q;\n" + "\n".join(lines) + "\n}\n"
+        )
+
+    def _reachable(self, roots: list[int], moving: bool) -> list[int]:
+        found: set[int] = set()
+        pending = [j for j in roots if self.moving[j] == moving]
+        while pending:
+            j = pending.pop()
+            if j not in found:
+                found.add(j)
+                pending += [a for a in self.nodes[j].args if self.moving[a] == moving]
+        return sorted(found)
+
+    def _is_value(self, j: int) -> bool:
+        """Whether a node has a variable of type T (masks have none)."""
+        node = self.nodes[j]
+        return node.op != "not"
+
+    def _mask(self, j: int) -> tuple[str, bool]:
+        node = self.nodes[j]
+        if node.op == "not":
+            name, negated = self._mask(node.args[0])
+            return name, not negated
+        return self.name(j), False
+
+    def _value(self, j: int) -> str:
+        node = self.nodes[j]
+        if node.op == "if_else_zero":
+            mask, negated = self._mask(node.args[0])
+            chosen = self._broadcast(node.args[1])
+            pair = ("BC(0.0)", chosen) if negated else (chosen, "BC(0.0)")
+            return f"SELECT({mask}, {pair[0]}, {pair[1]})"
+        if node.op == "add" and (choice := self._choice(node)) is not None:
+            return choice
+        args = [self.name(a) for a in node.args]
+        if node.op in _ARITHMETIC:
+            return _ARITHMETIC[node.op].format(*args)
+        call = _LIBRARY[node.op].upper().replace("NS_", "") + "_"
+        return f"{call}({', '.join(self._broadcast(a) for a in node.args)})"
+
+    def _choice(self, node: Node) -> str | None:
+        """``if_else`` is written by CasADi as a sum of two halves of which one is zero."""
+        halves = [self.nodes[a] for a in node.args]
+        if any(half.op != "if_else_zero" for half in halves):
+            return None
+        (one, first), (two, second) = (self._mask(half.args[0]) for half in halves)
+        if one != two or first == second:
+            return None
+        values = [self._broadcast(half.args[1]) for half in halves]
+        if first:
+            values.reverse()
+        return f"SELECT({one}, {values[0]}, {values[1]})"
+
+    def _broadcast(self, j: int) -> str:
+        return f"BC({self.name(j)})" if self.constant[j] else self.name(j)
+
+
+def _literal(value: float) -> str:
+    text = repr(float(value))
+    return f"({text})" if text.startswith("-") else text
+
+
+def _scalar(op: str, args: Sequence[str]) -> str:
+    if op in _ARITHMETIC:
+        return _ARITHMETIC[op].format(*args)
+    if op in _LIBRARY:
+        return f"{_LIBRARY[op]}({', '.join(args)})"
+    return _PARAMETERS_ONLY[op].format(*args)

@@ -1,0 +1,58 @@
+# The verbs of the project, the same for people and for CI. Each sets up .venv by itself when needed.
+#
+#   make reproduce PYTHON=python3.12     another Python (3.11 or later) for the environment
+#   make test PYTEST_ARGS="-k two_fold"  anything pytest takes
+
+PYTHON ?= python3
+PYTEST_ARGS ?=
+
+BIN := .venv/bin
+PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq
+PYTEST := $(BIN)/python -m pytest --quiet -n 2 --dist loadfile
+
+.DEFAULT_GOAL := help
+.DELETE_ON_ERROR:
+.PHONY: help reproduce test check bench docs lint clean
+
+help: ## list the verbs
+	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
+
+reproduce: .venv/.test ## every number and figure of the papers, into build/
+	@$(BIN)/python -m papers.biber_2022
+
+test: .venv/.test ## the tests, without the slow ones
+	@$(PYTEST) -m "not slow" $(PYTEST_ARGS)
+
+check: lint ## everything that must hold before a release: lint, then all tests
+	@$(PYTEST) $(PYTEST_ARGS)
+
+bench: .venv/.bench ## measured speeds, beside the peers
+	@$(BIN)/python -m benchmarks
+
+docs: .venv/.docs ## the documentation, into build/docs/
+	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs --quiet build --strict
+	@echo "docs: build/docs/index.html"
+
+lint: .venv/.dev ## formatting, lint, types and the floors
+	@$(BIN)/ruff format --quiet --check . || { echo "format: run '$(BIN)/ruff format .'"; exit 1; }
+	@$(BIN)/ruff check --quiet .
+	@$(BIN)/mypy
+	@$(BIN)/lint-imports --no-logo
+
+clean: ## remove what was made, except .venv
+	@rm -rf build dist *.egg-info .pytest_cache .hypothesis .mypy_cache .ruff_cache .import_linter_cache
+	@find . -name .venv -prune -o -name __pycache__ -type d -prune -exec rm -rf {} +
+
+# One environment; a stamp in it for each set of extras that has been installed.
+.venv/.python:
+	@$(PYTHON) -c 'import sys; sys.exit(sys.version_info < (3, 11))' || { \
+	  echo "Python 3.11 or later is needed, and '$(PYTHON)' is $$($(PYTHON) --version 2>&1 || true)."; \
+	  echo "Name another: make <verb> PYTHON=python3.12"; exit 1; }
+	@echo "Setting up .venv (once; about a minute) ..."
+	@$(PYTHON) -m venv .venv
+	@touch $@
+
+.venv/.%: .venv/.python pyproject.toml constraints.txt
+	@echo "Installing nonsmooth-dynamics[$*] into .venv ..."
+	@$(PIP) -e '.[$*]' -c constraints.txt
+	@touch $@

@@ -1,0 +1,15 @@
+"""What every test runs under: no display, and property tests that repeat.
+
+The default hypothesis profile draws the same examples every time, so a clone passes or fails like
+any other; `HYPOTHESIS_PROFILE=explore` draws new ones, and many more, to look for a counterexample.
+"""
+
+import os
+
+from hypothesis import settings
+
+os.environ["MPLBACKEND"] = "Agg"
+
+settings.register_profile("ci", derandomize=True, deadline=None)
+settings.register_profile("explore", deadline=None, max_examples=2000, print_blob=True)
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))

@@ -51,14 +51,14 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
     extra = ca.vertcat(slides, above, lam)
     stops = ca.densify(system._guards) if system._guards.numel() else ca.SX(0, 1)
     if system.surface_count:
-        sides, shared = _side_fields(system, lam)
+        sides = _side_fields(system, lam)
         sliding = motion(system, "s")
         h = system.surface_function(0)
         plus, minus = system.lie_derivative("+"), system.lie_derivative("-")
         fields = [*sides, sliding.field]
         functions = ca.vertcat(lam * h, -plus, minus, stops)
     else:
-        fields, shared, functions = [system.field("")], True, stops
+        fields, functions = [system.field("")], stops
     others = ca.vertcat(system.parameter_symbols, extra)
     expansion = _Expansion(system.extended_states, others, [ca.vertcat(*fields), functions])
     n = int(system.extended_states.numel())
@@ -77,16 +77,21 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
     return Blend(extra, states, guards, _affine(system))
 
 
-def _side_fields(system: FilippovSystem, lam: ca.SX) -> tuple[list[ca.SX], bool]:
+def _side_fields(system: FilippovSystem, lam: ca.SX) -> list[ca.SX]:
     """One field in lambda if that is cheaper than two, and safe; else those of both sides."""
     inputs = [system.extended_states, ca.vertcat(system.parameter_symbols, lam)]
     pair = [system.field("+"), system.field("-")]
     one = system.field_with(lam)
     nodes, _ = instructions(inputs, [one])
     separate, _ = instructions(inputs, pair)
-    if len(nodes) < len(separate) and {node.op for node in nodes} <= _ENTIRE:
-        return [one], True
-    return pair, False
+    if len(nodes) < len(separate) + _different(*pair) and {node.op for node in nodes} <= _ENTIRE:
+        return [one]
+    return pair
+
+
+def _different(a: ca.SX, b: ca.SX) -> int:
+    """Rows that would need a choice at every order."""
+    return sum(not ca.is_equal(u, v, 5) for u, v in zip(ca.vertsplit(a), ca.vertsplit(b)))
 
 
 def _choose(rows: list[Coefficient], slides: ca.SX, above: ca.SX) -> Coefficient:
@@ -98,9 +103,7 @@ def _choose(rows: list[Coefficient], slides: ca.SX, above: ca.SX) -> Coefficient
 
 
 def _select(mask: ca.SX, a: Coefficient, b: Coefficient) -> Coefficient:
-    if (a is None and b is None) or (
-        a is not None and b is not None and ca.is_equal(a, b, 1)
-    ):
+    if (a is None and b is None) or (a is not None and b is not None and ca.is_equal(a, b, 1)):
         return a
     return ca.if_else(mask, _value(a), _value(b))
 

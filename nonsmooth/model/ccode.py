@@ -109,9 +109,7 @@ class Program:
 class _Graph:
     """A value-numbered program: which nodes are constants, prepared, or computed each time."""
 
-    def __init__(
-        self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]
-    ):
+    def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]):
         self.nodes, self.types = nodes, types
         self.moving, self.constant = [], []
         for node in nodes:
@@ -121,10 +119,31 @@ class _Graph:
             else:
                 self.moving.append(any(self.moving[a] for a in node.args))
                 self.constant.append(node.op == "const")
-        used = {a for j, n in enumerate(nodes) if self.moving[j] for a in n.args}
-        used |= {j for row in rows for j in row}
+        self._find_divisors()
+        used = {j for row in rows for j in row}
+        for j, node in enumerate(nodes):
+            if self.moving[j]:
+                divisor = node.op == "div" and node.args[1] in self.divisors
+                used.update(node.args[:1] if divisor else node.args)
         frontier = sorted(j for j in used if not self.moving[j] and not self.constant[j])
         self.prepared = {j: k for k, j in enumerate(frontier)}
+        inverted = sorted(j for j in self.divisors if not self.moving[j] and not self.constant[j])
+        self.inverted = {j: len(frontier) + k for k, j in enumerate(inverted)}
+
+    def _find_divisors(self) -> None:
+        """Nodes whose reciprocal is taken once: a division costs as much as twenty products."""
+        count: dict[int, int] = {}
+        for j, node in enumerate(self.nodes):
+            if self.moving[j] and node.op == "div":
+                count[node.args[1]] = count.get(node.args[1], 0) + 1
+        self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
+
+    def _reciprocal(self, j: int) -> str:
+        if self.constant[j] and self.nodes[j].payload:
+            return _literal(1.0 / self.nodes[j].payload)  # type: ignore[operator]
+        if self.constant[j]:
+            return "(1.0 / 0.0)"
+        return f"q[{self.inverted[j]}]" if j in self.inverted else f"r{j}"
 
     def name(self, j: int) -> str:
         node = self.nodes[j]
@@ -140,7 +159,7 @@ class _Graph:
     def prepare(self) -> str:
         """C of the function from parameters to q."""
         lines = []
-        for j in self._reachable(list(self.prepared), moving=False):
+        for j in self._reachable([*self.prepared, *self.inverted], moving=False):
             node = self.nodes[j]
             if node.op == "const":
                 continue
@@ -154,8 +173,9 @@ class _Graph:
                 value = _scalar(node.op, args)
             lines.append(f"  const double v{j} = {value};")
         lines += [f"  q[{k}] = v{j};" for j, k in self.prepared.items()]
+        lines += [f"  q[{k}] = 1.0 / v{j};" for j, k in self.inverted.items()]
         return (
-            f"#define NQ {max(1, len(self.prepared))}\n"
+            f"#define NQ {max(1, len(self.prepared) + len(self.inverted))}\n"
             "static void prepare(const double *p, double *q) {\n  (void)p; (void)q;\n"
             + "\n".join(lines)
             + "\n}\n"
@@ -168,9 +188,15 @@ class _Graph:
             for k, j in enumerate(row):
                 stores.setdefault(j, []).append(f"{array}[{k}]")
         lines = []
-        for j in self._reachable(list(stores), moving=True):
-            if self.nodes[j].op != "input" and self._is_value(j):
+        reachable = self._reachable(list(stores), moving=True)
+        divisors = self.divisors & {
+            self.nodes[j].args[1] for j in reachable if self.nodes[j].op == "div"
+        }
+        for j in reachable:
+            if self.nodes[j].op not in ("input", "not"):
                 lines.append(f"  const T {self.name(j)} = {self._value(j)};")
+            if j in divisors:
+                lines.append(f"  const T r{j} = 1.0 / {self.name(j)};")
             lines += [f"  {target} = {self.name(j)};" for target in stores.pop(j, [])]
         for j, targets in stores.items():
             value = f"BC({self.name(j)})" if self.constant[j] else self.name(j)
@@ -189,13 +215,15 @@ class _Graph:
             j = pending.pop()
             if j not in found:
                 found.add(j)
-                pending += [a for a in self.nodes[j].args if self.moving[a] == moving]
+                pending += [a for a in self._arguments(j) if self.moving[a] == moving]
         return sorted(found)
 
-    def _is_value(self, j: int) -> bool:
-        """Whether a node has a variable of type T (masks have none)."""
+    def _arguments(self, j: int) -> list[int]:
+        """Arguments of the statement that a node is printed as: a choice skips its halves."""
         node = self.nodes[j]
-        return node.op != "not"
+        if node.op == "add" and self.moving[j] and self._choice(node) is not None:
+            return [a for half in node.args for a in self.nodes[half].args]
+        return list(node.args)
 
     def _mask(self, j: int) -> tuple[str, bool]:
         node = self.nodes[j]
@@ -213,6 +241,8 @@ class _Graph:
             return f"SELECT({mask}, {pair[0]}, {pair[1]})"
         if node.op == "add" and (choice := self._choice(node)) is not None:
             return choice
+        if node.op == "div" and node.args[1] in self.divisors:
+            return f"{self.name(node.args[0])} * {self._reciprocal(node.args[1])}"
         args = [self.name(a) for a in node.args]
         if node.op in _ARITHMETIC:
             return _ARITHMETIC[node.op].format(*args)

@@ -1,0 +1,163 @@
+/* What both drivers share: limits, operations on double, first root of a polynomial.
+ *
+ * The generated text defines before this file: N states with time, ND without, P order, M surfaces,
+ * NG guards of a mode at most, TIMED whether time is a state.
+ */
+#include <math.h>
+#include <stdint.h>
+#include <stdlib.h>
+#include <string.h>
+
+#define EPS 2.220446049250313e-16
+#define M1 (M > 0 ? M : 1)
+#define NG1 (NG > 0 ? NG : 1)
+#define DEPTH 52
+
+enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SMALL, NOT_FINITE,
+       TOO_MANY_EVENTS, TOO_MANY_STEPS };
+/* Not final: the run continues elsewhere, after the arrays were emptied, or is not begun. */
+enum { RUNNING = -1, FULL = -2, HAND_OVER = -3 };
+enum { CROSSING, ENTRY, EXIT, STOP, RESET, END, KINDS };
+
+static inline double ns_sign(double a) { return (a > 0) - (a < 0); }
+
+/* Inverse error function: Giles 2010, then two Newton steps. */
+static double ns_erfinv(double y) {
+  double w = -log((1 - y) * (1 + y)), x;
+  if (w < 5) {
+    w -= 2.5;
+    x = y * (1.50140941 + w * (0.246640727 + w * (-0.00417768164 + w * (-0.00125372503
+        + w * (0.00021858087 + w * (-4.39150654e-06 + w * (-3.5233877e-06 + w * (3.43273939e-07
+        + w * 2.81022636e-08))))))));
+  } else {
+    w = sqrt(w) - 3;
+    x = y * (2.83297682 + w * (1.00167406 + w * (0.00943887047 + w * (-0.0076224613
+        + w * (0.00573950773 + w * (-0.00367342844 + w * (0.00134934322 + w * (0.000100950558
+        + w * -0.000200214257))))))));
+  }
+  for (int k = 0; k < 2; k++) x -= (erf(x) - y) / (1.1283791670955126 * exp(-x * x));
+  return x;
+}
+
+/* First root ------------------------------------------------------------------------------- */
+
+/* Root in (lo, hi], positive at lo; |step| is tested before the bracket, because at a root near an
+ * end the iterate may leave it by rounding. */
+static double newton(const double *c, int n, double lo, double hi, double x) {
+  for (int it = 0; it < 100; it++) {
+    double f = c[n], d = 0;
+    for (int k = n - 1; k >= 0; k--) { d = d * x + f; f = f * x + c[k]; }
+    if (f > 0) lo = x; else hi = x;
+    double step = d != 0 ? f / d : INFINITY, next = x - step;
+    if (fabs(step) <= 4e-16 * fmax(fabs(x), hi)) return next < lo ? lo : next > hi ? hi : next;
+    if (!(next > lo && next < hi)) {
+      next = 0.5 * (lo + hi);
+      if (!(next > lo && next < hi)) return hi;
+    }
+    x = next;
+  }
+  return hi;
+}
+
+/* Power coefficients of degree n on [0, 1] to Bernstein coefficients, in place. */
+static void bernstein(double *b, int n) {
+  double binomial = 1;
+  for (int i = 0; i <= n; i++) { b[i] /= binomial; binomial = binomial * (n - i) / (i + 1); }
+  for (int level = 1; level <= n; level++)
+    for (int i = n; i >= level; i--) b[i] += b[i - 1];
+}
+
+/* First root on (lo, hi] given Bernstein coefficients there; -1 if none. */
+static double first_in(const double *c, int n, double *b, double lo, double hi, int depth) {
+  if (b[0] <= 0) return lo;
+  int changes = 0, first = -1;
+  for (int j = 0; j < n; j++) {
+    if ((b[j] > 0) != (b[j + 1] > 0)) { if (first < 0) first = j; changes++; }
+  }
+  if (changes == 0) return -1;
+  if (changes == 1) {
+    double s = (first + b[first] / (b[first] - b[first + 1])) / n;
+    return newton(c, n, lo, hi, lo + (hi - lo) * s);
+  }
+  if (depth == DEPTH) return b[n] <= 0 ? hi : -1;
+  double left[P + 1], mid = 0.5 * (lo + hi);
+  left[0] = b[0];
+  for (int level = n; level > 0; level--) {
+    for (int i = 0; i < level; i++) b[i] = 0.5 * (b[i] + b[i + 1]);
+    left[n - level + 1] = b[0];
+  }
+  double x = first_in(c, n, left, lo, mid, depth + 1);
+  return x >= 0 ? x : first_in(c, n, b, mid, hi, depth + 1);
+}
+
+/* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
+ * it stays positive. */
+static double first_root(const double *c, int n, double h) {
+  if (c[0] <= 0) return 0;
+  double a[P + 1], power = 1, rest = 0;
+  a[0] = c[0];
+  for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; rest += fabs(a[k]); }
+  if (c[0] > rest) return -1;
+  bernstein(a, n);
+  return first_in(c, n, a, 0, h, 0);
+}
+
+/* First t in (0, h] at which a polynomial passes zero falling (-1), rising (1) or either way (0).
+ * Leading zeros are a start on the zero and are skipped. */
+static double first_crossing(const double *given, int n, double h, int direction) {
+  double c[P + 1], s = direction > 0 ? -1 : 1;
+  while (n >= 0 && *given == 0) { given++; n--; }
+  if (n < 0) return -1;
+  for (int k = 0; k <= n; k++) c[k] = s * given[k];
+  if (c[0] > 0) return first_root(c, n, h);
+  for (int k = 0; k <= n; k++) c[k] = -c[k];
+  double rise = first_root(c, n, h);
+  if (rise < 0 || direction == 0) return rise;
+  if (n == 0 || rise >= h) return -1;
+  for (int i = 0; i < n; i++)
+    for (int k = n - 1; k >= i; k--) c[k] += rise * c[k + 1];
+  for (int k = 0; k <= n; k++) c[k] = -c[k];
+  double fall = first_root(c + 1, n - 1, h - rise);
+  return fall < 0 ? -1 : rise + fall;
+}
+
+static inline int finite_all(const double *a, int n) {
+  double s = 0;
+  for (int i = 0; i < n; i++) s += a[i] - a[i];
+  return s == 0;
+}
+
+/* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. */
+typedef struct { int32_t parent, child, sibling, mode; } Node;
+typedef struct { Node *node; int32_t size, room; } Tree;
+
+static int32_t tree_child(Tree *tree, int32_t parent, int mode) {
+  int32_t at = tree->node[parent].child;
+  while (at && tree->node[at].mode != mode) at = tree->node[at].sibling;
+  if (at) return at;
+  if (tree->size == tree->room) {
+    tree->room *= 2;
+    Node *more = realloc(tree->node, tree->room * sizeof(Node));
+    if (!more) { tree->room /= 2; return parent; }
+    tree->node = more;
+  }
+  at = tree->size++;
+  tree->node[at] = (Node){parent, 0, tree->node[parent].child, mode};
+  tree->node[parent].child = at;
+  return at;
+}
+
+Tree *tree_new(void) {
+  Tree *tree = malloc(sizeof(Tree));
+  *tree = (Tree){malloc(64 * sizeof(Node)), 1, 64};
+  tree->node[0] = (Node){-1, 0, 0, -1};
+  return tree;
+}
+int32_t tree_size(const Tree *tree) { return tree->size; }
+void tree_read(const Tree *tree, int32_t *parent, int32_t *mode) {
+  for (int32_t k = 0; k < tree->size; k++) {
+    parent[k] = tree->node[k].parent;
+    mode[k] = tree->node[k].mode;
+  }
+}
+void tree_free(Tree *tree) { free(tree->node); free(tree); }

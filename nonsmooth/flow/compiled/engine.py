@@ -1,0 +1,422 @@
+"""The compiled engine from Python: one system, one order, its libraries loaded with ctypes."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, FilippovSystem
+from ..options import Options
+from ..status import Status
+from ..stepper import order_for
+from .build import build
+from .codegen import lanes_source, scalar_source, supports_lanes, supports_scalar
+
+#: Event kinds by number, as in the C enumeration.
+KINDS = ("crossing", "entry", "exit", "stop", "reset", "end")
+
+#: Status of a trajectory that another engine must run.
+HAND_OVER = -3
+_FULL = -2
+
+_D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
+_POINTER = ctypes.c_void_p
+
+
+class _COptions(ctypes.Structure):
+    _fields_ = [
+        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step")],
+        *[(name, _I64) for name in ("max_steps", "max_events")],
+        *[(name, _I32) for name in ("start_mode", "at_kind")],
+        ("at_count", _I64),
+        *[(name, _I32) for name in ("dense", "pad")],
+    ]
+
+
+_OUTPUT_ARRAYS = {
+    "start": (float, "step"),
+    "coefficients": (float, "step"),
+    "point_t": (float, "point"),
+    "point_x": (float, "point"),
+    "event_t": (float, "event"),
+    "event_x": (float, "event"),
+    "step_mode": (np.int32, "step"),
+    "event_kind": (np.int32, "event"),
+    "event_before": (np.int32, "event"),
+    "event_after": (np.int32, "event"),
+    "event_guard": (np.int32, "event"),
+}
+
+
+class _COutput(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I64) for name in ("steps", "points", "events")],
+        *[(name, _I64) for name in ("step_room", "point_room", "event_room")],
+        *[(name, _POINTER) for name in _OUTPUT_ARRAYS],
+    ]
+
+
+@dataclass
+class Run:
+    """One dense run as arrays.
+
+    Attributes
+    ----------
+    status : int
+        A Status, or HAND_OVER: the reference driver must repeat the run.
+    reason, where : int
+        Why, for the message (see ``REASONS``): a surface, a stop, or a set of modes as bits.
+    t, x : ndarray (m,), (m, n)
+        Points: start, steps and events; a reset appears twice.
+    starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
+        Steps: start times, Taylor coefficients, mode numbers (positions in ``system.modes``).
+    event_kinds, event_t, event_x, event_before, event_after, event_guards : ndarray (e,) or (e, n)
+        Events: kind (position in ``KINDS``), modes before and after, row of the guard in
+        ``motion(system, mode_before).guards``. The final "end" is not among them.
+    limit : float
+        Accumulation time or NaN.
+    itinerary : str
+    """
+
+    status: int
+    reason: int
+    where: int
+    mode: int
+    limit: float
+    itinerary: str
+    t: Array
+    x: Array
+    starts: Array
+    coefficients: Array
+    modes: NDArray[np.int32]
+    event_kinds: NDArray[np.int32]
+    event_t: Array
+    event_x: Array
+    event_before: NDArray[np.int32]
+    event_after: NDArray[np.int32]
+    event_guards: NDArray[np.int32]
+
+
+#: Names of the C reasons.
+REASONS = (
+    "",
+    "two_fold",
+    "slid_to_two_fold",
+    "ambiguous",
+    "no_mode",
+    "degenerate",
+    "wrong_start",
+    "field",
+    "surface",
+    "reset_map",
+)
+
+
+@dataclass
+class Chunk:
+    """Results of some trajectories; itineraries as numbers into ``words``."""
+
+    x: Array
+    t: Array
+    status: NDArray[np.int32]
+    itinerary: NDArray[np.int32]
+    words: list[str]
+    kinds: NDArray[np.int32]
+    at_x: Array | None
+    at_t: Array | None
+    totals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(4, np.int64))
+
+
+class Engine:
+    """The compiled libraries of one system at one order, each built when first needed.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    order : int
+    """
+
+    def __init__(self, system: FilippovSystem, order: int):
+        self.system, self.order = system, order
+        self._scalar: ctypes.CDLL | None = None
+        self._lanes: ctypes.CDLL | None = None
+
+    @property
+    def scalar(self) -> ctypes.CDLL:
+        """The library for one trajectory at a time."""
+        if self._scalar is None:
+            library = build(scalar_source(self.system, self.order))
+            _declare(library)
+            self._scalar = library
+        return self._scalar
+
+    @property
+    def lanes(self) -> ctypes.CDLL:
+        """The library for trajectories in step."""
+        if self._lanes is None:
+            library = build(lanes_source(self.system, self.order))
+            _declare(library)
+            self._lanes = library
+        return self._lanes
+
+    # one trajectory ----------------------------------------------------------------------------
+
+    def run(self, x: Array, p: Array, options: Options) -> Run:
+        """Run one trajectory from an extended start, dense output kept."""
+        library = self.scalar
+        state = ctypes.create_string_buffer(library.run_size())
+        rooms = {"step": 256, "point": 1024, "event": 512}
+        arrays = self._output_arrays(rooms)
+        output = _COutput(0, 0, 0, *rooms.values(), *[a.ctypes.data for a in arrays.values()])
+        tree = library.tree_new()
+        c_options = _c_options(self.system, options, dense=True)
+        start, parameters = np.array(x, float), np.array(p, float)
+        parts: list[dict[str, NDArray[Any]]] = []
+        try:
+            library.run_begin(
+                state,
+                ctypes.byref(c_options),
+                ctypes.byref(output),
+                tree,
+                _address(start),
+                _address(parameters),
+                options.t_start,
+            )
+            while True:
+                status = library.run_continue(state)
+                numbers, counts = self._read(state)
+                sizes = dict(zip(("step", "point", "event"), counts[7:10], strict=True))
+                parts.append(
+                    {k: a[: sizes[_OUTPUT_ARRAYS[k][1]]].copy() for k, a in arrays.items()}
+                )
+                if status != _FULL:
+                    break
+                library.run_rewind(state)
+            words = _words(library, tree, self.system.modes)
+        finally:
+            library.tree_free(tree)
+        return self._run(parts, numbers, counts, words)
+
+    def _output_arrays(self, rooms: dict[str, int]) -> dict[str, NDArray[Any]]:
+        n = self.system.extended_dimension
+        shapes: dict[str, tuple[int, ...]] = {
+            "coefficients": (n, self.order + 1),
+            "point_x": (n,),
+            "event_x": (n,),
+        }
+        return {
+            name: np.empty((rooms[room], *shapes.get(name, ())), dtype)
+            for name, (dtype, room) in _OUTPUT_ARRAYS.items()
+        }
+
+    def _read(self, state: Any) -> tuple[Array, NDArray[np.int64]]:
+        numbers = np.empty(3 + 2 * self.system.extended_dimension)
+        counts = np.empty(10 + len(KINDS), np.int64)
+        self.scalar.run_read(state, _address(numbers), _address(counts))
+        return numbers, counts
+
+    def _run(
+        self,
+        parts: Sequence[dict[str, NDArray[Any]]],
+        numbers: Array,
+        counts: NDArray[np.int64],
+        words: list[str],
+    ) -> Run:
+        whole = {name: np.concatenate([p[name] for p in parts]) for name in _OUTPUT_ARRAYS}
+        n = self.system.dimension
+        return Run(
+            status=int(counts[0]),
+            reason=int(counts[1]),
+            where=int(counts[2]),
+            mode=int(counts[3]),
+            limit=float(numbers[1]),
+            itinerary=words[int(counts[4])],
+            t=whole["point_t"],
+            x=whole["point_x"][:, :n],
+            starts=whole["start"],
+            coefficients=whole["coefficients"],
+            modes=whole["step_mode"],
+            event_kinds=whole["event_kind"],
+            event_t=whole["event_t"],
+            event_x=whole["event_x"][:, :n],
+            event_before=whole["event_before"],
+            event_after=whole["event_after"],
+            event_guards=whole["event_guard"],
+        )
+
+    # many trajectories -------------------------------------------------------------------------
+
+    def run_many(
+        self, x: Array, p: Array, options: Options, at: tuple[int, int] | None, lanes: bool
+    ) -> Chunk:
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
+        chunk = self._empty(len(x), at is not None)
+        x = np.ascontiguousarray(x, float)
+        p = np.ascontiguousarray(p, float)
+        c_options = _c_options(self.system, options, dense=False, at=at)
+        arguments = (x, p, c_options, options.t_start, chunk)
+        if lanes:
+            self._call(self.lanes, "run_lanes", None, *arguments)
+            rest = np.flatnonzero(chunk.status == HAND_OVER)
+            if rest.size:
+                self._call(self.scalar, "run_many", rest, *arguments)
+        else:
+            self._call(self.scalar, "run_many", None, *arguments)
+        return chunk
+
+    def _empty(self, count: int, at: bool) -> Chunk:
+        n = self.system.dimension
+        return Chunk(
+            x=np.empty((count, n)),
+            t=np.empty(count),
+            status=np.full(count, HAND_OVER, np.int32),
+            itinerary=np.zeros(count, np.int32),
+            words=[],
+            kinds=np.zeros((count, len(KINDS)), np.int32),
+            at_x=np.full((count, n), np.nan) if at else None,
+            at_t=np.full(count, np.nan) if at else None,
+        )
+
+    def _call(
+        self,
+        library: ctypes.CDLL,
+        function: str,
+        which: NDArray[np.int64] | None,
+        x: Array,
+        p: Array,
+        options: _COptions,
+        t_start: float,
+        chunk: Chunk,
+    ) -> None:
+        tree = library.tree_new()
+        start = np.array([t_start])
+        try:
+            getattr(library, function)(
+                len(x) if which is None else len(which),
+                _address(which),
+                _address(x),
+                _address(p),
+                p.shape[-1] if p.ndim > 1 else 0,
+                _address(start),
+                ctypes.byref(options),
+                tree,
+                *[_address(a) for a in (chunk.x, chunk.t, chunk.status, chunk.itinerary)],
+                *[_address(a) for a in (chunk.kinds, chunk.at_x, chunk.at_t, chunk.totals)],
+            )
+            words = _words(library, tree, self.system.modes)
+        finally:
+            library.tree_free(tree)
+        mine = slice(None) if which is None else which
+        chunk.itinerary[mine] += len(chunk.words)
+        chunk.words += words
+
+
+def _declare(library: ctypes.CDLL) -> None:
+    library.tree_new.restype = _POINTER
+    library.tree_size.argtypes = [_POINTER]
+    library.tree_read.argtypes = [_POINTER] * 3
+    library.tree_free.argtypes = [_POINTER]
+    many = [_I64, *[_POINTER] * 3, _I64, *[_POINTER] * 11]
+    if hasattr(library, "run_lanes"):
+        library.run_lanes.argtypes = many
+        return
+    library.run_size.restype = _I64
+    library.run_begin.argtypes = [_POINTER] * 6 + [_D]
+    library.run_continue.argtypes = [_POINTER]
+    library.run_read.argtypes = [_POINTER] * 3
+    library.run_rewind.argtypes = [_POINTER]
+    library.run_many.argtypes = many
+
+
+def _address(a: NDArray[Any] | None) -> int | None:
+    return None if a is None else a.ctypes.data
+
+
+def _c_options(
+    system: FilippovSystem, o: Options, dense: bool, at: tuple[int, int] | None = None
+) -> _COptions:
+    start = -1 if o.start_mode is None else system.modes.index(o.start_mode)
+    kind, count = at or (-1, 0)
+    limit = 2**62
+    return _COptions(
+        o.t_end,
+        o.rtol,
+        o.atol,
+        o.max_step,
+        int(min(o.max_steps, limit)),
+        int(min(o.max_events, limit)),
+        start,
+        kind,
+        count,
+        int(dense),
+        0,
+    )
+
+
+def _words(library: ctypes.CDLL, tree: int, modes: Sequence[str]) -> list[str]:
+    """Itineraries of all nodes of a tree, as strings."""
+    size = library.tree_size(tree)
+    parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+    library.tree_read(tree, _address(parent), _address(mode))
+    words = [""] * size
+    letters = [m or "o" for m in modes]
+    for k in range(1, size):
+        head = words[parent[k]]
+        words[k] = f"{head} {letters[mode[k]]}" if head else letters[mode[k]]
+    return words
+
+
+def engine_for(system: FilippovSystem, options: Options) -> Engine | None:
+    """Return the system's engine for the options' tolerance, or None where it has none."""
+    if not supports_scalar(system):
+        return None
+    if options.start_mode is not None and options.start_mode not in system.modes:
+        return None
+    tolerance = min(options.rtol, options.atol) if options.atol > 0 else options.rtol
+    order = order_for(tolerance)
+    key = ("engine", order)
+    if key not in system._functions:
+        system._functions[key] = Engine(system, order)
+    return system._functions[key]
+
+
+def simulate_arrays(system: FilippovSystem, x: Array, p: Array, options: Options) -> Run | None:
+    """Run one trajectory; None where the reference driver must (no engine, singular points).
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    x : ndarray (N,)
+        Extended start.
+    p : ndarray
+    options : Options
+
+    Raises
+    ------
+    CompilerError
+        Without a compiler, or where it fails.
+    """
+    engine = engine_for(system, options)
+    if engine is None:
+        return None
+    run = engine.run(x, p, options)
+    return None if run.status == HAND_OVER else run
+
+
+__all__ = [
+    "HAND_OVER",
+    "KINDS",
+    "REASONS",
+    "Chunk",
+    "Engine",
+    "Run",
+    "Status",
+    "engine_for",
+    "simulate_arrays",
+    "supports_lanes",
+]

@@ -1,0 +1,668 @@
+/* The reference driver in C: one trajectory, any number of surfaces, every kind of event.
+ *
+ * The functions have the names and the order of nonsmooth/flow/{driver,stepper,switching}.py; read
+ * those first. What is rare and slow anyway (points where the jet is not finite) is handed over to
+ * them.
+ *
+ * The generated text defines, besides what common.h asks for: MODES, LETTER[MODES][M] (+1, -1, 0),
+ * MODE_OF[3^M], CANCELLED[MODES], GUARDS[MODES], GUARD[MODES][NG] = {kind, index, side},
+ * jet(mode, x, q, c, g), guard_values(mode, x, q, value, gradient), surface_values(x, q, h,
+ * gradient), reset_map(index, x, q, y), prepare(p, q).
+ */
+#define TIE 1e-13
+#define HISTORY 48
+
+enum { SURFACE_GUARD, EXIT_GUARD, STOP_GUARD, RESET_GUARD };
+static const int PRIORITY[] = {2, 3, 0, 1};
+
+typedef struct { double states[N][P + 1], guards[NG1][P + 1], gradient[NG1][N], scale[NG1];
+                 int mode, finite; } Expansion;
+
+typedef struct {
+  double t_end, rtol, atol, max_step;
+  int64_t max_steps, max_events;
+  int32_t start_mode, at_kind;
+  int64_t at_count;
+  int32_t dense, pad;
+} Options;
+
+/* What a run writes, when dense: steps, points and events, emptied by the caller when full. */
+typedef struct {
+  int64_t steps, points, events, step_room, point_room, event_room;
+  double *start, *coefficients, *point_t, *point_x, *event_t, *event_x;
+  int32_t *step_mode, *event_kind, *event_before, *event_after, *event_guard;
+} Output;
+
+typedef struct {
+  Options o;
+  double x[N], q[NQ], t, last_event, limit, at_t, at_x[N];
+  int32_t mode, status, reason, where, drop[NG1], adopted;
+  int64_t step_count, event_count, kinds[KINDS], segment_steps;
+  int32_t itinerary, segment_mode;
+  double interval[HISTORY];
+  int32_t pattern[HISTORY];
+  int64_t history;
+  Output out;
+  Tree *tree;
+} Run;
+
+/* Reasons, for the message of a status. */
+enum { NO_REASON, TWO_FOLD, SLID_TO_TWO_FOLD, AMBIGUOUS, NO_MODE, DEGENERATE, WRONG_START, FIELD,
+       SURFACE, RESET_MAP };
+
+static void finish(Run *r, int status, int reason, int where) {
+  if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }
+}
+
+/* Numbers: nonsmooth/flow/stepper.py ------------------------------------------------------- */
+
+static void expand(const Run *r, int mode, Expansion *e) {
+  double value[NG1];
+  e->mode = mode;
+  jet(mode, r->x, r->q, &e->states[0][0], &e->guards[0][0]);
+  guard_values(mode, r->x, r->q, value, &e->gradient[0][0]);
+  e->finite = finite_all(&e->states[0][0], N * (P + 1))
+              && finite_all(&e->guards[0][0], GUARDS[mode] * (P + 1));
+  for (int j = 0; j < GUARDS[mode]; j++) {
+    double s = 0;
+    for (int i = 0; i < N; i++) {
+      e->gradient[j][i] = fabs(e->gradient[j][i]);
+      s += e->gradient[j][i] * (1 + fabs(r->x[i]));
+    }
+    e->scale[j] = s;
+  }
+}
+
+/* Binary logarithm and exponential to 1e-4: enough for a step size, a hundredth of libm's cost. */
+static inline double rough_log2(double a) {
+  union { double d; int64_t i; } u = {a};
+  double e = (double)((u.i >> 52) - 1023);
+  u.i = (u.i & 0xfffffffffffffLL) | 0x3ff0000000000000LL;
+  double m = u.d - 1.5;
+  return e + 0.5849625007 + m * (0.9617966939 + m * (-0.3205988980 + m * (0.1424883991
+         + m * (-0.0712441996 + m * (0.0379969064 - m * 0.0211093925)))));
+}
+static inline double rough_exp2(double a) {
+  double k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;
+  union { double d; int64_t i; } u;
+  u.i = ((int64_t)k + 1023) << 52;
+  return u.d * (1 + f * (1 + f * (0.5 + f * (0.16666666666 + f * (0.0416666666 + f * 0.0083333333)))));
+}
+static double step_for(double last, double before) {
+  double h = INFINITY;
+  if (last > 0) h = rough_exp2(rough_log2(fmin(last, 1e300)) * (-1.0 / P));
+  if (before > 0) h = fmin(h, rough_exp2(rough_log2(fmin(before, 1e300)) * (-1.0 / (P - 1))));
+  return h;
+}
+
+static double step_size(const Run *r, const Expansion *e) {
+  double allowed[N] = {0}, last = 1e-300, before = 1e-300;
+  for (int i = 0; i < ND; i++) {
+    allowed[i] = r->o.atol + r->o.rtol * fabs(e->states[i][0]);
+    last = fmax(last, fabs(e->states[i][P]) / allowed[i]);
+    before = fmax(before, fabs(e->states[i][P - 1]) / allowed[i]);
+  }
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    double a = r->o.rtol * fabs(e->guards[j][0]);
+    for (int i = 0; i < ND; i++) a += e->gradient[j][i] * allowed[i];
+    if (a > 0) {
+      last = fmax(last, fabs(e->guards[j][P]) / a);
+      before = fmax(before, fabs(e->guards[j][P - 1]) / a);
+    }
+  }
+  return step_for(last > 1e-300 ? last : 0, before > 1e-300 ? before : 0);
+}
+
+/* First coefficient of a guard that is not zero to rounding; P + 1 if there is none. */
+static int leading(const Expansion *e, int row, int zeros, double *value) {
+  double sum = 0;
+  for (int i = 0; i < N; i++) sum += e->gradient[row][i];
+  for (int k = zeros; k <= P; k++) {
+    double noise = e->scale[row];
+    if (k) {
+      double speed = 0;
+      for (int i = 0; i < N; i++) speed = fmax(speed, fabs(e->states[i][k]));
+      noise = sum * speed * (k + 1);
+    }
+    if (fabs(e->guards[row][k]) > 64 * EPS * noise) { *value = e->guards[row][k]; return k; }
+  }
+  *value = 0;
+  return P + 1;
+}
+
+static double guard_root(const Expansion *e, int row, int drop, double h) {
+  const int *guard = GUARD[e->mode][row];
+  const double *c = e->guards[row] + drop;
+  if (drop > P) return -1;
+  if (guard[0] >= STOP_GUARD) return first_crossing(c, P - drop, h, guard[2]);
+  if (c[0] <= 0) {
+    double value;
+    drop = leading(e, row, drop, &value);
+    if (value == 0) return -1;
+    c = e->guards[row] + drop;
+  }
+  return first_root(c, P - drop, h);
+}
+
+/* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
+static int first_hit(const Run *r, const Expansion *e, double h, double *dt) {
+  double time[NG1], earliest = INFINITY;
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    time[j] = guard_root(e, j, r->drop[j], h);
+    if (time[j] >= 0 && time[j] < earliest) earliest = time[j];
+  }
+  int best = -1;
+  double latest = earliest + TIE * fmax(1, fabs(r->t));
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    if (time[j] < 0 || time[j] > latest) continue;
+    int rank = PRIORITY[GUARD[e->mode][j][0]];
+    int best_rank = best < 0 ? 9 : PRIORITY[GUARD[e->mode][best][0]];
+    if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
+  }
+  if (best >= 0) *dt = time[best];
+  return best;
+}
+
+/* Surfaces --------------------------------------------------------------------------------- */
+
+static int sliding_surface(int mode) {
+  for (int i = 0; i < M; i++) if (LETTER[mode][i] == 0) return i;
+  return -1;
+}
+
+static int mode_code(const int *letters) {
+  int code = 0, weight = 1;
+  for (int i = 0; i < M; i++) {
+    code += weight * (letters[i] > 0 ? 0 : letters[i] < 0 ? 1 : 2);
+    weight *= 3;
+  }
+  return MODE_OF[code];
+}
+
+/* Least-norm Newton steps of the states (not the time) onto the surfaces of a bit set: the rows are
+ * made orthogonal one after the other (a dependent row drops out). */
+static void project(Run *r, unsigned which) {
+  for (int iteration = 0; which && iteration < 3; iteration++) {
+    double h[M1], g[M1][N], row[M1][N], size[M1], residual[M1];
+    int any = 0, k = 0;
+    surface_values(r->x, r->q, h, &g[0][0]);
+    for (int i = 0; i < M; i++) {
+      if (!(which >> i & 1)) continue;
+      any |= h[i] != 0;
+      double full = 0;
+      for (int l = 0; l < ND; l++) { row[k][l] = g[i][l]; full += g[i][l] * g[i][l]; }
+      residual[k] = h[i];
+      for (int j = 0; j < k; j++) {
+        double s = 0;
+        for (int l = 0; l < ND; l++) s += row[k][l] * row[j][l];
+        s /= size[j];
+        for (int l = 0; l < ND; l++) row[k][l] -= s * row[j][l];
+        residual[k] -= s * residual[j];
+      }
+      size[k] = 0;
+      for (int l = 0; l < ND; l++) size[k] += row[k][l] * row[k][l];
+      if (size[k] > 1e-24 * full) k++;
+    }
+    if (!any) break;
+    for (int j = 0; j < k; j++)
+      for (int l = 0; l < ND; l++) r->x[l] -= residual[j] / size[j] * row[j][l];
+  }
+}
+
+/* Surfaces through the present state, to rounding, and those known to be. */
+static unsigned active_surfaces(const Run *r, unsigned certain) {
+  double h[M1], g[M1][N];
+  if (M == 0) return 0;
+  surface_values(r->x, r->q, h, &g[0][0]);
+  for (int i = 0; i < M; i++) {
+    double scale = 0;
+    for (int l = 0; l < N; l++) scale += fabs(g[i][l]) * (1 + fabs(r->x[l]));
+    if (fabs(h[i]) <= 64 * EPS * scale) certain |= 1u << i;
+  }
+  int s = r->mode >= 0 ? sliding_surface(r->mode) : -1;
+  return s >= 0 ? certain | 1u << s : certain;
+}
+
+/* Output ----------------------------------------------------------------------------------- */
+
+static void note(Run *r) {
+  if (!r->o.dense) return;
+  int64_t k = r->out.points++;
+  r->out.point_t[k] = r->t;
+  memcpy(r->out.point_x + k * N, r->x, sizeof r->x);
+}
+
+static void renote(Run *r) {
+  if (r->o.dense && r->out.points)
+    memcpy(r->out.point_x + (r->out.points - 1) * N, r->x, sizeof r->x);
+}
+
+static void enter_segment(Run *r, int mode) {
+  if (mode == r->segment_mode) return;
+  if (r->segment_steps == 0) r->itinerary = r->tree->node[r->itinerary].parent;
+  if (r->itinerary < 0) r->itinerary = 0;
+  r->itinerary = tree_child(r->tree, r->itinerary, mode);
+  r->segment_mode = mode;
+  r->segment_steps = 0;
+}
+
+static void limit_of_events(Run *r);
+
+static void event(Run *r, int kind, int before, int guard) {
+  r->kinds[kind]++;
+  r->event_count++;
+  if (kind == r->o.at_kind && r->kinds[kind] == r->o.at_count) {
+    r->at_t = r->t;
+    memcpy(r->at_x, r->x, sizeof r->x);
+  }
+  if (r->o.dense) {
+    int64_t k = r->out.events++;
+    r->out.event_kind[k] = kind;
+    r->out.event_t[k] = r->t;
+    memcpy(r->out.event_x + k * N, r->x, sizeof r->x);
+    r->out.event_before[k] = before;
+    r->out.event_after[k] = r->mode;
+    r->out.event_guard[k] = guard;
+  }
+  if (kind == END || kind == STOP) return;
+  int at = r->history++ % HISTORY;
+  r->interval[at] = r->t - r->last_event;
+  r->pattern[at] = ((kind * 64 + guard + 1) * (MODES + 1) + before + 1) * (MODES + 1) + r->mode + 1;
+  r->last_event = r->t;
+  limit_of_events(r);
+}
+
+/* nonsmooth/flow/accumulation.py */
+static double interval_back(const Run *r, int back) { return r->interval[(r->history - back) % HISTORY]; }
+static int pattern_back(const Run *r, int back) { return r->pattern[(r->history - back) % HISTORY]; }
+
+static void limit_of_events(Run *r) {
+  static const int LAGS[] = {1, 2, 3, 4, 6};
+  if (r->history > 40) {
+    int all_zero = 1;
+    for (int k = 1; k <= 40; k++) all_zero &= interval_back(r, k) == 0;
+    if (all_zero) { r->limit = r->t; finish(r, ACCUMULATION, NO_REASON, 0); return; }
+  }
+  for (int l = 0; l < 5; l++) {
+    int lag = LAGS[l], need = 6 * lag, same = 1;
+    if (r->history < need + lag) return;
+    for (int k = 1; k <= need && same; k++) same = pattern_back(r, k) == pattern_back(r, k + lag);
+    if (!same) continue;
+    double block[6], least = INFINITY, low = INFINITY, high = 0, ratio = 0;
+    for (int b = 0; b < 6; b++) {
+      block[b] = 0;
+      for (int k = 0; k < lag; k++) block[b] += interval_back(r, need - b * lag - k);
+      least = fmin(least, block[b]);
+    }
+    if (!(least > 0)) continue;
+    for (int b = 1; b < 6; b++) {
+      ratio = block[b] / block[b - 1];
+      low = fmin(low, ratio);
+      high = fmax(high, ratio);
+    }
+    if (!(high < 0.9999 && high - low <= 0.02 * (1 - ratio))) continue;
+    double left = block[5] * ratio / (1 - ratio);
+    if (left < 1e-6 * fmax(1, fabs(r->t))) {
+      r->limit = r->t + left;
+      finish(r, ACCUMULATION, NO_REASON, 0);
+      return;
+    }
+  }
+}
+
+/* Filippov's logic: nonsmooth/flow/switching.py ---------------------------------------------- */
+
+typedef struct { int mode, strict, drop[NG1]; } Continuation;
+
+static int is_two_fold(const Expansion *e, int surface, double tolerance) {
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    const int *guard = GUARD[e->mode][j];
+    if (guard[0] != EXIT_GUARD || guard[1] != surface) continue;
+    if (!(fabs(e->guards[j][0]) <= (tolerance + 2e-14) * e->scale[j] && e->scale[j] > 0)) return 0;
+  }
+  return 1;
+}
+
+/* Whether the motion can continue in a mode: its guards that vanish here become positive. */
+static int continuation(Run *r, int mode, unsigned active, int exit_index, int exit_side,
+                        Continuation *result) {
+  Expansion e;
+  expand(r, mode, &e);
+  if (!e.finite) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+  result->mode = mode;
+  result->strict = 1;
+  memset(result->drop, 0, sizeof result->drop);
+  for (int j = 0; j < GUARDS[mode]; j++) {
+    const int *guard = GUARD[mode][j];
+    if (guard[0] >= STOP_GUARD || !(active >> guard[1] & 1)) continue;
+    int zeros = guard[0] == SURFACE_GUARD;
+    if (guard[1] == exit_index && guard[2] == exit_side) zeros += 1;
+    double value;
+    int k = leading(&e, j, zeros, &value);
+    if (value < 0) return 0;
+    if (value == 0) result->strict = 0;
+    result->drop[j] = value != 0 ? (k < P ? k : P) : P + 1;
+  }
+  return 1;
+}
+
+/* One surface with both fields clearly transversal: the signs of L_F1 h and L_F2 h decide. */
+static int decide_quickly(Run *r, unsigned active, Continuation *result) {
+  int i = 0, letters[M1];
+  if (M == 0 || (active & (active - 1)) || !active) return 0;
+  while (!(active >> i & 1)) i++;
+  for (int j = 0; j < M; j++) letters[j] = LETTER[r->mode][j];
+  letters[i] = 0;
+  int sliding = mode_code(letters);
+  if (sliding < 0) return 0;
+  double value[NG1], gradient[NG1][N], fall[2] = {0, 0};
+  guard_values(sliding, r->x, r->q, value, &gradient[0][0]);
+  for (int j = 0; j < GUARDS[sliding]; j++) {
+    const int *guard = GUARD[sliding][j];
+    if (guard[0] != EXIT_GUARD) continue;
+    double scale = 0;
+    for (int l = 0; l < N; l++) scale += fabs(gradient[j][l]) * (1 + fabs(r->x[l]));
+    if (!(fabs(value[j]) > 64 * EPS * scale && fabs(value[j]) < INFINITY)) return 0;
+    fall[guard[2] < 0] = value[j]; /* -L_F1 h, L_F2 h */
+  }
+  if (fall[0] < 0 && fall[1] > 0) letters[i] = 1;
+  else if (fall[0] > 0 && fall[1] < 0) letters[i] = -1;
+  else if (fall[0] < 0) return 0;
+  result->mode = mode_code(letters);
+  result->strict = 1;
+  memset(result->drop, 0, sizeof result->drop);
+  for (int j = 0; j < GUARDS[result->mode]; j++)
+    if (GUARD[result->mode][j][0] == SURFACE_GUARD && GUARD[result->mode][j][1] == i)
+      result->drop[j] = 1;
+  return 1;
+}
+
+static int meets_two_fold(Run *r, unsigned active) {
+  int slides = sliding_surface(r->mode);
+  for (int i = 0; i < M; i++) {
+    int letters[M1];
+    if (!(active >> i & 1) || (slides >= 0 && slides != i && (active & (active - 1)))) continue;
+    for (int j = 0; j < M; j++) letters[j] = LETTER[r->mode][j] ? LETTER[r->mode][j] : 1;
+    letters[i] = 0;
+    int mode = mode_code(letters);
+    if (CANCELLED[mode]) continue;
+    Expansion e;
+    expand(r, mode, &e);
+    if (is_two_fold(&e, i, 0)) { finish(r, NON_UNIQUE, TWO_FOLD, i); return 1; }
+  }
+  return 0;
+}
+
+/* Choose the motion that continues from a point of the surfaces ``active``; 0 if the run ends. */
+static int decide(Run *r, unsigned active, int exit_index, int exit_side, Continuation *chosen) {
+  if (exit_index < 0 && decide_quickly(r, active, chosen)) return 1;
+  if (meets_two_fold(r, active)) return 0;
+  int found = 0, strict = 0, resting = 0, where = 0;
+  Continuation one = {0}, first = {0}, rest = {0};
+  for (int m = 0; m < MODES && r->status == RUNNING; m++) {
+    int fits = 1;
+    for (int i = 0; i < M; i++)
+      if (!(active >> i & 1) && LETTER[m][i] != LETTER[r->mode][i]) fits = 0;
+    Continuation c;
+    if (!fits || !continuation(r, m, active, exit_index, exit_side, &c)) continue;
+    if (c.strict && strict++ == 0) one = c;
+    if (c.strict) where |= m < 31 ? 1 << m : 0;
+    if (found++ == 0) first = c;
+    if (sliding_surface(m) >= 0 && resting++ == 0) rest = c;
+  }
+  if (r->status != RUNNING) return 0;
+  if (strict == 1) *chosen = one;
+  else if (!strict && found == 1) *chosen = first;
+  else if (strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, where); return 0; }
+  else if (resting) *chosen = rest;
+  else if (active & (active - 1)) { finish(r, INTERSECTION, NO_MODE, (int)active); return 0; }
+  else { finish(r, NON_UNIQUE, DEGENERATE, (int)active); return 0; }
+  return 1;
+}
+
+/* Events: nonsmooth/flow/driver.py ----------------------------------------------------------- */
+
+static int change_kind(int before, int after) {
+  int was = sliding_surface(before) >= 0, is = sliding_surface(after) >= 0;
+  return is > was ? ENTRY : is < was ? EXIT : CROSSING;
+}
+
+static void adopt(Run *r, const Continuation *c) {
+  enter_segment(r, c->mode);
+  r->mode = c->mode;
+  memcpy(r->drop, c->drop, sizeof r->drop);
+}
+
+static void proceed(Run *r, unsigned active, int exit_index, int exit_side, int before, int guard) {
+  Continuation c;
+  if (!decide(r, active, exit_index, exit_side, &c)) return;
+  adopt(r, &c);
+  if (r->mode != before) event(r, change_kind(before, r->mode), before, guard);
+  if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
+}
+
+/* A start on a stopping or resetting surface is not an event. */
+static void drop_zero_guards(Run *r) {
+  Expansion e;
+  if (r->status != RUNNING) return;
+  int needed = 0;
+  for (int j = 0; j < GUARDS[r->mode]; j++) needed |= GUARD[r->mode][j][0] >= STOP_GUARD;
+  if (!needed) return;
+  expand(r, r->mode, &e);
+  for (int j = 0; j < GUARDS[r->mode]; j++) {
+    double value;
+    if (GUARD[r->mode][j][0] >= STOP_GUARD) r->drop[j] = leading(&e, j, 0, &value);
+  }
+}
+
+static int mode_by_signs(const Run *r, int *finite) {
+  double h[M1], g[M1][N];
+  int letters[M1];
+  *finite = 1;
+  if (M > 0) {
+    surface_values(r->x, r->q, h, &g[0][0]);
+    *finite = finite_all(h, M);
+  }
+  for (int i = 0; i < M; i++) letters[i] = h[i] > 0 ? 1 : -1;
+  return mode_code(letters);
+}
+
+static void start_in(Run *r, int mode, unsigned active) {
+  for (int i = 0; i < M; i++)
+    if (!(active >> i & 1) && LETTER[mode][i] != LETTER[r->mode][i]) {
+      finish(r, NON_UNIQUE, WRONG_START, r->mode);
+      return;
+    }
+  Expansion e;
+  r->mode = mode;
+  expand(r, mode, &e);
+  for (int j = 0; j < GUARDS[mode]; j++) {
+    const int *guard = GUARD[mode][j];
+    if (guard[0] >= STOP_GUARD || !(active >> guard[1] & 1)) continue;
+    double value;
+    int k = leading(&e, j, guard[0] == SURFACE_GUARD, &value);
+    r->drop[j] = value > 0 ? k : P + 1;
+  }
+}
+
+static void begin(Run *r) {
+  int finite;
+  note(r);
+  r->mode = -1;
+  int signs = mode_by_signs(r, &finite);
+  if (!finite) { r->mode = 0; finish(r, NOT_FINITE, SURFACE, 0); return; }
+  unsigned active = active_surfaces(r, 0);
+  project(r, active);
+  renote(r);
+  r->mode = signs;
+  if (r->o.start_mode >= 0) start_in(r, r->o.start_mode, active);
+  else if (active) {
+    Continuation c;
+    if (decide(r, active, -1, 0, &c)) { r->mode = c.mode; memcpy(r->drop, c.drop, sizeof r->drop); }
+  }
+  if (r->status == RUNNING) enter_segment(r, r->mode);
+  drop_zero_guards(r);
+}
+
+static void reset(Run *r, int index, int guard) {
+  double y[N];
+  int finite, before = r->mode;
+  event(r, RESET, before, guard);
+  reset_map(index, r->x, r->q, y);
+  memcpy(r->x, y, ND * sizeof(double));
+  if (!finite_all(r->x, ND)) { finish(r, NOT_FINITE, RESET_MAP, index); return; }
+  note(r);
+  unsigned active = active_surfaces(r, 0);
+  r->mode = mode_by_signs(r, &finite);
+  Continuation c = {r->mode, 1, {0}};
+  if (active) proceed(r, active, -1, 0, before, guard);
+  else {
+    adopt(r, &c);
+    if (r->mode != before) event(r, change_kind(before, r->mode), before, guard);
+    if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
+  }
+  drop_zero_guards(r);
+}
+
+static void serve(Run *r, int row) {
+  const int *guard = GUARD[r->mode][row];
+  int before = r->mode;
+  if (guard[0] == STOP_GUARD) {
+    event(r, STOP, before, row);
+    finish(r, STOPPED, NO_REASON, guard[1]);
+  } else if (guard[0] == RESET_GUARD) {
+    reset(r, guard[1], row);
+  } else {
+    unsigned active = active_surfaces(r, 1u << guard[1]);
+    int exits = guard[0] == EXIT_GUARD;
+    project(r, active);
+    renote(r);
+    proceed(r, active, exits ? guard[1] : -1, guard[2], before, row);
+  }
+}
+
+static void advance(Run *r, const Expansion *e, double dt) {
+  if (r->o.dense) {
+    int64_t k = r->out.steps++;
+    r->out.start[k] = r->t;
+    r->out.step_mode[k] = r->mode;
+    memcpy(r->out.coefficients + k * N * (P + 1), e->states, sizeof e->states);
+  }
+  for (int i = 0; i < N; i++) {
+    double v = e->states[i][P];
+    for (int k = P - 1; k >= 0; k--) v = v * dt + e->states[i][k];
+    r->x[i] = v;
+  }
+  r->t += dt;
+  r->step_count++;
+  r->segment_steps++;
+  if (TIMED) r->x[N - 1] = r->t;
+  int s = sliding_surface(r->mode);
+  if (s >= 0) project(r, 1u << s);
+  memset(r->drop, 0, sizeof r->drop);
+  note(r);
+}
+
+static void watch_two_fold(Run *r) {
+  int s = sliding_surface(r->mode);
+  if (s < 0 || CANCELLED[r->mode]) return;
+  Expansion e;
+  expand(r, r->mode, &e);
+  if (is_two_fold(&e, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+}
+
+static void step(Run *r) {
+  double left = r->o.t_end - r->t, dt;
+  if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
+  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
+  Expansion e;
+  expand(r, r->mode, &e);
+  if (!e.finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  double h = fmin(step_size(r, &e), r->o.max_step);
+  if (h <= 4 * EPS * fmax(1, fabs(r->t)) && h < left) { finish(r, STEP_TOO_SMALL, NO_REASON, 0); return; }
+  int last = h >= left;
+  if (last) h = left;
+  int row = first_hit(r, &e, h, &dt);
+  advance(r, &e, row >= 0 ? dt : h);
+  if (row >= 0) serve(r, row);
+  else if (last) {
+    r->t = r->o.t_end;
+    if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
+  } else watch_two_fold(r);
+}
+
+/* The last mode counts only if it lasted for a step (or is the only one). */
+static int32_t final_itinerary(const Run *r) {
+  int32_t above = r->tree->node[r->itinerary].parent;
+  return r->segment_steps == 0 && above > 0 ? above : r->itinerary;
+}
+
+/* Entry points --------------------------------------------------------------------------------- */
+
+int64_t run_size(void) { return sizeof(Run); }
+
+void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const double *x,
+               const double *p, double t) {
+  memset(r, 0, sizeof *r);
+  r->o = *o;
+  r->out = *out;
+  r->tree = tree;
+  memcpy(r->x, x, sizeof r->x);
+  prepare(p, r->q);
+  r->t = r->last_event = t;
+  r->limit = r->at_t = NAN;
+  for (int i = 0; i < N; i++) r->at_x[i] = NAN;
+  r->status = RUNNING;
+  r->segment_mode = -1;
+  if (finite_all(r->x, N)) begin(r);
+  else { r->status = NOT_FINITE; r->reason = SURFACE; }
+}
+
+/* Go on until the run ends or its arrays have no room for another step (FULL). */
+int run_continue(Run *r) {
+  while (r->status == RUNNING) {
+    if (r->o.dense && (r->out.steps >= r->out.step_room || r->out.points + 3 > r->out.point_room
+                       || r->out.events + 4 > r->out.event_room))
+      return FULL;
+    step(r);
+  }
+  return r->status;
+}
+
+void run_read(const Run *r, double *numbers, int64_t *counts) {
+  numbers[0] = r->t;
+  numbers[1] = r->limit;
+  numbers[2] = r->at_t;
+  memcpy(numbers + 3, r->x, sizeof r->x);
+  memcpy(numbers + 3 + N, r->at_x, sizeof r->at_x);
+  int64_t head[] = {r->status, r->reason, r->where, r->mode, final_itinerary(r), r->step_count,
+                    r->event_count, r->out.steps, r->out.points, r->out.events};
+  memcpy(counts, head, sizeof head);
+  memcpy(counts + 10, r->kinds, sizeof r->kinds);
+}
+
+void run_rewind(Run *r) { r->out.steps = r->out.points = r->out.events = 0; }
+
+/* Trajectories start, start+1, ... of arrays, or those listed in ``which``. */
+void run_many(int64_t count, const int64_t *which, const double *x0, const double *p,
+              int64_t p_stride, const double *t0, const Options *o, Tree *tree, double *x, double *t,
+              int32_t *status, int32_t *itinerary, int32_t *kinds, double *at_x, double *at_t,
+              int64_t *totals) {
+  static const Output none;
+  Run r;
+  for (int64_t k = 0; k < count; k++) {
+    int64_t i = which ? which[k] : k;
+    run_begin(&r, o, &none, tree, x0 + i * N, p + i * p_stride, t0[0]);
+    run_continue(&r);
+    if (r.status == RUNNING) r.status = HAND_OVER;
+    if (r.status != STOPPED) r.kinds[END]++;
+    memcpy(x + i * ND, r.x, ND * sizeof(double));
+    t[i] = r.t;
+    status[i] = r.status;
+    itinerary[i] = final_itinerary(&r);
+    for (int j = 0; j < KINDS; j++) kinds[i * KINDS + j] = (int32_t)r.kinds[j];
+    if (at_x) { memcpy(at_x + i * ND, r.at_x, ND * sizeof(double)); at_t[i] = r.at_t; }
+    totals[0] += r.step_count;
+    totals[1] += r.event_count;
+  }
+}

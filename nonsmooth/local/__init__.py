@@ -1,0 +1,43 @@
+"""WHAT HAPPENS at a point of a surface, without time stepping: regions, folds, two-folds."""
+
+from .classification import Boundary, Classification, Slopes, classify_two_fold
+from .crossing import (
+    accumulation_time,
+    diabolo_slopes,
+    flight_above,
+    flight_below,
+    max_flights,
+    return_matrix,
+)
+from .folds import Fold, find_fold, fold
+from .normal_form import NormalForm, ReducedFlow, normal_form
+from .regions import Region, alpha, region, sliding_field
+from .two_fold import TraceError, TwoFold, find_two_fold, trace_two_folds, two_fold
+
+__all__ = [
+    "Boundary",
+    "Classification",
+    "Fold",
+    "NormalForm",
+    "ReducedFlow",
+    "Region",
+    "Slopes",
+    "TraceError",
+    "TwoFold",
+    "accumulation_time",
+    "alpha",
+    "classify_two_fold",
+    "diabolo_slopes",
+    "find_fold",
+    "find_two_fold",
+    "flight_above",
+    "flight_below",
+    "fold",
+    "max_flights",
+    "normal_form",
+    "region",
+    "return_matrix",
+    "sliding_field",
+    "trace_two_folds",
+    "two_fold",
+]

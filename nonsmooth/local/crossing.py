@@ -1,0 +1,155 @@
+"""Flights at a two-fold: the crossing map of the normal form near an invisible fold.
+
+Points are (z2, z3) on z1 = 0. An orbit that leaves upwards (z2 < 0) over an invisible fold of F1
+comes back after the time 2|z2|; downwards (z3 < 0) under an invisible fold of F2 after 2|z3|
+(normal-form times; times phi and 1/phi in real time). Jeffrey & Colombo 2009 for the
+diabolo; the counts and the accumulation time were derived for this library.
+"""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..model import Array, OptionError
+from .lie import positive
+
+Nu = tuple[float, float]
+
+
+def flight_above(z: ArrayLike, nu: Nu) -> Array:
+    """Landing point of a flight in z1 > 0 over an invisible fold: (-z2, z3 - 2 nu1 z2).
+
+    Parameters
+    ----------
+    z : array_like (..., 2)
+        (z2, z3) with z2 <= 0.
+    nu : (float, float)
+
+    Returns
+    -------
+    ndarray (..., 2)
+
+    Examples
+    --------
+    >>> flight_above([-1.0, 3.0], (-1.0, -2.0))
+    array([1., 1.])
+    """
+    z = np.asarray(z, dtype=float)
+    return np.stack([-z[..., 0], z[..., 1] - 2 * nu[0] * z[..., 0]], axis=-1)
+
+
+def flight_below(z: ArrayLike, nu: Nu) -> Array:
+    """Landing point of a flight in z1 < 0 under an invisible fold: (z2 - 2 nu2 z3, -z3).
+
+    Parameters
+    ----------
+    z : array_like (..., 2)
+        (z2, z3) with z3 <= 0.
+    nu : (float, float)
+
+    Returns
+    -------
+    ndarray (..., 2)
+
+    Examples
+    --------
+    >>> flight_below([3.0, -1.0], (-2.0, -1.0))
+    array([1., 1.])
+    """
+    z = np.asarray(z, dtype=float)
+    return np.stack([z[..., 0] - 2 * nu[1] * z[..., 1], -z[..., 1]], axis=-1)
+
+
+def return_matrix(nu: Nu) -> Array:
+    """Matrix of one flight above followed by one below, of an invisible two-fold; (2, 2).
+
+    Determinant 1, trace 4 nu1 nu2 - 2.
+
+    Examples
+    --------
+    >>> return_matrix((-2.0, -1.0))
+    array([[ 7.,  2.],
+           [-4., -1.]])
+    """
+    n1, n2 = nu
+    return np.array([[4 * n1 * n2 - 1, -2 * n2], [2 * n1, -1.0]])
+
+
+def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
+    """Largest number of flights of an orbit from a crossing region before it slides or goes away.
+
+    Both folds invisible: 1 if nu1, nu2 >= 0; 2 if one of them is negative; if both are,
+    ceil(pi/arccos sqrt(nu1 nu2)) - 1 for nu1 nu2 < 1 and no bound (``inf``) for nu1 nu2 >= 1. One
+    fold invisible: 1. None: 0.
+
+    Examples
+    --------
+    >>> max_flights((-1, 1), (-0.9, -1.0)), max_flights((-1, 1), (-2.0, -1.0))
+    (9, inf)
+    """
+    invisible = (sigma[0] < 0) + (sigma[1] > 0)
+    if invisible < 2:
+        return invisible
+    n1, n2 = nu
+    if n1 >= 0 or n2 >= 0:
+        return 1 if n1 >= 0 and n2 >= 0 else 2
+    if n1 * n2 >= 1:
+        return math.inf
+    angle = math.acos(math.sqrt(n1 * n2))
+    return math.ceil(math.pi / angle - 1e-12) - 1
+
+
+def diabolo_slopes(nu: Nu) -> tuple[float, float]:
+    """Slopes |z3/z2| of the two invariant lines of the return map (the nonsmooth diabolo).
+
+    For an invisible two-fold with nu1, nu2 < 0 and nu1 nu2 > 1: (r_-, r_+) with
+    r_-+ = |nu1| (1 -+ sqrt(1 - 1/(nu1 nu2))). On r_- flights grow; on r_+ they shrink to s.
+
+    Raises
+    ------
+    OptionError
+        For other nu: the return map has no invariant lines in the crossing region.
+
+    Examples
+    --------
+    >>> [round(r, 6) for r in diabolo_slopes((-2.0, -1.0))]
+    [0.585786, 3.414214]
+    """
+    a, b = -nu[0], -nu[1]
+    if not (a > 0 and b > 0 and a * b > 1):
+        raise OptionError(
+            f"nu: expected nu1, nu2 < 0 and nu1 nu2 > 1, received {nu!r}. Otherwise every orbit of "
+            "an invisible two-fold makes finitely many flights."
+        )
+    plus = a * (1 + math.sqrt(1 - 1 / (a * b)))
+    return a / (b * plus), plus
+
+
+def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
+    """Time of the infinitely many flights from (z2, z3) = (-1, r_+) into the two-fold.
+
+    Parameters
+    ----------
+    nu : (float, float)
+        Both negative, product above 1.
+    phi : float, optional
+        Time scale of the two-fold for real time; 1 gives normal-form time. The time is
+        proportional to |z2| of the start.
+
+    Raises
+    ------
+    OptionError
+
+    Examples
+    --------
+    >>> round(accumulation_time((-2.0, -1.0)), 12)
+    3.828427124746
+    """
+    a, b = -nu[0], -nu[1]
+    _, plus = diabolo_slopes(nu)
+    growth = 2 * a * b - 1 + 2 * a * b * math.sqrt(1 - 1 / (a * b))
+    phi = positive(phi, "phi")
+    return 2 * (phi + (2 * a - plus) / phi) / (1 - 1 / growth)

@@ -1,0 +1,309 @@
+"""Folds and cusps: points of a surface where one field is tangent to it (Filippov 1988).
+
+The order of contact is read from the jet of h along the field, h = sum_k (L_i^k h) t^k/k!: the
+first k >= 1 with a nonzero coefficient, 2 for a fold and 3 for a cusp.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    explain,
+    motion,
+)
+from .lie import TOLERANCE, Place, on_surface, place, positive
+from .newton import solve
+
+Side = Literal["above", "below"]
+
+_LETTERS = {"above": "+", "below": "-"}
+
+
+@dataclass(frozen=True, eq=False)
+class Fold:
+    """A tangency of one field with the surface.
+
+    Attributes
+    ----------
+    point : ndarray (n,)
+    side : {"above", "below"}
+        Of the field F1 (h > 0) or F2 (h < 0).
+    order : int or None
+        First k with L^k h != 0; None if there is none up to the order that was looked at.
+    kind : {"visible", "invisible", "cusp", "degenerate"}
+        A fold (order 2) is visible if the orbit of its field through the point stays on the
+        field's side; order 3 is a cusp; anything higher is degenerate.
+    lie : ndarray (order looked at + 1,)
+        L^k h for k = 0, 1, ...
+    other : float
+        First Lie derivative of h along the other field: attracting or repelling sliding begins
+        here unless it is zero too.
+    distance : float
+        From the start of the search; 0 if the point was given.
+    residual : float
+        Distance to the solution of h = L_i = 0 to first order.
+    iterations : int
+    """
+
+    point: Array
+    side: Side
+    order: int | None
+    kind: str
+    lie: Array
+    other: float
+    distance: float
+    residual: float
+    iterations: int
+
+    def __str__(self) -> str:
+        field = "F1 (above)" if self.side == "above" else "F2 (below)"
+        if self.order is None:
+            contact = (
+                f"no nonzero derivative of h along it up to order {len(self.lie) - 1}: an "
+                "equilibrium on the surface, or an orbit inside it"
+            )
+        else:
+            name = {2: "fold", 3: "cusp"}.get(self.order, "tangency")
+            contact = (
+                f"{self.kind} {name}" if name != self.kind else name
+            ) + f" of order {self.order}, L^{self.order} h = {self.lie[self.order]:.6g}"
+        found = f"; found {self.distance:.3g} from the start" if self.iterations else ""
+        return f"{field} at {self.point.tolist()}: {contact}{found}."
+
+
+def contact(where: Place, x: Array, letter: str, max_order: int, tol: float) -> Array:
+    """Derivatives L^k h for k = 0..max_order, with rounding-level values set to zero.
+
+    The k-th Taylor coefficient counts as zero below ``tol |grad h| |F| r^(k-1)``, where r is the
+    rate, per time, at which the coefficients of the orbit and of h grow.
+    """
+    system = where.system
+    mode = where.side(letter)
+    states, guards = motion(system, mode).jet_function(max_order)(x, where.parameters)
+    states = np.array(states, dtype=float)
+    sign = 1.0 if letter == "+" else -1.0
+    h = sign * np.array(guards, dtype=float)[where.surface]
+    speed = float(np.linalg.norm(states[:, 1]))
+    size = speed * float(np.linalg.norm(where.at(x).gradient))
+    if not (np.all(np.isfinite(states)) and np.all(np.isfinite(h))):
+        raise PointError(
+            f"point {x}: expected derivatives of h up to order {max_order}, received NaN or inf. "
+            "The field is not that smooth here; lower max_order."
+        )
+    if size > 0:
+        powers = 1.0 / np.arange(1, max_order)
+        growth = np.maximum(np.linalg.norm(states[:, 2:], axis=0) / speed, np.abs(h[2:]) / size)
+        rate = float(np.max(growth**powers))
+        with np.errstate(under="ignore"):
+            small = np.abs(h[1:]) <= tol * size * rate ** np.arange(max_order)
+        h[1:][small] = 0.0
+    return h * np.array([math.factorial(k) for k in range(max_order + 1)])
+
+
+def _name(order: int | None, value: float, letter: str) -> str:
+    if order == 2:
+        return "visible" if (value > 0) == (letter == "+") else "invisible"
+    return "cusp" if order == 3 else "degenerate"
+
+
+def _build(
+    where: Place, x: Array, side: Side, max_order: int, tol: float, search: tuple[float, float, int]
+) -> Fold:
+    letter = _LETTERS[side]
+    lie = contact(where, x, letter, max_order, tol)
+    lie[1] = 0.0
+    nonzero = np.flatnonzero(lie[2:])
+    order = int(nonzero[0]) + 2 if nonzero.size else None
+    kind = _name(order, float(lie[order]) if order else 0.0, letter)
+    other = float(where.at(x).lie[1 if letter == "+" else 0])
+    return Fold(x[: where.system.dimension], side, order, kind, lie, other, *search)
+
+
+def _check(side: str, max_order: int) -> None:
+    if side not in _LETTERS:
+        raise DefinitionError(
+            explain(
+                "side",
+                expected="'above' (F1, h > 0) or 'below' (F2, h < 0)",
+                received=repr(side),
+                advice="A fold belongs to one of the two fields.",
+            )
+        )
+    if isinstance(max_order, bool) or not isinstance(max_order, int) or max_order < 2:
+        raise DefinitionError(f"max_order: expected a whole number >= 2, received {max_order!r}.")
+
+
+def fold(
+    system: FilippovSystem,
+    point: ArrayLike,
+    *,
+    side: Side = "above",
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    max_order: int = 6,
+    tol: float = TOLERANCE,
+) -> Fold:
+    """Describe the tangency at a point where one field is tangent to the surface.
+
+    Parameters
+    ----------
+    system, point, parameters, t, surface, mode, tol
+        As in :func:`region`.
+    side : {"above", "below"}
+    max_order : int, optional
+        Highest order of contact to look at.
+
+    Returns
+    -------
+    Fold
+
+    Raises
+    ------
+    PointError
+        The field is not tangent there (angle above ``tol``), and as in :func:`region`.
+    DefinitionError, ParameterError, OptionError
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[1, x], below=[0, 1])
+    >>> print(fold(s, [0, 0]))
+    F1 (above) at [0.0, 0.0]: visible fold of order 2, L^2 h = 1.
+    """
+    _check(side, max_order)
+    where, x = place(system, point, parameters, t, surface, mode)
+    numbers = on_surface(where, x, positive(tol, "tol"))
+    k = 0 if side == "above" else 1
+    if abs(numbers.angles[k]) > tol:
+        raise PointError(
+            explain(
+                f"point {x}",
+                expected=f"L{k + 1} = 0, the field {side} tangent to the surface",
+                received=f"L{k + 1} = {numbers.lie[k]:.6g}",
+                advice="find_fold(system, near=point) goes to the nearest fold.",
+            )
+        )
+    length = float(np.linalg.norm(numbers.lie_gradients[k])) or 1.0
+    residual = max(numbers.distance, abs(float(numbers.lie[k])) / length)
+    return _build(where, x, side, max_order, tol, (0.0, residual, 0))
+
+
+def find_fold(
+    system: FilippovSystem,
+    near: ArrayLike,
+    *,
+    side: Side = "above",
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    hold: Sequence[str] = (),
+    max_order: int = 6,
+    tol: float = 1e-12,
+    max_iterations: int = 50,
+) -> Fold:
+    """Find a fold close to a point: h = 0 and L_i h = 0.
+
+    Newton's method with exact gradients and least-norm steps. For n > 2 folds form a set of
+    dimension n - 2; the one found is near the start, not exactly the nearest.
+
+    Parameters
+    ----------
+    system, parameters, t, surface, mode
+        As in :func:`region`; the point need not be on the surface.
+    near : array_like (n,)
+    side : {"above", "below"}
+        Whose fold: of F1 or F2.
+    hold : sequence of str, optional
+        Names of states that keep their value.
+    max_order : int, optional
+        Highest order of contact to look at.
+    tol : float, optional
+        Accepted residual (a distance), relative to 1 + |x|; the search itself goes to rounding.
+    max_iterations : int, optional
+
+    Returns
+    -------
+    Fold
+
+    Raises
+    ------
+    ConvergenceError
+        With ``residual`` and ``point``, the last iterate.
+    PointError, ParameterError, DefinitionError, OptionError
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[1, ca.sin(x)], below=[0, 1])
+    >>> print(find_fold(s, [3.0, 0.1]).kind, find_fold(s, [0.2, 0.1]).kind)
+    invisible visible
+    """
+    _check(side, max_order)
+    where, x = place(system, near, parameters, t, surface, mode)
+    free = unknowns(system, hold, 2, "fold")
+    k = 0 if side == "above" else 1
+
+    def equations(u: Array) -> tuple[Array, Array]:
+        full = x.copy()
+        full[free] = u
+        numbers = where.at(full)
+        values = np.array([numbers.h, numbers.lie[k]])
+        return values, np.vstack([numbers.gradient, numbers.lie_gradients[k]])[:, free]
+
+    root = solve(equations, x[free], tol=tol, max_iterations=max_iterations, what=f"fold {side}")
+    point = x.copy()
+    point[free] = root.x
+    search = (float(np.linalg.norm(point - x)), root.residual, root.iterations)
+    return _build(where, point, side, max_order, TOLERANCE, search)
+
+
+def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: str) -> list[int]:
+    """Indices of the states that a search may change.
+
+    Raises
+    ------
+    DefinitionError
+        An unknown state, or fewer free states than equations.
+    """
+    names = [hold] if isinstance(hold, str) else [str(name) for name in hold]
+    unknown = [name for name in names if name not in system.state_names]
+    if unknown:
+        raise DefinitionError(
+            explain(
+                "hold",
+                expected=f"names of states among {list(system.state_names)}",
+                received=str(unknown),
+                advice="Parameters keep their value anyway.",
+            )
+        )
+    free = [i for i, name in enumerate(system.state_names) if name not in names]
+    if len(free) < equations:
+        raise DefinitionError(
+            explain(
+                what,
+                expected=f"at least {equations} free states, one for each equation",
+                received=f"{len(free)} ({system.dimension} states, {len(names)} held)",
+                advice="In the plane a two-fold (fold-fold) happens at isolated values of a "
+                "parameter: make that parameter a state with derivative 0 to find it."
+                if equations == 3 and system.dimension < 3
+                else "Hold fewer states.",
+            )
+        )
+    return free

@@ -1,0 +1,238 @@
+"""Regions of a switching surface, the weight alpha and the sliding vector field (Filippov 1988)."""
+
+from __future__ import annotations
+
+from enum import Enum
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..model import Array, FilippovSystem, Parameters, PointError, explain, motion
+from .lie import TOLERANCE, Numbers, on_surface, place, positive
+
+
+class Region(Enum):
+    """What the two fields do at a point of the surface; above is h > 0 with F1.
+
+    Examples
+    --------
+    >>> print(Region.ATTRACTING)
+    attracting sliding
+    """
+
+    ATTRACTING = "attracting sliding"  # L1 < 0 < L2
+    REPELLING = "repelling sliding"  # L2 < 0 < L1
+    CROSSING_UP = "crossing up"  # L1, L2 > 0
+    CROSSING_DOWN = "crossing down"  # L1, L2 < 0
+    TANGENT_ABOVE = "tangency of the field above"  # L1 = 0
+    TANGENT_BELOW = "tangency of the field below"  # L2 = 0
+    TWO_FOLD = "tangency of both fields"  # L1 = L2 = 0
+
+    def __str__(self) -> str:
+        return self.value
+
+    @property
+    def sliding(self) -> bool:
+        """Whether the point is in a sliding region, attracting or repelling."""
+        return self in (Region.ATTRACTING, Region.REPELLING)
+
+
+def region_of(numbers: Numbers, tol: float) -> Region:
+    """Name the region from L1 and L2; zero is an angle with the surface of at most ``tol``."""
+    above, below = (0 if abs(a) <= tol else int(np.sign(a)) for a in numbers.angles)
+    return {
+        (-1, 1): Region.ATTRACTING,
+        (1, -1): Region.REPELLING,
+        (1, 1): Region.CROSSING_UP,
+        (-1, -1): Region.CROSSING_DOWN,
+        (0, 0): Region.TWO_FOLD,
+    }.get((above, below), Region.TANGENT_ABOVE if above == 0 else Region.TANGENT_BELOW)
+
+
+def region(
+    system: FilippovSystem,
+    point: ArrayLike,
+    *,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    tol: float = TOLERANCE,
+) -> Region:
+    """Region of the switching surface in which a point lies.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    point : array_like (n,)
+        A point on the surface: |h|/|grad h| <= tol (1 + |x|).
+    parameters : mapping, optional
+        Values that replace defaults.
+    t : float, optional
+        Time, where the system depends on it.
+    surface : int, optional
+        Index of the surface.
+    mode : str, optional
+        With several surfaces, one letter each: the sides of the others. By default the signs of
+        their functions at the point.
+    tol : float, optional
+        A field is tangent when |L_i| <= tol |grad h| |F_i|: it makes an angle below ``tol`` with
+        the surface. This does not change when h or a field is multiplied by a positive number.
+
+    Returns
+    -------
+    Region
+
+    Raises
+    ------
+    PointError
+        Off the surface (the message says how far and gives the nearest point), wrong shape, NaN.
+    ParameterError, DefinitionError, OptionError
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> s = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.4], below=[v, -x + 0.4])
+    >>> [str(region(s, [x0, 0.0])) for x0 in (0.2, -0.5, 0.4)]
+    ['attracting sliding', 'crossing up', 'tangency of the field below']
+    """
+    where, x = place(system, point, parameters, t, surface, mode)
+    return region_of(on_surface(where, x, positive(tol, "tol")), tol)
+
+
+def _refuse_crossing(numbers: Numbers, found: Region, what: str) -> None:
+    if found in (Region.CROSSING_UP, Region.CROSSING_DOWN):
+        raise PointError(
+            explain(
+                what,
+                expected="a point of the sliding region or its boundary, L1 L2 <= 0",
+                received=f"{found} at {numbers.x.tolist()}, L1 = {numbers.lie[0]:.6g}, "
+                f"L2 = {numbers.lie[1]:.6g}",
+                advice="Orbits cross the surface here; no convex combination is tangent to it.",
+            )
+        )
+
+
+def alpha(
+    system: FilippovSystem,
+    point: ArrayLike,
+    *,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    tol: float = TOLERANCE,
+) -> float:
+    """Weight of the field below in the sliding field, alpha = L1/(L1 - L2) = (1 - lambda)/2.
+
+    It is 0 where L1 = 0 and 1 where L2 = 0, and in between F_s = (1 - alpha) F1 + alpha F2
+    (Filippov 1988, section 4).
+
+    Parameters
+    ----------
+    system, point, parameters, t, surface, mode, tol
+        As in :func:`region`.
+
+    Returns
+    -------
+    float in [0, 1]
+
+    Raises
+    ------
+    PointError
+        In a crossing region; where both fields are tangent (0/0); and as in :func:`region`.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> s = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.4], below=[v, -x + 0.4])
+    >>> round(alpha(s, [0.2, 0.0]), 12)
+    0.75
+    """
+    where, x = place(system, point, parameters, t, surface, mode)
+    numbers = on_surface(where, x, positive(tol, "tol"))
+    found = region_of(numbers, tol)
+    _refuse_crossing(numbers, found, "alpha")
+    if found is Region.TWO_FOLD:
+        raise PointError(
+            explain(
+                "alpha",
+                expected="L1 and L2 not both zero",
+                received=f"both fields tangent at {x.tolist()}",
+                advice="alpha is 0/0 at a two-fold and its limit depends on the direction; the "
+                "sliding field itself is finite where the two fields coincide (sliding_field).",
+            )
+        )
+    if not found.sliding:
+        return 0.0 if found is Region.TANGENT_ABOVE else 1.0
+    return float(numbers.lie[0] / (numbers.lie[0] - numbers.lie[1]))
+
+
+def sliding_field(
+    system: FilippovSystem,
+    point: ArrayLike,
+    *,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    tol: float = TOLERANCE,
+) -> Array:
+    """Velocity of sliding, attracting or repelling: the convex combination tangent to the surface.
+
+    Factors that L1 - L2 and F1 - F2 have in common are cancelled symbolically, so the field is
+    accurate close to a two-fold where they vanish (Coulomb friction at zero normal force). At such
+    a point itself it is F1 = F2.
+
+    Parameters
+    ----------
+    system, point, parameters, t, surface, mode, tol
+        As in :func:`region`.
+
+    Returns
+    -------
+    ndarray (n,)
+
+    Raises
+    ------
+    PointError
+        In a crossing region; at a two-fold where the fields differ (0/0); and as in
+        :func:`region`.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> s = ns.FilippovSystem([x, v], surface=v - 1, above=[v, -x - 2], below=[v, -x + 2])
+    >>> sliding_field(s, [0.2, 1.0]).round(12) + 0.0
+    array([1., 0.])
+    """
+    where, x = place(system, point, parameters, t, surface, mode)
+    numbers = on_surface(where, x, positive(tol, "tol"))
+    found = region_of(numbers, tol)
+    _refuse_crossing(numbers, found, "sliding field")
+    n = system.dimension
+    if found is Region.TWO_FOLD:
+        if not coincide(numbers, tol):
+            raise PointError(
+                explain(
+                    "sliding field",
+                    expected="L1 and L2 not both zero, or F1 = F2",
+                    received=f"both fields tangent and different at {x.tolist()}",
+                    advice="The sliding field is 0/0 at this two-fold and its limit depends on "
+                    "the direction; ask find_two_fold for the class of the point.",
+                )
+            )
+        return np.array(numbers.fields.mean(axis=0)[:n])
+    build = motion(system, where.mode)
+    value = system.function(("sliding field", where.mode), lambda: [build.field])
+    return np.array(value(x, where.parameters), dtype=float).ravel()[:n]
+
+
+def coincide(numbers: Numbers, tol: float) -> bool:
+    """Whether F1 = F2 at the point, relative to their size."""
+    f1, f2 = numbers.fields
+    size = float(np.linalg.norm(f1) + np.linalg.norm(f2))
+    return bool(np.linalg.norm(f1 - f2) <= tol * size)

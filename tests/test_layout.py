@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-LONGEST_FUNCTION = 70  # lines, from `def` to its last
+LONGEST_FUNCTION = 70  # lines, from `def` to its last, the docstring not counted
 
 # Words of the client. The bouncing ball is also a classic of the general theory (impacts that
 # accumulate), so nonsmooth/textbook may say those two words, and no others.
@@ -114,6 +114,8 @@ def test_no_function_is_longer_than_a_screen():
         for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 lines = node.end_lineno - node.lineno + 1
+                if ast.get_docstring(node, clean=False) is not None:
+                    lines -= node.body[0].end_lineno - node.body[0].lineno + 1
                 if lines > LONGEST_FUNCTION:
                     long.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.name}: {lines}")
     assert not long, "\n".join(long)

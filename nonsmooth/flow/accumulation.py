@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 
 #: Periods of the pattern of events that are tried (an impact 1, a crossing pair 2, a relay pair 4).
 _LAGS = (1, 2, 3, 4, 6)
@@ -44,7 +45,7 @@ def remaining_time(intervals: Sequence[float], patterns: Sequence[str], t: float
         blocks = [sum(tail[k : k + lag]) for k in range(0, need, lag)]
         if min(blocks) <= 0.0:
             continue
-        ratios = [b / a for a, b in zip(blocks, blocks[1:], strict=False)]
+        ratios = [b / a for a, b in pairwise(blocks)]
         r = ratios[-1]
         if max(ratios) < 0.9999 and max(ratios) - min(ratios) <= _SPREAD * (1.0 - r):
             left = blocks[-1] * r / (1.0 - r)

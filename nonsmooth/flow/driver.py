@@ -60,6 +60,7 @@ class Driver:
         self._last_event = self.t
         self._ended: tuple[Status, str] | None = None
         self._limit: float | None = None
+        self._due: int | None = None  # a reset to be served where the run stands
 
     # the loop ----------------------------------------------------------------------------------
 
@@ -72,6 +73,9 @@ class Driver:
         return self._trajectory()
 
     def _step(self) -> None:
+        if self._due is not None:
+            guard = self.stepper.guards(self.mode)[self._due]
+            return self._reset(guard.index, guard.name)
         left = self.options.t_end - self.t
         if left <= 0.0:
             return self._end(Status.REACHED_END, f"t_end = {self.options.t_end:g} reached.")
@@ -98,9 +102,7 @@ class Driver:
     def _advance(self, e: Expansion, coefficients: Array, dt: float) -> None:
         self.record.starts.append(self.t)
         self.record.coefficients.append(coefficients)
-        x = self.stepper.advance(
-            e if coefficients is e.states else _with(e, coefficients), dt
-        )
+        x = self.stepper.advance(e if coefficients is e.states else _with(e, coefficients), dt)
         self.t += dt
         if self.system.time_dependent:
             x[-1] = self.t
@@ -208,13 +210,17 @@ class Driver:
                 self.drops[row] = k if value > 0 else e.guards.shape[1]
 
     def _drop_zero_guards(self) -> None:
-        """A start on a stopping or resetting surface is not an event."""
+        """A start on a stopping surface is not an event; one pressed into a reset is."""
+        self._due = None
         if self._ended is not None:
             return
         e = self.stepper.expand(self.mode, self.x)
         for row, guard in enumerate(self.stepper.guards(self.mode)):
             if guard.kind in ("stop", "reset"):
-                self.drops[row] = self.stepper.leading(e, row, 0)[0]
+                k, value = self.stepper.leading(e, row, 0)
+                self.drops[row] = k
+                if guard.kind == "reset" and k > 0 and value * guard.side > 0.0:
+                    self._due = row
 
     def _adopt(self, continuation: Continuation) -> None:
         self._close_segment(continuation.mode)

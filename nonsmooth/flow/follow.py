@@ -85,7 +85,9 @@ def follow(
         max_step=max_step,
         max_steps=max_steps,
     )
-    ends = [until] if isinstance(until, str) or not isinstance(until, (list, tuple)) else list(until)
+    ends = (
+        [until] if isinstance(until, str) or not isinstance(until, (list, tuple)) else list(until)
+    )
     expressions = [u for u in ends if not isinstance(u, str)] + list(watch)
     motion = Followed(system, mode, expressions)
     names = [g.name for g in motion.guards]

@@ -14,12 +14,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 #: Halvings of the interval before two roots count as one that touches without crossing.
 _MAX_DEPTH = 52
+
+#: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
+_ROUNDING = 4 * 2.220446049250313e-16
 
 
 @lru_cache(maxsize=64)
@@ -66,7 +70,9 @@ def first_root(coefficients: Sequence[float], h: float) -> float | None:
         scaled.append(v * power)
     if c[0] > sum(abs(v) for v in scaled[1:]):
         return None
-    bernstein = (_to_bernstein(len(c) - 1) @ scaled).tolist()
+    # A touch that reaches zero only by rounding is no root: look for roots of p + noise.
+    noise = _ROUNDING * sum(abs(v) for v in scaled)
+    bernstein = (_to_bernstein(len(c) - 1) @ scaled + noise).tolist()
     return _first_in(c, bernstein, 0.0, h)
 
 
@@ -77,7 +83,7 @@ def _first_in(c: list[float], b: list[float], low: float, high: float) -> float 
         b, low, high, depth = pending.pop()
         if b[0] <= 0.0:
             return low
-        changes = sum((u > 0.0) != (v > 0.0) for u, v in zip(b, b[1:], strict=False))
+        changes = sum((u > 0.0) != (v > 0.0) for u, v in pairwise(b))
         if changes == 0:
             continue
         if changes == 1:

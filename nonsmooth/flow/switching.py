@@ -13,6 +13,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
+import numpy as np
+
 from ..model import Array, motion
 from .status import Status
 from .stepper import Expansion, Stepper
@@ -39,9 +41,7 @@ class Decision:
     message: str = ""
 
 
-def decide(
-    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
-) -> Decision:
+def decide(stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known) -> Decision:
     """Choose the motion that continues from a point of the surfaces ``active``.
 
     Parameters
@@ -74,7 +74,9 @@ def decide(
     if len(active) > 1:
         surfaces = " and ".join(f"h{i}" for i in active)
         return Decision(
-            None, Status.INTERSECTION, f"No motion with at most one sliding surface leaves {surfaces}."
+            None,
+            Status.INTERSECTION,
+            f"No motion with at most one sliding surface leaves {surfaces}.",
         )
     return Decision(
         None, Status.NON_UNIQUE, "No mode continues from here to rounding: a degenerate tangency."
@@ -115,12 +117,8 @@ def _finite_prefix(e: Expansion) -> Expansion:
     """Zero the coefficients that are not finite: they decide nothing."""
     states, guards = e.states.copy(), e.guards.copy()
     for c in (states, guards):
-        c[~_finite(c)] = 0.0
+        c[~np.isfinite(c)] = 0.0
     return Expansion(e.mode, states, guards, e.scales, e.gradient, False)
-
-
-def _finite(c: Array) -> Array:
-    return (c - c) == 0.0
 
 
 def _two_folds(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) -> list[int]:

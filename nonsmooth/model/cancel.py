@@ -46,6 +46,7 @@ class _Forms:
     def __init__(self) -> None:
         self.atoms: list[ca.SX] = []
         self._known: dict[Hashable, int] = {}
+        self._sums: dict[Hashable, list[list[float]]] = {}
 
     def atom(self, key: Hashable, expression: ca.SX) -> Sum:
         if key not in self._known:
@@ -73,9 +74,19 @@ class _Forms:
         rest = {_times(m, _inverse(common)): c for m, c in a.items()}
         lead = rest[min(rest)]
         rest = {m: c / lead for m, c in sorted(rest.items())}
-        atom = self.atom(("sum", tuple(rest.items())), self.expression(rest))
+        atom = self.atom(("sum", tuple(rest), self._like(rest)), self.expression(rest))
         ((monomial, _),) = atom.items()
         return lead, _times(common, monomial)
+
+    def _like(self, rest: Sum) -> int:
+        """Number the coefficients of a sum, the same number for those equal to rounding."""
+        known = self._sums.setdefault(tuple(rest), [])
+        values = list(rest.values())
+        for k, other in enumerate(known):
+            if all(abs(a - b) <= _ROUNDING * abs(b) for a, b in zip(values, other, strict=True)):
+                return k
+        known.append(values)
+        return len(known) - 1
 
     def multiply(self, a: Sum, b: Sum) -> Sum:
         if not a or not b:
@@ -120,7 +131,7 @@ def _normal_forms(
             value: Sum = {(): node.payload} if node.payload else {}  # type: ignore[dict-item]
             expression = ca.SX(node.payload)
         elif node.op == "input":
-            vector, position = node.payload  # type: ignore[misc]
+            vector, position = node.place
             expression = inputs[vector][position]
             value = forms.atom(("input", node.payload), expression)
         else:

@@ -52,6 +52,12 @@ class Node:
     args: tuple[int, ...]
     payload: Hashable = None
 
+    @property
+    def place(self) -> tuple[int, int]:
+        """Input vector and position of an ``input`` node."""
+        vector, position = self.payload  # type: ignore[misc]
+        return int(vector), int(position)
+
 
 def instructions(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
@@ -103,7 +109,7 @@ def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
     result: list[bool] = []
     for node in nodes:
         if node.op == "input":
-            result.append(variable[node.payload[0]])  # type: ignore[index]
+            result.append(variable[node.place[0]])
         else:
             result.append(any(result[a] for a in node.args))
     return result

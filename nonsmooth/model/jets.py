@@ -16,13 +16,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
+from typing import TypeAlias
 
 import casadi as ca
 
 from .errors import NotSmoothError
 from .graph import Node, depends_on, instructions
 
-Coefficient = ca.SX | None  # None is a structural zero
+Coefficient: TypeAlias = "ca.SX | None"  # None is a structural zero
 
 
 def taylor(
@@ -49,8 +50,9 @@ def taylor(
     Examples
     --------
     >>> x, p = ca.SX.sym("x"), ca.SX.sym("p", 0)
-    >>> taylor(x, x**2, x, p, 2)[1]  # (e^t x)^2 = x^2 + 2 x^2 t + 2 x^2 t^2
-    SX([[sq(x), (2*sq(x)), (sq(x)+((0.5*x)*(x+x)))]])
+    >>> jet = taylor(x, x**2, x, p, 2)[1]  # (x e^t)^2 = x^2 (1 + 2 t + 2 t^2 + ...)
+    >>> ca.Function("jet", [x, p], [jet])(3.0, [])
+    DM([[9, 18, 18]])
     """
     n, m = rhs.numel(), functions.numel()
     expansion = _Expansion(states, others, [rhs, functions])
@@ -163,7 +165,7 @@ class _Expansion:
             value = None if node.payload == 0 else ca.SX(node.payload)
             return self._new(lambda k: value if k == 0 else None)
         if node.op == "input":
-            vector, position = node.payload  # type: ignore[misc]
+            vector, position = node.place
             if vector == 0:
                 return self._new(lambda k: self._states[position])
             symbol = self._inputs[vector][position]
@@ -269,13 +271,9 @@ class _Expansion:
 
     def _affine(self, u: _Series, offset: float, factor: float = 1.0) -> _Series:
         """Offset + factor*u."""
-        return self._new(
-            lambda k: _add(ca.SX(offset) if k == 0 else None, _scale(u.c[k], factor))
-        )
+        return self._new(lambda k: _add(ca.SX(offset) if k == 0 else None, _scale(u.c[k], factor)))
 
-    def _integral(
-        self, op: str, u: _Series, factor: list[_Series], sign: float = 1.0
-    ) -> _Series:
+    def _integral(self, op: str, u: _Series, factor: list[_Series], sign: float = 1.0) -> _Series:
         """w = op(u) with w' = sign*g*u'; the caller puts g, which may need w, into ``factor``."""
 
         def recurrence(k: int) -> Coefficient:

@@ -157,10 +157,10 @@ class Evaluator:
         ]
         for k, value in enumerate((self._x, self._p)):
             if value.size:
-                self._buffer.set_arg(k, memoryview(value))
+                self._buffer.set_arg(k, value.data)
         for k, result in enumerate(self.outputs):
             if result.size:
-                self._buffer.set_res(k, memoryview(result.reshape(-1, order="F")))
+                self._buffer.set_res(k, result.reshape(-1, order="F").data)
 
     def __call__(self, x: Array, p: Array) -> list[Array]:
         """Evaluate; the returned arrays are overwritten by the next call."""
@@ -185,7 +185,9 @@ class Followed(Motion):
         super().__init__(system, mode)
         own = [Guard("zero", k, 0, g.name) for k, g in enumerate(self.guards)]
         more = [Guard("zero", len(own) + k, 0, f"f{k}") for k in range(len(watched))]
-        expressions = [read_function(system, w, f"watched function {k}") for k, w in enumerate(watched)]
+        expressions = [
+            read_function(system, w, f"watched function {k}") for k, w in enumerate(watched)
+        ]
         self.guards = (*own, *more)
         self.functions = ca.densify(ca.vertcat(self.functions, *expressions))
         inputs = [system.extended_states, system.parameter_symbols]

@@ -153,7 +153,8 @@ class FilippovSystem:
         guards = [_column([s.function], f"stop {s.name!r}", 1) for s in stops]
         guards += [_column([r.function], f"reset {r.name!r}", 1) for r in resets]
         maps = [_column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
-        for item in (*stops, *resets):
+        items: list[Stop | Reset] = [*stops, *resets]
+        for item in items:
             if item.direction not in _DIRECTIONS:
                 raise DefinitionError(
                     f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
@@ -222,7 +223,9 @@ class FilippovSystem:
                 )
 
     def __repr__(self) -> str:
-        parts = [f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"]
+        parts = [
+            f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
+        ]
         parts.append(f"{self.surface_count} surface{'s' * (self.surface_count != 1)}")
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
@@ -366,11 +369,17 @@ class FilippovSystem:
         >>> s.lie_derivative("+"), s.lie_derivative("++"), s.lie_derivative("+-")
         (SX((-y)), SX(-1), SX(2))
         """
+        key = ("lie", tuple(fields), surface)
+        if of is None and key in self._functions:
+            return self._functions[key]
         expression = self.surface_function(surface) if of is None else ca.SX(of)
         for mode in reversed(list(fields)):
             gradient = ca.jacobian(expression, self.extended_states)
             expression = ca.mtimes(gradient, self.field(mode))
-        return ca.simplify(expression)
+        expression = ca.simplify(expression)
+        if of is None:
+            self._functions[key] = expression
+        return expression
 
     def gradient(self, expression: Expression) -> ca.SX:
         """Derivatives of a scalar with respect to the states, then time if it depends on it.
@@ -434,11 +443,19 @@ class FilippovSystem:
         3.0
         """
         values, p = self.extended_point(point, t), self.parameter_vector(parameters)
-        expression = ca.SX(expression)
-        _no_foreign_symbols(
-            expression, ca.vertcat(self.extended_states, self._p), "expression", self
-        )
-        return np.array(self.function(("expression", expression), lambda: [expression])(values, p))
+        return np.array(self._function_of(ca.densify(ca.SX(expression)))(values, p))
+
+    def _function_of(self, expression: ca.SX) -> ca.Function:
+        """Return the function of an expression, the same for the same expression object."""
+        entries = ca.vertsplit(ca.vec(expression)) if expression.numel() else []
+        key = ("expression", expression.shape, tuple(e.element_hash() for e in entries))
+        if key not in self._functions:
+            known = ca.vertcat(self.extended_states, self._p)
+            _no_foreign_symbols(expression, known, "expression", self)
+            # The expression stays alive beside its function: hashes are those of live nodes.
+            self._functions["alive", key] = expression
+            self.function(key, lambda: [expression])
+        return self._functions[key]
 
     def parameter_vector(self, parameters: Parameters | None = None) -> Array:
         """Numbers for all parameters, defaults replaced by ``parameters`` (keys: symbols or names).
@@ -641,7 +658,9 @@ def _two_fields(
                 "definition",
                 expected="above= and below= with one surface=, or field= with multipliers= and "
                 "surfaces=",
-                received="a mixture of the two forms" if h.numel() == 1 else f"{h.numel()} surfaces",
+                received="a mixture of the two forms"
+                if h.numel() == 1
+                else f"{h.numel()} surfaces",
                 advice="Two fields belong to exactly one surface.",
             )
         )
@@ -675,9 +694,7 @@ def _unique(symbols: ca.SX) -> None:
         )
 
 
-def _no_foreign_symbols(
-    expression: ca.SX, known: ca.SX, what: str, system: FilippovSystem
-) -> None:
+def _no_foreign_symbols(expression: ca.SX, known: ca.SX, what: str, system: FilippovSystem) -> None:
     present = ca.symvar(expression)
     listed = ca.vertsplit(known)
     foreign = [s for s in present if not any(ca.is_equal(s, k) for k in listed)]

@@ -1,0 +1,60 @@
+"""One mode's flow is followed both ways in time, and its event functions are reported."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+import nonsmooth as ns
+
+x, y, t, lam = (ca.SX.sym(s) for s in ("x", "y", "t", "lam"))
+PARABOLA = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[1, 1])
+
+
+def test_backward_along_a_parabola_to_the_surface():
+    run = ns.follow(PARABOLA, [2.0, 0.0], -10.0, mode="+", until="h0", tol=1e-13)
+    assert run.status is ns.Status.STOPPED
+    assert run.t[-1] == pytest.approx(-4.0, abs=1e-12)
+    np.testing.assert_allclose(run.x[-1], [-2.0, 0.0], atol=1e-12)
+    np.testing.assert_allclose(run(-2.0), [0.0, 2.0], atol=1e-12)
+
+
+def test_no_switching_and_every_zero_is_reported():
+    run = ns.follow(PARABOLA, [-2.0, 0.0], 10.0, mode="+", watch=[x, x - 5])
+    assert run.itinerary == "+"
+    assert [(e.name, round(e.t, 9)) for e in run.events if e.kind == "zero"] == [
+        ("f0", 2.0),
+        ("h0", 4.0),
+        ("f1", 7.0),
+    ]
+
+
+def test_off_the_surface_the_sliding_field_keeps_its_level():
+    run = ns.follow(PARABOLA, [2.0, 1.0], 3.0, mode="s", until=[x - 3])
+    np.testing.assert_allclose(run.x[-1], [3.0, 1.0], atol=1e-12)
+
+
+@given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 5.0), st.sampled_from("+-s"))
+def test_forward_then_backward_is_the_identity(a, b, span, mode):
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[y, -ca.sin(x) - lam * (1 + 0.2 * ca.cos(t))],
+        multipliers=lam,
+        surface=y,
+        time=t,
+    )
+    there = ns.follow(system, [a, b], span, mode=mode, tol=1e-12)
+    back = ns.follow(system, there.x[-1], 0.0, t_start=span, mode=mode, tol=1e-12)
+    np.testing.assert_allclose(back.x[-1], [a, b], atol=1e-9)
+
+
+def test_wrong_requests_are_refused():
+    with pytest.raises(ns.OptionError, match=r"until: expected a name among \['h0'\]"):
+        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until="h7")
+    with pytest.raises(ns.DefinitionError, match="mode"):
+        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="up")
+    with pytest.raises(ns.DefinitionError, match=r"also \['q'\]"):
+        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", watch=[ca.SX.sym("q")])
+    with pytest.raises(ns.NotSmoothError):
+        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until=[ca.fabs(x)])

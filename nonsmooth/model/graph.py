@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
+from typing import cast
 
 import casadi as ca
 
@@ -55,8 +56,7 @@ class Node:
     @property
     def place(self) -> tuple[int, int]:
         """Input vector and position of an ``input`` node."""
-        vector, position = self.payload  # type: ignore[misc]
-        return int(vector), int(position)
+        return cast("tuple[int, int]", self.payload)
 
 
 def instructions(

@@ -1,0 +1,145 @@
+"""The rows of the tables: claims, errata and equations, each with the checks that back it."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+AGREES = "agrees"
+CORRECTED = "corrected"
+NOT_CHECKABLE = "not checkable"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One computed fact.
+
+    Attributes
+    ----------
+    what : str
+        The fact, with the number computed.
+    holds : bool
+    """
+
+    what: str
+    holds: bool
+
+    def __str__(self) -> str:
+        return self.what if self.holds else f"FAILS: {self.what}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper and what computing it gives.
+
+    Attributes
+    ----------
+    id : str
+    place : str
+        Section and equation label.
+    statement : str
+        What the paper states.
+    value : str
+        What this code finds.
+    verdict : str
+        ``agrees``, ``corrected`` or ``not checkable``.
+    errata : tuple of int
+        Numbers of the errata that apply.
+    how : str
+        How it was computed.
+    checks : tuple of Check
+        All hold, or the row is not to be believed.
+    """
+
+    id: str
+    place: str
+    statement: str
+    value: str
+    verdict: str
+    how: str
+    checks: tuple[Check, ...]
+    errata: tuple[int, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether every check behind the verdict holds."""
+        return all(c.holds for c in self.checks)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {**asdict(self), "holds": self.holds}
+
+
+@dataclass(frozen=True)
+class Erratum:
+    """A misprint or error, what is correct, and the computation that shows both.
+
+    Attributes
+    ----------
+    number : int
+    place : str
+    printed, correct : str
+    checks : tuple of Check
+        Facts that show the printed form wrong and the corrected one right.
+    """
+
+    number: int
+    place: str
+    printed: str
+    correct: str
+    checks: tuple[Check, ...]
+
+    @property
+    def confirmed(self) -> bool:
+        """Whether every check holds."""
+        return all(c.holds for c in self.checks)
+
+    @property
+    def verdict(self) -> str:
+        """``confirmed`` or ``not confirmed``."""
+        return "confirmed" if self.confirmed else "not confirmed"
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {**asdict(self), "verdict": self.verdict}
+
+
+@dataclass(frozen=True)
+class Equation:
+    """A displayed equation and its check.
+
+    Attributes
+    ----------
+    number : int
+        Order of appearance among the displayed equations, unnumbered ones included.
+    label : str
+        The paper's label, or a few words.
+    content : str
+    verdict : str
+        ``agrees``, ``corrected``, ``definition`` (nothing to compute) or ``assumption``.
+    checks : tuple of Check
+    errata : tuple of int
+    """
+
+    number: int
+    label: str
+    content: str
+    verdict: str
+    checks: tuple[Check, ...] = ()
+    errata: tuple[int, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether every check holds."""
+        return all(c.holds for c in self.checks)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {**asdict(self), "holds": self.holds}
+
+
+def close(what: str, value: float, expected: float, tolerance: float) -> Check:
+    """Check that a number is ``expected`` within ``tolerance``; the text shows both."""
+    return Check(
+        f"{what} = {value:.12g} (expected {expected:.12g})", abs(value - expected) <= tolerance
+    )

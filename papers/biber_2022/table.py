@@ -1,0 +1,92 @@
+"""Table ics recomputed from its own dimensional entries, with the rounding of both sides."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from decimal import Decimal
+from pathlib import Path
+
+DATA = Path(__file__).parent / "data" / "table_ics.json"
+
+
+@dataclass(frozen=True)
+class Row:
+    """One entry of the table.
+
+    Attributes
+    ----------
+    surface, quantity, unit : str
+    dimensional, printed : str
+        As in the paper.
+    computed : float
+        In 1/s (velocity over radius) or rad/s.
+    radius : tuple of float or None
+        Ball radii in mm for which both printed roundings are right; None for spins.
+    consistent : bool
+        Whether the two printed numbers agree, within their roundings, for the stated radius.
+    fits_all : bool
+        Whether they agree for the radius that suits most entries (spins: at all).
+    """
+
+    surface: str
+    quantity: str
+    unit: str
+    dimensional: str
+    printed: str
+    computed: float
+    radius: tuple[float, float] | None
+    consistent: bool
+    fits_all: bool
+
+
+def rounding_interval(text: str, figures: int = 3) -> tuple[float, float]:
+    """Numbers that round to ``text`` at the given number of significant figures."""
+    value = Decimal(text)
+    half = Decimal(5).scaleb(value.adjusted() - figures)
+    return float(value - half), float(value + half)
+
+
+def _radius_interval(dimensional: str, printed: str) -> tuple[float, float]:
+    low, high = sorted(abs(v) for v in rounding_interval(dimensional))
+    least, most = sorted(abs(v) for v in rounding_interval(printed))
+    return 1e3 * low / most, 1e3 * high / least
+
+
+def _deepest(intervals: list[tuple[float, float]]) -> float:
+    """Return a radius in as many of the intervals as possible."""
+    points = sorted(x for interval in intervals for x in interval)
+    middles = [(a + b) / 2 for a, b in zip(points, points[1:], strict=False)]
+    return max(middles, key=lambda r: sum(a <= r <= b for a, b in intervals))
+
+
+def recomputed() -> list[Row]:
+    """Recompute every entry.
+
+    Returns
+    -------
+    list of Row
+    """
+    data = json.loads(DATA.read_text())
+    radius = float(data["radius_mm"])
+    speeds = [r for r in data["rows"] if r["unit"] == "m/s"]
+    common = _deepest([_radius_interval(r["dimensional"], r["printed"]) for r in speeds])
+    rows = []
+    for r in data["rows"]:
+        value = float(r["dimensional"])
+        low, high = rounding_interval(r["printed"])
+        if r["unit"] == "m/s":
+            interval = _radius_interval(r["dimensional"], r["printed"])
+            computed = 1e3 * value / radius
+            consistent = interval[0] <= radius <= interval[1]
+            fits = interval[0] <= common <= interval[1]
+        else:
+            interval = None
+            computed = value * math.pi / 30
+            ends = [v * math.pi / 30 for v in rounding_interval(r["dimensional"])]
+            consistent = fits = ends[0] <= high and low <= ends[1]
+        rows.append(
+            Row(**r, computed=computed, radius=interval, consistent=consistent, fits_all=fits)
+        )
+    return rows

@@ -88,13 +88,14 @@ class Motion:
         difference = ca.jacobian(field, lam)
         gradient = ca.jacobian(system.surface_function(i), system.extended_states)
         a = ca.simplify(ca.mtimes(gradient, middle))
-        b = ca.simplify(ca.mtimes(gradient, difference))
         entries = ca.vertsplit(ca.densify(difference))
+        # A factor of G is one of b = grad h . G too, and there it may no longer be in sight.
         reduced, factor = cancel_common_factor(
-            [*entries, ca.densify(b)], system.extended_states, system.parameter_symbols
+            entries, system.extended_states, system.parameter_symbols
         )
         self.cancelled = bool(ca.depends_on(factor, system.extended_states))
-        return middle - (a / reduced[-1]) * ca.vertcat(*reduced[:-1])
+        b = ca.simplify(ca.mtimes(gradient, ca.vertcat(*reduced)))
+        return middle - (a / b) * ca.vertcat(*reduced)
 
     def _guards(self) -> tuple[tuple[Guard, ...], ca.SX]:
         system = self.system

@@ -1,0 +1,78 @@
+"""The textbook on the command line: ``python -m nonsmooth list`` and ``show NAME``."""
+
+from __future__ import annotations
+
+import argparse
+import importlib
+import sys
+from collections.abc import Sequence
+from pathlib import Path
+
+from .model import NonsmoothError
+from .textbook import PROBLEMS, Problem, by_name
+
+
+def _parser() -> argparse.ArgumentParser:
+    parser = argparse.ArgumentParser(
+        prog="python -m nonsmooth", description="Textbook problems of nonsmooth dynamics."
+    )
+    verbs = parser.add_subparsers(dest="verb", required=True)
+    verbs.add_parser("list", help="names and titles of the problems")
+    show = verbs.add_parser("show", help="a problem: system, start, known values, one run")
+    show.add_argument("name", help="a name from the list")
+    show.add_argument("--out", type=Path, help="draw the run into this file (.png, .svg, .pdf)")
+    return parser
+
+
+def _draw(problem: Problem, path: Path) -> None:
+    plot = importlib.import_module("nonsmooth.plot")  # matplotlib is slow to import
+    plot.trajectory(problem.run()).savefig(path)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command; the exit status is 0, or 2 for a mistake in it.
+
+    Parameters
+    ----------
+    arguments : sequence of str, optional
+        Those of the command line by default.
+
+    Returns
+    -------
+    int
+
+    Examples
+    --------
+    >>> main(["show", "scalar_sliding"])
+    scalar_sliding: Scalar system that slides at 0
+      source: classical; closed form
+      FilippovSystem(1 state: x; 1 surface)
+      start: x = -1; until t = 1
+      - switch time: 0.3333333333333333 (to 1e-09; time of the entry)
+      - end: 0 (to 1e-09; x at t_end, sliding)
+      - alpha: 0.25 (to 1e-09; weight of the field below while sliding)
+      run: Trajectory(t = 0 .. 1, 3 points, 2 events, itinerary '- s', REACHED_END)
+      t_end = 1 reached. The run reached t_end.
+    0
+    """
+    given = _parser().parse_args(arguments)
+    if given.verb == "list":
+        width = max(map(len, PROBLEMS))
+        for name, make in PROBLEMS.items():
+            print(f"{name:{width}}  {make().title}")
+        return 0
+    try:
+        problem = by_name(given.name)
+        run = problem.run()
+        print(problem, f"  run: {run!r}", f"  {run.message}", sep="\n")
+        if given.out:
+            _draw(problem, given.out)
+            print(f"  drawn: {given.out}")
+    except (NonsmoothError, OSError, ValueError) as error:
+        print(error, file=sys.stderr)
+        return 2
+    return 0
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

@@ -1,0 +1,116 @@
+"""Named systems with known answers: problems that every method for nonsmooth systems must solve.
+
+Each function returns a :class:`Problem`: system, parameters, start, end time, and the values known
+for it as :class:`Reference`. The top floor of ``nonsmooth``: tests and the manual read from it.
+
+>>> import nonsmooth.textbook as textbook
+>>> problem = textbook.bouncing_ball()
+>>> problem["first impact"].agrees(problem.run().events[0].t)
+True
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from types import MappingProxyType
+
+from ..model import OptionError, explain
+from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
+from .impacts import bouncing_ball, impact_oscillator, kelvin_voigt_bounce
+from .models import harvested_prey_predator, state_dependent_jump, welander_box
+from .planar import (
+    piecewise_cycle,
+    planar_relay,
+    pseudo_hopf,
+    scalar_repelling,
+    scalar_sliding,
+    spiral_oscillator,
+)
+from .problem import Problem, Reference
+from .several_surfaces import ambiguous_exit, hidden_dynamics, two_relay_spiral
+from .two_folds import TWO_FOLDS, two_fold
+
+__all__ = [
+    "PROBLEMS",
+    "TWO_FOLDS",
+    "Problem",
+    "Reference",
+    "ambiguous_exit",
+    "bouncing_ball",
+    "by_name",
+    "dry_friction",
+    "harvested_prey_predator",
+    "hidden_dynamics",
+    "impact_oscillator",
+    "kelvin_voigt_bounce",
+    "leine_stick_slip",
+    "piecewise_cycle",
+    "planar_relay",
+    "pseudo_hopf",
+    "scalar_repelling",
+    "scalar_sliding",
+    "spiral_oscillator",
+    "state_dependent_jump",
+    "stick_slip_exponential",
+    "two_fold",
+    "two_relay_spiral",
+    "welander_box",
+]
+
+_FUNCTIONS: tuple[Callable[[], Problem], ...] = (
+    dry_friction,
+    spiral_oscillator,
+    leine_stick_slip,
+    scalar_sliding,
+    scalar_repelling,
+    two_relay_spiral,
+    bouncing_ball,
+    harvested_prey_predator,
+    welander_box,
+    planar_relay,
+    pseudo_hopf,
+    stick_slip_exponential,
+    state_dependent_jump,
+    impact_oscillator,
+    ambiguous_exit,
+    hidden_dynamics,
+    kelvin_voigt_bounce,
+    piecewise_cycle,
+    two_fold,
+)
+
+#: Every problem by name, in the order of the catalogue.
+PROBLEMS = MappingProxyType({f.__name__: f for f in _FUNCTIONS})
+
+
+def by_name(name: str) -> Problem:
+    """Build the problem of a name.
+
+    Parameters
+    ----------
+    name : str
+        One of ``PROBLEMS``.
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    OptionError
+
+    Examples
+    --------
+    >>> by_name("dry_friction").start
+    (3.0, 0.0)
+    """
+    if name not in PROBLEMS:
+        raise OptionError(
+            explain(
+                "name",
+                expected=f"one of {', '.join(PROBLEMS)}",
+                received=repr(name),
+                advice="`python -m nonsmooth list` prints them with their titles.",
+            )
+        )
+    return PROBLEMS[name]()

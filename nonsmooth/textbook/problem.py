@@ -1,0 +1,227 @@
+"""A textbook problem and its reference values: what a test or a page of the manual reads."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from decimal import Decimal
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..flow import Trajectory, simulate
+from ..model import Array, FilippovSystem, OptionError, explain
+
+#: Values are compared to nine digits, or to their own if they have fewer.
+RELATIVE = 1e-9
+
+
+def _nothing() -> Mapping[str, float]:
+    return MappingProxyType({})
+
+
+@dataclass(frozen=True, eq=False)
+class Reference:
+    """A known number of a problem.
+
+    Attributes
+    ----------
+    quantity : str
+        Unique within its problem.
+    value : float or tuple of float
+    tolerance : float
+        Largest error relative to each value; absolute where the value is 0.
+    how : str
+        How to compute it and what to compare.
+    at : mapping
+        Parameters or states of the start, by name, that replace those of the problem.
+    """
+
+    quantity: str
+    value: float | tuple[float, ...]
+    tolerance: float
+    how: str
+    at: Mapping[str, float] = field(default_factory=_nothing)
+
+    def error(self, computed: ArrayLike) -> float:
+        """Return the largest relative error of a computed value (absolute where the value is 0).
+
+        Parameters
+        ----------
+        computed : float or array_like
+
+        Examples
+        --------
+        >>> Reference("period", 2.0, 1e-9, "time between crossings").error(2.1)
+        0.050000000000000044
+        """
+        known = np.atleast_1d(np.asarray(self.value, dtype=float))
+        found = np.atleast_1d(np.asarray(computed, dtype=float))
+        if found.shape != known.shape:
+            raise OptionError(
+                explain(
+                    self.quantity,
+                    expected=f"shape {known.shape}",
+                    received=f"shape {found.shape}",
+                    advice="Compare like with like; `how` says what the value is.",
+                )
+            )
+        scale = np.where(known == 0.0, 1.0, np.abs(known))
+        return float(np.max(np.abs(found - known) / scale))
+
+    def agrees(self, computed: ArrayLike) -> bool:
+        """Whether a computed value is within the tolerance.
+
+        Examples
+        --------
+        >>> Reference("period", 2.0, 1e-9, "time between crossings").agrees(2 + 1e-10)
+        True
+        """
+        return self.error(computed) <= self.tolerance
+
+    def __str__(self) -> str:
+        values = self.value if isinstance(self.value, tuple) else (self.value,)
+        numbers = ", ".join(f"{v:.16g}" for v in values)
+        where = "".join(f", {name} = {value:g}" for name, value in self.at.items())
+        return f"{self.quantity}{where}: {numbers} (to {self.tolerance:.0e}; {self.how})"
+
+
+def stated(
+    quantity: str, how: str, *digits: str, at: Mapping[str, float] | None = None
+) -> Reference:
+    """Reference from decimal digits; few digits make the tolerance wider than 1e-9.
+
+    Parameters
+    ----------
+    quantity, how : str
+        See :class:`Reference`.
+    *digits : str
+        One number for each component, as printed in the source.
+    at : mapping, optional
+
+    Examples
+    --------
+    >>> stated("slope", "by differences", ".06665833").tolerance
+    7.500937...e-08
+    """
+    numbers = [Decimal(d) for d in digits]
+    tolerance = RELATIVE
+    for text, number in zip(digits, numbers, strict=True):
+        exponent = number.as_tuple().exponent
+        if number and "." in text and isinstance(exponent, int):
+            if len(number.as_tuple().digits) > 6:  # short ones, such as 1.4, are exact
+                tolerance = max(tolerance, float(Decimal((0, (5,), exponent - 1)) / abs(number)))
+    values = tuple(float(n) for n in numbers)
+    return Reference(
+        quantity,
+        values[0] if len(values) == 1 else values,
+        tolerance,
+        how,
+        MappingProxyType(dict(at or {})),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Problem:
+    """A named system with a start and its known answers.
+
+    Attributes
+    ----------
+    name : str
+        Of the function that makes it.
+    title : str
+    source : str
+    system : FilippovSystem
+    parameters : mapping
+        Names and values; the defaults of the system.
+    start : tuple of float
+    t_end : float
+    references : tuple of Reference
+    note : str
+        What is special or uncertain, e.g. parameters quoted from memory.
+    """
+
+    name: str
+    title: str
+    source: str
+    system: FilippovSystem
+    parameters: Mapping[str, float]
+    start: tuple[float, ...]
+    t_end: float
+    references: tuple[Reference, ...]
+    note: str = ""
+
+    def __getitem__(self, quantity: str) -> Reference:
+        """Return the reference of a quantity."""
+        for reference in self.references:
+            if reference.quantity == quantity:
+                return reference
+        raise KeyError(f"{quantity!r}: {self.name} has {[r.quantity for r in self.references]}")
+
+    def start_at(self, values: Mapping[str, float]) -> tuple[Array, dict[str, float]]:
+        """Return start (n,) and parameters with some of them, or of the states, replaced.
+
+        Parameters
+        ----------
+        values : mapping
+            Names of parameters or states, as in ``Reference.at``.
+        """
+        x, p = np.array(self.start, dtype=float), dict(self.parameters)
+        for name, value in values.items():
+            if name in self.system.state_names:
+                x[self.system.state_names.index(name)] = value
+            else:
+                p[name] = float(value)
+        return x, p
+
+    def run(
+        self, at: Mapping[str, float] | None = None, *, t_end: float | None = None, **options: Any
+    ) -> Trajectory:
+        """Simulate the problem from its start.
+
+        Parameters
+        ----------
+        at : mapping, optional
+            Parameters or states that replace the problem's.
+        t_end : float, optional
+        **options
+            As in :func:`nonsmooth.simulate`.
+
+        Returns
+        -------
+        Trajectory
+        """
+        x, p = self.start_at(at or {})
+        end = self.t_end if t_end is None else t_end
+        return simulate(self.system, x, end, parameters=p, **options)
+
+    def __str__(self) -> str:
+        lines = [f"{self.name}: {self.title}", f"  source: {self.source}", f"  {self.system!r}"]
+        if self.parameters:
+            text = ", ".join(f"{n} = {v:.12g}" for n, v in self.parameters.items())
+            lines.append(f"  parameters: {text}")
+        names = zip(self.system.state_names, self.start, strict=True)
+        start = ", ".join(f"{n} = {v:.12g}" for n, v in names)
+        lines.append(f"  start: {start}; until t = {self.t_end:g}")
+        if self.note:
+            lines.append(f"  note: {self.note}")
+        return "\n".join(lines + [f"  - {r}" for r in self.references])
+
+
+def problem(
+    name: str,
+    system: FilippovSystem,
+    start: tuple[float, ...],
+    t_end: float,
+    references: tuple[Reference, ...],
+    *,
+    title: str,
+    source: str,
+    note: str = "",
+) -> Problem:
+    """Build a problem whose parameters are the defaults of its system."""
+    values = system.parameter_vector().tolist()
+    parameters = MappingProxyType(dict(zip(system.parameter_names, values, strict=True)))
+    return Problem(name, title, source, system, parameters, start, t_end, references, note)

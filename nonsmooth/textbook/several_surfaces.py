@@ -1,0 +1,164 @@
+"""Systems with more than one surface, and what Filippov's convention leaves open there."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..model import FilippovSystem
+from .problem import Problem, problem, stated
+
+
+def two_relay_spiral() -> Problem:
+    """Infinitely many switches on the way to the origin (Zeno).
+
+    x1' = -s1 + 2 s2, x2' = -2 s1 - s2, s_i = sgn x_i: abs(x1) + abs(x2) falls at rate 2. From
+    (1, 0.5) the switches are at 1/6, 5/9, 37/54, 59/81, ... and the orbit reaches 0 at t = 3/4.
+
+    Returns
+    -------
+    Problem
+
+    Notes
+    -----
+    Source: Filippov 1988; closed form.
+
+    Examples
+    --------
+    >>> run = two_relay_spiral().run()
+    >>> run.status.name, round(run.accumulation_time, 9)
+    ('ACCUMULATION', 0.75)
+    """
+    x1, x2, s1, s2 = (ca.SX.sym(s) for s in ("x1", "x2", "s1", "s2"))
+    system = FilippovSystem(
+        [x1, x2], surfaces=[x1, x2], multipliers=[s1, s2], field=[-s1 + 2 * s2, -2 * s1 - s2]
+    )
+    return problem(
+        "two_relay_spiral",
+        system,
+        (1.0, 0.5),
+        2.0,
+        (
+            stated(
+                "switch times 1 to 4",
+                "times of the first four crossings: 1/6, 5/9, 37/54, 59/81",
+                ".16666666666666666667",
+                ".55555555555555555556",
+                ".68518518518518518519",
+                ".72839506172839506173",
+            ),
+            stated("accumulation time", "Trajectory.accumulation_time", ".75"),
+        ),
+        title="Filippov's spiral of two relays",
+        source="Filippov 1988; closed form",
+    )
+
+
+def ambiguous_exit() -> Problem:
+    """Sliding on the intersection of two surfaces whose exit Filippov's set leaves open.
+
+    x1' = -s1 + x3/2, x2' = -s2 + x3/4, x3' = 1 + s1 s2/2 from 0. On x1 = x2 = 0 the multipliers are
+    x3/2 and x3/4; x1 = 0 is left when x3 = 2. With the bilinear law x3' = 1 + x3^2/16, so at
+    t = 4 atan(1/2). The convex hull of the four fields allows x3' from 1/2 + 3 x3/8 to
+    3/2 - x3/8, so any time from 8 log(6/5) to (8/3) log(5/2).
+
+    Returns
+    -------
+    Problem
+
+    Notes
+    -----
+    Source: derived for this library; the bilinear law is the canopy of Jeffrey 2014, SIAM J. Appl.
+    Dyn. Syst. 13, 1082-1105. Sliding on intersections is not built: a run ends at t = 0 with
+    INTERSECTION.
+
+    Examples
+    --------
+    >>> run = ambiguous_exit().run()
+    >>> run.status.name, float(run.t[-1])
+    ('INTERSECTION', 0.0)
+    """
+    x1, x2, x3, s1, s2 = (ca.SX.sym(s) for s in ("x1", "x2", "x3", "s1", "s2"))
+    system = FilippovSystem(
+        [x1, x2, x3],
+        surfaces=[x1, x2],
+        multipliers=[s1, s2],
+        field=[-s1 + x3 / 2, -s2 + x3 / 4, 1 + s1 * s2 / 2],
+    )
+    return problem(
+        "ambiguous_exit",
+        system,
+        (0.0, 0.0, 0.0),
+        3.0,
+        (
+            stated(
+                "exit time, bilinear",
+                "time at which x1 = 0 is left: 4 atan(1/2)",
+                "1.85459043600322446",
+            ),
+            stated(
+                "exit times allowed",
+                "over the convex hull: 8 log(6/5) and (8/3) log(5/2)",
+                "1.45857245435163701",
+                "2.44344195166441351",
+            ),
+        ),
+        title="Exit of codimension two that is ambiguous",
+        source="derived for this library; bilinear law after Jeffrey 2014",
+        note="needs sliding on intersections, which is not built",
+    )
+
+
+def hidden_dynamics(*, nonlinear: bool = False) -> Problem:
+    """Sliding whose speed depends on what happens inside the switch.
+
+    x1' = -lam + b, x2' = 2 lam^2 - 1: off the surface x1 = 0 lam^2 = 1 and x2' = 1. Filippov's
+    convex combination of the two fields slides with x2' = 1, but the nonlinear law keeps
+    lam = b on the surface and gives x2' = 2 b^2 - 1.
+
+    Parameters
+    ----------
+    nonlinear : bool
+        Define it with the nonlinear multiplier instead of the two fields.
+
+    Returns
+    -------
+    Problem
+
+    Raises
+    ------
+    DefinitionError
+        With ``nonlinear``: hidden dynamics are not built.
+
+    Notes
+    -----
+    Source: Jeffrey 2018, Hidden Dynamics.
+
+    Examples
+    --------
+    >>> float(hidden_dynamics().run().x[-1, 1])
+    1.0
+    """
+    x1, x2, lam, b = (ca.SX.sym(s) for s in ("x1", "x2", "lam", "b"))
+    if nonlinear:
+        law = [-lam + b, 2 * lam**2 - 1]
+        system = FilippovSystem(
+            [x1, x2], surface=x1, multipliers=lam, field=law, parameters={b: 0.2}
+        )
+    else:
+        system = FilippovSystem(
+            [x1, x2], surface=x1, above=[b - 1, 1], below=[b + 1, 1], parameters={b: 0.2}
+        )
+    return problem(
+        "hidden_dynamics",
+        system,
+        (0.0, 0.0),
+        1.0,
+        (
+            stated("x2' off the surface", "second component of either field", "1"),
+            stated("x2' sliding, linear", "sliding field of the two fields", "1"),
+            stated("x2' sliding, nonlinear", "2 lam^2 - 1 at lam = b", "-.92"),
+        ),
+        title="Hidden dynamics",
+        source="Jeffrey 2018",
+        note="the nonlinear law needs hidden dynamics, which are not built",
+    )

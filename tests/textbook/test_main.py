@@ -1,0 +1,47 @@
+"""`python -m nonsmooth` lists and shows the textbook, draws a run, and refuses an unknown name."""
+
+import subprocess
+import sys
+
+import pytest
+
+from nonsmooth import textbook
+from nonsmooth.__main__ import main
+
+
+def test_list_names_every_problem(capsys):
+    assert main(["list"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert [line.split()[0] for line in lines] == list(textbook.PROBLEMS)
+    assert all(len(line.split()) > 2 for line in lines)
+
+
+@pytest.mark.parametrize("name", textbook.PROBLEMS)
+def test_show_prints_values_and_status(name, capsys):
+    assert main(["show", name]) == 0
+    out = capsys.readouterr().out
+    assert out.startswith(f"{name}: ")
+    for reference in textbook.by_name(name).references:
+        assert reference.quantity in out
+    assert "run: Trajectory(" in out
+
+
+def test_show_draws(tmp_path, capsys):
+    plot = pytest.importorskip("nonsmooth.plot", reason="pictures are another floor")
+    if "trajectory" not in dir(plot):
+        pytest.skip("nonsmooth.plot draws no trajectory yet")
+    target = tmp_path / "run.png"
+    assert main(["show", "dry_friction", "--out", str(target)]) == 0
+    assert target.read_bytes()[:4] == b"\x89PNG"
+
+
+def test_unknown_name_is_an_error_in_words(capsys):
+    assert main(["show", "nosuch"]) == 2
+    assert "received 'nosuch'" in capsys.readouterr().err
+
+
+def test_it_is_a_command():
+    done = subprocess.run(
+        [sys.executable, "-m", "nonsmooth", "list"], capture_output=True, text=True, check=True
+    )
+    assert "bouncing_ball" in done.stdout

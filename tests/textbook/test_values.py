@@ -1,0 +1,576 @@
+"""Every reference value of the textbook is met by a computation, to 1e-9 or to its own digits."""
+
+import functools
+import math
+
+import casadi as ca
+import numpy as np
+import pytest
+from scipy.optimize import brentq
+
+import nonsmooth as ns
+from nonsmooth import textbook
+from nonsmooth.model import motion
+
+TOL = 1e-13
+CHECKS = {}
+
+
+def check(name, *quantities):
+    """Register a function (problem, reference) -> value for some quantities of a problem."""
+
+    def register(function):
+        for quantity in quantities:
+            CHECKS[name, quantity] = function
+        return function
+
+    return register
+
+
+@functools.cache
+def build(name):
+    return textbook.by_name(name)
+
+
+@functools.cache
+def run_of(name, at=(), t_end=None):
+    return build(name).run(dict(at), t_end=t_end, tol=TOL)
+
+
+def events(run, kind):
+    return [event for event in run.events if event.kind == kind]
+
+
+def segments(run, mode):
+    """Complete segments of a mode: not the first, not the last of the run."""
+    return [s for s in run.segments[1:-1] if s.mode == mode]
+
+
+def evaluate(problem, expression, point, **at):
+    return problem.system.evaluate(expression, point, {**problem.parameters, **at})
+
+
+def sliding(problem, point, **at):
+    return evaluate(problem, motion(problem.system, "s").field, point, **at).ravel()
+
+
+def richardson(f, h):
+    """Derivative at 0 by central differences of step h, h/2, h/4, extrapolated to order 6."""
+    d = [(f(h / k) - f(-h / k)) * (k / (2 * h)) for k in (1, 2, 4)]
+    e = [(4 * d[1] - d[0]) / 3, (4 * d[2] - d[1]) / 3]
+    return (16 * e[1] - e[0]) / 15
+
+
+# periodic orbits --------------------------------------------------------------------------------
+
+
+def variational(system, mode):
+    """The system of states and fundamental matrix of one mode, without switching."""
+    field, states = motion(system, mode).field, system.extended_states
+    n = system.dimension
+    phi = ca.SX.sym("phi", n, n)
+    flow = ca.mtimes(ca.jacobian(field, states), phi)
+    unknowns = ca.vertsplit(ca.vertcat(states, ca.vec(phi)))
+    names = dict.fromkeys(ca.vertsplit(system.parameter_symbols)) if system.parameter_names else {}
+    return ns.FilippovSystem(
+        unknowns, field=ca.vertsplit(ca.vertcat(field, ca.vec(flow))), parameters=names
+    )
+
+
+def monodromy(problem, start, mode, duration, **at):
+    """Fundamental matrix over one period: smooth flow of each mode, saltation at each event."""
+    system, p = problem.system, {**problem.parameters, **at}
+    n = system.dimension
+    run = ns.simulate(system, start, duration, parameters=p, tol=TOL, start_mode=mode)
+    gradient = ca.jacobian(system.surface_function(), system.extended_states)
+    total = np.eye(n)
+    for segment in run.segments:
+        x0 = np.concatenate([run(segment.t_start), np.eye(n).ravel()])
+        if segment is run.segments[0]:
+            x0[:n] = start
+        else:
+            x0[:n] = next(e for e in run.events if e.t == segment.t_start).x
+        smooth = ns.simulate(
+            variational(system, segment.mode),
+            x0,
+            segment.t_end - segment.t_start,
+            parameters=p,
+            tol=TOL,
+        )
+        total = smooth.x[-1, n:].reshape(n, n, order="F") @ total
+        for event in [
+            e for e in run.events if e.t == segment.t_end and e.kind in ("crossing", "entry")
+        ]:
+            before, after = (
+                evaluate(problem, motion(system, m).field, event.x, **at).ravel()
+                for m in (event.mode_before, event.mode_after)
+            )
+            normal = evaluate(problem, gradient, event.x, **at).ravel()
+            total = (np.eye(n) + np.outer(after - before, normal) / (normal @ before)) @ total
+    return total, run
+
+
+@functools.cache
+def cycle(name, at=(), t_long=60.0):
+    """Multipliers, period and a point of the cycle that a long run settles on."""
+    problem = build(name)
+    ups = [
+        e for e in run_of(name, at, t_long).events if e.mode_before == "-" and e.mode_after == "+"
+    ]
+    a, b = ups[-2:]
+    period = b.t - a.t
+    # start and end inside a segment, so that the return is transversal to nothing but time
+    inside = run_of(name, at, t_long)(a.t + 0.1 * period)
+    matrix, closed = monodromy(problem, inside, None, period, **dict(at))
+    assert np.allclose(closed.x[-1], inside, rtol=1e-10, atol=1e-10)
+    return np.sort(np.linalg.eigvals(matrix).real)[::-1], period, a.x, inside
+
+
+def slope_of_return(name, at=()):
+    """Second method: differences of the return map along the surface."""
+    problem, (_, _, point, _) = build(name), cycle(name, at)
+    gradient = evaluate(
+        problem,
+        ca.jacobian(problem.system.surface_function(), problem.system.extended_states),
+        point,
+        **dict(at),
+    ).ravel()
+    along = np.array([-gradient[1], gradient[0]]) / np.linalg.norm(gradient)
+
+    def back(s):
+        run = ns.simulate(
+            problem.system,
+            point + s * along,
+            20.0,
+            parameters={**problem.parameters, **dict(at)},
+            tol=TOL,
+            max_events=4,
+        )
+        ups = [e for e in run.events if (e.mode_before, e.mode_after) == ("-", "+")]
+        return (ups[0].x - point) @ along
+
+    return richardson(back, 4e-3)
+
+
+# 1, 3, 11: friction -----------------------------------------------------------------------------
+
+
+@check("dry_friction", "turn 1 (y1, t)", "turn 2 (y1, t)", "turn 3 (y1, t)")
+def turn(problem, reference):
+    event = events(run_of("dry_friction"), "crossing")[int(reference.quantity.split()[1]) - 1]
+    return event.x[0], event.t
+
+
+@check("dry_friction", "rest (y1, t)")
+def rest(problem, reference):
+    (event,) = events(run_of("dry_friction"), "entry")
+    return event.x[0], event.t
+
+
+@check("dry_friction", "end y1")
+def stuck(problem, reference):
+    return run_of("dry_friction").x[-1, 0]
+
+
+def lengths(name, mode):
+    values = [s.t_end - s.t_start for s in segments(run_of(name), mode)]
+    assert len(values) > 1 and np.ptp(values) < 1e-11
+    return values[-1]
+
+
+@check("leine_stick_slip", "slip time")
+@check("stick_slip_exponential", "slip time")
+def slip_time(problem, reference):
+    return lengths(problem.name, "-")
+
+
+@check("leine_stick_slip", "stick time")
+def stick_time(problem, reference):
+    return lengths(problem.name, "s")
+
+
+@check("leine_stick_slip", "x at re-stick")
+@check("stick_slip_exponential", "landing x1")
+def landing(problem, reference):
+    return events(run_of(problem.name), "entry")[-1].x[0]
+
+
+@check("stick_slip_exponential", "exit (x1, x2)")
+def leaving(problem, reference):
+    return events(run_of(problem.name), "exit")[-1].x
+
+
+@check("leine_stick_slip", "period")
+@check("stick_slip_exponential", "period")
+def exits_apart(problem, reference):
+    a, b = events(run_of(problem.name), "exit")[-2:]
+    return b.t - a.t
+
+
+@check("leine_stick_slip", "multipliers")
+@check("stick_slip_exponential", "multipliers")
+def stick_slip_multipliers(problem, reference):
+    run = run_of(problem.name)
+    stick = segments(run, "s")[-1]
+    start = run(0.5 * (stick.t_start + stick.t_end))
+    start[1] = 0.2
+    matrix, _ = monodromy(problem, start, "s", exits_apart(problem, None))
+    return np.sort(np.linalg.eigvals(matrix).real)[::-1]
+
+
+# 2, 4, 9, 10, 17: plane and line ----------------------------------------------------------------
+
+
+@check("spiral_oscillator", "crossing time")
+def spiral_time(problem, reference):
+    return run_of("spiral_oscillator").events[0].t
+
+
+@check("spiral_oscillator", "crossing state")
+def spiral_state(problem, reference):
+    return run_of("spiral_oscillator").events[0].x
+
+
+@check("spiral_oscillator", "state at pi/2")
+def spiral_end(problem, reference):
+    return run_of("spiral_oscillator").x[-1]
+
+
+@check("scalar_sliding", "switch time")
+def scalar_time(problem, reference):
+    return events(run_of("scalar_sliding"), "entry")[0].t
+
+
+@check("scalar_sliding", "end")
+def scalar_end(problem, reference):
+    return run_of("scalar_sliding").x[-1, 0]
+
+
+@check("scalar_sliding", "alpha")
+def scalar_alpha(problem, reference):
+    l1, l2 = (evaluate(problem, problem.system.lie_derivative(m), [0.0]).item() for m in "+-")
+    return l1 / (l1 - l2)
+
+
+@check("scalar_repelling", "time of the status")
+def repelled(problem, reference):
+    run = run_of("scalar_repelling")
+    assert run.status is ns.Status.NON_UNIQUE
+    return run.t[-1]
+
+
+@check("scalar_repelling", "x(1) leaving up", "x(1) leaving down")
+def chosen(problem, reference):
+    mode = "+" if "up" in reference.quantity else "-"
+    return problem.run(start_mode=mode).x[-1, 0]
+
+
+@check("planar_relay", "fold of F1", "fold of F2")
+def relay_fold(problem, reference):
+    lie = problem.system.lie_derivative("+" if reference.quantity.endswith("1") else "-")
+    return brentq(lambda x: evaluate(problem, lie, [x, -x]).item(), -9.0, 9.0, xtol=1e-15)
+
+
+@check("planar_relay", "x(2)")
+def relay_slide(problem, reference):
+    run = run_of("planar_relay")
+    assert run.itinerary == "s"
+    return run.x[-1, 0]
+
+
+@check("planar_relay", "pseudo-node")
+def relay_node(problem, reference):
+    x = brentq(lambda x: sliding(problem, [x, -x])[0], -1.0, 1.5, xtol=1e-15)
+    return x, -x
+
+
+@check("planar_relay", "slope of the sliding field")
+def relay_slope(problem, reference):
+    return richardson(lambda x: sliding(problem, [x, -x])[0], 0.1)
+
+
+@check("pseudo_hopf", "x0")
+def hopf_point(problem, reference):
+    return cycle("pseudo_hopf")[2][0] * -1
+
+
+@check("pseudo_hopf", "period")
+@check("piecewise_cycle", "period")
+def cycle_period(problem, reference):
+    return cycle(problem.name)[1]
+
+
+@check("pseudo_hopf", "multiplier")
+@check("piecewise_cycle", "multiplier")
+@check("welander_box", "multiplier")
+def cycle_multiplier(problem, reference):
+    return cycle(problem.name, tuple(reference.at.items()))[0][1]
+
+
+@check("pseudo_hopf", "pseudo-node")
+def hopf_node(problem, reference):
+    return brentq(lambda x: sliding(problem, [x, 0.0])[0], -0.025, -0.005, xtol=1e-16)
+
+
+@check("piecewise_cycle", "radius")
+def cycle_radius(problem, reference):
+    return np.linalg.norm(cycle("piecewise_cycle")[3])
+
+
+# 5, 14, 15: several surfaces --------------------------------------------------------------------
+
+
+@check("two_relay_spiral", "switch times 1 to 4")
+def relay_switches(problem, reference):
+    return [e.t for e in run_of("two_relay_spiral").events[:4]]
+
+
+@check("two_relay_spiral", "accumulation time")
+@check("bouncing_ball", "Zeno time")
+def limit(problem, reference):
+    run = run_of(problem.name)
+    assert run.status is ns.Status.ACCUMULATION
+    return run.accumulation_time
+
+
+@check("ambiguous_exit", "exit time, bilinear", "exit times allowed")
+def intersection(problem, reference):
+    """Not built: the values are checked by the motion of x3 alone on the intersection."""
+    run = run_of("ambiguous_exit")
+    assert run.status is ns.Status.INTERSECTION and run.t[-1] == 0.0
+    x3 = ca.SX.sym("x3")
+
+    def time(speed):
+        reduced = ns.FilippovSystem([x3], field=[speed], stops=[ns.Stop(x3 - 2)])
+        return ns.simulate(reduced, [0.0], 5.0, tol=TOL).t[-1]
+
+    if "bilinear" in reference.quantity:
+        return time(1 + x3**2 / 16)
+    return time(1.5 - x3 / 8), time(0.5 + 3 * x3 / 8)
+
+
+@check("hidden_dynamics", "x2' off the surface")
+def off_surface(problem, reference):
+    values = {evaluate(problem, problem.system.field(m)[1], [0.0, 0.0]).item() for m in "+-"}
+    (value,) = values
+    return value
+
+
+@check("hidden_dynamics", "x2' sliding, linear")
+def linear_law(problem, reference):
+    run = run_of("hidden_dynamics")
+    assert run.itinerary == "s"
+    return run.x[-1, 1]
+
+
+@check("hidden_dynamics", "x2' sliding, nonlinear")
+def nonlinear_law(problem, reference):
+    """Not built: the value is checked by the formula."""
+    return 2 * problem.parameters["b"] ** 2 - 1
+
+
+# 6, 13, 16: impacts -----------------------------------------------------------------------------
+
+
+@check("bouncing_ball", "first impact")
+def impact(problem, reference):
+    return run_of("bouncing_ball").events[0].t
+
+
+@check("impact_oscillator", "grazing amplitude")
+def grazing(problem, reference):
+    c, w = problem.parameters["c"], problem.parameters["w"]
+    gain = 1 / math.hypot(1 - w**2, c * w)
+
+    def touches(amplitude):
+        run = problem.run({"A": amplitude, "x": -amplitude * gain}, tol=TOL)
+        return bool(events(run, "reset"))
+
+    low, high = 0.36, 0.38
+    assert not touches(low) and touches(high)
+    while high - low > 1e-11:
+        middle = 0.5 * (low + high)
+        low, high = (low, middle) if touches(middle) else (middle, high)
+    return 0.5 * (low + high)
+
+
+def bounce(reference):
+    run = run_of("kelvin_voigt_bounce", tuple(reference.at.items()))
+    assert run.status is ns.Status.STOPPED
+    return run
+
+
+@check("kelvin_voigt_bounce", "separation time")
+def separation(problem, reference):
+    return bounce(reference).t[-1]
+
+
+@check("kelvin_voigt_bounce", "Y' at separation")
+def rebound(problem, reference):
+    return bounce(reference).x[-1, 3]
+
+
+@check("kelvin_voigt_bounce", "sticking time")
+def sticking(problem, reference):
+    return events(bounce(reference), "entry")[0].t
+
+
+@check("kelvin_voigt_bounce", "slip restarts")
+def slipping(problem, reference):
+    event = events(bounce(reference), "exit")[0]
+    assert event.mode_after == "-"
+    return event.t
+
+
+@check("kelvin_voigt_bounce", "slip at separation", "slip at separation, fast spin")
+def last_slip(problem, reference):
+    run = bounce(reference)
+    assert run.itinerary == ("+" if reference.at else "+ s -")
+    return run.x[-1, 1] + run.x[-1, 4]
+
+
+@check("kelvin_voigt_bounce", "critical spin")
+def critical_spin(problem, reference):
+    """The rolling motion, followed beyond its exits, must have A = 0 where the load vanishes."""
+    p = problem.parameters
+
+    def miss(spin):
+        run = problem.run({**reference.at, "Omega": spin}, tol=TOL)
+        entry = events(run, "entry")[0]
+        roll = ns.follow(
+            problem.system, entry.x, 5.0, t_start=entry.t, mode="s", until="separation", tol=TOL
+        )
+        assert roll.status is ns.Status.STOPPED
+        x = roll.x[-1]
+        return 2 * p["d1"] * p["eta"] * x[1] + p["eta"] ** 2 * x[0]
+
+    return brentq(miss, 0.4, 0.6, xtol=1e-14)
+
+
+# 7, 8, 12: models -------------------------------------------------------------------------------
+
+
+@check("harvested_prey_predator", "fold of F1", "fold of F2")
+def harvest_fold(problem, reference):
+    above = reference.quantity.endswith("1")
+    lie = problem.system.lie_derivative("+" if above else "-")
+    low, high = (0.5, 0.9) if above else (0.01, 0.2)
+    alpha = problem.parameters["alpha"]
+    return brentq(lambda x: evaluate(problem, lie, [x, alpha]).item(), low, high, xtol=1e-16)
+
+
+@check("harvested_prey_predator", "boundary focus", "boundary node")
+def harvest_boundary(problem, reference):
+    mode = "-" if "focus" in reference.quantity else "+"
+    start = (0.0428, 0.92) if mode == "-" else (0.72, 0.8)
+    field = problem.system.field(mode)
+    jacobian = ca.jacobian(field, problem.system.extended_states)
+    x = np.array(start)
+    for _ in range(20):
+        x = x - np.linalg.solve(evaluate(problem, jacobian, x), evaluate(problem, field, x).ravel())
+    eigenvalues = np.linalg.eigvals(evaluate(problem, jacobian, x))
+    assert np.iscomplexobj(eigenvalues) == (mode == "-")
+    return x[1]
+
+
+@check("harvested_prey_predator", "pseudo-saddle-node")
+def harvest_double_zero(problem, reference):
+    """Largest alpha for which x1' = 0 has a solution on the surface: alpha as a function of x1."""
+
+    def level(x):
+        return brentq(lambda a: sliding(problem, [x, a], alpha=a)[0], 0.1, 3.0, xtol=1e-15)
+
+    top = brentq(lambda x: richardson(lambda s: level(x + s), 1e-2), 0.2, 0.5, xtol=1e-12)
+    return level(top)
+
+
+@check("welander_box", "boundary equilibrium, k = 0", "boundary equilibrium, k = 5")
+def welander_boundary(problem, reference):
+    mode = "-" if reference.quantity.endswith("0") else "+"
+    field = problem.system.field(mode)
+    zero = np.zeros(2)
+    jacobian = evaluate(problem, ca.jacobian(field, problem.system.extended_states), zero)
+    x = np.linalg.solve(jacobian, -evaluate(problem, field, zero).ravel())
+    return x[1] - problem.parameters["a"] * x[0]
+
+
+@check("welander_box", "period")
+def welander_period(problem, reference):
+    return cycle("welander_box", tuple(reference.at.items()))[1]
+
+
+@check("welander_box", "pseudo-equilibrium T")
+def welander_rest(problem, reference):
+    run = run_of("welander_box", tuple(reference.at.items()), 100.0)
+    assert run.segments[-1].mode == "s"
+    return run.x[-1, 0]
+
+
+@check("state_dependent_jump", "switch times")
+def jumps(problem, reference):
+    return [e.t for e in events(run_of("state_dependent_jump"), "crossing")]
+
+
+@check("state_dependent_jump", "x(20)")
+def jump_end(problem, reference):
+    return run_of("state_dependent_jump").x[-1]
+
+
+def jump_sensitivity(problem, name, component):
+    base = {
+        **problem.parameters,
+        **dict(zip(problem.system.state_names, problem.start, strict=True)),
+    }
+    return richardson(lambda s: problem.run({name: base[name] + s}, tol=TOL).x[-1, component], 2e-2)
+
+
+@check("state_dependent_jump", "dx1(20)/dx0", "dx2(20)/dx0")
+def jump_initial(problem, reference):
+    component = int(reference.quantity[2]) - 1
+    return [jump_sensitivity(problem, name, component) for name in ("x1", "x2")]
+
+
+@check("state_dependent_jump", "dx(20)/dp")
+def jump_parameter(problem, reference):
+    return [jump_sensitivity(problem, "p", component) for component in (0, 1)]
+
+
+@check("two_fold", "trace", "determinant", "discriminant")
+def two_fold_number(problem, reference):
+    """From the linear sliding flow, scaled by z2 + z3, at two points."""
+    points = np.array([[0.0, 1.0, 0.0], [0.0, 0.0, 1.0]])
+    matrix = np.array([sliding(problem, z)[1:] * (z[1] + z[2]) for z in points]).T
+    trace, determinant = np.trace(matrix), np.linalg.det(matrix)
+    return {"trace": trace, "determinant": determinant, "discriminant": trace**2 - 4 * determinant}[
+        reference.quantity
+    ]
+
+
+ALL = [(name, r) for name, make in textbook.PROBLEMS.items() for r in make().references]
+
+
+@pytest.mark.parametrize(("name", "reference"), ALL, ids=lambda v: getattr(v, "quantity", v))
+def test_reference(name, reference):
+    computed = CHECKS[name, reference.quantity](build(name), reference)
+    assert reference.agrees(computed), (
+        f"{reference}: computed {computed}, {reference.error(computed):.2e}"
+    )
+
+
+def test_every_check_belongs_to_a_reference():
+    assert set(CHECKS) == {(name, r.quantity) for name, r in ALL}
+
+
+@pytest.mark.parametrize(
+    ("name", "at"),
+    [("pseudo_hopf", ()), ("piecewise_cycle", ()), ("welander_box", (("eps", -0.01),))],
+)
+def test_multiplier_by_saltation_is_the_slope_of_the_return_map(name, at):
+    multipliers = cycle(name, at)[0]
+    assert abs(multipliers[0] - 1.0) < 1e-9
+    assert multipliers[1] == pytest.approx(slope_of_return(name, at), rel=1e-7)
+
+
+def test_hidden_dynamics_are_refused():
+    with pytest.raises(ns.DefinitionError, match=r"nonlinear one.*not built"):
+        textbook.hidden_dynamics(nonlinear=True)

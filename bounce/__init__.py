@@ -1,0 +1,82 @@
+"""The bounce of a spinning ball on compliant ground with dry friction: the front door.
+
+A ball of unit radius and mass, centre (x, y), spin omega (positive is backspin for xdot > 0), lands
+at y = 0 with ydot < 0. The ground pushes with a normal force and a tangential one, and rubs:
+
+    x'' = tangential_force + Lambda_T,  y'' = normal_force - G,  omega' = Lambda_T / inertia,
+    Lambda_T = -lambda mu Lambda_N,  lambda in Sgn(H),  H = xdot + omega.
+
+H is the velocity of the contact point: the ball slips forward (``+``), slips in reverse (``-``) or
+rolls (``s``, sliding in Filippov's words); where the load Lambda_N first falls to zero it lifts
+off. A ball that lifts off rolling passes through a two-fold, so almost none does. A rigid ground
+cannot reverse the slip; any tangential compliance can (Biber, Champneys & Szalai 2022).
+
+``simulate(model, xdot, ydot, omega)`` follows one bounce. A model is a ``ContactModel``: two forces
+written once, either one of those here or your own. Numbers are dimensionless as the model is.
+"""
+
+from __future__ import annotations
+
+import importlib
+from typing import TYPE_CHECKING, Any
+
+from .contact import ContactModel
+from .errors import LandingError, LiftOffError, ModelError, UnknownNameError
+from .friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
+from .generalised import Condition, Conditions, GeneralisedContact
+from .models import (
+    DepthDampedKelvinVoigt,
+    Hertz,
+    HuntCrossley,
+    KelvinVoigt,
+    KuwabaraKono,
+    Maxwell,
+    Tsuji,
+)
+from .rigid import NormalKelvinVoigt, RigidBounce, RigidShot, kelvin_voigt_restitution
+from .shot import Forces, Phase, Shot, State, simulate
+
+if TYPE_CHECKING:
+    from . import plot as plot
+
+__all__ = [
+    "Condition",
+    "Conditions",
+    "ContactModel",
+    "Coulomb",
+    "Dahl",
+    "DepthDampedKelvinVoigt",
+    "ExponentialDecay",
+    "Forces",
+    "FrictionLaw",
+    "GeneralisedContact",
+    "Hertz",
+    "HuntCrossley",
+    "KelvinVoigt",
+    "KuwabaraKono",
+    "LandingError",
+    "LiftOffError",
+    "LuGre",
+    "Maxwell",
+    "ModelError",
+    "NormalKelvinVoigt",
+    "Phase",
+    "RigidBounce",
+    "RigidShot",
+    "Shot",
+    "State",
+    "Stribeck",
+    "Tsuji",
+    "UnknownNameError",
+    "Viscous",
+    "kelvin_voigt_restitution",
+    "plot",
+    "simulate",
+]
+
+
+def __getattr__(name: str) -> Any:
+    """Load the pictures only when they are asked for (matplotlib is slow to import)."""
+    if name == "plot":
+        return importlib.import_module(".plot", __name__)
+    raise AttributeError(f"module 'bounce' has no attribute {name!r}")

@@ -1,0 +1,175 @@
+"""The equations of motion of a ball on a contact model, built once per kind of model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from functools import lru_cache
+from typing import Any
+
+import casadi as ca
+
+import nonsmooth as ns
+
+from .contact import ContactModel
+from .errors import ModelError
+from .friction import FrictionLaw
+from .parameters import Names
+
+#: The ball's own states, in the paper's order p = [X, X', Y, Y', Omega].
+STATES = ("x", "xdot", "y", "ydot", "omega")
+
+
+class Equations:
+    """Symbols, forces and fields of one blueprint.
+
+    Attributes
+    ----------
+    names : tuple of str
+        States: the ball's five, then the model's, then the friction law's.
+    start : dict
+        Values of the further states at touch-down.
+    """
+
+    def __init__(self, model: ContactModel):
+        self.model = model
+        self.start = {**model.extra_states, **model.friction.extra_states}
+        self.names = (*STATES, *self.start)
+        if len(set(self.names)) < len(self.names):
+            raise ModelError(
+                f"{type(model).__name__}: extra_states: expected names other than {STATES} and those "
+                f"of the friction law, received {self.names}."
+            )
+        self.x = {name: ca.SX.sym(name) for name in self.names}
+        self.p = {name: ca.SX.sym(name) for name in model.values}
+        clash = sorted(set(self.x) & set(self.p))
+        if clash:
+            raise ModelError(
+                f"{type(model).__name__}: expected states and parameters with different names, "
+                f"received {clash} as both."
+            )
+        self.contact_speed = self.x["xdot"] + self.x["omega"]
+        self._slip, self._sign = ca.SX.sym("slip"), ca.SX.sym("sign")
+        self.s = Names("state", {**self.x, "slip": self._slip})
+        self.q = Names("parameter", self.p)
+        self._forces()
+
+    def _forces(self) -> None:
+        model, s, q = self.model, self.s, self.q
+        self.normal = self._scalar("normal_force", model.normal_force(s, q))
+        tangential = self._scalar("tangential_force", model.tangential_force(s, q))
+        self.along = tangential - q.G * ca.sin(q.slope)
+        self.load = self._scalar("load", model.load(s, q))
+        self.lift_off = self._scalar("lift_off", model.lift_off(s, q))
+        law = model.friction
+        set_valued = type(law).traction is FrictionLaw.traction
+        if set_valued:
+            coefficient = self._scalar("friction_coefficient", model.friction_coefficient(s, q))
+            traction = -self._sign * coefficient
+        else:
+            traction = self._scalar("traction", law.traction(s, q, self._sign))
+        self.friction_force = traction * self.load
+        rates = {**model.extra_rates(s, q), **law.extra_rates(s, q, self._sign)}
+        if set(rates) != set(self.start):
+            raise ModelError(
+                f"{type(model).__name__}: extra_rates: expected a rate for each of "
+                f"{list(self.start)}, received {list(rates)}."
+            )
+        self.rates = [self._scalar(f"rate of {name}", rates[name]) for name in self.start]
+        energy = model.stored_energy(s, q)
+        self.stored = None if energy is None else self._scalar("stored_energy", energy)
+
+    def _scalar(self, what: str, value: Any) -> ca.SX:
+        try:
+            result = ca.SX(value)
+            if result.shape == (1, 1):
+                return ca.densify(result)
+            received = f"shape {result.shape}"
+        except (TypeError, ValueError, NotImplementedError):
+            received = f"{value!r} ({type(value).__name__})"
+        raise ModelError(
+            f"{type(self.model).__name__}.{what}: expected a scalar CasADi expression of the states "
+            f"and parameters, received {received}. Is the `return` missing?"
+        )
+
+    # fields ------------------------------------------------------------------------------------
+
+    def field(self, friction: ca.SX) -> list[ca.SX]:
+        """Right-hand side for a tangential friction force."""
+        s, q = self.s, self.q
+        return [
+            s.xdot,
+            self.along + friction,
+            s.ydot,
+            self.normal - q.G * ca.cos(q.slope),
+            friction / q.inertia,
+            *self.rates,
+        ]
+
+    def side(self, sign: float) -> list[ca.SX]:
+        """Right-hand side of forward (+1) or reverse (-1) slip."""
+        old, new = [self._sign, self._slip], [ca.SX(sign), sign * self.contact_speed]
+        return ca.substitute(self.field(self.friction_force), old, new)
+
+    def build(self, defaults: Mapping[str, float] | None = None) -> ns.FilippovSystem:
+        """Return the Filippov system of the contact phase."""
+        definition: dict[str, Any]
+        field = self.field(self.friction_force)
+        if ca.depends_on(ca.vertcat(*field), self._slip):
+            definition = dict(above=self.side(1.0), below=self.side(-1.0))
+        else:
+            definition = dict(field=field, multipliers=self._sign)
+        return ns.FilippovSystem(
+            list(self.x.values()),
+            surface=self.contact_speed,
+            parameters=self._defaults(defaults),
+            stops=[ns.Stop(self.lift_off, -1, "lift-off")],
+            **definition,
+        )
+
+    def build_free(self) -> ns.FilippovSystem:
+        """Return the smooth system of the phase before the load is positive (no friction)."""
+        return ns.FilippovSystem(
+            list(self.x.values()),
+            field=ca.substitute(
+                self.field(ca.SX(0)), [self._sign, self._slip], [ca.SX(1), self.contact_speed]
+            ),
+            parameters=self._defaults(None),
+            stops=[ns.Stop(self.lift_off, 1, "contact"), ns.Stop(self.s.y, 1, "surface")],
+        )
+
+    def _defaults(self, values: Mapping[str, float] | None) -> dict[ca.SX, float | None]:
+        return {symbol: None if values is None else values[n] for n, symbol in self.p.items()}
+
+    # functions ---------------------------------------------------------------------------------
+
+    def function(self, outputs: list[ca.SX]) -> ca.Function:
+        """Return the function (states, parameters) -> outputs."""
+        x, p = ca.vertcat(*self.x.values()), ca.vertcat(*self.p.values())
+        return ca.Function("outputs", [x, p], outputs)
+
+    def rolling_force(self) -> ca.SX:
+        """The friction that keeps H = 0: -A/(1 + 1/inertia), with A all other force along x."""
+        return -self.along / (1 + 1 / self.q.inertia)
+
+    def slipping_force(self, sign: float) -> ca.SX:
+        """The friction of forward (+1) or reverse (-1) slip."""
+        new = [ca.SX(sign), sign * self.contact_speed]
+        return ca.substitute([self.friction_force], [self._sign, self._slip], new)[0]
+
+
+@lru_cache(maxsize=64)
+def equations(blueprint: ContactModel) -> Equations:
+    """Return the equations of a blueprint (see ``ContactModel.blueprint``)."""
+    return Equations(blueprint)
+
+
+@lru_cache(maxsize=64)
+def contact_system(blueprint: ContactModel) -> ns.FilippovSystem:
+    """Return the contact phase of a blueprint; parameters have no defaults."""
+    return equations(blueprint).build()
+
+
+@lru_cache(maxsize=64)
+def free_system(blueprint: ContactModel) -> ns.FilippovSystem:
+    """Return the frictionless phase of a blueprint; parameters have no defaults."""
+    return equations(blueprint).build_free()

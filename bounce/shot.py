@@ -1,0 +1,353 @@
+"""One bounce, from touch-down to lift-off."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import casadi as ca
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import nonsmooth as ns
+
+from .contact import ContactModel
+from .equations import Equations, contact_system, equations, free_system
+from .errors import LandingError, LiftOffError, ModelError
+from .parameters import number
+
+Array = NDArray[np.float64]
+
+
+class State(NamedTuple):
+    """The ball at one instant: speeds, spin, position of its centre (y = 0 at touch-down)."""
+
+    xdot: float
+    ydot: float
+    omega: float
+    x: float = 0.0
+    y: float = 0.0
+
+    @property
+    def slip(self) -> float:
+        """Speed of the contact point, H = xdot + omega."""
+        return self.xdot + self.omega
+
+
+class Forces(NamedTuple):
+    """Load (what ``mu`` multiplies) and friction at the times asked for."""
+
+    load: Array
+    friction: Array
+
+
+class Phase(NamedTuple):
+    """A stretch of the bounce: ``+`` forward slip, ``-`` reverse slip, ``s`` rolling, ``F`` free."""
+
+    mode: str
+    t_start: float
+    t_end: float
+
+
+@dataclass(frozen=True, repr=False)
+class Shot:
+    """A bounce that lifted off.
+
+    Attributes
+    ----------
+    model : ContactModel
+    landing, lift_off : State
+        Touch-down and lift-off.
+    time : float
+        Duration.
+    trajectory : nonsmooth.Trajectory
+        The contact; its states are (x, xdot, y, ydot, omega, extra states).
+    approach : nonsmooth.Trajectory or None
+        The frictionless phase before it, where the load was not positive yet.
+    tol : float
+        Tolerance of the computation.
+    """
+
+    model: ContactModel
+    landing: State
+    lift_off: State
+    time: float
+    trajectory: ns.Trajectory
+    approach: ns.Trajectory | None
+    tol: float
+
+    @property
+    def slip(self) -> float:
+        """H_F = xdot + omega at lift-off; below zero is reverse slip."""
+        return self.lift_off.slip
+
+    @property
+    def itinerary(self) -> str:
+        """Phases in order: ``+`` and ``-`` slip, ``s`` rolling, ``F`` before the load is positive."""
+        return " ".join(phase.mode for phase in self.phases)
+
+    @property
+    def phases(self) -> tuple[Phase, ...]:
+        """The phases with their times."""
+        first = [] if self.approach is None else [Phase("F", 0.0, float(self.approach.t[-1]))]
+        rest = [Phase(s.mode, s.t_start, s.t_end) for s in self.trajectory.segments]
+        return (*first, *rest)
+
+    @property
+    def restitution(self) -> float:
+        """Normal speed at lift-off over that at touch-down."""
+        return -self.lift_off.ydot / self.landing.ydot
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """State at times of the bounce (dense output).
+
+        Parameters
+        ----------
+        t : array_like (...)
+            From 0 to ``time``.
+
+        Returns
+        -------
+        ndarray (..., n)
+            x, xdot, y, ydot, omega and extra states.
+        """
+        times = np.asarray(t, dtype=float)
+        if self.approach is None:
+            return self.trajectory(times)
+        early = times < self.approach.t[-1]
+        contact = self.trajectory(np.where(early, self.trajectory.t[0], times))
+        before = self.approach(np.where(early, times, 0.0))
+        return np.where(early[..., None], before, contact)
+
+    def mode(self, t: ArrayLike) -> NDArray[np.str_]:
+        """Letter of the phase at each time; at a transition the later one's.
+
+        Parameters
+        ----------
+        t : array_like (...)
+
+        Returns
+        -------
+        ndarray of str (...)
+        """
+        ends = np.array([phase.t_end for phase in self.phases[:-1]])
+        letters = np.array([phase.mode for phase in self.phases])
+        return letters[np.searchsorted(ends, np.asarray(t, dtype=float), side="right")]
+
+    def forces(self, t: ArrayLike) -> Forces:
+        """Load and friction force along the bounce.
+
+        Parameters
+        ----------
+        t : array_like (...)
+
+        Returns
+        -------
+        Forces
+            Arrays (...), load Lambda_N and friction Lambda_T; both zero at lift-off.
+        """
+        times = np.asarray(t, dtype=float)
+        eq = equations(kind(self.model))
+        outputs = [eq.load, eq.slipping_force(1.0), eq.slipping_force(-1.0), eq.rolling_force()]
+        load, forward, reverse, rolling = self._evaluate(outputs, times)
+        mode = self.mode(times)
+        friction = np.select([mode == "+", mode == "-", mode == "s"], [forward, reverse, rolling])
+        ended = times >= self.time
+        return Forces(np.where(ended, 0.0, load), np.where(ended, 0.0, friction))
+
+    def energy(self, t: ArrayLike) -> Array:
+        """Kinetic, gravitational and elastic energy per mass of the ball.
+
+        Raises
+        ------
+        ModelError
+            The model defines no ``stored_energy``.
+        """
+        eq = equations(kind(self.model))
+        if eq.stored is None:
+            raise ModelError(
+                f"{type(self.model).__name__}: expected a method stored_energy(s, p), received none. "
+                "Define it to get the energy of a shot."
+            )
+        s, q = eq.s, eq.q
+        kinetic = 0.5 * (s.xdot**2 + s.ydot**2 + q.inertia * s.omega**2)
+        height = ca.sin(q.slope) * s.x + ca.cos(q.slope) * s.y
+        return self._evaluate([kinetic + q.G * height + eq.stored], np.asarray(t, dtype=float))[0]
+
+    def _evaluate(self, outputs: list[ca.SX], times: Array) -> list[Array]:
+        eq = equations(kind(self.model))
+        states = self(times).reshape(-1, len(eq.names)).T
+        values = np.array(list(self.model.values.values()))[:, None]
+        results = eq.function(outputs)(states, np.repeat(values, states.shape[1], axis=1))
+        results = results if isinstance(results, (tuple, list)) else (results,)
+        return [np.array(r).reshape(times.shape) for r in results]
+
+    def __repr__(self) -> str:
+        end = self.lift_off
+        return (
+            f"Shot({self.itinerary!r}, lift-off at t = {self.time:.6g}: xdot = {end.xdot:.6g}, "
+            f"ydot = {end.ydot:.6g}, omega = {end.omega:.6g}, slip = {self.slip:.6g})"
+        )
+
+
+def simulate(
+    model: ContactModel,
+    xdot: float,
+    ydot: float,
+    omega: float,
+    x: float = 0.0,
+    y: float = 0.0,
+    *,
+    tol: float = 1e-10,
+    t_max: float = 1000.0,
+) -> Shot:
+    """Bounce a ball once: from touch-down to the first downward zero of the load.
+
+    Where the load is not positive just after touch-down (``load="net"`` with little damping) there
+    is no friction until it is: a phase ``F``.
+
+    Parameters
+    ----------
+    model : ContactModel
+    xdot, ydot, omega : float
+        Speeds along and normal to the ground and spin at touch-down. ``ydot < 0``, unless the ball
+        starts in the ground.
+    x, y : float, optional
+        Position of the centre; ``y < 0`` is a start in the middle of a contact, with any ``ydot``.
+    tol : float, optional
+        Relative and absolute tolerance.
+    t_max : float, optional
+        Longest time before lift-off.
+
+    Returns
+    -------
+    Shot
+
+    Raises
+    ------
+    LandingError
+        A number that is not finite, a ball above the ground or moving away from it.
+    LiftOffError
+        No lift-off before ``t_max``, or a future that is not unique.
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    >>> shot = bounce.simulate(turf, xdot=0.2, ydot=-1.0, omega=1.0)
+    >>> shot.itinerary
+    '+ s +'
+    >>> [f"{v:.6f}" for v in (shot.time, shot.slip, shot.lift_off.ydot)]
+    ['2.956310', '0.001762', '0.744065']
+    """
+    if not isinstance(model, ContactModel):
+        hint = " A class was given: make an instance of it." if isinstance(model, type) else ""
+        raise ModelError(f"model: expected a ContactModel, received {model!r}.{hint}")
+    given = dict(xdot=xdot, ydot=ydot, omega=omega, x=x, y=y)
+    landing = State(**{name: _landing_number(value, name) for name, value in given.items()})
+    _check_landing(landing)
+    limit = number(t_max, "t_max", ns.OptionError)
+    if limit <= 0:
+        raise ns.OptionError(f"t_max: expected a positive time, received {t_max!r}.")
+    eq = equations(kind(model))
+    start = [landing.x, landing.xdot, landing.y, landing.ydot, landing.omega, *eq.start.values()]
+    approach = None
+    if not _pressing(eq, model, start):
+        approach = _approach(model, start, tol, limit)
+        start = approach.x[-1].tolist()
+    run = ns.simulate(
+        contact_system(kind(model)),
+        start,
+        limit,
+        t_start=0.0 if approach is None else float(approach.t[-1]),
+        parameters=model.values,
+        tol=tol,
+    )
+    if run.status is not ns.Status.STOPPED:
+        raise LiftOffError(_no_lift_off(run, limit), run)
+    end = dict(zip(run.system.state_names, run.x[-1].tolist(), strict=True))
+    lift_off = State(**{name: end[name] for name in State._fields})
+    return Shot(model, landing, lift_off, float(run.t[-1]), run, approach, tol)
+
+
+def kind(model: ContactModel) -> ContactModel:
+    """Return the blueprint; without gravity the two load conventions coincide and one serves both."""
+    blueprint = model.blueprint()
+    if model.values["G"] == 0.0 and model.convention == "net":
+        blueprint = model.replace(load="contact").blueprint()
+    return blueprint
+
+
+def _landing_number(value: Any, name: str) -> float:
+    if (isinstance(value, np.ndarray) and value.ndim) or isinstance(value, (list, tuple)):
+        raise LandingError(
+            f"{name}: expected one number, received {np.shape(value)} of them. simulate follows one "
+            "bounce."
+        )
+    return number(value, name, LandingError)
+
+
+def _check_landing(landing: State) -> None:
+    if landing.y > 0.0:
+        raise LandingError(
+            f"y: expected at most 0 (in the ground), received {landing.y!r}. The ball is in the air; "
+            "touch-down is at y = 0."
+        )
+    if landing.y == 0.0 and landing.ydot >= 0.0:
+        raise LandingError(
+            f"ydot: expected a negative number at y = 0, received {landing.ydot!r}. The ball does not "
+            "approach the ground (y points up)."
+        )
+
+
+def _pressing(eq: Equations, model: ContactModel, start: list[float]) -> bool:
+    """Whether the load is positive just after the start.
+
+    Where it is zero the sign of its rate decides: there is no friction there, so the rate is that
+    of the frictionless motion.
+    """
+    system, parameters = free_system(kind(model)), model.values
+    value = system.evaluate(eq.lift_off, start, parameters).item()
+    if value == 0.0:
+        rate = system.lie_derivative([""], of=eq.lift_off)
+        value = system.evaluate(rate, start, parameters).item()
+    if not np.isfinite(value):
+        raise LandingError(
+            f"load: expected a finite number at touch-down, received {value}. The model's forces or "
+            f"their rates are not finite at {start}; see lift_off in ContactModel."
+        )
+    return bool(value > 0.0)
+
+
+def _approach(model: ContactModel, start: list[float], tol: float, limit: float) -> ns.Trajectory:
+    """The motion without friction until the load rises through zero."""
+    if start[2] < 0.0 <= start[3]:
+        raise LandingError(
+            f"load: expected a positive load in a ball that moves up in the ground, received y = "
+            f"{start[2]!r}, ydot = {start[3]!r}, where it is not. The ball has lifted off already."
+        )
+    run = ns.simulate(free_system(kind(model)), start, limit, parameters=model.values, tol=tol)
+    if run.status is not ns.Status.STOPPED:
+        raise LiftOffError(_no_lift_off(run, limit), run)
+    if run.events[-1].name != "contact":
+        raise LiftOffError(
+            f"lift-off: expected a load that becomes positive, received none before the ball was back "
+            f"at y = 0 at t = {run.t[-1]:.6g}. It passes through the surface without pressing on it.",
+            run,
+        )
+    return run
+
+
+def _no_lift_off(run: ns.Trajectory, limit: float) -> str:
+    y, ydot = run.x[-1, 2], run.x[-1, 3]
+    if run.status is ns.Status.REACHED_END:
+        cause = (
+            "The ball came to rest in the ground, or the contact is slow: give a larger t_max."
+            if abs(ydot) < 1e-6
+            else "Give a larger t_max, or check that the model's load vanishes."
+        )
+        return (
+            f"lift-off: expected before t_max = {limit:g}, received none; at the end y = {y:.6g}, "
+            f"ydot = {ydot:.6g}. {cause}"
+        )
+    return f"lift-off: expected at some time, received {run.status} at t = {run.t[-1]:.6g}: {run.message}"

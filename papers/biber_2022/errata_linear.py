@@ -15,13 +15,11 @@ from .exact import identical
 from .model import (
     Equations,
     G,
-    H,
     Omega,
     X,
     Xp,
     Y,
     Yp,
-    along,
     d1,
     d2,
     eta,
@@ -29,7 +27,6 @@ from .model import (
     mu,
 )
 from .records import Check, Erratum, close
-
 
 EPS2 = ca.SX.sym("e2")
 

@@ -6,6 +6,7 @@ import json
 import math
 from dataclasses import dataclass
 from decimal import Decimal
+from itertools import pairwise
 from pathlib import Path
 
 DATA = Path(__file__).parent / "data" / "table_ics.json"
@@ -57,7 +58,7 @@ def _radius_interval(dimensional: str, printed: str) -> tuple[float, float]:
 def _deepest(intervals: list[tuple[float, float]]) -> float:
     """Return a radius in as many of the intervals as possible."""
     points = sorted(x for interval in intervals for x in interval)
-    middles = [(a + b) / 2 for a, b in zip(points, points[1:], strict=False)]
+    middles = [(a + b) / 2 for a, b in pairwise(points)]
     return max(middles, key=lambda r: sum(a <= r <= b for a, b in intervals))
 
 

@@ -12,7 +12,8 @@ off. A ball that lifts off rolling passes through a two-fold, so almost none doe
 cannot reverse the slip; any tangential compliance can (Biber, Champneys & Szalai 2022).
 
 ``simulate(model, xdot, ydot, omega)`` follows one bounce. A model is a ``ContactModel``: two forces
-written once, either one of those here or your own. Numbers are dimensionless as the model is.
+written once, either one of those here or your own. Numbers are dimensionless as the model is;
+``Ball``, ``Landing`` and ``Scaling`` go to SI units and back.
 """
 
 from __future__ import annotations
@@ -35,11 +36,17 @@ from .models import (
 )
 from .rigid import NormalKelvinVoigt, RigidBounce, RigidShot, kelvin_voigt_restitution
 from .shot import Forces, Phase, Shot, State, simulate
+from .units import BALLS, BASKETBALL, GOLF, TENNIS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
     from . import plot as plot
 
 __all__ = [
+    "BALLS",
+    "BASKETBALL",
+    "GOLF",
+    "TENNIS",
+    "Ball",
     "Condition",
     "Conditions",
     "ContactModel",
@@ -54,6 +61,7 @@ __all__ = [
     "HuntCrossley",
     "KelvinVoigt",
     "KuwabaraKono",
+    "Landing",
     "LandingError",
     "LiftOffError",
     "LuGre",
@@ -63,6 +71,7 @@ __all__ = [
     "Phase",
     "RigidBounce",
     "RigidShot",
+    "Scaling",
     "Shot",
     "State",
     "Stribeck",

@@ -173,3 +173,14 @@ def contact_system(blueprint: ContactModel) -> ns.FilippovSystem:
 def free_system(blueprint: ContactModel) -> ns.FilippovSystem:
     """Return the frictionless phase of a blueprint; parameters have no defaults."""
     return equations(blueprint).build_free()
+
+
+@lru_cache(maxsize=64)
+def touch_down_function(blueprint: ContactModel) -> ca.Function:
+    """Return (states, parameters) -> lift-off function and its rate along the free motion.
+
+    Where the load is zero there is no friction, so the free motion decides whether it rises.
+    """
+    eq = equations(blueprint)
+    rate = free_system(blueprint).lie_derivative([""], of=eq.lift_off)
+    return eq.function([eq.lift_off, rate])

@@ -117,7 +117,7 @@ def _phases(ax: Axes, shot: Shot) -> None:
         label = None if phase.mode in labelled else style.pop("label")
         style.pop("label", None)
         labelled.add(phase.mode)
-        (line,) = ax.plot(
+        ax.plot(
             forces.friction,
             forces.load,
             label=label,
@@ -125,7 +125,7 @@ def _phases(ax: Axes, shot: Shot) -> None:
             zorder=3,
             **style,
         )
-        _arrow(ax, forces.friction, forces.load, line.get_color())
+        _arrow(ax, forces.friction, forces.load, STYLES[phase.mode]["color"])
 
 
 def _arrow(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:

@@ -15,6 +15,8 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+import nonsmooth as ns
+
 from .contact import ContactModel
 from .errors import LandingError
 from .parameters import LIMITS, Names, Parametrised, number
@@ -97,7 +99,7 @@ class RigidBounce(Parametrised):
         if not callable(restitution):
             _unit_interval(np.asarray(number(restitution, "restitution")))
         if hypothesis not in _TOTAL_IMPULSE:
-            raise ValueError(
+            raise ns.ParameterError(
                 f"hypothesis: expected one of {list(_TOTAL_IMPULSE)}, received {hypothesis!r}."
             )
         self._set("restitution", restitution)
@@ -178,7 +180,7 @@ def _landings(xdot: ArrayLike, ydot: ArrayLike, omega: ArrayLike) -> tuple[Array
 def _unit_interval(values: Array) -> Array:
     if not np.all((values >= 0) & (values <= 1)):
         wrong = values[~((values >= 0) & (values <= 1))].flat[0]
-        raise LandingError(
+        raise ns.ParameterError(
             f"restitution: expected a number in [0, 1], received {wrong}. Above 1 the impact would "
             "create energy."
         )
@@ -249,7 +251,7 @@ def kelvin_voigt_restitution(d2: float) -> float:
     """
     ratio = number(d2, "d2")
     if not LIMITS[">= 0"](ratio):
-        raise LandingError(f"d2: expected a number >= 0, received {d2!r}.")
+        raise ns.ParameterError(f"d2: expected a number >= 0, received {d2!r}.")
     if ratio == 1.0:
         return math.exp(-2.0)
     c = math.acos(ratio) if ratio < 1 else math.acosh(ratio)

@@ -12,9 +12,10 @@ from numpy.typing import ArrayLike, NDArray
 import nonsmooth as ns
 
 from .contact import ContactModel
-from .equations import Equations, contact_system, equations, free_system
+from .equations import contact_system, equations, free_system, touch_down_function
 from .errors import LandingError, LiftOffError, ModelError
 from .parameters import number
+from .rigid import RigidBounce
 
 Array = NDArray[np.float64]
 
@@ -242,6 +243,8 @@ def simulate(
     """
     if not isinstance(model, ContactModel):
         hint = " A class was given: make an instance of it." if isinstance(model, type) else ""
+        if isinstance(model, RigidBounce):
+            hint = " A rigid impact takes no time: use its lift_off(xdot, ydot, omega)."
         raise ModelError(f"model: expected a ContactModel, received {model!r}.{hint}")
     given = dict(xdot=xdot, ydot=ydot, omega=omega, x=x, y=y)
     landing = State(**{name: _landing_number(value, name) for name, value in given.items()})
@@ -252,7 +255,7 @@ def simulate(
     eq = equations(kind(model))
     start = [landing.x, landing.xdot, landing.y, landing.ydot, landing.omega, *eq.start.values()]
     approach = None
-    if not _pressing(eq, model, start):
+    if not _pressing(model, start):
         approach = _approach(model, start, tol, limit)
         start = approach.x[-1].tolist()
     run = ns.simulate(
@@ -300,23 +303,16 @@ def _check_landing(landing: State) -> None:
         )
 
 
-def _pressing(eq: Equations, model: ContactModel, start: list[float]) -> bool:
-    """Whether the load is positive just after the start.
-
-    Where it is zero the sign of its rate decides: there is no friction there, so the rate is that
-    of the frictionless motion.
-    """
-    system, parameters = free_system(kind(model)), model.values
-    value = system.evaluate(eq.lift_off, start, parameters).item()
-    if value == 0.0:
-        rate = system.lie_derivative([""], of=eq.lift_off)
-        value = system.evaluate(rate, start, parameters).item()
-    if not np.isfinite(value):
+def _pressing(model: ContactModel, start: list[float]) -> bool:
+    """Whether the load is positive just after the start: its sign, or that of its rate."""
+    value, rate = touch_down_function(kind(model))(start, list(model.values.values()))
+    decisive = float(value) or float(rate)
+    if not np.isfinite(decisive):
         raise LandingError(
-            f"load: expected a finite number at touch-down, received {value}. The model's forces or "
+            f"load: expected a finite number at touch-down, received {decisive}. The model's forces or "
             f"their rates are not finite at {start}; see lift_off in ContactModel."
         )
-    return bool(value > 0.0)
+    return decisive > 0.0
 
 
 def _approach(model: ContactModel, start: list[float], tol: float, limit: float) -> ns.Trajectory:

@@ -150,7 +150,8 @@ class _Follower:
         )
 
     def _loop(self) -> tuple[Status, str]:
-        fresh = set(range(len(self.motion.guards)))  # functions whose zero here is not news
+        # functions whose zero here is not news, and how many coefficients are known to vanish
+        fresh = dict.fromkeys(range(len(self.motion.guards)), 0)
         while True:
             left = abs(self.t_end - self.t)
             if left == 0.0:
@@ -170,7 +171,7 @@ class _Follower:
             if last and not hits:
                 self.t = self.times[-1] = self.t_end
             found = [row for d, row in hits if d <= dt + 1e-14 * max(1.0, abs(self.t))]
-            fresh = set(found)
+            fresh = dict.fromkeys(found, 1)
             stopped = self._report(found)
             if stopped:
                 return Status.STOPPED, f"{stopped!r} is zero at t = {self.t:.10g}."
@@ -182,13 +183,13 @@ class _Follower:
         flip = self.sign ** np.arange(e.states.shape[1])
         return Expansion(e.mode, e.states * flip, e.guards * flip, e.scales, e.gradient, e.finite)
 
-    def _zeros(self, e: Expansion, h: float, fresh: set[int]) -> list[tuple[float, int]]:
+    def _zeros(self, e: Expansion, h: float, fresh: dict[int, int]) -> list[tuple[float, int]]:
         hits = []
         for row in range(len(self.motion.guards)):
             c = e.guards[row]
             if not np.all(np.isfinite(c)):
                 continue
-            drop = self.stepper.leading(e, row, 0)[0] if row in fresh else 0
+            drop = self.stepper.leading(e, row, fresh[row])[0] if row in fresh else 0
             dt = first_crossing(c[drop:].tolist(), h, 0)
             if dt is not None:
                 hits.append((dt, row))

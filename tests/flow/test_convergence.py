@@ -1,0 +1,154 @@
+"""The error of events, end states and dense output falls in step with the tolerance, 1e-4 to 1e-13."""
+
+from dataclasses import dataclass
+from functools import cache
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+TOLERANCES = [10.0**-k for k in range(4, 14)]
+ROUNDING = 2e-13  # of a few dozen steps and events, at states and times of order ten
+
+
+@dataclass(frozen=True)
+class Case:
+    """A system, its start, and the events in closed form or to twenty digits."""
+
+    system: ns.FilippovSystem
+    start: tuple
+    t_end: float
+    itinerary: str
+    times: tuple
+    states: tuple
+
+
+def dry_friction():
+    """Problem 1: turning points -2.2, 1.4, -0.6 of an oscillator; it sticks at -0.2."""
+    y1, y2, lam = (ca.SX.sym(s) for s in ("y1", "y2", "lam"))
+    system = ns.FilippovSystem([y1, y2], surface=y2, multipliers=lam, field=[y2, -y1 - 0.4 * lam])
+    return Case(
+        system,
+        (3.0, 0.0),
+        20.0,
+        "- + - + s",
+        (np.pi, 2 * np.pi, 3 * np.pi, 4 * np.pi, 20.0),
+        ((-2.2, 0.0), (1.4, 0.0), (-0.6, 0.0), (-0.2, 0.0), (-0.2, 0.0)),
+    )
+
+
+def spiral():
+    """Problem 2: a spiral that reverses on the unit circle at t = 1."""
+    x1, x2 = ca.SX.sym("x1"), ca.SX.sym("x2")
+    w = 2 * np.pi
+    system = ns.FilippovSystem(
+        [x1, x2],
+        surface=x1**2 + x2**2 - 1,
+        above=[x1 - w * x2, w * x1 + x2],
+        below=[x1 + w * x2, -w * x1 + x2],
+    )
+    end = (-1.5974603774506981221, -0.76149362060601145276)
+    return Case(system, (np.exp(-1.0), 0.0), np.pi / 2, "- +", (1.0, np.pi / 2), ((1.0, 0.0), end))
+
+
+def stick_slip():
+    """Problem 3: friction 1/(1 + 3 |v_rel|); one period and a second landing."""
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    slip = v - 0.2
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=slip,
+        above=[v, -x - 1 / (1 + 3 * slip)],
+        below=[v, -x + 1 / (1 - 3 * slip)],
+    )
+    slipping, period, landing = (
+        4.2959995254801548834,
+        12.001031294830578647,
+        -0.54100635387008475271,
+    )
+    return Case(
+        system,
+        (1.0, 0.2),
+        period + slipping + 2.0,
+        "- s - s",
+        (slipping, period, period + slipping, period + slipping + 2.0),
+        ((landing, 0.2), (1.0, 0.2), (landing, 0.2), (landing + 0.4, 0.2)),
+    )
+
+
+def impact():
+    """Problem 16: compliant impact with friction; slips, sticks, slips the other way, separates."""
+    x, u, y, v, spin, lam = (ca.SX.sym(s) for s in ("x", "u", "y", "v", "spin", "lam"))
+    d1, d2, eta, mu, weight = 0.3, 0.2, 0.3, 0.3, 0.01
+    load = -2 * d2 * v - y - weight
+    drag = -(2 * d1 * eta * u + eta**2 * x)
+    system = ns.FilippovSystem(
+        [x, u, y, v, spin],
+        surface=u + spin,
+        multipliers=lam,
+        field=[u, drag - lam * mu * load, v, load, -2.5 * lam * mu * load],
+        stops=[ns.Stop(load, direction=-1, name="separation")],
+    )
+    nan = np.nan
+    return Case(
+        system,
+        (0.0, 1.0, 0.0, -1.0, 0.0),
+        10.0,
+        "+ s -",
+        (1.10002359853743845, 2.47845549499308424, 2.8053741589056785987),
+        ((nan,) * 5, (nan,) * 5, (nan, nan, nan, 0.56948169195034287377, nan)),
+    )
+
+
+CASES = {f.__name__: f for f in (dry_friction, spiral, stick_slip, impact)}
+
+
+@cache
+def case(name):
+    return CASES[name]()
+
+
+@cache
+def run(name, tol):
+    c = case(name)
+    return ns.simulate(c.system, c.start, c.t_end, tol=tol)
+
+
+def event_error(name, tol):
+    c = case(name)
+    events = run(name, tol).events
+    assert run(name, tol).itinerary == c.itinerary
+    times = np.array([e.t for e in events])
+    states = np.array([e.x for e in events])
+    assert times.shape == (len(c.times),)
+    return max(np.max(np.abs(times - c.times)), np.nanmax(np.abs(states - np.array(c.states))))
+
+
+@pytest.mark.parametrize("tol", TOLERANCES)
+@pytest.mark.parametrize("name", CASES)
+def test_events_and_end_are_within_the_tolerance(name, tol):
+    assert event_error(name, tol) <= tol + ROUNDING
+
+
+@pytest.mark.parametrize("tol", TOLERANCES)
+@pytest.mark.parametrize("name", CASES)
+def test_dense_output_is_within_the_tolerance(name, tol):
+    exact, found = run(name, 1e-15), run(name, tol)
+    t = np.linspace(0.0, min(exact.t[-1], found.t[-1]), 501)
+    assert np.max(np.abs(found(t) - exact(t))) <= 2 * tol + ROUNDING
+
+
+@pytest.mark.parametrize("name", CASES)
+def test_error_falls_in_proportion_to_the_tolerance(name):
+    """Over the whole range the error is a power of the tolerance with exponent close to one."""
+    usable = [tol for tol in TOLERANCES if tol >= 1e-11]  # below, rounding takes part
+    errors = [max(event_error(name, tol), 1e-16) for tol in usable]
+    slope = np.polyfit(np.log(usable), np.log(errors), 1)[0]
+    assert 0.85 < slope < 1.25
+
+
+def test_slip_at_separation_is_met_to_its_digits():
+    final = run("impact", 1e-13).x[-1]
+    assert final[1] + final[4] == pytest.approx(-0.0340870447107, abs=5e-14)

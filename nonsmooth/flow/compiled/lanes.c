@@ -1,0 +1,591 @@
+/* W trajectories in step, for systems of at most one surface and without resets.
+ *
+ * Each lane holds one trajectory and is refilled when it ends. Whatever is common is done for all
+ * lanes at once: expansion, step size, roots, projection, the decision at a surface where both
+ * fields are clearly transversal. Whatever is rare (tangency, repelling sliding, ties, accumulating
+ * events, limits, points that are not finite) is handed over: the trajectory gets the status
+ * HAND_OVER and runs again from its start in the scalar driver. No lane's result depends on its
+ * neighbours.
+ *
+ * The generated text defines, besides what common.h asks for: W, SLOTS guards (surface or exit to +,
+ * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], CANCELLED, CURVED, prepare(p, q),
+ * jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values.
+ */
+#define S1 (SLOTS > 0 ? SLOTS : 1)
+#define FIRST_STOP (SLOTS - STOPS)
+#define HEAD 5 /* below P, which is 6 at least */
+#define TIE 1e-13
+
+typedef struct {
+  double t_end, rtol, atol, max_step;
+  int64_t max_steps, max_events;
+  int32_t start_mode, at_kind;
+  int64_t at_count;
+  int32_t dense, pad;
+} Options;
+
+typedef struct {
+  T x[N], q[NQ], t, lambda, last_event, shortest;
+  I slides, above, drop, live, steps, events, kinds[KINDS], shrinking;
+  int64_t index[W];
+  int32_t itinerary[W];
+} Lanes;
+
+/* Where starts come from and results go. */
+typedef struct {
+  int64_t count, next, p_stride;
+  const double *x0, *p;
+  double t0, *x, *t, *at_x, *at_t;
+  const Options *o;
+  Tree *tree;
+  int32_t *status, *itinerary, *kinds;
+  int64_t *totals;
+  int alive;
+} Work;
+
+#define LANE(v, l) (((double *)&(v))[l])
+#define LANE_I(v, l) (((int64_t *)&(v))[l])
+
+/* Loading and storing -------------------------------------------------------------------------- */
+
+static void store(Lanes *s, Work *w, int l, int status) {
+  int64_t i = s->index[l];
+  LANE_I(s->live, l) = 0;
+  w->alive--;
+  w->totals[0] += LANE_I(s->steps, l);
+  w->totals[1] += LANE_I(s->events, l);
+  w->status[i] = status;
+  if (status == HAND_OVER) { w->totals[2]++; return; }
+  for (int k = 0; k < ND; k++) w->x[i * ND + k] = LANE(s->x[k], l);
+  w->t[i] = LANE(s->t, l);
+  w->itinerary[i] = s->itinerary[l];
+  for (int k = 0; k < KINDS; k++) w->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
+  w->kinds[i * KINDS + END] += status == REACHED_END;
+}
+
+static void refuse(Work *w, int64_t i) {
+  for (int k = 0; k < ND; k++) w->x[i * ND + k] = w->x0[i * N + k];
+  w->t[i] = w->t0;
+  w->status[i] = NOT_FINITE;
+  w->itinerary[i] = 0;
+  memset(w->kinds + i * KINDS, 0, KINDS * sizeof(int32_t));
+  w->kinds[i * KINDS + END] = 1;
+}
+
+/* Put the next start into a lane; 0 if there is none. */
+static int load(Lanes *s, Work *w, int l) {
+  while (w->next < w->count && !finite_all(w->x0 + w->next * N, N)) refuse(w, w->next++);
+  if (w->next >= w->count) return 0;
+  int64_t i = w->next++;
+  for (int k = 0; k < N; k++) LANE(s->x[k], l) = w->x0[i * N + k];
+  if (w->p_stride) {
+    double q[NQ];
+    prepare(w->p + i * w->p_stride, q);
+    for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
+  }
+  LANE(s->t, l) = LANE(s->last_event, l) = w->t0;
+  LANE(s->shortest, l) = 1e-3;
+  LANE_I(s->live, l) = -1;
+  LANE_I(s->steps, l) = LANE_I(s->events, l) = LANE_I(s->shrinking, l) = LANE_I(s->drop, l) = 0;
+  for (int k = 0; k < KINDS; k++) LANE_I(s->kinds[k], l) = 0;
+  s->index[l] = i;
+  s->itinerary[l] = 0;
+  w->alive++;
+  return 1;
+}
+
+static I refill(Lanes *s, Work *w) {
+  I fresh = {0};
+  for (int l = 0; l < W; l++)
+    if (!LANE_I(s->live, l) && load(s, w, l)) LANE_I(fresh, l) = -1;
+  return fresh;
+}
+
+static void hand_over(Lanes *s, Work *w, I which) {
+  which &= s->live;
+  if (!any(which)) return;
+  for (int l = 0; l < W; l++) if (LANE_I(which, l)) store(s, w, l, HAND_OVER);
+}
+
+static void note_modes(Lanes *s, Work *w, I which) {
+  for (int l = 0; l < W; l++)
+    if (LANE_I(which, l)) {
+      int mode = LANE_I(s->slides, l) ? 2 : LANE_I(s->above, l) ? 0 : M > 0 ? 1 : 0;
+      s->itinerary[l] = tree_child(w->tree, s->itinerary[l], mode);
+    }
+}
+
+/* The surface -------------------------------------------------------------------------------- */
+
+/* Newton steps of the states (not the time) along the gradient. */
+INLINE void project(Lanes *s, I which) {
+#if M > 0
+  for (int iteration = 0; iteration < (CURVED ? 3 : 1); iteration++) {
+    T h, g[N], size = BC(0);
+    surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
+    for (int i = 0; i < ND; i++) size += g[i] * g[i];
+    T step = SELECT(which & (I)(h != 0), h / size, BC(0));
+    for (int i = 0; i < ND; i++) s->x[i] -= step * g[i];
+  }
+#endif
+}
+
+/* sum of |gradient| (1 + |x|): rounding in a function is that times epsilon. */
+INLINE T rounding_scale(const Lanes *s, const T *gradient) {
+  T scale = BC(0);
+  for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (1.0 + ABS(s->x[i]));
+  return scale;
+}
+
+/* Lanes on the surface whose fields are both clearly transversal get their mode and the number of
+ * coefficients to drop; the mask of those that are not clear is returned. */
+INLINE I decide(Lanes *s, I which, const T *lie, const T *scale) {
+  I clear = (ABS(lie[0]) > 64 * EPS * scale[0]) & (ABS(lie[1]) > 64 * EPS * scale[1]);
+  I up0 = lie[0] > 0, up1 = lie[1] > 0;
+  clear &= ~(up0 & ~up1);
+  I mine = which & clear;
+  s->slides = (s->slides & ~mine) | (mine & ~up0 & up1);
+  s->above = (s->above & ~mine) | (mine & up0 & up1);
+  s->drop = (s->drop & ~mine) | (mine & ~s->slides & 1);
+  return which & ~clear;
+}
+
+INLINE void set_lambda(Lanes *s) { s->lambda = SELECT(s->above, BC(1), BC(-1)); }
+
+#if M > 0
+INLINE void lie(const Lanes *s, T *value, T *scale) {
+  T gradient[2][N];
+  lie_values(s->x, s->q, s->slides, s->above, s->lambda, value, &gradient[0][0]);
+  scale[0] = rounding_scale(s, gradient[0]);
+  scale[1] = rounding_scale(s, gradient[1]);
+}
+#endif
+
+/* Modes of lanes just loaded. */
+static void begin(Lanes *s, Work *w, I fresh) {
+  I unclear = {0};
+  s->slides &= ~fresh;
+  s->above &= ~fresh;
+#if M > 0
+  T h, g[N], value[2], scale[2];
+  surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
+  I on = fresh & (ABS(h) <= 64 * EPS * rounding_scale(s, g));
+  unclear |= fresh & ~(ABS(h) < INFINITY);
+  s->above |= fresh & (h > 0);
+  if (any(on)) {
+    project(s, on);
+    lie(s, value, scale);
+    unclear |= decide(s, on, value, scale);
+  }
+#endif
+#if STOPS > 0
+  T stop[STOPS], gradient[STOPS][N];
+  stop_values(s->x, s->q, s->slides, s->above, s->lambda, stop, &gradient[0][0]);
+  for (int j = 0; j < STOPS; j++)
+    unclear |= fresh & (ABS(stop[j]) <= 64 * EPS * rounding_scale(s, gradient[j]));
+#endif
+  set_lambda(s);
+  note_modes(s, w, fresh & ~unclear);
+  hand_over(s, w, unclear);
+}
+
+/* Step size ------------------------------------------------------------------------------------ */
+
+/* Ratios of the last two terms of the guards that are not affine to their allowances (an affine
+ * guard is bounded by the states). */
+INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g[S1][P + 1], T *last,
+                         T *before, T *sum) {
+  T gradient[S1][N], value[S1];
+#if M > 0
+  if (!AFFINE[0] || !AFFINE[1]) {
+    T h, surface[N];
+    lie_values(s->x, s->q, s->slides, s->above, s->lambda, value, &gradient[0][0]);
+    surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, surface);
+    for (int i = 0; i < N; i++) gradient[0][i] = SELECT(s->slides, gradient[0][i], surface[i]);
+  }
+#endif
+#if STOPS > 0
+  int needed = 0;
+  for (int j = FIRST_STOP; j < SLOTS; j++) needed |= !AFFINE[j];
+  if (needed)
+    stop_values(s->x, s->q, s->slides, s->above, s->lambda, value, &gradient[FIRST_STOP][0]);
+#endif
+  for (int j = 0; j < SLOTS; j++) {
+    if (AFFINE[j]) { *sum += g[j][P] + g[j][P - 1]; continue; }
+    T a = o->rtol * ABS(g[j][0]) + 1e-290;
+    for (int i = 0; i < ND; i++) a += ABS(gradient[j][i]) * allowed[i];
+    T r = ROUGH_INVERSE(a), p = ABS(g[j][P]) * r, b = ABS(g[j][P - 1]) * r;
+    I counts = M > 0 && j == 1 ? s->slides : ~(I){0};
+    counts &= a > 1e-280;
+    *sum += SELECT(counts, p + b, BC(0));
+    *last = MAX(*last, SELECT(counts, p, BC(0)));
+    *before = MAX(*before, SELECT(counts, b, BC(0)));
+  }
+}
+
+INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], I *finite) {
+  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), allowed[N];
+  for (int i = 0; i < N; i++) {
+    allowed[i] = i < ND ? o->atol + o->rtol * ABS(s->x[i]) : BC(0);
+    if (i >= ND) continue;
+    T r = ROUGH_INVERSE(allowed[i]), p = ABS(c[i][P]) * r, b = ABS(c[i][P - 1]) * r;
+    sum += p + b;
+    last = MAX(last, p);
+    before = MAX(before, b);
+  }
+  guard_ratios(s, o, allowed, g, &last, &before, &sum);
+  *finite = ABS(sum) < INFINITY;
+  T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
+  return EXP2(MIN(h1, h2));
+}
+
+/* Roots ---------------------------------------------------------------------------------------- */
+
+/* Power coefficients of degree n on [0, 1] to Bernstein coefficients, in place. */
+INLINE void to_bernstein(T *b, int n) {
+  double binomial = 1;
+  UNROLL for (int i = 0; i <= n; i++) { b[i] *= 1.0 / binomial; binomial = binomial * (n - i) / (i + 1); }
+  UNROLL for (int level = 1; level <= n; level++)
+    UNROLL for (int i = n; i >= level; i--) b[i] += b[i - 1];
+}
+
+/* Roots on (0, 1] of a polynomial positive at 0, without isolating them: bounds by a head of degree
+ * HEAD in Bernstein form and the sum of the rest. ``none``: it stays positive. ``one``: it ends at or
+ * below zero and falls throughout, is concave or is convex, so it has exactly one root. */
+INLINE void screen(const T *a, I *none, I *one, T *end) {
+  T tail = BC(0), tail1 = BC(0), tail2 = BC(0), sum = BC(0), b[HEAD + 1];
+  UNROLL for (int k = HEAD + 1; k <= P; k++) {
+    T c = ABS(a[k]);
+    tail += c;
+    tail1 += (double)k * c;
+    tail2 += (double)(k * (k - 1)) * c;
+    sum += a[k];
+  }
+  UNROLL for (int k = 0; k <= HEAD; k++) b[k] = a[k];
+  to_bernstein(b, HEAD);
+  T low = b[0], steepest = b[1] - b[0], most = b[2] - 2.0 * b[1] + b[0], least = most;
+  UNROLL for (int k = 1; k <= HEAD; k++) low = MIN(low, b[k]);
+  UNROLL for (int k = 1; k < HEAD; k++) {
+    T d = b[k + 1] - b[k], dd = d - (b[k] - b[k - 1]);
+    steepest = MAX(steepest, d);
+    most = MAX(most, dd);
+    least = MIN(least, dd);
+  }
+  *end = b[HEAD] + sum;
+  tail1 *= 1.0 / HEAD;
+  tail2 *= 1.0 / (HEAD * (HEAD - 1));
+  I simple = (steepest + tail1 < 0) | (I)(most + tail2 < 0), positive = *end > 0;
+  *none = (low > tail) | (simple & positive);
+  *one = (simple | (I)(least > tail2)) & ~positive;
+}
+
+/* The root of a polynomial with one on (0, 1]; converged lanes do not move any more. */
+INLINE T polish(const T *a, T end, I active, T *slope) {
+  T bend = end - a[0] - a[1], lo = BC(0), hi = BC(1), d[P];
+  T disc = a[1] * a[1] - 4.0 * a[0] * bend;
+  T s = 2.0 * a[0] / (SQRT_(MAX(disc, BC(0))) - a[1]);
+  s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
+  UNROLL for (int k = 0; k < P; k++) d[k] = (k + 1.0) * a[k + 1];
+  for (int it = 0; it < 60; it++) {
+    T z = s * s, even = a[P - (P & 1)], odd = a[P - 1 + (P & 1)];
+    T deven = d[P - 1 - ((P - 1) & 1)], dodd = d[P - 2 + ((P - 1) & 1)];
+    UNROLL for (int k = P - (P & 1) - 2; k >= 0; k -= 2) even = even * z + a[k];
+    UNROLL for (int k = P - 1 + (P & 1) - 2; k >= 1; k -= 2) odd = odd * z + a[k];
+    UNROLL for (int k = P - 1 - ((P - 1) & 1) - 2; k >= 0; k -= 2) deven = deven * z + d[k];
+    UNROLL for (int k = P - 2 + ((P - 1) & 1) - 2; k >= 1; k -= 2) dodd = dodd * z + d[k];
+    T f = even + s * odd, df = deven + s * dodd, step = f / df, next = s - step;
+    I positive = f > 0, small = ABS(step) <= 1e-9;
+    lo = SELECT(positive & active, s, lo);
+    hi = SELECT(positive | ~active, hi, s);
+    I inside = (next > lo) & (next < hi);
+    next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
+    s = SELECT(active, next, s);
+    *slope = SELECT(active, df, *slope);
+    active &= ~small;
+    if (!any(active)) break;
+  }
+  return s;
+}
+
+/* The same for one lane of any polynomial: isolation by subdivision. */
+static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped,
+                                                  double *slope) {
+  double c[P + 1];
+  for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
+  if (slot < FIRST_STOP) {
+    double s = first_root(c, P, 1), d = 0;
+    for (int k = P; k > 0; k--) d = d * s + k * c[k];
+    *slope = d;
+    return s;
+  }
+  int direction = DIRECTION[slot - FIRST_STOP];
+  return first_crossing(c, P, 1, flipped ? -direction : direction);
+}
+
+/* After a crossing the guard's first coefficient is zero, after a fold its first two. */
+INLINE void drop_zeros(const Lanes *s, T *a) {
+  I by_one = s->drop == 1, by_two = s->drop == 2;
+  if (!any(by_one | by_two)) return;
+  UNROLL for (int k = 0; k <= P; k++) {
+    T c1 = k < P ? a[k < P ? k + 1 : P] : BC(0), c2 = k + 1 < P ? a[k + 1 < P ? k + 2 : P] : BC(0);
+    a[k] = SELECT(by_one, c1, SELECT(by_two, c2, a[k]));
+  }
+}
+
+/* Guards scaled to [0, 1] with their lanes sorted: no root, one root to be polished, or a hard case,
+ * whose root is found here. */
+typedef struct { T a[S1][P + 1], end[S1], root[S1], slope[S1]; I one[S1], hard[S1], flipped[S1], wrong_way[S1]; } Guards;
+
+/* Returns the lanes whose surface or exit guard is not positive. */
+INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j) {
+  T *a = v->a[j];
+  I counts = s->live, flipped = {0}, wrong_way = {0}, none, unclear = {0};
+  v->root[j] = BC(INFINITY);
+  v->slope[j] = BC(0);
+  v->one[j] = (I){0};
+  v->hard[j] = v->flipped[j] = v->wrong_way[j] = (I){0};
+  if (M > 0 && j == 1 && !any(counts &= s->slides)) return unclear;
+  a[0] = g[0];
+  UNROLL for (int k = 1; k <= P; k++) a[k] = g[k] * power[k];
+  if (M > 0 && j == 0) drop_zeros(s, a);
+  if (j >= FIRST_STOP) {
+    int direction = DIRECTION[j < FIRST_STOP ? 0 : j - FIRST_STOP];
+    flipped = a[0] < 0;
+    if (any(flipped & counts)) {
+      I sign = flipped & INT64_MIN;
+      UNROLL for (int k = 0; k <= P; k++) a[k] = (T)((I)a[k] ^ sign);
+    }
+    wrong_way = direction == 0 ? wrong_way : direction < 0 ? flipped : ~flipped;
+  }
+  screen(a, &none, &v->one[j], &v->end[j]);
+  I zero = ~(I)(a[0] > 0);
+  if (j < FIRST_STOP) { unclear = counts & zero; counts &= ~zero; }
+  v->hard[j] = counts & ((~none & ~v->one[j]) | (v->one[j] & wrong_way) | zero);
+  v->one[j] &= counts & ~v->hard[j];
+  v->flipped[j] = flipped;
+  v->wrong_way[j] = wrong_way;
+  return unclear;
+}
+
+/* Hard cases: sign changes of all Bernstein coefficients, one slot of each lane at a time; what has
+ * several goes to hard_root. */
+static __attribute__((noinline)) void resolve(Guards *v) {
+  for (;;) {
+    I rest = ~(I){0}, mine[S1], all = {0};
+    for (int j = 0; j < SLOTS; j++) {
+      mine[j] = v->hard[j] & rest;
+      rest &= ~mine[j];
+      all |= mine[j];
+      v->hard[j] &= ~mine[j];
+    }
+    if (!any(all)) return;
+    T b[P + 1];
+    UNROLL for (int k = 0; k <= P; k++) b[k] = v->a[SLOTS - 1][k];
+    for (int j = 0; j < SLOTS - 1; j++)
+      if (any(mine[j])) UNROLL for (int k = 0; k <= P; k++) b[k] = SELECT(mine[j], v->a[j][k], b[k]);
+    to_bernstein(b, P);
+    I changes = {0}, positive = b[0] > 0, first = positive;
+    UNROLL for (int k = 1; k <= P; k++) {
+      I next = b[k] > 0;
+      changes -= positive ^ next;
+      positive = next;
+    }
+    for (int j = 0; j < SLOTS; j++) {
+      I one = mine[j] & first & (changes == 1) & ~v->wrong_way[j];
+      I deep = mine[j] & ~one & ~(first & (changes == 0));
+      v->one[j] |= one;
+      if (any(deep))
+        for (int l = 0; l < W; l++)
+          if (LANE_I(deep, l)) {
+            double r = hard_root(v->a[j], l, j, LANE_I(v->flipped[j], l) != 0, &LANE(v->slope[j], l));
+            if (r >= 0) LANE(v->root[j], l) = r;
+          }
+    }
+  }
+}
+
+/* Polish all isolated roots: one slot of each lane at a time, the slots of different lanes together. */
+INLINE void polish_guards(Guards *v) {
+  for (;;) {
+    I rest = ~(I){0}, mine[S1], all = {0};
+    for (int j = 0; j < SLOTS; j++) {
+      mine[j] = v->one[j] & rest;
+      rest &= ~mine[j];
+      all |= mine[j];
+    }
+    if (!any(all)) return;
+    T a[P + 1], end = v->end[SLOTS - 1], d = BC(0);
+    UNROLL for (int k = 0; k <= P; k++) a[k] = v->a[SLOTS - 1][k];
+    for (int j = 0; j < SLOTS - 1; j++) {
+      if (!any(mine[j])) continue;
+      UNROLL for (int k = 0; k <= P; k++) a[k] = SELECT(mine[j], v->a[j][k], a[k]);
+      end = SELECT(mine[j], v->end[j], end);
+    }
+    T s = polish(a, end, all, &d);
+    for (int j = 0; j < SLOTS; j++) {
+      v->root[j] = SELECT(mine[j], s, v->root[j]);
+      v->slope[j] = SELECT(mine[j], d, v->slope[j]);
+      v->one[j] &= ~mine[j];
+    }
+  }
+}
+
+/* Time of the first event within h in each lane and its slot + 1; lanes that are not clear. */
+INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T h, T *dt, I *slot, T *slope) {
+  Guards v;
+  T power[P + 1];
+  I unclear = {0};
+  power[1] = h;
+  UNROLL for (int k = 2; k <= P; k++) power[k] = power[k / 2] * power[k - k / 2];
+  for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, &v, g[j], power, j);
+  I hard = {0};
+  for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
+  if (any(hard)) resolve(&v);
+  if (SLOTS > 0) polish_guards(&v);
+  T best = BC(INFINITY), second = BC(INFINITY);
+  *slot = (I){0};
+  for (int j = 0; j < SLOTS; j++) {
+    I first = v.root[j] < best;
+    second = SELECT(first, best, MIN(second, v.root[j]));
+    best = SELECT(first, v.root[j], best);
+    *slot = (*slot & ~first) | (first & (j + 1));
+    *slope = SELECT(first, v.slope[j], *slope);
+  }
+  I hit = *slot != 0;
+  *dt = SELECT(hit, best * h, h);
+  return unclear | (hit & ((second - best) * h <= TIE * MAX(BC(1), ABS(s->t))));
+}
+
+/* Events --------------------------------------------------------------------------------------- */
+
+/* Zeno: ever shorter intervals are left to the scalar driver, which knows their limit. */
+INLINE I watch_intervals(Lanes *s, I which) {
+  T interval = s->t - s->last_event;
+  I shorter = which & (interval < 0.9999 * s->shortest);
+  s->last_event = SELECT(which, s->t, s->last_event);
+  s->shortest = SELECT(shorter, interval, s->shortest);
+  s->shrinking -= shorter;
+  return which & (s->shrinking >= 3);
+}
+
+INLINE void count(Lanes *s, Work *w, int kind, I which) {
+  s->kinds[kind] -= which;
+  s->events -= which;
+  if (w->o->at_kind != kind || !w->at_x) return;
+  I now = which & (s->kinds[kind] == w->o->at_count);
+  if (!any(now)) return;
+  for (int l = 0; l < W; l++)
+    if (LANE_I(now, l)) {
+      w->at_t[s->index[l]] = LANE(s->t, l);
+      for (int i = 0; i < ND; i++) w->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
+    }
+}
+
+#if M > 0
+/* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard
+ * over the step. The lanes that need the scalar driver are returned. */
+INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
+  T value[2], scale[2];
+  lie(s, value, scale);
+  I ends = up | down, was = s->slides, unclear = {0};
+  I steep = slope < -1e-10 * MAX(scale[0], scale[1]);
+  I attracts = (up & (I)(value[1] > 64 * EPS * scale[1])) | (down & (I)(value[0] < -64 * EPS * scale[0]));
+  unclear |= ends & ~(steep & attracts);
+  I was_above = s->above;
+  unclear |= decide(s, met, value, scale);
+  s->slides &= ~ends;
+  s->above = (s->above & ~ends) | up;
+  s->drop = (s->drop & ~ends) | (ends & 2);
+  I all = (met | ends) & ~unclear;
+  I entered = all & s->slides & ~was, changed = all & (s->slides ^ was | s->above ^ was_above);
+  unclear |= all & ~changed;
+  count(s, w, ENTRY, entered);
+  count(s, w, EXIT, all & ends);
+  count(s, w, CROSSING, changed & ~ends & ~entered);
+  unclear |= watch_intervals(s, all);
+  unclear |= s->events >= w->o->max_events;
+  set_lambda(s);
+  note_modes(s, w, all & ~unclear);
+  return unclear;
+}
+
+/* Sliding towards a two-fold where the sliding field is 0/0. */
+INLINE I near_two_fold(const Lanes *s, double tolerance) {
+  T value[2], scale[2];
+  lie(s, value, scale);
+  return s->slides & (ABS(value[0]) <= 2 * (tolerance + 2e-14) * scale[0])
+         & (ABS(value[1]) <= 2 * (tolerance + 2e-14) * scale[1]);
+}
+#endif
+
+INLINE void advance(Lanes *s, T c[N][P + 1], T dt) {
+  for (int i = 0; i < N; i++) {
+    T v = c[i][P];
+    UNROLL for (int k = P - 1; k >= 0; k--) v = v * dt + c[i][k];
+    s->x[i] = v;
+  }
+  s->t += dt;
+  if (TIMED) s->x[N - 1] = s->t;
+  s->steps += 1;
+  s->drop = (I){0};
+}
+
+static void finish_lanes(Lanes *s, Work *w, I which, int status) {
+  which &= s->live;
+  if (!any(which)) return;
+  for (int l = 0; l < W; l++) if (LANE_I(which, l)) store(s, w, l, status);
+}
+
+static void step(Lanes *s, Work *w) {
+  const Options *o = w->o;
+  T c[N][P + 1], g[S1][P + 1], dt, slope = BC(0);
+  I finite, slot;
+  jet(s->x, s->q, s->slides, s->above, s->lambda, &c[0][0], &g[0][0]);
+  T h = MIN(step_size(s, o, c, g, &finite), BC(o->max_step)), left = o->t_end - s->t;
+  I last = h >= left, unclear = ~finite;
+  unclear |= ~last & (h <= 4 * EPS * MAX(BC(1), ABS(s->t)));
+  unclear |= s->steps >= o->max_steps;
+  h = SELECT(last, left, h);
+  unclear |= first_hit(s, g, h, &dt, &slot, &slope);
+  I was_sliding = s->slides;
+  advance(s, c, dt);
+  I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
+#if M > 0
+  met = live & ~was_sliding & (slot == 1);
+  up = live & was_sliding & (slot == 1);
+  down = live & (slot == 2);
+  if (any(met | (live & was_sliding))) project(s, met | was_sliding);
+  if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, slope);
+  else if (!CANCELLED && any(live & was_sliding)) unclear |= near_two_fold(s, o->rtol);
+#endif
+#if STOPS > 0
+  stopped = live & (slot > FIRST_STOP);
+  if (any(stopped)) count(s, w, STOP, stopped);
+#endif
+  last &= live & (slot == 0);
+  s->t = SELECT(last, BC(o->t_end), s->t);
+  hand_over(s, w, unclear);
+  finish_lanes(s, w, stopped & ~unclear, STOPPED);
+  finish_lanes(s, w, last & ~unclear, REACHED_END);
+}
+
+void run_lanes(int64_t count, const int64_t *which, const double *x0, const double *p,
+               int64_t p_stride, const double *t0, const Options *o, Tree *tree, double *x, double *t,
+               int32_t *status, int32_t *itinerary, int32_t *kinds, double *at_x, double *at_t,
+               int64_t *totals) {
+  Work w = {count, 0, p_stride, x0, p, t0[0], x, t, at_x, at_t, o, tree, status, itinerary, kinds,
+            totals, 0};
+  Lanes s;
+  (void)which;
+  memset(&s, 0, sizeof s);
+  double q[NQ];
+  prepare(p, q);
+  for (int k = 0; k < NQ; k++) s.q[k] = BC(q[k]);
+  for (;;) {
+    I fresh = {0};
+    if (w.alive < W && w.next < w.count) fresh = refill(&s, &w);
+    if (any(fresh)) { begin(&s, &w, fresh); continue; }
+    if (!w.alive) break;
+    step(&s, &w);
+  }
+}

@@ -1,0 +1,55 @@
+/* W doubles at once with the vector extensions of GCC and Clang; masks are all ones or all zeros. */
+typedef double T __attribute__((vector_size(8 * W)));
+typedef int64_t I __attribute__((vector_size(8 * W)));
+
+#define BC(v) ((T){0} + (double)(v))
+#define SELECT(m, a, b) ((T)(((I)(a) & (m)) | ((I)(b) & ~(m))))
+#define INLINE static inline __attribute__((always_inline))
+#define FUNCTION static __attribute__((noinline)) void
+#define UNROLL _Pragma("GCC unroll 32")
+
+#define LANEWISE(NAME, f) \
+  static T NAME(T a) { for (int l = 0; l < W; l++) a[l] = f(a[l]); return a; }
+#define LANEWISE2(NAME, f) \
+  static T NAME(T a, T b) { for (int l = 0; l < W; l++) a[l] = f(a[l], b[l]); return a; }
+LANEWISE(SQRT_, sqrt) LANEWISE(EXP_, exp) LANEWISE(LOG_, log) LANEWISE(SIN_, sin)
+LANEWISE(COS_, cos) LANEWISE(TAN_, tan) LANEWISE(ASIN_, asin) LANEWISE(ACOS_, acos)
+LANEWISE(ATAN_, atan) LANEWISE(SINH_, sinh) LANEWISE(COSH_, cosh) LANEWISE(TANH_, tanh)
+LANEWISE(ASINH_, asinh) LANEWISE(ACOSH_, acosh) LANEWISE(ATANH_, atanh) LANEWISE(ERF_, erf)
+LANEWISE(ERFINV_, ns_erfinv) LANEWISE(EXPM1_, expm1) LANEWISE(LOG1P_, log1p)
+LANEWISE2(POW_, pow) LANEWISE2(ATAN2_, atan2) LANEWISE2(HYPOT_, hypot)
+
+INLINE T ABS(T a) { return (T)((I)a & 0x7fffffffffffffffLL); }
+#if defined(__AVX512F__) && W == 8 && !defined(__clang__)
+/* The same as below; GCC does not find the instruction by itself. */
+INLINE T MIN(T a, T b) { return (T)__builtin_ia32_minpd512_mask(a, b, BC(0), -1, 4); }
+INLINE T MAX(T a, T b) { return (T)__builtin_ia32_maxpd512_mask(a, b, BC(0), -1, 4); }
+#else
+INLINE T MIN(T a, T b) { I m = a < b; return SELECT(m, a, b); }
+INLINE T MAX(T a, T b) { I m = a > b; return SELECT(m, a, b); }
+#endif
+INLINE int any(I m) {
+  int64_t r = 0;
+  UNROLL for (int l = 0; l < W; l++) r |= m[l];
+  return r != 0;
+}
+
+/* Binary logarithm and exponential to 1e-4, reciprocal to 1e-3: enough for a step size, a hundredth
+ * of libm's cost. */
+INLINE T LOG2(T a) {
+  I b = (I)a;
+  T e = __builtin_convertvector((b >> 52) - 1023, T);
+  T m = (T)((b & 0xfffffffffffffLL) | 0x3ff0000000000000LL) - 1.5;
+  return e + (0.5849625007 + m * (0.9617966939 + m * (-0.3205988980 + m * (0.1424883991
+         + m * (-0.0712441996 + m * (0.0379969064 - m * 0.0211093925))))));
+}
+INLINE T EXP2(T a) {
+  T k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;
+  T y = 1.0 + f * (1.0 + f * (0.5 + f * (0.16666666666 + f * (0.0416666666 + f * 0.0083333333))));
+  return y * (T)((__builtin_convertvector(k, I) + 1023) << 52);
+}
+INLINE T ROUGH_INVERSE(T a) {
+  T y = (T)(0x7fde6238da3c2118LL - (I)a);
+  y = y * (2.0 - a * y);
+  return y * (2.0 - a * y);
+}

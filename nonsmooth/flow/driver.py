@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ..model import Array, FilippovSystem, Resets, Surfaces, motion
+from ..model import Array, FilippovSystem, Intersection, Resets, Surfaces, motion
 from .accumulation import remaining_time
 from .options import Options
 from .status import ADVICE, Status
@@ -53,6 +53,7 @@ class Driver:
         self.stepper = Stepper(system, p, options.rtol, options.atol)
         self.surfaces, self.resets = Surfaces(system), Resets(system)
         self.t, self.x = options.t_start, x
+        self.multipliers = np.zeros(0)  # of an intersection, where they are further states
         self.mode = ""
         self.drops: dict[int, int] = {}
         self.record = _Record()
@@ -81,11 +82,13 @@ class Driver:
             return self._end(Status.REACHED_END, f"t_end = {self.options.t_end:g} reached.")
         if len(self.record.starts) >= self.options.max_steps:
             return self._end(Status.TOO_MANY_STEPS, f"{self.options.max_steps} steps taken.")
-        e = self.stepper.expand(self.mode, self.x)
+        e = self._expand()
         if not e.finite:
             return self._singular_step(e, left)
         h = min(self.stepper.step_size(e), self.options.max_step)
         if h <= 4 * EPSILON * max(1.0, abs(self.t)) and h < left:
+            if len(self.multipliers) == 1:
+                return self._leave_branch(e)
             return self._end(Status.STEP_TOO_SMALL, f"A step of {h:.1e} would be needed.")
         last = h >= left
         h = min(h, left)
@@ -99,17 +102,32 @@ class Driver:
         elif "s" in self.mode and not hit:
             self._watch_two_fold()
 
+    def _expand(self) -> Expansion:
+        if self.multipliers.size:
+            return self.stepper.expand(self.mode, np.concatenate([self.x, self.multipliers]))
+        return self.stepper.expand(self.mode, self.x)
+
     def _advance(self, e: Expansion, coefficients: Array, dt: float) -> None:
         self.record.starts.append(self.t)
         self.record.coefficients.append(coefficients)
         x = self.stepper.advance(e if coefficients is e.states else _with(e, coefficients), dt)
         self.t += dt
         if self.system.time_dependent:
-            x[-1] = self.t
-        if "s" in self.mode:
-            x = self.surfaces.project(x, self.p, [self.mode.index("s")])
-        self.x, self.drops = x, {}
+            x[self.system.dimension] = self.t
+        self._settle(x)
+        self.drops = {}
         self._note()
+
+    def _settle(self, x: Array) -> None:
+        """Keep a sliding state on its surfaces, and multipliers on their equations."""
+        size = self.system.extended_dimension
+        sliding = [i for i, c in enumerate(self.mode) if c == "s"]
+        self.x = self.surfaces.project(x[:size], self.p, sliding)
+        if x.size > size:
+            of_mode = motion(self.system, self.mode)
+            assert isinstance(of_mode, Intersection)
+            values = of_mode.improve(np.concatenate([self.x, x[size:]]), self.p)
+            self.multipliers = values[size:]
 
     def _singular_step(self, e: Expansion, left: float) -> None:
         """Leave a point where only low derivatives exist; guards are looked at after the step."""
@@ -124,7 +142,7 @@ class Driver:
     def _watch_two_fold(self) -> None:
         if motion(self.system, self.mode).cancelled:
             return
-        e = self.stepper.expand(self.mode, self.x)
+        e = self._expand()
         surface = self.mode.index("s")
         if is_two_fold(self.stepper, e, surface, self.options.rtol):
             self._end(
@@ -142,18 +160,33 @@ class Driver:
         if guard.kind == "reset":
             return self._reset(guard.index, guard.name)
         i, before = guard.index, self.mode
-        active = self._active({i})
+        active = self._active({i}, self.mode)
         self.x = self.surfaces.project(self.x, self.p, active)
         self.record.x[-1] = self.x[: self.system.dimension].copy()
         known: dict[tuple[str, int, int], int] = {}
         if guard.kind == "exit":
             known = {("exit", i, guard.side): 1, ("surface", i, guard.side): 2}
-        self._continue(active, known, before, guard.name)
+        layer = (float(guard.side), -guard.side) if guard.kind == "surface" else None
+        self._continue(active, known, before, guard.name, layer)
+
+    def _leave_branch(self, e: Expansion) -> None:
+        """A hidden sliding solution merges with an unstable one; lambda moves on at once."""
+        direction = 1 if e.states[-1, 1] > 0 else -1
+        layer = (float(self.multipliers[0]), direction)
+        surface = self.mode.index("s")
+        self._continue([surface], {}, self.mode, "stability of sliding", layer)
 
     def _continue(
-        self, active: Sequence[int], known: dict[tuple[str, int, int], int], before: str, name: str
+        self,
+        active: Sequence[int],
+        known: dict[tuple[str, int, int], int],
+        before: str,
+        name: str,
+        layer: tuple[float, int] | None = None,
+        letters: str | None = None,
     ) -> None:
-        decision = decide(self.stepper, self.x, self.mode, active, known)
+        mode = self.mode if letters is None else letters
+        decision = decide(self.stepper, self.x, mode, active, known, layer)
         if decision.continuation is None:
             self._end(decision.status, decision.message)
             return
@@ -170,21 +203,25 @@ class Driver:
         if not np.all(np.isfinite(self.x)):
             return self._end(Status.NOT_FINITE, f"The map of reset {name!r} at t = {self.t:.10g}.")
         self._note()
-        before, h = self.mode, self.surfaces.values(self.x, self.p)[0]
-        active = self._active(set())
-        self.mode = "".join("+" if v > 0 else "-" for v in h)
-        self._continue(active, {}, before, name)
+        letters = self._letters()
+        active = self._active(set(), letters)
+        self._continue(active, {}, self.mode, name, letters=letters)
         self._drop_zero_guards()
+
+    def _letters(self) -> str:
+        """Sides of all surfaces; what is on a surface counts as below until it is decided."""
+        h = self.surfaces.values(self.x, self.p)[0]
+        return "".join("+" if v > 0 else "-" for v in h)
 
     def _begin(self, start_mode: str | None) -> None:
         """Decide the first mode, or take the one asked for."""
         h, _ = self.surfaces.values(self.x, self.p)
         if not np.all(np.isfinite(h)):
             return self._end(Status.NOT_FINITE, "A switching function at the start.")
-        active = self._active(set())
+        self.mode = self._letters()
+        active = self._active(set(), self.mode)
         self.x = self.surfaces.project(self.x, self.p, active)
         self.record.x[-1] = self.x[: self.system.dimension].copy()
-        self.mode = "".join("+" if v > 0 else "-" for v in h)
         if start_mode is not None:
             self._start_in(start_mode, active)
         elif active:
@@ -203,7 +240,16 @@ class Driver:
                 f"start_mode {mode!r} does not hold at the start, where the mode is {self.mode!r}.",
             )
         self.mode = mode
-        e = self.stepper.expand(mode, self.x)
+        of_mode = motion(self.system, mode)
+        if isinstance(of_mode, Intersection):
+            solutions = of_mode.solutions(self.x, self.p)
+            if len(solutions) != 1:
+                return self._end(
+                    Status.NON_UNIQUE,
+                    f"start_mode {mode!r} has {len(solutions)} stable sliding solutions here.",
+                )
+            self.multipliers = solutions[0][self.x.size :]
+        e = self._expand()
         for row, guard in enumerate(self.stepper.guards(mode)):
             if guard.index in active and guard.kind in ("surface", "exit"):
                 k, value = self.stepper.leading(e, row, 1 if guard.kind == "surface" else 0)
@@ -214,7 +260,7 @@ class Driver:
         self._due = None
         if self._ended is not None:
             return
-        e = self.stepper.expand(self.mode, self.x)
+        e = self._expand()
         for row, guard in enumerate(self.stepper.guards(self.mode)):
             if guard.kind in ("stop", "reset"):
                 k, value = self.stepper.leading(e, row, 0)
@@ -225,14 +271,14 @@ class Driver:
     def _adopt(self, continuation: Continuation) -> None:
         self._close_segment(continuation.mode)
         self.mode, self.drops = continuation.mode, dict(continuation.drops)
+        self.multipliers = continuation.multipliers
 
-    def _active(self, certain: set[int]) -> list[int]:
+    def _active(self, certain: set[int], mode: str) -> list[int]:
         """Surfaces through the present state, to rounding, and those known to be."""
         h, gradient = self.surfaces.values(self.x, self.p)
         scale = np.abs(gradient) @ (1.0 + np.abs(self.x))
         near = {i for i in range(len(h)) if abs(h[i]) <= 64 * EPSILON * scale[i]}
-        if "s" in self.mode:
-            near.add(self.mode.index("s"))
+        near |= {i for i, c in enumerate(mode) if c == "s"}
         return sorted(near | certain)
 
     # bookkeeping -------------------------------------------------------------------------------

@@ -37,8 +37,8 @@ ADVICE: dict[Status, str] = {
     "start_mode= the mode you mean.",
     Status.ACCUMULATION: "Events accumulate in finite time (Zeno); continue from the limit with "
     "the motion that holds there.",
-    Status.INTERSECTION: "The motion would slide on an intersection of surfaces, which is not "
-    "built; the state where it begins is the last one.",
+    Status.INTERSECTION: "At this intersection of surfaces Filippov's convention with independent "
+    "multipliers has no stable motion; look at the fields around the last state.",
     Status.STEP_TOO_SMALL: "The solution has a singularity here, or the tolerance is below "
     "rounding: loosen tol or look at the fields near the last state.",
     Status.NOT_FINITE: "A field or a switching function is not a finite number here: check "

@@ -23,7 +23,7 @@ _TIE = 1e-13
 #: Local errors add up over a run; a tenth keeps the global error near the tolerance.
 _SAFETY = 0.1
 
-_PRIORITY = {"stop": 0, "reset": 1, "surface": 2, "exit": 3}
+_PRIORITY = {"stop": 0, "reset": 1, "surface": 2, "exit": 3, "branch": 4}
 
 
 def order_for(tolerance: float) -> int:
@@ -103,10 +103,11 @@ class Stepper:
 
     def step_size(self, e: Expansion) -> float:
         """Step for which the last two terms of states and guards stay below the tolerances."""
-        n = self.system.dimension
-        allowed = np.zeros(e.states.shape[0])
-        allowed[:n] = _SAFETY * (self.atol + self.rtol * np.abs(e.states[:n, 0]))
-        h = _bound(e.states[:n], allowed[:n], self.order)
+        moves = np.ones(e.states.shape[0], dtype=bool)
+        if self.system.time_dependent:
+            moves[self.system.dimension] = False  # time is exact
+        allowed = _SAFETY * moves * (self.atol + self.rtol * np.abs(e.states[:, 0]))
+        h = _bound(e.states[moves], allowed[moves], self.order)
         if e.guards.size:
             # A guard without gradient here (a double zero) has no yardstick of its own.
             guard_allowed = e.gradient @ allowed + self.rtol * np.abs(e.guards[:, 0])

@@ -15,7 +15,7 @@ from itertools import product
 
 import numpy as np
 
-from ..model import Array, motion
+from ..model import Array, Intersection, motion
 from .status import Status
 from .stepper import Expansion, Stepper
 
@@ -25,11 +25,15 @@ Known = Mapping[tuple[str, int, int], int]
 
 @dataclass(frozen=True)
 class Continuation:
-    """A mode that can continue, and the coefficients to drop from its guards in the first step."""
+    """A mode that can continue, and the coefficients to drop from its guards in the first step.
+
+    ``multipliers`` are those of an :class:`Intersection`, which has them as further states.
+    """
 
     mode: str
     drops: dict[int, int]
     strict: bool
+    multipliers: Array
 
 
 @dataclass(frozen=True)
@@ -41,7 +45,14 @@ class Decision:
     message: str = ""
 
 
-def decide(stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known) -> Decision:
+def decide(
+    stepper: Stepper,
+    x: Array,
+    mode: str,
+    active: Sequence[int],
+    known: Known,
+    layer: tuple[float, int] | None = None,
+) -> Decision:
     """Choose the motion that continues from a point of the surfaces ``active``.
 
     Parameters
@@ -55,15 +66,19 @@ def decide(stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: 
         Surfaces through the point.
     known : mapping
         Coefficients known to vanish, besides the values of h at the active surfaces.
+    layer : (float, {-1, 1}), optional
+        With hidden dynamics and one active surface: where its multiplier comes from and which way
+        it moves through the layer lambda in [-1, 1].
     """
     singular = _two_folds(stepper, x, mode, active)
     if singular:
         return Decision(None, Status.NON_UNIQUE, _two_fold_message(singular[0]))
-    candidates = list(_candidates(mode, active))
     found = [
-        c for m in candidates if (c := _continuation(stepper, x, m, active, known)) is not None
+        c for m in _candidates(mode, active) for c in _continuations(stepper, x, m, active, known)
     ]
     strict = [c for c in found if c.strict]
+    if layer is not None and stepper.system.hidden and len(active) == 1:
+        strict = _through_layer(strict, active[0], *layer)
     if len(strict) == 1 or (not strict and len(found) == 1):
         return Decision((strict or found)[0])
     if len(strict) > 1:
@@ -74,9 +89,7 @@ def decide(stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: 
     if len(active) > 1:
         surfaces = " and ".join(f"h{i}" for i in active)
         return Decision(
-            None,
-            Status.INTERSECTION,
-            f"No motion with at most one sliding surface leaves {surfaces}.",
+            None, Status.INTERSECTION, f"No mode leaves or slides stably along {surfaces} = 0."
         )
     return Decision(
         None, Status.NON_UNIQUE, "No mode continues from here to rounding: a degenerate tangency."
@@ -88,8 +101,18 @@ def _candidates(mode: str, active: Sequence[int]) -> Iterable[str]:
         candidate = list(mode)
         for i, letter in zip(active, letters, strict=True):
             candidate[i] = letter
-        if candidate.count("s") <= 1:
-            yield "".join(candidate)
+        yield "".join(candidate)
+
+
+def _continuations(
+    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
+) -> Iterable[Continuation]:
+    of_mode = motion(stepper.system, mode)
+    points = of_mode.solutions(x, stepper.p) if isinstance(of_mode, Intersection) else [x]
+    for point in points:
+        continuation = _continuation(stepper, point, mode, active, known)
+        if continuation is not None:
+            yield continuation
 
 
 def _continuation(
@@ -110,7 +133,20 @@ def _continuation(
         if value == 0.0:
             strict = False
         drops[row] = min(k, e.guards.shape[1] - 1) if value else e.guards.shape[1]
-    return Continuation(mode, drops, strict)
+    return Continuation(mode, drops, strict, x[stepper.system.extended_dimension :])
+
+
+def _through_layer(
+    found: Sequence[Continuation], surface: int, origin: float, direction: int
+) -> list[Continuation]:
+    """First equilibrium of the layer problem that lambda meets on its way, if any (Jeffrey 2018)."""
+
+    def ahead(c: Continuation) -> float:
+        letter = c.mode[surface]
+        lam = float(c.multipliers[0]) if letter == "s" else (1.0 if letter == "+" else -1.0)
+        return (lam - origin) * direction
+
+    return sorted((c for c in found if ahead(c) > 1e-5), key=ahead)[:1]
 
 
 def _finite_prefix(e: Expansion) -> Expansion:
@@ -123,16 +159,13 @@ def _finite_prefix(e: Expansion) -> Expansion:
 
 def _two_folds(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) -> list[int]:
     """Active surfaces both of whose fields are tangent here and whose sliding field is 0/0."""
-    found = []
-    for i in active:
-        sliding = "".join("s" if j == i else c.replace("s", "+") for j, c in enumerate(mode))
-        if "s" in mode and mode.index("s") != i and len(active) > 1:
-            continue
-        if motion(stepper.system, sliding).cancelled:
-            continue
-        if is_two_fold(stepper, stepper.expand(sliding, x), i):
-            found.append(i)
-    return found
+    if len(active) != 1:
+        return []
+    i = active[0]
+    sliding = mode[:i] + "s" + mode[i + 1 :]
+    if motion(stepper.system, sliding).cancelled:
+        return []
+    return [i] if is_two_fold(stepper, stepper.expand(sliding, x), i) else []
 
 
 def is_two_fold(stepper: Stepper, e: Expansion, surface: int, tolerance: float = 0.0) -> bool:

@@ -10,6 +10,7 @@ from .crossing import (
     return_matrix,
 )
 from .folds import Fold, find_fold, fold
+from .intersection import intersection_range
 from .normal_form import NormalForm, ReducedFlow, normal_form
 from .regions import Region, alpha, region, sliding_field
 from .two_fold import TraceError, TwoFold, find_two_fold, trace_two_folds, two_fold
@@ -33,6 +34,7 @@ __all__ = [
     "flight_above",
     "flight_below",
     "fold",
+    "intersection_range",
     "max_flights",
     "normal_form",
     "region",

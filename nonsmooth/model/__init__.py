@@ -11,7 +11,7 @@ from .errors import (
     PointError,
     explain,
 )
-from .motion import Evaluator, Followed, Guard, Motion, Resets, Surfaces, motion
+from .motion import Evaluator, Followed, Guard, Intersection, Motion, Resets, Surfaces, motion
 from .system import Array, FilippovSystem, Parameters, Reset, Stop
 
 __all__ = [
@@ -23,6 +23,7 @@ __all__ = [
     "FilippovSystem",
     "Followed",
     "Guard",
+    "Intersection",
     "Motion",
     "NonsmoothError",
     "NotSmoothError",

@@ -30,7 +30,7 @@ class Guard:
 
     Attributes
     ----------
-    kind : {"surface", "exit", "stop", "reset"}
+    kind : {"surface", "exit", "stop", "reset", "branch", "zero"}
     index : int
         Of the surface, stop or reset.
     side : int
@@ -62,8 +62,9 @@ class Motion:
         if len(sliding) > 1:
             raise DefinitionError(
                 f"mode {mode!r}: expected at most one sliding surface, received {len(sliding)}. "
-                "Sliding on an intersection of surfaces is not built yet."
+                "Sliding on an intersection has the multipliers as further states: Intersection."
             )
+        self.states = system.extended_states
         self.sliding = sliding[0] if sliding else None
         self.cancelled = False
         self._key: tuple[object, ...] = ()
@@ -106,9 +107,9 @@ class Motion:
                 guards.append(Guard("surface", i, sign, f"h{i}"))
                 functions.append(sign * system.surface_function(i))
                 continue
-            for side in (1, -1):
-                guards.append(Guard("exit", i, side, "L_F1 h" if side > 0 else "L_F2 h"))
-                functions.append(-side * system.lie_derivative([self._with_side(side)], i))
+            for guard, function in self._exits(i):
+                guards.append(guard)
+                functions.append(function)
         for j, (name, direction) in enumerate(system.stops):
             guards.append(Guard("stop", j, direction, name))
             functions.append(system._guards[j])
@@ -117,25 +118,33 @@ class Motion:
             functions.append(system._guards[len(system.stops) + j])
         return tuple(guards), ca.densify(ca.vertcat(*functions)) if functions else ca.SX(0, 1)
 
+    def _exits(self, i: int) -> list[tuple[Guard, ca.SX]]:
+        """Guards of the sliding on surface i."""
+        return [
+            (
+                Guard("exit", i, side, "L_F1 h" if side > 0 else "L_F2 h"),
+                -side * self.system.lie_derivative([self._with_side(side)], i),
+            )
+            for side in (1, -1)
+        ]
+
     def jet_function(self, order: int) -> ca.Function:
         """Return (x, p) -> jets of states (N, order+1) and of guard functions (m, order+1)."""
         system = self.system
 
         def build() -> Sequence[ca.SX]:
-            return taylor(
-                self.field, self.functions, system.extended_states, system.parameter_symbols, order
-            )
+            return taylor(self.field, self.functions, self.states, system.parameter_symbols, order)
 
-        return system.function(("jet", self.mode, order, *self._key), build)
+        return system.function(("jet", self.mode, order, *self._key), build, self.states)
 
     def gradient_function(self) -> ca.Function:
         """Return (x, p) -> gradients of the guard functions (m, N), the yardstick of rounding."""
         system = self.system
 
         def build() -> Sequence[ca.SX]:
-            return [ca.jacobian(self.functions, system.extended_states)]
+            return [ca.jacobian(self.functions, self.states)]
 
-        return system.function(("gradient", self.mode, *self._key), build)
+        return system.function(("gradient", self.mode, *self._key), build, self.states)
 
 
 class Evaluator:
@@ -250,9 +259,98 @@ class Resets:
         return after
 
 
+class Intersection(Motion):
+    """Sliding whose multipliers solve grad h_i . f(x, lambda) = 0 implicitly.
+
+    For several sliding surfaces, or one whose multiplier enters nonlinearly (hidden dynamics), the
+    multipliers are further states with lambda' = -(dG/dlambda)^-1 dG/dx f, so the same jets carry
+    them. A multiplier that reaches +1 or -1 leaves its surface; ``branch`` guards keep the
+    equilibrium lambda of the layer problem eps lambda_i' = grad h_i . f stable (Jeffrey 2018).
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+        One letter for each surface.
+    """
+
+    def __init__(self, system: FilippovSystem, mode: str):
+        self.system, self.mode = system, mode
+        self.signs = system.parse_mode(mode)
+        self.surfaces = [i for i, s in enumerate(self.signs) if s == 0]
+        self.sliding, self.cancelled, self._key = self.surfaces[0], True, ()
+        self.multipliers = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in self.surfaces])
+        values = ca.SX([float(s) for s in self.signs])
+        for k, i in enumerate(self.surfaces):
+            values[i] = self.multipliers[k]
+        field = system.field_with(values)
+        x = system.extended_states
+        h = ca.vertcat(*[system.surface_function(i) for i in self.surfaces])
+        self.layer = ca.densify(ca.mtimes(ca.jacobian(h, x), field))
+        self.slope = ca.densify(ca.jacobian(self.layer, self.multipliers))
+        drift = ca.mtimes(ca.jacobian(self.layer, x), field)
+        rates = -ca.mtimes(ca.inv_minor(self.slope), drift)
+        self.states = ca.vertcat(x, self.multipliers)
+        self.field = ca.vertcat(field, rates)
+        self.guards, self.functions = self._guards()
+
+    def _guards(self) -> tuple[tuple[Guard, ...], ca.SX]:
+        guards, functions = super()._guards()
+        k, first = len(self.surfaces), self.surfaces[0]
+        # At a simple fold of one multiplier the field is singular before its guard is zero.
+        stable = [(-1.0) ** k * ca.det(self.slope)]
+        if k > 1:
+            stable.append(-ca.trace(self.slope))
+        more = tuple(Guard("branch", first, 0, "stability of sliding") for _ in stable)
+        return guards + more, ca.densify(ca.vertcat(functions, *stable))
+
+    def _exits(self, i: int) -> list[tuple[Guard, ca.SX]]:
+        lam = self.multipliers[self.surfaces.index(i)]
+        return [(Guard("exit", i, side, f"lambda{i}"), 1 - side * lam) for side in (1, -1)]
+
+    def layer_function(self) -> ca.Function:
+        """Return (x with multipliers, p) -> G (k,), dG/dlambda (k, k)."""
+        build = [self.layer, self.slope]
+        return self.system.function(("layer", self.mode), lambda: build, self.states)
+
+    def improve(self, values: Array, p: Array, iterations: int = 2) -> Array:
+        """Correct the multipliers at the end of ``values`` by Newton on G = 0."""
+        k, values = len(self.surfaces), values.copy()
+        for _ in range(iterations):
+            g, slope = (np.array(a) for a in self.layer_function()(values, p))
+            if not np.all(np.isfinite(slope)) or abs(np.linalg.det(slope)) == 0.0:
+                break
+            values[-k:] -= np.linalg.solve(slope, g.ravel())
+        return values
+
+    def solutions(self, x: Array, p: Array) -> list[Array]:
+        """All stable multipliers in [-1, 1]^k at x, each as x extended by them.
+
+        Newton from a grid: bilinear equations of two multipliers have at most two solutions.
+        """
+        k = len(self.surfaces)
+        grid = np.linspace(-0.95, 0.95, 21 if k == 1 else 5)
+        found: list[Array] = []
+        for start in np.stack(np.meshgrid(*[grid] * k), axis=-1).reshape(-1, k):
+            values = self.improve(np.concatenate([x, start]), p, 30)
+            g, slope = (np.array(a) for a in self.layer_function()(values, p))
+            lam = values[-k:]
+            small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
+            if not small or np.abs(lam).max() > 1.0 + 1e-9:
+                continue
+            if np.linalg.eigvals(slope).real.max() >= 0.0:
+                continue
+            if all(np.abs(lam - other[-k:]).max() > 1e-7 for other in found):
+                found.append(values)
+        return found
+
+
 def motion(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode, built once per system."""
     key = ("motion", mode)
     if key not in system._functions:
-        system._functions[key] = Motion(system, mode)
+        implicit = mode.count("s") > 1 or any(
+            c == "s" and nonlinear for c, nonlinear in zip(mode, system.nonlinear, strict=True)
+        )
+        system._functions[key] = (Intersection if implicit else Motion)(system, mode)
     return system._functions[key]

@@ -95,6 +95,9 @@ class FilippovSystem:
         The symbol of time if the system depends on it.
     stops : sequence of Stop, optional
     resets : sequence of Reset, optional
+    hidden : bool, optional
+        Allow multipliers that enter nonlinearly (hidden dynamics, Jeffrey 2018): sliding then
+        follows a stable solution lambda of grad h . f(x, lambda) = 0.
 
     Raises
     ------
@@ -129,6 +132,7 @@ class FilippovSystem:
         time: Expression | None = None,
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] = (),
+        hidden: bool = False,
     ):
         x = _symbols(states, "states")
         if x.numel() == 0:
@@ -163,6 +167,7 @@ class FilippovSystem:
         self._adopt(x, t, p, lam, f, h, ca.vertcat(*guards), ca.horzcat(*maps))
         self.stops = tuple((s.name, s.direction) for s in stops)
         self.resets = tuple((r.name, r.direction) for r in resets)
+        self.hidden = hidden
         self._check()
 
     # construction ------------------------------------------------------------------------------
@@ -182,6 +187,7 @@ class FilippovSystem:
         self._f, self._h = f, h
         self._guards, self._maps = guards, maps
         self._functions: dict[Any, Any] = {}
+        self.nonlinear = tuple(not ca.is_linear(f, lam[i]) for i in range(lam.numel()))
         self.state_names = tuple(s.name() for s in ca.vertsplit(x))
         self.parameter_names = tuple(s.name() for s in ca.vertsplit(p)) if p.numel() else ()
 
@@ -214,12 +220,12 @@ class FilippovSystem:
                     f"the constant {self._h[i]}. A surface is the zero set of a function of the "
                     "states."
                 )
-            if not ca.is_linear(self._f, self._lam[i]):
+            if self.nonlinear[i] and not self.hidden:
                 raise DefinitionError(
                     f"multiplier {self._lam[i]}: expected a field linear in it (Filippov's convex "
                     "combination), received a nonlinear one. Nonlinear multipliers are hidden "
-                    "dynamics (Jeffrey 2018) and are not built; products of different multipliers "
-                    "are fine."
+                    "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
+                    "different multipliers are fine."
                 )
 
     def __repr__(self) -> str:
@@ -243,6 +249,7 @@ class FilippovSystem:
             "defaults": self._defaults,
             "stops": self.stops,
             "resets": self.resets,
+            "hidden": self.hidden,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -252,6 +259,7 @@ class FilippovSystem:
         self._adopt(*vectors, *(ca.SX(e) for e in definition.call(vectors)))
         self._defaults = state["defaults"]
         self.stops, self.resets = state["stops"], state["resets"]
+        self.hidden = state["hidden"]
 
     # shape -------------------------------------------------------------------------------------
 
@@ -399,13 +407,14 @@ class FilippovSystem:
 
     # numeric -----------------------------------------------------------------------------------
 
-    def function(self, key: Any, build: Callable[[], Sequence[ca.SX]]) -> ca.Function:
-        """Return the cached CasADi function (x_extended, p) -> ``build()``."""
+    def function(
+        self, key: Any, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
+    ) -> ca.Function:
+        """Return the cached CasADi function (states, p) -> ``build()``; states as extended."""
         if key not in self._functions:
             outputs = [ca.densify(ca.SX(e)) for e in build()]
-            self._functions[key] = ca.Function(
-                "f", [self.extended_states, self._p], outputs, {"cse": True}
-            )
+            x = self.extended_states if states is None else states
+            self._functions[key] = ca.Function("f", [x, self._p], outputs, {"cse": True})
         return self._functions[key]
 
     def evaluate(

@@ -172,16 +172,6 @@ def test_two_relays_accumulate():
     assert run.accumulation_time == pytest.approx(0.75, abs=1e-6)
 
 
-def test_motion_that_would_slide_on_an_intersection_says_so():
-    system = ns.FilippovSystem(
-        [x, y], field=[-lam, -2 * kap], multipliers=[lam, kap], surfaces=[x, y]
-    )
-    run = ns.simulate(system, [1.0, 1.0], 5.0)
-    assert run.itinerary == "++ +s"  # y arrives first
-    assert run.status is ns.Status.INTERSECTION and run.t[-1] == pytest.approx(1.0)
-    assert "h0 and h1" in run.message
-
-
 def test_several_surfaces_switch_independently():
     """Two uncoupled oscillators with friction: the same events as two separate runs."""
     w = ca.SX.sym("w")

@@ -1,0 +1,132 @@
+"""Sliding on intersections and hidden dynamics follow the closed forms of their multipliers."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, z, w, lam, kap, b = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "lam", "kap", "b"))
+
+
+def test_two_contacts_at_rest_arrive_one_after_the_other():
+    """x' = -sgn x, y' = -2 sgn y, z' = 1 + sgn x: y sticks at 1/2, x at 1, and z goes on at 1."""
+    system = ns.FilippovSystem(
+        [x, y, z], field=[-lam, -2 * kap, 1 + lam], multipliers=[lam, kap], surfaces=[x, y]
+    )
+    run = ns.simulate(system, [1.0, 1.0, 0.0], 5.0, tol=1e-12)
+    assert run.itinerary == "++ +s ss" and run.status is ns.Status.REACHED_END
+    assert [e.kind for e in run.events] == ["entry", "entry", "end"]
+    np.testing.assert_allclose([e.t for e in run.events], [0.5, 1.0, 5.0], atol=1e-13)
+    np.testing.assert_allclose(run.x[-1], [0.0, 0.0, 2.0 + 4.0], atol=1e-12)
+
+
+def test_bilinear_law_leaves_the_intersection_at_its_closed_form():
+    """x1' = -s1 + x3/2, x2' = -s2 + x3/4, x3' = 1 + s1 s2/2: s1 = 1 at t = 4 atan(1/2)."""
+    system = ns.FilippovSystem(
+        [x, y, z],
+        field=[-lam + z / 2, -kap + z / 4, 1 + lam * kap / 2],
+        multipliers=[lam, kap],
+        surfaces=[x, y],
+    )
+    run = ns.simulate(system, [0.0, 0.0, 0.0], 2.5, tol=1e-13)
+    assert run.itinerary == "ss +s"
+    assert run.events[0].kind == "exit"
+    assert run.events[0].t == pytest.approx(4 * np.arctan(0.5), abs=1e-12)
+    times = np.linspace(0, run.events[0].t, 20)
+    np.testing.assert_allclose(run(times)[:, 2], 4 * np.tan(times / 4), atol=1e-11)
+    np.testing.assert_allclose(run(times)[:, :2], 0.0, atol=1e-12)
+    # Beyond, x1' = -1 + x3/2 with s2 = x3/4 still sliding: x3' = 1 + x3/8.
+    s = 2.5 - run.events[0].t
+    assert run.x[-1, 2] == pytest.approx(-8 + 10 * np.exp(s / 8), abs=1e-10)
+
+
+def test_spiralling_sliding_at_the_limit_of_two_relays():
+    """The intersection that attracts through infinitely many crossings holds the state."""
+    system = ns.FilippovSystem(
+        [x, y], field=[-lam + 2 * kap, -2 * lam - kap], multipliers=[lam, kap], surfaces=[x, y]
+    )
+    run = ns.simulate(system, [0.0, 0.0], 1.0)
+    assert run.itinerary == "ss" and run.x[-1].tolist() == [0.0, 0.0]
+
+
+def test_an_intersection_that_repels_is_not_unique():
+    system = ns.FilippovSystem([x, y], field=[lam, kap], multipliers=[lam, kap], surfaces=[x, y])
+    run = ns.simulate(system, [0.0, 0.0], 1.0)
+    assert run.status is ns.Status.NON_UNIQUE and "an intersection" in run.message
+
+
+def test_curved_intersection_does_not_drift():
+    """Held on a sphere and a plane, carried around the circle at unit speed for 200 turns."""
+    radius = x**2 + y**2 + w**2 - 1
+    field = [-y - lam * x, x - lam * y, -lam * w - kap]
+    system = ns.FilippovSystem([x, y, w], field=field, multipliers=[lam, kap], surfaces=[radius, w])
+    t_end = 400 * np.pi
+    run = ns.simulate(system, [1.0, 0.0, 0.0], t_end, tol=1e-12)
+    assert run.itinerary == "ss"
+    assert np.abs(np.linalg.norm(run.x, axis=1) - 1).max() < 1e-12
+    np.testing.assert_allclose(run.x[-1], [1.0, 0.0, 0.0], atol=1e-8)
+
+
+def test_hidden_dynamics_slides_nonlinearly():
+    """Jeffrey: x1' = -lam + b, x2' = 2 lam^2 - 1 slides with lam = b, x2' = 2 b^2 - 1."""
+    system = ns.FilippovSystem(
+        [x, y], field=[-lam + b, 2 * lam**2 - 1], multipliers=lam, surface=x,
+        parameters={b: 0.2}, hidden=True,
+    )  # fmt: skip
+    run = ns.simulate(system, [0.5, 0.0], 3.0, tol=1e-13)
+    assert run.itinerary == "+ s"
+    arrival = 0.5 / 0.8
+    assert run.events[0].t == pytest.approx(arrival, abs=1e-12)
+    assert run.x[-1, 1] == pytest.approx(arrival - 0.92 * (3.0 - arrival), abs=1e-11)
+
+
+def test_hidden_sliding_where_linear_filippov_crosses():
+    """grad h . f = (lam - .5)(lam + .2) - y: with y = 0 both sides push up (L1 = .6, L2 = 1.2)...
+
+    ... yet lam = -.2 is a stable layer equilibrium: from below (lam = -1 rising) the motion
+    sticks there until the two solutions merge at y = -.1225 as y falls.
+    """
+    field = [(lam - 0.5) * (lam + 0.2) - y, -0.1]
+    hidden = ns.FilippovSystem([x, y], field=field, multipliers=lam, surface=x, hidden=True)
+    run = ns.simulate(hidden, [-1.0, 0.2], 6.0, tol=1e-12)
+    assert run.itinerary == "- s +"
+    assert run.events[1].x[1] == pytest.approx(-0.1225, abs=1e-6)
+    linear = ns.FilippovSystem([x, y], surface=x, above=[0.6 - y, -0.1], below=[1.2 - y, -0.1])
+    assert ns.simulate(linear, [-1.0, 0.2], 6.0).itinerary == "- +"
+
+
+def test_nonlinear_multipliers_need_the_word():
+    with pytest.raises(ns.DefinitionError, match="hidden=True"):
+        ns.FilippovSystem([x], field=[lam**3], multipliers=lam, surface=x)
+
+
+def test_the_ambiguity_of_the_exit_is_reported():
+    """Among all Filippov solutions of the bilinear example the exit lies in [1.4586, 2.4434].
+
+    x1 leaves when x3 = 2; x3' ranges over [1/2 + 3 x3/8, 3/2 - x3/8] on the way, so the extreme
+    times are 8 log(6/5) and (8/3) log(5/2), and the bilinear law is in between.
+    """
+    system = ns.FilippovSystem(
+        [x, y, z],
+        field=[-lam + z / 2, -kap + z / 4, 1 + lam * kap / 2],
+        multipliers=[lam, kap],
+        surfaces=[x, y],
+    )
+    for height in (0.0, 0.7, 1.9):
+        low, high = ns.intersection_range(system, [0.0, 0.0, height], of=z)
+        assert low == pytest.approx(0.5 + 3 * height / 8, abs=1e-12)
+        assert high == pytest.approx(1.5 - height / 8, abs=1e-12)
+        assert low <= 1 + height**2 / 16 <= high
+    extremes = 8 * np.log(1.2), 8 / 3 * np.log(2.5)
+    np.testing.assert_allclose(extremes, [1.45857245435163701, 2.44344195166441351], rtol=1e-15)
+    run = ns.simulate(system, [0.0, 0.0, 0.0], 2.5)
+    assert extremes[0] < run.events[0].t < extremes[1]
+
+
+def test_no_motion_along_an_intersection_has_no_range():
+    system = ns.FilippovSystem(
+        [x, y], field=[2 + lam, kap], multipliers=[lam, kap], surfaces=[x, y]
+    )
+    with pytest.raises(ns.PointError, match="leaves the intersection"):
+        ns.intersection_range(system, [0.0, 0.0], of=x)

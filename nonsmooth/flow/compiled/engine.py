@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import threading
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any
@@ -145,24 +146,23 @@ class Engine:
         self.system, self.order = system, order
         self._scalar: ctypes.CDLL | None = None
         self._lanes: ctypes.CDLL | None = None
+        self._lock = threading.Lock()
 
     @property
     def scalar(self) -> ctypes.CDLL:
         """The library for one trajectory at a time."""
-        if self._scalar is None:
-            library = build(scalar_source(self.system, self.order))
-            _declare(library)
-            self._scalar = library
-        return self._scalar
+        with self._lock:
+            if self._scalar is None:
+                self._scalar = _declare(build(scalar_source(self.system, self.order)))
+            return self._scalar
 
     @property
     def lanes(self) -> ctypes.CDLL:
         """The library for trajectories in step."""
-        if self._lanes is None:
-            library = build(lanes_source(self.system, self.order))
-            _declare(library)
-            self._lanes = library
-        return self._lanes
+        with self._lock:
+            if self._lanes is None:
+                self._lanes = _declare(build(lanes_source(self.system, self.order)))
+            return self._lanes
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -316,7 +316,7 @@ class Engine:
         chunk.words += words
 
 
-def _declare(library: ctypes.CDLL) -> None:
+def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
     library.tree_new.restype = _POINTER
     library.tree_size.argtypes = [_POINTER]
     library.tree_read.argtypes = [_POINTER] * 3
@@ -324,13 +324,14 @@ def _declare(library: ctypes.CDLL) -> None:
     many = [_I64, *[_POINTER] * 3, _I64, *[_POINTER] * 11]
     if hasattr(library, "run_lanes"):
         library.run_lanes.argtypes = many
-        return
+        return library
     library.run_size.restype = _I64
     library.run_begin.argtypes = [_POINTER] * 6 + [_D]
     library.run_continue.argtypes = [_POINTER]
     library.run_read.argtypes = [_POINTER] * 3
     library.run_rewind.argtypes = [_POINTER]
     library.run_many.argtypes = many
+    return library
 
 
 def _address(a: NDArray[Any] | None) -> int | None:

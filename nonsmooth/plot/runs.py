@@ -1,0 +1,361 @@
+"""Trajectories: states against time with the modes marked, and the phase plane of planar systems."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Rectangle
+
+from ..flow import Event, Segment, Trajectory
+from ..model import Array, DefinitionError, FilippovSystem, OptionError, explain
+from . import style
+
+#: Marker of each kind of event; shape tells them apart without colour.
+MARKERS = {
+    "crossing": ("o", "white", "crossing"),
+    "entry": ("v", style.BLACK, "entry into sliding"),
+    "exit": ("^", "white", "exit from sliding"),
+    "stop": ("s", style.BLACK, "stop"),
+    "reset": ("D", "white", "reset"),
+    "zero": ("P", "white", "zero"),
+    "end": ("X", style.GREY, "end"),
+}
+_MODES = {
+    "+": (style.ABOVE, "-", 1.5, "+  above, h > 0"),
+    "-": (style.BELOW, (0, (5, 1.5)), 1.5, "−  below, h < 0"),
+    "s": (style.BLACK, "-", 3.0, "s  sliding"),
+    "": (style.BLUE, "-", 1.5, "smooth"),
+}
+_CYCLE = (style.ABOVE, style.BLUE, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
+_DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
+_GRID_FROM = 5  # states; fewer are stacked in one column
+_MANY = 300  # events; more are not marked one by one
+
+
+def trajectory(
+    run: Trajectory,
+    *,
+    states: list[str] | None = None,
+    phase_plane: bool | None = None,
+    samples: int = 2000,
+    size: tuple[float, float] | None = None,
+    figure: Figure | None = None,
+) -> Figure:
+    """Draw states against time, one panel each, with modes and events marked.
+
+    The strip on top of a column names the mode of each segment; sliding is also drawn thick, motion
+    below the surface dashed. A planar system gets its phase plane with the surface beside it.
+
+    Parameters
+    ----------
+    run : Trajectory
+        From ``simulate`` or ``follow``.
+    states : list of str, optional
+        Names of the states to draw; all by default.
+    phase_plane : bool, optional
+        Whether to draw the phase plane; by default for two states.
+    samples : int, optional
+        Points in time at which the dense output is drawn, besides the steps.
+    size : (float, float), optional
+        Inches.
+    figure : matplotlib Figure, optional
+        Where to draw; a new one by default.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    DefinitionError
+        ``run`` is not a trajectory, or a phase plane of a system that is not planar.
+    OptionError
+        An unknown state.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> block = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.4], below=[v, -x + 0.4])
+    >>> figure = ns.plot.trajectory(ns.simulate(block, [3.0, 0.0], t_end=15.0))
+    >>> [ax.get_ylabel() for ax in figure.axes if ax.get_ylabel()]
+    ['x', 'v', 'v']
+    """
+    run = _checked(run)
+    names = _states(run, states)
+    plane = run.system.dimension == 2 if phase_plane is None else phase_plane
+    if plane and run.system.dimension != 2:
+        raise DefinitionError(
+            explain(
+                "phase_plane",
+                expected="a system of 2 states",
+                received=f"{run.system.dimension} states: {', '.join(run.system.state_names)}",
+                advice="Leave phase_plane= out to draw states against time.",
+            )
+        )
+    columns = 1 if len(names) < _GRID_FROM else math.ceil(len(names) / 4)
+    rows = math.ceil(len(names) / columns)
+    if size is None:
+        size = (5.0 + 3.2 * (columns - 1) + 4.0 * plane, max(1.3 * rows + 1.2, 3.4))
+    with style.settings():
+        figure = style.new_figure(size) if figure is None else figure
+        parts = [_Part(run, segment, samples) for segment in run.segments]
+        looks = _looks([part.segment.mode for part in parts])
+        grid = figure.add_gridspec(
+            rows + 1,
+            columns + plane,
+            height_ratios=[0.13, *[1.0] * rows],
+            width_ratios=[1.0] * columns + [1.0 if columns == 1 else 1.2] * plane,
+        )
+        for column in range(columns):
+            chosen = names[column * rows : (column + 1) * rows]
+            _time_column(figure, grid, column, chosen, run, parts, looks)
+        if plane:
+            ax = figure.add_subplot(grid[1:, columns])
+            _phase_plane(ax, run, parts, looks)
+        figure.suptitle(_title(run), fontsize=10, fontfamily="monospace")
+        handles = _legend(run, looks, plane)
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5))
+    return figure
+
+
+class _Part:
+    """One segment with times and states at which it is drawn."""
+
+    def __init__(self, run: Trajectory, segment: Segment, samples: int):
+        span = abs(run.t[-1] - run.t[0]) or 1.0
+        low, high = sorted((segment.t_start, segment.t_end))
+        count = max(int(samples * (high - low) / span), 8)
+        steps = run.t[(run.t > low) & (run.t < high)] if len(run.t) < samples else run.t[:0]
+        # stay inside: at the ends, a reset would show the state after it
+        inner = (high - low) * 1e-9
+        times = np.union1d(np.linspace(low + inner, high - inner, count), steps)
+        resets = [e.t for e in run.events if e.kind == "reset" and low < e.t < high]
+        around = [t + shift for t in resets for shift in (-inner, inner)]
+        times = np.union1d(times, np.clip(around, low, high)) if resets else times
+        x = run(times)
+        # a jump is a gap in the curve
+        k = np.searchsorted(times, resets)
+        self.segment, self.t, self.x = (
+            segment,
+            np.insert(times, k, resets),
+            np.insert(x, k, np.nan, axis=0),
+        )
+
+
+def _checked(run: object) -> Trajectory:
+    if not isinstance(run, Trajectory):
+        raise DefinitionError(
+            explain(
+                "trajectory",
+                expected="a Trajectory",
+                received=type(run).__name__,
+                advice="Make one with simulate(system, x0, t_end=...).",
+            )
+        )
+    return run
+
+
+def _states(run: Trajectory, states: list[str] | None) -> list[str]:
+    known = list(run.system.state_names)
+    unknown = [name for name in states or [] if name not in known]
+    if unknown or states == []:
+        raise OptionError(
+            explain(
+                "states",
+                expected=f"names among {known}",
+                received=repr(states),
+                advice="Leave states= out to draw all of them.",
+            )
+        )
+    return list(states) if states else known
+
+
+def _looks(modes: list[str]) -> dict[str, tuple[str, Any, float, str]]:
+    """Colour, dashes, width and explanation of each mode, in order of appearance."""
+    looks: dict[str, tuple[str, Any, float, str]] = {}
+    several = any(len(mode) > 1 for mode in modes)
+    for mode in dict.fromkeys(modes):
+        if not several:
+            looks[mode] = _MODES[mode]
+            continue
+        k = len(looks)
+        width = 3.0 if "s" in mode else 1.5
+        text = mode.replace("-", "−")
+        looks[mode] = (_CYCLE[k % 6], "-" if "s" in mode else _DASHES[k % 4], width, text)
+    return looks
+
+
+def _time_column(
+    figure: Figure,
+    grid: Any,
+    column: int,
+    names: list[str],
+    run: Trajectory,
+    parts: list[_Part],
+    looks: dict[str, tuple[str, Any, float, str]],
+) -> None:
+    if not names:
+        return
+    strip = figure.add_subplot(grid[0, column])
+    _strip(strip, run, looks)
+    for row, name in enumerate(names):
+        ax = figure.add_subplot(grid[row + 1, column], sharex=strip)
+        k = run.system.state_names.index(name)
+        for part in parts:
+            color, dashes, width, _ = looks[part.segment.mode]
+            ax.plot(part.t, part.x[:, k], color=color, linestyle=dashes, linewidth=width)
+            if "s" in part.segment.mode:
+                ax.axvspan(part.segment.t_start, part.segment.t_end, color="#EDEDED", zorder=0)
+        _mark(ax, run.events, lambda event, k=k: (event.t, event.x[k]))
+        if run.accumulation_time is not None:
+            ax.axvline(run.accumulation_time, color=style.PURPLE, linestyle=":", linewidth=1.2)
+        ax.set_ylabel(name)
+        ax.tick_params(labelbottom=row == len(names) - 1)
+    ax.set_xlabel("t")
+    ax.margins(x=0.02)
+
+
+def _strip(ax: Axes, run: Trajectory, looks: dict[str, tuple[str, Any, float, str]]) -> None:
+    """Bar with the letter of each segment's mode, where there is room for it."""
+    span = abs(run.t[-1] - run.t[0]) or 1.0
+    for segment in run.segments:
+        low, high = sorted((segment.t_start, segment.t_end))
+        color = looks[segment.mode][0]
+        hatch = "///" if "s" in segment.mode else None
+        box = Rectangle(
+            (low, 0.0),
+            high - low,
+            1.0,
+            facecolor=color,
+            alpha=0.3,
+            edgecolor="white",
+            linewidth=0.5,
+            hatch=hatch,
+        )
+        ax.add_patch(box)
+        if (high - low) / span > 0.028 * max(len(segment.mode), 1):
+            ax.text(
+                (low + high) / 2,
+                0.45,
+                segment.mode.replace("-", "−"),
+                ha="center",
+                va="center",
+                fontsize=9,
+                fontweight="bold",
+                path_effects=style.halo(2.0),
+            )
+    ax.set(ylim=(0, 1), yticks=[])
+    ax.tick_params(bottom=False, labelbottom=False)
+    for side in ("top", "left", "right", "bottom"):
+        ax.spines[side].set_visible(False)
+
+
+def _mark(ax: Axes, events: list[Event], where: Any) -> None:
+    if len(events) > _MANY:
+        events = events[-1:]
+    for kind, (marker, face, _) in MARKERS.items():
+        points = np.array([where(event) for event in events if event.kind == kind])
+        if len(points):
+            ax.plot(
+                *points.T,
+                linestyle="none",
+                marker=marker,
+                markersize=5,
+                zorder=5,
+                markerfacecolor=face,
+                markeredgecolor=style.BLACK,
+                markeredgewidth=0.8,
+                gid=f"event {kind}",
+            )
+
+
+def _phase_plane(
+    ax: Axes, run: Trajectory, parts: list[_Part], looks: dict[str, tuple[str, Any, float, str]]
+) -> None:
+    for part in parts:
+        color, dashes, width, _ = looks[part.segment.mode]
+        ax.plot(*part.x.T, color=color, linestyle=dashes, linewidth=width, zorder=3)
+        if "s" not in part.segment.mode and np.all(np.isfinite(part.x)):
+            style.arrowhead(ax, part.x, 0.5, color, mutation_scale=11, zorder=4)
+    ax.plot(*run.x[0], "o", color=style.GREEN, markersize=6, zorder=5, gid="start")
+    _mark(ax, run.events, lambda event: event.x)
+    ax.margins(0.08)
+    low, high = ax.get_xlim(), ax.get_ylim()
+    if not run.system.time_dependent:
+        draw_surfaces(ax, run.system, np.array(list(run.parameters.values())), (*low, *high))
+    ax.set(xlim=low, ylim=high, xlabel=run.system.state_names[0], ylabel=run.system.state_names[1])
+
+
+def draw_surfaces(
+    ax: Axes, system: FilippovSystem, parameters: Array, box: tuple[float, float, float, float]
+) -> None:
+    """Draw the switching surfaces of a planar system in a box as grey lines."""
+    x, y = np.meshgrid(np.linspace(*box[:2], 161), np.linspace(*box[2:], 161))
+    points = np.vstack([x.ravel(), y.ravel()])
+    count = system.surface_count
+    function = system.function(
+        ("plot surfaces",), lambda: [system.surface_function(i) for i in range(count)]
+    )
+    values = function.call([points, parameters]) if count else []
+    for value in values:
+        h = np.array(value, dtype=float).reshape(x.shape)
+        if np.nanmin(h) < 0 < np.nanmax(h):
+            ax.contour(
+                x,
+                y,
+                h,
+                levels=[0.0],
+                colors=[style.GREY],
+                linewidths=2.2,
+                alpha=0.7,
+                linestyles="-",
+                zorder=1,
+            )
+
+
+def _title(run: Trajectory) -> str:
+    itinerary = run.itinerary.replace("-", "−")
+    if len(itinerary) > 48:
+        itinerary = itinerary[:44].rstrip() + " …"
+    return f"itinerary: {itinerary}   status: {run.status}"
+
+
+def _legend(
+    run: Trajectory, looks: dict[str, tuple[str, Any, float, str]], plane: bool
+) -> list[Line2D | Patch]:
+    handles: list[Line2D | Patch] = [
+        Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=text)
+        for color, dashes, width, text in looks.values()
+    ]
+    present = {event.kind for event in run.events}
+    if len(run.events) > _MANY:
+        present = {run.events[-1].kind}
+    for kind, (marker, face, text) in MARKERS.items():
+        if kind in present:
+            handles.append(
+                Line2D(
+                    [],
+                    [],
+                    linestyle="none",
+                    marker=marker,
+                    markerfacecolor=face,
+                    markeredgecolor=style.BLACK,
+                    markersize=5,
+                    label=text,
+                )
+            )
+    if plane:
+        handles.append(
+            Line2D([], [], linestyle="none", marker="o", color=style.GREEN, label="start")
+        )
+    if run.accumulation_time is not None:
+        handles.append(Line2D([], [], color=style.PURPLE, linestyle=":", label="accumulation time"))
+    if plane and run.system.surface_count and not run.system.time_dependent:
+        handles.append(Line2D([], [], color=style.GREY, linewidth=2.2, alpha=0.7, label="surface"))
+    return handles

@@ -1,0 +1,278 @@
+"""Exact sliding orbits of the normal form of a two-fold, for drawing.
+
+The sliding flow is z' = M z/(z2 + z3): its orbits are those of the linear flow dz/dr = M z, in the
+direction of real time where z2 + z3 > 0 (Da) and against it in Dr, which is the mirror image
+z -> -z with time reversed. So an orbit is a matrix exponential, here in closed form for 2 x 2, and
+the ends of its stay in a quadrant are inverse tangents; no step is taken.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..local import Classification, ReducedFlow, TwoFold, classify_two_fold
+from ..model import Array, DefinitionError, explain
+
+_SMALL = (
+    2e-3  # an orbit that has come so close to s, relative to its start, is drawn as reaching it
+)
+_LARGE = 30.0
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """A two-fold as the pictures need it: the linear flow and its class.
+
+    Attributes
+    ----------
+    flow : ReducedFlow
+    classification : Classification
+    coincident : bool
+        Whether both fields agree at the two-fold.
+    """
+
+    flow: ReducedFlow
+    classification: Classification
+    coincident: bool = False
+
+
+def portrait_of(fold: object, caller: str) -> Portrait:
+    """Read what is drawn from a two-fold, or from a pair (sigma, nu).
+
+    Raises
+    ------
+    DefinitionError
+        Neither a two-fold nor a pair of pairs of numbers.
+    DegenerateError, OptionError
+        A sigma that is zero, numbers that are not finite.
+
+    Examples
+    --------
+    >>> portrait_of(((-1, 1), (-2.0, -1.0)), "two_fold").classification.label
+    'II-C'
+    """
+    if isinstance(fold, TwoFold):
+        return Portrait(fold.form.flow, fold.classification, fold.coincident_fields)
+    try:
+        pair: Any = fold
+        (s1, s2), (n1, n2) = pair
+        sigma, nu = (int(s1), int(s2)), (float(n1), float(n2))
+    except (TypeError, ValueError) as error:
+        raise DefinitionError(
+            explain(
+                caller,
+                expected="a two-fold as find_two_fold returns it, or a pair (sigma, nu) such as "
+                "((1, -1), (-2.0, -0.5))",
+                received=f"{type(fold).__name__} {str(fold)[:60]!r}",
+                advice="Find one with find_two_fold(system, near=point).",
+            )
+        ) from error
+    return Portrait(ReducedFlow(sigma, nu), classify_two_fold(sigma, nu))
+
+
+def exponential(matrix: ArrayLike, r: ArrayLike) -> Array:
+    """Matrix exponential exp(M r) of a real 2 x 2 matrix, in closed form.
+
+    Parameters
+    ----------
+    matrix : array_like (2, 2)
+    r : array_like (...)
+
+    Returns
+    -------
+    ndarray (..., 2, 2)
+
+    Examples
+    --------
+    >>> exponential([[0.0, -1.0], [1.0, 0.0]], np.pi).round(12) + 0.0
+    array([[-1.,  0.],
+           [ 0., -1.]])
+    """
+    m, r = np.asarray(matrix, dtype=float), np.asarray(r, dtype=float)[..., None, None]
+    half = np.trace(m) / 2
+    rest = m - half * np.eye(2)
+    square = rest[0, 0] * rest[1, 1] - rest[0, 1] * rest[1, 0]  # minus the squared rate
+    if square < 0:
+        w = math.sqrt(-square)
+        # e^{half r} cosh(w r) as two exponentials: no overflow of one times underflow of the other
+        up, down = np.exp((half + w) * r), np.exp((half - w) * r)
+        return (up + down) / 2 * np.eye(2) + (up - down) / (2 * w) * rest
+    w = math.sqrt(square)
+    sine = np.sin(w * r) / w if w > 0 else r
+    return np.exp(half * r) * (np.cos(w * r) * np.eye(2) + sine * rest)
+
+
+def leaving(matrix: ArrayLike, z: ArrayLike) -> tuple[float, int]:
+    """Return the time r > 0 at which exp(M r) z leaves the open first quadrant, and through what.
+
+    Returns
+    -------
+    r : float
+        inf if it stays.
+    component : {0, 1, -1}
+        The coordinate that vanishes, -1 if none does.
+
+    Examples
+    --------
+    >>> leaving([[0.0, -1.0], [1.0, 0.0]], [1.0, 0.0])[0] / np.pi
+    0.5
+    """
+    m, z = np.asarray(matrix, dtype=float), np.asarray(z, dtype=float)
+    half = np.trace(m) / 2
+    rest = m - half * np.eye(2)
+    square = rest[0, 0] * rest[1, 1] - rest[0, 1] * rest[1, 0]
+    times = [_first_zero(z[i], (rest @ z)[i], square) for i in (0, 1)]
+    component = int(np.argmin(times))
+    return times[component], component if times[component] < math.inf else -1
+
+
+def _first_zero(value: float, slope: float, square: float) -> float:
+    """First r > 0 with value c(r) + slope s(r) = 0, c and s the (hyperbolic) cosine and sine."""
+    w = math.sqrt(abs(square))
+    if w < 1e-12:
+        return -value / slope if value * slope < 0 else math.inf
+    if square > 0:
+        angle = math.atan2(-value * w, slope)  # tan(w r) = -value w/slope
+        return (angle % math.pi or math.pi) / w
+    ratio = -value * w / slope if slope else math.inf
+    return math.atanh(ratio) / w if 0 < ratio < 1 else math.inf
+
+
+@dataclass(frozen=True)
+class Orbit:
+    """One sliding orbit of Da in the direction of real time; ``-points[::-1]`` is one of Dr.
+
+    Attributes
+    ----------
+    points : ndarray (m, 2)
+    comes_from, goes_to : {"z2=0", "z3=0", "s", "infinity", "equilibrium"}
+        Where it begins and ends, to leading order.
+    """
+
+    points: Array
+    comes_from: str
+    goes_to: str
+
+
+def orbit(flow: ReducedFlow, z: ArrayLike, count: int = 250) -> Orbit:
+    """Return the whole stay in Da of the sliding orbit through a point.
+
+    Parameters
+    ----------
+    flow : ReducedFlow
+    z : array_like (2,)
+        (z2, z3), both positive.
+    count : int, optional
+        Number of points, about evenly spaced relative to their distance from s.
+
+    Examples
+    --------
+    >>> run = orbit(ReducedFlow((-1, 1), (-2.0, -1.0)), [1.0, 1.0])
+    >>> run.comes_from, run.goes_to
+    ('z2=0', 's')
+    """
+    z = np.asarray(z, dtype=float)
+    forward, goes_to = _end(flow.matrix, z)
+    backward, comes_from = _end(-flow.matrix, z)
+    r = np.concatenate([-backward[:0:-1], forward])
+    points = np.einsum("...ij,j->...i", exponential(flow.matrix, r), z)
+    # evenly spaced relative to the distance from s, since copies of all scales are drawn
+    steps = np.hypot(*np.diff(points, axis=0).T) / np.linalg.norm(points[1:], axis=1)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    r = np.interp(np.linspace(0.0, length[-1], count), length, r)
+    points = np.einsum("...ij,j->...i", exponential(flow.matrix, r), z)
+    return Orbit(np.maximum(points, 0.0), comes_from, goes_to)
+
+
+def _end(matrix: Array, z: Array) -> tuple[Array, str]:
+    """Times from 0 to the end of the stay in Da, and what is there."""
+    last, component = leaving(matrix, z)
+    if component >= 0:
+        times = np.linspace(0.0, last, 1500)
+        size = np.linalg.norm(exponential(matrix, times) @ z, axis=-1)
+        return times[: _cut(size, float(np.linalg.norm(z)))], ("z2=0", "z3=0")[component]
+    rates = np.linalg.eigvals(matrix).real
+    rate = max(abs(v) for v in rates) or 1.0
+    start = float(np.linalg.norm(z))
+    times = np.concatenate([[0.0], np.geomspace(1e-3 / rate, 1e3 / rate, 3000)])
+    with np.errstate(over="ignore", invalid="ignore"):
+        size = np.linalg.norm(exponential(matrix, times) @ z, axis=-1)
+    keep = _cut(np.nan_to_num(size, nan=np.inf), start)
+    final = float(size[keep - 1])
+    end = "s" if final <= 2 * _SMALL * start else "infinity"
+    if _SMALL * 2 * start < final < _LARGE * start / 2:
+        end = "equilibrium"
+    return times[:keep], end
+
+
+def _cut(size: Array, start: float) -> int:
+    outside = np.flatnonzero((size < _SMALL * start) | (size > _LARGE * start))
+    return int(outside[0]) + 1 if outside.size else len(size)
+
+
+@dataclass(frozen=True)
+class Sector:
+    """A sector of Da between neighbouring eigenlines and folds; its orbits are scaled copies.
+
+    Attributes
+    ----------
+    low, high : float
+        Angles from the z2 axis, in rad.
+    orbit : Orbit
+        Through the unit vector of the middle angle.
+    """
+
+    low: float
+    high: float
+    orbit: Orbit
+
+    @property
+    def middle(self) -> Array:
+        """Unit vector along the middle."""
+        angle = (self.low + self.high) / 2
+        return np.array([math.cos(angle), math.sin(angle)])
+
+
+def eigenlines(flow: ReducedFlow) -> list[tuple[float, float]]:
+    """Return (eigenvalue, slope) of the eigenlines that lie in the sliding regions.
+
+    Examples
+    --------
+    >>> eigenlines(ReducedFlow((1, -1), (-2.0, -0.5)))
+    [(-2.5, 2.0)]
+    """
+    if flow.discriminant < -1e-9:
+        return []
+    pairs = zip(np.real(flow.eigenvalues), np.real(flow.slopes), strict=True)
+    found = [(float(value), float(m)) for value, m in pairs if m > 0]
+    if len(found) == 2 and abs(found[0][1] - found[1][1]) < 1e-4 * found[0][1]:
+        return found[:1]  # Jordan block: one line
+    return found
+
+
+def sectors(flow: ReducedFlow) -> list[Sector]:
+    """Return the sectors of Da, from the z2 axis to the z3 axis."""
+    angles = sorted([0.0, math.pi / 2, *(math.atan(m) for _, m in eigenlines(flow))])
+    result = []
+    for low, high in pairwise(angles):
+        middle = np.array([math.cos((low + high) / 2), math.sin((low + high) / 2)])
+        result.append(Sector(low, high, orbit(flow, middle)))
+    return result
+
+
+def sliding_velocity(flow: ReducedFlow, z: ArrayLike) -> Array:
+    """Sliding velocity M z/(z2 + z3) at points (..., 2), in normal-form time.
+
+    Examples
+    --------
+    >>> sliding_velocity(ReducedFlow((1, -1), (-2.0, -1.0)), [1.0, 1.0])
+    array([-1. , -1.5])
+    """
+    z = np.asarray(z, dtype=float)
+    return (z @ flow.matrix.T) / z.sum(axis=-1, keepdims=True)

@@ -1,0 +1,199 @@
+"""How every picture looks: colours that colour-blind readers tell apart, lines that print in grey.
+
+Nothing here touches matplotlib's global settings: pictures are built inside ``settings()`` on
+figures that pyplot does not know. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import matplotlib as mpl
+import matplotlib.patheffects as effects
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import FancyArrowPatch
+from numpy.typing import ArrayLike
+
+from ..model import Array, OptionError, explain
+
+# Okabe & Ito 2008.
+BLACK = "#000000"
+ORANGE = "#E69F00"
+SKY = "#56B4E9"
+GREEN = "#009E73"
+YELLOW = "#F0E442"
+BLUE = "#0072B2"
+VERMILLION = "#D55E00"
+PURPLE = "#CC79A7"
+GREY = "#7F7F7F"
+
+#: The two fields: F1 (h > 0) and F2 (h < 0). F2 is also drawn dashed where the two meet.
+ABOVE, BELOW = VERMILLION, BLUE
+#: Sliding orbits in the attracting and the repelling region.
+ATTRACTING, REPELLING = "#1A1A1A", "#8A5A00"
+#: Tints of the regions; their greys differ too (0.90, 0.80, 0.97).
+TINT_ATTRACTING, TINT_REPELLING, TINT_CROSSING = "#DCEBF5", "#F3D9A8", "#F7F7F7"
+CANARD, FAUX_CANARD = "#A8005C", GREEN
+
+DASH_DOT: Any = (0, (4, 1.5, 1, 1.5))
+
+_SETTINGS: Any = {
+    "font.family": "sans-serif",
+    "font.sans-serif": ["DejaVu Sans"],
+    "font.size": 9.0,
+    "mathtext.fontset": "dejavusans",
+    "axes.titlesize": 10.0,
+    "axes.labelsize": 11.0,
+    "axes.linewidth": 0.8,
+    "axes.spines.top": True,
+    "axes.spines.right": True,
+    "axes.grid": False,
+    "axes.unicode_minus": True,
+    "axes.facecolor": "white",
+    "axes.edgecolor": "#333333",
+    "figure.facecolor": "white",
+    "hatch.linewidth": 0.5,
+    "legend.fontsize": 8.5,
+    "legend.frameon": False,
+    "lines.solid_capstyle": "round",
+    "lines.dash_capstyle": "butt",
+    "text.usetex": False,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.direction": "in",
+    "ytick.direction": "in",
+}
+
+
+@contextmanager
+def settings() -> Iterator[None]:
+    """Apply the look inside a ``with`` block; the user's settings come back after it.
+
+    Examples
+    --------
+    >>> import matplotlib
+    >>> before = matplotlib.rcParams["font.size"]
+    >>> with settings():
+    ...     pass
+    >>> matplotlib.rcParams["font.size"] == before
+    True
+    """
+    with mpl.rc_context(_SETTINGS):
+        yield
+
+
+def check_size(size: object) -> tuple[float, float]:
+    """Return (width, height) in inches.
+
+    Raises
+    ------
+    OptionError
+        Not two positive numbers.
+
+    Examples
+    --------
+    >>> check_size((6, 4))
+    (6.0, 4.0)
+    """
+    try:
+        width, height = (float(v) for v in size)  # type: ignore[attr-defined]
+    except (TypeError, ValueError):
+        width = height = float("nan")
+    if not (0 < width < np.inf and 0 < height < np.inf):
+        raise OptionError(
+            explain(
+                "size",
+                expected="a width and a height in inches",
+                received=repr(size),
+                advice="For example size=(6, 5).",
+            )
+        )
+    return width, height
+
+
+def new_figure(size: object) -> Figure:
+    """Return an empty figure that pyplot does not keep."""
+    return Figure(figsize=check_size(size), layout="constrained")
+
+
+def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
+    """Return the axes to draw on: the given ones, or those of a new figure.
+
+    Raises
+    ------
+    OptionError
+        ``ax`` is not matplotlib axes.
+    """
+    if ax is None:
+        figure = new_figure(size)
+        return figure, figure.add_subplot()
+    if not isinstance(ax, Axes):
+        raise OptionError(
+            explain(
+                "ax",
+                expected="matplotlib axes",
+                received=type(ax).__name__,
+                advice="For example ax=pyplot.subplots()[1].",
+            )
+        )
+    return ax.figure, ax  # type: ignore[return-value]
+
+
+def halo(width: float = 2.5, color: str = "white") -> list[Any]:
+    """Return path effects that keep a line or a text legible on top of others."""
+    return [effects.Stroke(linewidth=width, foreground=color), effects.Normal()]
+
+
+def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str, **options: Any) -> None:
+    """Draw a straight arrow between two points in data coordinates, clipped to the axes."""
+    options = {"arrowstyle": "-|>", "mutation_scale": 11, "linewidth": 1.0, **options}
+    patch = FancyArrowPatch(
+        tuple(np.asarray(start, float)),
+        tuple(np.asarray(end, float)),
+        shrinkA=0,
+        shrinkB=0,
+        color=color,
+        **options,
+    )
+    patch.set_clip_on(True)
+    ax.add_patch(patch)
+
+
+def write(ax: Axes, place: ArrayLike, text: str, **options: Any) -> None:
+    """Write a text centred on a point in data coordinates."""
+    x, y = np.asarray(place, dtype=float)
+    ax.text(x, y, text, **{"ha": "center", "va": "center", **options})
+
+
+def arrowhead(ax: Axes, curve: ArrayLike, at: float, color: str, **options: Any) -> None:
+    """Put an arrowhead on a polyline (m, 2) at a fraction of its length, along its direction."""
+    points = np.asarray(curve, dtype=float)
+    steps = np.hypot(*np.diff(points, axis=0).T)
+    length = np.concatenate([[0.0], np.cumsum(steps)])
+    if not length[-1] > 0:
+        return
+    tip = np.array([np.interp(at * length[-1], length, c) for c in points.T])
+    back = max(at * length[-1] - 1e-3 * length[-1], 0.0)
+    tail = np.array([np.interp(back, length, c) for c in points.T])
+    if np.all(tail == tip):
+        tail = 2 * points[0] - points[1]
+    arrow(ax, tail, tip, color, **{"linewidth": 0.0, **options})
+
+
+def inside(curve: ArrayLike, box: tuple[float, float, float, float]) -> list[Array]:
+    """Return the pieces of a polyline (m, 2) with all points in (xmin, xmax, ymin, ymax).
+
+    Examples
+    --------
+    >>> [piece.tolist() for piece in inside([[0, 0], [2, 0], [0.5, 0], [0, 1]], (0, 1, 0, 1))]
+    [[[0.0, 0.0]], [[0.5, 0.0], [0.0, 1.0]]]
+    """
+    points = np.asarray(curve, dtype=float)
+    x, y = points.T
+    good = (box[0] <= x) & (x <= box[1]) & (box[2] <= y) & (y <= box[3])
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
+    return [points[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]

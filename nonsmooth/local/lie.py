@@ -208,10 +208,13 @@ def place(
 
 
 def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
+    if system.surface_count == 1:
+        return "s"
+
     def build() -> Sequence[Any]:
         return [system.surface_function(i) for i in range(system.surface_count)]
 
-    values = [float(v) for v in system.function("surfaces", build).call([x, p])]
+    values = [float(v) for v in system.function(("local", "surfaces"), build).call([x, p])]
     for i, value in enumerate(values):
         if i != surface and value == 0:
             raise PointError(

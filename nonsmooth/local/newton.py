@@ -36,7 +36,8 @@ class Root:
     conditioning : float
         Smallest over largest singular value of the normalised Jacobian.
     linear : bool
-        Whether the last steps gained less than a factor 4 each: a multiple root.
+        Whether the last steps (six or more) gained less than a factor 5 each: a multiple root,
+        where the equations have dependent gradients.
     """
 
     x: Array
@@ -115,7 +116,7 @@ def solve(
     history, steps = [float(np.max(np.abs(r)))], list[float]()
     while len(steps) < max_iterations:
         step = np.asarray(-np.linalg.lstsq(jacobian, r, rcond=1e-14)[0], dtype=np.float64)
-        if float(np.linalg.norm(step)) <= 2.0**-52 * float(np.linalg.norm(x)):
+        if float(np.linalg.norm(step)) <= 2.0**-51 * float(np.linalg.norm(x)):
             break
         damped = _damped(equations, x, r, step)
         if damped is None:
@@ -138,8 +139,9 @@ def _accept(
 ) -> Root:
     singular = np.linalg.svd(jacobian, compute_uv=False)
     conditioning = float(singular[-1] / singular[0]) if singular[0] else 0.0
-    gains = [b / a for a, b in zip(steps[-4:], steps[-3:], strict=False)]
-    linear = len(steps) >= 4 and all(gain > 0.25 for gain in gains)
+    above_rounding = [s for s in steps if s > 1e-10 * (1 + np.linalg.norm(x))][-9:]
+    gains = [b / a for a, b in zip(above_rounding, above_rounding[1:], strict=False)]
+    linear = len(gains) >= 6 and min(gains) > 0.2
     if history[-1] > tol * (1 + np.linalg.norm(x)):
         cause = (
             "its equations have (nearly) dependent gradients there"

@@ -315,15 +315,13 @@ def _refuse_degenerate(numbers: Numbers, root: Root | None) -> None:
     scaled = numbers.gradients / np.where(lengths > 0, lengths, 1.0)[:, None]
     smallest = float(np.linalg.svd(scaled, compute_uv=False)[-1])
     where = numbers.x.tolist()
-    if smallest <= DEPENDENT or (root is not None and root.linear and smallest < 1e-4):
-        _, _, rows = np.linalg.svd(scaled.T)
-        combination = " + ".join(
-            f"({c:.3g}) grad {name}/|grad {name}|"
-            for c, name in zip(rows[-1], ("h", "L1", "L2"), strict=True)
-        )
+    if smallest <= DEPENDENT or (root is not None and root.linear):
+        length, name = min(zip(lengths / lengths.max(), ("h", "L1", "L2"), strict=True))
+        vanishing = f"; |grad {name}| is {length:.1e} of the largest" if length < 1e-4 else ""
         raise DegenerateError(
             f"two-fold at {where}: expected independent grad h, grad L1 and grad L2, received "
-            f"dependent ones (smallest singular value {smallest:.2e}; {combination} is about 0). "
+            f"dependent ones (smallest singular value {smallest:.1e} after normalising{vanishing}"
+            f"{'; Newton converged only linearly' if root is not None and root.linear else ''}). "
             "The folds do not cross transversally, so there is no normal form: vary a parameter."
         )
     for k in (0, 1):

@@ -258,11 +258,16 @@ def visible_condition() -> Erratum:
     )
 
 
+@cache
+def reverse_slip_with_backspin() -> tuple[float, float]:
+    """H_F and Omega_F for d=.1, eta=.5, mu=.3, G=1e-4 and start (0,.3,0,-1,.6)."""
+    last = law("linear").bounce([0, 0.3, 0, -1, 0.6]).x[-1]
+    return float(last[1] + last[4]), float(last[4])
+
+
 def topspin() -> Erratum:
     """20: the sign of H_F is not the sign of the spin."""
-    model = linear(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-    last = model.bounce([0, 0.3, 0, -1, 0.6]).x[-1]
-    slip, spin = float(last[1] + last[4]), float(last[4])
+    slip, spin = reverse_slip_with_backspin()
     return Erratum(
         20,
         "abstract and Sec. 1",

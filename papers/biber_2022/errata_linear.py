@@ -403,11 +403,16 @@ def second_lie() -> Erratum:
     )
 
 
+@cache
+def exit_in_compression() -> ns.Event:
+    """Return the end of rolling for mu=.3, eta=1, d1=0, d2=.1, G=0 and start (0,2,0,-1,-2)."""
+    run = linear(mu=0.3, d1=0.0, d2=0.1, eta=1.0, G=0.0).bounce([0, 2, 0, -1, -2])
+    return next(e for e in run.events if e.kind == "exit")
+
+
 def roll_to_slip_in_compression() -> Erratum:
     """12: rolling can end in compression when the tangential direction is stiff."""
-    model = linear(mu=0.3, d1=0.0, d2=0.1, eta=1.0, G=0.0)
-    run = model.bounce([0, 2, 0, -1, -2])
-    leave = next(e for e in run.events if e.kind == "exit")
+    leave = exit_in_compression()
     return Erratum(
         12,
         "Sec. 3.2, after (switching_con)",
@@ -422,8 +427,8 @@ def roll_to_slip_in_compression() -> Erratum:
             ),
             close("there Y'", leave.x[3], -0.940, 5e-4),
             Check(
-                f"Y' = {leave.x[3]:.4f} < 0 is compression; itinerary {run.itinerary}",
-                leave.x[3] < 0 and run.itinerary.startswith("s"),
+                f"Y' = {leave.x[3]:.4f} < 0 is compression; {leave.mode_before!r} to {leave.mode_after!r}",
+                leave.x[3] < 0 and leave.mode_before == "s",
             ),
         ),
     )

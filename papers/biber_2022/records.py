@@ -24,6 +24,9 @@ class Check:
     what: str
     holds: bool
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "holds", bool(self.holds))  # numpy's bool is not JSON's
+
     def __str__(self) -> str:
         return self.what if self.holds else f"FAILS: {self.what}"
 

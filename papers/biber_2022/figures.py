@@ -1,0 +1,108 @@
+"""Every figure by the paper's label, with its caption."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from matplotlib.figure import Figure
+
+import nonsmooth as ns
+
+from . import figures_bounce, figures_space
+from .errata_general import fold_of
+
+
+def portrait_saddle() -> Figure:
+    """Figure visible-fp1: the sliding portrait of the ball's own two-fold."""
+    return ns.plot.two_fold(fold_of("linear"))
+
+
+def portrait_node() -> Figure:
+    """Figure visible-fp2: nu1, nu2 > 0 and nu1 nu2 > 1, which no ball has."""
+    return ns.plot.two_fold(((1, -1), (2.0, 1.0)))
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A figure of the paper.
+
+    Attributes
+    ----------
+    name : str
+        Of the files.
+    label : str
+        The paper's.
+    caption : str
+    draw : callable
+    """
+
+    name: str
+    label: str
+    caption: str
+    draw: Callable[[], Figure]
+
+
+PICTURES: tuple[Picture, ...] = (
+    Picture(
+        "geometries",
+        "geometries",
+        "What a bounce can do near lift-off, computed with the normal form of the linear ball's "
+        "two-fold (mu = .3, d1 = d2 = .1, eta = .5, G = 1e-4): (a) forward slip throughout, (b) "
+        "reverse slip throughout, (c, d) slip, roll, and slip again through a fold. Diamonds: "
+        "lift-off. Pale: behind or below a surface.",
+        figures_space.geometries,
+    ),
+    Picture(
+        "kv_pert_a",
+        "kv_pert (a)",
+        "The end of bounces (A), (B), (C) in the friction cone. The paper gives mu and p0 only; "
+        "here d1 = .098, d2 = .007, eta = .09, G = 0, and X'0 changed by -+.02 with Omega0 = -X'0.",
+        figures_bounce.kv_pert_cone,
+    ),
+    Picture(
+        "kv_pert_b",
+        "kv_pert (b)",
+        "Slip velocity of the same bounces: (A) rolls to lift-off, (B) and (C) begin to slip 1e-4 "
+        "before it.",
+        figures_bounce.kv_pert_slip,
+    ),
+    Picture(
+        "two_fold_a",
+        "2-fold (a)",
+        "The ball's visible two-fold with the lift-off surface. Thick: the only rolling orbit that "
+        "reaches s. Red: H > 0; blue, dashed: H < 0; black: rolling.",
+        figures_space.two_fold_visible,
+    ),
+    Picture(
+        "visible_fp1",
+        "visible-fp1",
+        "Rolling near the ball's two-fold, in normal-form coordinates: one canard. The second "
+        "eigenvalue is exactly 0 (erratum 18).",
+        portrait_saddle,
+    ),
+    Picture(
+        "visible_fp2",
+        "visible-fp2",
+        "The other visible portrait, nu1, nu2 > 0 and nu1 nu2 > 1. The ball's nu are negative, so "
+        "it never has it.",
+        portrait_node,
+    ),
+)
+
+
+def save(picture: Picture, folder: Path) -> list[Path]:
+    """Draw a figure and write it as PNG and PDF.
+
+    Returns
+    -------
+    list of Path
+    """
+    figure = picture.draw()
+    paths = [folder / f"{picture.name}.{kind}" for kind in ("png", "pdf")]
+    for path in paths:
+        figure.savefig(
+            path, dpi=150, metadata={"CreationDate": None} if path.suffix == ".pdf" else None
+        )
+    return paths

@@ -1,0 +1,181 @@
+"""The reproduction's verdicts and numbers: each erratum confirmed, each claim held by its checks."""
+
+from __future__ import annotations
+
+import csv
+import json
+from fractions import Fraction
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+from papers.biber_2022 import __main__ as program
+from papers.biber_2022 import equations, errata, figures, report, results, table
+from papers.biber_2022.errata_general import fold_of
+from papers.biber_2022.exact import evaluate, identical
+from papers.biber_2022.model import LAWS, linear
+
+FOLDER = Path(__file__).parent
+
+VERDICTS = {
+    "table-ics": "corrected",
+    "rigid-cases": "agrees",
+    "restitution": "corrected",
+    "ball-equations": "agrees",
+    "alpha": "corrected",
+    "switching": "agrees",
+    "second-lie-linear": "corrected",
+    "roll-to-slip": "corrected",
+    "rolling-lift-off-conditions": "corrected",
+    "kv-pert-parameters": "not checkable",
+    "kv-pert": "agrees",
+    "slip-reversal": "agrees",
+    "which-compliance": "corrected",
+    "no-rolling-lift-off": "agrees",
+    "second-lie-general": "corrected",
+    "sigma": "agrees",
+    "visible-condition": "corrected",
+    "nu-product": "corrected",
+    "singular-matrix": "corrected",
+    "one-canard": "agrees",
+    "rigid-limit": "agrees",
+    "topspin-or-slip": "corrected",
+}
+
+
+@pytest.fixture(scope="module")
+def claims():
+    return list(results.claims())
+
+
+@pytest.mark.parametrize("number", range(1, 25))
+def test_erratum_is_confirmed_by_computation(number):
+    found = errata.erratum(number)
+    assert found.checks
+    assert [str(c) for c in found.checks if not c.holds] == []
+
+
+def test_claims_hold_with_these_verdicts(claims):
+    assert {c.id: c.verdict for c in claims} == VERDICTS
+    assert [c.id for c in claims if not c.holds] == []
+
+
+def test_every_equation_check_holds():
+    rows = [compute() for compute in equations.ALL]
+    assert [e.label for e in rows if not e.holds] == []
+    assert [e.number for e in rows] == list(range(1, len(rows) + 1))
+
+
+def test_readme_shows_the_computed_claims(claims):
+    text = (FOLDER / "README.md").read_text(encoding="utf-8")
+    shown = text.split("in the tests -->\n")[1].split("\n<!-- end of claims -->")[0]
+    assert shown == report.readme_table(claims)
+
+
+# Numbers against values that this code did not make ------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["A_printed", "A_exact", "B", "C"])
+def test_kv_pert_trajectories_match_the_reference(name):
+    reference = results.kv_pert_data()["trajectories"][name]
+    shot = results.kv_pert_shot(name)
+    end = [float(v) for v in reference["p_F"]]
+    assert results.last_state(shot) == pytest.approx(end, rel=0, abs=1e-10)
+    assert shot.time == pytest.approx(float(reference["tau_F"]), rel=0, abs=1e-10)
+    # H_F of A is 4e-20: below rounding, so its last phase is not asked of float64.
+    if name != "A_printed":
+        assert shot.itinerary == reference["itinerary"]
+    inner = [e for e in shot.trajectory.events if e.kind in ("entry", "exit", "crossing")]
+    for event, row in zip(inner, reference["transitions"][1:-1], strict=False):
+        # A transition a time s before lift-off is known to rounding/s.
+        assert event.t == pytest.approx(float(row["tau"]), rel=0, abs=1e-10)
+        assert event.x == pytest.approx([float(v) for v in row["p"]], rel=0, abs=1e-10)
+
+
+@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("speeds", [(0.2, 0.7), (-0.1, 0.5), (0.05, 1.0)])
+def test_nu_product_is_one_at_visible_two_folds(law, speeds):
+    fold = fold_of(law, *speeds)
+    assert fold.kind == "visible"
+    assert abs(fold.nu[0] * fold.nu[1] - 1) <= 1e-14
+    assert fold.canards == 1 and fold.coincident_fields
+
+
+def test_lift_off_of_the_linear_ball_in_closed_form():
+    # Y'' = Lambda_N = 0 for Y'' + 2 d Y' + Y = 0, Y'(0) = -1: t = (pi - 2 arcsin d)/sqrt(1 - d^2).
+    d = 0.1
+    run = linear(mu=0.3, d1=0.1, d2=d, eta=0.5, G=0.0).bounce([0, 0.5, 0, -1, 0.3], tol=1e-13)
+    expected = (np.pi - 2 * np.arcsin(d)) / np.sqrt(1 - d**2)
+    assert run.t[-1] == pytest.approx(expected, rel=0, abs=1e-11)
+
+
+def test_table_entries_that_do_not_fit():
+    rows = table.recomputed()
+    assert {r.printed for r in rows if not r.fits_all} == {"71.1", "1090", "1140"}
+    assert len(rows) == 12
+
+
+@pytest.mark.parametrize(
+    ("text", "interval"),
+    [("1.53", (1.525, 1.535)), ("-1710", (-1715, -1705)), ("0.0171", (0.01705, 0.01715))],
+)
+def test_rounding_interval(text, interval):
+    assert table.rounding_interval(text) == pytest.approx(interval, rel=1e-12)
+
+
+# The exact arithmetic itself -----------------------------------------------------------------
+
+
+def test_exact_evaluation_reads_short_fractions():
+    x = ca.SX.sym("x")
+    assert evaluate(2 * x / 7 + 0.4, {"x": Fraction(1, 3)}) == Fraction(2, 21) + Fraction(2, 5)
+
+
+def test_identity_test_sees_a_tiny_difference():
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    assert identical((x**2 - y**2) / (x - y), x + y)
+    assert not identical((x**2 - y**2) / (x - y), x + y + 1e-30 * x)
+
+
+def test_exact_evaluation_refuses_roots():
+    x = ca.SX.sym("x")
+    with pytest.raises(ValueError, match="rational"):
+        evaluate(ca.sqrt(x), {"x": Fraction(4)})
+
+
+# Output --------------------------------------------------------------------------------------
+
+
+def test_program_writes_tables_and_a_self_contained_page(tmp_path, monkeypatch, capsys):
+    chosen = tuple(p for p in figures.PICTURES if p.name in ("kv_pert_b", "geometries"))
+    monkeypatch.setattr(figures, "PICTURES", chosen)
+    assert program.main(["--out", str(tmp_path)]) == 0
+    printed = capsys.readouterr().out
+    assert all(name in printed for name in VERDICTS)
+    rows = list(csv.reader((tmp_path / "claims.csv").open(encoding="utf-8")))
+    assert len(rows) == len(VERDICTS) + 1
+    assert len(json.loads((tmp_path / "claims.json").read_text())["errata"]) == 24
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert page.count("data:image/png;base64,") == 2 and "http" not in page.split("</style>")[1]
+    assert (tmp_path / "geometries.pdf").stat().st_size > 1000
+
+
+def test_a_failed_check_is_reported(tmp_path, monkeypatch, capsys):
+    claim = results.rigid_limit()
+    broken = results.Claim(**{**claim.__dict__, "checks": (results.Check("2 is 3", False),)})
+    monkeypatch.setattr(results, "ALL", (lambda: broken,))
+    monkeypatch.setattr(errata, "ALL", ())
+    monkeypatch.setattr(figures, "PICTURES", ())
+    monkeypatch.setattr(equations, "ALL", ())
+    assert program.main(["--out", str(tmp_path)]) == 1
+    assert "rigid-limit" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize("picture", figures.PICTURES, ids=lambda p: p.name)
+def test_figures_are_drawn_with_labels(picture):
+    figure = picture.draw()
+    texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
+    assert any(t.get_text() for t in texts)
+    assert picture.caption

@@ -9,6 +9,7 @@ text, and how it is compiled, is not known here.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -142,7 +143,7 @@ class _Graph:
         if self.constant[j] and self.nodes[j].payload:
             return _literal(1.0 / self.nodes[j].payload)  # type: ignore[operator]
         if self.constant[j]:
-            return "(1.0 / 0.0)"
+            return "INFINITY"
         return f"q[{self.inverted[j]}]" if j in self.inverted else f"r{j}"
 
     def name(self, j: int) -> str:
@@ -267,6 +268,8 @@ class _Graph:
 
 
 def _literal(value: float) -> str:
+    if not math.isfinite(value):
+        return "NAN" if math.isnan(value) else ("INFINITY" if value > 0 else "(-INFINITY)")
     text = repr(float(value))
     return f"({text})" if text.startswith("-") else text
 

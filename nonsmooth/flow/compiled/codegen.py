@@ -36,12 +36,14 @@ def _driver(name: str) -> str:
 
 def supports_scalar(system: FilippovSystem) -> bool:
     """Whether the scalar engine can be generated for a system."""
+    if any(system.nonlinear):  # hidden dynamics has multipliers as states: the reference driver's
+        return False
     return system.surface_count < 8 and len(system.modes) <= MAX_MODES
 
 
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether the lanes engine can be generated for a system."""
-    return system.surface_count <= 1 and not system.resets
+    return system.surface_count <= 1 and not system.resets and not any(system.nonlinear)
 
 
 def scalar_source(system: FilippovSystem, order: int) -> str:

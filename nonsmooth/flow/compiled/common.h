@@ -12,6 +12,8 @@
 #define M1 (M > 0 ? M : 1)
 #define NG1 (NG > 0 ? NG : 1)
 #define DEPTH 52
+#define SAFETY 0.1 /* as in stepper.py: local errors add up over a run */
+#define ROUNDING (4 * EPS) /* as in polynomial.py, relative to the sum of the magnitudes of terms */
 
 enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SMALL, NOT_FINITE,
        TOO_MANY_EVENTS, TOO_MANY_STEPS };
@@ -98,7 +100,9 @@ static double first_root(const double *c, int n, double h) {
   a[0] = c[0];
   for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; rest += fabs(a[k]); }
   if (c[0] > rest) return -1;
+  double noise = ROUNDING * (fabs(c[0]) + rest); /* a touch that reaches zero by rounding is no root */
   bernstein(a, n);
+  for (int k = 0; k <= n; k++) a[k] += noise;
   return first_in(c, n, a, 0, h, 0);
 }
 

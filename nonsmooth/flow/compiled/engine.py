@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from ...model import Array, FilippovSystem
 from ..options import Options
 from ..status import Status
+from ..stepper import _SAFETY as SAFETY
 from ..stepper import order_for
 from .build import build
 from .codegen import lanes_source, scalar_source, supports_lanes, supports_scalar
@@ -378,8 +379,7 @@ def engine_for(system: FilippovSystem, options: Options) -> Engine | None:
         return None
     if options.start_mode is not None and options.start_mode not in system.modes:
         return None
-    tolerance = min(options.rtol, options.atol) if options.atol > 0 else options.rtol
-    order = order_for(tolerance)
+    order = order_for(SAFETY * min(options.rtol, options.atol))
     key = ("engine", order)
     if key not in system._functions:
         system._functions[key] = Engine(system, order)

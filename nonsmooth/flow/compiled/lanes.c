@@ -226,7 +226,7 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g
 INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], I *finite) {
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0), allowed[N];
   for (int i = 0; i < N; i++) {
-    allowed[i] = i < ND ? o->atol + o->rtol * ABS(s->x[i]) : BC(0);
+    allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
     if (i >= ND) continue;
     T r = ROUGH_INVERSE(allowed[i]), p = ABS(c[i][P]) * r, b = ABS(c[i][P - 1]) * r;
     sum += p + b;
@@ -261,7 +261,8 @@ INLINE void screen(const T *a, I *none, I *one, T *end) {
     tail2 += (double)(k * (k - 1)) * c;
     sum += a[k];
   }
-  UNROLL for (int k = 0; k <= HEAD; k++) b[k] = a[k];
+  T noise = tail;
+  UNROLL for (int k = 0; k <= HEAD; k++) { b[k] = a[k]; noise += ABS(a[k]); }
   to_bernstein(b, HEAD);
   T low = b[0], steepest = b[1] - b[0], most = b[2] - 2.0 * b[1] + b[0], least = most;
   UNROLL for (int k = 1; k <= HEAD; k++) low = MIN(low, b[k]);
@@ -274,7 +275,7 @@ INLINE void screen(const T *a, I *none, I *one, T *end) {
   *end = b[HEAD] + sum;
   tail1 *= 1.0 / HEAD;
   tail2 *= 1.0 / (HEAD * (HEAD - 1));
-  I simple = (steepest + tail1 < 0) | (I)(most + tail2 < 0), positive = *end > 0;
+  I simple = (steepest + tail1 < 0) | (I)(most + tail2 < 0), positive = *end > -ROUNDING * noise;
   *none = (low > tail) | (simple & positive);
   *one = (simple | (I)(least > tail2)) & ~positive;
 }
@@ -383,7 +384,10 @@ static __attribute__((noinline)) void resolve(Guards *v) {
     UNROLL for (int k = 0; k <= P; k++) b[k] = v->a[SLOTS - 1][k];
     for (int j = 0; j < SLOTS - 1; j++)
       if (any(mine[j])) UNROLL for (int k = 0; k <= P; k++) b[k] = SELECT(mine[j], v->a[j][k], b[k]);
+    T noise = BC(0);
+    UNROLL for (int k = 0; k <= P; k++) noise += ABS(b[k]);
     to_bernstein(b, P);
+    UNROLL for (int k = 0; k <= P; k++) b[k] += ROUNDING * noise;
     I changes = {0}, positive = b[0] > 0, first = positive;
     UNROLL for (int k = 1; k <= P; k++) {
       I next = b[k] > 0;

@@ -36,7 +36,7 @@ typedef struct {
 typedef struct {
   Options o;
   double x[N], q[NQ], t, last_event, limit, at_t, at_x[N];
-  int32_t mode, status, reason, where, drop[NG1], adopted;
+  int32_t mode, status, reason, where, due, drop[NG1];
   int64_t step_count, event_count, kinds[KINDS], segment_steps;
   int32_t itinerary, segment_mode;
   double interval[HISTORY];
@@ -98,7 +98,7 @@ static double step_for(double last, double before) {
 static double step_size(const Run *r, const Expansion *e) {
   double allowed[N] = {0}, last = 1e-300, before = 1e-300;
   for (int i = 0; i < ND; i++) {
-    allowed[i] = r->o.atol + r->o.rtol * fabs(e->states[i][0]);
+    allowed[i] = SAFETY * (r->o.atol + r->o.rtol * fabs(e->states[i][0]));
     last = fmax(last, fabs(e->states[i][P]) / allowed[i]);
     before = fmax(before, fabs(e->states[i][P - 1]) / allowed[i]);
   }
@@ -210,7 +210,7 @@ static void project(Run *r, unsigned which) {
 }
 
 /* Surfaces through the present state, to rounding, and those known to be. */
-static unsigned active_surfaces(const Run *r, unsigned certain) {
+static unsigned active_surfaces(const Run *r, unsigned certain, int mode) {
   double h[M1], g[M1][N];
   if (M == 0) return 0;
   surface_values(r->x, r->q, h, &g[0][0]);
@@ -219,7 +219,7 @@ static unsigned active_surfaces(const Run *r, unsigned certain) {
     for (int l = 0; l < N; l++) scale += fabs(g[i][l]) * (1 + fabs(r->x[l]));
     if (fabs(h[i]) <= 64 * EPS * scale) certain |= 1u << i;
   }
-  int s = r->mode >= 0 ? sliding_surface(r->mode) : -1;
+  int s = sliding_surface(mode);
   return s >= 0 ? certain | 1u << s : certain;
 }
 
@@ -347,11 +347,11 @@ static int continuation(Run *r, int mode, unsigned active, int exit_index, int e
 }
 
 /* One surface with both fields clearly transversal: the signs of L_F1 h and L_F2 h decide. */
-static int decide_quickly(Run *r, unsigned active, Continuation *result) {
+static int decide_quickly(Run *r, int mode, unsigned active, Continuation *result) {
   int i = 0, letters[M1];
   if (M == 0 || (active & (active - 1)) || !active) return 0;
   while (!(active >> i & 1)) i++;
-  for (int j = 0; j < M; j++) letters[j] = LETTER[r->mode][j];
+  for (int j = 0; j < M; j++) letters[j] = LETTER[mode][j];
   letters[i] = 0;
   int sliding = mode_code(letters);
   if (sliding < 0) return 0;
@@ -377,32 +377,66 @@ static int decide_quickly(Run *r, unsigned active, Continuation *result) {
   return 1;
 }
 
-static int meets_two_fold(Run *r, unsigned active) {
-  int slides = sliding_surface(r->mode);
-  for (int i = 0; i < M; i++) {
-    int letters[M1];
-    if (!(active >> i & 1) || (slides >= 0 && slides != i && (active & (active - 1)))) continue;
-    for (int j = 0; j < M; j++) letters[j] = LETTER[r->mode][j] ? LETTER[r->mode][j] : 1;
-    letters[i] = 0;
-    int mode = mode_code(letters);
-    if (CANCELLED[mode]) continue;
+/* Both fields tangent at the only active surface, and the sliding field 0/0. */
+static int meets_two_fold(Run *r, int mode, unsigned active) {
+  int i = 0, letters[M1];
+  if (M == 0 || !active || (active & (active - 1))) return 0;
+  while (!(active >> i & 1)) i++;
+  for (int j = 0; j < M; j++) letters[j] = LETTER[mode][j];
+  letters[i] = 0;
+  int sliding = mode_code(letters);
+  if (sliding < 0) return 0;
+  if (CANCELLED[sliding]) return 0;
+  Expansion e;
+  expand(r, sliding, &e);
+  if (!is_two_fold(&e, i, 0)) return 0;
+  finish(r, NON_UNIQUE, TWO_FOLD, i);
+  return 1;
+}
+
+/* Whether sliding on two active surfaces at once is excluded: somewhere between the fields both
+ * grad h . f would vanish, but one of them has a strict sign in all four. */
+static int intersection_excluded(const Run *r, int mode, unsigned active) {
+  double low[M1], high[M1];
+  int count = 0;
+  for (int i = 0; i < M; i++) { low[i] = INFINITY; high[i] = -INFINITY; count += active >> i & 1; }
+  if (count != 2) return 0;
+  for (int m = 0; m < MODES; m++) {
+    int vertex = 1;
+    for (int i = 0; i < M; i++)
+      vertex &= active >> i & 1 ? LETTER[m][i] != 0 : LETTER[m][i] == LETTER[mode][i];
+    if (!vertex) continue;
     Expansion e;
-    expand(r, mode, &e);
-    if (is_two_fold(&e, i, 0)) { finish(r, NON_UNIQUE, TWO_FOLD, i); return 1; }
+    expand(r, m, &e);
+    for (int j = 0; j < GUARDS[m]; j++) {
+      const int *guard = GUARD[m][j];
+      if (guard[0] != SURFACE_GUARD) continue;
+      low[guard[1]] = fmin(low[guard[1]], guard[2] * e.guards[j][1]);
+      high[guard[1]] = fmax(high[guard[1]], guard[2] * e.guards[j][1]);
+    }
   }
+  for (int i = 0; i < M; i++)
+    if ((active >> i & 1) && (low[i] > 1e-10 * high[i]) && low[i] > 0) return 1;
+    else if ((active >> i & 1) && (high[i] < 1e-10 * low[i]) && high[i] < 0) return 1;
   return 0;
 }
 
-/* Choose the motion that continues from a point of the surfaces ``active``; 0 if the run ends. */
-static int decide(Run *r, unsigned active, int exit_index, int exit_side, Continuation *chosen) {
-  if (exit_index < 0 && decide_quickly(r, active, chosen)) return 1;
-  if (meets_two_fold(r, active)) return 0;
+/* Choose the motion that continues from a point of the surfaces ``active``; 0 if the run ends.
+ * ``mode`` has the letters of the other surfaces. */
+static int decide(Run *r, int mode, unsigned active, int exit_index, int exit_side,
+                  Continuation *chosen) {
+  if (exit_index < 0 && decide_quickly(r, mode, active, chosen)) return 1;
+  if (meets_two_fold(r, mode, active)) return 0;
+  if ((active & (active - 1)) && !intersection_excluded(r, mode, active)) {
+    finish(r, HAND_OVER, NO_REASON, 0);
+    return 0;
+  }
   int found = 0, strict = 0, resting = 0, where = 0;
   Continuation one = {0}, first = {0}, rest = {0};
   for (int m = 0; m < MODES && r->status == RUNNING; m++) {
     int fits = 1;
     for (int i = 0; i < M; i++)
-      if (!(active >> i & 1) && LETTER[m][i] != LETTER[r->mode][i]) fits = 0;
+      if (!(active >> i & 1) && LETTER[m][i] != LETTER[mode][i]) fits = 0;
     Continuation c;
     if (!fits || !continuation(r, m, active, exit_index, exit_side, &c)) continue;
     if (c.strict && strict++ == 0) one = c;
@@ -415,7 +449,7 @@ static int decide(Run *r, unsigned active, int exit_index, int exit_side, Contin
   else if (!strict && found == 1) *chosen = first;
   else if (strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, where); return 0; }
   else if (resting) *chosen = rest;
-  else if (active & (active - 1)) { finish(r, INTERSECTION, NO_MODE, (int)active); return 0; }
+  else if (active & (active - 1)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
   else { finish(r, NON_UNIQUE, DEGENERATE, (int)active); return 0; }
   return 1;
 }
@@ -433,25 +467,30 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->drop, c->drop, sizeof r->drop);
 }
 
-static void proceed(Run *r, unsigned active, int exit_index, int exit_side, int before, int guard) {
-  Continuation c;
-  if (!decide(r, active, exit_index, exit_side, &c)) return;
+static void proceed(Run *r, int letters, unsigned active, int exit_index, int exit_side, int guard) {
+  Continuation c = {letters, 1, {0}};
+  int before = r->mode;
+  if (active && !decide(r, letters, active, exit_index, exit_side, &c)) return;
   adopt(r, &c);
   if (r->mode != before) event(r, change_kind(before, r->mode), before, guard);
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }
 
-/* A start on a stopping or resetting surface is not an event. */
+/* A start on a stopping surface is not an event; one pressed into a reset is. */
 static void drop_zero_guards(Run *r) {
-  Expansion e;
-  if (r->status != RUNNING) return;
   int needed = 0;
+  r->due = -1;
+  if (r->status != RUNNING) return;
   for (int j = 0; j < GUARDS[r->mode]; j++) needed |= GUARD[r->mode][j][0] >= STOP_GUARD;
   if (!needed) return;
+  Expansion e;
   expand(r, r->mode, &e);
   for (int j = 0; j < GUARDS[r->mode]; j++) {
+    const int *guard = GUARD[r->mode][j];
     double value;
-    if (GUARD[r->mode][j][0] >= STOP_GUARD) r->drop[j] = leading(&e, j, 0, &value);
+    if (guard[0] < STOP_GUARD) continue;
+    r->drop[j] = leading(&e, j, 0, &value);
+    if (guard[0] == RESET_GUARD && r->drop[j] > 0 && value * guard[2] > 0) r->due = j;
   }
 }
 
@@ -488,56 +527,49 @@ static void start_in(Run *r, int mode, unsigned active) {
 static void begin(Run *r) {
   int finite;
   note(r);
-  r->mode = -1;
-  int signs = mode_by_signs(r, &finite);
-  if (!finite) { r->mode = 0; finish(r, NOT_FINITE, SURFACE, 0); return; }
-  unsigned active = active_surfaces(r, 0);
+  r->mode = mode_by_signs(r, &finite);
+  if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
+  unsigned active = active_surfaces(r, 0, r->mode);
   project(r, active);
   renote(r);
-  r->mode = signs;
   if (r->o.start_mode >= 0) start_in(r, r->o.start_mode, active);
   else if (active) {
     Continuation c;
-    if (decide(r, active, -1, 0, &c)) { r->mode = c.mode; memcpy(r->drop, c.drop, sizeof r->drop); }
+    if (decide(r, r->mode, active, -1, 0, &c)) {
+      r->mode = c.mode;
+      memcpy(r->drop, c.drop, sizeof r->drop);
+    }
   }
-  if (r->status == RUNNING) enter_segment(r, r->mode);
+  enter_segment(r, r->mode);
   drop_zero_guards(r);
 }
 
 static void reset(Run *r, int index, int guard) {
   double y[N];
-  int finite, before = r->mode;
-  event(r, RESET, before, guard);
+  int finite;
+  event(r, RESET, r->mode, guard);
   reset_map(index, r->x, r->q, y);
   memcpy(r->x, y, ND * sizeof(double));
   if (!finite_all(r->x, ND)) { finish(r, NOT_FINITE, RESET_MAP, index); return; }
   note(r);
-  unsigned active = active_surfaces(r, 0);
-  r->mode = mode_by_signs(r, &finite);
-  Continuation c = {r->mode, 1, {0}};
-  if (active) proceed(r, active, -1, 0, before, guard);
-  else {
-    adopt(r, &c);
-    if (r->mode != before) event(r, change_kind(before, r->mode), before, guard);
-    if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
-  }
+  int letters = mode_by_signs(r, &finite);
+  proceed(r, letters, active_surfaces(r, 0, letters), -1, 0, guard);
   drop_zero_guards(r);
 }
 
 static void serve(Run *r, int row) {
   const int *guard = GUARD[r->mode][row];
-  int before = r->mode;
   if (guard[0] == STOP_GUARD) {
-    event(r, STOP, before, row);
+    event(r, STOP, r->mode, row);
     finish(r, STOPPED, NO_REASON, guard[1]);
   } else if (guard[0] == RESET_GUARD) {
     reset(r, guard[1], row);
   } else {
-    unsigned active = active_surfaces(r, 1u << guard[1]);
+    unsigned active = active_surfaces(r, 1u << guard[1], r->mode);
     int exits = guard[0] == EXIT_GUARD;
     project(r, active);
     renote(r);
-    proceed(r, active, exits ? guard[1] : -1, guard[2], before, row);
+    proceed(r, r->mode, active, exits ? guard[1] : -1, guard[2], row);
   }
 }
 
@@ -572,6 +604,7 @@ static void watch_two_fold(Run *r) {
 }
 
 static void step(Run *r) {
+  if (r->due >= 0) { reset(r, GUARD[r->mode][r->due][1], r->due); return; }
   double left = r->o.t_end - r->t, dt;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
@@ -613,7 +646,7 @@ void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const do
   r->limit = r->at_t = NAN;
   for (int i = 0; i < N; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
-  r->segment_mode = -1;
+  r->segment_mode = r->due = -1;
   if (finite_all(r->x, N)) begin(r);
   else { r->status = NOT_FINITE; r->reason = SURFACE; }
 }

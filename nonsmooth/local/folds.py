@@ -220,7 +220,8 @@ def find_fold(
     """Find a fold close to a point: h = 0 and L_i h = 0.
 
     Newton's method with exact gradients and least-norm steps. For n > 2 folds form a set of
-    dimension n - 2; the one found is near the start, not exactly the nearest.
+    dimension n - 2; the one found is near the start, not exactly the nearest. A cusp of a planar
+    system is a double root: it is found to about 1e-8 and named.
 
     Parameters
     ----------
@@ -271,7 +272,9 @@ def find_fold(
     point = x.copy()
     point[free] = root.x
     search = (float(np.linalg.norm(point - x)), root.residual, root.iterations)
-    return _build(where, point, side, max_order, TOLERANCE, search)
+    # a multiple root is a cusp or worse, known to the square root of rounding only
+    zero = 1e-5 if root.linear else TOLERANCE
+    return _build(where, point, side, max_order, zero, search)
 
 
 def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: str) -> list[int]:

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -87,7 +88,7 @@ def solve(
         x (n,) -> values (m,), Jacobian (m, n).
     start : ndarray (n,)
     tol : float
-        Accepted residual, relative to 1 + |x|.
+        Accepted residual, relative to 1 + |x|; its square root at a multiple root.
     max_iterations : int
     what : str
         Named in messages, e.g. ``"two-fold"``.
@@ -140,12 +141,17 @@ def _accept(
     singular = np.linalg.svd(jacobian, compute_uv=False)
     conditioning = float(singular[-1] / singular[0]) if singular[0] else 0.0
     above_rounding = [s for s in steps if s > 1e-10 * (1 + np.linalg.norm(x))][-9:]
-    gains = [b / a for a, b in zip(above_rounding, above_rounding[1:], strict=False)]
-    linear = len(gains) >= 6 and min(gains) > 0.2
-    if history[-1] > tol * (1 + np.linalg.norm(x)):
+    gains = [b / a for a, b in pairwise(above_rounding)]
+    # all but one: the last step, at rounding, may be any size
+    linear = len(gains) >= 6 and sorted(gains)[1] > 0.2
+    # rounding hides a multiple root below the square root of what it does to a simple one
+    if history[-1] > (np.sqrt(tol) if linear else tol) * (1 + np.linalg.norm(x)):
         cause = (
             "its equations have (nearly) dependent gradients there"
             if conditioning < 1e-8
+            else "it is small but not at rounding: a multiple root, where gradients are dependent, "
+            "or large cancelling terms in the equations"
+            if history[-1] < np.sqrt(tol)
             else "the iteration budget was used up"
             if len(steps) >= max_iterations
             else "no smaller residual lies along the step: perhaps there is none nearby"

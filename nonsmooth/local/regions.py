@@ -213,22 +213,25 @@ def sliding_field(
     numbers = on_surface(where, x, positive(tol, "tol"))
     found = region_of(numbers, tol)
     _refuse_crossing(numbers, found, "sliding field")
-    n = system.dimension
-    if found is Region.TWO_FOLD:
-        if not coincide(numbers, tol):
-            raise PointError(
-                explain(
-                    "sliding field",
-                    expected="L1 and L2 not both zero, or F1 = F2",
-                    received=f"both fields tangent and different at {x.tolist()}",
-                    advice="The sliding field is 0/0 at this two-fold and its limit depends on "
-                    "the direction; ask find_two_fold for the class of the point.",
-                )
+    if found is Region.TWO_FOLD and not coincide(numbers, tol):
+        raise PointError(
+            explain(
+                "sliding field",
+                expected="L1 and L2 not both zero, or F1 = F2",
+                received=f"both fields tangent and different at {x.tolist()}",
+                advice="The sliding field is 0/0 at this two-fold and its limit depends on "
+                "the direction; ask find_two_fold for the class of the point.",
             )
-        return np.array(numbers.fields.mean(axis=0)[:n])
+        )
     build = motion(system, where.mode)
-    value = system.function(("sliding field", where.mode), lambda: [build.field])
-    return np.array(value(x, where.parameters), dtype=float).ravel()[:n]
+    function = system.function(("sliding field", where.mode), lambda: [build.field])
+    value = np.array(function(x, where.parameters), dtype=float).ravel()
+    if found is Region.TWO_FOLD:
+        middle = numbers.fields.mean(axis=0)
+        # at, or within rounding of, the point itself the quotient may be 0/0 or noise
+        if not np.linalg.norm(value - middle) <= 10 * tol * np.linalg.norm(middle):
+            value = middle
+    return value[: system.dimension]
 
 
 def coincide(numbers: Numbers, tol: float) -> bool:

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+
+import nonsmooth as ns
 from nonsmooth.local import (
     accumulation_time,
     diabolo_slopes,
@@ -15,8 +17,6 @@ from nonsmooth.local import (
     max_flights,
     return_matrix,
 )
-
-import nonsmooth as ns
 
 
 def system(sigma, nu):

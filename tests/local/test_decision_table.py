@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from nonsmooth.local import ReducedFlow, classify_two_fold
-from nonsmooth.local.classification import TABLE
 from scipy.linalg import expm
 
 import nonsmooth as ns
+from nonsmooth.local import ReducedFlow, classify_two_fold
+from nonsmooth.local.classification import TABLE
 
 VV, II, VI, IV = (1, -1), (-1, 1), (1, 1), (-1, -1)
 ANGLES = (np.arange(120) + 0.5) * np.pi / 240
@@ -35,7 +35,10 @@ def fates(matrix, angles):
         radius = np.hypot(*z)
         closest[open_] = np.minimum(closest[open_], radius[open_])
         for name, met in (
-            ("z2", z[0] <= 0), ("z3", z[1] <= 0), ("s", radius < 1e-25), ("far", radius > 1e6),
+            ("z2", z[0] <= 0),
+            ("z3", z[1] <= 0),
+            ("s", radius < 1e-25),
+            ("far", radius > 1e6),
         ):
             end[open_ & met & (end == "")] = name
     raise AssertionError("no end")
@@ -155,7 +158,9 @@ def test_eigenvalues_and_slopes(sigma, n1, n2):
     flow = ReducedFlow(sigma, (n1, n2))
     # a nearly defective matrix: numpy's own eigenvalues are accurate to sqrt(eps) only
     np.testing.assert_allclose(
-        np.sort_complex(flow.eigenvalues), np.sort_complex(np.linalg.eigvals(flow.matrix)), atol=1e-6
+        np.sort_complex(flow.eigenvalues),
+        np.sort_complex(np.linalg.eigvals(flow.matrix)),
+        atol=1e-6,
     )
     vectors = np.vstack([np.ones(2), flow.slopes])
     np.testing.assert_allclose(flow.matrix @ vectors, vectors * flow.eigenvalues, atol=1e-12)

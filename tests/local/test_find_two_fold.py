@@ -2,16 +2,17 @@
 
 import math
 import pickle
+from itertools import pairwise
 
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from nonsmooth.local import TraceError, find_two_fold, trace_two_folds, two_fold
-from nonsmooth.local.newton import solve
 
 import nonsmooth as ns
+from nonsmooth.local import TraceError, find_two_fold, trace_two_folds, two_fold
+from nonsmooth.local.newton import solve
 
 signs = st.sampled_from([(1, -1), (-1, 1), (1, 1), (-1, -1)])
 numbers = st.floats(-3, 3)
@@ -30,7 +31,7 @@ def hidden(sigma, nu, seed, extra=0):
     y = ca.mtimes(ca.DM(rotation), u - s)
     bend = 0.1 * rng.normal(size=(n, n))
     z = y + ca.mtimes(ca.DM(bend), ca.sin(y) * y)  # identity to first order at s
-    more = lambda: ca.mtimes(ca.DM(0.2 * rng.normal(size=(3, 3))), z[:3] ** 2)  # noqa: E731
+    more = lambda: ca.mtimes(ca.DM(0.2 * rng.normal(size=(3, 3))), z[:3] ** 2)
     tail = [ca.SX(v) for v in rng.normal(size=extra)]
     f1 = ca.vertcat(ca.vertcat(-z[1], -sigma[0], nu[0]) + more(), *tail)
     f2 = ca.vertcat(ca.vertcat(z[2], nu[1], sigma[1]) + more(), *tail)
@@ -82,9 +83,7 @@ def test_convergence_is_quadratic():
 
     start = s + np.linalg.solve(rotation, [0.15, -0.15, 0.1])
     history = solve(equations, start, tol=1e-12, max_iterations=30, what="two-fold").history
-    exponents = [
-        math.log(b) / math.log(a) for a, b in zip(history, history[1:], strict=False) if 1e-7 < a < 0.02
-    ]
+    exponents = [math.log(b) / math.log(a) for a, b in pairwise(history) if 1e-7 < a < 0.02]
     assert len(exponents) >= 2 and min(exponents) > 1.6
 
 
@@ -114,7 +113,9 @@ def test_coordinates_move_as_the_normal_form_says(sigma, n1, n2, seed):
     ):
         velocity = system.evaluate(system.field(mode), s)[:, 0]
         both = fold.coordinates(np.array([s + step * velocity, s - step * velocity]))
-        np.testing.assert_allclose((both[0] - both[1]) / (2 * step), np.array(rate) * clock, atol=1e-6)
+        np.testing.assert_allclose(
+            (both[0] - both[1]) / (2 * step), np.array(rate) * clock, atol=1e-6
+        )
 
 
 def test_reach_time_of_each_set():
@@ -136,7 +137,9 @@ def test_reach_time_of_each_set():
     start = np.array([0.01, 0.02])
     run = ns.simulate(teixeira.system, teixeira.point_at(start), t_end=1.0, tol=1e-12)
     assert run.t[-1] == pytest.approx(float(teixeira.reach_time(start)), rel=1e-9)
-    assert teixeira.reach_time(-start) == pytest.approx(-teixeira.reach_time(start))  # it came from s
+    assert teixeira.reach_time(-start) == pytest.approx(
+        -teixeira.reach_time(start)
+    )  # it came from s
     visible = fold((1, -1), (-2, -1))
     m = visible.slopes[0]
     times = visible.reach_time([[0.01, 0.01 * m], [0.01, 0.02 * m], [-0.01, 0.01]])
@@ -180,7 +183,7 @@ def test_trace_over_a_state():
 
 
 def test_trace_that_ends_keeps_what_it_found():
-    x, y, z, w, a = X, Y, Z, W, A
+    x, y, z, a = X, Y, Z, A
     system = ns.FilippovSystem(  # y^2 = 1 - a: no two-fold beyond a = 1
         [x, y, z], surface=x, above=[1 - a - y**2, 1, -2], below=[z, -1, 1], parameters={a: 0.0}
     )
@@ -216,9 +219,21 @@ NORMAL = ns.FilippovSystem([X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1
         (lambda: find_two_fold(NORMAL, [0, math.nan, 0]), ns.PointError, "finite numbers"),
         (lambda: find_two_fold(NORMAL, "abc"), ns.PointError, "3 numbers"),
         (lambda: find_two_fold(NORMAL, [0, 0, 0], parameters={"q": 1}), ns.ParameterError, "'q'"),
-        (lambda: find_two_fold(NORMAL, [0, 0, 0], tol=0), ns.OptionError, "tol: expected a positive"),
-        (lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=0), ns.OptionError, "max_iterations"),
-        (lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=1.5), ns.OptionError, "whole number"),
+        (
+            lambda: find_two_fold(NORMAL, [0, 0, 0], tol=0),
+            ns.OptionError,
+            "tol: expected a positive",
+        ),
+        (
+            lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=0),
+            ns.OptionError,
+            "max_iterations",
+        ),
+        (
+            lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=1.5),
+            ns.OptionError,
+            "whole number",
+        ),
         (lambda: find_two_fold(NORMAL, [0] * 3, surface=1), ns.DefinitionError, "index below 1"),
         (lambda: find_two_fold(NORMAL, [0] * 3, surface="x"), ns.DefinitionError, "an index"),
         (lambda: find_two_fold(NORMAL, [0] * 3, hold=["q"]), ns.DefinitionError, r"\['q'\]"),
@@ -288,7 +303,13 @@ def test_degenerate_two_folds_name_the_condition():
 
 def test_in_words():
     text = str(find_two_fold(NORMAL, [0.1, 0.1, 0.1]))
-    for part in ("Invisible two-fold", "class II-C", "nu = (-2, -1)", "infinitely many", "Found 0.173"):
+    for part in (
+        "Invisible two-fold",
+        "class II-C",
+        "nu = (-2, -1)",
+        "infinitely many",
+        "Found 0.173",
+    ):
         assert part in text
     assert max(map(len, text.splitlines())) <= 98
     boundary = make(X, [-Y, -1, 2], [Z, 0.5, -1])

@@ -5,9 +5,9 @@ import numpy as np
 import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
-from nonsmooth.local import find_two_fold, two_fold
 
 import nonsmooth as ns
+from nonsmooth.local import find_two_fold, two_fold
 
 X = ca.vertcat(*(ca.SX.sym(s) for s in "xyz"))
 STATES = ca.vertsplit(X)
@@ -98,7 +98,6 @@ def test_changing_coordinates(definition, linear, quadratic, shift, curved):
     fold = fold_of(h, f1, f2)
     linear = np.eye(3) * 2 + 0.3 * linear
     assume(abs(np.linalg.det(linear)) > 0.5)
-    u1, u2, u3 = STATES
     u = X - ca.DM(shift)  # the new two-fold is at shift
     x = ca.mtimes(ca.DM(linear), u)
     if curved:

@@ -10,9 +10,9 @@ import math
 import casadi as ca
 import numpy as np
 import pytest
-from nonsmooth.local import find_two_fold
 
 import nonsmooth as ns
+from nonsmooth.local import find_two_fold
 
 VV, II, VI, IV = (1, -1), (-1, 1), (1, 1), (-1, -1)
 RADIUS = 0.02

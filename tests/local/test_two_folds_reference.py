@@ -6,9 +6,9 @@ from pathlib import Path
 import casadi as ca
 import numpy as np
 import pytest
-from nonsmooth.local import find_two_fold, region, sliding_field, two_fold
 
 import nonsmooth as ns
+from nonsmooth.local import find_two_fold, region, sliding_field, two_fold
 
 FILE = Path(__file__).parents[1] / "data" / "two_folds.json"
 CASES = json.loads(FILE.read_text(encoding="utf-8"))["cases"]
@@ -62,7 +62,7 @@ def ids(case):
 @pytest.mark.parametrize("case", GENERIC, ids=ids)
 def test_normal_form(case):
     fold = two_fold(ball(case), point(case))
-    close = lambda value, text: value == pytest.approx(float(text), rel=1e-12)  # noqa: E731
+    close = lambda value, text: value == pytest.approx(float(text), rel=1e-12)
     for key in ("F1F1H", "F1F2H", "F2F1H", "F2F2H"):
         assert close(fold.lie[f"L{key[1]}{key[3]}"], case[key]), key
     assert fold.sigma == (case["sigma1"], case["sigma2"])

@@ -19,6 +19,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from .errors import DefinitionError, ParameterError, PointError, explain
 from .graph import require_smooth
+from .lift import LiftedSwitch, lift
 
 Array = NDArray[np.float64]
 Expression = Any  # a CasADi SX scalar, a number, or (for vectors) a sequence of these
@@ -172,6 +173,83 @@ class FilippovSystem:
 
     # construction ------------------------------------------------------------------------------
 
+    #: What ``from_expression`` found, one for each surface; empty for other systems.
+    lifted: tuple[LiftedSwitch, ...] = ()
+
+    @classmethod
+    def from_expression(
+        cls,
+        states: Sequence[Expression],
+        rhs: Sequence[Expression],
+        *,
+        parameters: Parameters | Sequence[Expression] | None = None,
+        time: Expression | None = None,
+        stops: Sequence[Stop] = (),
+        resets: Sequence[Reset] = (),
+        hidden: bool = False,
+    ) -> FilippovSystem:
+        """Find sign, fabs, fmin, fmax and if_else in x' = ``rhs`` and make them surfaces.
+
+        Identical switching functions, also up to a constant factor, share one multiplier; see
+        ``lifted`` for the surfaces and their order. What the expression is on a surface does not
+        matter: between its two sides the field is Filippov's convex combination, also where the
+        expression is nonlinear in a switch, as sign(x)**2 is, unless ``hidden`` is true.
+
+        Parameters
+        ----------
+        states, parameters, time, stops, resets
+            As for the class. Stops and resets must be smooth.
+        rhs : sequence of n expressions
+            In states, parameters and time, with switches.
+        hidden : bool, optional
+            Keep switches that enter nonlinearly as they are written (hidden dynamics).
+
+        Returns
+        -------
+        FilippovSystem
+
+        Raises
+        ------
+        NotSmoothError
+            floor, ceil, fmod, an equality, or a condition that is no comparison.
+        DefinitionError
+
+        Notes
+        -----
+        Source: Filippov 1988, sec. 4; nonlinear switches: Jeffrey 2018, Hidden Dynamics. The rules
+        are in ``nonsmooth/model/lift.py``.
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+        >>> rhs = [v, -x - ca.sign(v) * ca.if_else(v > 0, 0.4, 0.3)]
+        >>> system = ns.FilippovSystem.from_expression([x, v], rhs)
+        >>> system, str(system.lifted[0])
+        (FilippovSystem(2 states: x, v; 1 surface: v), 'h0 = v (comparison, sign); ...')
+        >>> system.field("+"), system.field("-")
+        (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
+        """
+        n = len(_listed(states))
+        frame = cls(states, field=[0] * n, parameters=parameters, time=time)
+        entries = _column(rhs, "rhs", n)
+        known = ca.vertcat(frame.extended_states, frame._p)
+        _no_foreign_symbols(entries, known, "rhs", frame)
+        found = lift(entries, frame._x, frame._t, frame._p, hidden=hidden)
+        system = cls(
+            states,
+            field=found.field,
+            multipliers=found.multipliers,
+            surfaces=found.surfaces,
+            parameters=parameters,
+            time=time,
+            stops=stops,
+            resets=resets,
+            hidden=hidden,
+        )
+        system.lifted = found.switches
+        return system
+
     def _adopt(
         self,
         x: ca.SX,
@@ -232,7 +310,8 @@ class FilippovSystem:
         parts = [
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
-        parts.append(f"{self.surface_count} surface{'s' * (self.surface_count != 1)}")
+        names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
+        parts.append(f"{self.surface_count} surface{'s' * (self.surface_count != 1)}{names}")
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
         if self.time_dependent:
@@ -250,6 +329,7 @@ class FilippovSystem:
             "stops": self.stops,
             "resets": self.resets,
             "hidden": self.hidden,
+            "lifted": self.lifted,
         }
 
     def __setstate__(self, state: dict[str, Any]) -> None:
@@ -259,6 +339,7 @@ class FilippovSystem:
         self._adopt(*vectors, *(ca.SX(e) for e in definition.call(vectors)))
         self._defaults = state["defaults"]
         self.stops, self.resets = state["stops"], state["resets"]
+        self.lifted = state.get("lifted", ())
         self.hidden = state["hidden"]
 
     # shape -------------------------------------------------------------------------------------
@@ -303,7 +384,7 @@ class FilippovSystem:
 
     def content_hash(self) -> str:
         """Hash of the definition: equal for equal expressions, names, stops and resets."""
-        state = self.__getstate__()
+        state = {k: v for k, v in self.__getstate__().items() if k != "lifted"}
         code = hashlib.sha256(str(sorted((k, repr(v)) for k, v in state.items())).encode())
         return code.hexdigest()
 

@@ -1,0 +1,408 @@
+"""Lifting: sign, fabs, fmin, fmax and if_else in an expression become surfaces and multipliers.
+
+Each switch of the right-hand side is replaced by what it is on the two sides of the zero set of a
+smooth switching function h, with one multiplier lam = sgn h for all switches on the same set:
+
+    sign(h)        lam                           h
+    fabs(h)        lam h                         h
+    fmax(a, b)     (1+lam)/2 a + (1-lam)/2 b     a - b
+    fmin(a, b)     (1-lam)/2 a + (1+lam)/2 b     a - b
+    a < b          (1+lam)/2                     b - a     also <=, and the condition of if_else
+    copysign(a, b) fabs(a) sign(b)
+
+``not``, ``and``, ``or`` act on conditions. Two functions that differ by a constant factor are one
+surface; the first one met is used, and a negative factor turns the sign of the multiplier.
+
+A switch inside a switch, such as fmax(fmin(x, 1), -1), is expanded over the sides of the inner one:
+sgn h(x, lam) = sum over lam = +1, -1 of its weight times sgn h(x, +-1). This is exact off the
+surfaces. It adds a surface for each side, which does nothing where the inner switch is on its
+other side.
+
+The result is affine in each multiplier: Filippov's convention (Filippov 1988, sec. 4), by which
+only the values beside a surface count. Where a multiplier enters in another way, as in sign(x)**2
+or exp(sign(x)), it is replaced by the affine function with the same values at +1 and -1; this too
+is exact off the surfaces. On the surface the expression as written could be read as Jeffrey's
+hidden dynamics instead (Jeffrey 2018), with another sliding field: ``LiftedSwitch.hidden`` says
+so, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are continuous and bring no such choice: fabs(h) = 0 on h = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from itertools import product
+
+import casadi as ca
+
+from .cancel import Sum, _apply, _normal_forms
+from .errors import DefinitionError, NotSmoothError, explain
+from .graph import NOT_SMOOTH, Node, instructions
+
+#: A switch that depends on more switches than this is refused: 2^n copies of it would be needed.
+_MOST_NESTED = 6
+_ROUNDING = 16 * 2.220446049250313e-16
+
+_INFINITELY_MANY = (
+    "It switches on infinitely many surfaces. Declare those that the motion can meet, each as "
+    "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset."
+)
+_EQUALITY = (
+    "Equality holds on a surface only, and what a field is there does not matter in Filippov's "
+    "convention. Write the comparison as < or >, or leave the case out."
+)
+_REFUSED: dict[str, str] = {
+    "eq": _EQUALITY,
+    "ne": _EQUALITY,
+    "floor": _INFINITELY_MANY,
+    "ceil": _INFINITELY_MANY,
+    "fmod": _INFINITELY_MANY,
+    "remainder": _INFINITELY_MANY,
+}
+
+
+@dataclass(frozen=True)
+class LiftedSwitch:
+    """A surface that was found in an expression.
+
+    Attributes
+    ----------
+    surface : str
+        Its name in events: ``h0``, ``h1``, ... in the order of the states that they depend on.
+    multiplier : str
+        Name of its multiplier.
+    function : str
+        The switching function.
+    origins : tuple of str
+        What it came from: ``sign``, ``fabs``, ``comparison``, ...
+    hidden : bool
+        Whether the multiplier was not affine in the expression as written, other than inside a
+        continuous switch, so that hidden dynamics would be another reading.
+    """
+
+    surface: str
+    multiplier: str
+    function: str
+    origins: tuple[str, ...]
+    hidden: bool = False
+
+    def __str__(self) -> str:
+        note = "; other readings on the surface: hidden dynamics" if self.hidden else ""
+        return f"{self.surface} = {self.function} ({', '.join(self.origins)}){note}"
+
+
+@dataclass(frozen=True)
+class Lifting:
+    """A right-hand side with its switches replaced: field (n,), multipliers and surfaces (m,)."""
+
+    field: ca.SX
+    multipliers: ca.SX
+    surfaces: ca.SX
+    switches: tuple[LiftedSwitch, ...]
+
+
+@dataclass
+class _Switch:
+    """A surface under construction.
+
+    ``even`` is the multiplier inside continuous switches, where it makes no difference on h = 0; it
+    becomes ``lam`` at the end.
+    """
+
+    h: ca.SX
+    lam: ca.SX
+    even: ca.SX
+    origins: list[str] = field(default_factory=list)
+    hidden: bool = False
+
+
+@dataclass(frozen=True)
+class _Value:
+    """An expression and the numbers of the switches in it."""
+
+    e: ca.SX
+    inside: frozenset[int] = frozenset()
+
+
+def lift(
+    rhs: ca.SX, states: ca.SX, time: ca.SX, parameters: ca.SX, *, hidden: bool = False
+) -> Lifting:
+    """Replace the switches of a right-hand side by multipliers.
+
+    Parameters
+    ----------
+    rhs : SX (n,)
+    states, time, parameters : SX
+        Columns of symbols; ``time`` and ``parameters`` may be empty. A switch of the parameters
+        alone is a constant and stays as it is.
+    hidden : bool, optional
+        Keep multipliers nonlinear where the expression is, instead of Filippov's convention.
+
+    Returns
+    -------
+    Lifting
+
+    Raises
+    ------
+    NotSmoothError
+        A switch that cannot be expressed; the message names it and the entry of ``rhs``.
+    DefinitionError
+        A switch of time alone, or too many switches within one.
+
+    Examples
+    --------
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> friction = -0.4 * ca.sign(v - 0.2) / (1 + ca.fabs(v - 0.2))
+    >>> result = lift(ca.vertcat(v, friction), ca.vertcat(x, v), ca.SX(0, 1), ca.SX(0, 1))
+    >>> print(*result.switches)
+    h0 = (v-0.2) (fabs, sign)
+    """
+    return _Lifter(rhs, states, time, parameters, hidden).run()
+
+
+class _Lifter:
+    """One expression graph on its way to a field with multipliers."""
+
+    def __init__(self, rhs: ca.SX, states: ca.SX, time: ca.SX, parameters: ca.SX, hidden: bool):
+        self.hidden = hidden
+        self.inputs = [ca.vertcat(states, time), parameters]
+        self.states, self.moving = states, self.inputs[0]
+        self.nodes, self.rows = instructions(self.inputs, [rhs])
+        self.switches: list[_Switch] = []
+        names = {str(s) for s in ca.vertsplit(ca.vertcat(*self.inputs))}
+        self.prefix = next(p for p in _prefixes() if not any(n.startswith(p) for n in names))
+
+    def run(self) -> Lifting:
+        values: list[_Value] = []
+        for number, node in enumerate(self.nodes):
+            args = [values[k] for k in node.args]
+            try:
+                values.append(self._value(node, args))
+            except NotSmoothError as error:
+                raise type(error)(f"{self._entry_of(number)}: {error}") from None
+            except DefinitionError as error:
+                raise DefinitionError(f"{self._entry_of(number)}: {error}") from None
+        entries = [self._affine(values[k]) for k in self.rows[0]]
+        return self._finish(ca.vertcat(*entries))
+
+    def _finish(self, f: ca.SX) -> Lifting:
+        kept = [s for s in self.switches if ca.depends_on(f, s.lam)]
+        kept.sort(key=lambda s: self._states_of(s.h))
+        report = tuple(
+            LiftedSwitch(f"h{i}", str(s.lam), str(s.h), tuple(sorted(s.origins)), s.hidden)
+            for i, s in enumerate(kept)
+        )
+        lam = ca.vertcat(*[s.lam for s in kept]) if kept else ca.SX(0, 1)
+        h = ca.vertcat(*[s.h for s in kept]) if kept else ca.SX(0, 1)
+        return Lifting(f, lam, h, report)
+
+    def _states_of(self, h: ca.SX) -> tuple[int, ...]:
+        return tuple(i for i in range(self.states.numel()) if ca.depends_on(h, self.states[i]))
+
+    # one node ----------------------------------------------------------------------------------
+
+    def _value(self, node: Node, args: list[_Value]) -> _Value:
+        if node.op == "const":
+            return _Value(ca.SX(node.payload))
+        if node.op == "input":
+            vector, position = node.place
+            return _Value(self.inputs[vector][position])
+        if node.op == "if_else_zero":
+            return self._if_else(*args)
+        inside = frozenset().union(*(a.inside for a in args))
+        if node.op in NOT_SMOOTH:
+            return self._over_sides(args, inside, lambda e: self._switch(node.op, e))
+        return _Value(_apply(node.op, [a.e for a in args]), inside)
+
+    def _over_sides(
+        self,
+        args: list[_Value],
+        inside: frozenset[int],
+        build: Callable[[list[_Value]], _Value],
+    ) -> _Value:
+        """Sum ``build`` over the sides of the switches ``inside``, with their weights."""
+        if not inside:
+            return build(args)
+        if len(inside) > _MOST_NESTED:
+            raise DefinitionError(
+                explain(
+                    "a switch inside a switch",
+                    expected=f"one that depends on at most {_MOST_NESTED} others",
+                    received=str(len(inside)),
+                    advice="Write the cases out as a field with multipliers=.",
+                )
+            )
+        numbers, found = sorted(inside), set(inside)
+        weights, values = [], []
+        for sides in product((1, -1), repeat=len(numbers)):
+            chosen = dict(zip(numbers, sides, strict=True))
+            value = build([_Value(self._at(a.e, chosen), a.inside - inside) for a in args])
+            weight = ca.SX(1)
+            for i, side in chosen.items():
+                weight = weight * (1 + side * self._symbol(i, args)) / 2
+            weights.append(weight)
+            values.append(value.e)
+            found |= value.inside
+        return _Value(_weighted(weights, values), frozenset(found))
+
+    def _symbol(self, i: int, args: list[_Value]) -> ca.SX:
+        """Multiplier of a switch for a function of arguments that may all be continuous there."""
+        s = self.switches[i]
+        return s.lam if any(ca.depends_on(a.e, s.lam) for a in args) else s.even
+
+    def _at(self, e: ca.SX, sides: dict[int, int]) -> ca.SX:
+        """Return an expression on given sides of some switches."""
+        for i, side in sides.items():
+            s = self.switches[i]
+            e = ca.substitute(e, ca.vertcat(s.lam, s.even), ca.DM([side, side]))
+        return e
+
+    # the switches, of smooth arguments ---------------------------------------------------------
+
+    def _if_else(self, condition: _Value, value: _Value) -> _Value:
+        """Only the condition decides; the value is looked at on each of its sides if it must."""
+        if condition.inside & value.inside:
+            return self._over_sides([condition, value], condition.inside, self._if_else_zero)
+        one = _Value(ca.SX(1))
+        factor = self._over_sides([condition, one], condition.inside, self._if_else_zero)
+        return _Value(factor.e * value.e, factor.inside | value.inside)
+
+    def _if_else_zero(self, args: list[_Value]) -> _Value:
+        condition, value = args
+        if ca.depends_on(condition.e, self.moving):
+            raise _cannot("if_else", "a condition that is not a comparison", condition.e, _EQUALITY)
+        return _Value(_apply("if_else_zero", [condition.e, value.e]), value.inside)
+
+    def _switch(self, op: str, args: list[_Value]) -> _Value:
+        e = [a.e for a in args]
+        if not any(ca.depends_on(a, self.moving) for a in e):
+            return _Value(_apply(op, e))
+        if op == "sign":
+            return self._sign(e[0], "sign")
+        if op == "fabs":
+            return self._choice(e[0], e[0], -e[0], "fabs")
+        if op in ("lt", "le"):
+            side = self._sign(e[1] - e[0], "comparison")
+            return _Value((1 + side.e) / 2, side.inside)
+        if op in ("fmax", "fmin"):
+            larger, smaller = (0, 1) if op == "fmax" else (1, 0)
+            return self._choice(e[0] - e[1], e[larger], e[smaller], op)
+        if op == "copysign":
+            size, side = self._choice(e[0], e[0], -e[0], op), self._sign(e[1], op)
+            return _Value(size.e * side.e, size.inside | side.inside)
+        advice = _REFUSED.get(op, "A number that moves is no condition: compare it with another.")
+        raise _cannot(NOT_SMOOTH[op], "one of the states", _apply(op, e), advice)
+
+    def _sign(self, h: ca.SX, origin: str) -> _Value:
+        number, side = self._surface(h, origin)
+        if number is None:
+            return _Value(ca.SX(side))
+        return _Value(side * self.switches[number].lam, frozenset([number]))
+
+    def _choice(self, h: ca.SX, above: ca.SX, below: ca.SX, origin: str) -> _Value:
+        """Return ``above`` where h > 0 and ``below`` where h < 0; they are equal on h = 0."""
+        number, side = self._surface(h, origin)
+        if number is None:
+            return _Value(above if side >= 0 else below)
+        lam = side * self.switches[number].even
+        if ca.is_equal(above, -below, 20):
+            return _Value(lam * above, frozenset([number]))
+        return _Value((1 + lam) / 2 * above + (1 - lam) / 2 * below, frozenset([number]))
+
+    def _surface(self, h: ca.SX, origin: str) -> tuple[int | None, int]:
+        """Return the number of the surface h = 0 and the sign by which h differs from its function.
+
+        The number is None where h is a constant; then the sign is that of h.
+        """
+        forms = self._forms([h, *(s.h for s in self.switches)])
+        if all(monomial == () for monomial in forms[0]):
+            c = forms[0].get((), 0.0)
+            return None, int(c > 0) - int(c < 0)
+        for i, form in enumerate(forms[1:]):
+            ratio = _ratio([forms[0], form])
+            if ratio:
+                if origin not in self.switches[i].origins:
+                    self.switches[i].origins.append(origin)
+                return i, 1 if ratio > 0 else -1
+        if not ca.depends_on(h, self.states):
+            raise DefinitionError(
+                explain(
+                    "a switch",
+                    expected="one that depends on the states",
+                    received=f"{origin} of {h}, which is known beforehand",
+                    advice="Make the clock a state with derivative 1, and switch on that.",
+                )
+            )
+        k = len(self.switches)
+        lam, even = ca.SX.sym(f"{self.prefix}{k}"), ca.SX.sym(f"{self.prefix}{k}_even")
+        self.switches.append(_Switch(h, lam, even, [origin]))
+        return k, 1
+
+    def _forms(self, expressions: list[ca.SX]) -> list[Sum]:
+        return [row[0] for row in _normal_forms(self.inputs, expressions)[1]]
+
+    # the result --------------------------------------------------------------------------------
+
+    def _affine(self, value: _Value) -> ca.SX:
+        """Make one entry of the field affine in every multiplier, exactly off the surfaces."""
+        f = value.e
+        hidden = {i for i in value.inside if not ca.is_linear(f, self.switches[i].lam)}
+        for i in sorted(value.inside):
+            s = self.switches[i]
+            s.hidden = s.hidden or i in hidden
+            written = ca.substitute(f, s.even, s.lam)
+            if ca.is_linear(written, s.lam) or (self.hidden and i in hidden):
+                f = written
+                continue
+            above, below = self._at(f, {i: 1}), self._at(f, {i: -1})
+            same = ca.is_equal(above, below, 20)
+            f = above if same else (1 + s.lam) / 2 * above + (1 - s.lam) / 2 * below
+        return f
+
+    def _entry_of(self, number: int) -> str:
+        """Name the first entry of the right-hand side that uses a node."""
+        for entry, row in enumerate(self.rows[0]):
+            todo, seen = [row], {row}
+            while todo:
+                for k in self.nodes[todo.pop()].args:
+                    if k not in seen:
+                        seen.add(k)
+                        todo.append(k)
+            if number in seen:
+                return f"rhs[{entry}]"
+        return "rhs"
+
+
+def _prefixes() -> Sequence[str]:
+    return ["lam" + "_" * k for k in range(100)]
+
+
+def _weighted(weights: list[ca.SX], values: list[ca.SX]) -> ca.SX:
+    """Sum of weight times value; the weights add up to one, which shortens conditions."""
+    ones = [w for w, v in zip(weights, values, strict=True) if v.is_one()]
+    zeros = [w for w, v in zip(weights, values, strict=True) if v.is_zero()]
+    if len(ones) + len(zeros) == len(values) > 1:
+        return sum(ones, ca.SX(0)) if len(ones) <= len(zeros) else 1 - sum(zeros, ca.SX(0))
+    terms = [w * v for w, v in zip(weights, values, strict=True)]
+    return sum(terms[1:], terms[0])
+
+
+def _ratio(forms: Sequence[Sum]) -> float:
+    """Return c with forms[0] = c forms[1], or 0 if they are not proportional."""
+    first, second = forms
+    if first.keys() != second.keys():
+        return 0.0
+    ratios = [first[monomial] / second[monomial] for monomial in first]
+    c = ratios[0]
+    return c if all(abs(r - c) <= _ROUNDING * abs(c) for r in ratios) else 0.0
+
+
+def _cannot(op: str, received: str, e: ca.SX, advice: str) -> NotSmoothError:
+    return NotSmoothError(
+        explain(
+            f"{op}",
+            expected="a switch that can be lifted (sign, fabs, fmin, fmax, copysign, if_else, "
+            "comparisons, and logic on these)",
+            received=f"{received}: {e}",
+            advice=advice,
+        )
+    )

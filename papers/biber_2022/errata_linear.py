@@ -211,7 +211,7 @@ def which_is_soft() -> Erratum:
     )
 
 
-def _scaling_residuals(length: ca.SX, spin: ca.SX, force: ca.SX) -> list[ca.SX]:
+def scaling_residuals(length: ca.SX, spin: ca.SX, force: ca.SX) -> list[ca.SX]:
     """What is left of (kv_rescaled) and of H for X = length x, Omega = spin omega, Lambda = force
     lambda and tau = t/eps2: the X and Omega equations and the slope mismatch of H."""
     x, xt, e1, lam_T = (ca.SX.sym(n) for n in ("x", "xt", "e1", "lT"))
@@ -232,11 +232,11 @@ def force_scale() -> Erratum:
             Check(
                 "X = x, tau = t/eps2, Lambda_T = eps2^2 lambda_T turns the first line of (kv) into "
                 "that of (kv_rescaled) identically",
-                identical(_scaling_residuals(ca.SX(1), EPS2, EPS2**2)[0]),
+                identical(scaling_residuals(ca.SX(1), EPS2, EPS2**2)[0]),
             ),
             Check(
                 "Lambda_T = eps2^-2 lambda_T does not",
-                not identical(_scaling_residuals(ca.SX(1), EPS2, EPS2**-2)[0]),
+                not identical(scaling_residuals(ca.SX(1), EPS2, EPS2**-2)[0]),
             ),
         ),
     )
@@ -246,7 +246,7 @@ def spin_scale() -> Erratum:
     """7: Omega = eps2 omega, or X = x/eps2."""
 
     def consistent(length: ca.SX, spin: ca.SX, force: ca.SX) -> bool:
-        return all(identical(r) for r in _scaling_residuals(length, spin, force))
+        return all(identical(r) for r in scaling_residuals(length, spin, force))
 
     one = ca.SX(1)
     return Erratum(

@@ -439,6 +439,10 @@ def coincident_fields() -> Claim:
                 identical(product, square, given=g.at_two_fold),
             ),
             Check(
+                "the zero eigenvector lies in the lift-off surface, slope -1/phi^2",
+                all(abs(f.slopes[1] + f.phi**-2) < 1e-13 for f in folds),
+            ),
+            Check(
                 "fields coincide at the computed two-folds", all(f.coincident_fields for f in folds)
             ),
         ),

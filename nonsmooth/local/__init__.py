@@ -13,7 +13,8 @@ from .folds import Fold, find_fold, fold
 from .intersection import intersection_range
 from .normal_form import NormalForm, ReducedFlow, normal_form
 from .regions import Region, alpha, region, sliding_field
-from .two_fold import TraceError, TwoFold, find_two_fold, trace_two_folds, two_fold
+from .tracing import TraceError, trace_two_folds
+from .two_fold import TwoFold, find_two_fold, two_fold
 
 __all__ = [
     "Boundary",

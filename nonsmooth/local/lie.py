@@ -144,6 +144,8 @@ class Place:
 
     def many(self, x: Array) -> tuple[Array, Array]:
         """Values (k, 3) and gradients (k, 3, N) of (h, L1, L2) at points (k, N)."""
+        if not len(x):
+            return np.zeros((0, 3)), np.zeros((0, 3, x.shape[1]))
         outputs = self._function()(x.T, self.parameters)
         values = np.vstack([np.array(v) for v in outputs[:3]])
         k, n = x.shape

@@ -1,7 +1,6 @@
 """Two-folds: points where both fields are tangent to the surface, h = L1 = L2 = 0.
 
-They are found by Newton's method with least-norm steps, described by their normal form and class,
-and for n > 3 states traced along the (n-3)-dimensional set that they form.
+They are found by Newton's method with least-norm steps and described by their normal form and class.
 """
 
 from __future__ import annotations
@@ -17,8 +16,6 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import (
     Array,
-    ConvergenceError,
-    DefinitionError,
     DegenerateError,
     FilippovSystem,
     Parameters,
@@ -247,24 +244,49 @@ class TwoFold:
             )
         if target.shape[-1] == 2:
             target = np.concatenate([np.zeros((*target.shape[:-1], 1)), target], axis=-1)
+        wanted = target.reshape(-1, 3)
+        x, converged = self._batch_newton(wanted, positive(tol, "tol"))
+        for k in np.flatnonzero(~converged):
+            x[k] = self._state_at(wanted[k], tol, max_iterations)
+        return x.reshape(*target.shape[:-1], self.system.dimension)
+
+    def _batch_newton(self, wanted: Array, tol: float) -> tuple[Array, NDArray[np.bool_]]:
+        """Newton without damping for all points at once, and which of them it solved."""
+        n = self.system.dimension
+        x = np.tile(self.point, (len(wanted), 1))
+        residual = np.full(len(wanted), np.inf)
+        going = np.ones(len(wanted), dtype=bool)
+        for _ in range(10):
+            values, gradients = self._place.many(self._extended(x[going]))
+            r = values * self._scales - wanted[going]
+            jacobian = gradients[:, :, :n] * self._scales[:, None]
+            lengths = np.linalg.norm(jacobian, axis=2)
+            good = np.isfinite(r).all(1) & np.isfinite(jacobian).all((1, 2)) & (lengths > 0).all(1)
+            index = np.flatnonzero(going)
+            going[index[~good]] = False
+            index, r, jacobian, lengths = index[good], r[good], jacobian[good], lengths[good]
+            if not index.size:
+                break
+            residual[index] = np.max(np.abs(r) / lengths, axis=1)
+            step = (np.linalg.pinv(jacobian) @ r[..., None])[..., 0]
+            x[index] -= step
+            size, length = np.linalg.norm(x[index], axis=1), np.linalg.norm(step, axis=1)
+            going[index] = (length > 2.0**-48 * (1 + size)) & (length < 1e8)
+            residual[index[length >= 1e8]] = np.inf
+            if not going.any():
+                break
+        return x, residual <= tol * (1 + np.linalg.norm(x, axis=1))
+
+    def _state_at(self, wanted: Array, tol: float, max_iterations: int) -> Array:
         n, full = self.system.dimension, self._extended(self.point)[0]
 
-        def equations(wanted: Array, x: Array) -> tuple[Array, Array]:
+        def equations(x: Array) -> tuple[Array, Array]:
             numbers = self._place.at(np.concatenate([x, full[n:]]))
             values = np.array([numbers.h, *numbers.lie]) * self._scales - wanted
             return values, numbers.gradients[:, :n] * self._scales[:, None]
 
-        rows = [
-            solve(
-                lambda x, wanted=wanted: equations(wanted, x),  # type: ignore[misc]
-                self.point,
-                tol=tol,
-                max_iterations=max_iterations,
-                what=f"state at z = {wanted.tolist()}",
-            ).x
-            for wanted in target.reshape(-1, 3)
-        ]
-        return np.array(rows).reshape(*target.shape[:-1], n)
+        what = f"state at z = {wanted.tolist()}"
+        return solve(equations, self.point, tol=tol, max_iterations=max_iterations, what=what).x
 
     def reach_time(self, z: ArrayLike, *, tol: float = 1e-9) -> Array:
         """Real time, to leading order, at which the sliding orbit through (z2, z3) is at s.
@@ -481,10 +503,12 @@ def find_two_fold(
     """
     where, x = place(system, near, parameters, t, surface, mode)
     free = unknowns(system, hold, 3, "two-fold")
-    return _search(where, x, free, tol, max_iterations)
+    return search(where, x, free, tol, max_iterations)
 
 
-def _search(where: Place, x: Array, free: list[int], tol: float, max_iterations: int) -> TwoFold:
+def search(where: Place, x: Array, free: list[int], tol: float, max_iterations: int) -> TwoFold:
+    """Find a two-fold from the extended point ``x``, changing the states ``free`` only."""
+
     def full(u: Array) -> Array:
         point = x.copy()
         point[free] = u
@@ -496,136 +520,3 @@ def _search(where: Place, x: Array, free: list[int], tol: float, max_iterations:
 
     root = solve(equations, x[free], tol=tol, max_iterations=max_iterations, what="two-fold")
     return _build(where, full(root.x), root, x)
-
-
-# Tracing ---------------------------------------------------------------------------------------
-
-
-class TraceError(ConvergenceError):
-    """A trace of two-folds ended early.
-
-    Attributes
-    ----------
-    value : float
-        The value at which it failed.
-    folds : list of TwoFold
-        Those found before.
-    residual, point
-        As in ConvergenceError.
-    """
-
-    def __init__(self, message: str, *, value: float, folds: list[TwoFold], **details: Any):
-        super().__init__(message, **details)
-        self.value = value
-        self.folds = folds
-
-
-def trace_two_folds(
-    system: FilippovSystem,
-    near: ArrayLike,
-    *,
-    over: Any,
-    values: ArrayLike,
-    parameters: Parameters | None = None,
-    t: float = 0.0,
-    surface: int = 0,
-    mode: str | None = None,
-    hold: Sequence[str] = (),
-    tol: float = 1e-12,
-    max_iterations: int = 50,
-) -> list[TwoFold]:
-    """Follow two-folds while a parameter, or one coordinate of the state, takes given values.
-
-    Natural continuation: each search starts from the two-fold before, extrapolated along the last
-    two. It does not go round a turning point in the value: trace over another coordinate there.
-
-    Parameters
-    ----------
-    system, parameters, t, surface, mode, hold, tol, max_iterations
-        As in :func:`find_two_fold`.
-    near : array_like (n,)
-        Start of the first search.
-    over : str or SX symbol
-        Name of a parameter, or of a state (for n > 3, where two-folds form a set of dimension
-        n - 3).
-    values : array_like (k,)
-        In the order in which they are visited.
-
-    Returns
-    -------
-    list of k TwoFold
-
-    Raises
-    ------
-    TraceError
-        A search failed or met a degenerate two-fold; ``value`` and the ``folds`` before it.
-    DefinitionError, ParameterError, PointError, OptionError
-
-    Examples
-    --------
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, y, z, a = (ca.SX.sym(s) for s in "xyza")
-    >>> s = ns.FilippovSystem([x, y, z], surface=x, above=[a - y, 1, -2], below=[z, -1, 1],
-    ...                       parameters={a: 0.0})
-    >>> [fold.point.tolist() for fold in trace_two_folds(s, [0, 0, 0], over="a", values=[0, 0.5])]
-    [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
-    """
-    name, numbers = str(over), _values(values)
-    state = name in system.state_names
-    if not state and name not in system.parameter_names:
-        raise DefinitionError(
-            explain(
-                "over",
-                expected=f"a parameter {list(system.parameter_names)} or a state "
-                f"{list(system.state_names)}",
-                received=repr(name),
-                advice="Give its name or its symbol.",
-            )
-        )
-    start = system.extended_point(near, t)[: system.dimension]
-    held = [hold] if isinstance(hold, str) else [str(h) for h in hold]
-    held = [*held, name] if state and name not in held else held
-    free = unknowns(system, held, 3, "two-fold")
-    folds: list[TwoFold] = []
-    for value in numbers:
-        guess = _predict(start, folds, numbers)
-        given = dict(parameters or {})
-        if state:
-            guess[system.state_names.index(name)] = value
-        else:
-            given = {k: v for k, v in given.items() if str(k) != name} | {name: value}
-        where, x = place(system, guess, given, t, surface, mode)
-        try:
-            folds.append(_search(where, x, free, tol, max_iterations))
-        except (ConvergenceError, DegenerateError, PointError) as error:
-            raise TraceError(
-                f"trace over {name!r}: expected a two-fold at {name} = {value:.6g}, received after "
-                f"{len(folds)} of {len(numbers)} values: {error} The two-folds before are in the "
-                "exception's folds; take smaller steps in the values, or another coordinate.",
-                value=value,
-                folds=folds,
-                residual=error.residual if isinstance(error, ConvergenceError) else math.nan,
-                point=error.point if isinstance(error, ConvergenceError) else guess,
-            ) from error
-    return folds
-
-
-def _values(values: ArrayLike) -> list[float]:
-    try:
-        numbers = np.asarray(values, dtype=float)
-    except (TypeError, ValueError):
-        numbers = np.array(math.nan)
-    if numbers.ndim != 1 or numbers.size == 0 or not np.all(np.isfinite(numbers)):
-        raise DefinitionError(f"values: expected a list of finite numbers, received {values!r}.")
-    return [float(v) for v in numbers]
-
-
-def _predict(start: Array, folds: list[TwoFold], values: list[float]) -> Array:
-    """Extrapolate the last two two-folds to the next value; the last one, or the start, if few."""
-    k = len(folds)
-    if k == 0:
-        return start.copy()
-    if k == 1 or values[k - 1] == values[k - 2]:
-        return folds[-1].point.copy()
-    ratio = (values[k] - values[k - 1]) / (values[k - 1] - values[k - 2])
-    return folds[-1].point + np.clip(ratio, -2, 2) * (folds[-1].point - folds[-2].point)

@@ -370,3 +370,14 @@ def test_the_parameters_are_read_only_and_the_system_is_kept():
     with pytest.raises(TypeError):
         fold.parameters["a"] = 1
     assert pickle.loads(pickle.dumps(fold.system)).state_names == fold.system.state_names
+
+
+def test_point_at_far_away_is_found_or_refused():
+    system = make(X, [-ca.tanh(Y), 1, -2], [Z, -1, 1])
+    fold = two_fold(system, [0, 0, 0])
+    far = fold.point_at([[0.999, 0.1], [0.1, 0.1]])  # undamped Newton overshoots the first
+    np.testing.assert_allclose(fold.coordinates(far)[:, 1:], [[0.999, 0.1], [0.1, 0.1]], atol=1e-13)
+    with pytest.raises(ns.ConvergenceError, match=r"state at z = \[0.0, 1.1, 0.1\]"):
+        fold.point_at([1.1, 0.1])
+    assert fold.point_at(np.zeros((0, 2))).shape == (0, 3)
+    assert fold.coordinates(np.zeros((0, 3))).shape == (0, 3)

@@ -198,6 +198,7 @@ def _eigenlines(ax: Axes, portrait: Portrait) -> None:
     for value, m in sliding:
         end = _to_box(math.atan(m))
         color, name = line_style(value, portrait.flow)
+        name = name.removeprefix("strong ").removeprefix("weak ")
         ax.plot(
             [-end[0], end[0]],
             [-end[1], end[1]],

@@ -330,13 +330,13 @@ class _Results:
             order[self._words[word]] = k
         shape = self.shape
         return Ensemble(
-            x=self.x.reshape(*shape, -1),
+            x=self.x.reshape(*shape, self.x.shape[1]),
             t=self.t.reshape(shape),
             status=self.status.reshape(shape),
             itineraries=tuple(words),
             itinerary_code=order[self.code].reshape(shape),
             events={kind: self.kinds[k].reshape(shape) for k, kind in enumerate(KINDS)},
-            event_x=None if self.at_x is None else self.at_x.reshape(*shape, -1),
+            event_x=None if self.at_x is None else self.at_x.reshape(*shape, self.x.shape[1]),
             event_t=None if self.at_t is None else self.at_t.reshape(shape),
         )
 
@@ -405,11 +405,15 @@ def _submit(
                     pending[pool.submit(run_chunk, job, *item[1:])] = item[0]
             if pending:
                 finished, _ = wait(pending, return_when=FIRST_COMPLETED)
-                for future in finished:
+                for future in sorted(finished, key=_failed):  # what is finished is saved first
                     yield pending.pop(future), future.result()
     finally:
         for future in pending:
             future.cancel()
+
+
+def _failed(future: Future[Chunk]) -> bool:
+    return future.cancelled() or future.exception() is not None
 
 
 def _processors() -> int:

@@ -1,0 +1,189 @@
+"""The compiled engine and the reference driver agree to rounding, whatever the system."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+import nonsmooth.textbook as textbook
+from nonsmooth.flow.compiled import KINDS, engine_for, find_compiler, simulate_arrays
+from nonsmooth.flow.compiled.engine import HAND_OVER, supports_lanes
+from nonsmooth.flow.driver import Driver
+from nonsmooth.flow.options import Options
+from nonsmooth.model import FilippovSystem, Reset, Stop
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+
+def reference(system, x, p, options):
+    return Driver(system, x.copy(), p, options).run()
+
+
+def agree(system, start, options, parameters=None, tolerance=1e-12):
+    """Assert that engines agree; returns the status."""
+    x, p = system.extended_point(start, options.t_start), system.parameter_vector(parameters)
+    expected = reference(system, x, p, options)
+    run = simulate_arrays(system, x, p, options)
+    if run is None:
+        return None
+    assert run.status == expected.status, expected.message
+    assert run.itinerary == expected.itinerary
+    kinds = [e.kind for e in expected.events if e.kind != "end"]
+    assert [KINDS[k] for k in run.event_kinds] == kinds
+    scale = 1.0 + np.abs(expected.x).max() + np.abs(expected.t).max()
+    # Steps are chosen with a rough logarithm, so they agree less well than what lies on them.
+    assert run.t.shape == expected.t.shape
+    np.testing.assert_allclose(run.t, expected.t, rtol=1e-5, atol=1e-5)
+    np.testing.assert_allclose(run.t[-1], expected.t[-1], rtol=0, atol=tolerance * scale)
+    np.testing.assert_allclose(run.x[-1], expected.x[-1], rtol=0, atol=tolerance * scale)
+    states = [e.x for e in expected.events if e.kind != "end"]
+    if states:
+        np.testing.assert_allclose(run.event_x, states, rtol=0, atol=tolerance * scale)
+    times = [e.t for e in expected.events if e.kind != "end"]
+    np.testing.assert_allclose(run.event_t, times, rtol=0, atol=tolerance * scale)
+    if supports_lanes(system):
+        lanes_agree(system, x, p, options, expected, tolerance * scale)
+    return expected.status
+
+
+def lanes_agree(system, x, p, options, expected, tolerance):
+    engine = engine_for(system, options)
+    chunk = engine.run_many(np.tile(x, (11, 1)), p, options, None, True)
+    assert set(chunk.status) <= {expected.status, HAND_OVER}
+    for k in np.flatnonzero(chunk.status != HAND_OVER):
+        assert chunk.words[chunk.itinerary[k]] == expected.itinerary
+        np.testing.assert_allclose(chunk.x[k], expected.x[-1], rtol=0, atol=tolerance)
+        np.testing.assert_allclose(chunk.t[k], expected.t[-1], rtol=0, atol=tolerance)
+
+
+@pytest.mark.parametrize("name", sorted(textbook.PROBLEMS))
+def test_textbook_problems(name):
+    problem = textbook.by_name(name)
+    options = Options(t_end=problem.t_end)
+    agree(problem.system, problem.start, options, problem.parameters, 1e-11)
+
+
+def polynomial(draw, n, size):
+    """A polynomial of degree 2 in n states: coefficients of 1, x_i, x_i x_j."""
+    number = st.integers(-4, 4).map(lambda k: k / 4)
+    constant = draw(number)
+    linear = draw(st.lists(number, min_size=n, max_size=n))
+    pairs = draw(
+        st.lists(
+            st.tuples(st.integers(0, n - 1), st.integers(0, n - 1), number), max_size=size
+        )
+    )
+    return constant, linear, pairs
+
+
+def expression(form, x):
+    constant, linear, pairs = form
+    value = ca.SX(constant)
+    for c, xi in zip(linear, x, strict=True):
+        value += c * xi
+    for i, j, c in pairs:
+        value += c * x[i] * x[j]
+    return value
+
+
+@st.composite
+def polynomial_systems(draw):
+    n = draw(st.integers(2, 6))
+    x = [ca.SX.sym(f"x{i}") for i in range(n)]
+    # Damping keeps most solutions bounded.
+    above = [expression(polynomial(draw, n, 2), x) - xi for xi in x]
+    below = [expression(polynomial(draw, n, 2), x) - xi for xi in x]
+    surface = expression(polynomial(draw, n, 1), x) + x[draw(st.integers(0, n - 1))] * 5
+    start = draw(st.lists(st.integers(-8, 8).map(lambda k: k / 8), min_size=n, max_size=n))
+    return FilippovSystem(x, above=above, below=below, surface=surface), start
+
+
+@settings(max_examples=25, suppress_health_check=list(HealthCheck))
+@given(polynomial_systems())
+def test_polynomial_systems(made):
+    system, start = made
+    agree(system, start, Options(t_end=2.0, max_steps=2000), tolerance=1e-9)
+
+
+def test_every_operation():
+    x, y, p, t = (ca.SX.sym(s) for s in ("x", "y", "p", "t"))
+    f = (
+        ca.sin(x) + ca.cos(y) - ca.tan(x / 3) + ca.exp(-y * y) + ca.log(2 + x * x) + ca.sqrt(2 + y)
+        + ca.sinh(x / 4) - ca.cosh(y / 4) + ca.tanh(x) + ca.asin(x / 9) + ca.acos(y / 9)
+        + ca.atan(x) + ca.asinh(y) + ca.acosh(4 + x) + ca.atanh(y / 9) + ca.atan2(y, 3 + x)
+        + ca.erf(x) + (2 + x) ** 1.3 + (3 + x) ** (y / 5) + x**3 + (3 + y) ** -2 + ca.expm1(x / 5)
+        + ca.log1p(x * x) + ca.hypot(x, 1 + y * y) + ca.fabs(p) + ca.erfinv(x / 20)
+    )
+    system = FilippovSystem(
+        [x, y],
+        above=[0.1 * f * ca.fmax(p, 0.1) - x + ca.sin(3 * t), -y - 1],
+        below=[0.1 * f - x / p, 2 - y + 0.1 * x],
+        surface=y - 0.3 * ca.sin(t),
+        parameters={p: 0.7},
+        time=t,
+    )
+    assert agree(system, [0.4, 0.9], Options(t_end=3.0)) is not None
+    assert agree(system, [0.4, 0.9], Options(t_end=4.0, t_start=1.0), {"p": 1.5}) is not None
+
+
+def test_resets_and_stops():
+    y, v, t, r = (ca.SX.sym(s) for s in ("y", "v", "t", "r"))
+    system = FilippovSystem(
+        [y, v],
+        field=[v, -1 - 0.05 * v],
+        parameters={r: 0.8},
+        time=t,
+        resets=[Reset(y - 0.1 * ca.sin(t), [y, -r * v + 0.3], -1, "impact")],
+        stops=[Stop(y - 3, 1, "ceiling")],
+    )
+    for start in ([1.0, 0.0], [1.0, 2.5], [0.5, -1.0]):
+        assert agree(system, start, Options(t_end=20.0)) is not None
+
+
+def test_two_surfaces_with_sliding_on_each():
+    x1, v1, x2, v2 = (ca.SX.sym(s) for s in ("x1", "v1", "x2", "v2"))
+    l1, l2 = ca.SX.sym("l1"), ca.SX.sym("l2")
+    system = FilippovSystem(
+        [x1, v1, x2, v2],
+        field=[v1, -2 * x1 + x2 - 0.5 * l1, v2, x1 - 1.4 * x2 - 0.4 * l2],
+        surfaces=[v1 - 0.2, v2 - 0.2],
+        multipliers=[l1, l2],
+    )
+    found = [agree(system, [a, 0.0, 0.3, -0.2], Options(t_end=10.0)) for a in (0.1, 1.0, 2.0)]
+    assert any(status is not None for status in found)
+
+
+def test_curved_surface_keeps_the_slider_on_it():
+    x, y, lam = (ca.SX.sym(s) for s in "xyl")
+    h = x * x + y * y - 1
+    system = FilippovSystem(
+        [x, y], field=[-y - 2 * lam * x, x - 2 * lam * y], surface=h, multipliers=lam
+    )
+    options = Options(t_end=1000.0)
+    run = simulate_arrays(system, np.array([1.0, 0.0]), np.zeros(0), options)
+    assert run is not None and run.itinerary == "s"
+    assert np.abs(run.x[:, 0] ** 2 + run.x[:, 1] ** 2 - 1).max() < 1e-14
+    chunk = engine_for(system, options).run_many(
+        np.tile([1.0, 0.0], (9, 1)), np.zeros(0), options, None, True
+    )
+    assert np.abs((chunk.x**2).sum(1) - 1).max() < 1e-14
+    np.testing.assert_allclose(chunk.x[:, 0], np.cos(1000.0), atol=1e-9)
+
+
+def test_limits_become_the_same_status():
+    problem = textbook.by_name("pseudo_hopf")
+    for limits in ({"max_events": 5}, {"max_steps": 7}, {"max_step": 0.01}):
+        assert agree(problem.system, problem.start, Options(t_end=5.0, **limits)) is not None
+
+
+def test_start_mode_on_repelling_surface():
+    x = ca.SX.sym("x")
+    system = FilippovSystem([x], surface=x, above=[1], below=[-1])
+    for mode in ("+", "-", None):
+        agree(system, [0.0], Options(t_end=1.0, start_mode=mode))
+
+
+def test_dense_output_survives_full_buffers():
+    problem = textbook.by_name("leine_stick_slip")
+    assert agree(problem.system, problem.start, Options(t_end=600.0), tolerance=1e-9) is not None

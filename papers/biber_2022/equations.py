@@ -19,7 +19,7 @@ from .errata import erratum
 from .errata_general import fold_of, generic, law
 from .errata_linear import kelvin_voigt, scaling_residuals
 from .exact import identical
-from .model import Omega, Xp, Y, Yp, along, d2, eps, grad_H, mu
+from .model import G, Omega, Xp, Y, Yp, along, d1, d2, eps, eta, generalised, grad_H, mu
 from .records import Check, Equation, close
 
 Checks = tuple[Check, ...]
@@ -84,6 +84,42 @@ def kv_rescaled() -> Checks:
             all(identical(r) for r in scaling_residuals(ca.SX(1), e2, e2**2)),
         ),
         Check("Y equation follows", identical(normal, -2 * d2 * (e2 * yt) - y - e2**2 * g)),
+    )
+
+
+def special_case() -> Checks:
+    """The linear model is the generalised one with constant functions."""
+    model = generalised(2 * d1, 1, 2 * d2, 1, {s: None for s in (mu, G, eps, d1, d2)}, "constant")
+    linear = kelvin_voigt()
+    at_eta = [(eta, eps)]
+    return (
+        Check(
+            "upsilon = 2 d1, zeta = 1, delta = 2 d2, kappa = 1, eps = eta: the same forces",
+            identical(linear.A, model.A, given=at_eta)
+            and identical(linear.Lambda_N, model.Lambda_N, given=at_eta),
+        ),
+    )
+
+
+def sign_conditions() -> Checks:
+    """The polynomial and exponential laws used here meet the assumptions of Sec. 4."""
+    rows = []
+    for name in ("linear", "polynomial", "exponential"):
+        model = law(name)
+        slope = ca.jacobian(model.Lambda_N, Y)
+        rows.append(
+            max(
+                model.value(slope, [0.1, 0.3, y, w, -0.3])
+                for y in (-1.0, -0.1)
+                for w in (-1.0, 0.0, 0.5)
+            )
+        )
+    return (
+        Check(
+            "largest dLambda_N/dY over Y in {-1, -.1}, Y' in {-1, 0, .5} for the three laws used "
+            "here: " + ", ".join(f"{r:.3g}" for r in rows),
+            max(rows) < 0,
+        ),
     )
 
 
@@ -299,12 +335,12 @@ _ENTRIES: tuple[Entry, ...] = (
     ("lie2_kv", "(F1.grad)^2 H", CORRECTED, (11,), None),
     ("switching_con2", "F2.grad H", AGREES, (), switching),
     ("2conds", "4 d1 eta X' + eta^2 X = 0, Lambda_N = 0", CORRECTED, (10,), None),
-    ("generic_eq", "generalised model", ASSUMPTION, (), None),
+    ("generic_eq", "generalised model", ASSUMPTION, (), special_case),
     ("Sec. 4, slip", "abs(lT) = mu lN", CORRECTED, (4,), None),
     ("Sec. 4, roll", "abs(lT) < mu lN", CORRECTED, (4,), None),
     ("lift_off_cond", "lN = -d y' - k y - g = 0", CORRECTED, (4,), None),
     ("functions_constraints", "u_y < 0, d_y < 0", ASSUMPTION, (), None),
-    ("force_constraints", "d lN/dy < 0", ASSUMPTION, (), None),
+    ("force_constraints", "d lN/dy < 0", ASSUMPTION, (), sign_conditions),
     ("functions_constraints_horizontal", "sign(u_x' < 0)) = sign x'", CORRECTED, (26,), None),
     ("Sec. 4, tau", "tau = t/eps", DEFINITION, (), None),
     (

@@ -74,6 +74,12 @@ def log_restitution(d: ca.SX) -> ca.SX:
     return -ca.tan(b) * (math.pi - 2 * b)
 
 
+def log_restitution_value(d: float) -> float:
+    """``log_restitution`` of a number."""
+    b = math.asin(d / 2)
+    return -math.tan(b) * (math.pi - 2 * b)
+
+
 def measured_restitution(damping: float, stiffness: float) -> float:
     """Simulate y'' = -damping y' - stiffness y from y' = -1 to zero force; return y' there."""
     y, v, h = (ca.SX.sym(n) for n in ("y", "v", "h"))

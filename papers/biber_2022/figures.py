@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
-from . import figures_bounce, figures_space
+from . import figures_bounce, figures_data, figures_schematic, figures_space
 from .errata_general import fold_of
 
 
@@ -22,6 +22,16 @@ def portrait_saddle() -> Figure:
 def portrait_node() -> Figure:
     """Figure visible-fp2: nu1, nu2 > 0 and nu1 nu2 > 1, which no ball has."""
     return ns.plot.two_fold(((1, -1), (2.0, 1.0)))
+
+
+def invisible() -> Figure:
+    """Figure 2-fold (b)."""
+    return ns.plot.two_fold_3d(((-1, 1), (-0.5, -0.5)))
+
+
+def visible_invisible() -> Figure:
+    """Figure 2-fold (c)."""
+    return ns.plot.two_fold_3d(((1, 1), (0.0, 0.5)))
 
 
 @dataclass(frozen=True)
@@ -46,6 +56,48 @@ class Picture:
 
 PICTURES: tuple[Picture, ...] = (
     Picture(
+        "setting_notation",
+        "setting_notation",
+        "Notation. Counter-clockwise rotation, omega > 0, is backspin for a ball that moves right.",
+        figures_schematic.setting_notation,
+    ),
+    Picture(
+        "ics",
+        "ics",
+        "Ranges of the experiments (table ics), dimensionless as printed. Dotted: the largest spin "
+        "as it follows from the printed rpm. The measured points are not public.",
+        figures_data.experiment_ranges,
+    ),
+    Picture(
+        "tangential_velocity",
+        "tangential_vel_experiments",
+        "Slip at lift-off against slip at touch-down, predicted for 256 landings spread evenly over "
+        "the ranges of table ics (the measurements are not public). Rigid law: r and mu fitted by "
+        "the companion experiments. Compliant: the paper's linear model with the same r and mu, "
+        "d1 = .1, eta = .5, G = 0. The two classes that the paper describes appear: large positive "
+        "slip, and small negative slip, which no rigid bounce has.",
+        figures_data.tangential_velocity,
+    ),
+    Picture(
+        "trajectories",
+        "trajectories",
+        "Tangential and normal velocity during a rigid bounce (mu = .3, r = .6). Dots: touch-down; "
+        "diamonds: lift-off.",
+        figures_data.trajectories,
+    ),
+    Picture(
+        "settings_kv",
+        "settings_kv",
+        "The linear mechanism.",
+        figures_schematic.settings_kv,
+    ),
+    Picture(
+        "filippov_convexity",
+        "filippov_convexity",
+        "F_s is the point of the line between the tips of F_1 and F_2 that lies in the surface.",
+        figures_schematic.filippov_convexity,
+    ),
+    Picture(
         "geometries",
         "geometries",
         "What a bounce can do near lift-off, computed with the normal form of the linear ball's "
@@ -69,11 +121,29 @@ PICTURES: tuple[Picture, ...] = (
         figures_bounce.kv_pert_slip,
     ),
     Picture(
+        "setting_generic",
+        "setting_generic",
+        "The generalised mechanism.",
+        figures_schematic.setting_generic,
+    ),
+    Picture(
         "two_fold_a",
         "2-fold (a)",
         "The ball's visible two-fold with the lift-off surface. Thick: the only rolling orbit that "
         "reaches s. Red: H > 0; blue, dashed: H < 0; black: rolling.",
         figures_space.two_fold_visible,
+    ),
+    Picture(
+        "two_fold_b",
+        "2-fold (b)",
+        "An invisible two-fold, nu = (-.5, -.5).",
+        invisible,
+    ),
+    Picture(
+        "two_fold_c",
+        "2-fold (c)",
+        "A visible-invisible two-fold, nu = (0, .5).",
+        visible_invisible,
     ),
     Picture(
         "visible_fp1",

@@ -208,7 +208,7 @@ def _ball_labels(axes: Axes, scene: Scene) -> None:
         color=look.REVERSE,
     )
     scene.text(
-        [0, -0.12, 1.03 * a],
+        [-0.05, -0.16, 1.06 * a],
         "$F_1\\cdot\\nabla H=0$\n" r"$\alpha=0$",
         ha="left",
         va="top",
@@ -232,8 +232,8 @@ def two_fold_visible() -> Figure:
         scene.folds()
         slope = flow.slopes[0]
         canard = np.array([[0, 0.9, 0.9 * slope], [0, 0, 0], [0, -0.9, -0.9 * slope]]) * 1.1
-        scene.curve(canard[:2], look.PURPLE, SURFACE + 1.6, width=3.0, at=(0.5,))
-        scene.curve(canard[1:], look.PURPLE, BEHIND + 0.6, width=3.0, at=(0.6,))
+        scene.curve(canard[:2], look.CANARD, SURFACE + 1.6, width=3.0, at=(0.5,))
+        scene.curve(canard[1:], look.CANARD, BEHIND + 0.6, width=3.0, at=(0.6,))
         for start in ((0, 1.2, 0.55), (0, 1.2, 0.9), (0, 0.55, 1.2), (0, 0.9, 1.2)):
             scene.run(start, width=1.4)
         t = np.linspace(-0.55, 0.55, 60)

@@ -21,6 +21,7 @@ from .errata import erratum
 from .errata_general import fold_of, generic, law, reverse_slip_with_backspin
 from .errata_linear import exit_in_compression, kelvin_voigt
 from .exact import identical
+from .figures_data import FITS, predictions
 from .model import LAWS, Array, G, X, Xp, Y, Yp, d1, d2, eta, linear, mu
 from .records import AGREES, CORRECTED, NOT_CHECKABLE, Check, Claim, close
 from .table import recomputed
@@ -108,6 +109,31 @@ def restitution() -> Claim:
         "exactly exp(-tan b (pi - 2b)), b = arcsin(d/2)",
         2,
         "simulation at four d; derivatives of the closed form at d = 0",
+    )
+
+
+def slip_classes() -> Claim:
+    """What the models predict over the ranges of the experiments."""
+    counts, checks = [], []
+    for surface in FITS:
+        h0, compliant, rigid = predictions(surface)
+        forward = h0 > 0
+        reverse = int(np.sum(compliant[forward] < 0))
+        large = int(np.sum(compliant[forward] > 0))
+        wrong = int(np.sum(rigid[forward] < 0))
+        counts.append(f"{surface}: {reverse} reverse, {large} forward, rigid law {wrong} reverse")
+        checks.append(Check(counts[-1], wrong == 0 and reverse > 0))
+    return Claim(
+        "slip-classes",
+        "Sec. 2.1, figure tangential_vel_experiments",
+        "two classes at lift-off: large positive slip, and small negative slip; rarely none; a rigid "
+        "bounce has no spin reversal",
+        "landings with H0 > 0 over the published ranges: "
+        + "; ".join(counts)
+        + ". The measurements themselves are not public",
+        NOT_CHECKABLE,
+        "256 landings for each surface, r and mu of the companion fits, d1 = .1, eta = .5, G = 0",
+        tuple(checks),
     )
 
 
@@ -500,6 +526,7 @@ def table() -> Claim:
 
 ALL: tuple[Callable[[], Claim], ...] = (
     table,
+    slip_classes,
     rigid_cases,
     restitution,
     ball_equations,

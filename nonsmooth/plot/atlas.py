@@ -210,7 +210,7 @@ def _legend() -> list[Line2D | Patch]:
         _entry(style.BELOW, 2.2, "-", "fold of $F_2$, visible"),
         _entry(style.BELOW, 2.2, dashed, "fold of $F_2$, invisible"),
         _entry(style.CANARD, 2.6, "-", "canard"),
-        _entry(style.FAUX_CANARD, 2.6, "-", "faux canard"),
+        _entry(style.FAUX_CANARD, 2.6, style.LONG_DASH, "faux canard"),
         _entry(style.BLACK, 2.6, ":", "pseudo-equilibria"),
         Patch(
             facecolor="white", edgecolor="#9A9A9A", hatch="////", label="all $D_a\\to s\\to D_r$"

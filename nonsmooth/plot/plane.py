@@ -110,12 +110,7 @@ def phase_portrait(
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         portrait = _Portrait(axes, plane, t_end)
-        portrait.directions()
-        portrait.orbits(None if starts is None else _points(system, starts))
-        if separatrices:
-            portrait.separatrices()
-        portrait.surface()
-        portrait.marks()
+        portrait.draw(None if starts is None else _points(system, starts), separatrices)
         names = system.state_names
         axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
         if title is not None:
@@ -196,6 +191,15 @@ class _Portrait:
         self.forward, self.backward = _bounded(plane, 1), _bounded(plane, -1)
         self.t_end = _duration(plane) if t_end is None else t_end
         self.drawn: set[str] = set()
+
+    def draw(self, starts: Array | None, separatrices: bool) -> None:
+        """Draw every part, from the back."""
+        self.directions()
+        self.orbits(starts)
+        if separatrices:
+            self.separatrices()
+        self.surface()
+        self.marks()
 
     def directions(self) -> None:
         """Faint arrows of the field on each side."""

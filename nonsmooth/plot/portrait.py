@@ -197,14 +197,14 @@ def _eigenlines(ax: Axes, portrait: Portrait) -> None:
     sliding = eigenlines(portrait.flow)
     for value, m in sliding:
         end = _to_box(math.atan(m))
-        color, name = line_style(value, portrait.flow)
+        color, name, dashes = line_style(value, portrait.flow)
         name = name.removeprefix("strong ").removeprefix("weak ")
         ax.plot(
             [-end[0], end[0]],
             [-end[1], end[1]],
             color=color,
             linewidth=2.6,
-            linestyle=":" if abs(value) < _ZERO else "-",
+            linestyle=dashes,
             zorder=4,
             gid="eigenline",
             path_effects=style.halo(4.0),
@@ -237,15 +237,16 @@ def _eigenlines(ax: Axes, portrait: Portrait) -> None:
                 )
 
 
-def line_style(value: float, flow: ReducedFlow) -> tuple[str, str]:
+def line_style(value: float, flow: ReducedFlow) -> tuple[str, str, Any]:
+    """Colour, name and dashes of an eigenline of Da by its eigenvalue."""
     if abs(value) < _ZERO:
-        return style.BLACK, "pseudo-equilibria"
+        return style.BLACK, "pseudo-equilibria", ":"
     color, name = (style.CANARD, "canard") if value < 0 else (style.FAUX_CANARD, "faux canard")
     values = [v for v, _ in eigenlines(flow)]
     if len(values) == 2 and values[0] * values[1] > 0:
         strength = "strong" if abs(value) == max(map(abs, values)) else "weak"
         name = f"{strength} {name}"
-    return color, name
+    return color, name, "-" if value < 0 else style.LONG_DASH
 
 
 def _along(ax: Axes, m: float, end: Array, name: str, color: str) -> None:
@@ -316,8 +317,11 @@ def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
     """Draw the invariant lines of the return map of an invisible two-fold, where it has some."""
     if not has_diabolo(flow):
         return
-    for slope, color in zip(
-        diabolo_slopes(flow.nu), (style.FAUX_CANARD, style.CANARD), strict=True
+    for slope, color, dashes in zip(
+        diabolo_slopes(flow.nu),
+        (style.FAUX_CANARD, style.CANARD),
+        (style.DOTS, style.DASH_DOT),
+        strict=True,
     ):
         start = np.array([-1.0, slope])
         for z in (start, flight_above(start, flow.nu)):
@@ -327,7 +331,7 @@ def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
                 [0, end[1]],
                 color=color,
                 linewidth=1.3,
-                linestyle=style.DASH_DOT,
+                linestyle=dashes,
                 zorder=1.7,
                 gid="diabolo",
             )
@@ -396,9 +400,9 @@ def _legend(ax: Axes, portrait: Portrait, parts: list[Sector]) -> None:
     handles.append(_line(style.ABOVE, "through the surface: above it", 1.2))
     handles.append(_line(style.BELOW, "through the surface: below it", 1.2, "--"))
     for value, _ in eigenlines(portrait.flow):
-        color, name = line_style(value, portrait.flow)
+        color, name, dashes = line_style(value, portrait.flow)
         text = f"{name}, $\\lambda$ = {_number(value)}" if abs(value) > _ZERO else name
-        handles.append(_line(color, text, 2.6, "-" if abs(value) > _ZERO else ":"))
+        handles.append(_line(color, text, 2.6, dashes))
     if portrait.flow.discriminant > 0 and any(m < 0 for m in np.real(portrait.flow.slopes)):
         handles.append(_line(style.GREY, "eigenline outside sliding", 0.9, ":"))
     if any(part.orbit.goes_to == "s" for part in parts):
@@ -409,7 +413,7 @@ def _legend(ax: Axes, portrait: Portrait, parts: list[Sector]) -> None:
         handles.append(Patch(facecolor="white", edgecolor="#9A9A9A", hatch="...", label=text))
     if has_diabolo(portrait.flow):
         handles.append(_line(style.CANARD, "diabolo: flights shrink to $s$", 1.3, style.DASH_DOT))
-        handles.append(_line(style.FAUX_CANARD, "diabolo: flights grow", 1.3, style.DASH_DOT))
+        handles.append(_line(style.FAUX_CANARD, "diabolo: flights grow", 1.3, style.DOTS))
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0)
 
 

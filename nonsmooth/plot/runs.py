@@ -98,6 +98,18 @@ def trajectory(
                 advice="Leave phase_plane= out to draw states against time.",
             )
         )
+    return _draw(run, names, plane, samples, size, figure)
+
+
+def _draw(
+    run: Trajectory,
+    names: list[str],
+    plane: bool,
+    samples: int,
+    size: tuple[float, float] | None,
+    figure: Figure | None,
+) -> Figure:
+    """Lay out the panels and fill them."""
     columns = 1 if len(names) < _GRID_FROM else math.ceil(len(names) / 4)
     rows = math.ceil(len(names) / columns)
     if size is None:

@@ -156,14 +156,8 @@ def two_fold_3d(
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         scene = _Scene(axes, camera, portrait)
-        scene.surface()
-        scene.sliding()
-        scene.arcs()
-        scene.crossings()
-        scene.diabolo()
-        scene.names()
+        scene.draw()
         axes.set_title(title if title is not None else title_of(portrait))
-        scene.frame()
         if legend:
             scene.legend()
     return figure
@@ -179,6 +173,16 @@ class _Scene:
         self.portrait = portrait
         ax.set_aspect("equal")
         ax.set_axis_off()
+
+    def draw(self) -> None:
+        """Draw every part."""
+        self.surface()
+        self.sliding()
+        self.arcs()
+        self.crossings()
+        self.diabolo()
+        self.names()
+        self.frame()
 
     # parts -------------------------------------------------------------------------------------
 
@@ -225,12 +229,11 @@ class _Scene:
                     for piece in style.inside(scale * points, (-1.0, 1.0, -1.0, 1.0)):
                         self._curve(self._flat(piece), color, 0.9, self.SLIDING, at=0.5)
         for value, m in eigenlines(self.flow):
-            color, _ = line_style(value, self.flow)
+            color, _, dashes = line_style(value, self.flow)
             end = np.array([1.0, m]) / max(1.0, m)
             line = np.outer(np.linspace(1, -1, 41) * (1 if value < 0 else -1), end)
-            dashes = ":" if abs(value) < 1e-9 else "-"
             self._curve(self._flat(line), color, 2.4, self.SLIDING + 0.2, dashes=dashes)
-            if dashes == "-":
+            if dashes != ":":
                 for piece in (line[:21], line[21:]):
                     style.arrowhead(
                         self.ax,
@@ -348,8 +351,8 @@ class _Scene:
             color = (style.ABOVE, style.BELOW)[k]
             handles.append(_entry(color, f"fold of $F_{k + 1}$: {word}", 2.2, dashes))
         for value, _ in eigenlines(self.flow):
-            color, name = line_style(value, self.flow)
-            handles.append(_entry(color, name, 2.4, "-" if abs(value) > 1e-9 else ":"))
+            color, name, dashes = line_style(value, self.flow)
+            handles.append(_entry(color, name, 2.4, dashes))
         if has_diabolo(self.flow):
             handles.append(_entry(style.CANARD, "diabolo: flights shrink", 4.0, alpha=0.3))
             handles.append(_entry(style.FAUX_CANARD, "diabolo: flights grow", 4.0, alpha=0.3))

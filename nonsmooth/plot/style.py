@@ -35,11 +35,13 @@ GREY = "#7F7F7F"
 ABOVE, BELOW = VERMILLION, BLUE
 #: Sliding orbits in the attracting and the repelling region.
 ATTRACTING, REPELLING = "#1A1A1A", "#8A5A00"
-#: Tints of the regions; their greys differ too (0.90, 0.80, 0.97).
-TINT_ATTRACTING, TINT_REPELLING, TINT_CROSSING = "#DCEBF5", "#F3D9A8", "#F7F7F7"
+#: Tints of the regions; their greys differ too (0.91, 0.81, 0.97).
+TINT_ATTRACTING, TINT_REPELLING, TINT_CROSSING = "#DCEBF5", "#EFCB8C", "#F7F7F7"
 CANARD, FAUX_CANARD = "#A8005C", GREEN
 
 DASH_DOT: Any = (0, (4, 1.5, 1, 1.5))
+DOTS: Any = (0, (1.2, 1.6))
+LONG_DASH: Any = (0, (7, 1.0))
 
 _SETTINGS: Any = {
     "font.family": "sans-serif",

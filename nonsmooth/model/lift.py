@@ -282,6 +282,8 @@ class _Lifter:
             return self._choice(e[0], e[0], -e[0], "fabs")
         if op in ("lt", "le"):
             side = self._sign(e[1] - e[0], "comparison")
+            if side.e.is_zero():  # both sides are the same function
+                return _Value(ca.SX(op == "le"))
             return _Value((1 + side.e) / 2, side.inside)
         if op in ("fmax", "fmin"):
             larger, smaller = (0, 1) if op == "fmax" else (1, 0)

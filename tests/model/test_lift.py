@@ -57,6 +57,7 @@ EXPRESSIONS = {
     "dead zone": (ca.if_else(ca.fabs(x) < 1, 0, x), 3),
     "size of a size": (ca.fabs(ca.fabs(x) - 1), 3),
     "switch moved by a switch": (ca.sign(x - 0.1 * ca.sign(y)), 3),
+    "equal on one side": (ca.if_else(x < ca.fabs(x), y, 1) + (y <= ca.fabs(y)), 1),
     "product of relays": (ca.sign(x) * ca.sign(y), 2),
     "parameters only": (x * ca.fmax(mu, 0.1) * ca.sign(mu), 0),
     "a square hides the sign": (ca.sign(x) ** 2 * y, 0),

@@ -32,7 +32,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     ]
     done: dict[str, list] = {"erratum": [], "claim": [], "equation": [], "figure": []}
     for kind, compute in (bar := tqdm(steps, unit="step", leave=False)):
-        bar.set_description(f"{kind:9}")
+        bar.set_description(f"{kind:9}", refresh=False)
         done[kind].append(compute())
     claims, found, shown = done["claim"], done["erratum"], done["equation"]
     written = report.write(folder, claims, found, shown, table.recomputed(), figures.PICTURES)

@@ -199,7 +199,7 @@ def _axis_of_slip(axes: Axes, scene: Scene, top: float) -> None:
 
 def _ball_labels(axes: Axes, scene: Scene) -> None:
     a = scene.size
-    scene.text([-0.3, -0.92, 0.92], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
+    scene.text([-0.36, -1.0, 1.0], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
     scene.text(
         [0, 1.03 * a, -0.12],
         "$F_2\\cdot\\nabla H=0$\n" r"$\alpha=1$",
@@ -251,7 +251,7 @@ def two_fold_visible() -> Figure:
 def _region_labels(scene: Scene) -> None:
     a = scene.size
     scene.text([0, 0.93 * a, 0.91 * a], r"$D_a$", fontsize=13)
-    scene.text([0, -0.55 * a, -0.55 * a], r"$D_r$", fontsize=13)
+    scene.text([0, -0.78 * a, -0.5 * a], r"$D_r$", fontsize=13)
     scene.text([0, 0.72 * a, -0.5 * a], r"$C_2$", fontsize=13)
     scene.text([0, -0.5 * a, 0.72 * a], r"$C_1$", fontsize=13)
     scene.text(

@@ -13,6 +13,7 @@ from typing import Any
 
 import casadi as ca
 import numpy as np
+from scipy.optimize import brentq
 
 import bounce
 import nonsmooth as ns
@@ -120,8 +121,12 @@ def slip_classes() -> Claim:
         forward = h0 > 0
         reverse = int(np.sum(compliant[forward] < 0))
         large = int(np.sum(compliant[forward] > 0))
+        median, largest = np.median(compliant[compliant < 0]), compliant.max()
         wrong = int(np.sum(rigid[forward] < 0))
-        counts.append(f"{surface}: {reverse} reverse, {large} forward, rigid law {wrong} reverse")
+        counts.append(
+            f"{surface}: {reverse} reverse (median {median:.0f}/s), {large} forward (to "
+            f"{largest:.0f}/s), rigid law {wrong} reverse"
+        )
         checks.append(Check(counts[-1], wrong == 0 and reverse > 0))
     return Claim(
         "slip-classes",
@@ -238,6 +243,54 @@ def roll_to_slip() -> Claim:
         bool(leave.x[3] > 0),
     )
     return Claim(**{**claim.__dict__, "checks": (*claim.checks, extra)})
+
+
+@cache
+def dividing_points() -> list[dict[str, Any]]:
+    """Critical spins at two landing speeds: one on each part of the dividing surface."""
+    reference = json.loads((DATA / "dividing_points.json").read_text())["points"]
+    model = linear(**BASE)
+    found = []
+    for row in reference:
+        xp0, guess = float(row["Xp0"]), float(row["Omega0"])
+
+        def crossing(spin: float, xp0: float = xp0) -> float:
+            run = model.bounce([0, xp0, 0, -1, spin], tol=1e-13)
+            end = run.x[-1]
+            # After rolling H_F is quadratic in the distance from the critical spin, A linear.
+            return model.value(model.A, end) if "s" in run.itinerary else float(end[1] + end[4])
+
+        spin = brentq(crossing, guess - 0.01, guess + 0.01, xtol=1e-14)
+        sides = [model.bounce([0, xp0, 0, -1, spin + d]).itinerary for d in (-1e-6, 1e-6)]
+        found.append({"Xp0": xp0, "Omega0": spin, "error": abs(spin - guess), "sides": sides})
+    return found
+
+
+def dividing_surface() -> Claim:
+    """The surface between forward and reverse slip at lift-off."""
+    rolling, slipping = dividing_points()
+    return Claim(
+        "dividing-surface",
+        "abstract; Sec. 4.2",
+        "a surface of codimension one, of landings that reach s rolling, divides forward from "
+        "reverse slip at lift-off",
+        f"so at X'0 = {rolling['Xp0']:.4f}, Omega0 = {rolling['Omega0']:.9f} "
+        f"({rolling['sides'][0]} | {rolling['sides'][1]}); but the surface goes on where the ball "
+        f"slips throughout and H = 0 at lift-off: X'0 = {slipping['Xp0']:.4f}, Omega0 = "
+        f"{slipping['Omega0']:.9f} ({slipping['sides'][0]} | {slipping['sides'][1]}), a second part "
+        "that the paper does not mention",
+        AGREES,
+        "root of A (after rolling) or of H at lift-off in Omega0, Y'0 = -1, by simulation",
+        (
+            Check(
+                f"both spins within {max(rolling['error'], slipping['error']):.1e} of the reference",
+                max(rolling["error"], slipping["error"]) < 1e-9,
+            ),
+            Check("rolls on both sides of the first", rolling["sides"] == ["+ s -", "+ s +"]),
+            Check("rolls on neither side of the second", slipping["sides"] == ["+ -", "+"]),
+        ),
+        (20,),
+    )
 
 
 def normal_compliance() -> Claim:
@@ -538,6 +591,7 @@ ALL: tuple[Callable[[], Claim], ...] = (
     kv_pert_parameters,
     kv_pert,
     slip_reversal,
+    dividing_surface,
     normal_compliance,
     rolling_lift_off,
     second_lie_general,

@@ -33,6 +33,7 @@ VERDICTS = {
     "kv-pert-parameters": "not checkable",
     "kv-pert": "agrees",
     "slip-reversal": "agrees",
+    "dividing-surface": "agrees",
     "which-compliance": "corrected",
     "no-rolling-lift-off": "agrees",
     "second-lie-general": "corrected",
@@ -112,6 +113,13 @@ def test_lift_off_of_the_linear_ball_in_closed_form():
     run = linear(mu=0.3, d1=0.1, d2=d, eta=0.5, G=0.0).bounce([0, 0.5, 0, -1, 0.3], tol=1e-13)
     expected = (np.pi - 2 * np.arcsin(d)) / np.sqrt(1 - d**2)
     assert run.t[-1] == pytest.approx(expected, rel=0, abs=1e-11)
+
+
+def test_dividing_surface_matches_the_reference():
+    reference = json.loads((results.DATA / "dividing_points.json").read_text())["points"]
+    for found, row in zip(results.dividing_points(), reference, strict=True):
+        assert found["Omega0"] == pytest.approx(float(row["Omega0"]), rel=0, abs=1e-9)
+        assert found["sides"] == [row["below"], row["above"]]
 
 
 def test_table_entries_that_do_not_fit():

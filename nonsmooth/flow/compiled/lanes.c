@@ -96,23 +96,20 @@ static int load(Lanes *s, Work *w, int l) {
 
 static I refill(Lanes *s, Work *w) {
   I fresh = {0};
-  for (int l = 0; l < W; l++)
-    if (!LANE_I(s->live, l) && load(s, w, l)) LANE_I(fresh, l) = -1;
+  for EACH(l, ~s->live) if (load(s, w, l)) LANE_I(fresh, l) = -1;
   return fresh;
 }
 
 static void hand_over(Lanes *s, Work *w, I which) {
-  which &= s->live;
-  if (!any(which)) return;
-  for (int l = 0; l < W; l++) if (LANE_I(which, l)) store(s, w, l, HAND_OVER);
+  for EACH(l, which & s->live) store(s, w, l, HAND_OVER);
 }
 
 static void note_modes(Lanes *s, Work *w, I which) {
-  for (int l = 0; l < W; l++)
-    if (LANE_I(which, l)) {
-      int mode = LANE_I(s->slides, l) ? 2 : LANE_I(s->above, l) ? 0 : M > 0 ? 1 : 0;
-      s->itinerary[l] = tree_child(w->tree, s->itinerary[l], mode);
-    }
+  unsigned slides = bits(s->slides), above = bits(s->above);
+  for EACH(l, which) {
+    int mode = slides >> l & 1 ? 2 : M > 0 && !(above >> l & 1);
+    s->itinerary[l] = tree_child(w->tree, s->itinerary[l], mode);
+  }
 }
 
 /* The surface -------------------------------------------------------------------------------- */
@@ -280,28 +277,33 @@ INLINE void screen(const T *a, I *none, I *one, T *end) {
   *one = (simple | (I)(least > tail2)) & ~positive;
 }
 
-/* The root of a polynomial with one on (0, 1]; converged lanes do not move any more. */
+/* Even and odd parts separately: two short chains instead of a long one. */
+INLINE T value_at(const T *a, int n, T s, T z) {
+  T even = a[n - (n & 1)], odd = a[n - 1 + (n & 1)];
+  UNROLL for (int k = n - (n & 1) - 2; k >= 0; k -= 2) even = even * z + a[k];
+  UNROLL for (int k = n - 1 + (n & 1) - 2; k >= 1; k -= 2) odd = odd * z + a[k];
+  return even + s * odd;
+}
+
+/* The root of a polynomial with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
+ * not move any more. */
 INLINE T polish(const T *a, T end, I active, T *slope) {
-  T bend = end - a[0] - a[1], lo = BC(0), hi = BC(1), d[P];
+  T bend = end - a[0] - a[1], lo = BC(0), hi = BC(1), d[P], dd[P];
   T disc = a[1] * a[1] - 4.0 * a[0] * bend;
   T s = 2.0 * a[0] / (SQRT_(MAX(disc, BC(0))) - a[1]);
   s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
   UNROLL for (int k = 0; k < P; k++) d[k] = (k + 1.0) * a[k + 1];
+  UNROLL for (int k = 0; k < P - 1; k++) dd[k] = 0.5 * (k + 1.0) * d[k + 1];
   for (int it = 0; it < 60; it++) {
-    T z = s * s, even = a[P - (P & 1)], odd = a[P - 1 + (P & 1)];
-    T deven = d[P - 1 - ((P - 1) & 1)], dodd = d[P - 2 + ((P - 1) & 1)];
-    UNROLL for (int k = P - (P & 1) - 2; k >= 0; k -= 2) even = even * z + a[k];
-    UNROLL for (int k = P - 1 + (P & 1) - 2; k >= 1; k -= 2) odd = odd * z + a[k];
-    UNROLL for (int k = P - 1 - ((P - 1) & 1) - 2; k >= 0; k -= 2) deven = deven * z + d[k];
-    UNROLL for (int k = P - 2 + ((P - 1) & 1) - 2; k >= 1; k -= 2) dodd = dodd * z + d[k];
-    T f = even + s * odd, df = deven + s * dodd, step = f / df, next = s - step;
-    I positive = f > 0, small = ABS(step) <= 1e-9;
+    T z = s * s, f = value_at(a, P, s, z), f1 = value_at(d, P - 1, s, z);
+    T half_f2 = value_at(dd, P - 2, s, z), step = f * f1 / (f1 * f1 - f * half_f2), next = s - step;
+    I positive = f > 0, small = ABS(step) <= 2e-6;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);
     I inside = (next > lo) & (next < hi);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
-    *slope = SELECT(active, df, *slope);
+    *slope = SELECT(active, f1, *slope);
     active &= ~small;
     if (!any(active)) break;
   }
@@ -398,38 +400,43 @@ static __attribute__((noinline)) void resolve(Guards *v) {
       I one = mine[j] & first & (changes == 1) & ~v->wrong_way[j];
       I deep = mine[j] & ~one & ~(first & (changes == 0));
       v->one[j] |= one;
-      if (any(deep))
-        for (int l = 0; l < W; l++)
-          if (LANE_I(deep, l)) {
-            double r = hard_root(v->a[j], l, j, LANE_I(v->flipped[j], l) != 0, &LANE(v->slope[j], l));
-            if (r >= 0) LANE(v->root[j], l) = r;
-          }
+      for EACH(l, deep) {
+        double r = hard_root(v->a[j], l, j, LANE_I(v->flipped[j], l) != 0, &LANE(v->slope[j], l));
+        if (r >= 0) LANE(v->root[j], l) = r;
+      }
     }
   }
 }
 
-/* Polish all isolated roots: one slot of each lane at a time, the slots of different lanes together. */
-INLINE void polish_guards(Guards *v) {
-  for (;;) {
-    I rest = ~(I){0}, mine[S1], all = {0};
+/* Polish the isolated roots that can be the first: of each lane the one that a secant puts first, the
+ * slots of different lanes together, then others only if they are not clearly later. */
+INLINE void polish_guards(Guards *v, T margin) {
+  I all = {0};
+  for (int j = 0; j < SLOTS; j++) all |= v->one[j];
+  while (any(all)) {
+    T a[P + 1], end = BC(0), guess = BC(INFINITY), d = BC(0);
+    I mine[S1];
     for (int j = 0; j < SLOTS; j++) {
-      mine[j] = v->one[j] & rest;
-      rest &= ~mine[j];
-      all |= mine[j];
+      T g = v->a[j][0] / (v->a[j][0] - v->end[j]);
+      mine[j] = v->one[j] & (g < guess);
+      guess = SELECT(mine[j], g, guess);
+      for (int i = 0; i < j; i++) mine[i] &= ~mine[j];
     }
-    if (!any(all)) return;
-    T a[P + 1], end = v->end[SLOTS - 1], d = BC(0);
     UNROLL for (int k = 0; k <= P; k++) a[k] = v->a[SLOTS - 1][k];
+    end = v->end[SLOTS - 1];
     for (int j = 0; j < SLOTS - 1; j++) {
       if (!any(mine[j])) continue;
       UNROLL for (int k = 0; k <= P; k++) a[k] = SELECT(mine[j], v->a[j][k], a[k]);
       end = SELECT(mine[j], v->end[j], end);
     }
-    T s = polish(a, end, all, &d);
+    T s = polish(a, end, all, &d), later = s + margin;
+    all = (I){0};
     for (int j = 0; j < SLOTS; j++) {
       v->root[j] = SELECT(mine[j], s, v->root[j]);
       v->slope[j] = SELECT(mine[j], d, v->slope[j]);
       v->one[j] &= ~mine[j];
+      if (any(v->one[j])) v->one[j] &= ~(I)(value_at(v->a[j], P, later, later * later) > 0);
+      all |= v->one[j];
     }
   }
 }
@@ -445,7 +452,8 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T h, T *dt, I *slot, T *slope
   I hard = {0};
   for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
   if (any(hard)) resolve(&v);
-  if (SLOTS > 0) polish_guards(&v);
+  T tie = TIE * MAX(BC(1), ABS(s->t));
+  if (SLOTS > 0) polish_guards(&v, tie / h);
   T best = BC(INFINITY), second = BC(INFINITY);
   *slot = (I){0};
   for (int j = 0; j < SLOTS; j++) {
@@ -457,7 +465,7 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T h, T *dt, I *slot, T *slope
   }
   I hit = *slot != 0;
   *dt = SELECT(hit, best * h, h);
-  return unclear | (hit & ((second - best) * h <= TIE * MAX(BC(1), ABS(s->t))));
+  return unclear | (hit & ((second - best) * h <= tie));
 }
 
 /* Events --------------------------------------------------------------------------------------- */
@@ -477,12 +485,10 @@ INLINE void count(Lanes *s, Work *w, int kind, I which) {
   s->events -= which;
   if (w->o->at_kind != kind || !w->at_x) return;
   I now = which & (s->kinds[kind] == w->o->at_count);
-  if (!any(now)) return;
-  for (int l = 0; l < W; l++)
-    if (LANE_I(now, l)) {
-      w->at_t[s->index[l]] = LANE(s->t, l);
-      for (int i = 0; i < ND; i++) w->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
-    }
+  for EACH(l, now) {
+    w->at_t[s->index[l]] = LANE(s->t, l);
+    for (int i = 0; i < ND; i++) w->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
+  }
 }
 
 #if M > 0
@@ -535,9 +541,7 @@ INLINE void advance(Lanes *s, T c[N][P + 1], T dt) {
 }
 
 static void finish_lanes(Lanes *s, Work *w, I which, int status) {
-  which &= s->live;
-  if (!any(which)) return;
-  for (int l = 0; l < W; l++) if (LANE_I(which, l)) store(s, w, l, status);
+  for EACH(l, which & s->live) store(s, w, l, status);
 }
 
 static void step(Lanes *s, Work *w) {

@@ -557,6 +557,14 @@ static void reset(Run *r, int index, int guard) {
   drop_zero_guards(r);
 }
 
+static void watch_two_fold(Run *r) {
+  int s = sliding_surface(r->mode);
+  if (s < 0 || CANCELLED[r->mode]) return;
+  Expansion e;
+  expand(r, r->mode, &e);
+  if (is_two_fold(&e, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+}
+
 static void serve(Run *r, int row) {
   const int *guard = GUARD[r->mode][row];
   if (guard[0] == STOP_GUARD) {
@@ -569,6 +577,8 @@ static void serve(Run *r, int row) {
     int exits = guard[0] == EXIT_GUARD;
     project(r, active);
     renote(r);
+    if (exits) watch_two_fold(r);
+    if (r->status != RUNNING) return;
     proceed(r, r->mode, active, exits ? guard[1] : -1, guard[2], row);
   }
 }
@@ -593,14 +603,6 @@ static void advance(Run *r, const Expansion *e, double dt) {
   if (s >= 0) project(r, 1u << s);
   memset(r->drop, 0, sizeof r->drop);
   note(r);
-}
-
-static void watch_two_fold(Run *r) {
-  int s = sliding_surface(r->mode);
-  if (s < 0 || CANCELLED[r->mode]) return;
-  Expansion e;
-  expand(r, r->mode, &e);
-  if (is_two_fold(&e, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
 static void step(Run *r) {

@@ -12,7 +12,12 @@ typedef int64_t I __attribute__((vector_size(8 * W)));
   static T NAME(T a) { for (int l = 0; l < W; l++) a[l] = f(a[l]); return a; }
 #define LANEWISE2(NAME, f) \
   static T NAME(T a, T b) { for (int l = 0; l < W; l++) a[l] = f(a[l], b[l]); return a; }
-LANEWISE(SQRT_, sqrt) LANEWISE(EXP_, exp) LANEWISE(LOG_, log) LANEWISE(SIN_, sin)
+#if defined(__AVX512F__) && W == 8 && !defined(__clang__)
+static inline T SQRT_(T a) { return (T)__builtin_ia32_sqrtpd512_mask(a, a, -1, 4); }
+#else
+LANEWISE(SQRT_, sqrt)
+#endif
+LANEWISE(EXP_, exp) LANEWISE(LOG_, log) LANEWISE(SIN_, sin)
 LANEWISE(COS_, cos) LANEWISE(TAN_, tan) LANEWISE(ASIN_, asin) LANEWISE(ACOS_, acos)
 LANEWISE(ATAN_, atan) LANEWISE(SINH_, sinh) LANEWISE(COSH_, cosh) LANEWISE(TANH_, tanh)
 LANEWISE(ASINH_, asinh) LANEWISE(ACOSH_, acosh) LANEWISE(ATANH_, atanh) LANEWISE(ERF_, erf)
@@ -28,11 +33,22 @@ INLINE T MAX(T a, T b) { return (T)__builtin_ia32_maxpd512_mask(a, b, BC(0), -1,
 INLINE T MIN(T a, T b) { I m = a < b; return SELECT(m, a, b); }
 INLINE T MAX(T a, T b) { I m = a > b; return SELECT(m, a, b); }
 #endif
-INLINE int any(I m) {
-  int64_t r = 0;
-  UNROLL for (int l = 0; l < W; l++) r |= m[l];
-  return r != 0;
+/* One bit for each lane of a mask. */
+#if defined(__AVX512DQ__) && W == 8
+typedef long long Bits __attribute__((vector_size(64)));
+INLINE unsigned bits(I m) { return (unsigned char)__builtin_ia32_cvtq2mask512((Bits)m); }
+#elif defined(__AVX__) && W == 4
+INLINE unsigned bits(I m) { return (unsigned)__builtin_ia32_movmskpd256((T)m); }
+#else
+INLINE unsigned bits(I m) {
+  unsigned r = 0;
+  UNROLL for (int l = 0; l < W; l++) r |= (unsigned)(m[l] & 1) << l;
+  return r;
 }
+#endif
+INLINE int any(I m) { return bits(m) != 0; }
+/* Loop over the lanes of a mask. */
+#define EACH(l, mask) (unsigned left_ = bits(mask), l; left_ && (l = (unsigned)__builtin_ctz(left_), 1); left_ &= left_ - 1)
 
 /* Binary logarithm and exponential to 1e-4, reciprocal to 1e-3: enough for a step size, a hundredth
  * of libm's cost. */

@@ -1,0 +1,110 @@
+"""From the compiled engine's arrays to the same Trajectory that the reference driver returns."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from ...model import Array, FilippovSystem, motion
+from .. import messages
+from ..options import Options
+from ..status import ADVICE, Status
+from ..trajectory import Event, Segment, Trajectory
+from .engine import KINDS, REASONS, Run
+
+
+def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
+    """Convert a dense run.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    p : ndarray
+        Parameter values of the run.
+    options : Options
+    run : Run
+        As :func:`simulate_arrays` returns it.
+
+    Returns
+    -------
+    Trajectory
+    """
+    status, modes = Status(run.status), system.modes
+    limit = None if math.isnan(run.limit) else run.limit
+    events = _events(system, run)
+    if status is not Status.STOPPED:
+        letters = modes[run.mode]
+        events.append(Event("end", float(run.t[-1]), run.x[-1], letters, letters, str(status)))
+    return Trajectory(
+        system=system,
+        parameters=dict(zip(system.parameter_names, p.tolist(), strict=True)),
+        t=run.t,
+        x=run.x,
+        events=events,
+        segments=_segments(system, run),
+        status=status,
+        message=f"{_message(system, options, run)} {ADVICE[status]}",
+        accumulation_time=limit if status is Status.ACCUMULATION else None,
+        _starts=run.starts,
+        _coefficients=run.coefficients,
+    )
+
+
+def _events(system: FilippovSystem, run: Run) -> list[Event]:
+    modes, found = system.modes, []
+    for k, kind in enumerate(run.event_kinds):
+        before, after = modes[run.event_before[k]], modes[run.event_after[k]]
+        name = motion(system, before).guards[run.event_guards[k]].name
+        t = float(run.event_t[k])
+        found.append(Event(KINDS[kind], t, run.event_x[k].copy(), before, after, name))
+    return found
+
+
+def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
+    """Stretches of steps in one mode; a run without a step has its one mode."""
+    t_last = float(run.t[-1])
+    if not len(run.modes):
+        return [Segment(system.modes[run.mode], t_last, t_last, 0, 0)]
+    changes = np.flatnonzero(np.diff(run.modes)) + 1
+    bounds = [0, *changes.tolist(), len(run.modes)]
+    ends = [*(float(run.starts[k]) for k in changes), t_last]
+    return [
+        Segment(system.modes[run.modes[a]], float(run.starts[a]), end, a, b)
+        for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
+    ]
+
+
+def _message(system: FilippovSystem, options: Options, run: Run) -> str:
+    status, t = Status(run.status), float(run.t[-1])
+    if status is Status.REACHED_END:
+        return messages.reached_end(options.t_end)
+    if status is Status.STOPPED:
+        return messages.stopped(system.stops[run.where][0], t)
+    if status is Status.ACCUMULATION:
+        return messages.accumulation(len(run.event_kinds), run.limit)
+    if status is Status.TOO_MANY_EVENTS:
+        return messages.too_many("events", options.max_events)
+    if status is Status.TOO_MANY_STEPS:
+        return messages.too_many("steps", options.max_steps)
+    if status is Status.STEP_TOO_SMALL:
+        return messages.step_too_small(4e-16 * max(1.0, abs(t)))
+    return _reason(system, options, run)
+
+
+def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
+    modes, t = system.modes, float(run.t[-1])
+    reason = REASONS[run.reason]
+    if reason == "two_fold":
+        return messages.two_fold(run.where)
+    if reason == "slid_to_two_fold":
+        return messages.slid_to_two_fold(run.where)
+    if reason == "ambiguous":
+        return messages.ambiguous([m for k, m in enumerate(modes) if run.where >> k & 1])
+    if reason == "wrong_start":
+        return messages.wrong_start(str(options.start_mode), modes[run.where])
+    if reason == "field":
+        return messages.field_not_finite(modes[run.mode], run.x[-1].tolist())
+    if reason == "reset_map":
+        return messages.reset_not_finite(system.resets[run.where][0], t)
+    return messages.surface_not_finite() if reason == "surface" else messages.degenerate()

@@ -120,7 +120,9 @@ class _Graph:
             else:
                 self.moving.append(any(self.moving[a] for a in node.args))
                 self.constant.append(node.op == "const")
+        self.prepared: dict[int, int] = {}
         self._find_divisors()
+        self._find_sums(rows)
         used = {j for row in rows for j in row}
         for j, node in enumerate(nodes):
             if self.moving[j]:
@@ -138,6 +140,42 @@ class _Graph:
             if self.moving[j] and node.op == "div":
                 count[node.args[1]] = count.get(node.args[1], 0) + 1
         self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
+
+    def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
+        """Terms of sums whose partial sums nobody else uses, those that are ready first first.
+
+        A convolution's oldest terms can then be added while its newest are still computed.
+        """
+        users = [0] * len(self.nodes)
+        for node in self.nodes:
+            for a in node.args:
+                users[a] += 1
+        for row in rows:
+            for j in row:
+                users[j] += 1
+        terms: dict[int, list[int]] = {}
+        for j, node in enumerate(self.nodes):
+            if node.op != "add" or not self.moving[j] or self._choice(node) is not None:
+                continue
+            terms[j] = []
+            for a in node.args:
+                terms[j] += terms.pop(a) if a in terms and users[a] == 1 else [a]
+        self.sums = {
+            j: sorted(t, key=lambda k: max(self.nodes[k].args, default=k))
+            for j, t in terms.items()
+            if len(t) > 2
+        }
+
+    def _sum(self, terms: Sequence[int]) -> str:
+        """Two chains of the early terms, then the two last."""
+        names = [self.name(k) for k in terms]
+        early, late = names[:-2], names[-2:]
+        chains = [early] if len(early) < 4 else [early[0::2], early[1::2]]
+        sums = ["(" * (len(c) - 1) + ") + ".join(c) for c in chains]
+        total = sums[0] if len(sums) == 1 else f"({sums[0]}) + ({sums[1]})"
+        for name in late:
+            total = f"({total}) + {name}"
+        return total
 
     def _reciprocal(self, j: int) -> str:
         if self.constant[j] and self.nodes[j].payload:
@@ -224,7 +262,7 @@ class _Graph:
         node = self.nodes[j]
         if node.op == "add" and self.moving[j] and self._choice(node) is not None:
             return [a for half in node.args for a in self.nodes[half].args]
-        return list(node.args)
+        return self.sums.get(j, list(node.args))
 
     def _mask(self, j: int) -> tuple[str, bool]:
         node = self.nodes[j]
@@ -242,6 +280,8 @@ class _Graph:
             return f"SELECT({mask}, {pair[0]}, {pair[1]})"
         if node.op == "add" and (choice := self._choice(node)) is not None:
             return choice
+        if j in self.sums:
+            return self._sum(self.sums[j])
         if node.op == "div" and node.args[1] in self.divisors:
             return f"{self.name(node.args[0])} * {self._reciprocal(node.args[1])}"
         args = [self.name(a) for a in node.args]

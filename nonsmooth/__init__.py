@@ -26,10 +26,12 @@ import importlib
 from typing import TYPE_CHECKING, Any
 
 from .flow import (
+    Ensemble,
     Event,
     Segment,
     Status,
     Trajectory,
+    ensemble,
     first_crossing,
     first_root,
     follow,
@@ -75,6 +77,7 @@ from .model import (
     PointError,
     Reset,
     Stop,
+    regularise,
 )
 
 if TYPE_CHECKING:
@@ -88,6 +91,7 @@ __all__ = [
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
+    "Ensemble",
     "Event",
     "FilippovSystem",
     "Fold",
@@ -111,6 +115,7 @@ __all__ = [
     "alpha",
     "classify_two_fold",
     "diabolo_slopes",
+    "ensemble",
     "find_fold",
     "find_two_fold",
     "first_crossing",
@@ -124,6 +129,7 @@ __all__ = [
     "normal_form",
     "plot",
     "region",
+    "regularise",
     "return_matrix",
     "simulate",
     "sliding_field",

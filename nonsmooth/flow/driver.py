@@ -14,6 +14,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..model import Array, FilippovSystem, Intersection, Resets, Surfaces, motion
+from . import messages
 from .accumulation import remaining_time
 from .options import Options
 from .status import ADVICE, Status
@@ -79,9 +80,11 @@ class Driver:
             return self._reset(guard.index, guard.name)
         left = self.options.t_end - self.t
         if left <= 0.0:
-            return self._end(Status.REACHED_END, f"t_end = {self.options.t_end:g} reached.")
+            return self._end(Status.REACHED_END, messages.reached_end(self.options.t_end))
         if len(self.record.starts) >= self.options.max_steps:
-            return self._end(Status.TOO_MANY_STEPS, f"{self.options.max_steps} steps taken.")
+            return self._end(
+                Status.TOO_MANY_STEPS, messages.too_many("steps", self.options.max_steps)
+            )
         e = self._expand()
         if not e.finite:
             return self._singular_step(e, left)
@@ -89,7 +92,7 @@ class Driver:
         if h <= 4 * EPSILON * max(1.0, abs(self.t)) and h < left:
             if len(self.multipliers) == 1:
                 return self._leave_branch(e)
-            return self._end(Status.STEP_TOO_SMALL, f"A step of {h:.1e} would be needed.")
+            return self._end(Status.STEP_TOO_SMALL, messages.step_too_small(h))
         last = h >= left
         h = min(h, left)
         hit = self.stepper.first_hit(e, h, self.drops, self.t)
@@ -133,8 +136,7 @@ class Driver:
         """Leave a point where only low derivatives exist; guards are looked at after the step."""
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
         if h == 0.0:
-            what = ", ".join(f"{v:.6g}" for v in self.x)
-            return self._end(Status.NOT_FINITE, f"The field of mode {self.mode!r} at ({what}).")
+            return self._end(Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x))
         drops = self.drops
         self._advance(e, coefficients, h)
         self.drops = {row: k for row, k in drops.items() if k > e.guards.shape[1]}
@@ -147,7 +149,7 @@ class Driver:
         if is_two_fold(self.stepper, e, surface, self.options.rtol):
             self._end(
                 Status.NON_UNIQUE,
-                f"Sliding reached a two-fold of h{surface} = 0: both fields are tangent there.",
+                messages.slid_to_two_fold(surface),
             )
 
     # events ------------------------------------------------------------------------------------
@@ -156,7 +158,7 @@ class Driver:
         guard = hit.guard
         if guard.kind == "stop":
             self._event("stop", self.mode, guard.name)
-            return self._end(Status.STOPPED, f"{guard.name!r} at t = {self.t:.10g}.")
+            return self._end(Status.STOPPED, messages.stopped(guard.name, self.t))
         if guard.kind == "reset":
             return self._reset(guard.index, guard.name)
         i, before = guard.index, self.mode
@@ -165,6 +167,7 @@ class Driver:
         self.record.x[-1] = self.x[: self.system.dimension].copy()
         known: dict[tuple[str, int, int], int] = {}
         if guard.kind == "exit":
+            self._watch_two_fold()
             known = {("exit", i, guard.side): 1, ("surface", i, guard.side): 2}
         layer = (float(guard.side), -guard.side) if guard.kind == "surface" else None
         self._continue(active, known, before, guard.name, layer)
@@ -185,6 +188,8 @@ class Driver:
         layer: tuple[float, int] | None = None,
         letters: str | None = None,
     ) -> None:
+        if self._ended is not None:
+            return
         mode = self.mode if letters is None else letters
         decision = decide(self.stepper, self.x, mode, active, known, layer)
         if decision.continuation is None:
@@ -195,13 +200,13 @@ class Driver:
             kind = _kind(before, self.mode)
             self._event(kind, before, name)
         if len(self.record.events) >= self.options.max_events:
-            self._end(Status.TOO_MANY_EVENTS, f"{self.options.max_events} events.")
+            self._end(Status.TOO_MANY_EVENTS, messages.too_many("events", self.options.max_events))
 
     def _reset(self, index: int, name: str) -> None:
         self._event("reset", self.mode, name)
         self.x = self.resets.apply(index, self.x, self.p)
         if not np.all(np.isfinite(self.x)):
-            return self._end(Status.NOT_FINITE, f"The map of reset {name!r} at t = {self.t:.10g}.")
+            return self._end(Status.NOT_FINITE, messages.reset_not_finite(name, self.t))
         self._note()
         letters = self._letters()
         active = self._active(set(), letters)
@@ -217,7 +222,7 @@ class Driver:
         """Decide the first mode, or take the one asked for."""
         h, _ = self.surfaces.values(self.x, self.p)
         if not np.all(np.isfinite(h)):
-            return self._end(Status.NOT_FINITE, "A switching function at the start.")
+            return self._end(Status.NOT_FINITE, messages.surface_not_finite())
         self.mode = self._letters()
         active = self._active(set(), self.mode)
         self.x = self.surfaces.project(self.x, self.p, active)
@@ -237,7 +242,7 @@ class Driver:
         if wrong:
             return self._end(
                 Status.NON_UNIQUE,
-                f"start_mode {mode!r} does not hold at the start, where the mode is {self.mode!r}.",
+                messages.wrong_start(mode, self.mode),
             )
         self.mode = mode
         of_mode = motion(self.system, mode)
@@ -300,7 +305,7 @@ class Driver:
             self._limit = self.t + left
             self._end(
                 Status.ACCUMULATION,
-                f"After {len(self.record.events)} events; estimated limit t = {self._limit:.12g}.",
+                messages.accumulation(len(self.record.events), self._limit),
             )
 
     def _close_segment(self, following: str) -> None:

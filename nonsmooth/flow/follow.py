@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, Followed, OptionError, Parameters, Surfaces
+from . import messages
 from .options import Options
 from .polynomial import first_crossing
 from .status import ADVICE, Status
@@ -157,13 +158,13 @@ class _Follower:
             if left == 0.0:
                 return Status.REACHED_END, f"t = {self.t_end:g} reached."
             if len(self.starts) >= self.options.max_steps:
-                return Status.TOO_MANY_STEPS, f"{self.options.max_steps} steps taken."
+                return Status.TOO_MANY_STEPS, messages.too_many("steps", self.options.max_steps)
             e = self._expand()
             if not np.all(np.isfinite(e.states)):
-                return Status.NOT_FINITE, f"The field of mode {self.motion.mode!r} at {self.x}."
+                return Status.NOT_FINITE, messages.field_not_finite(self.motion.mode, self.x)
             h = min(self.stepper.step_size(e), self.options.max_step)
             if h <= 1e-15 * max(1.0, abs(self.t)) and h < left:
-                return Status.STEP_TOO_SMALL, f"A step of {h:.1e} would be needed."
+                return Status.STEP_TOO_SMALL, messages.step_too_small(h)
             last, h = h >= left, min(h, left)
             hits = self._zeros(e, h, fresh)
             dt = min((d for d, _ in hits), default=h)

@@ -3,13 +3,21 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from ..model import FilippovSystem, OptionError, Parameters
+from ..model import Array, FilippovSystem, Parameters
+from .compiled.convert import trajectory
+from .compiled.engine import engine_for, simulate_arrays
+from .compiled.select import use_compiled
 from .driver import Driver
 from .options import Options
+from .status import Status
 from .trajectory import Trajectory
+
+#: Steps that the reference driver takes before a run counts as long.
+_SHORT = 300
 
 
 def simulate(
@@ -50,7 +58,8 @@ def simulate(
     max_step, max_steps, max_events : optional
         Limits.
     engine : {"auto", "reference", "compiled"}
-        Which driver runs.
+        Which driver runs. ``"auto"`` takes the compiled engine for runs of more than 300 steps,
+        where there is a compiler; without one it says so, once.
 
     Returns
     -------
@@ -89,8 +98,23 @@ def simulate(
     )
     x = system.extended_point(x0, t_start)
     p = system.parameter_vector(parameters)
-    if engine not in ("auto", "reference", "compiled"):
-        raise OptionError(
-            f"engine: expected 'auto', 'reference' or 'compiled', received {engine!r}."
-        )
+    return _run(system, x, p, options, engine)
+
+
+def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: str) -> Trajectory:
+    """Choose the engine: short runs are done before a compiler would have started.
+
+    The choice depends on the problem alone, never on what happens to be cached, so that the same
+    call gives the same bits.
+    """
+    compiled = use_compiled(engine, engine_for(system, options) is not None)
+    if compiled and engine == "auto":
+        first = Driver(system, x, p, replace(options, max_steps=min(_SHORT, options.max_steps)))
+        short = first.run()
+        if short.status is not Status.TOO_MANY_STEPS or options.max_steps <= _SHORT:
+            return short
+    if compiled:
+        arrays = simulate_arrays(system, x, p, options)
+        if arrays is not None:
+            return trajectory(system, p, options, arrays)
     return Driver(system, x, p, options).run()

@@ -121,8 +121,9 @@ class Stepper:
         Returns ``(order + 1, 0.0)`` if there is none.
         """
         speed = np.abs(e.states).max(axis=0)
+        steepness = float(e.gradient[row].sum())  # infinite at a power law's zero
         for k in range(known_zeros, e.guards.shape[1]):
-            noise = e.scales[row] if k == 0 else e.gradient[row].sum() * speed[k] * (k + 1)
+            noise = e.scales[row] if k == 0 else steepness * float(speed[k]) * (k + 1)
             if abs(e.guards[row, k]) > 64 * EPSILON * noise:
                 return k, float(e.guards[row, k])
         return e.guards.shape[1], 0.0

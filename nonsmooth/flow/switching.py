@@ -16,6 +16,7 @@ from itertools import product
 import numpy as np
 
 from ..model import Array, Intersection, motion
+from . import messages
 from .status import Status
 from .stepper import Expansion, Stepper
 
@@ -72,7 +73,7 @@ def decide(
     """
     singular = _two_folds(stepper, x, mode, active)
     if singular:
-        return Decision(None, Status.NON_UNIQUE, _two_fold_message(singular[0]))
+        return Decision(None, Status.NON_UNIQUE, messages.two_fold(singular[0]))
     found = [
         c for m in _candidates(mode, active) for c in _continuations(stepper, x, m, active, known)
     ]
@@ -82,18 +83,13 @@ def decide(
     if len(strict) == 1 or (not strict and len(found) == 1):
         return Decision((strict or found)[0])
     if len(strict) > 1:
-        return Decision(None, Status.NON_UNIQUE, _ambiguity(strict, active))
+        return Decision(None, Status.NON_UNIQUE, messages.ambiguous([c.mode for c in strict]))
     resting = [c for c in found if "s" in c.mode]
     if resting:
         return Decision(resting[0])
     if len(active) > 1:
-        surfaces = " and ".join(f"h{i}" for i in active)
-        return Decision(
-            None, Status.INTERSECTION, f"No mode leaves or slides stably along {surfaces} = 0."
-        )
-    return Decision(
-        None, Status.NON_UNIQUE, "No mode continues from here to rounding: a degenerate tangency."
-    )
+        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+    return Decision(None, Status.NON_UNIQUE, messages.degenerate())
 
 
 def _candidates(mode: str, active: Sequence[int]) -> Iterable[str]:
@@ -182,17 +178,3 @@ def is_two_fold(stepper: Stepper, e: Expansion, surface: int, tolerance: float =
         abs(e.guards[row, 0]) <= (tolerance + 2e-14) * e.scales[row] and e.scales[row] > 0
         for row in rows
     )
-
-
-def _two_fold_message(surface: int) -> str:
-    return (
-        f"Both fields are tangent to h{surface} = 0: a two-fold, where the sliding field is 0/0 "
-        "and the future is not decided by Filippov's convention."
-    )
-
-
-def _ambiguity(found: Sequence[Continuation], active: Sequence[int]) -> str:
-    modes = ", ".join(repr(c.mode) for c in found)
-    surfaces = " and ".join(f"h{i}" for i in active)
-    where = "repelling sliding or a fold of both fields" if len(active) == 1 else "an intersection"
-    return f"On {surfaces} = 0 ({where}) the motion can continue in each of the modes {modes}."

@@ -15,8 +15,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, DefinitionError, FilippovSystem, NonsmoothError, Parameters, PointError
-from ..model import explain
+from ..model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    NonsmoothError,
+    Parameters,
+    PointError,
+    explain,
+)
 from .folds import Side
 from .lie import TOLERANCE, Numbers, Place, place
 from .newton import Root, solve
@@ -285,7 +292,7 @@ def side_index(side: str) -> int:
                 advice="An equilibrium belongs to one of the two fields.",
             )
         )
-    return SIDES.index(side)  # type: ignore[arg-type]
+    return SIDES.index(side)
 
 
 def _equilibrium(where: Place, root: Root, side: Side, distance: float) -> Equilibrium:
@@ -298,7 +305,15 @@ def _equilibrium(where: Place, root: Root, side: Side, distance: float) -> Equil
     else:
         status = "real" if (numbers.h > 0) == (side == "above") else "virtual"
     return Equilibrium(
-        x, side, status, kind, eigenvalues, numbers.h, margin, distance, root.residual,
+        x,
+        side,
+        status,
+        kind,
+        eigenvalues,
+        numbers.h,
+        margin,
+        distance,
+        root.residual,
         root.iterations,
     )
 

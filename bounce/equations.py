@@ -177,10 +177,7 @@ def free_system(blueprint: ContactModel) -> ns.FilippovSystem:
 
 @lru_cache(maxsize=64)
 def touch_down_function(blueprint: ContactModel) -> ca.Function:
-    """Return (states, parameters) -> lift-off function and its rate along the free motion.
-
-    Where the load is zero there is no friction, so the free motion decides whether it rises.
-    """
-    eq = equations(blueprint)
-    rate = free_system(blueprint).lie_derivative([""], of=eq.lift_off)
-    return eq.function([eq.lift_off, rate])
+    """Return (states, parameters) -> lift-off function, its rate and field without friction."""
+    eq, system = equations(blueprint), free_system(blueprint)
+    rate = system.lie_derivative([""], of=eq.lift_off)
+    return eq.function([eq.lift_off, rate, system.field("")])

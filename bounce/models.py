@@ -9,6 +9,8 @@ from __future__ import annotations
 from abc import abstractmethod
 from typing import Any
 
+import casadi as ca
+
 from .contact import ContactModel
 from .parameters import Names
 
@@ -120,8 +122,10 @@ class _PowerLaw(_LinearTangential):
         return self._power(s) * self._factor(s, p)
 
     def lift_off(self, s: Names, p: Names) -> Expression:
-        """The load, or what it is a positive multiple of where it has a power law's zero."""
-        return self.load(s, p) if self.convention == "net" else self._end(s, p)
+        """The load over a positive function, so that it is not small where the contact begins."""
+        if self.convention == "contact":
+            return self._end(s, p)
+        return self.load(s, p) / (self._power(s) + p.G * ca.cos(p.slope))
 
     def _normal_energy(self, s: Names, p: Names) -> Expression:
         return 2 / 5 * p.stiffness * (-s.y) ** 2.5

@@ -23,7 +23,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.optimize import brentq
 
 from ..model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
 from .equilibria import equilibrium_distance, jacobians, require_linear, side_index, tangent_basis
@@ -288,6 +287,8 @@ def fold_orbit_landing(rho: float, omega: float) -> float:
 
     def miss(u: float) -> float:  # divided by exp(q u), which overflows for a strong focus
         return math.cos(u) - q * math.sin(u) - math.exp(-q * u)
+
+    from scipy.optimize import brentq
 
     root = brentq(miss, math.pi, 2 * math.pi, xtol=4e-16, rtol=1e-15)
     return math.exp(min(q * root, 700.0)) * (rho * q + omega) * math.sin(root)

@@ -39,9 +39,14 @@ from .flow import (
 )
 from .local import (
     Boundary,
+    BoundaryEquilibrium,
     Classification,
+    Equilibrium,
     Fold,
+    FoldFold,
+    LocalObject,
     NormalForm,
+    PseudoEquilibrium,
     ReducedFlow,
     Region,
     Slopes,
@@ -49,13 +54,20 @@ from .local import (
     TwoFold,
     accumulation_time,
     alpha,
+    boundary_equilibrium,
+    classify,
     classify_two_fold,
     diabolo_slopes,
+    find_all,
+    find_boundary_equilibrium,
+    find_equilibrium,
     find_fold,
+    find_pseudo_equilibrium,
     find_two_fold,
     flight_above,
     flight_below,
     fold,
+    fold_fold,
     intersection_range,
     max_flights,
     normal_form,
@@ -81,26 +93,31 @@ from .model import (
 )
 
 if TYPE_CHECKING:
-    from . import plot
+    from . import plot, textbook
 
 __version__ = "0.1.0.dev0"
 
 __all__ = [
     "Boundary",
+    "BoundaryEquilibrium",
     "Classification",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
     "Ensemble",
+    "Equilibrium",
     "Event",
     "FilippovSystem",
     "Fold",
+    "FoldFold",
+    "LocalObject",
     "NonsmoothError",
     "NormalForm",
     "NotSmoothError",
     "OptionError",
     "ParameterError",
     "PointError",
+    "PseudoEquilibrium",
     "ReducedFlow",
     "Region",
     "Reset",
@@ -113,16 +130,23 @@ __all__ = [
     "TwoFold",
     "accumulation_time",
     "alpha",
+    "boundary_equilibrium",
+    "classify",
     "classify_two_fold",
     "diabolo_slopes",
     "ensemble",
+    "find_all",
+    "find_boundary_equilibrium",
+    "find_equilibrium",
     "find_fold",
+    "find_pseudo_equilibrium",
     "find_two_fold",
     "first_crossing",
     "first_root",
     "flight_above",
     "flight_below",
     "fold",
+    "fold_fold",
     "follow",
     "intersection_range",
     "max_flights",
@@ -133,13 +157,14 @@ __all__ = [
     "return_matrix",
     "simulate",
     "sliding_field",
+    "textbook",
     "trace_two_folds",
     "two_fold",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    """Load the pictures only when they are asked for (matplotlib is slow to import)."""
-    if name == "plot":
-        return importlib.import_module(".plot", __name__)
+    """Load pictures and textbook only when they are asked for (matplotlib is slow to import)."""
+    if name in ("plot", "textbook"):
+        return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")

@@ -136,7 +136,9 @@ class Driver:
         """Leave a point where only low derivatives exist; guards are looked at after the step."""
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
         if h == 0.0:
-            return self._end(Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x))
+            return self._end(
+                Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x.tolist())
+            )
         drops = self.drops
         self._advance(e, coefficients, h)
         self.drops = {row: k for row, k in drops.items() if k > e.guards.shape[1]}

@@ -161,7 +161,9 @@ class _Follower:
                 return Status.TOO_MANY_STEPS, messages.too_many("steps", self.options.max_steps)
             e = self._expand()
             if not np.all(np.isfinite(e.states)):
-                return Status.NOT_FINITE, messages.field_not_finite(self.motion.mode, self.x)
+                return Status.NOT_FINITE, messages.field_not_finite(
+                    self.motion.mode, self.x.tolist()
+                )
             h = min(self.stepper.step_size(e), self.options.max_step)
             if h <= 1e-15 * max(1.0, abs(self.t)) and h < left:
                 return Status.STEP_TOO_SMALL, messages.step_too_small(h)

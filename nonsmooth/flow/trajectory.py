@@ -80,7 +80,7 @@ class Trajectory:
     message: str
     accumulation_time: float | None = None
     _starts: Array = field(default_factory=lambda: np.zeros(0))
-    _coefficients: Sequence[Array] = ()
+    _coefficients: Sequence[Array] | Array = ()
 
     @property
     def itinerary(self) -> str:

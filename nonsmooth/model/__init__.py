@@ -12,6 +12,7 @@ from .errors import (
     explain,
 )
 from .motion import Evaluator, Followed, Guard, Intersection, Motion, Resets, Surfaces, motion
+from .regularise import regularise
 from .system import Array, FilippovSystem, Parameters, Reset, Stop
 
 __all__ = [
@@ -37,4 +38,5 @@ __all__ = [
     "Surfaces",
     "explain",
     "motion",
+    "regularise",
 ]

@@ -21,6 +21,17 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
+from .algebraic import (
+    TURFS,
+    CrossBounce,
+    PennerBounce,
+    PublishedFit,
+    Rebound,
+    TiltedBounce,
+    penner_restitution,
+    penner_tilt,
+    rebound,
+)
 from .contact import ContactModel
 from .errors import LandingError, LiftOffError, ModelError, UnknownNameError
 from .friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
@@ -46,11 +57,13 @@ __all__ = [
     "BASKETBALL",
     "GOLF",
     "TENNIS",
+    "TURFS",
     "Ball",
     "Condition",
     "Conditions",
     "ContactModel",
     "Coulomb",
+    "CrossBounce",
     "Dahl",
     "DepthDampedKelvinVoigt",
     "ExponentialDecay",
@@ -68,18 +81,25 @@ __all__ = [
     "Maxwell",
     "ModelError",
     "NormalKelvinVoigt",
+    "PennerBounce",
     "Phase",
+    "PublishedFit",
+    "Rebound",
     "RigidBounce",
     "RigidShot",
     "Scaling",
     "Shot",
     "State",
     "Stribeck",
+    "TiltedBounce",
     "Tsuji",
     "UnknownNameError",
     "Viscous",
     "kelvin_voigt_restitution",
+    "penner_restitution",
+    "penner_tilt",
     "plot",
+    "rebound",
     "simulate",
 ]
 

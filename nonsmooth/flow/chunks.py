@@ -142,6 +142,8 @@ def _compact(chunk: Chunk) -> Chunk:
     words = sorted(set(named))
     number = {word: k for k, word in enumerate(words)}
     table: NDArray[np.int32] = np.array([number[w] for w in named], np.int32)
-    chunk.itinerary = table[codes.reshape(chunk.itinerary.shape)] if len(chunk.t) else chunk.itinerary
+    chunk.itinerary = (
+        table[codes.reshape(chunk.itinerary.shape)] if len(chunk.t) else chunk.itinerary
+    )
     chunk.words = words
     return chunk

@@ -72,9 +72,8 @@ class Ensemble:
         return (self.status == Status.REACHED_END) | (self.status == Status.STOPPED)
 
     def __repr__(self) -> str:
-        counts = ", ".join(
-            f"{Status(int(s))} {k}" for s, k in zip(*np.unique(self.status, return_counts=True))
-        )
+        found, number = np.unique(self.status, return_counts=True)
+        counts = ", ".join(f"{Status(int(s))} {k}" for s, k in zip(found, number, strict=True))
         return (
             f"Ensemble(shape {self.t.shape}, {self.x.shape[-1]} states, "
             f"{len(self.itineraries)} itineraries; {counts})"
@@ -213,9 +212,7 @@ class _Starts:
         arrays = {str(k): _numbers(v, f"parameter {k}") for k, v in (parameters or {}).items()}
         sample = {k: _sample(v) for k, v in arrays.items()}
         self.p = system.parameter_vector(sample)
-        self.varied = {
-            system.parameter_names.index(k): v for k, v in arrays.items() if v.ndim > 0
-        }
+        self.varied = {system.parameter_names.index(k): v for k, v in arrays.items() if v.ndim > 0}
         shapes = [self.x0.shape[:-1], *[v.shape for v in self.varied.values()]]
         try:
             self.shape = np.broadcast_shapes(*shapes)

@@ -91,7 +91,8 @@ def _side_fields(system: FilippovSystem, lam: ca.SX) -> list[ca.SX]:
 
 def _different(a: ca.SX, b: ca.SX) -> int:
     """Rows that would need a choice at every order."""
-    return sum(not ca.is_equal(u, v, 5) for u, v in zip(ca.vertsplit(a), ca.vertsplit(b)))
+    pairs = zip(ca.vertsplit(a), ca.vertsplit(b), strict=True)
+    return sum(not ca.is_equal(u, v, 5) for u, v in pairs)
 
 
 def _choose(rows: list[Coefficient], slides: ca.SX, above: ca.SX) -> Coefficient:

@@ -115,7 +115,7 @@ class _Graph:
         self.moving, self.constant = [], []
         for node in nodes:
             if node.op == "input":
-                self.moving.append(node.payload[0] != 1)  # type: ignore[index]
+                self.moving.append(_place(node)[0] != 1)
                 self.constant.append(False)
             else:
                 self.moving.append(any(self.moving[a] for a in node.args))
@@ -178,20 +178,20 @@ class _Graph:
         return total
 
     def _reciprocal(self, j: int) -> str:
-        if self.constant[j] and self.nodes[j].payload:
-            return _literal(1.0 / self.nodes[j].payload)  # type: ignore[operator]
         if self.constant[j]:
-            return "INFINITY"
+            value = _value(self.nodes[j])
+            return _literal(1.0 / value) if value else "INFINITY"
         return f"q[{self.inverted[j]}]" if j in self.inverted else f"r{j}"
 
     def name(self, j: int) -> str:
+        """C of a node's value."""
         node = self.nodes[j]
         if node.op == "const":
-            return _literal(node.payload)  # type: ignore[arg-type]
+            return _literal(_value(node))
         if j in self.prepared:
             return f"q[{self.prepared[j]}]"
         if node.op == "input":
-            vector, position = node.payload  # type: ignore[misc]
+            vector, position = _place(node)
             return f"x[{position}]" if vector == 0 else f"e{position}"
         return f"v{j}"
 
@@ -203,10 +203,10 @@ class _Graph:
             if node.op == "const":
                 continue
             if node.op == "input":
-                value = f"p[{node.payload[1]}]"  # type: ignore[index]
+                value = f"p[{_place(node)[1]}]"
             else:
                 args = [
-                    _literal(self.nodes[a].payload) if self.constant[a] else f"v{a}"  # type: ignore[arg-type]
+                    _literal(_value(self.nodes[a])) if self.constant[a] else f"v{a}"
                     for a in node.args
                 ]
                 value = _scalar(node.op, args)
@@ -305,6 +305,18 @@ class _Graph:
 
     def _broadcast(self, j: int) -> str:
         return f"BC({self.name(j)})" if self.constant[j] else self.name(j)
+
+
+def _place(node: Node) -> tuple[int, int]:
+    """Vector and position of an input."""
+    assert isinstance(node.payload, tuple)
+    return node.payload
+
+
+def _value(node: Node) -> float:
+    """Value of a constant."""
+    assert isinstance(node.payload, float)
+    return node.payload
 
 
 def _literal(value: float) -> str:

@@ -322,12 +322,12 @@ def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
     library.tree_size.argtypes = [_POINTER]
     library.tree_read.argtypes = [_POINTER] * 3
     library.tree_free.argtypes = [_POINTER]
-    many = [_I64, *[_POINTER] * 3, _I64, *[_POINTER] * 11]
+    many: list[Any] = [_I64, *[_POINTER] * 3, _I64, *[_POINTER] * 11]
     if hasattr(library, "run_lanes"):
         library.run_lanes.argtypes = many
         return library
     library.run_size.restype = _I64
-    library.run_begin.argtypes = [_POINTER] * 6 + [_D]
+    library.run_begin.argtypes = [*[_POINTER] * 6, _D]
     library.run_continue.argtypes = [_POINTER]
     library.run_read.argtypes = [_POINTER] * 3
     library.run_rewind.argtypes = [_POINTER]

@@ -499,7 +499,8 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
   I steep = slope < -1e-10 * MAX(scale[0], scale[1]);
-  I attracts = (up & (I)(value[1] > 64 * EPS * scale[1])) | (down & (I)(value[0] < -64 * EPS * scale[0]));
+  double clear = CANCELLED ? 64 * EPS : 2 * (w->o->rtol + 2e-14); /* not an exit at a two-fold */
+  I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);
   I was_above = s->above;
   unclear |= decide(s, met, value, scale);
@@ -519,11 +520,11 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   return unclear;
 }
 
-/* Sliding towards a two-fold where the sliding field is 0/0. */
+/* Lanes that slide towards a two-fold where the sliding field is 0/0. */
 INLINE I near_two_fold(const Lanes *s, double tolerance) {
   T value[2], scale[2];
   lie(s, value, scale);
-  return s->slides & (ABS(value[0]) <= 2 * (tolerance + 2e-14) * scale[0])
+  return (ABS(value[0]) <= 2 * (tolerance + 2e-14) * scale[0])
          & (ABS(value[1]) <= 2 * (tolerance + 2e-14) * scale[1]);
 }
 #endif
@@ -563,8 +564,9 @@ static void step(Lanes *s, Work *w) {
   up = live & was_sliding & (slot == 1);
   down = live & (slot == 2);
   if (any(met | (live & was_sliding))) project(s, met | was_sliding);
+  I on = live & was_sliding & (slot == 0) & ~last;
+  if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, o->rtol);
   if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, slope);
-  else if (!CANCELLED && any(live & was_sliding)) unclear |= near_two_fold(s, o->rtol);
 #endif
 #if STOPS > 0
   stopped = live & (slot > FIRST_STOP);

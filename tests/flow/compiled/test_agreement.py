@@ -70,9 +70,7 @@ def polynomial(draw, n, size):
     constant = draw(number)
     linear = draw(st.lists(number, min_size=n, max_size=n))
     pairs = draw(
-        st.lists(
-            st.tuples(st.integers(0, n - 1), st.integers(0, n - 1), number), max_size=size
-        )
+        st.lists(st.tuples(st.integers(0, n - 1), st.integers(0, n - 1), number), max_size=size)
     )
     return constant, linear, pairs
 
@@ -103,17 +101,40 @@ def polynomial_systems(draw):
 @given(polynomial_systems())
 def test_polynomial_systems(made):
     system, start = made
-    agree(system, start, Options(t_end=2.0, max_steps=2000), tolerance=1e-9)
+    # A loose tolerance means a low order: less to compile, and the engines agree all the same.
+    options = Options(t_end=2.0, max_steps=2000, rtol=1e-5, atol=1e-5)
+    agree(system, start, options, tolerance=1e-9)
 
 
 def test_every_operation():
     x, y, p, t = (ca.SX.sym(s) for s in ("x", "y", "p", "t"))
     f = (
-        ca.sin(x) + ca.cos(y) - ca.tan(x / 3) + ca.exp(-y * y) + ca.log(2 + x * x) + ca.sqrt(2 + y)
-        + ca.sinh(x / 4) - ca.cosh(y / 4) + ca.tanh(x) + ca.asin(x / 9) + ca.acos(y / 9)
-        + ca.atan(x) + ca.asinh(y) + ca.acosh(4 + x) + ca.atanh(y / 9) + ca.atan2(y, 3 + x)
-        + ca.erf(x) + (2 + x) ** 1.3 + (3 + x) ** (y / 5) + x**3 + (3 + y) ** -2 + ca.expm1(x / 5)
-        + ca.log1p(x * x) + ca.hypot(x, 1 + y * y) + ca.fabs(p) + ca.erfinv(x / 20)
+        ca.sin(x)
+        + ca.cos(y)
+        - ca.tan(x / 3)
+        + ca.exp(-y * y)
+        + ca.log(2 + x * x)
+        + ca.sqrt(2 + y)
+        + ca.sinh(x / 4)
+        - ca.cosh(y / 4)
+        + ca.tanh(x)
+        + ca.asin(x / 9)
+        + ca.acos(y / 9)
+        + ca.atan(x)
+        + ca.asinh(y)
+        + ca.acosh(4 + x)
+        + ca.atanh(y / 9)
+        + ca.atan2(y, 3 + x)
+        + ca.erf(x)
+        + (2 + x) ** 1.3
+        + (3 + x) ** (y / 5)
+        + x**3
+        + (3 + y) ** -2
+        + ca.expm1(x / 5)
+        + ca.log1p(x * x)
+        + ca.hypot(x, 1 + y * y)
+        + ca.fabs(p)
+        + ca.erfinv(x / 20)
     )
     system = FilippovSystem(
         [x, y],
@@ -123,8 +144,10 @@ def test_every_operation():
         parameters={p: 0.7},
         time=t,
     )
-    assert agree(system, [0.4, 0.9], Options(t_end=3.0)) is not None
-    assert agree(system, [0.4, 0.9], Options(t_end=4.0, t_start=1.0), {"p": 1.5}) is not None
+    loose = {"rtol": 1e-5, "atol": 1e-5}
+    assert agree(system, [0.4, 0.9], Options(t_end=3.0, **loose)) is not None
+    options = Options(t_end=4.0, t_start=1.0, **loose)
+    assert agree(system, [0.4, 0.9], options, {"p": 1.5}) is not None
 
 
 def test_resets_and_stops():

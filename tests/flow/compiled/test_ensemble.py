@@ -122,7 +122,9 @@ def test_process_pool_gives_the_same_bits(system, starts):
     here = ensemble(system, starts, 5.0, chunk=50)
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as pool:
-        same(here, ensemble(pickle.loads(pickle.dumps(system)), starts, 5.0, chunk=50, executor=pool))
+        same(
+            here, ensemble(pickle.loads(pickle.dumps(system)), starts, 5.0, chunk=50, executor=pool)
+        )
 
 
 @needs_compiler

@@ -82,11 +82,13 @@ def _first_in(c: list[float], b: list[float], low: float, high: float) -> float 
     while pending:
         b, low, high, depth = pending.pop()
         if b[0] <= 0.0:
-            return low
+            return _polish(c, low, high)
         changes = sum((u > 0.0) != (v > 0.0) for u, v in pairwise(b))
         if changes == 0:
             continue
         if changes == 1:
+            if _horner(c, low)[0] <= 0.0:
+                return _polish(c, low, high)
             return _newton(c, low, high, low + (high - low) * _crossing(b))
         if depth == _MAX_DEPTH:
             if b[-1] <= 0.0:
@@ -116,13 +118,33 @@ def _halve(b: list[float]) -> tuple[list[float], list[float]]:
     return left, right[::-1]
 
 
+def _polish(c: list[float], x: float, h: float) -> float:
+    """Newton's steps near a root that rounding in Bernstein form has put a little late."""
+    value, slope = _horner(c, x)
+    for _ in range(4):
+        new = x - value / slope if slope else math.nan
+        if not 0.0 <= new <= h:
+            break
+        new_value, slope = _horner(c, new)
+        if abs(new_value) >= abs(value):
+            break
+        x, value = new, new_value
+    return x
+
+
+def _horner(c: list[float], x: float) -> tuple[float, float]:
+    """Value and slope of a polynomial."""
+    value, slope = c[-1], 0.0
+    for v in reversed(c[:-1]):
+        slope = slope * x + value
+        value = value * x + v
+    return value, slope
+
+
 def _newton(c: list[float], low: float, high: float, x: float) -> float:
     """Root in (low, high], positive at low; Newton with bisection where it leaves the bracket."""
     for _ in range(100):
-        value, slope = c[-1], 0.0
-        for v in reversed(c[:-1]):
-            slope = slope * x + value
-            value = value * x + v
+        value, slope = _horner(c, x)
         if value > 0.0:
             low = x
         else:

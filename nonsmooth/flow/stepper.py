@@ -185,9 +185,13 @@ class Stepper:
         h = min(h_max, 1e-3)
         while h > 1e-15:
             end = self.advance(kept, h)
-            slope = self.expand(e.mode, end).states[:, 1]
+            there = self.expand(e.mode, end)
+            slope = there.states[:, 1]
             defect = np.abs(slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * _powers(h, c)))
-            if np.all(np.isfinite(slope)) and np.all(defect * h <= allowed):
+            # Guards are not located within this step: none may fall in it.
+            crossed = np.sign(there.guards[:, 0]) * np.sign(e.guards[:, 0]) < 0
+            fits = np.all(np.isfinite(slope)) and np.all(defect * h <= allowed)
+            if fits and not np.any(crossed):
                 return c, h
             h *= 0.25
         return c, 0.0

@@ -68,6 +68,14 @@ def return_matrix(nu: Nu) -> Array:
 
     Determinant 1, trace 4 nu1 nu2 - 2.
 
+    Parameters
+    ----------
+    nu : (float, float)
+
+    Returns
+    -------
+    ndarray (2, 2)
+
     Examples
     --------
     >>> return_matrix((-2.0, -1.0))
@@ -84,6 +92,17 @@ def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
     Both folds invisible: 1 if nu1, nu2 >= 0; 2 if one of them is negative; if both are,
     ceil(pi/arccos sqrt(nu1 nu2)) - 1 for nu1 nu2 < 1 and no bound (``inf``) for nu1 nu2 >= 1. One
     fold invisible: 1. None: 0.
+
+    Parameters
+    ----------
+    sigma : (int, int)
+        Signs of the two folds.
+    nu : (float, float)
+
+    Returns
+    -------
+    float
+        A whole number, or inf.
 
     Examples
     --------
@@ -107,6 +126,15 @@ def diabolo_slopes(nu: Nu) -> tuple[float, float]:
 
     For an invisible two-fold with nu1, nu2 < 0 and nu1 nu2 > 1: (r_-, r_+) with
     r_-+ = |nu1| (1 -+ sqrt(1 - 1/(nu1 nu2))). On r_- flights grow; on r_+ they shrink to s.
+
+    Parameters
+    ----------
+    nu : (float, float)
+
+    Returns
+    -------
+    (float, float)
+        (r_-, r_+).
 
     Raises
     ------
@@ -138,6 +166,10 @@ def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
     phi : float, optional
         Time scale of the two-fold for real time; 1 gives normal-form time. The time is
         proportional to |z2| of the start.
+
+    Returns
+    -------
+    float
 
     Raises
     ------

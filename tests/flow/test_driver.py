@@ -235,6 +235,13 @@ def test_a_power_law_starts_at_its_singular_point():
     assert run.x[-1, 0] == pytest.approx(1.25**0.4, abs=1e-10)
 
 
+def test_a_stop_inside_the_singular_step_is_not_skipped():
+    """y' = -1 from 0 stops where (-y)^(3/2) = 1e-9, at t = 1e-6, within the first short step."""
+    stop = ns.Stop((-y) ** 1.5 - 1e-9, 1, "depth")
+    run = ns.simulate(ns.FilippovSystem([y], field=[-1], stops=[stop]), [0.0], 1.0)
+    assert run.status is ns.Status.STOPPED and run.t[-1] == pytest.approx(1e-6, rel=1e-9)
+
+
 def test_limits_end_the_run_with_advice():
     run = ns.simulate(relay(), [30.0, 0.0], 1e3, max_events=3)
     assert run.status is ns.Status.TOO_MANY_EVENTS and "max_events" in run.message

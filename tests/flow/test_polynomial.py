@@ -57,6 +57,16 @@ def test_a_touch_is_no_root(centre, scale):
     assert first_root([scale * centre**2, -2 * scale * centre, scale], 1.0) is None
 
 
+def test_a_root_found_late_by_rounding_is_polished():
+    """Two shallow dips seen over a long interval: the first root is accurate to its condition."""
+    a, d = 2.137940228912001, 1e-9
+    one = np.array([a * a - d, -2 * a, 1.0])
+    b = a + 1
+    two = np.array([b * b - d, -2 * b, 1.0])
+    found = first_root(np.convolve(one, two).tolist(), 10.0)
+    assert found == pytest.approx(a - np.sqrt(d), abs=2e-9)
+
+
 def test_the_end_of_the_interval_belongs_to_it():
     """To rounding: a root at the very end is found in this step or at the start of the next."""
     assert first_root([1.0, -1.0], 1.0 + 1e-14) == pytest.approx(1.0, abs=1e-15)

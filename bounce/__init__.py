@@ -33,6 +33,13 @@ from .algebraic import (
     rebound,
 )
 from .contact import ContactModel
+from .dividing import (
+    DividingCurve,
+    DividingSurface,
+    critical_eta,
+    dividing_curve,
+    dividing_surface,
+)
 from .errors import LandingError, LiftOffError, ModelError, UnknownNameError
 from .friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
 from .generalised import Condition, Conditions, GeneralisedContact
@@ -47,6 +54,7 @@ from .models import (
 )
 from .rigid import NormalKelvinVoigt, RigidBounce, RigidShot, kelvin_voigt_restitution
 from .shot import Forces, Phase, Shot, State, simulate
+from .tracing import Arc
 from .units import BALLS, BASKETBALL, GOLF, TENNIS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
@@ -58,6 +66,7 @@ __all__ = [
     "GOLF",
     "TENNIS",
     "TURFS",
+    "Arc",
     "Ball",
     "Condition",
     "Conditions",
@@ -66,6 +75,8 @@ __all__ = [
     "CrossBounce",
     "Dahl",
     "DepthDampedKelvinVoigt",
+    "DividingCurve",
+    "DividingSurface",
     "ExponentialDecay",
     "Forces",
     "FrictionLaw",
@@ -95,6 +106,9 @@ __all__ = [
     "Tsuji",
     "UnknownNameError",
     "Viscous",
+    "critical_eta",
+    "dividing_curve",
+    "dividing_surface",
     "kelvin_voigt_restitution",
     "penner_restitution",
     "penner_tilt",

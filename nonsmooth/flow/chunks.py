@@ -9,7 +9,6 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..model import Array, FilippovSystem
 from .compiled.engine import HAND_OVER, KINDS, Chunk, engine_for
@@ -137,13 +136,11 @@ def _run_reference(
 
 def _compact(chunk: Chunk) -> Chunk:
     """Keep only the words in use, sorted: equal results then have equal arrays."""
-    used, codes = np.unique(chunk.itinerary, return_inverse=True)
-    named = [chunk.words[k] for k in used]
-    words = sorted(set(named))
+    used = np.flatnonzero(np.bincount(chunk.itinerary, minlength=len(chunk.words)))
+    words = sorted({chunk.words[k] for k in used})
     number = {word: k for k, word in enumerate(words)}
-    table: NDArray[np.int32] = np.array([number[w] for w in named], np.int32)
-    chunk.itinerary = (
-        table[codes.reshape(chunk.itinerary.shape)] if len(chunk.t) else chunk.itinerary
-    )
+    table = np.array([number.get(w, 0) for w in chunk.words], np.int32)
+    if len(chunk.t):
+        chunk.itinerary = table[chunk.itinerary]
     chunk.words = words
     return chunk

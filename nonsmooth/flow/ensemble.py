@@ -225,16 +225,23 @@ class _Starts:
     def part(self, first: int, last: int) -> tuple[Array, Array]:
         """Extended starts and parameters of the trajectories first to last - 1."""
         n = self.system.dimension
-        where = np.unravel_index(np.arange(first, last), self.shape) if self.shape else ()
         x = np.empty((last - first, self.system.extended_dimension))
-        x[:, :n] = np.broadcast_to(self.x0, (*self.shape, n))[where]
+        x[:, :n] = _rows(self.x0, self.shape, first, last, n)
         x[:, n:] = self.t_start
         if not self.varied:
             return x, self.p
         p = np.tile(self.p, (last - first, 1))
         for column, values in self.varied.items():
-            p[:, column] = np.broadcast_to(values, self.shape)[where]
+            p[:, column] = _rows(values[..., None], self.shape, first, last, 1)[:, 0]
         return x, p
+
+
+def _rows(values: Array, shape: tuple[int, ...], first: int, last: int, n: int) -> Array:
+    """Rows first to last - 1 of values broadcast to ``(*shape, n)``, which is never made."""
+    if values.shape == (*shape, n):
+        return values.reshape(-1, n)[first:last]
+    where = np.unravel_index(np.arange(first, last), shape) if shape else ()
+    return np.broadcast_to(values, (*shape, n))[where]
 
 
 def _numbers(value: ArrayLike, what: str) -> Array:
@@ -304,7 +311,7 @@ class _Results:
         self.x, self.t = np.empty((count, n)), np.empty(count)
         self.status = np.empty(count, np.int8)
         self.code = np.empty(count, np.int32)
-        self.kinds = np.empty((len(KINDS), count), np.int32)
+        self.kinds = np.empty((count, len(KINDS)), np.int32)
         self.at_x = np.empty((count, n)) if at else None
         self.at_t = np.empty(count) if at else None
         self._words: dict[str, int] = {}
@@ -313,7 +320,7 @@ class _Results:
         """Store a chunk that begins with trajectory ``first``."""
         part = slice(first, first + len(chunk.t))
         self.x[part], self.t[part], self.status[part] = chunk.x, chunk.t, chunk.status
-        self.kinds[:, part] = chunk.kinds.T
+        self.kinds[part] = chunk.kinds
         numbers = [self._words.setdefault(w, len(self._words)) for w in chunk.words]
         self.code[part] = np.array(numbers, np.int32)[chunk.itinerary]
         if self.at_x is not None and self.at_t is not None:
@@ -332,7 +339,7 @@ class _Results:
             status=self.status.reshape(shape),
             itineraries=tuple(words),
             itinerary_code=order[self.code].reshape(shape),
-            events={kind: self.kinds[k].reshape(shape) for k, kind in enumerate(KINDS)},
+            events={kind: self.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
             event_x=None if self.at_x is None else self.at_x.reshape(*shape, self.x.shape[1]),
             event_t=None if self.at_t is None else self.at_t.reshape(shape),
         )

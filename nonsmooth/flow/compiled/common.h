@@ -43,12 +43,32 @@ static double ns_erfinv(double y) {
 
 /* First root ------------------------------------------------------------------------------- */
 
+static double horner(const double *c, int n, double x, double *slope) {
+  double f = c[n], d = 0;
+  for (int k = n - 1; k >= 0; k--) { d = d * x + f; f = f * x + c[k]; }
+  *slope = d;
+  return f;
+}
+
+/* Newton's steps near a root that rounding in Bernstein form has put a little late. */
+static double polish(const double *c, int n, double x, double h) {
+  double d, f = horner(c, n, x, &d);
+  for (int it = 0; it < 4 && d != 0; it++) {
+    double next = x - f / d, fn;
+    if (!(next >= 0 && next <= h)) break;
+    fn = horner(c, n, next, &d);
+    if (fabs(fn) >= fabs(f)) break;
+    x = next;
+    f = fn;
+  }
+  return x;
+}
+
 /* Root in (lo, hi], positive at lo; |step| is tested before the bracket, because at a root near an
  * end the iterate may leave it by rounding. */
 static double newton(const double *c, int n, double lo, double hi, double x) {
   for (int it = 0; it < 100; it++) {
-    double f = c[n], d = 0;
-    for (int k = n - 1; k >= 0; k--) { d = d * x + f; f = f * x + c[k]; }
+    double d, f = horner(c, n, x, &d);
     if (f > 0) lo = x; else hi = x;
     double step = d != 0 ? f / d : INFINITY, next = x - step;
     if (fabs(step) <= 4e-16 * fmax(fabs(x), hi)) return next < lo ? lo : next > hi ? hi : next;
@@ -71,13 +91,15 @@ static void bernstein(double *b, int n) {
 
 /* First root on (lo, hi] given Bernstein coefficients there; -1 if none. */
 static double first_in(const double *c, int n, double *b, double lo, double hi, int depth) {
-  if (b[0] <= 0) return lo;
+  if (b[0] <= 0) return polish(c, n, lo, hi);
   int changes = 0, first = -1;
   for (int j = 0; j < n; j++) {
     if ((b[j] > 0) != (b[j + 1] > 0)) { if (first < 0) first = j; changes++; }
   }
   if (changes == 0) return -1;
   if (changes == 1) {
+    double d;
+    if (horner(c, n, lo, &d) <= 0) return polish(c, n, lo, hi);
     double s = (first + b[first] / (b[first] - b[first + 1])) / n;
     return newton(c, n, lo, hi, lo + (hi - lo) * s);
   }

@@ -51,7 +51,7 @@ static double horner(const double *c, int n, double x, double *slope) {
 }
 
 /* Newton's steps near a root that rounding in Bernstein form has put a little late. */
-static double polish(const double *c, int n, double x, double h) {
+static double polish_late(const double *c, int n, double x, double h) {
   double d, f = horner(c, n, x, &d);
   for (int it = 0; it < 4 && d != 0; it++) {
     double next = x - f / d, fn;
@@ -91,7 +91,7 @@ static void bernstein(double *b, int n) {
 
 /* First root on (lo, hi] given Bernstein coefficients there; -1 if none. */
 static double first_in(const double *c, int n, double *b, double lo, double hi, int depth) {
-  if (b[0] <= 0) return polish(c, n, lo, hi);
+  if (b[0] <= 0) return polish_late(c, n, lo, hi);
   int changes = 0, first = -1;
   for (int j = 0; j < n; j++) {
     if ((b[j] > 0) != (b[j + 1] > 0)) { if (first < 0) first = j; changes++; }
@@ -99,7 +99,7 @@ static double first_in(const double *c, int n, double *b, double lo, double hi, 
   if (changes == 0) return -1;
   if (changes == 1) {
     double d;
-    if (horner(c, n, lo, &d) <= 0) return polish(c, n, lo, hi);
+    if (horner(c, n, lo, &d) <= 0) return polish_late(c, n, lo, hi);
     double s = (first + b[first] / (b[first] - b[first + 1])) / n;
     return newton(c, n, lo, hi, lo + (hi - lo) * s);
   }
@@ -153,30 +153,35 @@ static inline int finite_all(const double *a, int n) {
   return s == 0;
 }
 
-/* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. */
-typedef struct { int32_t parent, child, sibling, mode; } Node;
+/* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. With
+ * few modes a node has its children by number, else a list of them. */
+#define FEW_MODES (MODES <= 4)
+typedef struct { int32_t parent, mode, child[FEW_MODES ? MODES : 1], sibling; } Node;
 typedef struct { Node *node; int32_t size, room; } Tree;
 
-static int32_t tree_child(Tree *tree, int32_t parent, int mode) {
-  int32_t at = tree->node[parent].child;
-  while (at && tree->node[at].mode != mode) at = tree->node[at].sibling;
-  if (at) return at;
+static __attribute__((noinline)) int32_t tree_grow(Tree *tree, int32_t parent, int mode) {
   if (tree->size == tree->room) {
-    tree->room *= 2;
-    Node *more = realloc(tree->node, tree->room * sizeof(Node));
-    if (!more) { tree->room /= 2; return parent; }
+    Node *more = realloc(tree->node, 2 * (size_t)tree->room * sizeof(Node));
+    if (!more) return parent;
     tree->node = more;
+    tree->room *= 2;
   }
-  at = tree->size++;
-  tree->node[at] = (Node){parent, 0, tree->node[parent].child, mode};
-  tree->node[parent].child = at;
+  int32_t at = tree->size++, *child = &tree->node[parent].child[FEW_MODES ? mode : 0];
+  tree->node[at] = (Node){.parent = parent, .mode = mode, .sibling = *child};
+  *child = at;
   return at;
+}
+
+static inline int32_t tree_child(Tree *tree, int32_t parent, int mode) {
+  int32_t at = tree->node[parent].child[FEW_MODES ? mode : 0];
+  if (!FEW_MODES) while (at && tree->node[at].mode != mode) at = tree->node[at].sibling;
+  return at ? at : tree_grow(tree, parent, mode);
 }
 
 Tree *tree_new(void) {
   Tree *tree = malloc(sizeof(Tree));
   *tree = (Tree){malloc(64 * sizeof(Node)), 1, 64};
-  tree->node[0] = (Node){-1, 0, 0, -1};
+  tree->node[0] = (Node){.parent = -1, .mode = -1};
   return tree;
 }
 int32_t tree_size(const Tree *tree) { return tree->size; }

@@ -41,6 +41,7 @@ from .dividing import (
     dividing_surface,
 )
 from .errors import LandingError, LiftOffError, ModelError, UnknownNameError
+from .flight import AIRS, QUINTAVALLA, SMITS_SMITH, Air, Flight, flight
 from .friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
 from .generalised import Condition, Conditions, GeneralisedContact
 from .models import (
@@ -61,11 +62,15 @@ if TYPE_CHECKING:
     from . import plot as plot
 
 __all__ = [
+    "AIRS",
     "BALLS",
     "BASKETBALL",
     "GOLF",
+    "QUINTAVALLA",
+    "SMITS_SMITH",
     "TENNIS",
     "TURFS",
+    "Air",
     "Arc",
     "Ball",
     "Condition",
@@ -78,6 +83,7 @@ __all__ = [
     "DividingCurve",
     "DividingSurface",
     "ExponentialDecay",
+    "Flight",
     "Forces",
     "FrictionLaw",
     "GeneralisedContact",
@@ -109,6 +115,7 @@ __all__ = [
     "critical_eta",
     "dividing_curve",
     "dividing_surface",
+    "flight",
     "kelvin_voigt_restitution",
     "penner_restitution",
     "penner_tilt",

@@ -33,7 +33,7 @@ class TiltedBounce(RigidBounce):
     """Rigid impact on a plane tilted towards the ball, as if it hit the front wall of its own dent.
 
     The plane's normal leans by ``tilt`` against the horizontal velocity, so some of the forward
-    speed becomes height. A ball that falls vertically meets no tilt: the law jumps there. A ball
+    speed becomes height. A ball that falls vertically meets no tilt, so a constant tilt jumps there. A ball
     with much backspin may leave with ydot <= 0, into the ground: the law does not exclude it.
 
     Parameters

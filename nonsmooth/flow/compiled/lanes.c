@@ -120,9 +120,9 @@ INLINE void project(Lanes *s, I which) {
   for (int iteration = 0; iteration < (CURVED ? 3 : 1); iteration++) {
     T h, g[N], size = BC(0);
     surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
-    for (int i = 0; i < ND; i++) size += g[i] * g[i];
+    UNROLL for (int i = 0; i < ND; i++) size += g[i] * g[i];
     T step = SELECT(which & (I)(h != 0), h / size, BC(0));
-    for (int i = 0; i < ND; i++) s->x[i] -= step * g[i];
+    UNROLL for (int i = 0; i < ND; i++) s->x[i] -= step * g[i];
   }
 #endif
 }
@@ -130,7 +130,7 @@ INLINE void project(Lanes *s, I which) {
 /* sum of |gradient| (1 + |x|): rounding in a function is that times epsilon. */
 INLINE T rounding_scale(const Lanes *s, const T *gradient) {
   T scale = BC(0);
-  for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (1.0 + ABS(s->x[i]));
+  UNROLL for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (1.0 + ABS(s->x[i]));
   return scale;
 }
 
@@ -198,7 +198,7 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g
     T h, surface[N];
     lie_values(s->x, s->q, s->slides, s->above, s->lambda, value, &gradient[0][0]);
     surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, surface);
-    for (int i = 0; i < N; i++) gradient[0][i] = SELECT(s->slides, gradient[0][i], surface[i]);
+    UNROLL for (int i = 0; i < N; i++) gradient[0][i] = SELECT(s->slides, gradient[0][i], surface[i]);
   }
 #endif
 #if STOPS > 0
@@ -207,10 +207,10 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g
   if (needed)
     stop_values(s->x, s->q, s->slides, s->above, s->lambda, value, &gradient[FIRST_STOP][0]);
 #endif
-  for (int j = 0; j < SLOTS; j++) {
+  UNROLL for (int j = 0; j < SLOTS; j++) {
     if (AFFINE[j]) { *sum += g[j][P] + g[j][P - 1]; continue; }
     T a = o->rtol * ABS(g[j][0]) + 1e-290;
-    for (int i = 0; i < ND; i++) a += ABS(gradient[j][i]) * allowed[i];
+    UNROLL for (int i = 0; i < ND; i++) a += ABS(gradient[j][i]) * allowed[i];
     T r = ROUGH_INVERSE(a), p = ABS(g[j][P]) * r, b = ABS(g[j][P - 1]) * r;
     I counts = M > 0 && j == 1 ? s->slides : ~(I){0};
     counts &= a > 1e-280;
@@ -222,7 +222,7 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g
 
 INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], I *finite) {
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0), allowed[N];
-  for (int i = 0; i < N; i++) {
+  UNROLL for (int i = 0; i < N; i++) {
     allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
     if (i >= ND) continue;
     T r = ROUGH_INVERSE(allowed[i]), p = ABS(c[i][P]) * r, b = ABS(c[i][P - 1]) * r;
@@ -375,7 +375,7 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
 static __attribute__((noinline)) void resolve(Guards *v) {
   for (;;) {
     I rest = ~(I){0}, mine[S1], all = {0};
-    for (int j = 0; j < SLOTS; j++) {
+    UNROLL for (int j = 0; j < SLOTS; j++) {
       mine[j] = v->hard[j] & rest;
       rest &= ~mine[j];
       all |= mine[j];
@@ -396,7 +396,7 @@ static __attribute__((noinline)) void resolve(Guards *v) {
       changes -= positive ^ next;
       positive = next;
     }
-    for (int j = 0; j < SLOTS; j++) {
+    UNROLL for (int j = 0; j < SLOTS; j++) {
       I one = mine[j] & first & (changes == 1) & ~v->wrong_way[j];
       I deep = mine[j] & ~one & ~(first & (changes == 0));
       v->one[j] |= one;
@@ -412,11 +412,11 @@ static __attribute__((noinline)) void resolve(Guards *v) {
  * slots of different lanes together, then others only if they are not clearly later. */
 INLINE void polish_guards(Guards *v, T margin) {
   I all = {0};
-  for (int j = 0; j < SLOTS; j++) all |= v->one[j];
+  UNROLL for (int j = 0; j < SLOTS; j++) all |= v->one[j];
   while (any(all)) {
     T a[P + 1], end = BC(0), guess = BC(INFINITY), d = BC(0);
     I mine[S1];
-    for (int j = 0; j < SLOTS; j++) {
+    UNROLL for (int j = 0; j < SLOTS; j++) {
       T g = v->a[j][0] / (v->a[j][0] - v->end[j]);
       mine[j] = v->one[j] & (g < guess);
       guess = SELECT(mine[j], g, guess);
@@ -431,7 +431,7 @@ INLINE void polish_guards(Guards *v, T margin) {
     }
     T s = polish(a, end, all, &d), later = s + margin;
     all = (I){0};
-    for (int j = 0; j < SLOTS; j++) {
+    UNROLL for (int j = 0; j < SLOTS; j++) {
       v->root[j] = SELECT(mine[j], s, v->root[j]);
       v->slope[j] = SELECT(mine[j], d, v->slope[j]);
       v->one[j] &= ~mine[j];
@@ -448,15 +448,15 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T h, T *dt, I *slot, T *slope
   I unclear = {0};
   power[1] = h;
   UNROLL for (int k = 2; k <= P; k++) power[k] = power[k / 2] * power[k - k / 2];
-  for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, &v, g[j], power, j);
+  UNROLL for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, &v, g[j], power, j);
   I hard = {0};
-  for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
+  UNROLL for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
   if (any(hard)) resolve(&v);
   T tie = TIE * MAX(BC(1), ABS(s->t));
   if (SLOTS > 0) polish_guards(&v, tie / h);
   T best = BC(INFINITY), second = BC(INFINITY);
   *slot = (I){0};
-  for (int j = 0; j < SLOTS; j++) {
+  UNROLL for (int j = 0; j < SLOTS; j++) {
     I first = v.root[j] < best;
     second = SELECT(first, best, MIN(second, v.root[j]));
     best = SELECT(first, v.root[j], best);
@@ -487,7 +487,7 @@ INLINE void count(Lanes *s, Work *w, int kind, I which) {
   I now = which & (s->kinds[kind] == w->o->at_count);
   for EACH(l, now) {
     w->at_t[s->index[l]] = LANE(s->t, l);
-    for (int i = 0; i < ND; i++) w->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
+    UNROLL for (int i = 0; i < ND; i++) w->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
   }
 }
 
@@ -530,7 +530,7 @@ INLINE I near_two_fold(const Lanes *s, double tolerance) {
 #endif
 
 INLINE void advance(Lanes *s, T c[N][P + 1], T dt) {
-  for (int i = 0; i < N; i++) {
+  UNROLL for (int i = 0; i < N; i++) {
     T v = c[i][P];
     UNROLL for (int k = P - 1; k >= 0; k--) v = v * dt + c[i][k];
     s->x[i] = v;

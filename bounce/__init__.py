@@ -53,7 +53,9 @@ from .models import (
     Maxwell,
     Tsuji,
 )
+from .outcomes import BounceStatus, LiftOffs, OutcomeMap, lift_off, outcome_map
 from .rigid import NormalKelvinVoigt, RigidBounce, RigidShot, kelvin_voigt_restitution
+from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
 from .shot import Forces, Phase, Shot, State, simulate
 from .tracing import Arc
 from .units import BALLS, BASKETBALL, GOLF, TENNIS, Ball, Landing, Scaling
@@ -66,6 +68,7 @@ __all__ = [
     "BALLS",
     "BASKETBALL",
     "GOLF",
+    "GREEN_ROLLING_FRICTION",
     "QUINTAVALLA",
     "SMITS_SMITH",
     "TENNIS",
@@ -73,6 +76,8 @@ __all__ = [
     "Air",
     "Arc",
     "Ball",
+    "Bounce",
+    "BounceStatus",
     "Condition",
     "Conditions",
     "ContactModel",
@@ -87,6 +92,7 @@ __all__ = [
     "Forces",
     "FrictionLaw",
     "GeneralisedContact",
+    "Glide",
     "Hertz",
     "HuntCrossley",
     "KelvinVoigt",
@@ -94,16 +100,20 @@ __all__ = [
     "Landing",
     "LandingError",
     "LiftOffError",
+    "LiftOffs",
     "LuGre",
     "Maxwell",
     "ModelError",
+    "NoRestError",
     "NormalKelvinVoigt",
+    "OutcomeMap",
     "PennerBounce",
     "Phase",
     "PublishedFit",
     "Rebound",
     "RigidBounce",
     "RigidShot",
+    "Run",
     "Scaling",
     "Shot",
     "State",
@@ -117,8 +127,11 @@ __all__ = [
     "dividing_surface",
     "flight",
     "kelvin_voigt_restitution",
+    "lift_off",
+    "outcome_map",
     "penner_restitution",
     "penner_tilt",
+    "play",
     "plot",
     "rebound",
     "simulate",

@@ -28,6 +28,7 @@ from typing import TYPE_CHECKING, Any
 from .flow import (
     Ensemble,
     Event,
+    Funnel,
     Segment,
     Status,
     Trajectory,
@@ -35,6 +36,7 @@ from .flow import (
     first_crossing,
     first_root,
     follow,
+    funnel,
     simulate,
 )
 from .local import (
@@ -110,6 +112,7 @@ __all__ = [
     "FilippovSystem",
     "Fold",
     "FoldFold",
+    "Funnel",
     "LocalObject",
     "NonsmoothError",
     "NormalForm",
@@ -148,6 +151,7 @@ __all__ = [
     "fold",
     "fold_fold",
     "follow",
+    "funnel",
     "intersection_range",
     "max_flights",
     "normal_form",

@@ -26,6 +26,9 @@ KINDS = ("crossing", "entry", "exit", "stop", "reset", "end")
 HAND_OVER = -3
 _FULL = -2
 
+#: Room of the first and of the largest arrays of a dense run.
+_FIRST_STEPS, _MOST_STEPS = 256, 16384
+
 _D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
 _POINTER = ctypes.c_void_p
 
@@ -169,39 +172,38 @@ class Engine:
 
     def run(self, x: Array, p: Array, options: Options) -> Run:
         """Run one trajectory from an extended start, dense output kept."""
-        library = self.scalar
+        library, steps = self.scalar, _FIRST_STEPS
         state = ctypes.create_string_buffer(library.run_size())
-        rooms = {"step": 256, "point": 1024, "event": 512}
-        arrays = self._output_arrays(rooms)
-        output = _COutput(0, 0, 0, *rooms.values(), *[a.ctypes.data for a in arrays.values()])
         tree = library.tree_new()
-        c_options = _c_options(self.system, options, dense=True)
-        start, parameters = np.array(x, float), np.array(p, float)
+        c_options = ctypes.byref(_c_options(self.system, options, dense=True))
+        x, p = np.array(x, float), np.array(p, float)
+        arrays, output = self._output(steps)
         parts: list[dict[str, NDArray[Any]]] = []
         try:
             library.run_begin(
-                state,
-                ctypes.byref(c_options),
-                ctypes.byref(output),
-                tree,
-                _address(start),
-                _address(parameters),
-                options.t_start,
+                state, c_options, output, tree, _address(x), _address(p), options.t_start
             )
             while True:
                 status = library.run_continue(state)
                 numbers, counts = self._read(state)
                 sizes = dict(zip(("step", "point", "event"), counts[7:10], strict=True))
-                parts.append(
-                    {k: a[: sizes[_OUTPUT_ARRAYS[k][1]]].copy() for k, a in arrays.items()}
-                )
+                parts.append({k: a[: sizes[_OUTPUT_ARRAYS[k][1]]] for k, a in arrays.items()})
                 if status != _FULL:
                     break
-                library.run_rewind(state)
+                steps = min(4 * steps, _MOST_STEPS)
+                arrays, output = self._output(steps)
+                library.run_resume(state, output)
             words = _words(library, tree, self.system.modes)
         finally:
             library.tree_free(tree)
         return self._run(parts, numbers, counts, words)
+
+    def _output(self, steps: int) -> tuple[dict[str, NDArray[Any]], Any]:
+        """Arrays with room for some steps, and the C structure that points to them."""
+        rooms = {"step": steps, "point": 3 * steps, "event": 2 * steps}
+        arrays = self._output_arrays(rooms)
+        addresses = [a.ctypes.data for a in arrays.values()]
+        return arrays, ctypes.byref(_COutput(0, 0, 0, *rooms.values(), *addresses))
 
     def _output_arrays(self, rooms: dict[str, int]) -> dict[str, NDArray[Any]]:
         n = self.system.extended_dimension
@@ -330,7 +332,7 @@ def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
     library.run_begin.argtypes = [*[_POINTER] * 6, _D]
     library.run_continue.argtypes = [_POINTER]
     library.run_read.argtypes = [_POINTER] * 3
-    library.run_rewind.argtypes = [_POINTER]
+    library.run_resume.argtypes = [_POINTER] * 2
     library.run_many.argtypes = many
     return library
 

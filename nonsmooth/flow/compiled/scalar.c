@@ -314,11 +314,15 @@ static void limit_of_events(Run *r) {
 
 typedef struct { int mode, strict, drop[NG1]; } Continuation;
 
-static int is_two_fold(const Expansion *e, int surface, double tolerance) {
-  for (int j = 0; j < GUARDS[e->mode]; j++) {
-    const int *guard = GUARD[e->mode][j];
-    if (guard[0] != EXIT_GUARD || guard[1] != surface) continue;
-    if (!(fabs(e->guards[j][0]) <= (tolerance + 2e-14) * e->scale[j] && e->scale[j] > 0)) return 0;
+/* Both fields tangent to the surface that slides in a mode, at the present point. */
+static int is_two_fold(const Run *r, int mode, double tolerance) {
+  double value[NG1], gradient[NG1][N];
+  guard_values(mode, r->x, r->q, value, &gradient[0][0]);
+  for (int j = 0; j < GUARDS[mode]; j++) {
+    if (GUARD[mode][j][0] != EXIT_GUARD) continue;
+    double scale = 0;
+    for (int i = 0; i < N; i++) scale += fabs(gradient[j][i]) * (1 + fabs(r->x[i]));
+    if (!(fabs(value[j]) <= (tolerance + 2e-14) * scale && scale > 0)) return 0;
   }
   return 1;
 }
@@ -387,9 +391,7 @@ static int meets_two_fold(Run *r, int mode, unsigned active) {
   int sliding = mode_code(letters);
   if (sliding < 0) return 0;
   if (CANCELLED[sliding]) return 0;
-  Expansion e;
-  expand(r, sliding, &e);
-  if (!is_two_fold(&e, i, 0)) return 0;
+  if (!is_two_fold(r, sliding, 0)) return 0;
   finish(r, NON_UNIQUE, TWO_FOLD, i);
   return 1;
 }
@@ -560,9 +562,7 @@ static void reset(Run *r, int index, int guard) {
 static void watch_two_fold(Run *r) {
   int s = sliding_surface(r->mode);
   if (s < 0 || CANCELLED[r->mode]) return;
-  Expansion e;
-  expand(r, r->mode, &e);
-  if (is_two_fold(&e, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+  if (is_two_fold(r, r->mode, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
 }
 
 static void serve(Run *r, int row) {
@@ -676,7 +676,8 @@ void run_read(const Run *r, double *numbers, int64_t *counts) {
   memcpy(counts + 10, r->kinds, sizeof r->kinds);
 }
 
-void run_rewind(Run *r) { r->out.steps = r->out.points = r->out.events = 0; }
+/* Go on with other, empty arrays. */
+void run_resume(Run *r, const Output *out) { r->out = *out; }
 
 /* Trajectories start, start+1, ... of arrays, or those listed in ``which``. */
 void run_many(int64_t count, const int64_t *which, const double *x0, const double *p,

@@ -1,0 +1,361 @@
+"""The switching surface of a system of three states: its regions, folds and sliding orbits."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+from numpy.typing import NDArray
+from scipy.ndimage import distance_transform_edt, label
+
+from ..local import TwoFold
+from ..model import Array, DefinitionError, FilippovSystem, OptionError, Parameters, explain
+from . import style
+from .surface import Fold, Sheet
+
+_ATTRACTING, _REPELLING, _UP, _DOWN = 0, 1, 2, 3
+_NAMES = ("$D_a$", "$D_r$", "$C_1$", "$C_2$")
+_TINTS = (style.TINT_ATTRACTING, style.TINT_REPELLING, style.TINT_CROSSING, "#E4E4E4")
+_TEXTS = (
+    "$D_a$: attracting sliding",
+    "$D_r$: repelling sliding",
+    "$C_1$: crossing up",
+    "$C_2$: crossing down",
+)
+_DASHES: dict[bool, Any] = {True: "-", False: (0, (5, 2.5))}
+_CANARD, _FAUX, _MANIFOLD = "canard", "faux canard", "manifold of a pseudo-saddle"
+_SPECIAL: dict[str, tuple[str, Any]] = {
+    _CANARD: (style.CANARD, "-"),
+    _FAUX: (style.FAUX_CANARD, style.LONG_DASH),
+    _MANIFOLD: (style.PURPLE, "-"),
+}
+_MARKERS = {"node": "s", "focus": "o", "saddle": "X"}
+_SMALLEST = 0.008  # share of the box below which a region gets no name
+
+
+def sliding_portrait(
+    system: FilippovSystem,
+    box: Sequence[float] | Sequence[Sequence[float]],
+    *,
+    coordinates: Sequence[str] | None = None,
+    guess: float = 0.0,
+    parameters: Parameters | None = None,
+    orbits: int = 12,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (7.6, 5.2),
+    legend: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw the switching surface of a system of three states over two of them.
+
+    The regions of sliding and crossing, the fold curves (visible: solid, invisible: dashed),
+    cusps, two-folds with their class, pseudo-equilibria, and sliding orbits with the direction of
+    time; canards through two-folds and the manifolds of pseudo-saddles stand out. Everything is
+    found on a grid of 1/200 of the box and then solved for, so closer pairs can be missed. Stops
+    and resets are ignored.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        Three states, one surface, no explicit time.
+    box : (umin, umax, vmin, vmax) or ((umin, umax), (vmin, vmax))
+        Limits of the two coordinates.
+    coordinates : (str, str), optional
+        Names of the states drawn to the right and up. By default the state along which the
+        surface is steepest is left out.
+    guess : float, optional
+        Of the remaining state: where the search for the surface starts.
+    parameters : mapping, optional
+        Values that replace defaults.
+    orbits : int, optional
+        About how many sliding orbits would fit across the box; 0 for none.
+    ax : matplotlib Axes, optional
+    size : (float, float), optional
+        Inches, of a new figure.
+    legend : bool, optional
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    DefinitionError
+        Not three states, explicit time, several surfaces, hidden dynamics; a state that is none;
+        no surface in the box.
+    OptionError, ParameterError
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> problem = ns.textbook.two_fold("VV-C1")
+    >>> figure = ns.plot.sliding_portrait(problem.system, (-1, 1, -1, 1))
+    >>> figure.axes[0].get_xlabel()
+    'z2'
+    """
+    _check(system)
+    if isinstance(orbits, bool) or not isinstance(orbits, int) or orbits < 0:
+        raise OptionError(f"orbits: expected a whole number >= 0, received {orbits!r}.")
+    limits = _limits(box)
+    values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
+    sheet = Sheet.of(system, values, limits, coordinates, float(guess))
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        portrait = _Portrait(axes, sheet)
+        portrait.draw(orbits)
+        names = [system.state_names[i] for i in sheet.shown]
+        axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
+        if title is not None:
+            axes.set_title(title)
+        if legend:
+            portrait.legend()
+    return figure
+
+
+def _check(system: object) -> None:
+    if not isinstance(system, FilippovSystem):
+        received, advice = type(system).__name__, "Give the system first, then the box."
+    elif system.dimension != 3:
+        received = f"{system.dimension} states: {', '.join(system.state_names)}"
+        advice = "For two states use phase_portrait; with more, hold some of them fixed."
+    elif system.surface_count != 1:
+        received, advice = f"{system.surface_count} surfaces", "Draw runs with trajectory."
+    elif system.time_dependent:
+        received, advice = "explicit time", "Freeze it at a value, or draw runs with trajectory."
+    elif system.nonlinear[0]:
+        received, advice = "hidden dynamics", "Its sliding field is not a convex combination."
+    else:
+        return
+    raise DefinitionError(
+        explain(
+            "sliding_portrait",
+            expected="an autonomous FilippovSystem of 3 states and 1 surface",
+            received=received,
+            advice=advice,
+        )
+    )
+
+
+def _limits(box: object) -> tuple[float, float, float, float]:
+    try:
+        values = np.asarray(box, dtype=float).ravel()
+    except (TypeError, ValueError):
+        values = np.empty(0)
+    finite = values.shape == (4,) and bool(np.all(np.isfinite(values)))
+    if not finite or not (values[0] < values[1] and values[2] < values[3]):
+        raise OptionError(
+            explain(
+                "box",
+                expected="(umin, umax, vmin, vmax) with umin < umax and vmin < vmax",
+                received=repr(box),
+                advice="For example (-1, 1, -2, 2).",
+            )
+        )
+    u0, u1, v0, v1 = values.tolist()
+    return u0, u1, v0, v1
+
+
+class _Portrait:
+    """Draws one portrait."""
+
+    def __init__(self, ax: Axes, sheet: Sheet):
+        self.ax, self.sheet = ax, sheet
+        self.regions = sheet.regions()
+        self.folds: list[Fold] = sheet.folds()
+        self.two_folds = sheet.two_folds()
+        self.rest = sheet.pseudo_equilibria()
+        self.drawn: set[str] = set()
+
+    def draw(self, orbits: int) -> None:
+        """Draw every part, from the back."""
+        self.tints()
+        self.separatrices()
+        if orbits:
+            self.orbits(orbits)
+        for fold in self.folds:
+            color = style.ABOVE if fold.side > 0 else style.BELOW
+            for piece, visible in fold.pieces:
+                self.ax.plot(
+                    *piece.T,
+                    color=color,
+                    linewidth=2.2,
+                    linestyle=_DASHES[visible],
+                    zorder=4,
+                    gid=f"{'visible' if visible else 'invisible'} fold",
+                )
+        self.marks()
+        self.names()
+
+    def tints(self) -> None:
+        """Colour the regions."""
+        u, v = self.sheet.mesh
+        shown = np.ma.masked_less(self.regions, 0)
+        self.ax.pcolormesh(
+            u,
+            v,
+            shown,
+            cmap=ListedColormap(list(_TINTS)),
+            vmin=-0.5,
+            vmax=3.5,
+            shading="nearest",
+            rasterized=True,
+            zorder=0,
+        )
+
+    def separatrices(self) -> None:
+        """Eigenlines of two-folds and manifolds of pseudo-saddles."""
+        special = [line for fold in self.two_folds for line in self._eigenlines(fold)]
+        for found in self.rest:
+            if found.kind == "pseudo-saddle":
+                special += [(*line, _MANIFOLD) for line in self.sheet.manifolds(found)]
+        if not special:
+            return
+        starts, ahead, names = zip(*special, strict=True)
+        curves = self.sheet.sliding(np.array(starts), ahead)
+        for curve, way, name in zip(curves, ahead, names, strict=True):
+            if len(curve) < 3:
+                continue
+            color, dashes = _SPECIAL[name]
+            self.ax.plot(
+                *curve.T,
+                color=color,
+                linewidth=2.4,
+                linestyle=dashes,
+                zorder=3,
+                gid=name,
+                path_effects=style.halo(3.6),
+            )
+            style.arrowhead(self.ax, curve[::way], 0.5, color, mutation_scale=15, zorder=3.1)
+            self.drawn.add(name)
+
+    def _eigenlines(self, fold: TwoFold) -> list[tuple[Array, int, str]]:
+        """Start, way to go and name of each half of the sliding eigenlines of a two-fold."""
+        if fold.discriminant < 0:
+            return []
+        halves = []
+        for value, slope in zip(np.real(fold.eigenvalues), np.real(fold.slopes), strict=True):
+            if not slope > 0 or abs(value) < 1e-9:
+                continue
+            line = np.array([1.0, slope]) / np.hypot(1.0, slope)
+            starts = fold.point_at(1e-3 * np.array([line, -line]) * self.sheet.reach(fold))
+            # a canard comes to s in Da and goes away in Dr
+            ways = (-1, 1) if value < 0 else (1, -1)
+            name = _CANARD if value < 0 else _FAUX
+            halves += [(s, way, name) for s, way in zip(starts, ways, strict=True)]
+        return halves
+
+    def orbits(self, count: int) -> None:
+        """Sliding orbits, about evenly spaced."""
+        for curve, attracting in self.sheet.orbits(count):
+            color = style.ATTRACTING if attracting else style.REPELLING
+            self.ax.plot(*curve.T, color=color, linewidth=0.9, zorder=2, gid="orbit")
+            if self.sheet.length(curve) > 0.1:
+                style.arrowhead(self.ax, curve, 0.55, color, mutation_scale=10, zorder=2.1)
+
+    def marks(self) -> None:
+        """Cusps, two-folds and pseudo-equilibria."""
+        for fold in self.folds:
+            for cusp in fold.cusps:
+                self._mark(cusp, "^", style.ABOVE if fold.side > 0 else style.BELOW, gid="cusp")
+        for found in self.two_folds:
+            place = found.point[list(self.sheet.shown)]
+            self._mark(place, "o", style.BLACK, gid="two-fold")
+            self.ax.annotate(
+                found.label.removeprefix("boundary ").replace("Delta", "Δ").replace("nu", "ν"),
+                (float(place[0]), float(place[1])),
+                xytext=(7, -13),
+                textcoords="offset points",
+                fontsize=9,
+                zorder=8,
+                path_effects=style.halo(3.0),
+            )
+        for rest in self.rest:
+            marker = _MARKERS.get(rest.kind.rpartition("-")[2], "P")
+            fill = style.BLACK if rest.stable or "saddle" in rest.kind else "white"
+            place = rest.point[list(self.sheet.shown)]
+            self._mark(place, marker, fill, gid=rest.kind, markersize=8)
+
+    def _mark(self, place: Array, marker: str, fill: str, **options: Any) -> None:
+        style_ = {"markersize": 6.5, "markeredgecolor": style.BLACK, "zorder": 7, **options}
+        self.ax.plot(*place, linestyle="none", marker=marker, markerfacecolor=fill, **style_)
+
+    def _free(self) -> NDArray[np.bool_]:
+        """Grid points that are not close to a mark."""
+        shown = list(self.sheet.shown)
+        marks = [f.point[shown] for f in self.two_folds] + [r.point[shown] for r in self.rest]
+        grid = np.stack(np.meshgrid(*self.sheet.mesh), axis=-1)
+        free = np.ones(self.regions.shape, dtype=bool)
+        for mark in marks:
+            free &= np.linalg.norm((grid - mark) / self.sheet.scale, axis=-1) > 0.06
+        return free
+
+    def names(self) -> None:
+        """Write the name of each region where there is most room."""
+        (u, v), free = self.sheet.mesh, self._free()
+        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
+        for kind, name in enumerate(_NAMES):
+            parts, count = label((self.regions == kind) & free)
+            for k in range(1, count + 1):
+                part = np.pad(parts == k, 1)
+                if part.mean() < _SMALLEST:
+                    continue
+                deep = distance_transform_edt(part)[1:-1, 1:-1]
+                i, j = np.unravel_index(int(np.argmax(deep)), deep.shape)
+                place = (float(u[j]), float(v[i]))
+                style.write(self.ax, place, name, fontsize=13, zorder=7.5, bbox=box, gid="region")
+
+    def legend(self) -> None:
+        """Explain colours, lines and marks beside the axes."""
+        handles: list[Line2D | Patch] = [
+            Patch(facecolor=_TINTS[k], edgecolor="#BBBBBB", label=_TEXTS[k])
+            for k in range(4)
+            if np.any(self.regions == k)
+        ]
+        for side, name, color in ((1, "F_1", style.ABOVE), (-1, "F_2", style.BELOW)):
+            for visible, word in ((True, "visible"), (False, "invisible")):
+                folds = [f for f in self.folds if f.side == side]
+                if any(seen is visible for f in folds for _, seen in f.pieces):
+                    dashes = _DASHES[visible]
+                    handles.append(_line(color, f"fold of ${name}$, {word}", 2.2, dashes))
+        if np.any(self.regions == _ATTRACTING):
+            handles.append(_line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
+        if np.any(self.regions == _REPELLING):
+            handles.append(_line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
+        for name, (color, dashes) in _SPECIAL.items():
+            if name in self.drawn:
+                handles.append(_line(color, name, 2.4, dashes))
+        if self.two_folds:
+            handles.append(_point("o", style.BLACK, "two-fold"))
+        if any(fold.cusps.size for fold in self.folds):
+            handles.append(_point("^", style.GREY, "cusp"))
+        for kind in dict.fromkeys(rest.kind for rest in self.rest):
+            filled = "saddle" in kind or kind.startswith("stable")
+            marker = _MARKERS.get(kind.rpartition("-")[2], "P")
+            handles.append(_point(marker, style.BLACK if filled else "white", kind))
+        self.ax.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0
+        )
+
+
+def _line(color: str, text: str, width: float, dashes: Any = "-") -> Line2D:
+    return Line2D([], [], color=color, linewidth=width, linestyle=dashes, label=text)
+
+
+def _point(marker: str, fill: str, text: str) -> Line2D:
+    return Line2D(
+        [],
+        [],
+        linestyle="none",
+        marker=marker,
+        markersize=6,
+        markeredgecolor=style.BLACK,
+        markerfacecolor=fill,
+        label=text,
+    )

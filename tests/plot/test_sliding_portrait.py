@@ -1,0 +1,143 @@
+"""The sliding portrait of a surface in three dimensions shows exact folds, points and orbits."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+from scipy.linalg import expm
+
+import nonsmooth as ns
+from nonsmooth.plot.surface import Sheet
+
+x, y, z = (ca.SX.sym(name) for name in "xyz")
+BOX = (-1.0, 1.0, -1.0, 1.0)
+
+
+def drawn(figure, gid):
+    return [line for line in figure.axes[0].lines if line.get_gid() == gid]
+
+
+def system(above, below, surface=x):
+    return ns.FilippovSystem([x, y, z], surface=surface, above=above, below=below)
+
+
+@pytest.mark.parametrize(
+    ("label", "words"),
+    [
+        ("VV-C1", ("visible", "visible")),
+        ("II-C", ("invisible", "invisible")),
+        ("mix-S", ("visible", "invisible")),
+    ],
+)
+def test_normal_form_has_its_folds_on_the_axes_and_its_class(label, words):
+    problem = ns.textbook.two_fold(label)
+    figure = ns.plot.sliding_portrait(problem.system, BOX)
+    seen = {}
+    for word in set(words):
+        for line in drawn(figure, f"{word} fold"):
+            points = line.get_xydata()
+            seen[int(np.argmin(np.abs(points).max(axis=0)))] = word
+            assert np.abs(points).min(axis=1).max() < 1e-14
+    assert seen == {0: words[0], 1: words[1]}  # z2 = 0 is the fold of F1
+    assert [t.get_text() for t in figure.axes[0].texts if "fold" not in t.get_text()].count(label)
+    assert len(drawn(figure, "two-fold")) == 1
+    canards = {"VV-C1": 2, "II-C": 2, "mix-S": 2}[label]  # halves, in Da and in Dr
+    assert len(drawn(figure, "canard")) == canards
+    assert len(drawn(figure, "faux canard")) == (2 if label == "mix-S" else 0)
+
+
+def test_regions_are_those_of_the_signs():
+    sheet = Sheet.of(ns.textbook.two_fold("II-C").system, {}, (-1, 1.01, -1, 1.01), None, 0.0)
+    u, v = sheet.mesh
+    z2, z3 = np.meshgrid(u, v)
+    expected = np.where(z2 > 0, np.where(z3 > 0, 0, 3), np.where(z3 > 0, 2, 1))
+    away = (np.abs(z2) > 1e-9) & (np.abs(z3) > 1e-9)
+    assert np.array_equal(sheet.regions()[away], expected[away])
+
+
+def test_sliding_orbits_are_those_of_the_linear_flow():
+    # z' = M z/(z2 + z3) has the orbits of exp(M r) z: every point drawn is on that curve
+    problem = ns.textbook.two_fold("mix-0")
+    sheet = Sheet.of(problem.system, {}, BOX, None, 0.0)
+    (curve,) = sheet.sliding(np.array([[0.0, 0.5, 0.2]]), [1])
+    matrix = np.array([[0.5, -1.0], [1.0, 0.0]])  # nu = (0, .5), sigma = (1, 1)
+    fine = np.array([expm(matrix * r) @ [0.5, 0.2] for r in np.linspace(0, 3, 3001)])
+    gaps = np.linalg.norm(curve[:-1, None] - fine[None], axis=2).min(axis=1)
+    assert gaps.max() < 1e-3
+    first = int(np.argmax(fine[:, 0] < 0))  # it leaves through z2 = 0, the visible fold
+    assert_allclose(curve[-1], [0, fine[first, 1]], atol=1e-3)
+
+
+@pytest.mark.parametrize("centre", [(0.0, 0.0), (1.5, 1.0)])
+def test_pseudo_saddle_and_its_manifolds(centre):
+    # L1 = -1, L2 = 1: the sliding field is the mean of the two fields
+    s = system([-1, 2 * (y - centre[0]), centre[1] - z], [1, 0, 0])
+    figure = ns.plot.sliding_portrait(s, (-2, 3, -2, 3))
+    (mark,) = drawn(figure, "pseudo-saddle")
+    assert_allclose(mark.get_xydata()[0], centre, atol=1e-12)
+    lines = drawn(figure, "manifold of a pseudo-saddle")
+    assert len(lines) == 4
+    for line in lines:
+        assert np.abs(line.get_xydata() - centre).max(axis=0).min() < 1e-9  # along an axis
+
+
+def test_cusp_parts_the_visible_from_the_invisible_fold():
+    # L1 = z + y^2 - .3, L11 = 2 y + .2: cusp at y = -.1, z = .29, visible to the right of it
+    s = system([z + y**2 - 0.3, 1, 0.2], [1, 0.3, 0.1 - z])
+    figure = ns.plot.sliding_portrait(s, (-2, 2, -2, 2))
+    (cusp,) = drawn(figure, "cusp")
+    assert_allclose(cusp.get_xydata()[0], [-0.1, 0.29], atol=1e-4)
+    (visible,), (invisible,) = drawn(figure, "visible fold"), drawn(figure, "invisible fold")
+    assert visible.get_xydata()[:, 0].min() > -0.1001
+    assert invisible.get_xydata()[:, 0].max() < -0.0999
+    for line in (visible, invisible):
+        a, b = line.get_xydata().T
+        inner = np.abs(a + 0.1) > 1e-3
+        assert np.abs(b + a**2 - 0.3)[inner].max() < 1e-12
+
+
+def test_curved_surface_is_drawn_over_chosen_coordinates():
+    s = system([1, 1, 0], [0, 0, 1], surface=z + x - y**2)  # L1 = 1 - 2 y, fold at y = .5
+    for names, column in ((("x", "y"), 1), (("y", "x"), 0), (("y", "z"), 0)):
+        figure = ns.plot.sliding_portrait(s, (-1, 1, -1, 1), coordinates=names)
+        folds = drawn(figure, "visible fold") + drawn(figure, "invisible fold")
+        assert folds
+        for line in folds:
+            assert_allclose(line.get_xydata()[:, column], 0.5, atol=1e-12)
+        assert figure.axes[0].get_xlabel() == names[0]
+
+
+def test_each_region_is_named():
+    figure = ns.plot.sliding_portrait(ns.textbook.two_fold("II-F").system, BOX, orbits=0)
+    names = {t.get_text() for t in figure.axes[0].texts if t.get_gid() == "region"}
+    assert names == {"$D_a$", "$D_r$", "$C_1$", "$C_2$"}
+    assert not drawn(figure, "orbit")
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda s: ns.plot.sliding_portrait("no", BOX), ns.DefinitionError, "system first"),
+        (
+            lambda s: ns.plot.sliding_portrait(ns.textbook.planar_relay().system, BOX),
+            ns.DefinitionError,
+            "phase_portrait",
+        ),
+        (lambda s: ns.plot.sliding_portrait(s, (1, 0, 0, 1)), ns.OptionError, "umin < umax"),
+        (lambda s: ns.plot.sliding_portrait(s, "box"), ns.OptionError, "umin < umax"),
+        (
+            lambda s: ns.plot.sliding_portrait(s, BOX, coordinates=("z2", "q")),
+            ns.DefinitionError,
+            "two of the states",
+        ),
+        (
+            lambda s: ns.plot.sliding_portrait(s, BOX, coordinates=("z1", "z2")),
+            ns.DefinitionError,
+            "no surface|none over",
+        ),
+        (lambda s: ns.plot.sliding_portrait(s, BOX, orbits=-1), ns.OptionError, "orbits"),
+    ],
+)
+def test_bad_input_is_refused_with_advice(call, error, words):
+    with pytest.raises(error, match=words):
+        call(ns.textbook.two_fold("II-C").system)

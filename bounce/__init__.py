@@ -56,6 +56,7 @@ from .models import (
 from .outcomes import BounceStatus, LiftOffs, OutcomeMap, lift_off, outcome_map
 from .rigid import NormalKelvinVoigt, RigidBounce, RigidShot, kelvin_voigt_restitution
 from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
+from .sensitivity import Sensitivity, sensitivity
 from .shot import Forces, Phase, Shot, State, simulate
 from .tracing import Arc
 from .units import BALLS, BASKETBALL, GOLF, TENNIS, Ball, Landing, Scaling
@@ -115,6 +116,7 @@ __all__ = [
     "RigidShot",
     "Run",
     "Scaling",
+    "Sensitivity",
     "Shot",
     "State",
     "Stribeck",
@@ -134,6 +136,7 @@ __all__ = [
     "play",
     "plot",
     "rebound",
+    "sensitivity",
     "simulate",
 ]
 

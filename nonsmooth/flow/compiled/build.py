@@ -85,6 +85,11 @@ def _processor() -> str:
     )
 
 
+def lane_width() -> int:
+    """Doubles in a vector register, and at least 4: wider vectors than the processor's are slow."""
+    return 8 if "avx512f" in _processor().split() else 4
+
+
 def cache_directory() -> Path:
     """Folder of compiled engines: $NONSMOOTH_CACHE, or the user's cache folder."""
     explicit = os.environ.get("NONSMOOTH_CACHE")

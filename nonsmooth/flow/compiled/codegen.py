@@ -64,7 +64,7 @@ def scalar_source(system: FilippovSystem, order: int) -> str:
     )
 
 
-def lanes_source(system: FilippovSystem, order: int, width: int = 8) -> str:
+def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
     program, affine = lanes_program(system, order)
     slots = 2 * system.surface_count + len(system.stops)

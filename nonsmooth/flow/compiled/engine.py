@@ -16,7 +16,7 @@ from ..options import Options
 from ..status import Status
 from ..stepper import _SAFETY as SAFETY
 from ..stepper import order_for
-from .build import build
+from .build import build, lane_width
 from .codegen import lanes_source, scalar_source, supports_lanes, supports_scalar
 
 #: Event kinds by number, as in the C enumeration.
@@ -165,7 +165,7 @@ class Engine:
         """The library for trajectories in step."""
         with self._lock:
             if self._lanes is None:
-                self._lanes = _declare(build(lanes_source(self.system, self.order)))
+                self._lanes = _declare(build(lanes_source(self.system, self.order, lane_width())))
             return self._lanes
 
     # one trajectory ----------------------------------------------------------------------------

@@ -1,11 +1,15 @@
 """The compiled engine and the reference driver agree to rounding, whatever the system."""
 
+import platform
+
 import casadi as ca
 import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+import nonsmooth.flow.compiled.build as build_module
+import nonsmooth.flow.compiled.engine as engine_module
 import nonsmooth.textbook as textbook
 from nonsmooth.flow.compiled import KINDS, engine_for, find_compiler, simulate_arrays
 from nonsmooth.flow.compiled.engine import HAND_OVER, supports_lanes
@@ -210,3 +214,26 @@ def test_start_mode_on_repelling_surface():
 def test_dense_output_survives_full_buffers():
     problem = textbook.by_name("leine_stick_slip")
     assert agree(problem.system, problem.start, Options(t_end=600.0), tolerance=1e-9) is not None
+
+
+@pytest.mark.parametrize(
+    ("width", "flags"),
+    [(8, ""), (4, ""), (4, "-mno-avx512f"), (4, "-mno-avx"), (8, "-mno-avx512f")],
+)
+def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
+    if flags and platform.machine() not in ("x86_64", "AMD64"):
+        pytest.skip("flags of another processor")
+    problem = textbook.by_name("leine_stick_slip")
+    system, options = problem.system, Options(t_end=30.0, rtol=1e-6, atol=1e-6)
+    starts = np.random.default_rng(1).normal(size=(50, 2))
+    p = system.parameter_vector()
+    with monkeypatch.context() as patch:
+        patch.setattr(build_module, "FLAGS", [*build_module.FLAGS, *flags.split()])
+        patch.setattr(engine_module, "lane_width", lambda: width)
+        engine = engine_module.Engine(system, 10)
+        chunk = engine.run_many(starts, p, options, None, True)
+    expected = engine_module.Engine(system, 10).run_many(starts, p, options, None, False)
+    np.testing.assert_allclose(chunk.x, expected.x, rtol=0, atol=1e-8)
+    assert [chunk.words[k] for k in chunk.itinerary] == [
+        expected.words[k] for k in expected.itinerary
+    ]

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from .equations import equations
+from .outcome_plots import outcome_map as outcome_map
 from .shot import Shot, kind
 
 if TYPE_CHECKING:

@@ -14,13 +14,14 @@ import numpy as np
 
 import nonsmooth as ns
 
+from ..claims import Check, close
 from . import results
 from .errata import erratum
 from .errata_general import fold_of, generic, law
 from .errata_linear import kelvin_voigt, scaling_residuals
 from .exact import identical
 from .model import G, Omega, Xp, Y, Yp, along, d1, d2, eps, eta, generalised, grad_H, mu
-from .records import Check, Equation, close
+from .records import Equation
 
 Checks = tuple[Check, ...]
 AGREES, CORRECTED, DEFINITION, ASSUMPTION = "agrees", "corrected", "definition", "assumption"

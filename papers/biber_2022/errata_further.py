@@ -4,10 +4,11 @@ from __future__ import annotations
 
 import casadi as ca
 
+from ..claims import Check
 from .errata_general import generic
 from .exact import identical, impose
 from .model import Omega, Xp, Y, d1, d2, eps, eta, p
-from .records import Check, Erratum
+from .records import Erratum
 
 
 def gravity_in_impact() -> Erratum:

@@ -9,6 +9,7 @@ import numpy as np
 
 import nonsmooth as ns
 
+from ..claims import Check, close
 from . import printed
 from .exact import identical
 from .model import (
@@ -29,7 +30,7 @@ from .model import (
     p,
     two_fold_point,
 )
-from .records import Check, Erratum, close
+from .records import Erratum
 from .table import recomputed
 
 

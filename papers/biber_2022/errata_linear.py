@@ -10,6 +10,7 @@ import numpy as np
 
 import nonsmooth as ns
 
+from ..claims import Check, close
 from . import printed
 from .exact import identical
 from .model import (
@@ -26,7 +27,7 @@ from .model import (
     linear,
     mu,
 )
-from .records import Check, Erratum, close
+from .records import Erratum
 
 EPS2 = ca.SX.sym("e2")
 

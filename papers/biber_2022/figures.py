@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
-from pathlib import Path
-
 from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
+from ..pictures import Picture
 from . import figures_bounce, figures_data, figures_schematic, figures_space
 from .errata_general import fold_of
 
@@ -32,26 +29,6 @@ def invisible() -> Figure:
 def visible_invisible() -> Figure:
     """Figure 2-fold (c)."""
     return ns.plot.two_fold_3d(((1, 1), (0.0, 0.5)))
-
-
-@dataclass(frozen=True)
-class Picture:
-    """A figure of the paper.
-
-    Attributes
-    ----------
-    name : str
-        Of the files.
-    label : str
-        The paper's.
-    caption : str
-    draw : callable
-    """
-
-    name: str
-    label: str
-    caption: str
-    draw: Callable[[], Figure]
 
 
 PICTURES: tuple[Picture, ...] = (
@@ -160,19 +137,3 @@ PICTURES: tuple[Picture, ...] = (
         portrait_node,
     ),
 )
-
-
-def save(picture: Picture, folder: Path) -> list[Path]:
-    """Draw a figure and write it as PNG and PDF.
-
-    Returns
-    -------
-    list of Path
-    """
-    figure = picture.draw()
-    paths = [folder / f"{picture.name}.{kind}" for kind in ("png", "pdf")]
-    for path in paths:
-        figure.savefig(
-            path, dpi=150, metadata={"CreationDate": None} if path.suffix == ".pdf" else None
-        )
-    return paths

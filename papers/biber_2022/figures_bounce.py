@@ -6,14 +6,14 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from . import look
+from .. import look
 from .results import kv_pert_data, kv_pert_shot
 
 #: Name in the paper, trajectory, colour, line style.
 RUNS = (
     ("A", "A_exact", look.BLACK, "-"),
-    ("B", "B", look.FORWARD, look.DASHED),
-    ("C", "C", look.REVERSE, look.DASHDOT),
+    ("B", "B", look.ABOVE, look.DASHED),
+    ("C", "C", look.BELOW, look.DASHDOT),
 )
 _UNIT = 1e4  # figures are in units of 1e-4
 

@@ -18,7 +18,7 @@ from scipy.stats import qmc
 
 import bounce
 
-from . import look
+from .. import look
 from .errata_linear import log_restitution_value
 from .model import Array
 from .table import Row, recomputed
@@ -43,7 +43,7 @@ def trajectories() -> Figure:
     with look.settings():
         figure = look.new_figure(6.2, 4.6)
         axes = figure.add_subplot()
-        for side, color, style in ((1, look.FORWARD, "-"), (-1, look.REVERSE, look.DASHED)):
+        for side, color, style in ((1, look.ABOVE, "-"), (-1, look.BELOW, look.DASHED)):
             for start in (0.35, 0.7, 1.25, 1.5, 1.95, 2.3):
                 turn = start / slope - 1
                 ends = (
@@ -68,7 +68,7 @@ def trajectories() -> Figure:
                     va="center",
                 )
         roll = np.array([(0.0, -0.67), (0.0, r)])
-        axes.plot(*roll.T, color=look.ROLLING, linewidth=2.4, zorder=3)
+        axes.plot(*roll.T, color=look.SLIDING, linewidth=2.4, zorder=3)
         axes.text(0.07, 0.3, "roll", va="center", path_effects=look.halo(), zorder=6)
         axes.axhline(0, color="0.5", linewidth=0.8, zorder=0)
         axes.axvline(0, color="0.5", linewidth=0.8, zorder=0)

@@ -7,7 +7,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon, Rectangle
 
-from . import look
+from .. import look
 
 _GROUND = "0.85"
 
@@ -94,11 +94,11 @@ def setting_notation() -> Figure:
             )
         )
         axes.text(-0.07, -0.06, "$(x, y)$", ha="right", va="top")
-        look.arrow(axes, (0, -1), (0, -0.3), look.REVERSE, linewidth=2)
-        axes.text(0.08, -0.5, r"$\lambda_N$", color=look.REVERSE)
-        look.arrow(axes, (0, -1), (0.8, -1), look.FORWARD, linewidth=2, zorder=5)
+        look.arrow(axes, (0, -1), (0, -0.3), look.BELOW, linewidth=2)
+        axes.text(0.08, -0.5, r"$\lambda_N$", color=look.BELOW)
+        look.arrow(axes, (0, -1), (0.8, -1), look.ABOVE, linewidth=2, zorder=5)
         axes.text(
-            0.87, -1.05, r"$\lambda_T$", color=look.FORWARD, va="center", path_effects=look.halo()
+            0.87, -1.05, r"$\lambda_T$", color=look.ABOVE, va="center", path_effects=look.halo()
         )
         for end, name, offset in (((-1.1, 1.3), "$x$", (0.12, 0)), ((-1.6, 1.8), "$y$", (0, 0.12))):
             look.arrow(axes, (-1.6, 1.3), end, "0.3")
@@ -126,10 +126,10 @@ def _mechanism(labels: dict[str, str]) -> Figure:
         axes.plot([0.9, 0.9], [0.25, 0.85], color="black", linewidth=1.3)
         for y, draw in ((0.85, _spring), (0.25, _dashpot)):
             draw(axes, np.array([2.3, y - 0.03]), np.array([0.9, y - 0.03]))
-        look.arrow(axes, (-0.5, -0.2), (-0.5, 0.3), look.REVERSE, linewidth=1.8)
-        axes.text(-0.4, 0.0, r"$\lambda_N$", color=look.REVERSE, va="center")
-        look.arrow(axes, (-0.5, -0.2), (0.15, -0.2), look.FORWARD, linewidth=1.8, zorder=5)
-        axes.text(0.2, -0.08, r"$\lambda_T$", color=look.FORWARD, va="center")
+        look.arrow(axes, (-0.5, -0.2), (-0.5, 0.3), look.BELOW, linewidth=1.8)
+        axes.text(-0.4, 0.0, r"$\lambda_N$", color=look.BELOW, va="center")
+        look.arrow(axes, (-0.5, -0.2), (0.15, -0.2), look.ABOVE, linewidth=1.8, zorder=5)
+        axes.text(0.2, -0.08, r"$\lambda_T$", color=look.ABOVE, va="center")
         axes.text(-1.15, -1.0, labels["k"], ha="right", va="center")
         axes.text(0.15, -1.0, labels["d"], ha="left", va="center")
         axes.text(1.6, 1.0, labels["z"], ha="center", va="bottom")
@@ -181,8 +181,8 @@ def filippov_convexity() -> Figure:
         axes.text(*(put(-0.55, -0.75, 0)), r"$H(p)=0$", va="bottom")
         tips = [put(*v) for v in (first, second, slide)]
         styles = (
-            (look.FORWARD, "$F_1$", "-", (0.08, -0.06)),
-            (look.REVERSE, "$F_2$", "-", (0.08, 0.04)),
+            (look.ABOVE, "$F_1$", "-", (0.08, -0.06)),
+            (look.BELOW, "$F_2$", "-", (0.08, 0.04)),
             (look.BLACK, "$F_s$", "-", (0.1, -0.1)),
         )
         for tip, (color, name, style, offset) in zip(tips, styles, strict=True):
@@ -200,6 +200,6 @@ def filippov_convexity() -> Figure:
         axes.plot(*np.array(tips[:2]).T, color="0.25", linestyle=look.DASHED, zorder=3)
         axes.plot(*put(*start), "o", color="black", zorder=6)
         axes.text(-0.08, 0.1, "$p$", ha="right")
-        axes.text(-1.3, 1.5, "$H>0$", color=look.FORWARD)
-        axes.text(-1.3, -1.1, "$H<0$", color=look.REVERSE)
+        axes.text(-1.3, 1.5, "$H>0$", color=look.ABOVE)
+        axes.text(-1.3, -1.1, "$H<0$", color=look.BELOW)
     return figure

@@ -17,7 +17,7 @@ from matplotlib.patches import Polygon
 
 import nonsmooth as ns
 
-from . import look
+from .. import look
 from .errata_general import fold_of
 from .model import Array
 
@@ -95,7 +95,7 @@ class Scene:
     def folds(self, visible: tuple[bool, bool] = (True, True)) -> None:
         """The lines z2 = 0 (of F1) and z3 = 0 (of F2); invisible folds are dashed."""
         a = self.size
-        for k, color in ((0, look.FORWARD), (1, look.REVERSE)):
+        for k, color in ((0, look.ABOVE), (1, look.BELOW)):
             end = np.array([0.0, 0.0, a] if k == 0 else [0.0, a, 0.0])
             for side, order in ((1, SURFACE + 1), (-1, BEHIND + 0.5)):
                 line = project(np.array([[0.0, 0, 0], side * end]))
@@ -137,9 +137,9 @@ class Scene:
         """Draw the orbit of the ball's normal form from a start to lift-off."""
         run = ns.simulate(ball_normal_form(), start, 10.0, tol=1e-11)
         styles = {
-            "+": (look.FORWARD, "-", ABOVE),
-            "-": (look.REVERSE, look.DASHED, FRONT_BELOW),
-            "s": (look.ROLLING, "-", SURFACE + 1.5),
+            "+": (look.ABOVE, "-", ABOVE),
+            "-": (look.BELOW, look.DASHED, FRONT_BELOW),
+            "s": (look.SLIDING, "-", SURFACE + 1.5),
         }
         for segment in run.segments:
             color, style, order = styles[segment.mode]
@@ -205,18 +205,18 @@ def _ball_labels(axes: Axes, scene: Scene) -> None:
         "$F_2\\cdot\\nabla H=0$\n" r"$\alpha=1$",
         ha="right",
         va="top",
-        color=look.REVERSE,
+        color=look.BELOW,
     )
     scene.text(
         [-0.05, -0.16, 1.06 * a],
         "$F_1\\cdot\\nabla H=0$\n" r"$\alpha=0$",
         ha="left",
         va="top",
-        color=look.FORWARD,
+        color=look.ABOVE,
     )
     scene.text([0, 0.62 * a, 0.93 * a], r"$H=0$: rolling")
-    axes.text(-1.9, 0.95, "$H>0$: forward slip, $F_1$", color=look.FORWARD)
-    axes.text(-1.9, -1.22, "$H<0$: reverse slip, $F_2$", color=look.REVERSE)
+    axes.text(-1.9, 0.95, "$H>0$: forward slip, $F_1$", color=look.ABOVE)
+    axes.text(-1.9, -1.22, "$H<0$: reverse slip, $F_2$", color=look.BELOW)
 
 
 def two_fold_visible() -> Figure:
@@ -240,8 +240,8 @@ def two_fold_visible() -> Figure:
         for centre in (0.62, 0.95):
             above = np.column_stack([t**2 / 2, -t, centre + n1 * t])
             below = np.column_stack([-(t**2) / 2, centre + n2 * t, -t])
-            scene.curve(above, look.FORWARD, ABOVE, width=1.6, at=(0.25, 0.85))
-            scene.curve(below, look.REVERSE, FRONT_BELOW, look.DASHED, 1.6, at=(0.25, 0.85))
+            scene.curve(above, look.ABOVE, ABOVE, width=1.6, at=(0.25, 0.85))
+            scene.curve(below, look.BELOW, FRONT_BELOW, look.DASHED, 1.6, at=(0.25, 0.85))
         _axis_of_slip(axes, scene, 0.85)
         _region_labels(scene)
         scene.text([-0.3, -0.92, 0.92], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
@@ -255,8 +255,8 @@ def _region_labels(scene: Scene) -> None:
     scene.text([0, 0.72 * a, -0.5 * a], r"$C_2$", fontsize=13)
     scene.text([0, -0.5 * a, 0.72 * a], r"$C_1$", fontsize=13)
     scene.text(
-        [0, 1.05 * a, -0.05], "$z_3=0$\n" r"$\alpha=1$", ha="right", va="top", color=look.REVERSE
+        [0, 1.05 * a, -0.05], "$z_3=0$\n" r"$\alpha=1$", ha="right", va="top", color=look.BELOW
     )
     scene.text(
-        [0, -0.05, 1.03 * a], "$z_2=0$\n" r"$\alpha=0$", ha="left", va="top", color=look.FORWARD
+        [0, -0.05, 1.03 * a], "$z_2=0$\n" r"$\alpha=0$", ha="left", va="top", color=look.ABOVE
     )

@@ -18,13 +18,13 @@ from scipy.optimize import brentq
 import bounce
 import nonsmooth as ns
 
+from ..claims import AGREES, CORRECTED, NOT_CHECKABLE, Check, Claim, close
 from .errata import erratum
 from .errata_general import fold_of, generic, law, reverse_slip_with_backspin
 from .errata_linear import exit_in_compression, kelvin_voigt
 from .exact import identical
 from .figures_data import FITS, predictions
 from .model import LAWS, Array, G, X, Xp, Y, Yp, d1, d2, eta, linear, mu
-from .records import AGREES, CORRECTED, NOT_CHECKABLE, Check, Claim, close
 from .table import recomputed
 
 DATA = Path(__file__).parent / "data"

@@ -1,4 +1,4 @@
-"""How the paper's figures look: one palette for colour-blind eyes, line styles that print in grey."""
+"""How the figures of papers look: one palette for colour-blind eyes, line styles that print in grey."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from numpy.typing import ArrayLike
 # Okabe & Ito 2008.
 BLACK, ORANGE, SKY, GREEN = "#000000", "#E69F00", "#56B4E9", "#009E73"
 BLUE, VERMILLION, PURPLE, GREY = "#0072B2", "#D55E00", "#CC79A7", "#7F7F7F"
-FORWARD, REVERSE, ROLLING = VERMILLION, BLUE, BLACK
+ABOVE, BELOW, SLIDING = VERMILLION, BLUE, BLACK
 CANARD = "#A8005C"
 DASHED, DASHDOT, DOTTED = (0, (5, 2)), (0, (6, 2, 1.5, 2)), (0, (1, 1.5))
 

@@ -1,0 +1,80 @@
+"""A claim of a paper, what computing it gives, and the checks behind the verdict."""
+
+from __future__ import annotations
+
+from dataclasses import asdict, dataclass
+from typing import Any
+
+AGREES = "agrees"
+CORRECTED = "corrected"
+NOT_CHECKABLE = "not checkable"
+
+
+@dataclass(frozen=True)
+class Check:
+    """One computed fact.
+
+    Attributes
+    ----------
+    what : str
+        The fact, with the number computed.
+    holds : bool
+    """
+
+    what: str
+    holds: bool
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "holds", bool(self.holds))  # numpy's bool is not JSON's
+
+    def __str__(self) -> str:
+        return self.what if self.holds else f"FAILS: {self.what}"
+
+
+@dataclass(frozen=True)
+class Claim:
+    """A statement of the paper and what computing it gives.
+
+    Attributes
+    ----------
+    id : str
+    place : str
+        Section and equation label; ``from memory`` where the paper was not at hand.
+    statement : str
+        What the paper states.
+    value : str
+        What this code finds.
+    verdict : str
+        ``agrees``, ``corrected`` or ``not checkable``.
+    how : str
+        How it was computed.
+    checks : tuple of Check
+        All hold, or the row is not to be believed.
+    errata : tuple of int
+        Numbers of the errata that apply.
+    """
+
+    id: str
+    place: str
+    statement: str
+    value: str
+    verdict: str
+    how: str
+    checks: tuple[Check, ...]
+    errata: tuple[int, ...] = ()
+
+    @property
+    def holds(self) -> bool:
+        """Whether every check behind the verdict holds."""
+        return all(c.holds for c in self.checks)
+
+    def as_dict(self) -> dict[str, Any]:
+        """Plain values, for JSON."""
+        return {**asdict(self), "holds": self.holds}
+
+
+def close(what: str, value: float, expected: float, tolerance: float) -> Check:
+    """Check that a number is ``expected`` within ``tolerance``; the text shows both."""
+    return Check(
+        f"{what} = {value:.12g} (expected {expected:.12g})", abs(value - expected) <= tolerance
+    )

@@ -41,9 +41,11 @@ from .dividing import (
     dividing_surface,
 )
 from .errors import LandingError, LiftOffError, ModelError, UnknownNameError
+from .fitting import FitError, FitResult, Start, fit
 from .flight import AIRS, QUINTAVALLA, SMITS_SMITH, Air, Flight, flight
 from .friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
 from .generalised import Condition, Conditions, GeneralisedContact
+from .measurements import DataError, Measurements, read_measurements
 from .models import (
     DepthDampedKelvinVoigt,
     Hertz,
@@ -85,10 +87,13 @@ __all__ = [
     "Coulomb",
     "CrossBounce",
     "Dahl",
+    "DataError",
     "DepthDampedKelvinVoigt",
     "DividingCurve",
     "DividingSurface",
     "ExponentialDecay",
+    "FitError",
+    "FitResult",
     "Flight",
     "Forces",
     "FrictionLaw",
@@ -104,6 +109,7 @@ __all__ = [
     "LiftOffs",
     "LuGre",
     "Maxwell",
+    "Measurements",
     "ModelError",
     "NoRestError",
     "NormalKelvinVoigt",
@@ -118,6 +124,7 @@ __all__ = [
     "Scaling",
     "Sensitivity",
     "Shot",
+    "Start",
     "State",
     "Stribeck",
     "TiltedBounce",
@@ -127,6 +134,7 @@ __all__ = [
     "critical_eta",
     "dividing_curve",
     "dividing_surface",
+    "fit",
     "flight",
     "kelvin_voigt_restitution",
     "lift_off",
@@ -135,6 +143,7 @@ __all__ = [
     "penner_tilt",
     "play",
     "plot",
+    "read_measurements",
     "rebound",
     "sensitivity",
     "simulate",

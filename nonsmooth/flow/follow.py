@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Followed, OptionError, Parameters, Surfaces
+from ..model import Array, FilippovSystem, Followed, OptionError, Parameters, Surfaces, followed
 from . import messages
 from .options import Options
 from .polynomial import first_crossing
@@ -90,7 +90,7 @@ def follow(
         [until] if isinstance(until, str) or not isinstance(until, (list, tuple)) else list(until)
     )
     expressions = [u for u in ends if not isinstance(u, str)] + list(watch)
-    motion = Followed(system, mode, expressions)
+    motion = followed(system, mode, expressions)
     names = [g.name for g in motion.guards]
     ending = {f"f{k}" for k in range(sum(not isinstance(u, str) for u in ends))}
     for name in (u for u in ends if isinstance(u, str)):
@@ -161,6 +161,8 @@ class _Follower:
                 return Status.TOO_MANY_STEPS, messages.too_many("steps", self.options.max_steps)
             e = self._expand()
             if not np.all(np.isfinite(e.states)):
+                if self._leave_singular_point(e, left):
+                    continue
                 return Status.NOT_FINITE, messages.field_not_finite(
                     self.motion.mode, self.x.tolist()
                 )
@@ -185,6 +187,15 @@ class _Follower:
             return e
         flip = self.sign ** np.arange(e.states.shape[1])
         return Expansion(e.mode, e.states * flip, e.guards * flip, e.scales, e.gradient, e.finite)
+
+    def _leave_singular_point(self, e: Expansion, left: float) -> bool:
+        """Take the driver's short step where high derivatives do not exist; forward only."""
+        if self.sign < 0:
+            return False
+        coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
+        if h > 0.0:
+            self._advance(Expansion(e.mode, coefficients, e.guards, e.scales, e.gradient, True), h)
+        return h > 0.0
 
     def _zeros(self, e: Expansion, h: float, fresh: dict[int, int]) -> list[tuple[float, int]]:
         hits = []

@@ -11,7 +11,17 @@ from .errors import (
     PointError,
     explain,
 )
-from .motion import Evaluator, Followed, Guard, Intersection, Motion, Resets, Surfaces, motion
+from .motion import (
+    Evaluator,
+    Followed,
+    Guard,
+    Intersection,
+    Motion,
+    Resets,
+    Surfaces,
+    followed,
+    motion,
+)
 from .regularise import regularise
 from .system import Array, FilippovSystem, Parameters, Reset, Stop
 
@@ -37,6 +47,7 @@ __all__ = [
     "Stop",
     "Surfaces",
     "explain",
+    "followed",
     "motion",
     "regularise",
 ]

@@ -345,6 +345,16 @@ class Intersection(Motion):
         return found
 
 
+def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -> Followed:
+    """Return the watched motion of a mode, built once per system unless functions are added."""
+    if watched:
+        return Followed(system, mode, watched)
+    key = ("followed", mode)
+    if key not in system._functions:
+        system._functions[key] = Followed(system, mode, ())
+    return system._functions[key]
+
+
 def motion(system: FilippovSystem, mode: str) -> Motion:
     """Return the motion of a mode, built once per system."""
     key = ("motion", mode)

@@ -58,3 +58,10 @@ def test_wrong_requests_are_refused():
         ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", watch=[ca.SX.sym("q")])
     with pytest.raises(ns.NotSmoothError):
         ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until=[ca.fabs(x)])
+
+
+def test_a_power_law_is_followed_from_its_singular_point():
+    """v' = -x^(3/2) from x = 0 keeps v^2/2 + x^(5/2)/2.5."""
+    system = ns.FilippovSystem([x, y], field=[y, -x * ca.sqrt(x)])
+    run = ns.follow(system, [0.0, 1.0], 10.0, mode="", until=[y], tol=1e-12)
+    assert run.x[-1, 0] == pytest.approx(1.25**0.4, abs=1e-10)

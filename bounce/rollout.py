@@ -226,7 +226,7 @@ def play(
             raise NoRestError(
                 f"max_bounces: expected rest within {max_bounces} bounces, received a hop of "
                 f"{_height(landing, slope):.3g} m before the next. Raise max_bounces or min_height "
-                f"({min_height:g} m); with a restitution of 1 there is no rest."
+                f"({min_height:g} m); with a restitution of 1, or down a slope, there may be no rest."
             )
         hit = rebound(model, landing, ball, scaling=scaling, tol=tol)
         off, hop = hit.lift_off, None

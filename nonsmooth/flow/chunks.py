@@ -77,6 +77,13 @@ def forget(job: Job) -> None:
     _OWN.pop(_digest(job.system), None)
 
 
+def stop_chunks(job: Job, stopping: bool) -> None:
+    """Make the chunks of a job that run in this process fail at once, or take that back."""
+    engine = engine_for(_system(job), job.options) if job.compiled else None
+    if engine is not None:
+        engine.stop(stopping)
+
+
 def run_chunk(job: Job, x: Array, p: Array) -> Chunk:
     """Run the trajectories from extended starts x (m, N) with parameters p (np,) or (m, np)."""
     system = _system(job)
@@ -89,6 +96,8 @@ def run_chunk(job: Job, x: Array, p: Array) -> Chunk:
     else:
         chunk = engine.run_many(start, p, job.options, job.at, job.lanes)
     for i in np.flatnonzero(chunk.status == HAND_OVER):
+        if engine is not None and engine.stopping:
+            raise RuntimeError("The ensemble was stopped.")
         _run_reference(chunk, system, int(i), start[i], p[i] if p.ndim > 1 else p, job)
     chunk.x[bad] = x[bad, : system.dimension]
     return _compact(chunk)

@@ -9,8 +9,9 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from contextlib import closing
 from dataclasses import dataclass
 from typing import Any
 
@@ -19,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, OptionError, PointError, explain
 from .checkpoint import Checkpoint
-from .chunks import Job, forget, make_job, run_chunk
+from .chunks import Job, forget, make_job, run_chunk, stop_chunks
 from .compiled.engine import KINDS, Chunk, engine_for, supports_lanes
 from .compiled.select import use_compiled
 from .options import Options
@@ -370,28 +371,33 @@ def _run_all(
     work = ((k, *starts.part(k * size, min((k + 1) * size, starts.count))) for k in missing)
     workers = min(threads or _processors(), max(1, len(missing)))
     try:
-        for number, chunk in _chunks(job, work, workers, executor):
-            if saved is not None:
-                saved.save(number, chunk)
-            results.put(number * size, chunk)
-            bar.update(len(chunk.t))
+        with closing(_chunks(job, work, workers, executor)) as finished:
+            for number, chunk in finished:
+                if saved is not None:
+                    saved.save(number, chunk)
+                results.put(number * size, chunk)
+                bar.update(len(chunk.t))
     finally:
         bar.close()
 
 
 def _chunks(
     job: Job, work: Iterator[tuple[int, Array, Array]], workers: int, executor: Executor | None
-) -> Iterator[tuple[int, Chunk]]:
+) -> Generator[tuple[int, Chunk], None, None]:
     """Finished chunks in the order in which they finish; a bounded number is under way."""
-    if executor is None and workers == 1:
-        for number, x, p in work:
-            yield number, run_chunk(job, x, p)
-        return
     if executor is not None:
         yield from _submit(job, work, executor, _IN_FLIGHT)
         return
-    with ThreadPoolExecutor(workers) as pool:
+    # A pool even for one thread: this one then hears Ctrl-C while a chunk is running.
+    pool = ThreadPoolExecutor(workers)
+    try:
         yield from _submit(job, work, pool, 2 * workers)
+    except BaseException:
+        stop_chunks(job, True)
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+        stop_chunks(job, False)
 
 
 def _submit(

@@ -21,6 +21,9 @@ enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SM
 enum { RUNNING = -1, FULL = -2, HAND_OVER = -3 };
 enum { CROSSING, ENTRY, EXIT, STOP, RESET, END, KINDS };
 
+/* Set by another thread to leave all runs as they are. */
+volatile int stop_requested = 0;
+
 static inline double ns_sign(double a) { return (a > 0) - (a < 0); }
 
 /* Inverse error function: Giles 2010, then two Newton steps. */

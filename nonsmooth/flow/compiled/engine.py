@@ -151,6 +151,7 @@ class Engine:
         self._scalar: ctypes.CDLL | None = None
         self._lanes: ctypes.CDLL | None = None
         self._lock = threading.Lock()
+        self.stopping = False
 
     @property
     def scalar(self) -> ctypes.CDLL:
@@ -167,6 +168,13 @@ class Engine:
             if self._lanes is None:
                 self._lanes = _declare(build(lanes_source(self.system, self.order, lane_width())))
             return self._lanes
+
+    def stop(self, stopping: bool) -> None:
+        """Make running calls of ``run_many`` return at once; to be taken back afterwards."""
+        self.stopping = stopping
+        for library in (self._scalar, self._lanes):
+            if library is not None:
+                ctypes.c_int.in_dll(library, "stop_requested").value = int(stopping)
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -296,6 +304,8 @@ class Engine:
         t_start: float,
         chunk: Chunk,
     ) -> None:
+        if self.stopping:  # a library that was loaded after the request does not know of it
+            return
         tree = library.tree_new()
         start = np.array([t_start])
         try:

@@ -602,7 +602,7 @@ void run_lanes(int64_t count, const int64_t *which, const double *x0, const doub
     I fresh = {0};
     if (w.alive < W && w.next < w.count) fresh = refill(&s, &w);
     if (any(fresh)) { begin(&s, &w, fresh); continue; }
-    if (!w.alive) break;
+    if (!w.alive || stop_requested) break;
     step(&s, &w);
   }
 }

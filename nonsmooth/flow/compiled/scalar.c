@@ -655,7 +655,7 @@ void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const do
 
 /* Go on until the run ends or its arrays have no room for another step (FULL). */
 int run_continue(Run *r) {
-  while (r->status == RUNNING) {
+  while (r->status == RUNNING && !stop_requested) {
     if (r->o.dense && (r->out.steps >= r->out.step_room || r->out.points + 3 > r->out.point_room
                        || r->out.events + 4 > r->out.event_room))
       return FULL;
@@ -689,8 +689,7 @@ void run_many(int64_t count, const int64_t *which, const double *x0, const doubl
   for (int64_t k = 0; k < count; k++) {
     int64_t i = which ? which[k] : k;
     run_begin(&r, o, &none, tree, x0 + i * N, p + i * p_stride, t0[0]);
-    run_continue(&r);
-    if (r.status == RUNNING) r.status = HAND_OVER;
+    if (run_continue(&r) == RUNNING) return;
     if (r.status != STOPPED) r.kinds[END]++;
     memcpy(x + i * ND, r.x, ND * sizeof(double));
     t[i] = r.t;

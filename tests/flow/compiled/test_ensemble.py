@@ -2,7 +2,12 @@
 
 import concurrent.futures
 import multiprocessing
+import os
 import pickle
+import signal
+import subprocess
+import sys
+import time
 
 import casadi as ca
 import numpy as np
@@ -222,3 +227,37 @@ def test_quiet_without_a_terminal(system, starts, capfd):
     ensemble(system, starts[:5], 1.0, progress=True)
     out, err = capfd.readouterr()
     assert out == "" and err == ""
+
+
+ENDLESS = """
+import sys, casadi as ca, numpy as np
+from nonsmooth.flow.ensemble import ensemble
+from nonsmooth.model import FilippovSystem
+x, v = ca.SX.sym("x"), ca.SX.sym("v")
+system = FilippovSystem([x, v], surface=v - 9, above=[v, -x - 1], below=[v, -x])
+starts = np.random.default_rng(0).normal(size=(400, 2))
+ensemble(system, starts[:100], 1.0, chunk=50, threads=1)
+print("ready", flush=True)
+ensemble(system, starts, 1e8, max_steps=10**12, chunk=50, threads=int(sys.argv[1]))
+"""
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+@pytest.mark.parametrize("threads", ["1", "2"])
+def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(threads):
+    path = os.pathsep.join(p for p in sys.path if p)
+    with subprocess.Popen(
+        [sys.executable, "-c", ENDLESS, threads],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        env=os.environ | {"PYTHONPATH": path},
+    ) as process:
+        try:
+            assert process.stdout.readline() == b"ready\n"
+            time.sleep(0.5)
+            process.send_signal(signal.SIGINT)
+            _, error = process.communicate(timeout=20)
+        finally:
+            process.kill()
+    assert b"KeyboardInterrupt" in error and process.returncode != 0

@@ -1,0 +1,1 @@
+"""Speeds and errors beside other tools: ``python -m benchmarks`` or ``make bench``."""

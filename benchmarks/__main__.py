@@ -1,0 +1,62 @@
+"""``python -m benchmarks [--quick] [--only SECTION ...]``: measure, and write build/benchmarks/."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+from . import bounces, correctness, elsewhere, long_runs, report, resources, startup, two_folds
+from .measure import ROOT, machine
+
+BOUNCES = ("linear", "nonlinear")
+FOLDER = ROOT / "build" / "benchmarks"
+
+
+def sections(folder: Path, quick: bool) -> dict[str, Callable[[], Any]]:
+    """What can be measured, by name."""
+    return {
+        "peak": resources.peak,
+        "bounces": lambda: {name: bounces.run(name, folder, quick) for name in BOUNCES},
+        "long runs": lambda: long_runs.run(quick),
+        "elsewhere": lambda: elsewhere.run(quick),
+        "two-folds": lambda: two_folds.run(quick),
+        "startup": lambda: startup.run(quick),
+        "memory": lambda: resources.memory(quick),
+        "scaling": lambda: resources.scaling(quick),
+        "correctness": lambda: {name: correctness.run(name, folder, quick) for name in BOUNCES},
+    }
+
+
+def main(arguments: Sequence[str] | None = None) -> None:
+    """Run the sections asked for; results of the others are kept from the last run."""
+    parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
+    parser.add_argument(
+        "--quick", action="store_true", help="small sizes: a minute, not for figures"
+    )
+    parser.add_argument("--only", nargs="+", metavar="SECTION", choices=[*sections(FOLDER, True)])
+    parser.add_argument("--folder", type=Path, help="where results go (build/benchmarks)")
+    options = parser.parse_args(arguments)
+    folder = options.folder or (FOLDER / "quick" if options.quick else FOLDER)
+    folder.mkdir(parents=True, exist_ok=True)
+    path = folder / "results.json"
+    results: dict[str, Any] = json.loads(path.read_text()) if options.only and path.exists() else {}
+    results["machine"] = machine()
+    for name, run in sections(folder, options.quick).items():
+        if options.only and name not in options.only:
+            continue
+        print(f"{name} (load {os.getloadavg()[0]:.1f})", flush=True)
+        results[name] = run()
+        path.write_text(json.dumps(results, indent=1))
+    text = report.markdown(results)
+    (folder / "results.md").write_text(text, encoding="utf-8")
+    report.pictures(results, folder)
+    print(text)
+    print(f"benchmarks: {os.path.relpath(path)}, results.md, work_precision.png")
+
+
+if __name__ == "__main__":
+    main()

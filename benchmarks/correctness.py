@@ -1,0 +1,102 @@
+"""Itineraries: 100,000 random starts, and starts bisected to 1e-9 of every boundary between them.
+
+The compiled engine at its default tolerance against itself at 1e-14 for all starts, against the
+reference driver at 1e-15 and against mpmath for a sample of the random starts and for boundaries.
+"""
+
+from __future__ import annotations
+
+from itertools import combinations
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import ours, reference
+from .problems import LETTERS, Array, Codes, landings, random_starts
+
+DEFAULT, TIGHT = 1e-10, 1e-14
+#: Distance between the two ends of a bisected pair of starts.
+GAP = 1e-9
+
+
+def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
+    """Count wrong itineraries of one bounce."""
+    count, sample = (5_000, 50) if quick else (100_000, 1_000)
+    starts = random_starts(count, seed=5)
+    solve, tight = ours.make(name, DEFAULT), ours.make(name, TIGHT)
+    ends, exact = solve(starts), tight(starts)
+    driver = ours.reference_driver(name, 1e-15)(starts[:sample])
+    some = slice(0, 50 if quick else 500)
+    truth = reference.solve(name, starts[some])
+    result: dict[str, Any] = {
+        "random starts": count,
+        "wrong at the default tolerance": _differ(ends.itinerary, exact.itinerary),
+        "largest difference": float(reference.error(ends, exact).max()),
+        "against the reference driver": sample,
+        "wrong against the reference driver": _differ(ends.itinerary[:sample], driver.itinerary),
+        "against mpmath": len(truth.t),
+        "wrong against mpmath": _differ(ends.itinerary[some], truth.itinerary),
+        "boundaries": _boundaries(name, starts, exact.itinerary, 4 if quick else 40, quick),
+    }
+    print(f"  {name}: {result}", flush=True)
+    return result
+
+
+def _differ(a: Codes, b: Codes) -> int:
+    return int((a != b).sum())
+
+
+def letters(number: int) -> str:
+    """Itinerary of a code."""
+    word = ""
+    while number:
+        number, digit = divmod(number - 1, 4)
+        word = LETTERS[digit] + word
+    return word
+
+
+def _boundaries(
+    name: str, starts: Array, codes: Codes, each: int, quick: bool
+) -> dict[str, dict[str, int]]:
+    """For each pair of itineraries that are neighbours somewhere: pairs of starts, wrong ones."""
+    low, high, a, b = _pairs(name, starts, codes, each)
+    solve = ours.make(name, DEFAULT)
+    checks = [(low, a), (high, b)]
+    wrong = np.zeros(len(low), int)
+    wrong_mp = np.zeros(len(low), int)
+    stride = slice(None, None, 4)
+    for x, expected in checks:
+        wrong += solve(x).itinerary != expected
+        wrong_mp[stride] += reference.solve(name, x[stride]).itinerary != expected[stride]
+    result: dict[str, dict[str, int]] = {}
+    for i in range(len(low)):
+        key = " | ".join(sorted((letters(int(a[i])), letters(int(b[i])))))
+        row = result.setdefault(key, {"starts": 0, "wrong": 0, "mpmath disagrees": 0})
+        row["starts"] += 2
+        row["wrong"] += int(wrong[i])
+        row["mpmath disagrees"] += int(wrong_mp[i])
+    return result
+
+
+def _pairs(name: str, starts: Array, codes: Codes, each: int) -> tuple[Array, Array, Codes, Codes]:
+    """Bisect segments between starts of different itineraries until their ends are GAP apart.
+
+    A third itinerary met on the way replaces one end, so that what is left are true neighbours.
+    """
+    rng = np.random.default_rng(6)
+    low, high = [], []
+    for one, other in combinations(np.unique(codes), 2):
+        first, second = np.flatnonzero(codes == one), np.flatnonzero(codes == other)
+        low.append(starts[rng.choice(first, each)])
+        high.append(starts[rng.choice(second, each)])
+    x, y = np.concatenate(low), np.concatenate(high)
+    solve = ours.make(name, TIGHT)
+    a, b = solve(x).itinerary, solve(y).itinerary
+    while np.abs(x - y).max() > GAP:
+        middle = landings(0.5 * (x[:, 1] + y[:, 1]), 0.5 * (x[:, 4] + y[:, 4]))
+        c = solve(middle).itinerary
+        left = c != a
+        y[left], b[left] = middle[left], c[left]
+        x[~left] = middle[~left]
+    return x, y, a, b

@@ -1,0 +1,74 @@
+"""Peers that live in interpreters of their own: Siconos and nosnoc, on a shorter stick-slip run.
+
+Name the interpreters in the environment variables below; without them the section says so.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import time
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import nonsmooth as ns
+
+from .problems import BELTS, STICK, STICK_START, stick_slip_system
+
+BELT, T_END = BELTS["many events"], 100.0
+#: Label, environment variable, script, steps to try.
+PEERS = (
+    (
+        "siconos, Moreau time stepping",
+        "BENCH_SICONOS_PYTHON",
+        "siconos_stick_slip",
+        (1e-2, 1e-3, 1e-4),
+    ),
+    ("nosnoc, FESD Radau IIA", "BENCH_NOSNOC_PYTHON", "nosnoc_stick_slip", (0.5, 0.25)),
+)
+
+
+def run(quick: bool) -> dict[str, Any]:
+    """Errors at t = 100 and processor seconds, for each step of each peer, and for ours."""
+    truth = ns.simulate(stick_slip_system(BELT), STICK_START, T_END, tol=1e-14).x[-1]
+    result: dict[str, Any] = {"nonsmooth": {"rows": _ours(truth)}}
+    for label, variable, script, steps in PEERS:
+        python = os.environ.get(variable)
+        if python is None:
+            result[label] = {"missing": f"name an interpreter that has it in {variable}"}
+            continue
+        found = _peer(python, script, list(steps[:1] if quick else steps))
+        for row in found["rows"]:
+            row["error"] = float(np.abs(np.array(row.pop("x")) - truth).max())
+        result[label] = found
+        print(f"  {label}: {found}", flush=True)
+    return result
+
+
+def _ours(truth: np.ndarray) -> list[dict[str, Any]]:
+    rows = []
+    for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
+        seconds = []
+        for _ in range(5):
+            begin = time.process_time()
+            end = ns.simulate(
+                stick_slip_system(BELT), STICK_START, T_END, tol=tolerance, engine="compiled"
+            )
+            seconds.append(time.process_time() - begin)
+        error = float(np.abs(end.x[-1] - truth).max())
+        rows.append({"tolerance": tolerance, "error": error, "seconds": float(np.median(seconds))})
+    return rows
+
+
+def _peer(python: str, script: str, steps: list[float]) -> dict[str, Any]:
+    problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": steps}
+    path = Path(__file__).with_name("peers") / f"{script}.py"
+    call = [python, str(path), json.dumps(problem)]
+    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    if done.returncode:
+        return {"missing": f"failed: {done.stderr.strip()[-200:]}", "rows": []}
+    found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
+    return found

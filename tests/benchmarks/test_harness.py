@@ -1,0 +1,118 @@
+"""The benchmarks compute what they say: problems, references, errors and ratios, on tiny sizes."""
+
+from __future__ import annotations
+
+import math
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from benchmarks import bounces, correctness, measure, ours, problems, reference, report, two_folds
+from benchmarks.peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
+
+NAMES = ("linear", "nonlinear")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_peers_and_library_get_the_same_fields(name):
+    x = np.array([0.1, 0.7, -0.3, -0.4, 0.2])
+    problem, system = problems.bounce(name), problems.bounce_system(name)
+    for mode, letter in ((problems.PLUS, "+"), (problems.MINUS, "-")):
+        values = system.evaluate(system.field(letter), x)
+        assert np.allclose(problem.fields[mode](*x), np.ravel(values), rtol=1e-14, atol=1e-15)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_mpmath_scipy_and_the_library_agree(name):
+    starts = problems.random_starts(2, seed=7)
+    truth = reference.solve(name, starts)
+    for solve in (ours.reference_driver(name, 1e-13), scipy_dop853.make(name, 1e-11)):
+        ends = solve(starts)
+        assert reference.error(ends, truth).max() < 1e-9
+        assert (ends.itinerary == truth.itinerary).all()
+
+
+@pytest.mark.parametrize(
+    "peer",
+    [heyoka_modes, heyoka_callbacks, pytest.param(diffrax_modes, marks=pytest.mark.slow)],
+    ids=lambda m: m.__name__.split(".")[-1],
+)
+def test_peers_that_are_installed_agree(peer):
+    if not peer.available():
+        pytest.skip("an extra of the benchmarks")
+    starts = problems.random_starts(2, seed=7)
+    truth = reference.solve("linear", starts)
+    ends = peer.make("linear", 1e-10)(starts)
+    assert reference.error(ends, truth).max() < 1e-8
+    assert (ends.itinerary == truth.itinerary).all()
+
+
+def test_stick_slip_is_the_same_for_peers():
+    belt = problems.BELTS["many events"]
+    engine = scipy_dop853.Scipy(problems.stick_slip(belt, math.cos), 1e-11, 1e-13)
+    end = engine.solve(np.array([[*problems.STICK_START, 0.0]]), 20.0)
+    run = ns.simulate(problems.stick_slip_system(belt), problems.STICK_START, 20.0)
+    assert np.abs(end.x[0, :2] - run.x[-1]).max() < 1e-9
+    assert end.itinerary[0] == problems.code(run.itinerary)
+
+
+def test_first_fall_skips_rises_and_what_is_dropped():
+    # t (t - 0.25) (0.5 - t) (t - 0.75): falls at 0.5 only, after t is dropped
+    c = [mp.mpf(v) for v in np.polynomial.polynomial.polyfromroots([0, 0.25, 0.5, 0.75])]
+    assert abs(reference.first_fall(c, mp.mpf(1), 1) - mp.mpf("0.5")) < 1e-14
+    assert reference.first_fall(c, mp.mpf("0.4"), 1) is None
+
+
+def test_codes_are_itineraries():
+    assert correctness.letters(problems.code("+ s -")) == "+s-"
+    assert problems.code("- s -") != problems.code("+ s -")
+
+
+def test_a_failed_run_is_an_infinite_error():
+    good = reference.Ends(np.zeros(2), np.zeros((2, 5)), np.ones(2, np.int64))
+    bad = reference.Ends(np.array([0.0, np.nan]), np.zeros((2, 5)), np.ones(2, np.int64))
+    assert reference.error(bad, good).tolist() == [0.0, math.inf]
+
+
+def test_ladder():
+    assert bounces.ladder(-6, -8, 1) == (1e-6, 1e-7, 1e-8)
+
+
+def test_work_takes_turns():
+    order, now = [], iter(range(100))
+    work = {name: lambda name=name: order.append(name) for name in "ab"}
+    timings = measure.alternate(work, 2, clock=lambda: float(next(now)))
+    assert order == list("ababab")
+    assert timings["a"].median == 1.0 and timings["a"].rate(10) == 10.0
+
+
+def test_a_fresh_process_reports():
+    result = measure.fresh("note = 1 + 1")
+    assert result["note"] == 2 and result["peak_mib"] > 1
+    with pytest.raises(RuntimeError, match="no_such_name"):
+        measure.fresh("no_such_name")
+
+
+def test_the_script_by_hand_gives_the_same_classes():
+    grid = np.array([(-2.0, 1.0), (1.5, -2.5), (2.5, 2.0)])
+    assert two_folds.library(grid) == two_folds.by_hand(grid)
+
+
+def test_ratios_and_tables():
+    solvers = {
+        "nonsmooth": {"rate": 300.0},
+        report.MODES: {"rate": 10.0},
+        "scipy DOP853": {"rate": 0.2},
+    }
+    results = {
+        "machine": {"cpu": "any"},
+        "bounces": {"linear": {"solvers": solvers, "target": 1e-9}},
+        "memory": {"peak MiB": 2048.0, "bounces": 10, "starts_mib": 1.0, "results_mib": 2.0},
+    }
+    found = report.figures(results)
+    assert found[f"linear bounce: times {report.MODES}"] == 30.0
+    assert found["linear bounce: times scipy"] == pytest.approx(1500.0)
+    rows = report._targets(results).splitlines()[2:]
+    assert [row.split("|")[-2].strip() for row in rows] == ["met", "**missed**", "met"]

@@ -1,0 +1,20 @@
+"""All eight classes of two-folds
+
+The generic two-folds, each by its sliding portrait and its flow in space, and where they lie in the
+plane of (nu1, nu2). Two signs and two numbers decide: which orbits reach the singularity, and
+whether the future is unique behind it.
+"""
+
+import nonsmooth as ns
+
+classes = {
+    label: ns.classify_two_fold(sigma, nu)
+    for label, (sigma, nu) in ns.textbook.TWO_FOLDS.items()
+}  # fmt: skip
+
+figure = ns.plot.two_fold_atlas(list(classes))
+
+if __name__ == "__main__":
+    for label, found in classes.items():
+        print(f"{label:6} canards {found.canards:g}, faux canards {found.faux_canards:g}")
+    figure.savefig("atlas.pdf")

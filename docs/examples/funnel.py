@@ -1,0 +1,44 @@
+"""All futures behind a two-fold
+
+Along the canard of a visible two-fold (class VV-C1) sliding leads through the singularity into
+repelling sliding, where the motion may leave to either side at any time. A run stops at the
+two-fold with `NON_UNIQUE`; a funnel samples the set of futures instead of choosing one.
+"""
+
+import numpy as np
+from matplotlib.figure import Figure
+
+import nonsmooth as ns
+
+system = ns.textbook.two_fold("VV-C1").system
+fold = ns.find_two_fold(system, near=[0.0, 0.0, 0.0])
+slope = fold.classification.into.low  # z3/z2 on the canard
+run = ns.simulate(system, [0.0, 0.5, 0.5 * slope], t_end=10.0)
+futures = ns.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
+
+figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+height, plane = figure.subplots(1, 2)
+STYLE = {
+    "+": dict(color="#D55E00", linewidth=0.8),
+    "-": dict(color="#0072B2", linewidth=0.8, linestyle="--"),
+    "s": dict(color="black", linewidth=2.0),
+}
+before = np.linspace(0.0, futures.t, 100)
+after = np.linspace(futures.t, futures.t + 1.0, 200)
+height.plot(before, run(before)[:, 0], **STYLE["s"])
+plane.plot(*run(before)[:, 1:].T, **STYLE["s"])
+for states, departure in zip(futures(after), futures.departures, strict=True):
+    height.plot(after, states[:, 0], **STYLE[departure.side])
+    plane.plot(*states[:, 1:].T, **STYLE[departure.side])
+for side, label in (("+", "leaves up"), ("-", "leaves down"), ("s", "slides")):
+    height.plot([], [], label=label, **STYLE[side])
+height.set(xlabel="t", ylabel="z1")
+height.legend(loc="upper left", frameon=False)
+plane.plot(0.0, 0.0, "ko")
+plane.annotate("two-fold", (0.0, 0.0), xytext=(8, -4), textcoords="offset points")
+plane.set(xlabel="z2", ylabel="z3")
+
+if __name__ == "__main__":
+    print(run.status, run.message)
+    print(futures)
+    figure.savefig("funnel.png")

@@ -1,0 +1,42 @@
+"""A harvested population at its bifurcations
+
+Predators are hunted only where there are more than alpha of them. As alpha rises, the equilibrium
+with harvest becomes a pseudo-node (boundary node); the one without harvest frees itself from the
+line and leaves a pseudo-saddle behind (boundary focus); at last pseudo-saddle and pseudo-node meet
+and vanish (pseudo-saddle-node). Kuznetsov, Rinaldi & Gragnani 2003; parameters quoted from memory.
+"""
+
+from matplotlib.figure import Figure
+
+import nonsmooth as ns
+
+problem = ns.textbook.harvested_prey_predator()
+values = {
+    "boundary node": problem["boundary node"].value,
+    "boundary focus": problem["boundary focus"].value,
+    "saddle and node": 1.06,
+    "pseudo-saddle-node": problem["pseudo-saddle-node"].value,
+}
+figure = Figure(figsize=(11.0, 8.4), layout="constrained")
+panels = dict(zip(values, figure.subplots(2, 2).T.flat, strict=True))
+for name, ax in panels.items():
+    ns.plot.phase_portrait(
+        problem.system,
+        (0.0, 1.1, values[name] - 0.5, values[name] + 0.5),
+        parameters={"alpha": values[name]},
+        ax=ax,
+        legend=name == "saddle and node",
+        title=f"{name}, alpha = {values[name]:.4f}",
+    )
+
+merged = ((1 - problem.parameters["b"]) / 2, values["pseudo-saddle-node"])
+panels["pseudo-saddle-node"].plot(*merged, "ks", fillstyle="left", markersize=8, zorder=9)
+
+pseudo = [
+    ns.find_pseudo_equilibrium(problem.system, near=[x1, 1.06], parameters={"alpha": 1.06})
+    for x1 in (0.1, 0.6)
+]
+
+if __name__ == "__main__":
+    print(values, *pseudo)
+    figure.savefig("harvest.png")

@@ -1,0 +1,141 @@
+"""Each program of the gallery runs, draws, and computes the numbers that its page speaks of.
+
+The numbers come from outside the programs: closed forms, and the references of the textbook.
+"""
+
+import importlib.util
+import math
+from functools import cache
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+DOCS = Path(__file__).parents[2] / "docs"
+_spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
+generate = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(generate)
+
+#: The period of docs/examples/stick_slip.py: both fields are linear, so the slip ends at a root of
+#: a sum of exponentials, found here to 30 digits with mpmath.
+PERIOD = 6.736837191765135
+
+
+@cache
+def ran(name):
+    """What a program of the gallery defines."""
+    return generate.run_example(name)
+
+
+@pytest.mark.parametrize("name", generate.GALLERY)
+def test_program_draws(name, tmp_path):
+    figure = ran(name)["figure"]
+    assert isinstance(figure, Figure)
+    figure.savefig(tmp_path / "picture.svg")
+    assert (tmp_path / "picture.svg").stat().st_size > 5_000
+
+
+def test_gallery_is_all_programs():
+    assert sorted(generate.GALLERY) == sorted(p.stem for p in generate.EXAMPLES.glob("*.py"))
+
+
+def test_two_fold_is_the_teixeira_singularity():
+    fold = ran("two_fold")["fold"]
+    assert (fold.label, fold.sigma) == ("II-C", (-1, 1))
+    assert fold.nu == pytest.approx((-2, -1), abs=1e-12)
+
+
+def test_diabolo():
+    found = ran("two_fold_space")
+    assert found["expanding"] == pytest.approx(2 - math.sqrt(2), abs=1e-12)
+    assert found["contracting"] == pytest.approx(2 + math.sqrt(2), abs=1e-12)
+    assert found["time_to_fold"] == pytest.approx(1 + 2 * math.sqrt(2), abs=1e-11)
+
+
+def test_atlas_counts_canards():
+    counts = {k: (c.canards, c.faux_canards) for k, c in ran("atlas")["classes"].items()}
+    inf = math.inf
+    assert counts == {
+        "VV-C1": (1, 0),
+        "VV-F": (0, inf),
+        "II-C": (inf, 0),
+        "II-F": (0, 1),
+        "mix-0": (0, 0),
+        "mix-S": (1, 1),
+        "mix-C": (inf, 0),
+        "mix-F": (0, inf),
+    }
+
+
+def test_funnel_begins_where_the_canard_meets_the_two_fold():
+    found = ran("funnel")
+    golden = (1 + math.sqrt(5)) / 2  # slope of the canard for nu = (-2, -1)
+    assert found["slope"] == pytest.approx(golden, abs=1e-12)
+    # on an eigenline t = (z2 + z3)/|lambda|, with lambda = -(1 + slope)
+    assert found["futures"].t == pytest.approx(0.5, abs=1e-9)
+    assert {d.side for d in found["futures"].departures} == {"+", "-", "s"}
+
+
+def test_stick_slip_period():
+    found = ran("stick_slip")
+    assert found["period"] == pytest.approx(PERIOD, abs=1e-9)
+    assert [e.x[0] for e in found["exits"]] == pytest.approx([0.5] * 5, abs=1e-10)
+
+
+def test_period_of_stick_slip_in_high_precision():
+    mpmath = pytest.importorskip("mpmath")
+    with mpmath.workdps(30):
+        a, c = mpmath.mpf("0.1"), mpmath.mpf("0.44")  # x'' - 2 a x' + x = c while it slips
+        w = mpmath.sqrt(1 - a**2)
+        p = mpmath.mpf("0.5") - c
+        q = (mpmath.mpf("0.3") - a * p) / w
+
+        def x(t):
+            return c + mpmath.exp(a * t) * (p * mpmath.cos(w * t) + q * mpmath.sin(w * t))
+
+        slip = mpmath.findroot(lambda t: mpmath.diff(x, t) - mpmath.mpf("0.3"), 5.3)
+        period = slip + (mpmath.mpf("0.5") - x(slip)) / mpmath.mpf("0.3")
+    assert float(period) == pytest.approx(PERIOD, abs=1e-14)
+
+
+def test_leine_oscillator():
+    found = ran("leine")
+    assert found["problem"]["period"].agrees(found["period"])
+    assert found["problem"]["stick time"].agrees(found["stick_time"])
+
+
+def test_harvest_has_a_saddle_and_a_node():
+    found = ran("harvest")
+    saddle, node = found["pseudo"]
+    assert (saddle.kind, node.kind) == ("pseudo-saddle", "stable pseudo-node")
+    a, b = (found["problem"].parameters[k] for k in "ab")
+    half = math.sqrt((1 + b) ** 2 - 4 * a * 1.06) / 2  # (1 - x1)(b + x1) = a alpha
+    centre = (1 - b) / 2
+    assert saddle.point[0] == pytest.approx(centre - half, abs=1e-10)
+    assert node.point[0] == pytest.approx(centre + half, abs=1e-10)
+
+
+def test_every_block_comes_to_rest():
+    found = ran("basins")
+    assert found["at_rest"].all()
+    share = found["share"]
+    assert share["left"] == share["right"]  # the system is odd, and so is the grid
+    assert share["left"] + share["hill"] + share["right"] == pytest.approx(1)
+    x = found["many"].x[..., 0]
+    assert np.abs(x - x**3).max() <= 0.08 + 1e-9  # within reach of static friction
+
+
+def test_bounce_goes_into_reverse():
+    shot = ran("friction_cone")["shot"]
+    assert shot.itinerary == "+ s -"
+    assert shot.slip < 0
+
+
+def test_dividing_curve_divides_the_map():
+    found = ran("outcome_map")
+    curve, slip = found["curve"], found["map_"].slip
+    speeds, spins = found["speeds"], found["spins"]
+    inside = np.abs(speeds) < 0.4  # where the curve is one spin for each speed
+    above = spins[:, None] > curve.omega(speeds[inside])
+    assert np.mean((slip[:, inside] > 0) == above) > 0.998

@@ -1,0 +1,66 @@
+"""The Python blocks of every page run, in order, as one program, and print what the page says."""
+
+import contextlib
+import doctest
+import importlib
+import io
+import re
+from pathlib import Path
+
+import pytest
+
+DOCS = Path(__file__).parents[2] / "docs"
+PAGES = sorted(DOCS.glob("*.md"))
+
+# An optional comment, a block of Python, and the text it prints, if it is shown.
+BLOCK = re.compile(
+    r"(?:^<!-- (?P<note>not run|needs): (?P<what>.*?) -->\n)?"
+    r"^```python[^\n]*\n(?P<source>.*?)^```[ ]*$"
+    r"(?:\n*^```text\n(?P<output>.*?)^```[ ]*$)?",
+    re.MULTILINE | re.DOTALL,
+)
+SAME = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+
+
+def check_block(name, line, source, wanted, namespace):
+    """Run one block and compare what it prints."""
+    printed = io.StringIO()
+    with contextlib.redirect_stdout(printed):
+        exec(compile("\n" * (line - 1) + source, name, "exec"), namespace)
+    if wanted is not None:
+        agrees = doctest.OutputChecker().check_output(wanted, printed.getvalue(), SAME)
+        assert agrees, f"{name}:{line}: expected\n{wanted}\nprinted\n{printed.getvalue()}"
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+def test_blocks_run_and_print_what_the_page_says(page, tmp_path, monkeypatch):
+    text = page.read_text(encoding="utf-8")
+    monkeypatch.chdir(tmp_path)  # what a block saves stays out of the repository
+    namespace = {"__name__": page.stem}
+    for found in BLOCK.finditer(text):
+        if found["note"] == "not run" or (found["note"] == "needs" and not present(found["what"])):
+            continue
+        line = text[: found.start("source")].count("\n") + 1
+        check_block(page.name, line, found["source"], found["output"], namespace)
+
+
+def present(module):
+    """Whether a module can be imported."""
+    try:
+        importlib.import_module(module)
+    except ImportError:
+        return False
+    return True
+
+
+def test_every_page_is_in_the_navigation():
+    navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+    assert PAGES
+    assert [p.name for p in PAGES if f": {p.name}\n" not in navigation] == []
+
+
+def test_blocks_are_found_with_their_output():
+    text = "```python\nprint(1)\n```\n\n```text\n1\n```\n\n<!-- needs: a -->\n```python\nb\n```\n"
+    first, second = BLOCK.finditer(text)
+    assert (first["source"], first["output"], first["note"]) == ("print(1)\n", "1\n", None)
+    assert (second["source"], second["output"], second["what"]) == ("b\n", None, "a")

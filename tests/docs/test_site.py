@@ -1,0 +1,179 @@
+"""The site is complete, says what the code says, and needs no network."""
+
+import html.parser
+import importlib.util
+import os
+import re
+import shutil
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import bounce
+import nonsmooth as ns
+from nonsmooth.flow.status import ADVICE
+from nonsmooth.local.classification import TABLE
+
+ROOT = Path(__file__).parents[2]
+DOCS = ROOT / "docs"
+_spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
+generate = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(generate)
+
+#: What a page loads, by tag and attribute; a plain link to elsewhere loads nothing.
+LOADS = {
+    ("script", "src"),
+    ("img", "src"),
+    ("iframe", "src"),
+    ("source", "src"),
+    ("link", "href"),
+    ("object", "data"),
+}
+FOREIGN = re.compile(r"^(?:https?:)?//")
+
+
+class _Loads(html.parser.HTMLParser):
+    def __init__(self):
+        super().__init__()
+        self.foreign, self.local = [], []
+
+    def handle_starttag(self, tag, attrs):
+        values = dict(attrs)
+        if tag == "link" and values.get("rel") == "canonical":
+            return
+        for name, value in attrs:
+            if (tag, name) in LOADS and value:
+                (self.foreign if FOREIGN.match(value) else self.local).append(value)
+
+
+def loads(text):
+    """What a page loads from elsewhere, and from beside it."""
+    parser = _Loads()
+    parser.feed(text)
+    return parser.foreign, parser.local
+
+
+# The sources ---------------------------------------------------------------------------------------
+
+
+def test_decision_table_is_the_code_s():
+    text = generate.fill((DOCS / "two_folds.md").read_text(encoding="utf-8"))
+    rows = [line for line in text.splitlines() if re.match(r"\| \*\*[\w-]+\*\* \| \(", line)]
+    assert len(rows) == len(TABLE) == 8
+    for line, row in zip(rows, TABLE, strict=True):
+        assert line.startswith(f"| **{row.label}** |")
+        assert row.condition in line and row.determinism in line
+        assert f"| {row.into} | {row.out_of} |" in line
+
+
+def test_every_status_is_listed_with_its_advice():
+    text = generate.fill((DOCS / "statuses.md").read_text(encoding="utf-8"))
+    for status in ns.Status:
+        assert f"| `{status.name}` | {int(status)} |" in text
+        assert ADVICE[status] in text
+
+
+def test_every_exception_is_listed():
+    text = generate.error_table()
+    classes = [getattr(m, n) for m in (ns, bounce) for n in m.__all__]
+    errors = [c for c in classes if isinstance(c, type) and issubclass(c, ns.NonsmoothError)]
+    assert len(errors) > 8
+    assert [c.__name__ for c in errors if f"{c.__name__}`" not in text] == []
+
+
+def test_obligations_of_a_contact_model_are_numbered_from_one():
+    text = generate.obligations()
+    numbers = [int(n) for n in re.findall(r"^(\d+)\. ", text, re.MULTILINE)]
+    assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) >= 9
+
+
+def test_every_marker_has_its_part_and_every_part_its_marker():
+    asked = {
+        name
+        for page in DOCS.glob("*.md")
+        for name in generate.MARKER.findall(page.read_text(encoding="utf-8"))
+    }
+    assert asked == set(generate.PARTS)
+
+
+def test_every_public_name_is_in_the_api():
+    pages = "\n".join(text for uri, text in generate.api_pages().items() if "index" not in uri)
+    for module in (ns, bounce):
+        things = {n: getattr(module, n) for n in module.__all__}
+        wanted = [n for n, t in things.items() if generate._documented(t)]
+        assert wanted
+        assert [n for n in wanted if f"::: {module.__name__}.{n}\n" not in pages] == []
+
+
+def test_sources_load_nothing_from_elsewhere():
+    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
+    assert "font: false" in config
+    assert "extra_javascript" not in config and "extra_css" not in config
+    assert "http" not in config
+    for page in DOCS.glob("*.md"):
+        text = page.read_text(encoding="utf-8")
+        assert loads(text)[0] == [], page.name
+        assert not re.search(r"!\[[^\]]*\]\((?:https?:)?//", text), page.name
+        assert "```mermaid" not in text, f"{page.name}: mermaid is loaded from a network"
+
+
+def test_loads_are_found():
+    foreign, local = loads(
+        '<script src="//a/b.js"></script><img src=c.png><a href="http://d">d</a>'
+    )
+    assert (foreign, local) == (["//a/b.js"], ["c.png"])
+
+
+# The README's picture ------------------------------------------------------------------------------
+
+
+def test_picture_of_the_readme_is_what_its_program_draws(tmp_path):
+    image = pytest.importorskip("matplotlib.image")
+    spec = importlib.util.spec_from_file_location("docs_pictures", DOCS / "pictures.py")
+    pictures = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(pictures)
+    kept, drawn = image.imread(pictures.PICTURE), image.imread(pictures.draw(tmp_path))
+    for ours, theirs in zip(kept.shape, drawn.shape, strict=True):
+        assert abs(ours - theirs) <= 0.02 * ours  # fonts differ a little between versions
+    rows, columns = (min(a, b) for a, b in zip(kept.shape[:2], drawn.shape[:2], strict=True))
+    difference = abs(kept[:rows, :columns] - drawn[:rows, :columns]).mean()
+    assert difference < 0.02, "run `python docs/pictures.py` and look at the picture"
+
+
+# The built site ------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_built_site_loads_nothing_from_elsewhere_and_everything_it_loads_is_there(tmp_path):
+    pytest.importorskip("material", reason="the site is built with the docs extra")
+    pytest.importorskip("mkdocstrings", reason="the site is built with the docs extra")
+    site = tmp_path / "site"
+    build = subprocess.run(
+        [sys.executable, "-m", "mkdocs", "--quiet", "build", "--strict", "--site-dir", str(site)],
+        cwd=ROOT,
+        env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
+        capture_output=True,
+        text=True,
+    )
+    assert build.returncode == 0, build.stderr[-3000:]
+    pages = sorted(site.rglob("*.html"))
+    assert len(pages) > 15
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        foreign, local = loads(text)
+        assert foreign == [], page.name
+        assert "<!-- generated" not in text, page.name
+        if page.name != "404.html":  # its addresses begin at the root of a server
+            missing = [
+                name
+                for name in local
+                if not name.startswith("data:")
+                and not (page.parent / name.partition("#")[0].partition("?")[0]).exists()
+            ]
+            assert missing == [], page.name
+    for style in site.rglob("*.css"):
+        assert not re.search(r"url\(\s*['\"]?(?:https?:)?//", style.read_text(encoding="utf-8"))
+    assert {p.stem for p in (site / "gallery").glob("*.svg")} == set(generate.GALLERY)
+    shutil.rmtree(site)

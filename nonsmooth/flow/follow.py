@@ -13,7 +13,17 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Followed, OptionError, Parameters, Surfaces, followed
+from ..model import (
+    Array,
+    FilippovSystem,
+    Followed,
+    OptionError,
+    Parameters,
+    Surfaces,
+    followed,
+    real,
+    require_system,
+)
 from . import messages
 from .options import Options
 from .polynomial import first_crossing
@@ -29,7 +39,7 @@ def follow(
     *,
     mode: str,
     until: Sequence[Any] | Any = (),
-    watch: Sequence[Any] = (),
+    watch: Sequence[Any] | Any = (),
     t_start: float = 0.0,
     parameters: Parameters | None = None,
     tol: float = 1e-10,
@@ -53,7 +63,7 @@ def follow(
         End at a zero of these: names of the mode's own event functions (``"h0"``, ``"L_F1 h"``,
         ``"L_F2 h"``, names of stops and resets) or expressions in states, parameters and time. A
         zero at the start is not counted.
-    watch : sequence of expressions, optional
+    watch : expression or sequence of them, optional
         Further functions whose zeros are reported (named ``f0``, ``f1``, ...).
     t_start, parameters, tol, rtol, atol, max_step, max_steps : optional
         As in :func:`simulate`.
@@ -78,6 +88,8 @@ def follow(
     >>> run.status.name, run.x[-1].round(12) + 0.0
     ('STOPPED', array([-2.,  0.]))
     """
+    require_system(system)
+    t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
     options = Options(
         t_end=max(t_end, t_start),
         t_start=min(t_end, t_start),
@@ -86,10 +98,8 @@ def follow(
         max_step=max_step,
         max_steps=max_steps,
     )
-    ends = (
-        [until] if isinstance(until, str) or not isinstance(until, (list, tuple)) else list(until)
-    )
-    expressions = [u for u in ends if not isinstance(u, str)] + list(watch)
+    ends, further = _several(until), _several(watch)
+    expressions = [u for u in ends if not isinstance(u, str)] + further
     motion = followed(system, mode, expressions)
     names = [g.name for g in motion.guards]
     ending = {f"f{k}" for k in range(sum(not isinstance(u, str) for u in ends))}
@@ -102,6 +112,10 @@ def follow(
     x = system.extended_point(point, t_start)
     p = system.parameter_vector(parameters)
     return _Follower(system, motion, x, p, options, t_start, t_end, ending).run()
+
+
+def _several(value: Any) -> list[Any]:
+    return list(value) if isinstance(value, (list, tuple)) else [value]
 
 
 class _Follower:

@@ -23,6 +23,9 @@ from ..model import (
     PointError,
     Surfaces,
     explain,
+    real,
+    real_array,
+    require_system,
 )
 from .joined import join, until
 from .outgoing import Path, Slider, paths_from
@@ -111,7 +114,7 @@ class Funnel:
         PointError
             A time before the start of the past.
         """
-        times = np.asarray(t, dtype=float)
+        times = real_array(t, "time")
         result = np.full((len(self), *times.shape, self.point.size), np.nan)
         before = times < self.t
         if before.any():
@@ -236,6 +239,7 @@ def _past(
     """Return the run up to the point where the future is not unique."""
     if t_end is None:
         raise OptionError("t_end: expected the final time of the funnel, received none.")
+    t_end = real(t_end, "t_end")
     if isinstance(start, Trajectory):
         if point is not None or parameters is not None:
             raise OptionError(
@@ -249,6 +253,7 @@ def _past(
             )
         past = start
     else:
+        require_system(start)
         if point is None:
             raise OptionError("point: expected a start, received none.")
         past = simulate(start, point, t_end, t_start=t_start, parameters=parameters, tol=tol)

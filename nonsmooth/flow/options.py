@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from ..model import OptionError, explain
+from ..model import OptionError, explain, real, whole
 
 
 @dataclass(frozen=True)
@@ -41,18 +41,17 @@ class Options:
 
     def __post_init__(self) -> None:
         for name in ("t_end", "t_start"):
-            _number(name, getattr(self, name))
+            self._set(name, real(getattr(self, name), name))
         for name in ("rtol", "atol"):
-            value = getattr(self, name)
-            if not (isinstance(value, (int, float)) and 1e-16 <= value < 1.0):
-                raise OptionError(
-                    explain(
-                        "tol" if name == "rtol" else name,
-                        expected="a number from 1e-16 to below 1",
-                        received=repr(value),
-                        advice="1e-10 is a good start; below 1e-14 rounding dominates.",
-                    )
-                )
+            value = real(
+                getattr(self, name),
+                "tol" if name == "rtol" else name,
+                expected="a number from 1e-16 to below 1",
+                advice="1e-10 is a good start; below 1e-14 rounding dominates.",
+                low=1e-16,
+                high=math.nextafter(1.0, 0.0),
+            )
+            self._set(name, value)
         if not self.t_end >= self.t_start:
             raise OptionError(
                 explain(
@@ -63,12 +62,13 @@ class Options:
                     "nonsmooth.follow runs one smooth mode backward.",
                 )
             )
-        for name in ("max_step", "max_steps", "max_events"):
-            value = getattr(self, name)
-            if not (isinstance(value, (int, float)) and value > 0):
-                raise OptionError(f"{name}: expected a positive number, received {value!r}.")
+        if self.max_step != math.inf:
+            low = math.nextafter(0.0, 1.0)
+            step = real(self.max_step, "max_step", expected="a positive number", low=low)
+            self._set("max_step", step)
+        for name in ("max_steps", "max_events"):
+            self._set(name, whole(getattr(self, name), name))
 
-
-def _number(name: str, value: object) -> None:
-    if not isinstance(value, (int, float)) or not math.isfinite(value):
-        raise OptionError(f"{name}: expected a finite number, received {value!r}.")
+    def _set(self, name: str, value: float) -> None:
+        """Keep the checked number, whatever type it came in."""
+        object.__setattr__(self, name, value)

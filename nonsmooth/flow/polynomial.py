@@ -19,6 +19,8 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from ..model import OptionError
+
 #: Halvings of the interval before two roots count as one that touches without crossing.
 _MAX_DEPTH = 52
 
@@ -61,7 +63,7 @@ def first_root(coefficients: Sequence[float], h: float) -> float | None:
     >>> abs(root - (0.5 - 1e-9**0.5)) < 1e-12
     True
     """
-    c = [float(v) for v in coefficients]
+    c = _floats(coefficients)
     if c[0] <= 0.0:
         return 0.0
     scaled, power = [c[0]], 1.0
@@ -74,6 +76,19 @@ def first_root(coefficients: Sequence[float], h: float) -> float | None:
     noise = _ROUNDING * sum(abs(v) for v in scaled)
     bernstein = (_to_bernstein(len(c) - 1) @ scaled + noise).tolist()
     return _first_in(c, bernstein, 0.0, h)
+
+
+def _floats(coefficients: Sequence[float]) -> list[float]:
+    try:
+        c = [float(v) for v in coefficients]
+    except (TypeError, ValueError):
+        c = []
+    if not c:
+        raise OptionError(
+            f"coefficients: expected at least one number, in increasing powers of t, received "
+            f"{coefficients!r}."
+        )
+    return c
 
 
 def _first_in(c: list[float], b: list[float], low: float, high: float) -> float | None:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters
+from ..model import Array, FilippovSystem, Parameters, require_system
 from .compiled.convert import trajectory
 from .compiled.engine import engine_for, simulate_arrays
 from .compiled.select import use_compiled
@@ -86,6 +86,7 @@ def simulate(
     >>> run.itinerary, bool(abs(run.x[-1, 0] + 0.2) < 1e-9)
     ('- + - + s', True)
     """
+    require_system(system)
     options = Options(
         t_end=t_end,
         t_start=t_start,
@@ -96,7 +97,7 @@ def simulate(
         max_events=max_events,
         start_mode=start_mode,
     )
-    x = system.extended_point(x0, t_start)
+    x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
     return _run(system, x, p, options, engine)
 

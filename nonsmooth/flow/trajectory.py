@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, PointError
+from ..model import Array, FilippovSystem, PointError, real_array
 from .status import Status
 
 
@@ -104,7 +104,7 @@ class Trajectory:
         PointError
             A time outside the run.
         """
-        times = np.asarray(t, dtype=float)
+        times = real_array(t, "time")
         low, high = sorted((float(self.t[0]), float(self.t[-1])))
         slack = 1e-12 * max(1.0, abs(low), abs(high))
         if times.size and not (low - slack <= times.min() and times.max() <= high + slack):

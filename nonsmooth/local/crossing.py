@@ -9,14 +9,43 @@ diabolo; the counts and the accumulation time were derived for this library.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, OptionError
+from ..model import Array, OptionError, PointError, real, real_array
 from .lie import positive
 
 Nu = tuple[float, float]
+
+
+def pair(values: Any, what: str) -> tuple[float, float]:
+    """Return two finite numbers or raise OptionError.
+
+    Examples
+    --------
+    >>> pair([1, 2], "nu")
+    (1.0, 2.0)
+    """
+    try:
+        items = list(values)
+    except TypeError:
+        items = []
+    if isinstance(values, str) or len(items) != 2:
+        raise OptionError(f"{what}: expected a pair of numbers, received {values!r}.")
+    expected = "a pair of finite numbers"
+    first, second = (real(v, what, expected=expected) for v in items)
+    return first, second
+
+
+def _points(z: ArrayLike) -> Array:
+    points = real_array(z, "z")
+    if points.ndim == 0 or points.shape[-1] != 2:
+        raise PointError(
+            f"z: expected shape (..., 2), the coordinates (z2, z3), received {points.shape}."
+        )
+    return points
 
 
 def flight_above(z: ArrayLike, nu: Nu) -> Array:
@@ -37,8 +66,8 @@ def flight_above(z: ArrayLike, nu: Nu) -> Array:
     >>> flight_above([-1.0, 3.0], (-1.0, -2.0))
     array([1., 1.])
     """
-    z = np.asarray(z, dtype=float)
-    return np.stack([-z[..., 0], z[..., 1] - 2 * nu[0] * z[..., 0]], axis=-1)
+    z, (nu1, _) = _points(z), pair(nu, "nu")
+    return np.stack([-z[..., 0], z[..., 1] - 2 * nu1 * z[..., 0]], axis=-1)
 
 
 def flight_below(z: ArrayLike, nu: Nu) -> Array:
@@ -59,8 +88,8 @@ def flight_below(z: ArrayLike, nu: Nu) -> Array:
     >>> flight_below([3.0, -1.0], (-2.0, -1.0))
     array([1., 1.])
     """
-    z = np.asarray(z, dtype=float)
-    return np.stack([z[..., 0] - 2 * nu[1] * z[..., 1], -z[..., 1]], axis=-1)
+    z, (_, nu2) = _points(z), pair(nu, "nu")
+    return np.stack([z[..., 0] - 2 * nu2 * z[..., 1], -z[..., 1]], axis=-1)
 
 
 def return_matrix(nu: Nu) -> Array:
@@ -82,7 +111,7 @@ def return_matrix(nu: Nu) -> Array:
     array([[ 7.,  2.],
            [-4., -1.]])
     """
-    n1, n2 = nu
+    n1, n2 = pair(nu, "nu")
     return np.array([[4 * n1 * n2 - 1, -2 * n2], [2 * n1, -1.0]])
 
 
@@ -109,10 +138,13 @@ def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
     >>> max_flights((-1, 1), (-0.9, -1.0)), max_flights((-1, 1), (-2.0, -1.0))
     (9, inf)
     """
-    invisible = (sigma[0] < 0) + (sigma[1] > 0)
+    first, second = pair(sigma, "sigma")
+    if {abs(first), abs(second)} != {1.0}:
+        raise OptionError(f"sigma: expected two signs, +1 or -1, received {sigma!r}.")
+    n1, n2 = pair(nu, "nu")
+    invisible = (first < 0) + (second > 0)
     if invisible < 2:
         return invisible
-    n1, n2 = nu
     if n1 >= 0 or n2 >= 0:
         return 1 if n1 >= 0 and n2 >= 0 else 2
     if n1 * n2 >= 1:
@@ -146,7 +178,8 @@ def diabolo_slopes(nu: Nu) -> tuple[float, float]:
     >>> [round(r, 6) for r in diabolo_slopes((-2.0, -1.0))]
     [0.585786, 3.414214]
     """
-    a, b = -nu[0], -nu[1]
+    n1, n2 = pair(nu, "nu")
+    a, b = -n1, -n2
     if not (a > 0 and b > 0 and a * b > 1):
         raise OptionError(
             f"nu: expected nu1, nu2 < 0 and nu1 nu2 > 1, received {nu!r}. Otherwise every orbit of "
@@ -180,8 +213,9 @@ def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
     >>> round(accumulation_time((-2.0, -1.0)), 12)
     3.828427124746
     """
-    a, b = -nu[0], -nu[1]
     _, plus = diabolo_slopes(nu)
+    n1, n2 = pair(nu, "nu")
+    a, b = -n1, -n2
     growth = 2 * a * b - 1 + 2 * a * b * math.sqrt(1 - 1 / (a * b))
     phi = positive(phi, "phi")
     return 2 * (phi + (2 * a - plus) / phi) / (1 - 1 / growth)

@@ -20,9 +20,11 @@ from ..model import (
     DefinitionError,
     FilippovSystem,
     NonsmoothError,
+    OptionError,
     Parameters,
     PointError,
     explain,
+    real_array,
 )
 from .folds import Side
 from .lie import TOLERANCE, Numbers, Place, place
@@ -544,7 +546,16 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
     ['stable node', 'saddle']
     """
     found: list[Any] = []
-    for start in np.atleast_2d(np.asarray(starts, dtype=float)):
+    if not callable(search):
+        raise OptionError(
+            explain(
+                "search",
+                expected="a function of a start",
+                received=repr(search),
+                advice="For example lambda x: nonsmooth.find_fold(system, x).",
+            )
+        )
+    for start in np.atleast_2d(real_array(starts, "starts")):
         try:
             result = search(start)
         except NonsmoothError:

@@ -17,7 +17,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import FilippovSystem, Parameters, PointError
+from ..model import (
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    read_function,
+    require_system,
+)
+from .lie import TOLERANCE
 
 
 def intersection_range(
@@ -66,9 +74,12 @@ def intersection_range(
     """
     from scipy.optimize import linprog
 
-    chosen = list(range(system.surface_count)) if surfaces is None else list(surfaces)
+    require_system(system)
+    chosen = _chosen(system, surfaces)
+    of = read_function(system, of, "of")
     every = range(system.surface_count)
     h = [system.evaluate(system.surface_function(i), point, parameters, t).item() for i in every]
+    _refuse_distance(system, point, parameters, t, {i: h[i] for i in chosen})
     letters = ["+" if value > 0 else "-" for value in h]
     rates, normal = [], []
     for combination in product("+-", repeat=len(chosen)):
@@ -86,6 +97,38 @@ def intersection_range(
             f"{chosen}, received one (h = {[h[i] for i in chosen]}) where none does. The motion leaves the intersection."
         )
     return float(results[0].fun), float(-results[1].fun)
+
+
+def _chosen(system: FilippovSystem, surfaces: Sequence[int] | None) -> list[int]:
+    items: Any = range(system.surface_count) if surfaces is None else surfaces
+    if isinstance(items, (str, bytes)) or not isinstance(items, (Sequence, np.ndarray)):
+        items = [items]
+    chosen = [system._index(i) for i in items]
+    if not chosen or len(set(chosen)) < len(chosen):
+        raise DefinitionError(
+            f"surfaces: expected different indices below {system.surface_count}, at least one, "
+            f"received {chosen}."
+        )
+    return chosen
+
+
+def _refuse_distance(
+    system: FilippovSystem,
+    point: ArrayLike,
+    parameters: Parameters | None,
+    t: float,
+    values: dict[int, float],
+) -> None:
+    for i, h in values.items():
+        slope = system.evaluate(system.gradient(system.surface_function(i)), point, parameters, t)
+        scale = float(np.linalg.norm(slope)) * (
+            1.0 + float(np.linalg.norm(np.asarray(point, float)))
+        )
+        if not abs(h) <= TOLERANCE * scale:
+            raise PointError(
+                f"point: expected one on surfaces {list(values)}, received one with h{i} = {h:.6g}. "
+                "Give surfaces= those that meet at the point."
+            )
 
 
 def _rate(

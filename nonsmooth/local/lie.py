@@ -6,6 +6,7 @@ F1 . grad L2). Gradients and fields have a time component where the system depen
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -17,10 +18,11 @@ from ..model import (
     Array,
     DefinitionError,
     FilippovSystem,
-    OptionError,
     Parameters,
     PointError,
     explain,
+    real,
+    require_system,
 )
 
 #: Default of ``tol`` for questions about a given point: an angle, and a relative distance.
@@ -183,6 +185,7 @@ def place(
     ------
     PointError, ParameterError, DefinitionError
     """
+    require_system(system)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
     if system.surface_count == 0:
@@ -190,9 +193,7 @@ def place(
             "system: expected at least one switching surface, received a smooth system. Give "
             "surface= with above= and below=, or surfaces= with multipliers=."
         )
-    if isinstance(surface, bool) or not isinstance(surface, (int, np.integer)):
-        raise DefinitionError(f"surface: expected an index (int), received {surface!r}.")
-    system.surface_function(surface)  # refuses an index out of range
+    system.surface_function(surface)  # refuses what is no index or out of range
     letters = list(_signs(system, x, p, surface) if mode is None else mode)
     if mode is not None:
         system.parse_mode(mode)
@@ -232,20 +233,13 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
 
 def positive(value: float, name: str) -> float:
     """Return a positive finite number or raise OptionError."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        number = float("nan")
-    if not (np.isfinite(number) and number > 0):
-        raise OptionError(
-            explain(
-                name,
-                expected="a positive finite number",
-                received=repr(value),
-                advice="Leave it out for the default.",
-            )
-        )
-    return number
+    return real(
+        value,
+        name,
+        expected="a positive finite number",
+        advice="Leave it out for the default.",
+        low=math.nextafter(0.0, 1.0),
+    )
 
 
 def on_surface(where: Place, x: Array, tol: float) -> Numbers:

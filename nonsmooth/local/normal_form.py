@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Array, DegenerateError, OptionError
+from ..model import Array, DegenerateError, OptionError, explain, real
 
 
 @dataclass(frozen=True)
@@ -164,8 +164,22 @@ def normal_form(lie: Mapping[str, float]) -> NormalForm:
     >>> form.flow.sigma, form.flow.nu, form.theta, round(form.phi, 6)
     ((1, -1), (-1.0, -1.0), 0.5, 0.707107)
     """
-    l11, l22 = float(lie["L11"]), float(lie["L22"])
+    l11, l12, l21, l22 = _entries(lie)
     sigma = (int(np.sign(l11)), int(np.sign(l22)))
     root = float(np.sqrt(abs(l11)) * np.sqrt(abs(l22))) or 1.0
-    flow = ReducedFlow(sigma, (float(lie["L12"]) / root, -float(lie["L21"]) / root))
+    flow = ReducedFlow(sigma, (l12 / root, -l21 / root))
     return NormalForm(flow, 1 / root, float(np.sqrt(np.sqrt(abs(l22 / l11)))))
+
+
+def _entries(lie: Mapping[str, float]) -> list[float]:
+    names = ("L11", "L12", "L21", "L22")
+    if not isinstance(lie, Mapping) or any(name not in lie for name in names):
+        raise OptionError(
+            explain(
+                "lie",
+                expected=f"a mapping with {', '.join(names)}",
+                received=repr(lie),
+                advice="L_ij = F_i . grad L_j, the second Lie derivatives at the two-fold.",
+            )
+        )
+    return [real(lie[name], name) for name in names]

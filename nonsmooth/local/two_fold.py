@@ -21,6 +21,7 @@ from ..model import (
     Parameters,
     PointError,
     explain,
+    real_array,
 )
 from .classification import Boundary, Classification, classify_two_fold
 from .describe import two_fold_in_words
@@ -172,7 +173,7 @@ class TwoFold:
     # maps --------------------------------------------------------------------------------------
 
     def _extended(self, x: ArrayLike) -> Array:
-        states = np.asarray(x, dtype=float)
+        states = real_array(x, "states")
         n = self.system.dimension
         if states.ndim == 0 or states.shape[-1] != n:
             raise PointError(

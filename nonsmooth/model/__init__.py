@@ -1,5 +1,6 @@
 """WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
 
+from .checks import real, real_array, require_system, whole
 from .errors import (
     ConvergenceError,
     DefinitionError,
@@ -23,7 +24,7 @@ from .motion import (
     motion,
 )
 from .regularise import regularise
-from .system import Array, FilippovSystem, Parameters, Reset, Stop
+from .system import Array, FilippovSystem, Parameters, Reset, Stop, read_function
 
 __all__ = [
     "Array",
@@ -49,5 +50,10 @@ __all__ = [
     "explain",
     "followed",
     "motion",
+    "read_function",
+    "real",
+    "real_array",
     "regularise",
+    "require_system",
+    "whole",
 ]

@@ -30,8 +30,10 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from .checks import real, require_system
 from .errors import DefinitionError, OptionError, explain
 from .system import FilippovSystem, Reset, Stop
+from .system import _expression as read_value
 
 
 @dataclass(frozen=True)
@@ -109,16 +111,19 @@ def regularise(
     >>> bool(abs(run.x[-1, 1] + 1e-4 * 0.5 / 0.75**0.5) < 1e-7)
     True
     """
-    if eps is not None and not (isinstance(eps, (int, float)) and 0.0 < eps < math.inf):
-        raise OptionError(
-            explain(
-                "eps",
-                expected="a positive number, or None for no default",
-                received=repr(eps),
-                advice="It is the width of the layer in the units of the switching function.",
-            )
+    require_system(system)
+    if eps is not None:
+        eps = real(
+            eps,
+            "eps",
+            expected="a positive number, or None for no default",
+            advice="It is the width of the layer in the units of the switching function.",
+            low=math.nextafter(0.0, 1.0),
         )
-    if name in system.parameter_names or name in system.state_names:
+    taken = {*system.parameter_names, *system.state_names}
+    if system.time_dependent:
+        taken.add(str(system.extended_states[system.dimension]))
+    if not isinstance(name, str) or not name or name in taken:
         raise DefinitionError(
             explain(
                 "name",
@@ -157,7 +162,8 @@ def _chosen(transition: str | Callable[[ca.SX], ca.SX]) -> Transition:
         return TRANSITIONS[transition]
     if callable(transition):
         s = ca.SX.sym("s")
-        values = ca.Function("phi", [s], [transition(s)])
+        phi = read_value(transition(s), "transition")
+        values = ca.Function("phi", [s], [phi])
         low, high = float(values(-1e12)), float(values(1e12))
         if abs(low + 1.0) < 1e-6 and abs(high - 1.0) < 1e-6:
             return Transition(transition)

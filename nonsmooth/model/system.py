@@ -17,6 +17,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from .checks import real, real_array
 from .errors import DefinitionError, ParameterError, PointError, explain
 from .graph import require_smooth
 from .lift import LiftedSwitch, lift
@@ -155,12 +156,13 @@ class FilippovSystem:
                     advice="Surface i switches multiplier i.",
                 )
             )
+        stops, resets = _items(stops, Stop, "stops"), _items(resets, Reset, "resets")
         guards = [_column([s.function], f"stop {s.name!r}", 1) for s in stops]
         guards += [_column([r.function], f"reset {r.name!r}", 1) for r in resets]
         maps = [_column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
         items: list[Stop | Reset] = [*stops, *resets]
         for item in items:
-            if item.direction not in _DIRECTIONS:
+            if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
                 raise DefinitionError(
                     f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
                     f"received {item.direction!r}."
@@ -291,13 +293,12 @@ class FilippovSystem:
                 )
             _finite_constants(expression, known, what)
             require_smooth(expression, moving, self._p, what)
+        for i, name in enumerate(guard_names):
+            if not ca.depends_on(self._guards[i], self.extended_states):
+                raise DefinitionError(_without_states(name, self._guards[i], self))
         for i in range(self.surface_count):
             if not ca.depends_on(self._h[i], self._x):
-                raise DefinitionError(
-                    f"surface {i}: expected a function of the states {self.state_names}, received "
-                    f"the constant {self._h[i]}. A surface is the zero set of a function of the "
-                    "states."
-                )
+                raise DefinitionError(_without_states(f"surface {i}", self._h[i], self))
             if self.nonlinear[i] and not self.hidden:
                 raise DefinitionError(
                     f"multiplier {self._lam[i]}: expected a field linear in it (Filippov's convex "
@@ -533,7 +534,7 @@ class FilippovSystem:
         3.0
         """
         values, p = self.extended_point(point, t), self.parameter_vector(parameters)
-        return np.array(self._function_of(ca.densify(ca.SX(expression)))(values, p))
+        return np.array(self._function_of(_matrix(expression))(values, p))
 
     def _function_of(self, expression: ca.SX) -> ca.Function:
         """Return the function of an expression, the same for the same expression object."""
@@ -559,9 +560,24 @@ class FilippovSystem:
         ParameterError
             An unknown name, a missing value or one that is not a finite number.
         """
-        values = dict(self._defaults)
+        values, given = dict(self._defaults), dict[str, Any]()
+        if parameters is not None and not isinstance(parameters, Mapping):
+            raise ParameterError(
+                explain(
+                    "parameters",
+                    expected="a mapping from names or symbols to numbers",
+                    received=f"{parameters!r} ({type(parameters).__name__})",
+                    advice=f"The names are {list(self.parameter_names)}.",
+                )
+            )
         for key, value in (parameters or {}).items():
             name = key if isinstance(key, str) else str(key)
+            if name in given:
+                raise ParameterError(
+                    f"parameters: expected one value for {name!r}, received {given[name]!r} and "
+                    f"{value!r}, under its name and its symbol. Keep one of them."
+                )
+            given[name] = value
             if name not in values:
                 raise ParameterError(
                     explain(
@@ -578,7 +594,12 @@ class FilippovSystem:
                 f"parameters: expected a value for {missing}, received none. They have no default: "
                 "pass parameters={name: value}."
             )
-        return np.array([_finite(values[n], f"parameter {n!r}") for n in self.parameter_names])
+        return np.array(
+            [
+                real(values[n], f"parameter {n!r}", error=ParameterError)
+                for n in self.parameter_names
+            ]
+        )
 
     def extended_point(self, point: ArrayLike, t: float = 0.0) -> Array:
         """Check a state and append the time where the system depends on it.
@@ -588,17 +609,7 @@ class FilippovSystem:
         PointError
             Wrong shape, not numbers, NaN or inf.
         """
-        try:
-            values = np.asarray(point, dtype=float)
-        except (TypeError, ValueError) as error:
-            raise PointError(
-                explain(
-                    "point",
-                    expected=f"{self.dimension} numbers",
-                    received=repr(point),
-                    advice="States must be real numbers.",
-                )
-            ) from error
+        values = real_array(point, "point", f"{self.dimension} numbers")
         if values.shape != (self.dimension,):
             raise PointError(
                 explain(
@@ -617,16 +628,17 @@ class FilippovSystem:
                     advice="NaN or inf often comes from an earlier division by zero.",
                 )
             )
-        if self.time_dependent:
-            values = np.append(values, _finite(t, "time", PointError))
-        return values
+        moment = real(t, "time", error=PointError)
+        return np.append(values, moment) if self.time_dependent else values
 
     def _index(self, surface: int) -> int:
+        if isinstance(surface, bool) or not isinstance(surface, (int, np.integer)):
+            raise DefinitionError(f"surface: expected an index (int), received {surface!r}.")
         if not 0 <= surface < self.surface_count:
             raise DefinitionError(
                 f"surface: expected an index below {self.surface_count}, received {surface}."
             )
-        return surface
+        return int(surface)
 
 
 # Reading a definition --------------------------------------------------------------------------
@@ -635,8 +647,8 @@ class FilippovSystem:
 def _listed(value: Any) -> list[Any]:
     if value is None:
         return []
-    if isinstance(value, ca.SX):
-        return ca.vertsplit(ca.vec(value)) if value.numel() else []
+    if isinstance(value, (ca.SX, ca.DM)):
+        return ca.vertsplit(ca.vec(ca.SX(value))) if value.numel() else []
     if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
         return [value]
     return list(value)
@@ -658,6 +670,17 @@ def _expression(value: Any, what: str) -> ca.SX:
     if result.shape != (1, 1):
         raise DefinitionError(f"{what}: expected a scalar, received shape {result.shape}.")
     return ca.densify(result)
+
+
+def _matrix(value: Any) -> ca.SX:
+    """Read an expression of any shape: an SX, or a (nested) sequence of scalars."""
+    if not isinstance(value, (list, tuple, np.ndarray)):
+        return (
+            ca.densify(ca.SX(value))
+            if isinstance(value, (ca.SX, ca.DM))
+            else _expression(value, "expression")
+        )
+    return ca.densify(ca.vertcat(*[_matrix(v).T for v in value]))
 
 
 def read_function(system: FilippovSystem, value: Any, what: str) -> ca.SX:
@@ -720,7 +743,7 @@ def _parameter_symbols(
         values = [None] * len(symbols)
     p = _symbols(symbols, "parameters")
     defaults = {
-        s.name(): None if v is None else _finite(v, f"parameter {s.name()!r}")
+        s.name(): None if v is None else real(v, f"parameter {s.name()!r}", error=ParameterError)
         for s, v in zip(symbols, values, strict=True)
     }
     return p, defaults
@@ -737,6 +760,41 @@ def _surface_expressions(
     items = [surface] if surface is not None else _listed(surfaces)
     expressions = [_expression(v, f"surface {i}") for i, v in enumerate(items)]
     return ca.vertcat(*expressions) if expressions else ca.SX(0, 1)
+
+
+def _without_states(what: str, function: ca.SX, system: FilippovSystem) -> str:
+    """Message for a surface, stop or reset that no motion can cross."""
+    if system.time_dependent and ca.depends_on(function, system._t):
+        received, advice = (
+            f"the function {function} of time alone",
+            "Make a clock a state: c with c' = 1, started at the time, and the surface a function "
+            "of c.",
+        )
+    else:
+        received = f"the constant {function}"
+        advice = "A surface is the zero set of a function of the states."
+    return explain(
+        what,
+        expected=f"a function of the states {system.state_names}",
+        received=received,
+        advice=advice,
+    )
+
+
+def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
+    """Read stops= or resets=: one, or a sequence of them."""
+    items = [values] if isinstance(values, kind) else _listed(values)
+    for i, item in enumerate(items):
+        if not isinstance(item, kind):
+            raise DefinitionError(
+                explain(
+                    f"{what}[{i}]",
+                    expected=f"a {kind.__name__}",
+                    received=f"{item!r} ({type(item).__name__})",
+                    advice=f"Write {what}=[nonsmooth.{kind.__name__}(function, ...)].",
+                )
+            )
+    return items
 
 
 def _two_fields(
@@ -762,16 +820,6 @@ def _two_fields(
         same = ca.is_equal(a, b, 10)
         entries.append(a if same else (1 + lam) / 2 * a + (1 - lam) / 2 * b)
     return lam, ca.vertcat(*entries)
-
-
-def _finite(value: Any, what: str, error: type[Exception] = ParameterError) -> float:
-    try:
-        number = float(value)
-    except (TypeError, ValueError, NotImplementedError):
-        number = math.nan
-    if not math.isfinite(number):
-        raise error(f"{what}: expected a finite number, received {value!r}.")
-    return number
 
 
 def _unique(symbols: ca.SX) -> None:

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ..flow import Event, Segment, Trajectory
-from ..model import Array, DefinitionError, FilippovSystem, OptionError, explain
+from ..model import Array, DefinitionError, FilippovSystem, OptionError, explain, whole
 from . import style
 
 #: Marker of each kind of event; shape tells them apart without colour.
@@ -75,7 +75,7 @@ def trajectory(
     DefinitionError
         ``run`` is not a trajectory, or a phase plane of a system that is not planar.
     OptionError
-        An unknown state.
+        An unknown state, or no positive number of samples.
 
     Examples
     --------
@@ -98,7 +98,7 @@ def trajectory(
                 advice="Leave phase_plane= out to draw states against time.",
             )
         )
-    return _draw(run, names, plane, samples, size, figure)
+    return _draw(run, names, plane, whole(samples, "samples"), size, figure)
 
 
 def _draw(

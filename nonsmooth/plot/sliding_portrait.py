@@ -12,10 +12,10 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
-from scipy.ndimage import distance_transform_edt, label
+from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
 from ..local import TwoFold
-from ..model import Array, DefinitionError, FilippovSystem, OptionError, Parameters, explain
+from ..model import Array, DefinitionError, FilippovSystem, OptionError, Parameters, explain, real
 from . import style
 from .surface import Fold, Sheet
 
@@ -105,7 +105,7 @@ def sliding_portrait(
         raise OptionError(f"orbits: expected a whole number >= 0, received {orbits!r}.")
     limits = _limits(box)
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
-    sheet = Sheet.of(system, values, limits, coordinates, float(guess))
+    sheet = Sheet.of(system, values, limits, coordinates, real(guess, "guess"))
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         portrait = _Portrait(axes, sheet)
@@ -172,6 +172,7 @@ class _Portrait:
         self.two_folds = sheet.two_folds()
         self.rest = sheet.pseudo_equilibria()
         self.drawn: set[str] = set()
+        self.separated: list[Array] = []
 
     def draw(self, orbits: int) -> None:
         """Draw every part, from the back."""
@@ -234,6 +235,7 @@ class _Portrait:
             )
             style.arrowhead(self.ax, curve[::way], 0.5, color, mutation_scale=15, zorder=3.1)
             self.drawn.add(name)
+            self.separated.append(curve)
 
     def _eigenlines(self, fold: TwoFold) -> list[tuple[Array, int, str]]:
         """Start, way to go and name of each half of the sliding eigenlines of a two-fold."""
@@ -287,14 +289,15 @@ class _Portrait:
         self.ax.plot(*place, linestyle="none", marker=marker, markerfacecolor=fill, **style_)
 
     def _free(self) -> NDArray[np.bool_]:
-        """Grid points that are not close to a mark."""
+        """Grid points that are not close to a mark or a separatrix."""
         shown = list(self.sheet.shown)
         marks = [f.point[shown] for f in self.two_folds] + [r.point[shown] for r in self.rest]
-        grid = np.stack(np.meshgrid(*self.sheet.mesh), axis=-1)
-        free = np.ones(self.regions.shape, dtype=bool)
-        for mark in marks:
-            free &= np.linalg.norm((grid - mark) / self.sheet.scale, axis=-1) > 0.06
-        return free
+        points = np.vstack([np.reshape(marks, (-1, 2)), *self.separated])
+        corner, n = np.array(self.sheet.box[::2]), len(self.regions)
+        j, i = np.clip((points - corner) / self.sheet.scale * n, 0, n - 1).astype(int).T
+        taken = np.zeros(self.regions.shape, dtype=bool)
+        taken[i, j] = True
+        return ~binary_dilation(taken, iterations=n // 18)
 
     def names(self) -> None:
         """Write the name of each region where there is most room."""

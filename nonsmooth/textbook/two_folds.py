@@ -128,7 +128,7 @@ def _by_label(
 def _checked(
     sigma: Sequence[int], nu: Sequence[float] | None
 ) -> tuple[tuple[int, int], tuple[float, float]]:
-    signs = tuple(sigma)
+    signs = tuple(sigma) if isinstance(sigma, (Sequence, np.ndarray)) else ()
     if len(signs) != 2 or any(s not in (-1, 1) for s in signs):
         raise OptionError(f"sigma: expected two signs, +1 or -1, received {sigma!r}.")
     numbers = np.asarray(nu, dtype=float) if nu is not None else np.zeros(0)

@@ -1,0 +1,117 @@
+"""Reading what a user gave: real numbers, whole numbers, arrays of them, a system.
+
+A bool, a string, a complex number or an array where one number is meant is an accident more often
+than an intention, so it is refused even where Python or NumPy would convert it.
+"""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import DefinitionError, NonsmoothError, OptionError, PointError, explain
+
+_NO_NUMBER = (str, bytes, bool, np.bool_, complex, np.complexfloating)
+
+
+def is_real(value: Any) -> bool:
+    """Whether a value is one finite real number (NumPy's and CasADi's scalars included)."""
+    if isinstance(value, (ca.DM, ca.SX)):
+        return value.numel() == 1 and _finite(value)
+    if isinstance(value, np.ndarray) and (value.ndim or value.dtype.kind not in "iuf"):
+        return False
+    return not isinstance(value, _NO_NUMBER) and _finite(value)
+
+
+def _finite(value: Any) -> bool:
+    try:
+        return math.isfinite(float(value))
+    except (TypeError, ValueError, OverflowError, NotImplementedError, RuntimeError):
+        return False
+
+
+def real(
+    value: Any,
+    what: str,
+    *,
+    expected: str = "a finite number",
+    advice: str = "",
+    low: float = -math.inf,
+    high: float = math.inf,
+    error: type[NonsmoothError] = OptionError,
+) -> float:
+    """Return a finite number from ``low`` to ``high`` or raise.
+
+    Examples
+    --------
+    >>> real(np.float32(0.5), "eps")
+    0.5
+    """
+    if not is_real(value) or not low <= float(value) <= high:
+        raise error(explain(what, expected=expected, received=repr(value), advice=advice).rstrip())
+    return float(value)
+
+
+def whole(value: Any, what: str, *, least: int = 1, advice: str = "") -> int:
+    """Return a whole number of at least ``least`` or raise OptionError; 1e6 is one too."""
+    if not is_real(value) or float(value) != int(value) or value < least:
+        expected = "a positive whole number" if least == 1 else f"a whole number >= {least}"
+        raise OptionError(
+            explain(what, expected=expected, received=repr(value), advice=advice).rstrip()
+        )
+    return int(value)
+
+
+def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArray[np.float64]:
+    """Return an array of real numbers, NaN and inf included, or raise PointError.
+
+    A CasADi column or row is one axis.
+    """
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and type(values) is np.ndarray:
+        return values
+    if isinstance(values, ca.DM) and 1 in values.shape:
+        return np.array(values, dtype=float).ravel()
+    if values is None:
+        return np.array(np.nan)  # no axis: the caller says which shape is expected
+    try:
+        array = np.asarray(values)
+        fits = array.dtype.kind in "iuf" and not np.ma.is_masked(values)
+        if array.dtype.kind == "O":
+            fits = array.size > 0 and all(_number(v) for v in array.ravel())
+        if fits or array.size == 0:
+            return array.astype(float)
+    except (TypeError, ValueError, NotImplementedError, RuntimeError):
+        pass
+    raise PointError(
+        explain(
+            what,
+            expected=expected,
+            received=repr(values),
+            advice="States must be real numbers: no strings, booleans, complex numbers, symbols "
+            "or missing values.",
+        )
+    )
+
+
+def _number(value: Any) -> bool:
+    return is_real(value) or (isinstance(value, float) and not math.isfinite(value))
+
+
+def require_system(value: Any) -> None:
+    """Raise DefinitionError unless a value is a FilippovSystem."""
+    from .system import FilippovSystem
+
+    if not isinstance(value, FilippovSystem):
+        raise DefinitionError(
+            explain(
+                "system",
+                expected="a FilippovSystem",
+                received=f"{value!r} ({type(value).__name__})",
+                advice="Make one with FilippovSystem(states, ...) or "
+                "FilippovSystem.from_expression(states, rhs).",
+            )
+        )

@@ -1,0 +1,186 @@
+"""What a user gives is read strictly, and every refusal is a NonsmoothError that says what is wrong."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+X, Y, P, T, LAM = (ca.SX.sym(name) for name in ("x", "y", "p", "t", "lam"))
+
+
+def relay(**options):
+    return ns.FilippovSystem(
+        [X, Y],
+        surface=Y,
+        above=[Y, -X - P],
+        below=[Y, -X + P],
+        parameters={P: 0.4},
+        **options,
+    )
+
+
+SYSTEM = relay()
+TWO = ns.FilippovSystem(
+    [X, Y, T], field=[-LAM, -P, 1 + LAM * P], multipliers=[LAM, P], surfaces=[X, Y]
+)
+
+
+@pytest.mark.parametrize(
+    "value", [1, 1.0, np.int64(1), np.float32(1), np.array(1.0), ca.DM(1.0)], ids=repr
+)
+def test_every_kind_of_real_number_is_a_time(value):
+    assert ns.simulate(SYSTEM, [3, 0], value).t[-1] == 1.0
+
+
+@pytest.mark.parametrize("value", [True, "1", 1j, None, np.array([1.0]), np.nan, np.inf], ids=repr)
+@pytest.mark.parametrize("name", ["t_end", "t_start", "tol", "rtol", "atol"])
+def test_what_is_no_real_number_is_no_time_and_no_tolerance(name, value):
+    if value is None and name in ("rtol", "atol"):
+        return  # the default
+    options = {"t_end": 1.0, name: value}
+    with pytest.raises(ns.OptionError, match=r"(tol|t_end|t_start): expected a .*number"):
+        ns.simulate(SYSTEM, [3.0, 0.0], **options)
+
+
+@pytest.mark.parametrize("name", ["max_steps", "max_events"])
+@pytest.mark.parametrize("value", [0, -1, 1.5, True, np.inf, "3", None], ids=repr)
+def test_limits_are_positive_whole_numbers(name, value):
+    with pytest.raises(ns.OptionError, match=f"{name}: expected a positive whole number"):
+        ns.simulate(SYSTEM, [3.0, 0.0], 1.0, **{name: value})
+
+
+@pytest.mark.parametrize(
+    "start",
+    [
+        ["1", "2"],
+        [True, False],
+        [1 + 0j, 2],
+        [None, 2],
+        [X, Y],
+        "12",
+        {"x": 1},
+        [[1], [2, 3]],
+        np.ma.array([1.0, 2.0], mask=[False, True]),
+    ],
+    ids=repr,
+)
+def test_a_start_is_real_numbers(start):
+    with pytest.raises(ns.PointError, match=r"point: expected 2 numbers[\s\S]*States must be real"):
+        ns.simulate(SYSTEM, start, 1.0)
+
+
+@pytest.mark.parametrize(
+    "start", [(3, 0), np.array([3, 0]), ca.DM([3, 0]), np.array([3, 0], object)]
+)
+def test_any_sequence_of_real_numbers_is_a_start(start):
+    run = ns.simulate(SYSTEM, start, 1.0)
+    np.testing.assert_array_equal(run.x, ns.simulate(SYSTEM, [3.0, 0.0], 1.0).x)
+
+
+@pytest.mark.parametrize("parameters", [[0.1], 0.1, "p", np.array([0.1])], ids=repr)
+def test_parameters_are_a_mapping(parameters):
+    with pytest.raises(ns.ParameterError, match=r"expected a mapping .* The names are \['p'\]"):
+        ns.simulate(SYSTEM, [3.0, 0.0], 1.0, parameters=parameters)
+
+
+@pytest.mark.parametrize("value", [True, "0.4", 1j, [0.4], np.array([0.4]), np.nan], ids=repr)
+def test_a_parameter_is_one_finite_number(value):
+    with pytest.raises(ns.ParameterError, match="parameter 'p': expected a finite number"):
+        ns.simulate(SYSTEM, [3.0, 0.0], 1.0, parameters={"p": value})
+
+
+def test_a_parameter_given_twice_is_refused():
+    with pytest.raises(ns.ParameterError, match=r"one value for 'p', received 1 and 2"):
+        ns.simulate(SYSTEM, [3.0, 0.0], 1.0, parameters={"p": 1, P: 2})
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        lambda s: ns.simulate(s, [0, 0], 1.0),
+        lambda s: ns.follow(s, [0, 0], 1.0, mode="+"),
+        lambda s: ns.funnel(s, [0, 0], 1.0),
+        lambda s: ns.region(s, [0, 0]),
+        lambda s: ns.classify(s, [0, 0]),
+        lambda s: ns.find_two_fold(s, [0, 0]),
+        lambda s: ns.regularise(s),
+        lambda s: ns.intersection_range(s, [0, 0], X),
+    ],
+)
+@pytest.mark.parametrize("system", [None, "system", [X, Y]], ids=repr)
+def test_a_system_is_asked_for_where_there_is_none(call, system):
+    with pytest.raises(ns.DefinitionError, match="system: expected a FilippovSystem, received"):
+        call(system)
+
+
+@pytest.mark.parametrize("time", ["a", 0.5 + 1j, [True]], ids=repr)
+def test_dense_output_is_asked_at_real_times(time):
+    with pytest.raises(ns.PointError, match="time: expected real numbers"):
+        ns.simulate(SYSTEM, [3.0, 0.0], 1.0)(time)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"stops": [X]}, r"stops\[0\]: expected a Stop"),
+        ({"stops": 3}, r"stops\[0\]: expected a Stop"),
+        ({"resets": [ns.Stop(X)]}, r"resets\[0\]: expected a Reset"),
+        ({"stops": [ns.Stop(1)]}, "stop 'stop': expected a function of the states.*constant 1"),
+        ({"stops": [ns.Stop(P - 1)]}, "stop 'stop': expected a function of the states"),
+        ({"stops": [ns.Stop(X, direction=True)]}, "direction of 'stop': expected -1"),
+    ],
+)
+def test_stops_and_resets_are_what_they_are_called(options, message):
+    with pytest.raises(ns.DefinitionError, match=message):
+        relay(**options)
+
+
+def test_one_stop_needs_no_list():
+    assert relay(stops=ns.Stop(X)).stops == (("stop", 0),)
+
+
+def test_a_surface_of_time_alone_is_refused_with_the_way_out():
+    def square(surface, states, field, **options):
+        return ns.FilippovSystem(states, field=field, multipliers=LAM, surface=surface, **options)
+
+    with pytest.raises(ns.DefinitionError, match=r"of time alone.*Make a clock a state"):
+        square(ca.sin(T), [X], [LAM], time=T)
+    wave = square(ca.sin(Y), [X, Y], [LAM, 1])
+    end = ns.simulate(wave, [0.0, 0.5], 6.0).x[-1, 0]
+    assert end == pytest.approx(6.0 - 2.0 * np.pi, abs=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("call", "message"),
+    [
+        (lambda: ns.intersection_range(TWO, [0, 0, 0], "x"), "of: expected a CasADi SX"),
+        (lambda: ns.intersection_range(TWO, [0, 0, 0], X, surfaces=[5]), "surface: .* below 2"),
+        (lambda: ns.intersection_range(TWO, [0, 0, 0], X, surfaces=[0, 0]), "different indices"),
+        (lambda: ns.intersection_range(TWO, [0, 1, 0], X), r"received one with h1 = 1\."),
+        (lambda: SYSTEM.evaluate("a", [0, 0]), "expression: expected a CasADi SX"),
+        (lambda: SYSTEM.surface_function("a"), r"surface: expected an index \(int\)"),
+        (lambda: ns.regularise(SYSTEM, True), "eps: expected a positive number"),
+        (lambda: ns.regularise(SYSTEM, name=3), "name: expected one that the system does not"),
+        (lambda: ns.regularise(SYSTEM, transition=lambda s: "a"), "transition: expected a CasADi"),
+        (lambda: ns.follow(SYSTEM, [0, 0], None, mode="+"), "t_end: expected a finite number"),
+        (lambda: ns.find_all(None, [[0, 0]]), "search: expected a function of a start"),
+        (lambda: ns.find_all(lambda x: x, "ab"), "starts: expected real numbers"),
+        (lambda: ns.return_matrix(None), "nu: expected a pair"),
+        (lambda: ns.return_matrix((1,)), "nu: expected a pair"),
+        (lambda: ns.accumulation_time("ab"), "nu: expected a pair"),
+        (lambda: ns.max_flights((-1, 1), (np.nan, 1)), "nu: expected a pair of finite"),
+        (lambda: ns.max_flights((1, 2), (1, 1)), "sigma: expected two signs"),
+        (lambda: ns.flight_above("a", (1, 1)), "z: expected real numbers"),
+        (lambda: ns.flight_below([1, 2, 3], (1, 1)), r"z: expected shape \(..., 2\)"),
+        (lambda: ns.normal_form(None), "lie: expected a mapping with L11"),
+        (lambda: ns.normal_form({"L11": 1.0}), "lie: expected a mapping with L11"),
+        (lambda: ns.first_root([], 1.0), "coefficients: expected at least one number"),
+        (lambda: ns.first_root("ab", 1.0), "coefficients: expected at least one number"),
+        (lambda: ns.textbook.two_fold(None), "sigma: expected two signs"),
+        (lambda: ns.plot.trajectory(ns.simulate(SYSTEM, [3, 0], 1), samples="a"), "samples: "),
+    ],
+)
+def test_other_wrong_arguments(call, message):
+    with pytest.raises(ns.NonsmoothError, match=message):
+        call()

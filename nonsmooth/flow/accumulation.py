@@ -12,11 +12,14 @@ _SPREAD = 0.02
 _REMAINING = 1e-6
 
 
-def remaining_time(intervals: Sequence[float], patterns: Sequence[str], t: float) -> float | None:
+def remaining_time(
+    intervals: Sequence[float], patterns: Sequence[str], elapsed: float
+) -> float | None:
     """Estimate the time left until events accumulate, or None if they do not (yet).
 
     Blocks of events with a repeating pattern shrink by a steady ratio r < 1 before a Zeno point,
-    so the time left is (last block) r/(1 - r). The estimate is given once it is below 1e-6.
+    so the time left is (last block) r/(1 - r). The estimate is given once it is below 1e-6 of the
+    time that the run has taken, so that the unit of time does not matter.
 
     Parameters
     ----------
@@ -24,12 +27,12 @@ def remaining_time(intervals: Sequence[float], patterns: Sequence[str], t: float
         Times between successive events.
     patterns : sequence of str
         What each event was; same length.
-    t : float
-        Present time, the scale of "small".
+    elapsed : float
+        Time since the start of the run, the scale of "small".
 
     Examples
     --------
-    >>> remaining_time([2.0**-k for k in range(40)], ["impact"] * 40, 0.0) < 1e-11
+    >>> remaining_time([2.0**-k for k in range(40)], ["impact"] * 40, 2.0) < 1e-11
     True
     """
     if len(intervals) > 40 and not any(intervals[-40:]):
@@ -49,6 +52,6 @@ def remaining_time(intervals: Sequence[float], patterns: Sequence[str], t: float
         r = ratios[-1]
         if max(ratios) < 0.9999 and max(ratios) - min(ratios) <= _SPREAD * (1.0 - r):
             left = blocks[-1] * r / (1.0 - r)
-            if left < _REMAINING * max(1.0, abs(t)):
+            if left < _REMAINING * elapsed:
                 return left
     return None

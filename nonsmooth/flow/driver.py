@@ -302,7 +302,9 @@ class Driver:
         self.record.intervals.append(self.t - self._last_event)
         self.record.patterns.append(f"{kind} {before} {self.mode} {name}")
         self._last_event = self.t
-        left = remaining_time(self.record.intervals, self.record.patterns, self.t)
+        left = remaining_time(
+            self.record.intervals, self.record.patterns, self.t - self.options.t_start
+        )
         if left is not None:
             self._limit = self.t + left
             self._end(

@@ -90,6 +90,9 @@ class Motion:
         gradient = ca.jacobian(system.surface_function(i), system.extended_states)
         a = ca.simplify(ca.mtimes(gradient, middle))
         entries = ca.vertsplit(ca.densify(difference))
+        if self._continuous(entries):
+            self.cancelled = True
+            return middle
         # A factor of G is one of b = grad h . G too, and there it may no longer be in sight.
         reduced, factor = cancel_common_factor(
             entries, system.extended_states, system.parameter_symbols
@@ -97,6 +100,20 @@ class Motion:
         self.cancelled = bool(ca.depends_on(factor, system.extended_states))
         b = ca.simplify(ca.mtimes(gradient, ca.vertcat(*reduced)))
         return middle - (a / b) * ca.vertcat(*reduced)
+
+    def _continuous(self, difference: list[ca.SX]) -> bool:
+        """Whether the two fields are one field on the surface: their difference is 0 or h times a
+        function, so that there is nothing to choose there."""
+        system = self.system
+        assert self.sliding is not None
+        h = system.surface_function(self.sliding)
+        pieces = [e for e in difference if not e.is_zero()]
+        if not pieces:
+            return True
+        reduced, _ = cancel_common_factor(
+            [*pieces, h], system.extended_states, system.parameter_symbols
+        )
+        return not ca.depends_on(reduced[-1], system.extended_states)
 
     def _guards(self) -> tuple[tuple[Guard, ...], ca.SX]:
         system = self.system

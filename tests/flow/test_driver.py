@@ -283,3 +283,42 @@ def test_wrong_starts_are_refused():
         ns.simulate(relay(), [1.0, 0.0, 0.0], 1.0)
     with pytest.raises(ns.DefinitionError, match="mode"):
         ns.simulate(relay(), [1.0, 0.0], 1.0, start_mode="++")
+
+
+@pytest.mark.parametrize(
+    ("states", "rhs", "start"),
+    [
+        ((x, y), [y, -x - ca.fmax(x, 0)], [0.0, 0.0]),
+        ((x, y), [y, 1 - x - 3 * ca.fmax(x - 1, 0)], [1.0, 0.0]),
+    ],
+)
+def test_rest_on_a_surface_across_which_the_field_is_continuous(states, rhs, start):
+    system = ns.FilippovSystem.from_expression(states, rhs)
+    run = ns.simulate(system, start, 10.0)
+    assert run.status is ns.Status.REACHED_END
+    np.testing.assert_array_equal(run.x[-1], start)
+
+
+def test_a_surface_on_which_nothing_switches_never_makes_the_future_ambiguous():
+    system = ns.FilippovSystem([x, y], field=[y, -x], multipliers=lam, surface=y - 1)
+    run = ns.simulate(system, [0.0, 1.0], 6.0)  # tangent to the surface at the start
+    assert run.status is ns.Status.REACHED_END and run.itinerary == "-"
+    np.testing.assert_allclose(run.x[-1], [np.sin(6.0), np.cos(6.0)], atol=1e-9)
+
+
+@pytest.mark.parametrize("unit", [1e-7, 1.0, 1e7])
+def test_accumulation_does_not_depend_on_the_unit_of_time(unit):
+    # x'' = -sgn x - v: the intervals shrink like 1/n, so their sum has no limit.
+    damped = ns.FilippovSystem(
+        [x, v], field=[v / unit, (-lam - v) / unit], multipliers=lam, surface=x
+    )
+    run = ns.simulate(damped, [0.5, 0.0], 100.0 * unit, max_events=400)
+    assert run.status is ns.Status.TOO_MANY_EVENTS
+    bounce = ns.FilippovSystem(
+        [x, v],
+        field=[v / unit, -1 / unit],
+        resets=[ns.Reset(x, map=[x, -0.5 * v], direction=-1)],
+    )
+    run = ns.simulate(bounce, [0.0, 1.0], 100.0 * unit)
+    assert run.status is ns.Status.ACCUMULATION
+    assert run.accumulation_time == pytest.approx(4.0 * unit, rel=1e-9)

@@ -39,7 +39,7 @@ GALLERY = (
 
 def table(head: Iterable[str], rows: Iterable[Iterable[object]]) -> str:
     """Lay out a Markdown table; bars in a cell are kept apart from those of the table."""
-    lines = [list(head), *([str(cell).replace("|", "&#124;") for cell in row] for row in rows)]
+    lines = [list(head), *([str(cell).replace("|", r"\|") for cell in row] for row in rows)]
     lines.insert(1, ["---"] * len(lines[0]))
     return "\n".join("| " + " | ".join(line) + " |" for line in lines)
 
@@ -184,7 +184,7 @@ def api_pages() -> dict[str, str]:
         pages[f"api/{short}.md"] = _page(f"nonsmooth.{short}", about, package.__name__, names)
     names = [n for n in bounce.__all__ if _documented(getattr(bounce, n))]
     pages["api/bounce.md"] = _page("bounce", first_line(bounce), "bounce", names)
-    names = [n for n, f in vars(bounce.plot).items() if _is_public(bounce.plot, n, f)]
+    names = [n for n, thing in vars(bounce.plot).items() if _draws(n, thing)]
     pages["api/bounce_plot.md"] = _page(
         "bounce.plot", first_line(bounce.plot), "bounce.plot", names
     )
@@ -219,12 +219,10 @@ def _documented(thing: object) -> bool:
     return inspect.isclass(thing) or inspect.isfunction(thing)
 
 
-def _is_public(module: ModuleType, name: str, thing: object) -> bool:
-    return (
-        inspect.isfunction(thing)
-        and not name.startswith("_")
-        and thing.__module__ == module.__name__
-    )
+def _draws(name: str, thing: object) -> bool:
+    """Whether a name of a module is a public function that returns a picture."""
+    public = inspect.isfunction(thing) and not name.startswith("_")
+    return public and inspect.signature(thing).return_annotation == "Figure"
 
 
 # Pages --------------------------------------------------------------------------------------------

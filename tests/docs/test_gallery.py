@@ -134,7 +134,7 @@ def test_bounce_goes_into_reverse():
 
 def test_dividing_curve_divides_the_map():
     found = ran("outcome_map")
-    curve, slip = found["curve"], found["map_"].slip
+    curve, slip = found["curve"], found["outcomes"].slip
     speeds, spins = found["speeds"], found["spins"]
     inside = np.abs(speeds) < 0.4  # where the curve is one spin for each speed
     above = spins[:, None] > curve.omega(speeds[inside])

@@ -26,7 +26,10 @@ def ambiguous(modes: Sequence[str]) -> str:
         "an intersection" if len(differing) > 1 else "repelling sliding or a fold of both fields"
     )
     listed = ", ".join(repr(m) for m in modes)
-    return f"On {surfaces} = 0 ({where}) the motion can continue in each of the modes {listed}."
+    first = "" if len(differing) > 1 else ", at once or after sliding for a while"
+    return (
+        f"On {surfaces} = 0 ({where}) the motion can continue in each of the modes {listed}{first}."
+    )
 
 
 def degenerate() -> str:

@@ -122,6 +122,17 @@ def penner_restitution(speed: ArrayLike) -> Array:
 
     0.510 - 0.0375 v + 0.000903 v^2 up to 20 m/s, 0.120 beyond.
 
+    Parameters
+    ----------
+    speed : array_like (...)
+        Normal speed in m/s.
+
+    Returns
+    -------
+    ndarray (...)
+
+    Notes
+    -----
     Source: Penner 2002, p. 933, eq. 5, as quoted by public golf simulators.
 
     Examples
@@ -140,6 +151,19 @@ def penner_tilt(speed: ArrayLike, angle: ArrayLike) -> Array:
     is the angle of the path with the *vertical*. Some public simulators take that with the ground
     instead; Penner's worked heights come out with the vertical only (tests/bounce).
 
+    Parameters
+    ----------
+    speed : array_like (...)
+        Speed of landing in m/s.
+    angle : array_like (...)
+        Angle of descent below the horizontal in rad.
+
+    Returns
+    -------
+    ndarray (...)
+
+    Notes
+    -----
     Source: Penner 2002, p. 934, eqs. 6-8, as quoted by public golf simulators.
 
     Examples

@@ -35,7 +35,7 @@ typedef struct {
 
 typedef struct {
   Options o;
-  double x[N], q[NQ], t, last_event, limit, at_t, at_x[N];
+  double x[N], q[NQ], t, begun, last_event, limit, at_t, at_x[N];
   int32_t mode, status, reason, where, due, drop[NG1];
   int64_t step_count, event_count, kinds[KINDS], segment_steps;
   int32_t itinerary, segment_mode;
@@ -302,7 +302,7 @@ static void limit_of_events(Run *r) {
     }
     if (!(high < 0.9999 && high - low <= 0.02 * (1 - ratio))) continue;
     double left = block[5] * ratio / (1 - ratio);
-    if (left < 1e-6 * fmax(1, fabs(r->t))) {
+    if (left < 1e-6 * (r->t - r->begun)) {
       r->limit = r->t + left;
       finish(r, ACCUMULATION, NO_REASON, 0);
       return;
@@ -644,7 +644,7 @@ void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const do
   r->tree = tree;
   memcpy(r->x, x, sizeof r->x);
   prepare(p, r->q);
-  r->t = r->last_event = t;
+  r->t = r->begun = r->last_event = t;
   r->limit = r->at_t = NAN;
   for (int i = 0; i < N; i++) r->at_x[i] = NAN;
   r->status = RUNNING;

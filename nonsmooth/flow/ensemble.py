@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, FilippovSystem, OptionError, PointError, explain
+from ..model import Array, FilippovSystem, OptionError, PointError, explain, require_system
 from .checkpoint import Checkpoint
 from .chunks import Job, forget, make_job, run_chunk, stop_chunks
 from .compiled.engine import KINDS, Chunk, engine_for, supports_lanes
@@ -159,6 +159,16 @@ def ensemble(
         max_events=max_events,
         start_mode=start_mode,
     )
+    require_system(system)
+    if executor is not None and not isinstance(executor, Executor):
+        raise OptionError(
+            explain(
+                "executor",
+                expected="a concurrent.futures.Executor",
+                received=f"{executor!r} ({type(executor).__name__})",
+                advice="ProcessPoolExecutor(), or dask.distributed.Client(...).get_executor().",
+            )
+        )
     if start_mode is not None:
         system.parse_mode(start_mode)
     starts = _Starts(system, x0, parameters, t_start)
@@ -210,6 +220,8 @@ class _Starts:
                     advice="States are on the last axis.",
                 )
             )
+        if parameters is not None and not isinstance(parameters, Mapping):
+            system.parameter_vector(parameters)  # refuses what is no mapping
         arrays = {str(k): _numbers(v, f"parameter {k}") for k, v in (parameters or {}).items()}
         sample = {k: _sample(v) for k, v in arrays.items()}
         self.p = system.parameter_vector(sample)

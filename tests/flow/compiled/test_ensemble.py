@@ -261,3 +261,18 @@ def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(threads):
         finally:
             process.kill()
     assert b"KeyboardInterrupt" in error and process.returncode != 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ({"system": None}, "system: expected a FilippovSystem"),
+        ({"parameters": [0.3]}, "expected a mapping"),
+        ({"executor": 3}, "executor: expected a concurrent.futures.Executor"),
+    ],
+)
+def test_arguments_of_another_kind_are_refused(arguments, message):
+    x = ca.SX.sym("x")
+    given = {"system": ns.FilippovSystem([x], surface=x, above=[-1], below=[1]), **arguments}
+    with pytest.raises(ns.NonsmoothError, match=message):
+        ns.ensemble(x0=[[1.0]], t_end=1.0, **given)

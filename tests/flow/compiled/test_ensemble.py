@@ -17,7 +17,7 @@ from nonsmooth.flow import Status, simulate
 from nonsmooth.flow.checkpoint import Checkpoint
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.ensemble import ensemble
-from nonsmooth.model import FilippovSystem, OptionError, ParameterError, PointError, Stop
+from nonsmooth.model import FilippovSystem, NonsmoothError, OptionError, ParameterError, PointError, Stop
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -273,6 +273,6 @@ def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(threads):
 )
 def test_arguments_of_another_kind_are_refused(arguments, message):
     x = ca.SX.sym("x")
-    given = {"system": ns.FilippovSystem([x], surface=x, above=[-1], below=[1]), **arguments}
-    with pytest.raises(ns.NonsmoothError, match=message):
-        ns.ensemble(x0=[[1.0]], t_end=1.0, **given)
+    given = {"system": FilippovSystem([x], surface=x, above=[-1], below=[1]), **arguments}
+    with pytest.raises(NonsmoothError, match=message):
+        ensemble(x0=[[1.0]], t_end=1.0, **given)

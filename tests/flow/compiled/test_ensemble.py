@@ -17,7 +17,14 @@ from nonsmooth.flow import Status, simulate
 from nonsmooth.flow.checkpoint import Checkpoint
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.ensemble import ensemble
-from nonsmooth.model import FilippovSystem, NonsmoothError, OptionError, ParameterError, PointError, Stop
+from nonsmooth.model import (
+    FilippovSystem,
+    NonsmoothError,
+    OptionError,
+    ParameterError,
+    PointError,
+    Stop,
+)
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

@@ -1,0 +1,288 @@
+"""The figures, drawn again from the normal form."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.cm import ScalarMappable
+from matplotlib.colors import BoundaryNorm, ListedColormap
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+
+import nonsmooth as ns
+
+from .. import look
+from ..pictures import Picture
+from .model import (
+    AFTER,
+    AT,
+    BEFORE,
+    SIGMA,
+    Array,
+    V,
+    flights,
+    formula_for_flights,
+    most_flights,
+    run,
+)
+from .results import COUNTS
+
+_CASES = (("a", BEFORE, "$V^+V^- < 1$"), ("b", AT, "$V^+V^- = 1$"), ("c", AFTER, "$V^+V^- > 1$"))
+_FINITE: V = (-0.75, -1.0)  # at most 5 flights
+_COLORS = ("#FFFFFF", "#DCEBF5", "#A9CCE3", "#6FA8CF", "#3C7FB1", "#1B4F72")
+
+
+def _numbers(v: V) -> str:
+    return f"({v[0]:g}, {v[1]:g})".replace("-", "−")
+
+
+def space() -> Figure:
+    """Flow on both sides of the surface, before, at and after the bifurcation."""
+    with look.settings():
+        figure = look.new_figure(13.0, 4.0)
+        for ax, (letter, v, words) in zip(figure.subplots(1, 3), _CASES, strict=True):
+            title = f"({letter}) {words}: $V$ = {_numbers(v)}"
+            ns.plot.two_fold_3d((SIGMA, v), ax=ax, legend=False, title=title)
+        handles = [
+            _entry(look.ABOVE, "orbits in $x > 0$"),
+            _entry(look.BELOW, "orbits in $x < 0$", look.DASHED),
+            _entry(look.CANARD, "canard", width=2.4),
+            _entry(look.GREEN, "faux canard", look.DASHED, 2.4),
+            _entry(look.BLACK, "pseudo-equilibria", look.DOTTED, 2.4),
+            Patch(color=look.CANARD, alpha=0.2, label="diabolo: orbits fall in"),
+            Patch(color=look.GREEN, alpha=0.2, label="diabolo: orbits come out"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=7)
+    return figure
+
+
+def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
+    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
+
+
+def sliding() -> Figure:
+    """Sliding portraits before, at and after the bifurcation."""
+    with look.settings():
+        figure = look.new_figure(13.0, 5.0)
+        for ax, (letter, v, words) in zip(figure.subplots(1, 3), _CASES, strict=True):
+            title = f"({letter}) {words}: $V$ = {_numbers(v)}"
+            ns.plot.two_fold((SIGMA, v), ax=ax, legend=False, title=title)
+            ax.set(xlabel="$y$", ylabel="$z$")
+        handles = [
+            _entry(look.BLACK, "sliding orbits"),
+            _entry(look.ABOVE, "invisible fold of $x > 0$", look.DASHED, 2.2),
+            _entry(look.BELOW, "invisible fold of $x < 0$", look.DASHED, 2.2),
+            _entry(look.CANARD, "canard", width=2.4),
+            _entry(look.GREEN, "faux canard", look.DASHED, 2.4),
+            _entry(look.BLACK, "pseudo-equilibria", look.DOTTED, 2.4),
+            _entry(look.CANARD, "diabolo: orbits fall in", look.DASHDOT),
+            _entry(look.GREEN, "diabolo: orbits come out", look.DOTTED),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=4)
+    return figure
+
+
+def _arcs(start: Array, above: bool) -> tuple[Array, Array, Array]:
+    """Surface of the arcs over or under the segment from 0 to ``start``, as large as the frame."""
+    flight = ns.flight_above if above else ns.flight_below
+    reach = max(np.abs(start).max(), np.abs(flight(start, AFTER)).max())
+    size, share = np.meshgrid(np.linspace(0.0, 1.0 / reach, 25), np.linspace(0.0, 1.0, 25))
+    y, z = size * start[0], size * start[1]
+    if above:
+        t = -2 * y * share
+        return -y * t - t**2 / 2, y + t, z + AFTER[0] * t
+    t = -2 * z * share
+    return z * t + t**2 / 2, y + AFTER[1] * t, z + t
+
+
+def diabolo() -> Figure:
+    """The pair of invariant surfaces with an orbit on the one whose orbits fall in."""
+    low, high = ns.diabolo_slopes(AFTER)
+    with look.settings():
+        figure = look.new_figure(7.6, 6.2)
+        ax = figure.add_subplot(projection="3d", computed_zorder=False)
+        for slope, color in ((high, look.CANARD), (low, look.GREEN)):
+            up = np.array([-1.0, slope])
+            for start, above in ((up, True), (ns.flight_above(up, AFTER), False)):
+                x, y, z = _arcs(start, above)
+                ax.plot_surface(y, z, x, color=color, alpha=0.3, linewidth=0, zorder=2)
+                for edge in (0, -1):
+                    ax.plot(y[edge], z[edge], x[edge], color=color, linewidth=1.6, zorder=3)
+        orbit = run(AFTER, (-1.0 / high, 1.0), 3.828427 / high)
+        t = orbit.t[-1] * (1 - np.concatenate([[0], np.geomspace(1e-4, 1, 800)])[::-1])
+        x, y, z = orbit(t).T
+        for side, color in ((1, look.ABOVE), (-1, look.BELOW)):
+            shown = np.where(side * x >= 0, [y, z, x], np.nan)
+            ax.plot(*shown, color=color, linewidth=2.0, zorder=5)
+        ax.plot([0], [0], [0], "o", color="black", markersize=6, zorder=6)
+        plane = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]).T
+        ax.plot(*plane, [0] * 5, color=look.GREY, linewidth=0.8, zorder=1)
+        for line in ([[-1, 1], [0, 0]], [[0, 0], [-1, 1]]):
+            ax.plot(*line, [0, 0], color=look.GREY, linewidth=0.8, zorder=1, linestyle=look.DASHED)
+        ax.set(xlabel="$y$", ylabel="$z$", zlabel="$x$", xlim=(-1, 1), ylim=(-1, 1))
+        ax.view_init(elev=24, azim=28)
+        ax.set_box_aspect((1, 1, 0.6))
+        handles = [
+            Patch(color=look.CANARD, alpha=0.4, label="surface on which orbits fall in"),
+            Patch(color=look.GREEN, alpha=0.4, label="surface on which orbits come out"),
+            _entry(look.ABOVE, "an orbit, $x > 0$"),
+            _entry(look.BELOW, "the same orbit, $x < 0$"),
+            _entry(look.GREY, "folds, on $x = 0$", look.DASHED, 0.8),
+        ]
+        ax.legend(handles=handles, loc="upper left")
+    return figure
+
+
+def _flights_by_slope(v: V, count: int = 90) -> tuple[Array, list[int]]:
+    """Edges of angles in the crossing region y < 0 < z, and the flights from between them."""
+    edges = np.linspace(0.0, math.pi / 2, count + 1)
+    middles = (edges[1:] + edges[:-1]) / 2
+    runs = [run(v, (-math.cos(a), math.sin(a)), 60.0, tol=1e-8) for a in middles]
+    return edges, [flights(r) if "s" in r.itinerary else 0 for r in runs]
+
+
+def regions() -> Figure:
+    """Crossing regions by the number of flights before sliding."""
+    with look.settings():
+        figure = look.new_figure(9.6, 4.6)
+        axes = figure.subplots(1, 2)
+        for ax, v in zip(axes, (_FINITE, AFTER), strict=True):
+            for turn in (1, -1):
+                # below the surface the roles of y and z, and of V+ and V-, are exchanged
+                edges, counts = _flights_by_slope(v if turn > 0 else (v[1], v[0]))
+                for a, b, n in zip(edges[:-1], edges[1:], counts, strict=True):
+                    corners = np.array([[0, 0], *[[-math.cos(q), math.sin(q)] for q in (a, b)]])
+                    corners = corners if turn > 0 else corners[:, ::-1]
+                    color = _COLORS[min(n, 5)]
+                    ax.add_patch(Polygon(2 * corners, facecolor=color, edgecolor=color, lw=0.3))
+            _dress(ax, v)
+        scale = ListedColormap(_COLORS)
+        bar = figure.colorbar(
+            ScalarMappable(BoundaryNorm(np.arange(-0.5, 6), 6), scale), ax=axes, shrink=0.85
+        )
+        bar.set_ticks(range(6), labels=["never", "1", "2", "3", "4", "5 or more"])
+        bar.set_label("flights before it slides")
+    return figure
+
+
+def _dress(ax: Axes, v: V) -> None:
+    """Folds, names, and the diabolo lines where there are some."""
+    for x, y in (([-1, 1], [0, 0]), ([0, 0], [-1, 1])):
+        ax.plot(x, y, color="black", linewidth=1.6, linestyle=look.DASHED)
+    if v[0] * v[1] > 1:
+        for slope, color in zip(ns.diabolo_slopes(v), (look.GREEN, look.CANARD), strict=True):
+            start = np.array([-1.0, slope])
+            for z in (start, ns.flight_above(start, v)):
+                ax.plot(*np.array([0 * z, z / np.abs(z).max()]).T, color=color, linewidth=2.2)
+    ax.text(0.5, 0.5, "attracting\nsliding", ha="center", va="center")
+    ax.text(-0.5, -0.5, "repelling\nsliding", ha="center", va="center")
+    ax.set(xlim=(-1, 1), ylim=(-1, 1), xlabel="$y$", ylabel="$z$", title=f"$V$ = {_numbers(v)}")
+    ax.set_aspect("equal")
+
+
+def crossings() -> Figure:
+    """Largest number of flights against V+ V-."""
+    with look.settings():
+        figure = look.new_figure(6.2, 4.2)
+        ax = figure.add_subplot()
+        away = np.geomspace(1, 2e-3, 4000)[1:]
+        ax.plot(away, [formula_for_flights(1 - a) for a in away], color=look.BLACK, lw=1.2)
+        for v, _ in COUNTS:
+            ax.plot(1 - v[0] * v[1], most_flights(v), "o", color=look.ABOVE, markersize=7)
+        ax.set(xscale="log", yscale="log", xlabel="$1 - V^+V^-$", ylabel="most flights")
+        ax.invert_xaxis()
+        ticks = [2, 3, 5, 9, 20, 31, 60]
+        ax.set_yticks(ticks, labels=[str(n) for n in ticks])
+        ax.minorticks_off()
+        handles = [
+            Line2D([], [], color="black", label=r"$\lceil\pi/\arccos\sqrt{V^+V^-}\,\rceil - 1$"),
+            Line2D([], [], color=look.ABOVE, marker="o", ls="none", label="simulated orbits"),
+        ]
+        ax.legend(handles=handles, loc="upper left")
+    return figure
+
+
+def eigenvalues() -> Figure:
+    """Eigenvalues of the return map against V+ V-."""
+    with look.settings():
+        figure = look.new_figure(9.2, 4.2)
+        left, right = figure.subplots(1, 2)
+        circle = np.linspace(0, 2 * math.pi, 200)
+        left.plot(np.cos(circle), np.sin(circle), color=look.GREY, linewidth=0.8)
+        for p in (0.05, 0.25, 0.5, 0.75, 0.9, 1.0, 1.05, 1.2):
+            values = np.linalg.eigvals(ns.return_matrix((-p, -1.0)))
+            color = look.BLUE if p < 1 else look.VERMILLION
+            left.plot(values.real, values.imag, "o" if p < 1 else "D", color=color, markersize=5)
+            left.annotate(
+                f"{p:g}",
+                (values.real.max(), abs(values.imag[0])),
+                xytext=(5, 5),
+                fontsize=8,
+                textcoords="offset points",
+            )
+        left.set(xlabel="Re", ylabel="Im", title="eigenvalues, labelled by $V^+V^-$")
+        left.set(xlim=(-1.3, 3.0), ylim=(-1.4, 1.4))
+        left.set_aspect("equal")
+        p = np.linspace(0, 2.5, 501)
+        root = np.sqrt((p - 1).astype(complex))
+        for sign, dashes in ((1, "-"), (-1, look.DASHED)):
+            size = np.abs((np.sqrt(p) + sign * root) ** 2)
+            right.plot(p, size, color=look.BLACK, linestyle=dashes)
+        right.axvline(1, color=look.GREY, linewidth=0.8)
+        right.set(yscale="log", xlabel="$V^+V^-$", ylabel="modulus")
+        ticks = [0.15, 0.3, 0.5, 1, 2, 3, 6]
+        right.set_yticks(ticks, labels=[f"{v:g}" for v in ticks])
+        right.minorticks_off()
+        right.set_title("moduli: 1 until $V^+V^- = 1$")
+    return figure
+
+
+PICTURES: tuple[Picture, ...] = (
+    Picture(
+        "space",
+        "flow",
+        "The flow near the two-fold before, at and after the bifurcation, with (z1, z2, z3) for "
+        "(x, y, z). Orbits above and below the surface cross it repeatedly; after the bifurcation, invariant lines bound those that "
+        "fall into the singularity.",
+        space,
+    ),
+    Picture(
+        "sliding",
+        "sliding",
+        "The sliding portraits. Before the bifurcation sliding orbits turn away from the "
+        "singularity; at V+ V- = 1 one eigenvalue is 0, a line of pseudo-equilibria; after it every "
+        "sliding orbit passes through the singularity (hatched).",
+        sliding,
+    ),
+    Picture(
+        "diabolo",
+        "nonsmooth diabolo",
+        f"The two invariant surfaces for V = {_numbers(AFTER)} and an orbit on the one whose orbits "
+        "fall into the singularity, crossing infinitely often until t = 3.828427.",
+        diabolo,
+    ),
+    Picture(
+        "regions",
+        "regions of attraction",
+        "How many flights an orbit makes that starts on the surface, by simulation. Before the "
+        "bifurcation everything comes to slide; after it only what starts inside the diabolo "
+        "(violet line), and all of that reaches the singularity.",
+        regions,
+    ),
+    Picture(
+        "crossings",
+        "number of crossings",
+        "Largest number of flights before sliding, by formula and by simulation.",
+        crossings,
+    ),
+    Picture(
+        "eigenvalues",
+        "return map",
+        "Eigenvalues of the return map move round the unit circle and meet at 1 as V+ V- reaches 1.",
+        eigenvalues,
+    ),
+)

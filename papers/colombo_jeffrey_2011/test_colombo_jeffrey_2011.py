@@ -1,0 +1,36 @@
+"""Rings of sliding orbits reach the two-fold as the theory has it, and excursions come back."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from papers.colombo_jeffrey_2011 import model, results
+
+
+@pytest.mark.parametrize("name", model.CLASSES)
+def test_classes_have_their_label_and_their_ring_counts(name):
+    numbers = model.CLASSES[name]
+    assert ns.classify_two_fold(*numbers).label == name
+    found = (model.arrivals(numbers), model.repelling_arrivals(numbers))
+    assert found == results.COUNTS[name]
+
+
+def test_excursions_end_where_they_began():
+    for e in model.excursions(8, seed=7):
+        assert e.returned
+        assert np.abs(e.trajectory.x[-1]).max() < 1e-8
+
+
+def test_slid_orbit_leads_from_the_two_fold_to_the_exit():
+    e = model.excursions()[0]
+    orbit = model.slid_from(tuple(e.start))
+    assert orbit[-1] == pytest.approx(e.start, abs=1e-12)
+    assert np.abs(orbit[0]).max() < 2e-3
+    assert np.all(orbit[:, 1:] <= 0)
+
+
+def test_nothing_returns_below_the_bifurcation():
+    run = model.calm_run(50.0)
+    assert run.status is ns.Status.REACHED_END and run.x[-1, 1] > 1

@@ -1,0 +1,28 @@
+"""Reproduce the paper: ``python -m papers.kuznetsov_2003 [--out FOLDER]``."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Sequence
+
+from ..program import Paper, reproduce
+from . import figures, results
+
+PAPER = Paper(
+    name="kuznetsov_2003",
+    title="The harvest model of Kuznetsov, Rinaldi & Gragnani (2003), reproduced",
+    source="Yu. A. Kuznetsov, S. Rinaldi and A. Gragnani, One-parameter bifurcations in planar Filippov "
+    "systems, Int. J. Bifurcation Chaos 13 (2003) 2157-2188.",
+    note="Statements and parameters are quoted from memory; the paper was not at hand.",
+    claims=results.ALL,
+    pictures=figures.PICTURES,
+)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Compute the claims, draw the figures, write the report; 0 if every check holds."""
+    return reproduce(PAPER, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

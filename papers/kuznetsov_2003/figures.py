@@ -1,0 +1,264 @@
+"""The portraits around each bifurcation, and what happens over the threshold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+
+import nonsmooth as ns
+
+from .. import look
+from ..pictures import Picture
+from .model import (
+    BOUNDARY_FOCUS,
+    BOUNDARY_NODE,
+    FREE_FOLD,
+    HARVESTED_FOLD,
+    SADDLE_NODE,
+    SYSTEM,
+    at,
+    free_cycle,
+    landing,
+    period,
+    pseudo_equilibria,
+    run_from_fold,
+    sliding_homoclinic,
+)
+
+_STAR: dict[str, Any] = {
+    "markersize": 13,
+    "markerfacecolor": "#F0E442",
+    "markeredgecolor": look.BLACK,
+}
+Box = tuple[float, float, float, float]
+
+
+def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
+    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
+
+
+def _mark(marker: str, text: str, fill: str = look.BLACK) -> Line2D:
+    return Line2D(
+        [], [], marker=marker, ls="none", markerfacecolor=fill, markeredgecolor="black", label=text
+    )
+
+
+def _legend() -> list[Line2D]:
+    return [
+        _entry(look.BLACK, "sliding", width=3.4),
+        _entry(look.GREY, "crossing", width=1.2),
+        _entry(look.GREEN, "orbit through a visible fold", width=1.6),
+        _entry(look.CANARD, "separatrix", width=1.8),
+        _mark("D", "visible fold"),
+        _mark("D", "invisible fold", "white"),
+        _mark("o", "stable equilibrium"),
+        _mark("o", "unstable equilibrium", "white"),
+        _mark("s", "stable pseudo-node"),
+        _mark("X", "pseudo-saddle"),
+    ]
+
+
+def _around(levels: tuple[float, float, float], boxes: Callable[[float], Box], x1: float) -> Figure:
+    """Portraits before, at and after a bifurcation, which happens at x1."""
+    with look.settings():
+        figure = look.new_figure(13.0, 4.9)
+        for ax, alpha in zip(figure.subplots(1, 3), levels, strict=True):
+            ns.plot.phase_portrait(
+                SYSTEM,
+                boxes(alpha),
+                parameters=at(alpha),
+                ax=ax,
+                legend=False,
+                title=f"$\\alpha$ = {alpha:.6g}",
+                t_end=150.0,
+            )
+            ax.set(xlabel="$x_1$", ylabel="$x_2$")
+        figure.axes[1].plot(x1, levels[1], "*", **_STAR, zorder=9)
+        star = Line2D([], [], ls="none", marker="*", **_STAR, label="the bifurcation")
+        figure.legend(handles=[*_legend(), star], loc="outside lower center", ncols=6)
+    return figure
+
+
+def focus() -> Figure:
+    """Around the boundary focus."""
+    levels = (BOUNDARY_FOCUS - 0.015, BOUNDARY_FOCUS, BOUNDARY_FOCUS + 0.015)
+    return _around(levels, lambda alpha: (0.02, 0.075, alpha - 0.06, alpha + 0.02), FREE_FOLD)
+
+
+def node() -> Figure:
+    """Around the boundary node."""
+    levels = (BOUNDARY_NODE - 0.02, BOUNDARY_NODE, BOUNDARY_NODE + 0.02)
+    return _around(levels, lambda alpha: (0.55, 0.85, alpha - 0.06, alpha + 0.06), HARVESTED_FOLD)
+
+
+def saddle_node() -> Figure:
+    """Around the pseudo-saddle-node."""
+    levels = (SADDLE_NODE - 0.02, SADDLE_NODE, SADDLE_NODE + 0.02)
+    return _around(
+        levels,
+        lambda alpha: (0.15, 0.55, alpha - 0.15, alpha + 0.15),
+        pseudo_equilibria(SADDLE_NODE - 1e-15)[0],
+    )
+
+
+def whole() -> Figure:
+    """The whole plane in four regimes."""
+    with look.settings():
+        figure = look.new_figure(11.5, 8.4)
+        for ax, alpha in zip(figure.subplots(2, 2).ravel(), (0.75, 0.88, 1.05, 1.3), strict=True):
+            ns.plot.phase_portrait(
+                SYSTEM,
+                (0.0, 1.1, 0.05, 1.7),
+                parameters=at(alpha),
+                ax=ax,
+                legend=False,
+                title=f"$\\alpha$ = {alpha:g}",
+                t_end=150.0,
+            )
+            ax.set(xlabel="$x_1$", ylabel="$x_2$")
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=5)
+    return figure
+
+
+def cycles() -> Figure:
+    """Sliding cycles for several thresholds."""
+    with look.settings():
+        figure = look.new_figure(7.0, 5.2)
+        ax = figure.add_subplot()
+        colors = (look.BLUE, look.GREEN, look.ORANGE, look.VERMILLION)
+        for alpha, color in zip((1.2, 1.5, 2.0, 2.3), colors, strict=True):
+            run = run_from_fold(alpha, period(alpha))
+            t = np.linspace(0, run.t[-1], 1500)
+            ax.plot(*run(t).T, color=color, linewidth=1.4, label=f"$\\alpha$ = {alpha:g}")
+            ax.plot([FREE_FOLD, landing(alpha)[1]], [alpha, alpha], color=color, linewidth=3.2)
+        top, curve = free_cycle()
+        ax.plot(
+            *curve.T, color=look.BLACK, linewidth=1.2, linestyle=look.DASHED, label="no harvest"
+        )
+        ax.plot(FREE_FOLD, top, "D", color=look.BLACK, markersize=5)
+        ax.axvline(FREE_FOLD, color=look.GREY, linewidth=0.7, linestyle=look.DOTTED)
+        ax.set(xlabel="$x_1$", ylabel="$x_2$", xlim=(0, 1), ylim=(0, 2.6))
+        ax.legend(loc="upper right", title="thick: sliding")
+    return figure
+
+
+def diagram() -> Figure:
+    """Everything on the threshold against alpha, and the period of the sliding cycle."""
+    top, _ = free_cycle()
+    with look.settings():
+        figure = look.new_figure(8.6, 7.0)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        for x, visible in ((FREE_FOLD, BOUNDARY_FOCUS), (HARVESTED_FOLD, BOUNDARY_NODE)):
+            # the free fold is visible above its threshold, the harvested one below its own
+            low, high = (0.7, visible), (visible, 2.5)
+            solid, dashed = (high, low) if x == FREE_FOLD else (low, high)
+            color = look.BELOW if x == FREE_FOLD else look.ABOVE
+            upper.plot(solid, (x, x), color=color, linewidth=2.0)
+            upper.plot(dashed, (x, x), color=color, linewidth=2.0, linestyle=look.DASHED)
+        for start, which, dashes in ((BOUNDARY_FOCUS, 0, look.DASHED), (BOUNDARY_NODE, 1, "-")):
+            levels = np.append(np.linspace(start, SADDLE_NODE, 300)[:-1], SADDLE_NODE * (1 - 1e-15))
+            roots = [pseudo_equilibria(a) for a in levels]
+            points = [r[which] if r else np.nan for r in roots]
+            upper.plot(levels, points, color=look.BLACK, linestyle=dashes, linewidth=1.6)
+        levels = np.linspace(BOUNDARY_FOCUS + 1e-3, top - 1e-6, 90)
+        landings = np.array([landing(float(a))[1] for a in levels])
+        born = sliding_homoclinic()
+        upper.plot(
+            levels[levels < born], landings[levels < born], color=look.GREEN, linestyle=look.DOTTED
+        )
+        upper.plot(
+            levels[levels >= born], landings[levels >= born], color=look.GREEN, linewidth=1.8
+        )
+        _bifurcations(upper, lower, top)
+        later = [born + 2e-6, born + 2e-5, *np.linspace(SADDLE_NODE, top - 1e-3, 45)]
+        lower.plot(
+            later, [period(float(a), 2500.0) for a in later], color=look.GREEN, linewidth=1.8
+        )
+        upper.set(ylabel="$x_1$ on $x_2 = \\alpha$", ylim=(0, 0.9))
+        lower.set(xlabel="$\\alpha$", ylabel="period", yscale="log", xlim=(0.7, 2.5))
+        upper.legend(handles=_diagram_legend(), loc="upper right", ncols=2, bbox_to_anchor=(1, 0.8))
+    return figure
+
+
+def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:
+    names = (
+        (BOUNDARY_NODE, "boundary node"),
+        (BOUNDARY_FOCUS, "boundary focus"),
+        (SADDLE_NODE, "sliding homoclinic,\npseudo-saddle-node"),
+        (top, "grazing-\nsliding"),
+    )
+    for value, name in names:
+        for ax in (upper, lower):
+            ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTTED)
+        right = value == top
+        upper.text(
+            value - 0.01 if right else value + 0.01,
+            0.55 if "boundary" in name else 0.885,
+            name,
+            fontsize=8,
+            va="top",
+            ha="right" if right else "left",
+            rotation=90 if "boundary" in name else 0,
+        )
+
+
+def _diagram_legend() -> list[Line2D]:
+    return [
+        _entry(look.BELOW, "fold of the free field, visible", width=2.0),
+        _entry(look.BELOW, "the same, invisible", look.DASHED, 2.0),
+        _entry(look.ABOVE, "fold of the harvested field, visible", width=2.0),
+        _entry(look.ABOVE, "the same, invisible", look.DASHED, 2.0),
+        _entry(look.BLACK, "stable pseudo-node", width=1.6),
+        _entry(look.BLACK, "pseudo-saddle", look.DASHED, 1.6),
+        _entry(look.GREEN, "landing of the sliding cycle", width=1.8),
+        _entry(look.GREEN, "landing of the fold's orbit", look.DOTTED),
+    ]
+
+
+PICTURES: tuple[Picture, ...] = (
+    Picture(
+        "boundary_node",
+        "boundary node",
+        "Before, at and after the boundary node (BN1): the stable node above the threshold turns into "
+        "a stable pseudo-node.",
+        node,
+    ),
+    Picture(
+        "boundary_focus",
+        "boundary focus",
+        "Before, at and after the boundary focus (BF3): an unstable focus and a pseudo-saddle appear "
+        "together. The orbit from the visible fold (green) lands beyond the pseudo-saddle.",
+        focus,
+    ),
+    Picture(
+        "pseudo_saddle_node",
+        "pseudo-saddle-node",
+        "Before, at and after the pseudo-saddle-node: the pseudo-equilibria merge and vanish, and "
+        "sliding then runs from right to left throughout.",
+        saddle_node,
+    ),
+    Picture(
+        "regimes",
+        "four regimes",
+        "Stable node (.75), stable pseudo-node (.88), with pseudo-saddle and unstable focus (1.05), "
+        "stable sliding cycle (1.3).",
+        whole,
+    ),
+    Picture(
+        "cycles",
+        "sliding cycles",
+        "Sliding cycles through the fold of the free field (dotted line), and the cycle of the model without harvest, which touches the threshold from below at alpha = 2.40009.",
+        cycles,
+    ),
+    Picture(
+        "diagram",
+        "bifurcation diagram",
+        "All that lies on the threshold, and the period of the sliding cycle.",
+        diagram,
+    ),
+)

@@ -1,0 +1,188 @@
+"""Portraits over the threshold, the oscillation in time, and the bifurcation diagram."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch
+
+import nonsmooth as ns
+
+from .. import look
+from ..pictures import Picture
+from .model import (
+    BOUNDARY_MIXED,
+    BOUNDARY_RESTING,
+    FOLD_FOLD,
+    MERGING,
+    MIXED,
+    RESTING,
+    SYSTEM,
+    A,
+    Array,
+    at,
+    cycle,
+    point,
+    simulate,
+    threshold_of,
+)
+
+_LEVELS = (-0.06, -0.03, -0.01, 0.0, 0.05, 0.22)
+
+
+def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
+    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
+
+
+def _mark(marker: str, text: str, fill: str = look.BLACK) -> Line2D:
+    return Line2D(
+        [], [], marker=marker, ls="none", markerfacecolor=fill, markeredgecolor="black", label=text
+    )
+
+
+def _cycle_points(eps: float) -> tuple[Array, Array, Array]:
+    """Times over one period of the cycle, its states, and whether it mixes."""
+    temperature, period, _ = cycle(eps)
+    run = simulate(point(temperature, eps), eps, period, "-")
+    t = np.linspace(0, run.t[-1], 800)
+    x = run(t)
+    return t, x, x[:, 1] - A * x[:, 0] > eps
+
+
+def portraits() -> Figure:
+    """Portraits for six thresholds."""
+    with look.settings():
+        figure = look.new_figure(13.0, 9.0)
+        for ax, eps in zip(figure.subplots(2, 3).ravel(), _LEVELS, strict=True):
+            ns.plot.phase_portrait(
+                SYSTEM,
+                (0.0, 1.12, 0.0, 1.12),
+                parameters=at(eps),
+                ax=ax,
+                legend=False,
+                t_end=8.0,
+                title=rf"$\varepsilon$ = {eps:g}".replace("-", "−"),
+            )
+            if BOUNDARY_MIXED < eps < 0:
+                ax.plot(*_cycle_points(eps)[1].T, color=look.PURPLE, linewidth=2.6, zorder=5)
+            ax.set(xlabel="$T$", ylabel="$S$")
+        handles = [
+            _entry(look.BLACK, "sliding, attracting", width=3.4),
+            _entry(look.ORANGE, "sliding, repelling", look.DASHED, 3.4),
+            _entry(look.GREY, "crossing", width=1.2),
+            _entry(look.PURPLE, "stable cycle", width=2.6),
+            _entry(look.CANARD, "separatrix", width=1.8),
+            _entry(look.GREEN, "orbit through a visible fold", width=1.5),
+            _mark("D", "visible fold"),
+            _mark("D", "invisible fold", "white"),
+            _mark("o", "stable equilibrium"),
+            _mark("s", "stable pseudo-node"),
+            _mark("s", "unstable pseudo-node", "white"),
+            _mark("X", "pseudo-saddle"),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=6)
+    return figure
+
+
+def oscillation() -> Figure:
+    """Temperature, salinity and density over three periods."""
+    eps = -0.01
+    t, x, mixing = _cycle_points(eps)
+    with look.settings():
+        figure = look.new_figure(8.6, 5.0)
+        top, bottom = figure.subplots(2, 1, sharex=True)
+        for k in range(3):
+            now = t + k * t[-1]
+            top.plot(now, x[:, 0], color=look.VERMILLION, linewidth=1.6)
+            top.plot(now, x[:, 1], color=look.BLUE, linewidth=1.6, linestyle=look.DASHED)
+            bottom.plot(now, x[:, 1] - A * x[:, 0], color=look.BLACK, linewidth=1.6)
+            for ax in (top, bottom):
+                ax.axvspan(now[mixing][0], now[mixing][-1], color="#EFCB8C", alpha=0.6, linewidth=0)
+        bottom.axhline(eps, color=look.GREY, linewidth=0.9, linestyle=look.DOTTED)
+        top.set(ylabel="temperature, salinity", xlim=(0, 3 * t[-1]))
+        bottom.set(ylabel="density $S - aT$", xlabel="time")
+        handles: list[Line2D | Patch] = [
+            _entry(look.VERMILLION, "$T$", width=1.6),
+            _entry(look.BLUE, "$S$", look.DASHED, 1.6),
+            Patch(color="#EFCB8C", alpha=0.6, label="mixing"),
+            _entry(look.GREY, r"threshold $\varepsilon$", look.DOTTED, 0.9),
+        ]
+        figure.legend(handles=handles, loc="outside upper center", ncols=4)
+    return figure
+
+
+def diagram() -> Figure:
+    """Equilibria, pseudo-equilibria and the cycle against the threshold; the period."""
+    with look.settings():
+        figure = look.new_figure(8.8, 7.0)
+        upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
+        for low, high, color, dashes in (
+            (MIXED[0], MERGING, look.BLACK, look.DASHED),
+            (MERGING, FOLD_FOLD[0], look.ORANGE, look.DASHED),
+            (FOLD_FOLD[0], RESTING[0], look.BLACK, "-"),
+        ):
+            branch = np.linspace(low, high, 200)
+            upper.plot(threshold_of(branch), branch, color=color, linestyle=dashes, linewidth=1.8)
+        upper.plot([-0.08, BOUNDARY_MIXED], [MIXED[0]] * 2, color=look.ABOVE, linewidth=2.2)
+        upper.plot([BOUNDARY_RESTING, 0.25], [RESTING[0]] * 2, color=look.BELOW, linewidth=2.2)
+        levels = np.concatenate(
+            [BOUNDARY_MIXED + np.geomspace(1e-7, 1e-2, 14), -np.geomspace(0.032, 1e-5, 26)]
+        )
+        extremes = np.array([_extremes(float(eps)) for eps in levels])
+        upper.fill_between(levels, *extremes[:, :2].T, color=look.PURPLE, alpha=0.15, linewidth=0)
+        for k in (0, 1):
+            upper.plot(levels, extremes[:, k], color=look.PURPLE, linewidth=1.8)
+        lower.plot(levels, extremes[:, 2], color=look.PURPLE, linewidth=1.8)
+        upper.plot(0, FOLD_FOLD[0], "*", color="#F0E442", markeredgecolor="black", markersize=12)
+        for value in (BOUNDARY_MIXED, 0.0, BOUNDARY_RESTING):
+            for ax in (upper, lower):
+                ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTTED)
+        upper.set(ylabel="$T$", xlim=(-0.08, 0.25), ylim=(0, 1.1))
+        lower.set(xlabel=r"$\varepsilon$", ylabel="period", ylim=(0, None))
+        handles = [
+            _entry(look.ABOVE, "mixed equilibrium, stable", width=2.2),
+            _entry(look.BELOW, "resting equilibrium, stable", width=2.2),
+            _entry(look.BLACK, "stable pseudo-node", width=1.8),
+            _entry(look.BLACK, "pseudo-saddle", look.DASHED, 1.8),
+            _entry(look.ORANGE, "unstable pseudo-node", look.DASHED, 1.8),
+            _entry(look.PURPLE, "cycle: least and largest $T$", width=1.8),
+            _mark("*", "fused focus", "#F0E442"),
+        ]
+        upper.legend(handles=handles, loc="lower right")
+    return figure
+
+
+def _extremes(eps: float) -> tuple[float, float, float]:
+    """Least and largest temperature of the cycle, and its period."""
+    t, x, _ = _cycle_points(eps)
+    return float(x[:, 0].min()), float(x[:, 0].max()), float(t[-1])
+
+
+PICTURES: tuple[Picture, ...] = (
+    Picture(
+        "portraits",
+        "portraits",
+        "The box for six thresholds: mixed all the time (-.06), oscillating (-.03, -.01), the stable "
+        "fused focus (0), balanced on the surface (.05), resting (.22).",
+        portraits,
+    ),
+    Picture(
+        "oscillation",
+        "oscillation",
+        "Three periods of the oscillation at eps = -.01: while the box rests it slowly warms and takes "
+        "up salt; when its density reaches the threshold it mixes, for a short time.",
+        oscillation,
+    ),
+    Picture(
+        "diagram",
+        "bifurcation diagram",
+        "Equilibria, pseudo-equilibria and the cycle over the threshold. Two pseudo-equilibria in "
+        "repelling sliding merge at eps = -.0702. The cycle begins at the fused "
+        "focus and ends in a homoclinic orbit of the boundary equilibrium at eps = -7/165; there its "
+        "period has no bound.",
+        diagram,
+    ),
+)

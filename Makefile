@@ -18,7 +18,7 @@ help: ## list the verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 
 reproduce: .venv/.test ## every number and figure of the papers, into build/
-	@$(BIN)/python -m papers.biber_2022
+	@$(BIN)/python -m papers
 
 test: .venv/.test ## the tests, without the slow ones
 	@$(PYTEST) -m "not slow" $(PYTEST_ARGS)

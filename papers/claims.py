@@ -8,6 +8,7 @@ from typing import Any
 AGREES = "agrees"
 CORRECTED = "corrected"
 NOT_CHECKABLE = "not checkable"
+ADDED = "added here"  # not stated by the paper, as far as recalled
 
 
 @dataclass(frozen=True)
@@ -45,7 +46,7 @@ class Claim:
     value : str
         What this code finds.
     verdict : str
-        ``agrees``, ``corrected`` or ``not checkable``.
+        ``agrees``, ``corrected``, ``not checkable`` or ``added here``.
     how : str
         How it was computed.
     checks : tuple of Check

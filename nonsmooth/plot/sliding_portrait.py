@@ -304,12 +304,13 @@ class _Portrait:
         (u, v), free = self.sheet.mesh, self._free()
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
         for kind, name in enumerate(_NAMES):
-            parts, count = label((self.regions == kind) & free)
+            parts, count = label(self.regions == kind)
             for k in range(1, count + 1):
-                part = np.pad(parts == k, 1)
+                part = parts == k
                 if part.mean() < _SMALLEST:
                     continue
-                deep = distance_transform_edt(part)[1:-1, 1:-1]
+                room = part & free if np.any(part & free) else part
+                deep = distance_transform_edt(np.pad(room, 1))[1:-1, 1:-1]
                 i, j = np.unravel_index(int(np.argmax(deep)), deep.shape)
                 place = (float(u[j]), float(v[i]))
                 style.write(self.ax, place, name, fontsize=13, zorder=7.5, bbox=box, gid="region")

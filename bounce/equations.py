@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from functools import lru_cache
 from typing import Any
@@ -13,7 +14,7 @@ import nonsmooth as ns
 from .contact import ContactModel
 from .errors import ModelError
 from .friction import FrictionLaw
-from .parameters import Names
+from .parameters import Names, number
 
 #: The ball's own states, in the paper's order p = [X, X', Y, Y', Omega].
 STATES = ("x", "xdot", "y", "ydot", "omega")
@@ -32,7 +33,12 @@ class Equations:
 
     def __init__(self, model: ContactModel):
         self.model = model
-        self.start = {**model.extra_states, **model.friction.extra_states}
+        further = {**model.extra_states, **model.friction.extra_states}
+        who = type(model).__name__
+        self.start = {
+            name: number(value, f"{who}: extra_states: {name}", ModelError)
+            for name, value in further.items()
+        }
         self.names = (*STATES, *self.start)
         if len(set(self.names)) < len(self.names):
             raise ModelError(
@@ -60,6 +66,7 @@ class Equations:
         self.along = tangential - q.G * ca.sin(q.slope)
         self.load = self._scalar("load", model.load(s, q))
         self.lift_off = self._scalar("lift_off", model.lift_off(s, q))
+        self._require_end()
         law = model.friction
         set_valued = type(law).traction is FrictionLaw.traction
         if set_valued:
@@ -68,7 +75,8 @@ class Equations:
         else:
             traction = self._scalar("traction", law.traction(s, q, self._sign))
         self.friction_force = traction * self.load
-        rates = {**model.extra_rates(s, q), **law.extra_rates(s, q, self._sign)}
+        own = model.extra_rates(s, q)
+        rates = {**own, **law.extra_rates(s, q, self._sign)} if isinstance(own, Mapping) else own
         if set(rates) != set(self.start):
             raise ModelError(
                 f"{type(model).__name__}: extra_rates: expected a rate for each of "
@@ -78,17 +86,26 @@ class Equations:
         energy = model.stored_energy(s, q)
         self.stored = None if energy is None else self._scalar("stored_energy", energy)
 
+    def _require_end(self) -> None:
+        if not ca.depends_on(self.lift_off, ca.vertcat(*self.x.values())):
+            raise ModelError(
+                f"{type(self.model).__name__}: load: expected a function of the states, received "
+                f"{self.lift_off}. A load that does not change never vanishes, so the ball never "
+                "lifts off: normal_force must depend on s.y or s.ydot."
+            )
+
     def _scalar(self, what: str, value: Any) -> ca.SX:
         try:
             result = ca.SX(value)
-            if result.shape == (1, 1):
+            if result.shape == (1, 1) and not _has_nan(result):
                 return ca.densify(result)
-            received = f"shape {result.shape}"
+            received = f"shape {result.shape}" if result.shape != (1, 1) else f"{result}"
         except (TypeError, ValueError, NotImplementedError):
             received = f"{value!r} ({type(value).__name__})"
         raise ModelError(
             f"{type(self.model).__name__}.{what}: expected a scalar CasADi expression of the states "
-            f"and parameters, received {received}. Is the `return` missing?"
+            f"and parameters, received {received}. Is the `return` missing, or a function taken from "
+            "math instead of casadi?"
         )
 
     # fields ------------------------------------------------------------------------------------
@@ -122,9 +139,20 @@ class Equations:
             list(self.x.values()),
             surface=self.contact_speed,
             parameters=self._defaults(defaults),
-            stops=[ns.Stop(self.lift_off, -1, "lift-off")],
+            stops=self._ends(),
             **definition,
         )
+
+    def _ends(self) -> list[ns.Stop]:
+        """What ends the contact: the model's lift-off function, and the load itself.
+
+        The friction that can hold a rolling ball vanishes with the load. Where its approximate zero
+        comes a little before that of another function, this ends the contact, not the rolling.
+        """
+        ends = [ns.Stop(self.lift_off, -1, "lift-off")]
+        if not ca.is_equal(self.lift_off, self.load, 10):
+            ends.append(ns.Stop(self.load, -1, "no load"))
+        return ends
 
     def build_free(self) -> ns.FilippovSystem:
         """Return the smooth system of the phase before the load is positive (no friction)."""
@@ -155,6 +183,15 @@ class Equations:
         """The friction of forward (+1) or reverse (-1) slip."""
         new = [ca.SX(sign), sign * self.contact_speed]
         return ca.substitute([self.friction_force], [self._sign, self._slip], new)[0]
+
+
+def _has_nan(expression: ca.SX) -> bool:
+    """Whether a constant in it is NaN, as ``math.sin`` of a symbol is."""
+    tape = ca.Function("tape", ca.symvar(expression), [expression])
+    return any(
+        tape.instruction_id(k) == ca.OP_CONST and math.isnan(tape.instruction_constant(k))
+        for k in range(tape.n_instructions())
+    )
 
 
 @lru_cache(maxsize=64)

@@ -145,8 +145,8 @@ class Hertz(_PowerLaw):
     --------
     >>> import bounce
     >>> shot = bounce.simulate(bounce.Hertz(mu=0.3, stiffness=1.0), 0.1, -1.0, 2.0)
-    >>> f"{shot.lift_off.ydot:.9f}", f"{abs(shot.lift_off.y):.0e}"[:2]  # elastic: it keeps its speed
-    ('1.000000000', '0e')
+    >>> f"{shot.lift_off.ydot:.9f}", abs(shot.lift_off.y) < 1e-9  # elastic: it keeps its speed
+    ('1.000000000', True)
     """
 
     parameters = dict(mu=None, stiffness=None, d1=0.0, eta=0.0, G=0.0)

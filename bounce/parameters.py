@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Self
 
 import nonsmooth as ns
 
-from .errors import UnknownNameError
+from .errors import ModelError, UnknownNameError
 
 #: What a limit means; the keys are the words used in ``limits`` and in messages.
 LIMITS: dict[str, Callable[[float], bool]] = {
@@ -65,6 +65,7 @@ class Parametrised:
         shown = list(inspect.signature(cls.__init__).parameters.values())[1:]
         named = [p for p in shown if p.kind is not kind.VAR_KEYWORD]
         taken = {p.name for p in named}
+        _check_declarations(cls, taken)
         for name, default in cls.declared().items():
             empty = kind.empty if default is None else default
             if name not in taken and name.isidentifier():
@@ -162,6 +163,27 @@ class Parametrised:
         shown = [f"{k}={v:.6g}" for k, v in self.values.items() if v != declared.get(k)]
         shown += [f"{k}={v!r}" for k, v in self._options().items()]
         return f"{type(self).__name__}({', '.join(shown)})"
+
+
+def _check_declarations(cls: type, options: set[str]) -> None:
+    for attribute in ("parameters", "limits"):
+        given = vars(cls).get(attribute, {})
+        if not isinstance(given, Mapping):
+            raise ModelError(
+                f"{cls.__name__}: {attribute}: expected a dict, received {given!r}. Write "
+                f"{attribute} = dict(name=value)."
+            )
+    for name, limit in vars(cls).get("limits", {}).items():
+        if limit not in LIMITS:
+            raise ModelError(
+                f"{cls.__name__}: limits: {name}: expected one of {list(LIMITS)}, received {limit!r}."
+            )
+    taken = sorted(options & set(vars(cls).get("parameters", {})))
+    if taken:
+        raise ModelError(
+            f"{cls.__name__}: parameters: expected names other than the constructor's options, "
+            f"received {taken}. No value could be given for them: rename them."
+        )
 
 
 def _merged(cls: type, attribute: str) -> dict[str, Any]:

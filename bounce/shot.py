@@ -256,9 +256,9 @@ def simulate(
     limit = number(t_max, "t_max", ns.OptionError)
     if limit <= 0:
         raise ns.OptionError(f"t_max: expected a positive time, received {t_max!r}.")
-    eq = equations(kind(model))
-    start = [landing.x, landing.xdot, landing.y, landing.ydot, landing.omega, *eq.start.values()]
     blueprint = kind(model)
+    further = equations(blueprint).start.values()
+    start = [landing.x, landing.xdot, landing.y, landing.ydot, landing.omega, *further]
     before, start = approach(blueprint, model.values, start, tol, limit)
     run = _contact(model, before, start, tol, limit)
     if run.status is not ns.Status.STOPPED:
@@ -314,18 +314,3 @@ def _check_landing(landing: State) -> None:
             f"ydot: expected a negative number at y = 0, received {landing.ydot!r}. The ball does not "
             "approach the ground (y points up)."
         )
-
-
-def _pressing(model: ContactModel, start: list[float]) -> bool:
-    """Whether contact with friction begins at once (for ``shooting``)."""
-    try:
-        return approach(kind(model), model.values, start, 1e-10, 1e-300)[0] is None
-    except LiftOffError:
-        return False
-
-
-def _approach(model: ContactModel, start: list[float], tol: float, limit: float) -> ns.Trajectory:
-    """The phase before it (for ``shooting``)."""
-    run = approach(kind(model), model.values, start, tol, limit)[0]
-    assert run is not None
-    return run

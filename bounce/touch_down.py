@@ -115,11 +115,17 @@ def no_lift_off(run: ns.Trajectory, t_max: float) -> str:
             f"lift-off: expected at some time, received {run.status} at t = {run.t[-1]:.6g}: "
             f"{run.message}"
         )
-    cause = (
-        "The ball came to rest in the ground, or the contact is slow: give a larger t_max."
-        if abs(ydot) < 1e-2
-        else "Give a larger t_max, or check that the model's load vanishes."
-    )
+    if abs(ydot) < 1e-2:
+        cause = "The ball came to rest in the ground, or the contact is slow: give a larger t_max."
+    elif y > 0.0:
+        cause = "The ball is above the ground: the load of this model does not vanish there."
+    elif ydot < 0.0 and y < -10.0:
+        cause = (
+            "The ball sinks without end: the surface does not push it up. normal_force is positive "
+            "in compression, as -k * s.y is."
+        )
+    else:
+        cause = "Give a larger t_max, or check that the model's load vanishes."
     return (
         f"lift-off: expected before t_max = {t_max:g}, received none; at the end y = {y:.6g}, "
         f"ydot = {ydot:.6g}. {cause}"

@@ -220,3 +220,41 @@ def test_models_are_immutable():
         turf.mu = 0.4
     with pytest.raises(AttributeError, match="immutable"):
         del turf.values
+
+
+def own(**attributes):
+    forces = dict(
+        normal_force=lambda self, s, p: -s.y, tangential_force=lambda self, s, p: -0.1 * s.x
+    )
+    return type("Own", (bounce.ContactModel,), dict(parameters=dict(mu=0.3)) | forces | attributes)
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [
+        (dict(normal_force=lambda self, s, p: 1.0), "load: .*never vanishes"),
+        (dict(normal_force=lambda self, s, p: -math.sin(s.y)), "math instead of casadi"),
+        (dict(extra_states=dict(z="a")), "extra_states: z: expected a finite number"),
+        (dict(extra_states=dict(z=math.nan)), "extra_states: z: expected a finite number"),
+        (
+            dict(extra_states=dict(z=0.0), extra_rates=lambda self, s, p: [-s.z]),
+            "extra_rates: expected a rate for each of",
+        ),
+    ],
+)
+def test_a_model_that_cannot_be_built(attributes, message):
+    with pytest.raises(bounce.ModelError, match=message):
+        own(**attributes)().system()
+
+
+@pytest.mark.parametrize(
+    ("attributes", "message"),
+    [
+        (dict(limits=dict(mu="positive")), "limits: mu: expected one of"),
+        (dict(parameters=["mu"]), "parameters: expected a dict"),
+        (dict(parameters=dict(mu=0.3, load=1.0)), "options, received ..load.."),
+    ],
+)
+def test_wrong_declarations(attributes, message):
+    with pytest.raises(bounce.ModelError, match=message):
+        own(**attributes)

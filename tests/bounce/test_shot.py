@@ -2,6 +2,7 @@
 
 import math
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -166,3 +167,56 @@ def test_energy_needs_the_models_word():
 
     with pytest.raises(bounce.ModelError, match="stored_energy"):
         bounce.simulate(Plain(), 1.0, -1.0, 0.0).energy(0.0)
+
+
+POWER_LAWS = [
+    bounce.Hertz(mu=0.3, stiffness=1),
+    bounce.Hertz(mu=0.3, stiffness=1, G=0.01),
+    bounce.Hertz(mu=0.3, stiffness=1, d1=0.1, eta=0.5, G=0.01, load="net"),
+    bounce.HuntCrossley(mu=0.3, stiffness=1, damping=0.3),
+    bounce.HuntCrossley(mu=0.3, stiffness=1, damping=0.3, d1=0.1, eta=0.5),
+    bounce.Tsuji(mu=0.3, stiffness=1, damping=0.3),
+    bounce.KuwabaraKono(mu=0.3, stiffness=1, damping=0.3, G=0.01, load="net"),
+]
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-10, 1e-13])
+@pytest.mark.parametrize("model", POWER_LAWS, ids=repr)
+def test_a_ball_that_rolls_to_lift_off_where_the_load_fades(model, tol):
+    """With no force along the ground rolling lasts to lift-off, whatever function ends the load."""
+    landings = [(0.0, 0.0)] if model.values["eta"] else [(0.0, 0.0), (0.5, -0.5), (0.3, -0.1)]
+    for xdot, omega in landings:
+        shot = bounce.simulate(model, xdot, -1.0, omega, tol=tol)
+        assert shot.itinerary.endswith("s")
+        assert abs(shot.slip) < 10 * tol
+        many = bounce.lift_off(model, xdot, -1.0, omega, tol=tol)
+        assert many.itinerary == shot.itinerary
+        slipping = bounce.simulate(model, 5.0, -1.0, 5.0, tol=1e-13)
+        assert abs(shot.time - slipping.time) < 100 * tol
+        assert abs(shot.lift_off.ydot - slipping.lift_off.ydot) < 100 * tol
+
+
+class Law(bounce.ContactModel):
+    parameters = dict(mu=0.3)
+    law = staticmethod(lambda s: -s.y)
+
+    def normal_force(self, s, p):
+        return self.law(s)
+
+    def tangential_force(self, s, p):
+        return 0
+
+
+@pytest.mark.parametrize(
+    ("law", "cause"),
+    [
+        (lambda s: s.y, "sinks without end.*positive in compression"),
+        (lambda s: s.y - 1, "sinks without end.*positive in compression"),
+        (lambda s: ca.exp(-s.y), "above the ground: the load of this model does not vanish"),
+    ],
+    ids=["wrong sign", "attractive", "never vanishes"],
+)
+def test_why_there_is_no_lift_off(law, cause):
+    model = type("Own", (Law,), dict(law=staticmethod(law)))()
+    with pytest.raises(bounce.LiftOffError, match=cause):
+        bounce.simulate(model, 1.0, -1.0, 0.2)

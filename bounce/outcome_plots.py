@@ -43,6 +43,8 @@ _LABELS = {
     "d2": r"$d_2$",
     "G": r"gravity $G$",
 }
+#: How many regions without room for their name are listed, the largest first.
+_LISTED = 16
 _QUANTITIES = ("itinerary", "slip", "spin_reversal", "lift_off_angle")
 
 
@@ -124,15 +126,26 @@ def _regions(ax: Axes, outcomes: OutcomeMap) -> None:
     ax.pcolormesh(
         *outcomes.axes, outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits
     )
-    narrow = []
+    narrow: list[tuple[int, Patch]] = []
     for code, (name, colour) in enumerate(zip(outcomes.regions, colours, strict=True)):
-        if not _named(ax, outcomes, outcomes.code == code, name, colour):
-            narrow.append(Patch(facecolor=colour, edgecolor="0.3", linewidth=0.6, label=name))
+        inside = outcomes.code == code
+        if not _named(ax, outcomes, inside, name, colour):
+            patch = Patch(facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name))
+            narrow.append((int(inside.sum()), patch))
     if narrow:
+        handles = [patch for _, patch in sorted(narrow, key=lambda pair: -pair[0])[:_LISTED]]
+        if len(narrow) > _LISTED:
+            handles.append(Patch(alpha=0, label=f"and {len(narrow) - _LISTED} more"))
         ax.legend(
-            handles=narrow, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
+            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
             frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
         )  # fmt: skip
+
+
+def _short(name: str) -> str:
+    """The first phases of a long itinerary and its last."""
+    phases = name.split()
+    return name if len(phases) <= 8 else " ".join([*phases[:6], "..", phases[-1]])
 
 
 def _named(
@@ -158,7 +171,7 @@ def _field(figure: Figure, ax: Axes, outcomes: OutcomeMap, quantity: str) -> Non
     options: dict[str, Any] = dict(cmap="viridis")
     label = "angle above +x at lift-off (rad)"
     if quantity == "slip":
-        bound = float(np.nanmax(np.abs(values))) or 1.0
+        bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
         options, label = dict(cmap="PuOr_r", vmin=-bound, vmax=bound), "slip at lift-off $H_F$"
     elif quantity == "spin_reversal":
         options, label = dict(cmap="cividis", vmin=0, vmax=1), "spin reverses"
@@ -172,7 +185,7 @@ def _contour(ax: Axes, outcomes: OutcomeMap) -> None:
     """The border between forward and reverse slip, from the map's last phases."""
     last = [{"+": 1.0, "-": -1.0}.get(name[-1], 0.0) for name in outcomes.regions]
     sign = np.array([*last, np.nan])[outcomes.code]
-    if np.nanmin(sign) < 0 < np.nanmax(sign):
+    if np.any(sign < 0) and np.any(sign > 0):
         ax.contour(*outcomes.axes, sign, levels=[0.0], colors="black", linewidths=1.6)
 
 

@@ -20,7 +20,7 @@ import nonsmooth as ns
 from .contact import ContactModel
 from .equations import contact_system, equations, free_system, touch_down_function
 from .errors import LandingError, ModelError
-from .parameters import LIMITS
+from .parameters import LIMITS, number
 from .shot import kind
 from .touch_down import _AHEAD, _INSTANT
 
@@ -523,6 +523,9 @@ def outcome_map(
     """
     if not isinstance(model, ContactModel):
         raise ModelError(f"model: expected a ContactModel, received {model!r}.")
+    for what, given in dict(over=over, fixed=fixed or {}).items():
+        if not isinstance(given, Mapping):
+            raise ns.OptionError(f"{what}: expected a dict of names, received {given!r}.")
     axes, others = _checked_map(model, dict(over), dict(fixed or {}))
     first, second = axes
     values: dict[str, Any] = {**others, first: axes[first], second: axes[second][:, None]}
@@ -548,7 +551,14 @@ def _checked_map(
     for name, values in axes.items():
         if values.ndim != 1 or values.size == 0:
             raise ns.OptionError(f"over: {name}: expected a list, received shape {values.shape}.")
-    others = {"ydot": -1.0, "x": 0.0, "y": 0.0, **{k: float(v) for k, v in fixed.items()}}
+        if not np.all(np.isfinite(values)):
+            raise ns.OptionError(f"over: {name}: expected finite numbers, received {values}.")
+    others = {
+        "ydot": -1.0,
+        "x": 0.0,
+        "y": 0.0,
+        **{k: number(v, f"fixed: {k}") for k, v in fixed.items()},
+    }
     others = {name: v for name, v in others.items() if name not in axes}
     missing = [name for name in INPUTS if name not in axes and name not in others]
     if missing:

@@ -124,7 +124,7 @@ class RigidBounce(Parametrised):
         """
         u, v, w = _landings(xdot, ydot, omega)
         r = self.restitution
-        ratio = _unit_interval(np.asarray(r(-v) if callable(r) else r, dtype=float))
+        ratio = _unit_interval(_of_speed(r, -v) if callable(r) else np.asarray(r, dtype=float))
         inverse_mass = 1 + 1 / self.values["inertia"]
         drag = inverse_mass * self.values["mu"]
         slip, sign = u + w, np.sign(u + w)
@@ -177,12 +177,24 @@ def _landings(xdot: ArrayLike, ydot: ArrayLike, omega: ArrayLike) -> tuple[Array
     return u, v, w
 
 
+def _of_speed(restitution: Callable[[Any], ArrayLike], speed: Array) -> Array:
+    """Values of a restitution function, one for each speed."""
+    value = restitution(speed)
+    try:
+        return np.broadcast_to(np.asarray(value, dtype=float), speed.shape)
+    except (TypeError, ValueError) as error:
+        raise ns.ParameterError(
+            f"restitution: expected a function of the normal speed that returns an array of its shape "
+            f"{speed.shape}, received {value!r}."
+        ) from error
+
+
 def _unit_interval(values: Array) -> Array:
     if not np.all((values >= 0) & (values <= 1)):
         wrong = values[~((values >= 0) & (values <= 1))].flat[0]
         raise ns.ParameterError(
             f"restitution: expected a number in [0, 1], received {wrong}. Above 1 the impact would "
-            "create energy."
+            "create energy, below 0 the ball would pass through the ground."
         )
     return values
 

@@ -258,3 +258,39 @@ def test_pictures_refuse_what_they_cannot_draw(outcomes):
     m = bounce.outcome_map(TURF, dict(mu=[0.1, 0.2], omega=[0.0, 1.0]), fixed=dict(xdot=1.0))
     with pytest.raises(ns.OptionError, match="map over xdot and omega"):
         bounce.plot.outcome_map(m, curve=bounce.dividing_curve(TURF, step=0.4, reach=0.6))
+
+
+@pytest.mark.parametrize(
+    ("over", "fixed", "error"),
+    [
+        ({"eta": [0.1, 0.2], "mu": [0.3]}, dict(xdot="a", omega=1), ns.ParameterError),
+        ({"eta": [0.1, 0.2], "mu": [0.3]}, dict(xdot=[1, 2], omega=1), ns.ParameterError),
+        (["eta", "mu"], {}, ns.OptionError),
+        ({"xdot": [0.1, math.nan], "omega": [0.3]}, {}, ns.OptionError),
+    ],
+)
+def test_maps_of_what_is_no_number(over, fixed, error):
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    with pytest.raises(error, match="expected"):
+        bounce.outcome_map(turf, over, fixed)
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("quantity", ["itinerary", "slip"])
+def test_a_picture_of_a_map_without_lift_off(quantity):
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    over = {"xdot": [0.0, 1.0], "omega": [0.0, 1.0]}
+    figure = bounce.plot.outcome_map(bounce.outcome_map(turf, over, {"ydot": 1.0}), quantity)
+    figure.canvas.draw()
+
+
+def test_a_legend_of_dozens_of_regions_is_short():
+    stiff = bounce.KelvinVoigt(mu=0.3, d1=0.05, d2=0.1, eta=12)
+    axis = np.linspace(-1, 1, 60)
+    outcomes = bounce.outcome_map(stiff, {"xdot": axis, "omega": axis})
+    legend = bounce.plot.outcome_map(outcomes).axes[0].get_legend()
+    names = [text.get_text() for text in legend.get_texts()]
+    assert len(outcomes.regions) > 40
+    assert len(names) <= 17
+    assert names[-1].endswith("more")
+    assert max(map(len, names)) < 30

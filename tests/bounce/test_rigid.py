@@ -135,3 +135,10 @@ def test_restitution_as_a_function_of_speed_and_arrays():
 def test_messages(call, error, message):
     with pytest.raises(error, match=message):
         call()
+
+
+@pytest.mark.parametrize("wrong", [lambda v: np.ones(3), lambda v: "a"])
+def test_a_restitution_function_of_the_wrong_shape(wrong):
+    ball = bounce.RigidBounce(mu=0.3, restitution=wrong)
+    with pytest.raises(ns.ParameterError, match="an array of its shape"):
+        ball.lift_off([1.0, 2.0], -1.0, 0.0)

@@ -62,6 +62,7 @@ class Driver:
         self._last_event = self.t
         self._ended: tuple[Status, str] | None = None
         self._limit: float | None = None
+        self._repelling = False  # sliding that only start_mode chooses
         self._due: int | None = None  # a reset to be served where the run stands
 
     # the loop ----------------------------------------------------------------------------------
@@ -95,7 +96,7 @@ class Driver:
             return self._end(Status.STEP_TOO_SMALL, messages.step_too_small(h))
         last = h >= left
         h = min(h, left)
-        hit = self.stepper.first_hit(e, h, self.drops, self.t)
+        hit = self.stepper.first_hit(e, h, self.drops, self.t, self._repelling)
         self._advance(e, e.states, hit.dt if hit else h)
         if hit is not None:
             self._serve(hit)
@@ -256,11 +257,17 @@ class Driver:
                     f"start_mode {mode!r} has {len(solutions)} stable sliding solutions here.",
                 )
             self.multipliers = solutions[0][self.x.size :]
-        e = self._expand()
+        e, leading = self._expand(), {}
         for row, guard in enumerate(self.stepper.guards(mode)):
             if guard.index in active and guard.kind in ("surface", "exit"):
                 k, value = self.stepper.leading(e, row, 1 if guard.kind == "surface" else 0)
-                self.drops[row] = k if value > 0 else e.guards.shape[1]
+                leading[row] = (guard.kind, value)
+                self.drops[row] = k
+        exits = [value for kind, value in leading.values() if kind == "exit"]
+        self._repelling = bool(exits) and max(exits) <= 0.0 and min(exits) < 0.0
+        holds = self._repelling or all(value >= 0.0 for value in exits)
+        if not holds or any(kind == "surface" and value < 0.0 for kind, value in leading.values()):
+            self._end(Status.NON_UNIQUE, messages.impossible_start(mode))
 
     def _drop_zero_guards(self) -> None:
         """A start on a stopping surface is not an event; one pressed into a reset is."""
@@ -279,6 +286,7 @@ class Driver:
         self._close_segment(continuation.mode)
         self.mode, self.drops = continuation.mode, dict(continuation.drops)
         self.multipliers = continuation.multipliers
+        self._repelling = False
 
     def _active(self, certain: set[int], mode: str) -> list[int]:
         """Surfaces through the present state, to rounding, and those known to be."""

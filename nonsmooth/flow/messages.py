@@ -47,6 +47,11 @@ def wrong_start(asked: str, actual: str) -> str:
     return f"start_mode {asked!r} does not hold at the start, where the mode is {actual!r}."
 
 
+def impossible_start(asked: str) -> str:
+    """The mode asked for cannot leave the start."""
+    return f"start_mode {asked!r} cannot continue from the start: its field points elsewhere."
+
+
 def field_not_finite(mode: str, x: Sequence[float]) -> str:
     """The field of a mode is not finite at a state."""
     return f"The field of mode {mode!r} at ({', '.join(f'{v:.6g}' for v in x)})."

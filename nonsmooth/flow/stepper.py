@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -128,8 +128,16 @@ class Stepper:
                 return k, float(e.guards[row, k])
         return e.guards.shape[1], 0.0
 
-    def first_hit(self, e: Expansion, h: float, drops: dict[int, int], t: float) -> Hit | None:
-        """Earliest guard to end the mode within h; ``drops[row]`` leading coefficients are zero."""
+    def first_hit(
+        self, e: Expansion, h: float, drops: dict[int, int], t: float, repelling: bool = False
+    ) -> Hit | None:
+        """Earliest guard to end the mode within h; ``drops[row]`` leading coefficients are zero.
+
+        In repelling sliding the exit guards are negative, and rise to zero where it ends.
+        """
+        if repelling:
+            exits = [guard.kind == "exit" for guard in self.guards(e.mode)]
+            e = replace(e, guards=np.where(np.array(exits)[:, None], -e.guards, e.guards))
         hits = []
         for row, guard in enumerate(self.guards(e.mode)):
             c = e.guards[row, drops.get(row, 0) :]

@@ -74,6 +74,27 @@ def test_repelling_start_is_not_unique_and_each_continuation_can_be_chosen():
     assert ends == {"+": 1.0, "-": -1.0, "s": 0.0}
 
 
+def test_repelling_sliding_that_was_chosen_goes_on_until_it_ends():
+    """L1 = 1 > 0 > L2 = x - 1: repelling until x = 1, where F2 turns upward and the orbit leaves.
+
+    Beyond, both fields point up, and F2 is tangent with z'' = 1: only F1 leaves.
+    """
+    system = ns.FilippovSystem([x, z], surface=z, above=[1, 1], below=[1, x - 1])
+    assert ns.simulate(system, [0.0, 0.0], 3.0).status is ns.Status.NON_UNIQUE
+    for engine in ("auto", "reference", "compiled"):
+        run = ns.simulate(system, [0.0, 0.0], 3.0, start_mode="s", engine=engine, tol=1e-12)
+        assert run.itinerary == "s +" and run.events[0].t == pytest.approx(1.0, abs=1e-12)
+        np.testing.assert_allclose(run.x[-1], [3.0, 2.0], atol=1e-11)
+
+
+@pytest.mark.parametrize(("mode", "start"), [("+", 0.0), ("-", 0.0), ("s", 3.0)])
+def test_a_start_mode_whose_field_points_elsewhere_is_refused(mode, start):
+    """Attracting for x < 2: neither side leaves; crossing beyond: no sliding."""
+    system = ns.FilippovSystem([x, z], surface=z, above=[1, x - 2], below=[1, 1])
+    run = ns.simulate(system, [start, 0.0], 5.0, start_mode=mode)
+    assert run.status is ns.Status.NON_UNIQUE and "cannot continue" in run.message
+
+
 def test_two_folds_are_never_guessed_through():
     """Started at each kind of two-fold, and slid into a Teixeira singularity in finite time."""
     for above, below in [

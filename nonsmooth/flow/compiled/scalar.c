@@ -522,7 +522,11 @@ static void start_in(Run *r, int mode, unsigned active) {
     if (guard[0] >= STOP_GUARD || !(active >> guard[1] & 1)) continue;
     double value;
     int k = leading(&e, j, guard[0] == SURFACE_GUARD, &value);
-    r->drop[j] = value > 0 ? k : P + 1;
+    r->drop[j] = k;
+    if (value < 0) { /* repelling sliding, or a mode that cannot hold: the reference knows which */
+      finish(r, HAND_OVER, NO_REASON, 0);
+      return;
+    }
   }
 }
 

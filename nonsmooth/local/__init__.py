@@ -1,5 +1,6 @@
 """WHAT HAPPENS at a point of a surface, without time stepping: regions, folds, two-folds."""
 
+from .branches import SlidingBranch, sliding_branches
 from .classification import Boundary, Classification, Slopes, classify_two_fold
 from .crossing import (
     accumulation_time,
@@ -38,6 +39,7 @@ __all__ = [
     "PseudoEquilibrium",
     "ReducedFlow",
     "Region",
+    "SlidingBranch",
     "Slopes",
     "TraceError",
     "TwoFold",
@@ -62,6 +64,7 @@ __all__ = [
     "normal_form",
     "region",
     "return_matrix",
+    "sliding_branches",
     "sliding_field",
     "trace_two_folds",
     "two_fold",

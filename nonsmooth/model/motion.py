@@ -113,7 +113,40 @@ class Motion:
         reduced, _ = cancel_common_factor(
             [*pieces, h], system.extended_states, system.parameter_symbols
         )
-        return not ca.depends_on(reduced[-1], system.extended_states)
+        if not ca.depends_on(reduced[-1], system.extended_states):
+            return True
+        return self._vanishes_on_surface(ca.vertcat(*pieces), h)
+
+    def _vanishes_on_surface(self, difference: ca.SX, h: ca.SX, samples: int = 6) -> bool:
+        """Whether an expression is zero at random points of the surface: an identity test.
+
+        It finds factors h that no rearrangement of the expression brings to light.
+        """
+        system = self.system
+        x, p = system.extended_states, system.parameter_symbols
+        gradient = ca.jacobian(h, x)
+        f = ca.Function("f", [x, p], [difference, h, gradient, ca.fabs(difference)])
+        random, seen = np.random.default_rng(0), 0
+        for _ in range(4 * samples):
+            point, q = random.uniform(0.2, 1.2, x.numel()), random.uniform(0.2, 1.2, p.numel())
+            size = float(np.max(np.array(f(point, q)[3]), initial=0.0))
+            for _ in range(8):
+                _, value, slope, _ = (np.array(v) for v in f(point, q))
+                step = (
+                    value.item() * slope.ravel() / max(float(slope.ravel() @ slope.ravel()), 1e-300)
+                )
+                point = point - step
+            left = np.array(f(point, q)[0])
+            if not (
+                np.all(np.isfinite(left)) and np.isfinite(size) and abs(f(point, q)[1]) < 1e-12
+            ):
+                continue
+            if np.abs(left).max() > 1e-11 * max(1.0, size):
+                return False
+            seen += 1
+            if seen == samples:
+                return True
+        return False
 
     def _guards(self) -> tuple[tuple[Guard, ...], ca.SX]:
         system = self.system
@@ -340,8 +373,16 @@ class Intersection(Motion):
             values[-k:] -= np.linalg.solve(slope, g.ravel())
         return values
 
-    def solutions(self, x: Array, p: Array) -> list[Array]:
-        """All stable multipliers in [-1, 1]^k at x, each as x extended by them.
+    def velocity_and_slope(self, values: Array, p: Array) -> tuple[Array, Array]:
+        """Field of the extended state (N,) and dG/dlambda (k, k) at x with multipliers."""
+        rows = self.system.extended_dimension
+        build = [self.field[:rows], self.slope]
+        f = self.system.function(("velocity", self.mode), lambda: build, self.states)
+        velocity, slope = (np.array(v) for v in f(values, p))
+        return velocity.ravel(), slope
+
+    def solutions(self, x: Array, p: Array, stable_only: bool = True) -> list[Array]:
+        """Multipliers in [-1, 1]^k at x, each as x extended by them.
 
         Newton from a grid: bilinear equations of two multipliers have at most two solutions.
         """
@@ -355,7 +396,7 @@ class Intersection(Motion):
             small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
             if not small or np.abs(lam).max() > 1.0 + 1e-9:
                 continue
-            if np.linalg.eigvals(slope).real.max() >= 0.0:
+            if stable_only and np.linalg.eigvals(slope).real.max() >= 0.0:
                 continue
             if all(np.abs(lam - other[-k:]).max() > 1e-7 for other in found):
                 found.append(values)

@@ -109,3 +109,11 @@ def test_a_coefficient_of_ones_own():
     load, friction = shot.forces(0.5)
     state = shot(0.5)
     assert friction == pytest.approx(-0.3 / (1 + 0.5 * (state[1] + state[4])) * load, abs=1e-12)
+
+
+def test_bristles_at_rest_do_not_stop_a_vertical_landing():
+    """The bristle law is continuous across H = 0, so there is nothing to decide there."""
+    law = bounce.LuGre(bristle_stiffness=200.0, mu_kinetic=0.2, stribeck_speed=0.1)
+    model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, friction=law)
+    shot = bounce.simulate(model, xdot=0.0, ydot=-1.0, omega=0.0)
+    assert shot.slip == 0.0 and shot.time == pytest.approx(2.956075324749550, abs=1e-9)

@@ -189,3 +189,15 @@ def test_a_mode_of_the_wrong_form_is_refused():
     for mode in ("", "++", "x", 1):
         with pytest.raises(ns.DefinitionError, match="mode: expected 1 letter"):
             stick_slip().parse_mode(mode)
+
+
+def test_a_field_continuous_across_the_surface_is_seen_however_it_is_written():
+    """Two products that differ by a multiple of h: no factor is in sight, yet F1 = F2 on h = 0."""
+    a, b = x + 2 * v, 3 + x * v
+    system = ns.FilippovSystem(
+        [x, v], surface=v - 1, above=[a * b, v], below=[(a + (v - 1)) * b, v * v]
+    )
+    assert motion(system, "s").cancelled
+    run = ns.simulate(ns.FilippovSystem([x, v], surface=v, above=[1, a * v], below=[1, (a + v) * v]),
+                      [0.0, 0.0], 1.0)  # fmt: skip
+    assert run.status is ns.Status.REACHED_END

@@ -39,6 +39,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     )
     parser.add_argument("--only", nargs="+", metavar="SECTION", choices=[*sections(FOLDER, True)])
     parser.add_argument("--folder", type=Path, help="where results go (build/benchmarks)")
+    parser.add_argument("--record", action="store_true", help="put the results into README.md too")
     options = parser.parse_args(arguments)
     folder = options.folder or (FOLDER / "quick" if options.quick else FOLDER)
     folder.mkdir(parents=True, exist_ok=True)
@@ -53,7 +54,9 @@ def main(arguments: Sequence[str] | None = None) -> None:
         path.write_text(json.dumps(results, indent=1))
     text = report.markdown(results)
     (folder / "results.md").write_text(text, encoding="utf-8")
-    report.pictures(results, folder)
+    pictures = report.pictures(results, folder)
+    if options.record:
+        report.record(text, pictures, Path(__file__).parent)
     print(text)
     print(f"benchmarks: {os.path.relpath(path)}, results.md, work_precision.png")
 

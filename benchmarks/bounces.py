@@ -31,7 +31,7 @@ class Solver:
     label : str
     make : (name of a problem, tolerance) -> function of the starts
     tolerances : what to try, loosest first
-    count, timed : trajectories for the errors at most, and in one timed turn
+    count, timed : trajectories for the errors at most, and in one timed turn (about 0.1 s)
     available : whether it is installed
     """
 
@@ -55,15 +55,15 @@ def solvers() -> list[Solver]:
     taylor = ladder(-4, -14, 4)
     fixed = lambda make, **options: lambda name, tol: make(name, tol, **options)
     return [
-        Solver("nonsmooth", ours.make, taylor, 100_000, 50_000),
+        Solver("nonsmooth", ours.make, taylor, 100_000, 200_000),
         Solver("nonsmooth, reference driver", ours.reference_driver, ladder(-6, -12, 1), 200, 100),
-        Solver("heyoka, one integrator per mode", hy.make, taylor, 100_000, 2_000, hy.available),
+        Solver("heyoka, one integrator per mode", hy.make, taylor, 100_000, 10_000, hy.available),
         Solver(
             "heyoka, one integrator and callbacks",
             heyoka_callbacks.make,
             taylor,
             100_000,
-            2_000,
+            10_000,
             hy.available,
         ),
         Solver(
@@ -71,16 +71,16 @@ def solvers() -> list[Solver]:
             fixed(hy.make, lanes=8),
             ladder(-4, -12, 2),
             100_000,
-            2_000,
+            10_000,
             hy.available,
         ),
-        Solver("scipy DOP853", sp.make, ladder(-6, -13, 2), 500, 40),
+        Solver("scipy DOP853", sp.make, ladder(-6, -13, 2), 500, 60),
         Solver(
             "scipy DOP853, numba",
             fixed(sp.make, numba=True),
             ladder(-6, -13, 2),
             500,
-            40,
+            60,
             sp.numba_available,
         ),
         Solver(

@@ -63,8 +63,11 @@ def scaling(quick: bool, tolerance: float = 1e-8) -> dict[str, Any]:
                 "1 process": lambda sweep=sweep: sweep(executor=one),
                 "2 processes": lambda sweep=sweep: sweep(executor=two),
             }
-            timings = alternate(work, 3 if quick else 9, clock=time.perf_counter)
+            timings = alternate(work, 3 if quick else 15, clock=time.perf_counter)
             result[name] = {k: t.as_dict() | {"rate": t.rate(count)} for k, t in timings.items()}
+            threads = {k: run for k, run in work.items() if "thread" in k}
+            for k, t in alternate(threads, 3).items():
+                result[name][k]["processor s"] = t.median
             print(
                 f"  {name}: { ({k: round(t.median, 3) for k, t in timings.items()}) }", flush=True
             )

@@ -258,3 +258,10 @@ def test_a_model_that_cannot_be_built(attributes, message):
 def test_wrong_declarations(attributes, message):
     with pytest.raises(bounce.ModelError, match=message):
         own(**attributes)
+
+
+def test_a_negative_stiffness_is_physically_impossible():
+    with pytest.raises(
+        ns.ParameterError, match=r"Hertz: stiffness: expected a number > 0, received"
+    ):
+        bounce.Hertz(mu=0.3, stiffness=-1.0)

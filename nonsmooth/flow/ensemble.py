@@ -9,7 +9,8 @@ from __future__ import annotations
 import hashlib
 import math
 import os
-from collections.abc import Generator, Iterator, Mapping
+import threading
+from collections.abc import Callable, Generator, Iterator, Mapping
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
@@ -20,7 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, OptionError, PointError, explain, require_system
 from .checkpoint import Checkpoint
-from .chunks import Job, forget, make_job, run_chunk, stop_chunks
+from .chunks import Job, run_chunk, shipped
 from .compiled.engine import KINDS, Chunk, engine_for, supports_lanes
 from .compiled.select import use_compiled
 from .options import Options
@@ -183,16 +184,13 @@ def ensemble(
         and starts.count >= _FEW
         and t_end > t_start
     )
-    job = make_job(system, options, at, compiled, lanes)
+    job = Job(system, options, at, compiled, lanes)
     saved = None
     if checkpoint is not None:
         saved = Checkpoint(checkpoint, _problem(system, starts, options, at, compiled), chunk)
         chunk = saved.chunk
     results = _Results(system, starts.shape, at is not None)
-    try:
-        _run_all(job, starts, results, chunk, threads, executor, saved, progress)
-    finally:
-        forget(job)
+    _run_all(job, starts, results, chunk, threads, executor, saved, progress)
     return results.ensemble()
 
 
@@ -238,9 +236,9 @@ class _Starts:
     def part(self, first: int, last: int) -> tuple[Array, Array]:
         """Extended starts and parameters of the trajectories first to last - 1."""
         n = self.system.dimension
-        x = np.empty((last - first, self.system.extended_dimension))
-        x[:, :n] = _rows(self.x0, self.shape, first, last, n)
-        x[:, n:] = self.t_start
+        x = _rows(self.x0, self.shape, first, last, n)
+        if self.system.time_dependent:
+            x = np.concatenate([x, np.full((last - first, 1), self.t_start)], axis=1)
         if not self.varied:
             return x, self.p
         p = np.tile(self.p, (last - first, 1))
@@ -259,7 +257,7 @@ def _rows(values: Array, shape: tuple[int, ...], first: int, last: int, n: int) 
 
 def _numbers(value: ArrayLike, what: str) -> Array:
     try:
-        return np.asarray(value, dtype=float)
+        return np.asarray(value, dtype=float, order="C")
     except (TypeError, ValueError) as error:
         raise PointError(f"{what}: expected numbers, received {value!r}.") from error
 
@@ -320,41 +318,58 @@ class _Results:
     """Arrays of all trajectories, filled as chunks arrive in any order."""
 
     def __init__(self, system: FilippovSystem, shape: tuple[int, ...], at: bool):
-        self.shape, count, n = shape, math.prod(shape), system.dimension
-        self.x, self.t = np.empty((count, n)), np.empty(count)
-        self.status = np.empty(count, np.int8)
-        self.code = np.empty(count, np.int32)
-        self.kinds = np.empty((count, len(KINDS)), np.int32)
-        self.at_x = np.empty((count, n)) if at else None
-        self.at_t = np.empty(count) if at else None
+        self.shape = shape
+        self.all = Chunk.empty(math.prod(shape), system.dimension, at)
         self._words: dict[str, int] = {}
 
+    def part(self, first: int, last: int) -> Chunk:
+        """Return the arrays of the trajectories first to last - 1, to be written in place."""
+        every, cut = self.all, slice(first, last)
+        return Chunk(
+            x=every.x[cut],
+            t=every.t[cut],
+            status=every.status[cut],
+            itinerary=every.itinerary[cut],
+            words=[],
+            kinds=every.kinds[cut],
+            at_x=None if every.at_x is None else every.at_x[cut],
+            at_t=None if every.at_t is None else every.at_t[cut],
+        )
+
     def put(self, first: int, chunk: Chunk) -> None:
-        """Store a chunk that begins with trajectory ``first``."""
-        part = slice(first, first + len(chunk.t))
-        self.x[part], self.t[part], self.status[part] = chunk.x, chunk.t, chunk.status
-        self.kinds[part] = chunk.kinds
+        """Take a chunk that begins with trajectory ``first``; its arrays may be a ``part``."""
+        whole = self._arrays(self.all)
+        for name, array in self._arrays(chunk).items():
+            if array.base is not whole[name]:
+                whole[name][first : first + len(array)] = array
         numbers = [self._words.setdefault(w, len(self._words)) for w in chunk.words]
-        self.code[part] = np.array(numbers, np.int32)[chunk.itinerary]
-        if self.at_x is not None and self.at_t is not None:
-            self.at_x[part], self.at_t[part] = chunk.at_x, chunk.at_t
+        if numbers != list(range(len(numbers))):
+            codes = self.all.itinerary[first : first + len(chunk.t)]
+            codes[:] = np.array(numbers, np.int32)[codes]
+
+    @staticmethod
+    def _arrays(chunk: Chunk) -> dict[str, NDArray[Any]]:
+        names = ("x", "t", "status", "itinerary", "kinds", "at_x", "at_t")
+        return {name: a for name in names if (a := getattr(chunk, name)) is not None}
 
     def ensemble(self) -> Ensemble:
         """Return the results, with the itineraries sorted."""
-        words = sorted(self._words)
-        order = np.empty(max(1, len(words)), np.int32)
-        for k, word in enumerate(words):
-            order[self._words[word]] = k
-        shape = self.shape
+        words, code, every = sorted(self._words), self.all.itinerary, self.all
+        if words != list(self._words):
+            order = np.empty(len(words), np.int32)
+            for k, word in enumerate(words):
+                order[self._words[word]] = k
+            code = order[code]
+        n, shape = every.x.shape[1], self.shape
         return Ensemble(
-            x=self.x.reshape(*shape, self.x.shape[1]),
-            t=self.t.reshape(shape),
-            status=self.status.reshape(shape),
+            x=every.x.reshape(*shape, n),
+            t=every.t.reshape(shape),
+            status=every.status.reshape(shape),
             itineraries=tuple(words),
-            itinerary_code=order[self.code].reshape(shape),
-            events={kind: self.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
-            event_x=None if self.at_x is None else self.at_x.reshape(*shape, self.x.shape[1]),
-            event_t=None if self.at_t is None else self.at_t.reshape(shape),
+            itinerary_code=code.reshape(shape),
+            events={kind: every.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
+            event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
+            event_t=None if every.at_t is None else every.at_t.reshape(shape),
         )
 
 
@@ -380,10 +395,11 @@ def _run_all(
         else:
             results.put(number * size, done)
             bar.update(len(done.t))
-    work = ((k, *starts.part(k * size, min((k + 1) * size, starts.count))) for k in missing)
-    workers = min(threads or _processors(), max(1, len(missing)))
+    work = ((k, k * size, min((k + 1) * size, starts.count)) for k in missing)
+    pieces = ((k, *starts.part(*ends), results.part(*ends)) for k, *ends in work)
+    workers = min(threads or _processors(), len(missing))
     try:
-        with closing(_chunks(job, work, workers, executor)) as finished:
+        with closing(_chunks(job, pieces, workers, executor)) as finished:
             for number, chunk in finished:
                 if saved is not None:
                     saved.save(number, chunk)
@@ -393,27 +409,43 @@ def _run_all(
         bar.close()
 
 
+#: The number of a chunk, its starts and parameters, the arrays for its results.
+_Piece = tuple[int, Array, Array, Chunk]
+
+
 def _chunks(
-    job: Job, work: Iterator[tuple[int, Array, Array]], workers: int, executor: Executor | None
+    job: Job, work: Iterator[_Piece], workers: int, executor: Executor | None
 ) -> Generator[tuple[int, Chunk], None, None]:
     """Finished chunks in the order in which they finish; a bounded number is under way."""
     if executor is not None:
-        yield from _submit(job, work, executor, _IN_FLIGHT)
-        return
-    # A pool even for one thread: this one then hears Ctrl-C while a chunk is running.
-    pool = ThreadPoolExecutor(workers)
+        job = shipped(job)
+        away = lambda x, p, out: executor.submit(run_chunk, job, x, p)
+        yield from _submit(work, away, _IN_FLIGHT)
+    elif workers < 2:
+        for number, x, p, out in work:
+            yield number, run_chunk(job, x, p, out)
+    else:
+        yield from _in_threads(job, work, workers)
+
+
+def _in_threads(
+    job: Job, work: Iterator[_Piece], workers: int
+) -> Generator[tuple[int, Chunk], None, None]:
+    pool, stop = ThreadPoolExecutor(workers), threading.Event()
+    here = lambda x, p, out: pool.submit(run_chunk, job, x, p, out, stop.is_set)
     try:
-        yield from _submit(job, work, pool, 2 * workers)
+        yield from _submit(work, here, 2 * workers)
     except BaseException:
-        stop_chunks(job, True)
+        stop.set()
         raise
     finally:
         pool.shutdown(cancel_futures=True)
-        stop_chunks(job, False)
 
 
 def _submit(
-    job: Job, work: Iterator[tuple[int, Array, Array]], pool: Executor, limit: int
+    work: Iterator[_Piece],
+    submit: Callable[[Array, Array, Chunk], Future[Chunk]],
+    limit: int,
 ) -> Iterator[tuple[int, Chunk]]:
     pending: dict[Future[Chunk], int] = {}
     exhausted = False
@@ -424,7 +456,7 @@ def _submit(
                 if item is None:
                     exhausted = True
                 else:
-                    pending[pool.submit(run_chunk, job, *item[1:])] = item[0]
+                    pending[submit(*item[1:])] = item[0]
             if pending:
                 finished, _ = wait(pending, return_when=FIRST_COMPLETED)
                 for future in sorted(finished, key=_failed):  # what is finished is saved first

@@ -363,7 +363,7 @@ class FilippovSystem:
     @property
     def extended_dimension(self) -> int:
         """Number of states, plus one if the system depends on time."""
-        return int(self.extended_states.numel())
+        return int(self._x.numel() + self._t.numel())
 
     @property
     def extended_states(self) -> ca.SX:

@@ -17,13 +17,34 @@
 
 enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SMALL, NOT_FINITE,
        TOO_MANY_EVENTS, TOO_MANY_STEPS };
-/* Not final: the run continues elsewhere, after the arrays were emptied, or is not begun. */
+/* Not final: the run goes on in the next call, after the arrays were emptied, or elsewhere. */
 enum { RUNNING = -1, FULL = -2, HAND_OVER = -3 };
 enum { CROSSING, ENTRY, EXIT, STOP, RESET, END, KINDS };
 
-/* Set by another thread to leave all runs as they are. */
-volatile int stop_requested = 0;
+typedef struct {
+  double t_end, rtol, atol, max_step;
+  int64_t max_steps, max_events;
+  int32_t start_mode, at_kind;
+  int64_t at_count;
+  int32_t dense, pad;
+} Options;
 
+/* Trajectories of a call: all of the arrays, or those listed in ``which``; where results go. */
+typedef struct {
+  int64_t count, p_stride;
+  double t0;
+  const int64_t *which;
+  const double *x0, *p;
+  double *x, *t;
+  int8_t *status;
+  int32_t *itinerary, *kinds;
+  double *at_x, *at_t;
+  int64_t *totals;
+} Batch;
+
+/* As fmax and fmin where b is a number, without the calls. */
+static inline double larger(double a, double b) { return a > b ? a : b; }
+static inline double smaller(double a, double b) { return a < b ? a : b; }
 static inline double ns_sign(double a) { return (a > 0) - (a < 0); }
 
 /* Inverse error function: Giles 2010, then two Newton steps. */
@@ -74,7 +95,7 @@ static double newton(const double *c, int n, double lo, double hi, double x) {
     double d, f = horner(c, n, x, &d);
     if (f > 0) lo = x; else hi = x;
     double step = d != 0 ? f / d : INFINITY, next = x - step;
-    if (fabs(step) <= 4e-16 * fmax(fabs(x), hi)) return next < lo ? lo : next > hi ? hi : next;
+    if (fabs(step) <= 4e-16 * larger(fabs(x), hi)) return next < lo ? lo : next > hi ? hi : next;
     if (!(next > lo && next < hi)) {
       next = 0.5 * (lo + hi);
       if (!(next > lo && next < hi)) return hi;
@@ -117,14 +138,24 @@ static double first_in(const double *c, int n, double *b, double lo, double hi, 
   return x >= 0 ? x : first_in(c, n, b, mid, hi, depth + 1);
 }
 
+/* Sum of the magnitudes of all terms but the first, odd and even ones apart: a chain of half the
+ * length. */
+static inline double rest_of(const double *c, int n, double h) {
+  double even = 0, odd = 0, z = h * h;
+  int k = n;
+  if (k % 2) { odd = fabs(c[k]); k--; }
+  for (; k >= 2; k -= 2) { even = even * z + fabs(c[k]); odd = odd * z + fabs(c[k - 1]); }
+  return odd * h + even * z;
+}
+
 /* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
  * it stays positive. */
 static double first_root(const double *c, int n, double h) {
   if (c[0] <= 0) return 0;
-  double a[P + 1], power = 1, rest = 0;
-  a[0] = c[0];
-  for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; rest += fabs(a[k]); }
+  double a[P + 1], power = 1, rest = rest_of(c, n, h);
   if (c[0] > rest) return -1;
+  a[0] = c[0];
+  for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; }
   double noise = ROUNDING * (fabs(c[0]) + rest); /* a touch that reaches zero by rounding is no root */
   bernstein(a, n);
   for (int k = 0; k <= n; k++) a[k] += noise;
@@ -150,10 +181,14 @@ static double first_crossing(const double *given, int n, double h, int direction
   return fall < 0 ? -1 : rise + fall;
 }
 
+/* Four sums: one would wait for every addition before the next. */
 static inline int finite_all(const double *a, int n) {
-  double s = 0;
-  for (int i = 0; i < n; i++) s += a[i] - a[i];
-  return s == 0;
+  double s[4] = {0, 0, 0, 0};
+  int i = 0;
+  for (; i + 4 <= n; i += 4)
+    for (int k = 0; k < 4; k++) s[k] += a[i + k] - a[i + k];
+  for (; i < n; i++) s[0] += a[i] - a[i];
+  return s[0] + s[1] + s[2] + s[3] == 0;
 }
 
 /* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. With

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -26,8 +26,11 @@ KINDS = ("crossing", "entry", "exit", "stop", "reset", "end")
 HAND_OVER = -3
 _FULL = -2
 
+#: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
+_BURST = 4096
+
 #: Room of the first and of the largest arrays of a dense run.
-_FIRST_STEPS, _MOST_STEPS = 256, 16384
+_FIRST_STEPS, _MOST_STEPS = 1024, 16384
 
 _D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
 _POINTER = ctypes.c_void_p
@@ -56,6 +59,16 @@ _OUTPUT_ARRAYS = {
     "event_after": (np.int32, "event"),
     "event_guard": (np.int32, "event"),
 }
+
+
+class _CBatch(ctypes.Structure):
+    _fields_ = [
+        ("count", _I64),
+        ("p_stride", _I64),
+        ("t0", _D),
+        *[(name, _POINTER) for name in ("which", "x0", "p", "x", "t", "status", "itinerary")],
+        *[(name, _POINTER) for name in ("kinds", "at_x", "at_t", "totals")],
+    ]
 
 
 class _COutput(ctypes.Structure):
@@ -124,17 +137,47 @@ REASONS = (
 
 @dataclass
 class Chunk:
-    """Results of some trajectories; itineraries as numbers into ``words``."""
+    """Results of some trajectories; itineraries as numbers into ``words``, which are sorted.
+
+    ``totals``: steps, events and trajectories handed over by the lanes.
+    """
 
     x: Array
     t: Array
-    status: NDArray[np.int32]
+    status: NDArray[np.int8]
     itinerary: NDArray[np.int32]
     words: list[str]
     kinds: NDArray[np.int32]
     at_x: Array | None
     at_t: Array | None
     totals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(4, np.int64))
+
+    @classmethod
+    def empty(cls, count: int, n: int, at: bool) -> Chunk:
+        """Arrays without values for ``count`` trajectories of ``n`` states."""
+        return cls(
+            x=np.empty((count, n)),
+            t=np.empty(count),
+            status=np.empty(count, np.int8),
+            itinerary=np.empty(count, np.int32),
+            words=[],
+            kinds=np.empty((count, len(KINDS)), np.int32),
+            at_x=np.empty((count, n)) if at else None,
+            at_t=np.empty(count) if at else None,
+        )
+
+    def rename(self, words: Mapping[int, str]) -> None:
+        """Number the itineraries in the order of their words, those in use only."""
+        self.words = sorted(set(words.values()))
+        number = {word: k for k, word in enumerate(self.words)}
+        table = np.zeros(max(words, default=0) + 1, np.int32)
+        for code, word in words.items():
+            table[code] = number[word]
+        self.itinerary[:] = table[self.itinerary]
+
+
+class Stopped(Exception):
+    """The work was told to stop before it was done."""
 
 
 class Engine:
@@ -151,7 +194,6 @@ class Engine:
         self._scalar: ctypes.CDLL | None = None
         self._lanes: ctypes.CDLL | None = None
         self._lock = threading.Lock()
-        self.stopping = False
 
     @property
     def scalar(self) -> ctypes.CDLL:
@@ -168,13 +210,6 @@ class Engine:
             if self._lanes is None:
                 self._lanes = _declare(build(lanes_source(self.system, self.order, lane_width())))
             return self._lanes
-
-    def stop(self, stopping: bool) -> None:
-        """Make running calls of ``run_many`` return at once; to be taken back afterwards."""
-        self.stopping = stopping
-        for library in (self._scalar, self._lanes):
-            if library is not None:
-                ctypes.c_int.in_dll(library, "stop_requested").value = int(stopping)
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -201,10 +236,11 @@ class Engine:
                 steps = min(4 * steps, _MOST_STEPS)
                 arrays, output = self._output(steps)
                 library.run_resume(state, output)
-            words = _words(library, tree, self.system.modes)
+            code = int(counts[4])
+            itinerary = _words(library, tree, self.system.modes, [code])[code]
         finally:
             library.tree_free(tree)
-        return self._run(parts, numbers, counts, words)
+        return self._run(parts, numbers, counts, itinerary)
 
     def _output(self, steps: int) -> tuple[dict[str, NDArray[Any]], Any]:
         """Arrays with room for some steps, and the C structure that points to them."""
@@ -236,9 +272,10 @@ class Engine:
         parts: Sequence[dict[str, NDArray[Any]]],
         numbers: Array,
         counts: NDArray[np.int64],
-        words: list[str],
+        itinerary: str,
     ) -> Run:
-        whole = {name: np.concatenate([p[name] for p in parts]) for name in _OUTPUT_ARRAYS}
+        joined = np.concatenate if len(parts) > 1 else lambda pieces: pieces[0]
+        whole = {name: joined([p[name] for p in parts]) for name in _OUTPUT_ARRAYS}
         n = self.system.dimension
         return Run(
             status=int(counts[0]),
@@ -246,7 +283,7 @@ class Engine:
             where=int(counts[2]),
             mode=int(counts[3]),
             limit=float(numbers[1]),
-            itinerary=words[int(counts[4])],
+            itinerary=itinerary,
             t=whole["point_t"],
             x=whole["point_x"][:, :n],
             starts=whole["start"],
@@ -263,70 +300,76 @@ class Engine:
     # many trajectories -------------------------------------------------------------------------
 
     def run_many(
-        self, x: Array, p: Array, options: Options, at: tuple[int, int] | None, lanes: bool
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+        lanes: bool,
+        out: Chunk | None = None,
+        stop: Callable[[], bool] = lambda: False,
     ) -> Chunk:
-        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
-        chunk = self._empty(len(x), at is not None)
-        x = np.ascontiguousarray(x, float)
-        p = np.ascontiguousarray(p, float)
-        c_options = _c_options(self.system, options, dense=False, at=at)
-        arguments = (x, p, c_options, options.t_start, chunk)
-        if lanes:
-            self._call(self.lanes, "run_lanes", None, *arguments)
-            rest = np.flatnonzero(chunk.status == HAND_OVER)
-            if rest.size:
-                self._call(self.scalar, "run_many", rest, *arguments)
-        else:
-            self._call(self.scalar, "run_many", None, *arguments)
-        return chunk
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,).
 
-    def _empty(self, count: int, at: bool) -> Chunk:
-        n = self.system.dimension
-        return Chunk(
-            x=np.empty((count, n)),
-            t=np.empty(count),
-            status=np.full(count, HAND_OVER, np.int32),
-            itinerary=np.zeros(count, np.int32),
-            words=[],
-            kinds=np.zeros((count, len(KINDS)), np.int32),
-            at_x=np.full((count, n), np.nan) if at else None,
-            at_t=np.full(count, np.nan) if at else None,
-        )
+        Parameters
+        ----------
+        at : (kind, count) or None
+            Event whose state is kept.
+        lanes : bool
+            Run several in step; what is rare is run again one by one.
+        out : Chunk, optional
+            Contiguous arrays for the results, which are made unless given.
+        stop : callable, optional
+            Asked now and then whether to leave the work.
+
+        Raises
+        ------
+        Stopped
+        CompilerError
+        """
+        chunk = out or Chunk.empty(len(x), self.system.dimension, at is not None)
+        for array in (chunk.at_x, chunk.at_t):
+            if array is not None:  # what does not happen is not written
+                array[:] = np.nan
+        x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
+        c_options = _c_options(self.system, options, dense=False, at=at)
+        library = self.lanes if lanes else self.scalar
+        tree = library.tree_new()
+        try:
+            self._call(library, None, x, p, c_options, options.t_start, tree, chunk, stop)
+            rest = np.flatnonzero(chunk.status == HAND_OVER)
+            if lanes and rest.size:
+                self._call(self.scalar, rest, x, p, c_options, options.t_start, tree, chunk, stop)
+            used = np.flatnonzero(np.bincount(chunk.itinerary))
+            chunk.rename(_words(library, tree, self.system.modes, used.tolist()))
+        finally:
+            library.tree_free(tree)
+        return chunk
 
     def _call(
         self,
         library: ctypes.CDLL,
-        function: str,
-        which: NDArray[np.int64] | None,
+        which: NDArray[np.intp] | None,
         x: Array,
         p: Array,
         options: _COptions,
         t_start: float,
+        tree: int,
         chunk: Chunk,
+        stop: Callable[[], bool],
     ) -> None:
-        if self.stopping:  # a library that was loaded after the request does not know of it
-            return
-        tree = library.tree_new()
-        start = np.array([t_start])
-        try:
-            getattr(library, function)(
-                len(x) if which is None else len(which),
-                _address(which),
-                _address(x),
-                _address(p),
-                p.shape[-1] if p.ndim > 1 else 0,
-                _address(start),
-                ctypes.byref(options),
-                tree,
-                *[_address(a) for a in (chunk.x, chunk.t, chunk.status, chunk.itinerary)],
-                *[_address(a) for a in (chunk.kinds, chunk.at_x, chunk.at_t, chunk.totals)],
-            )
-            words = _words(library, tree, self.system.modes)
-        finally:
-            library.tree_free(tree)
-        mine = slice(None) if which is None else which
-        chunk.itinerary[mine] += len(chunk.words)
-        chunk.words += words
+        count = len(x) if which is None else len(which)
+        stride = p.shape[-1] if p.ndim > 1 else 0
+        given = [_address(a) for a in (which, x, p)]
+        results = (chunk.x, chunk.t, chunk.status, chunk.itinerary, chunk.kinds)
+        kept = (chunk.at_x, chunk.at_t, chunk.totals)
+        batch = _CBatch(count, stride, t_start, *given, *[_address(a) for a in (*results, *kept)])
+        memory = np.zeros(library.many_size() + 64, np.uint8)
+        state = memory.ctypes.data + -memory.ctypes.data % 64
+        call = (state, ctypes.byref(batch), ctypes.byref(options), tree, _BURST)
+        while library.run_many(*call):
+            if stop():
+                raise Stopped
 
 
 def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
@@ -334,16 +377,15 @@ def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
     library.tree_size.argtypes = [_POINTER]
     library.tree_read.argtypes = [_POINTER] * 3
     library.tree_free.argtypes = [_POINTER]
-    many: list[Any] = [_I64, *[_POINTER] * 3, _I64, *[_POINTER] * 11]
-    if hasattr(library, "run_lanes"):
-        library.run_lanes.argtypes = many
+    library.many_size.restype = _I64
+    library.run_many.argtypes = [*[_POINTER] * 4, _I64]
+    if not hasattr(library, "run_size"):
         return library
     library.run_size.restype = _I64
     library.run_begin.argtypes = [*[_POINTER] * 6, _D]
     library.run_continue.argtypes = [_POINTER]
     library.run_read.argtypes = [_POINTER] * 3
     library.run_resume.argtypes = [_POINTER] * 2
-    library.run_many.argtypes = many
     return library
 
 
@@ -372,16 +414,21 @@ def _c_options(
     )
 
 
-def _words(library: ctypes.CDLL, tree: int, modes: Sequence[str]) -> list[str]:
-    """Itineraries of all nodes of a tree, as strings."""
+def _words(
+    library: ctypes.CDLL, tree: int, modes: Sequence[str], nodes: Sequence[int]
+) -> dict[int, str]:
+    """Itineraries of some nodes of a tree, as strings."""
     size = library.tree_size(tree)
-    parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
-    library.tree_read(tree, _address(parent), _address(mode))
-    words = [""] * size
-    letters = [m or "o" for m in modes]
-    for k in range(1, size):
-        head = words[parent[k]]
-        words[k] = f"{head} {letters[mode[k]]}" if head else letters[mode[k]]
+    arrays = np.empty(size, np.int32), np.empty(size, np.int32)
+    library.tree_read(tree, *[_address(a) for a in arrays])
+    parent, mode = (a.tolist() for a in arrays)
+    words = {}
+    for node in nodes:
+        letters, k = [], node
+        while k > 0:
+            letters.append(modes[mode[k]] or "o")
+            k = parent[k]
+        words[node] = " ".join(reversed(letters))
     return words
 
 
@@ -429,6 +476,7 @@ __all__ = [
     "Engine",
     "Run",
     "Status",
+    "Stopped",
     "engine_for",
     "simulate_arrays",
     "supports_lanes",

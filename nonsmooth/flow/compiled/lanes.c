@@ -17,29 +17,18 @@
 #define TIE 1e-13
 
 typedef struct {
-  double t_end, rtol, atol, max_step;
-  int64_t max_steps, max_events;
-  int32_t start_mode, at_kind;
-  int64_t at_count;
-  int32_t dense, pad;
-} Options;
-
-typedef struct {
   T x[N], q[NQ], t, lambda, last_event, shortest;
   I slides, above, drop, live, steps, events, kinds[KINDS], shrinking;
   int64_t index[W];
   int32_t itinerary[W];
 } Lanes;
 
-/* Where starts come from and results go. */
+/* A batch, and how far it is. */
 typedef struct {
-  int64_t count, next, p_stride;
-  const double *x0, *p;
-  double t0, *x, *t, *at_x, *at_t;
+  const Batch *b;
   const Options *o;
   Tree *tree;
-  int32_t *status, *itinerary, *kinds;
-  int64_t *totals;
+  int64_t next;
   int alive;
 } Work;
 
@@ -49,41 +38,43 @@ typedef struct {
 /* Loading and storing -------------------------------------------------------------------------- */
 
 static void store(Lanes *s, Work *w, int l, int status) {
+  const Batch *b = w->b;
   int64_t i = s->index[l];
   LANE_I(s->live, l) = 0;
   w->alive--;
-  w->totals[0] += LANE_I(s->steps, l);
-  w->totals[1] += LANE_I(s->events, l);
-  w->status[i] = status;
-  if (status == HAND_OVER) { w->totals[2]++; return; }
-  for (int k = 0; k < ND; k++) w->x[i * ND + k] = LANE(s->x[k], l);
-  w->t[i] = LANE(s->t, l);
-  w->itinerary[i] = s->itinerary[l];
-  for (int k = 0; k < KINDS; k++) w->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
-  w->kinds[i * KINDS + END] += status == REACHED_END;
+  b->totals[0] += LANE_I(s->steps, l);
+  b->totals[1] += LANE_I(s->events, l);
+  b->status[i] = (int8_t)status;
+  if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
+  b->t[i] = LANE(s->t, l);
+  b->itinerary[i] = s->itinerary[l];
+  for (int k = 0; k < KINDS; k++) b->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
+  b->kinds[i * KINDS + END] += status == REACHED_END;
 }
 
-static void refuse(Work *w, int64_t i) {
-  for (int k = 0; k < ND; k++) w->x[i * ND + k] = w->x0[i * N + k];
-  w->t[i] = w->t0;
-  w->status[i] = NOT_FINITE;
-  w->itinerary[i] = 0;
-  memset(w->kinds + i * KINDS, 0, KINDS * sizeof(int32_t));
-  w->kinds[i * KINDS + END] = 1;
+static void refuse(const Batch *b, int64_t i) {
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
+  b->t[i] = b->t0;
+  b->status[i] = NOT_FINITE;
+  b->itinerary[i] = 0;
+  memset(b->kinds + i * KINDS, 0, KINDS * sizeof(int32_t));
+  b->kinds[i * KINDS + END] = 1;
 }
 
 /* Put the next start into a lane; 0 if there is none. */
 static int load(Lanes *s, Work *w, int l) {
-  while (w->next < w->count && !finite_all(w->x0 + w->next * N, N)) refuse(w, w->next++);
-  if (w->next >= w->count) return 0;
+  const Batch *b = w->b;
+  while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
+  if (w->next >= b->count) return 0;
   int64_t i = w->next++;
-  for (int k = 0; k < N; k++) LANE(s->x[k], l) = w->x0[i * N + k];
-  if (w->p_stride) {
+  for (int k = 0; k < N; k++) LANE(s->x[k], l) = b->x0[i * N + k];
+  if (b->p_stride) {
     double q[NQ];
-    prepare(w->p + i * w->p_stride, q);
+    prepare(b->p + i * b->p_stride, q);
     for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
   }
-  LANE(s->t, l) = LANE(s->last_event, l) = w->t0;
+  LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
   LANE(s->shortest, l) = 1e-3;
   LANE_I(s->live, l) = -1;
   LANE_I(s->steps, l) = LANE_I(s->events, l) = LANE_I(s->shrinking, l) = LANE_I(s->drop, l) = 0;
@@ -490,11 +481,12 @@ INLINE I watch_intervals(Lanes *s, I which) {
 INLINE void count(Lanes *s, Work *w, int kind, I which) {
   s->kinds[kind] -= which;
   s->events -= which;
-  if (w->o->at_kind != kind || !w->at_x) return;
+  const Batch *b = w->b;
+  if (w->o->at_kind != kind || !b->at_x) return;
   I now = which & (s->kinds[kind] == w->o->at_count);
   for EACH(l, now) {
-    w->at_t[s->index[l]] = LANE(s->t, l);
-    UNROLL for (int i = 0; i < ND; i++) w->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
+    b->at_t[s->index[l]] = LANE(s->t, l);
+    UNROLL for (int i = 0; i < ND; i++) b->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
   }
 }
 
@@ -586,23 +578,28 @@ static void step(Lanes *s, Work *w) {
   finish_lanes(s, w, last & ~unclear, REACHED_END);
 }
 
-void run_lanes(int64_t count, const int64_t *which, const double *x0, const double *p,
-               int64_t p_stride, const double *t0, const Options *o, Tree *tree, double *x, double *t,
-               int32_t *status, int32_t *itinerary, int32_t *kinds, double *at_x, double *at_t,
-               int64_t *totals) {
-  Work w = {count, 0, p_stride, x0, p, t0[0], x, t, at_x, at_t, o, tree, status, itinerary, kinds,
-            totals, 0};
-  Lanes s;
-  (void)which;
-  memset(&s, 0, sizeof s);
-  double q[NQ];
-  prepare(p, q);
-  for (int k = 0; k < NQ; k++) s.q[k] = BC(q[k]);
+typedef struct { Lanes lanes; Work work; int begun; } Many;
+
+int64_t many_size(void) { return sizeof(Many); }
+
+/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
+ * is zero before the first, and aligned like a vector. */
+int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
+  Lanes *s = &many->lanes;
+  Work *w = &many->work;
+  if (!many->begun) {
+    double q[NQ];
+    *w = (Work){b, o, tree, 0, 0};
+    prepare(b->p, q);
+    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
+    many->begun = 1;
+  }
   for (;;) {
     I fresh = {0};
-    if (w.alive < W && w.next < w.count) fresh = refill(&s, &w);
-    if (any(fresh)) { begin(&s, &w, fresh); continue; }
-    if (!w.alive || stop_requested) break;
-    step(&s, &w);
+    if (w->alive < W && w->next < b->count) fresh = refill(s, w);
+    if (any(fresh)) { begin(s, w, fresh); continue; }
+    if (!w->alive) return 0;
+    if (--budget < 0) return 1;
+    step(s, w);
   }
 }

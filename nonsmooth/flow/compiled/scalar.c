@@ -18,14 +18,6 @@ static const int PRIORITY[] = {2, 3, 0, 1};
 typedef struct { double states[N][P + 1], guards[NG1][P + 1], gradient[NG1][N], scale[NG1];
                  int mode, finite; } Expansion;
 
-typedef struct {
-  double t_end, rtol, atol, max_step;
-  int64_t max_steps, max_events;
-  int32_t start_mode, at_kind;
-  int64_t at_count;
-  int32_t dense, pad;
-} Options;
-
 /* What a run writes, when dense: steps, points and events, emptied by the caller when full. */
 typedef struct {
   int64_t steps, points, events, step_room, point_room, event_room;
@@ -89,25 +81,25 @@ static inline double rough_exp2(double a) {
   return u.d * (1 + f * (1 + f * (0.5 + f * (0.16666666666 + f * (0.0416666666 + f * 0.0083333333)))));
 }
 static double step_for(double last, double before) {
-  double h = INFINITY;
-  if (last > 0) h = rough_exp2(rough_log2(fmin(last, 1e300)) * (-1.0 / P));
-  if (before > 0) h = fmin(h, rough_exp2(rough_log2(fmin(before, 1e300)) * (-1.0 / (P - 1))));
-  return h;
+  double log_h = INFINITY;
+  if (last > 0) log_h = rough_log2(smaller(last, 1e300)) * (-1.0 / P);
+  if (before > 0) log_h = smaller(rough_log2(smaller(before, 1e300)) * (-1.0 / (P - 1)), log_h);
+  return log_h < INFINITY ? rough_exp2(log_h) : INFINITY;
 }
 
 static double step_size(const Run *r, const Expansion *e) {
   double allowed[N] = {0}, last = 1e-300, before = 1e-300;
   for (int i = 0; i < ND; i++) {
     allowed[i] = SAFETY * (r->o.atol + r->o.rtol * fabs(e->states[i][0]));
-    last = fmax(last, fabs(e->states[i][P]) / allowed[i]);
-    before = fmax(before, fabs(e->states[i][P - 1]) / allowed[i]);
+    last = larger(fabs(e->states[i][P]) / allowed[i], last);
+    before = larger(fabs(e->states[i][P - 1]) / allowed[i], before);
   }
   for (int j = 0; j < GUARDS[e->mode]; j++) {
     double a = r->o.rtol * fabs(e->guards[j][0]);
     for (int i = 0; i < ND; i++) a += e->gradient[j][i] * allowed[i];
     if (a > 0) {
-      last = fmax(last, fabs(e->guards[j][P]) / a);
-      before = fmax(before, fabs(e->guards[j][P - 1]) / a);
+      last = larger(fabs(e->guards[j][P]) / a, last);
+      before = larger(fabs(e->guards[j][P - 1]) / a, before);
     }
   }
   return step_for(last > 1e-300 ? last : 0, before > 1e-300 ? before : 0);
@@ -121,7 +113,7 @@ static int leading(const Expansion *e, int row, int zeros, double *value) {
     double noise = e->scale[row];
     if (k) {
       double speed = 0;
-      for (int i = 0; i < N; i++) speed = fmax(speed, fabs(e->states[i][k]));
+      for (int i = 0; i < N; i++) speed = larger(fabs(e->states[i][k]), speed);
       noise = sum * speed * (k + 1);
     }
     if (fabs(e->guards[row][k]) > 64 * EPS * noise) { *value = e->guards[row][k]; return k; }
@@ -152,7 +144,7 @@ static int first_hit(const Run *r, const Expansion *e, double h, double *dt) {
     if (time[j] >= 0 && time[j] < earliest) earliest = time[j];
   }
   int best = -1;
-  double latest = earliest + TIE * fmax(1, fabs(r->t));
+  double latest = earliest + TIE * larger(fabs(r->t), 1);
   for (int j = 0; j < GUARDS[e->mode]; j++) {
     if (time[j] < 0 || time[j] > latest) continue;
     int rank = PRIORITY[GUARD[e->mode][j][0]];
@@ -617,8 +609,8 @@ static void step(Run *r) {
   Expansion e;
   expand(r, r->mode, &e);
   if (!e.finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  double h = fmin(step_size(r, &e), r->o.max_step);
-  if (h <= 4 * EPS * fmax(1, fabs(r->t)) && h < left) { finish(r, STEP_TOO_SMALL, NO_REASON, 0); return; }
+  double h = smaller(step_size(r, &e), r->o.max_step);
+  if (h <= 4 * EPS * larger(fabs(r->t), 1) && h < left) { finish(r, STEP_TOO_SMALL, NO_REASON, 0); return; }
   int last = h >= left;
   if (last) h = left;
   int row = first_hit(r, &e, h, &dt);
@@ -657,15 +649,22 @@ void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const do
   else { r->status = NOT_FINITE; r->reason = SURFACE; }
 }
 
-/* Go on until the run ends or its arrays have no room for another step (FULL). */
-int run_continue(Run *r) {
-  while (r->status == RUNNING && !stop_requested) {
+/* Go on until the run ends, its arrays have no room for another step (FULL), or ``budget`` steps are
+ * done (RUNNING). */
+static int go_on(Run *r, int64_t *budget) {
+  while (r->status == RUNNING) {
     if (r->o.dense && (r->out.steps >= r->out.step_room || r->out.points + 3 > r->out.point_room
                        || r->out.events + 4 > r->out.event_room))
       return FULL;
+    if (--*budget < 0) return RUNNING;
     step(r);
   }
   return r->status;
+}
+
+int run_continue(Run *r) {
+  int64_t budget = INT64_MAX;
+  return go_on(r, &budget);
 }
 
 void run_read(const Run *r, double *numbers, int64_t *counts) {
@@ -683,25 +682,34 @@ void run_read(const Run *r, double *numbers, int64_t *counts) {
 /* Go on with other, empty arrays. */
 void run_resume(Run *r, const Output *out) { r->out = *out; }
 
-/* Trajectories start, start+1, ... of arrays, or those listed in ``which``. */
-void run_many(int64_t count, const int64_t *which, const double *x0, const double *p,
-              int64_t p_stride, const double *t0, const Options *o, Tree *tree, double *x, double *t,
-              int32_t *status, int32_t *itinerary, int32_t *kinds, double *at_x, double *at_t,
-              int64_t *totals) {
+typedef struct { int64_t next, begun; Run run; } Many;
+
+int64_t many_size(void) { return sizeof(Many); }
+
+static void keep(const Run *r, const Batch *b, int64_t i) {
+  memcpy(b->x + i * ND, r->x, ND * sizeof(double));
+  b->t[i] = r->t;
+  b->status[i] = (int8_t)r->status;
+  b->itinerary[i] = final_itinerary(r);
+  for (int j = 0; j < KINDS; j++) b->kinds[i * KINDS + j] = (int32_t)r->kinds[j];
+  b->kinds[i * KINDS + END] += r->status != STOPPED;
+  if (b->at_x) { memcpy(b->at_x + i * ND, r->at_x, ND * sizeof(double)); b->at_t[i] = r->at_t; }
+  b->totals[0] += r->step_count;
+  b->totals[1] += r->event_count;
+}
+
+/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
+ * is zero before the first. */
+int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
   static const Output none;
-  Run r;
-  for (int64_t k = 0; k < count; k++) {
-    int64_t i = which ? which[k] : k;
-    run_begin(&r, o, &none, tree, x0 + i * N, p + i * p_stride, t0[0]);
-    if (run_continue(&r) == RUNNING) return;
-    if (r.status != STOPPED) r.kinds[END]++;
-    memcpy(x + i * ND, r.x, ND * sizeof(double));
-    t[i] = r.t;
-    status[i] = r.status;
-    itinerary[i] = final_itinerary(&r);
-    for (int j = 0; j < KINDS; j++) kinds[i * KINDS + j] = (int32_t)r.kinds[j];
-    if (at_x) { memcpy(at_x + i * ND, r.at_x, ND * sizeof(double)); at_t[i] = r.at_t; }
-    totals[0] += r.step_count;
-    totals[1] += r.event_count;
+  Run *r = &many->run;
+  for (; many->next < b->count; many->next++) {
+    int64_t i = b->which ? b->which[many->next] : many->next;
+    if (!many->begun) run_begin(r, o, &none, tree, b->x0 + i * N, b->p + i * b->p_stride, b->t0);
+    many->begun = 1;
+    if (go_on(r, &budget) == RUNNING) return 1;
+    many->begun = 0;
+    keep(r, b, i);
   }
+  return 0;
 }

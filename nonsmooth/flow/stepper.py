@@ -20,8 +20,12 @@ EPSILON = float(np.finfo(float).eps)
 #: Two events closer than this, relative to the time, are simultaneous; a stop is then served first.
 _TIE = 1e-13
 
-#: Local errors add up over a run; a tenth keeps the global error near the tolerance.
-_SAFETY = 0.1
+#: Local errors add up over a run; a twentieth keeps the global error near the tolerance.
+_SAFETY = 0.05
+
+#: The last terms of a guard's series stay below this part of all of them, however small the guard is
+#: beside the tolerance: beyond its circle of convergence a polynomial has roots that the guard has not.
+_RESOLVED = 1e-3
 
 _PRIORITY = {"stop": 0, "reset": 1, "surface": 2, "exit": 3, "branch": 4}
 
@@ -117,6 +121,9 @@ class Stepper:
             guard_allowed = e.gradient @ allowed + self.rtol * np.abs(e.guards[:, 0])
             known = guard_allowed > 0
             h = min(h, _bound(e.guards[known], guard_allowed[known], self.order))
+            small = ~known | (guard_allowed > _RESOLVED * np.abs(e.guards[:, 0]))
+            for g in e.guards[small]:  # elsewhere the bound above is the stronger one
+                h = _resolved(np.abs(g), h)
         return h
 
     def leading(self, e: Expansion, row: int, known_zeros: int) -> tuple[int, float]:
@@ -199,7 +206,9 @@ class Stepper:
             end = self.advance(kept, h)
             there = self.expand(e.mode, end)
             slope = there.states[:, 1]
-            defect = np.abs(slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * _powers(h, c)))
+            defect = np.abs(
+                slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * _powers(h, c.shape[1] - 1))
+            )
             # Guards are not located within this step: none may fall in it.
             crossed = np.sign(there.guards[:, 0]) * np.sign(e.guards[:, 0]) < 0
             fits = np.all(np.isfinite(slope)) and np.all(defect * h <= allowed)
@@ -209,8 +218,19 @@ class Stepper:
         return c, 0.0
 
 
-def _powers(h: float, c: Array) -> Array:
-    return h ** np.arange(c.shape[1] - 1)
+def _powers(h: float, count: int) -> Array:
+    return np.asarray(h ** np.arange(count), float)
+
+
+def _resolved(g: Array, h: float) -> float:
+    """Shorten a step until a guard's series, given in magnitudes, converges within it."""
+    while math.isfinite(h):
+        terms = g * _powers(h, g.size)
+        last, rest = float(terms[-2:].max()), _RESOLVED * float(terms[:-2].sum())
+        if last <= rest or not 0.0 < rest < math.inf:
+            break
+        h *= 0.99 * (rest / last) ** (1.0 / (g.size - 2))
+    return h
 
 
 def _bound(c: Array, allowed: Array, order: int) -> float:

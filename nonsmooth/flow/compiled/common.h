@@ -12,7 +12,8 @@
 #define M1 (M > 0 ? M : 1)
 #define NG1 (NG > 0 ? NG : 1)
 #define DEPTH 52
-#define SAFETY 0.1 /* as in stepper.py: local errors add up over a run */
+#define SAFETY 0.05 /* as in stepper.py: local errors add up over a run */
+#define RESOLVED 1e-3 /* as in stepper.py: last terms of a guard's series beside all of them */
 #define ROUNDING (4 * EPS) /* as in polynomial.py, relative to the sum of the magnitudes of terms */
 
 enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SMALL, NOT_FINITE,
@@ -181,14 +182,10 @@ static double first_crossing(const double *given, int n, double h, int direction
   return fall < 0 ? -1 : rise + fall;
 }
 
-/* Four sums: one would wait for every addition before the next. */
 static inline int finite_all(const double *a, int n) {
-  double s[4] = {0, 0, 0, 0};
-  int i = 0;
-  for (; i + 4 <= n; i += 4)
-    for (int k = 0; k < 4; k++) s[k] += a[i + k] - a[i + k];
-  for (; i < n; i++) s[0] += a[i] - a[i];
-  return s[0] + s[1] + s[2] + s[3] == 0;
+  double s = 0;
+  for (int i = 0; i < n; i++) s += a[i] - a[i];
+  return s == 0;
 }
 
 /* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. With

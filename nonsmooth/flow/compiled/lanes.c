@@ -239,8 +239,9 @@ INLINE void to_bernstein(T *b, int n) {
 
 /* Roots on (0, 1] of a polynomial positive at 0, without isolating them: bounds by a head of degree
  * HEAD in Bernstein form and the sum of the rest. ``none``: it stays positive. ``one``: it ends at or
- * below zero and falls throughout, is concave or is convex, so it has exactly one root. */
-INLINE void screen(const T *a, I *none, I *one, T *end) {
+ * below zero and falls throughout, is concave or is convex, so it has exactly one root.
+ * ``unresolved``: the series does not converge well within the step. */
+INLINE void screen(const T *a, I *none, I *one, I *unresolved, T *end) {
   T tail = BC(0), tail1 = BC(0), tail2 = BC(0), sum = BC(0), b[HEAD + 1];
   UNROLL for (int k = HEAD + 1; k <= P; k++) {
     T c = ABS(a[k]);
@@ -261,6 +262,7 @@ INLINE void screen(const T *a, I *none, I *one, T *end) {
     least = MIN(least, dd);
   }
   *end = b[HEAD] + sum;
+  *unresolved = MAX(ABS(a[P]), ABS(a[P - 1])) > RESOLVED * noise;
   tail1 *= 1.0 / HEAD;
   tail2 *= 1.0 / (HEAD * (HEAD - 1));
   I simple = (steepest + tail1 < 0) | (I)(most + tail2 < 0), positive = *end > -ROUNDING * noise;
@@ -337,10 +339,10 @@ INLINE void drop_zeros(const Lanes *s, T *a) {
  * whose root is found here. */
 typedef struct { T a[S1][P + 1], end[S1], root[S1], slope[S1]; I one[S1], hard[S1], flipped[S1], wrong_way[S1]; } Guards;
 
-/* Returns the lanes whose surface or exit guard is not positive. */
+/* Returns the lanes whose surface or exit guard is not positive, or whose step is too long for it. */
 INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j) {
   T *a = v->a[j];
-  I counts = s->live, flipped = {0}, wrong_way = {0}, none, unclear = {0};
+  I counts = s->live, flipped = {0}, wrong_way = {0}, none, unresolved, unclear = {0};
   v->root[j] = BC(INFINITY);
   v->slope[j] = BC(0);
   v->one[j] = (I){0};
@@ -358,9 +360,10 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
     }
     wrong_way = direction == 0 ? wrong_way : direction < 0 ? flipped : ~flipped;
   }
-  screen(a, &none, &v->one[j], &v->end[j]);
+  screen(a, &none, &v->one[j], &unresolved, &v->end[j]);
   I zero = ~(I)(a[0] > 0);
-  if (j < FIRST_STOP) { unclear = counts & zero; counts &= ~zero; }
+  unclear = counts & unresolved;
+  if (j < FIRST_STOP) { unclear |= counts & zero; counts &= ~zero; }
   v->hard[j] = counts & ((~none & ~v->one[j]) | (v->one[j] & wrong_way) | zero);
   v->one[j] &= counts & ~v->hard[j];
   v->flipped[j] = flipped;

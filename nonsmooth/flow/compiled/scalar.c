@@ -53,8 +53,14 @@ static void expand(const Run *r, int mode, Expansion *e) {
   e->mode = mode;
   jet(mode, r->x, r->q, &e->states[0][0], &e->guards[0][0]);
   guard_values(mode, r->x, r->q, value, &e->gradient[0][0]);
-  e->finite = finite_all(&e->states[0][0], N * (P + 1))
-              && finite_all(&e->guards[0][0], GUARDS[mode] * (P + 1));
+  /* A coefficient that is not finite makes all later ones so: the last two tell. */
+  double zero = 0, none = 0;
+  for (int i = 0; i < N; i++) { zero += 0 * e->states[i][P]; none += 0 * e->states[i][P - 1]; }
+  for (int j = 0; j < GUARDS[mode]; j++) {
+    zero += 0 * e->guards[j][P];
+    none += 0 * e->guards[j][P - 1];
+  }
+  e->finite = zero + none == 0;
   for (int j = 0; j < GUARDS[mode]; j++) {
     double s = 0;
     for (int i = 0; i < N; i++) {
@@ -87,8 +93,22 @@ static double step_for(double last, double before) {
   return log_h < INFINITY ? rough_exp2(log_h) : INFINITY;
 }
 
+/* Shorten a step until a guard's series converges within it. */
+static double resolve(const double *g, double h) {
+  while (h < INFINITY) {
+    double power = 1;
+    for (int k = 1; k < P; k++) power *= h;
+    double last = larger(fabs(g[P]) * h, fabs(g[P - 1])) * power;
+    double rest = RESOLVED * (fabs(g[0]) + rest_of(g, P - 2, h));
+    if (last <= rest || !(rest > 0 && rest < INFINITY)) break;
+    h *= 0.99 * pow(rest / last, 1.0 / (P - 1));
+  }
+  return h;
+}
+
 static double step_size(const Run *r, const Expansion *e) {
   double allowed[N] = {0}, last = 1e-300, before = 1e-300;
+  int small[NG1];
   for (int i = 0; i < ND; i++) {
     allowed[i] = SAFETY * (r->o.atol + r->o.rtol * fabs(e->states[i][0]));
     last = larger(fabs(e->states[i][P]) / allowed[i], last);
@@ -97,12 +117,15 @@ static double step_size(const Run *r, const Expansion *e) {
   for (int j = 0; j < GUARDS[e->mode]; j++) {
     double a = r->o.rtol * fabs(e->guards[j][0]);
     for (int i = 0; i < ND; i++) a += e->gradient[j][i] * allowed[i];
+    small[j] = !(a > 0 && a <= RESOLVED * fabs(e->guards[j][0]));
     if (a > 0) {
       last = larger(fabs(e->guards[j][P]) / a, last);
       before = larger(fabs(e->guards[j][P - 1]) / a, before);
     }
   }
-  return step_for(last > 1e-300 ? last : 0, before > 1e-300 ? before : 0);
+  double h = step_for(last > 1e-300 ? last : 0, before > 1e-300 ? before : 0);
+  for (int j = 0; j < GUARDS[e->mode]; j++) if (small[j]) h = resolve(e->guards[j], h);
+  return h;
 }
 
 /* First coefficient of a guard that is not zero to rounding; P + 1 if there is none. */

@@ -439,8 +439,8 @@ def _require_two_fold(shooting: Shooting) -> None:
     """Refuse models whose lift-off has no visible two-fold of dry friction."""
     who = type(shooting.model).__name__
     u = -0.3 * shooting.ydot * np.ones(2)
-    slip = shooting.slip(u)
-    above, below, *_ = shooting.numbers(slip(0.5 * (slip.t[0] + slip.t[-1])))
+    phase = shooting.first_phase(u)
+    above, below, *_ = shooting.numbers(phase(0.5 * (phase.t[0] + phase.t[-1])))
     law = type(shooting.model.friction).__name__
     if not below > above:
         raise ns.DegenerateError(
@@ -448,6 +448,7 @@ def _require_two_fold(shooting: Shooting) -> None:
             "of the slip and of its own states. There is no rolling phase and no two-fold, so H_F = 0 "
             "is a smooth level: find it with scipy from bounce.lift_off."
         )
+    slip = shooting.slip(u)
     rate = shooting.numbers(slip.x[-1])[6]
     middle = shooting.numbers(slip(0.5 * (slip.t[0] + slip.t[-1])))[5]
     duration = float(slip.t[-1] - slip.t[0])

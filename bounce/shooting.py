@@ -112,6 +112,10 @@ class Shooting:
         """Forward slip from touch-down to lift-off."""
         return self._follow("+", *self.land(u), ("lift-off",))
 
+    def first_phase(self, u: Array) -> ns.Trajectory:
+        """Forward slip from touch-down to its end: H = 0 or lift-off."""
+        return self._follow("+", *self.land(u), ("h0", "lift-off"))
+
     def slip_then_roll(self, u: Array, mode: str, entry: float) -> tuple[float, Arrival]:
         """Slip until the time ``entry``, then roll to lift-off: H at entry, and the lift-off."""
         t, x = self.land(u)

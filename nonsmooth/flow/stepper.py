@@ -225,8 +225,9 @@ def _powers(h: float, count: int) -> Array:
 def _resolved(g: Array, h: float) -> float:
     """Shorten a step until a guard's series, given in magnitudes, converges within it."""
     while math.isfinite(h):
-        terms = g * _powers(h, g.size)
-        last, rest = float(terms[-2:].max()), _RESOLVED * float(terms[:-2].sum())
+        with np.errstate(over="ignore"):
+            terms = g * _powers(h, g.size)
+            last, rest = float(terms[-2:].max()), _RESOLVED * float(terms[:-2].sum())
         if last <= rest or not 0.0 < rest < math.inf:
             break
         h *= 0.99 * (rest / last) ** (1.0 / (g.size - 2))
@@ -236,7 +237,8 @@ def _resolved(g: Array, h: float) -> float:
 def _bound(c: Array, allowed: Array, order: int) -> float:
     if not c.size:
         return math.inf
-    last = float((np.abs(c[:, order]) / allowed).max())
-    before = float((np.abs(c[:, order - 1]) / allowed).max())
+    with np.errstate(over="ignore"):  # infinite ratios give a step of zero
+        last = float((np.abs(c[:, order]) / allowed).max())
+        before = float((np.abs(c[:, order - 1]) / allowed).max())
     h = math.inf if last == 0.0 else last ** (-1.0 / order)
     return h if before == 0.0 else min(h, before ** (-1.0 / (order - 1)))

@@ -18,7 +18,7 @@ from . import messages
 from .accumulation import remaining_time
 from .options import Options
 from .status import ADVICE, Status
-from .stepper import EPSILON, Expansion, Hit, Stepper
+from .stepper import EPSILON, ON_SURFACE, Expansion, Hit, Stepper
 from .switching import Continuation, decide, is_two_fold
 from .trajectory import Event, Segment, Trajectory
 
@@ -292,7 +292,7 @@ class Driver:
         """Surfaces through the present state, to rounding, and those known to be."""
         h, gradient = self.surfaces.values(self.x, self.p)
         scale = np.abs(gradient) @ (1.0 + np.abs(self.x))
-        near = {i for i in range(len(h)) if abs(h[i]) <= 64 * EPSILON * scale[i]}
+        near = {i for i in range(len(h)) if abs(h[i]) <= ON_SURFACE * EPSILON * scale[i]}
         near |= {i for i, c in enumerate(mode) if c == "s"}
         return sorted(near | certain)
 

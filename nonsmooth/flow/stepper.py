@@ -17,8 +17,12 @@ from .polynomial import first_crossing, first_root
 
 EPSILON = float(np.finfo(float).eps)
 
-#: Two events closer than this, relative to the time, are simultaneous; a stop is then served first.
-_TIE = 1e-13
+#: Two events closer than this, relative to the time, are simultaneous to rounding; a stop is then
+#: served first.
+_TIE = 8 * EPSILON
+
+#: A point is on a surface where h is zero to this many roundings of its terms.
+ON_SURFACE = 16
 
 #: Local errors add up over a run; a twentieth keeps the global error near the tolerance.
 _SAFETY = 0.05

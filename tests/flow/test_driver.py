@@ -263,6 +263,45 @@ def test_a_stop_inside_the_singular_step_is_not_skipped():
     assert run.status is ns.Status.STOPPED and run.t[-1] == pytest.approx(1e-6, rel=1e-9)
 
 
+ENGINES = ["reference", "compiled"]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("gap", [3e-14, -3e-14])
+def test_events_keep_their_order_until_rounding(engine, gap):
+    """x' = 1 from -1 meets x = 0 at t = 1, and a stop a few dozen roundings before or after."""
+    system = ns.FilippovSystem(
+        [x, y], field=[1, -lam], multipliers=lam, surface=x, stops=[ns.Stop(x - gap, 1, "wall")]
+    )
+    run = ns.simulate(system, [-1.0, 0.0], 2.0, engine=engine)
+    assert run.itinerary == ("- +" if gap > 0 else "-")
+    assert run.t[-1] == pytest.approx(1.0 + gap, abs=5e-16)
+    many = ns.ensemble(system, np.tile([-1.0, 0.0], (100, 1)), 2.0, engine=engine, progress=False)
+    assert set(many.itinerary) == {run.itinerary}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("offset", [5e-14, -5e-14])
+def test_a_start_is_on_a_surface_only_to_rounding(engine, offset):
+    """Sliding along x = y + 1.5 begins where the surface is met, unless the start is on it."""
+    system = ns.FilippovSystem([x, y], field=[-lam, 0], multipliers=lam, surface=x - y)
+    for start, word in (([1.5 + offset, 1.5], ("+ s", "- s")[offset < 0]), ([1.5, 1.5], "s")):
+        assert ns.simulate(system, start, 1.0, engine=engine).itinerary == word
+        many = ns.ensemble(system, np.tile(start, (100, 1)), 1.0, engine=engine, progress=False)
+        assert set(many.itinerary) == {word}
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("tol", [1e-4, 1e-5, 1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13])
+def test_a_guard_far_below_the_tolerance_keeps_its_sign(engine, tol):
+    """y^(3/2) grows from 3e-20; beyond its circle of convergence the series falls through zero."""
+    system = ns.FilippovSystem([y], field=[1], stops=[ns.Stop(y**1.5, -1, "no load")])
+    run = ns.simulate(system, [1e-13], 1.0, tol=tol, engine=engine)
+    assert run.status is ns.Status.REACHED_END
+    many = ns.ensemble(system, np.full((100, 1), 1e-13), 1.0, tol=tol, engine=engine)
+    assert set(many.status) == {ns.Status.REACHED_END}
+
+
 def test_limits_end_the_run_with_advice():
     run = ns.simulate(relay(), [30.0, 0.0], 1e3, max_events=3)
     assert run.status is ns.Status.TOO_MANY_EVENTS and "max_events" in run.message

@@ -14,6 +14,8 @@
 #define DEPTH 52
 #define SAFETY 0.05 /* as in stepper.py: local errors add up over a run */
 #define RESOLVED 1e-3 /* as in stepper.py: last terms of a guard's series beside all of them */
+#define TIE (8 * EPS) /* as in stepper.py: relative to the time */
+#define ON_SURFACE 16 /* as in stepper.py: roundings */
 #define ROUNDING (4 * EPS) /* as in polynomial.py, relative to the sum of the magnitudes of terms */
 
 enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SMALL, NOT_FINITE,

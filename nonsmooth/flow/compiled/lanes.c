@@ -14,7 +14,6 @@
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
 #define HEAD 5 /* below P, which is 6 at least */
-#define TIE 1e-13
 
 typedef struct {
   T x[N], q[NQ], t, lambda, last_event, shortest;
@@ -157,7 +156,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 #if M > 0
   T h, g[N], value[2], scale[2];
   surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
-  I on = fresh & (ABS(h) <= 64 * EPS * rounding_scale(s, g));
+  I on = fresh & (ABS(h) <= ON_SURFACE * EPS * rounding_scale(s, g));
   unclear |= fresh & ~(ABS(h) < INFINITY);
   s->above |= fresh & (h > 0);
   if (any(on)) {

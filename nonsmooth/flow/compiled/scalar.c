@@ -9,7 +9,6 @@
  * jet(mode, x, q, c, g), guard_values(mode, x, q, value, gradient), surface_values(x, q, h,
  * gradient), reset_map(index, x, q, y), prepare(p, q).
  */
-#define TIE 1e-13
 #define HISTORY 48
 
 enum { SURFACE_GUARD, EXIT_GUARD, STOP_GUARD, RESET_GUARD };
@@ -232,7 +231,7 @@ static unsigned active_surfaces(const Run *r, unsigned certain, int mode) {
   for (int i = 0; i < M; i++) {
     double scale = 0;
     for (int l = 0; l < N; l++) scale += fabs(g[i][l]) * (1 + fabs(r->x[l]));
-    if (fabs(h[i]) <= 64 * EPS * scale) certain |= 1u << i;
+    if (fabs(h[i]) <= ON_SURFACE * EPS * scale) certain |= 1u << i;
   }
   int s = sliding_surface(mode);
   return s >= 0 ? certain | 1u << s : certain;

@@ -190,6 +190,42 @@ def test_interrupted_sweep_goes_on_where_it_was(system, starts, tmp_path, monkey
     assert len(saved) == 8 - finished + 1
 
 
+def _die(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+class _Murdered(concurrent.futures.ProcessPoolExecutor):
+    """A pool whose worker the system kills after some chunks, as when memory runs out."""
+
+    left = 3
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.left -= 1
+        return super().submit(fn if self.left >= 0 else _die, *args, **kwargs)
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_a_sweep_whose_worker_was_killed_goes_on_where_it_was(
+    system, starts, tmp_path, monkeypatch
+):
+    whole = ensemble(system, starts, 5.0)
+    context = multiprocessing.get_context("spawn")
+    with (
+        _Murdered(1, mp_context=context) as pool,
+        pytest.raises(concurrent.futures.BrokenExecutor),
+    ):
+        ensemble(system, starts, 5.0, chunk=40, executor=pool, checkpoint=tmp_path / "sweep")
+    assert len(list((tmp_path / "sweep").glob("chunk-*.npz"))) == 3
+    saved = []
+    original = Checkpoint.save
+    monkeypatch.setattr(
+        Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
+    )
+    same(whole, ensemble(system, starts, 5.0, checkpoint=tmp_path / "sweep"))
+    assert sorted(saved) == [3, 4, 5, 6, 7]
+
+
 def test_checkpoint_of_another_problem_is_refused(system, starts, tmp_path):
     few = starts[:4]
     ensemble(system, few, 1.0, checkpoint=tmp_path / "a")

@@ -97,7 +97,12 @@ class Driver:
         last = h >= left
         h = min(h, left)
         hit = self.stepper.first_hit(e, h, self.drops, self.t, self._repelling)
-        self._advance(e, e.states, hit.dt if hit else h)
+        dt = self.stepper.reach(e, hit.dt if hit else h)
+        if dt == 0.0:
+            return self._end(Status.STEP_TOO_SMALL, messages.branch_point(self.t))
+        if dt < (hit.dt if hit else h):
+            hit, last = None, False
+        self._advance(e, e.states, dt)
         if hit is not None:
             self._serve(hit)
         elif last:

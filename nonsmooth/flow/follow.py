@@ -185,7 +185,12 @@ class _Follower:
                 return Status.STEP_TOO_SMALL, messages.step_too_small(h)
             last, h = h >= left, min(h, left)
             hits = self._zeros(e, h, fresh)
-            dt = min((d for d, _ in hits), default=h)
+            wanted = min((d for d, _ in hits), default=h)
+            dt = self.stepper.reach(e, wanted, self.sign)
+            if dt == 0.0:
+                return Status.STEP_TOO_SMALL, messages.branch_point(self.t)
+            if dt < wanted:
+                last, hits = False, []
             self._advance(e, dt)
             if last and not hits:
                 self.t = self.times[-1] = self.t_end

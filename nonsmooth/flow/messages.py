@@ -87,6 +87,14 @@ def too_many(what: str, count: int) -> str:
     return f"{count} {what}."
 
 
+def branch_point(t: float) -> str:
+    """A polynomial passed where the field has no derivatives, and is no solution beyond."""
+    return (
+        f"The field stops being smooth just after t = {t:.8g}: a root or a power of something that "
+        "reaches zero there. End the run before, with a Stop at a small positive value of it."
+    )
+
+
 def step_too_small(h: float) -> str:
     """Rounding swallows the step."""
     return f"A step of {h:.1e} would be needed."

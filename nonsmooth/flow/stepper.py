@@ -11,6 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
 from .polynomial import first_crossing, first_root
@@ -30,6 +31,15 @@ _SAFETY = 0.05
 #: The last terms of a guard's series stay below this part of all of them, however small the guard is
 #: beside the tolerance: beyond its circle of convergence a polynomial has roots that the guard has not.
 _RESOLVED = 1e-3
+
+#: A defect this many times the local tolerance is no truncation error.
+_WRONG = 1e3
+
+#: So many steps that had to be shortened for their defect, most of them in a row, are an end.
+_SHORTENED = 40
+
+#: An event at the end of a domain may lie beyond it by rounding; the field is looked at just before.
+_JUST = 1 - 1e-9
 
 _PRIORITY = {"stop": 0, "reset": 1, "surface": 2, "exit": 3, "branch": 4}
 
@@ -56,6 +66,14 @@ class Expansion:
     scales: Array
     gradient: Array
     finite: bool
+
+
+def rounding_scale(gradient: Array, x: Array) -> Array:
+    """``sum_i |d guard/d x_i| (1 + |x_i|)``: rounding in a guard is that times epsilon.
+
+    Entries that are not finite, those of a square root at zero, say nothing and are left out.
+    """
+    return _finite(gradient) @ (1.0 + np.abs(x))
 
 
 @dataclass(frozen=True)
@@ -94,6 +112,8 @@ class Stepper:
         self.rtol, self.atol = rtol, atol
         self.order = order_for(_SAFETY * min(rtol, atol))
         self._jets: dict[str, tuple[Evaluator, Evaluator]] = {}
+        self._fields: dict[str, Evaluator | None] = {}
+        self._shortened = 0.0
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Return the guards of a mode, in the order of the rows of its expansion."""
@@ -111,7 +131,7 @@ class Stepper:
         states, guards = (np.array(a) for a in jets(x, self.p))
         gradient = np.abs(gradients(x, self.p)[0])
         finite = bool(np.all(np.isfinite(states)) and np.all(np.isfinite(guards)))
-        return Expansion(mode, states, guards, gradient @ (1.0 + np.abs(x)), gradient, finite)
+        return Expansion(mode, states, guards, rounding_scale(gradient, x), gradient, finite)
 
     def step_size(self, e: Expansion) -> float:
         """Step for which the last two terms of states and guards stay below the tolerances."""
@@ -187,6 +207,35 @@ class Stepper:
             value += e.states[:, k]
         return value
 
+    def reach(self, e: Expansion, dt: float, sign: float = 1.0) -> float:
+        """Longest of dt, dt/2, dt/4, ... at whose end the polynomial satisfies the equation.
+
+        Looked at only where the field has a branch point, which a polynomial may pass unseen.
+
+        Returns
+        -------
+        float
+            0 after many steps in a row that had to be shortened: the run is at the branch point.
+        """
+        if e.mode not in self._fields:
+            m = self._motion_of(self.system, e.mode)
+            self._fields[e.mode] = Evaluator(m.field_function()) if m.branches else None
+        field = self._fields[e.mode]
+        if field is None:
+            return dt
+        wanted = dt
+        while not self._satisfies(e, field, dt * _JUST, sign):
+            dt *= 0.5
+        self._shortened = max(0.0, self._shortened + (1.0 if dt < wanted else -0.2))
+        return dt if self._shortened < _SHORTENED else 0.0
+
+    def _satisfies(self, e: Expansion, field: Evaluator, dt: float, sign: float) -> bool:
+        c = e.states
+        allowed = _WRONG * _SAFETY * (self.atol + self.rtol * np.abs(c[:, 0]))
+        slope = sign * field(self.advance(e, dt), self.p)[0][:, 0]
+        defect = slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * _powers(dt, c.shape[1] - 1))
+        return bool(np.all(np.abs(defect) * dt <= allowed))
+
     def singular_step(self, e: Expansion, h_max: float) -> tuple[Array, float]:
         """Short step from a point where high derivatives do not exist (a power law at zero).
 
@@ -213,13 +262,26 @@ class Stepper:
             defect = np.abs(
                 slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * _powers(h, c.shape[1] - 1))
             )
-            # Guards are not located within this step: none may fall in it.
+            # Guards are not located within this step: none may fall in it, and what leaves zero at
+            # a rate must do so at that rate, however far below the tolerance.
             crossed = np.sign(there.guards[:, 0]) * np.sign(e.guards[:, 0]) < 0
+            wrong = _finite(there.gradient) @ defect > 1e-2 * np.abs(_finite(e.guards[:, 1]))
             fits = np.all(np.isfinite(slope)) and np.all(defect * h <= allowed)
-            if fits and not np.any(crossed):
+            if fits and not np.any(crossed) and not np.any(wrong & _leaves_zero(e)):
                 return c, h
             h *= 0.25
         return c, 0.0
+
+
+def _finite(a: Array) -> Array:
+    return np.where(np.isfinite(a), a, 0.0)
+
+
+def _leaves_zero(e: Expansion) -> NDArray[np.bool_]:
+    """Guards that are zero to rounding and change at a rate."""
+    rate = e.guards[:, 1]
+    zero = np.abs(e.guards[:, 0]) <= 64 * EPSILON * e.scales
+    return zero & np.isfinite(rate) & (rate != 0.0)
 
 
 def _powers(h: float, count: int) -> Array:

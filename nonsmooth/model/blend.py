@@ -40,6 +40,7 @@ class Blend:
     states: ca.SX
     guards: ca.SX
     affine: list[bool]
+    field: ca.SX
 
 
 def blended_jet(system: FilippovSystem, order: int) -> Blend:
@@ -74,7 +75,10 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
     states = ca.vertcat(*[ca.horzcat(*[_value(c) for c in row]) for row in jet])
     columns = [ca.vertcat(*[_value(c) for c in column]) for column in values]
     guards = ca.horzcat(*columns) if columns[0].numel() else ca.SX(0, order + 1)
-    return Blend(extra, states, guards, _affine(system))
+    sides = [ca.vertsplit(f) for f in fields]
+    chosen = [_choose(list(row), slides, above) for row in zip(*sides, strict=True)]
+    field = ca.vertcat(*[_value(c) for c in chosen])
+    return Blend(extra, states, guards, _affine(system), field)
 
 
 def _side_fields(system: FilippovSystem, lam: ca.SX) -> list[ca.SX]:

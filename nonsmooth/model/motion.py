@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 import numpy as np
@@ -20,6 +21,7 @@ from numpy.typing import NDArray
 
 from .cancel import cancel_common_factor
 from .errors import DefinitionError
+from .graph import has_branch_points
 from .jets import taylor
 from .system import Array, FilippovSystem, read_function
 
@@ -177,6 +179,15 @@ class Motion:
             )
             for side in (1, -1)
         ]
+
+    @cached_property
+    def branches(self) -> bool:
+        """Whether a step must be compared with the field at its end (see has_branch_points)."""
+        return has_branch_points([self.states, self.system.parameter_symbols], [self.field])
+
+    def field_function(self) -> ca.Function:
+        """Return (x, p) -> the field (N, 1)."""
+        return self.system.function(("field", self.mode), lambda: [self.field], self.states)
 
     def jet_function(self, order: int) -> ca.Function:
         """Return (x, p) -> jets of states (N, order+1) and of guard functions (m, order+1)."""

@@ -18,6 +18,8 @@ from .system import FilippovSystem
 def modes_program(system: FilippovSystem, order: int) -> str:
     """C of ``jet_k``, ``guard_values_k`` for mode k, ``surface_values`` and ``reset_map_j``.
 
+    ``field_k`` is the field, for modes whose field has branch points.
+
     Arrays are row by row: states (N, order+1), guards (m, order+1), gradients (m, N).
     """
     x, p = system.extended_states, system.parameter_symbols
@@ -27,6 +29,8 @@ def modes_program(system: FilippovSystem, order: int) -> str:
         states, guards = taylor(m.field, m.functions, x, p, order)
         program.add(f"jet_{k}", c=states, g=guards)
         program.add(f"guard_values_{k}", value=m.functions, gradient=_gradient(m.functions, x))
+        if m.branches:
+            program.add(f"field_{k}", f=m.field)
     if system.surface_count:
         h = _surfaces(system)
         program.add("surface_values", h=h, gradient=_gradient(h, x))
@@ -39,6 +43,7 @@ def lanes_program(system: FilippovSystem, order: int) -> tuple[str, list[bool]]:
     """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, and which guards are affine.
 
     ``lie_values`` are L_F1 h and L_F2 h; each comes with its gradient, which measures rounding.
+    ``field_values`` is there where a field has branch points.
     """
     x, p = system.extended_states, system.parameter_symbols
     blend = blended_jet(system, order)
@@ -51,6 +56,8 @@ def lanes_program(system: FilippovSystem, order: int) -> tuple[str, list[bool]]:
         program.add("lie_values", value=values, gradient=_gradient(values, x))
     stops = ca.densify(system._guards) if system._guards.numel() else ca.SX(0, 1)
     program.add("stop_values", value=stops, gradient=_gradient(stops, x))
+    if has_branches(system):
+        program.add("field_values", f=blend.field)
     return program.text(), blend.affine
 
 
@@ -60,6 +67,11 @@ def _surfaces(system: FilippovSystem) -> ca.SX:
 
 def _gradient(functions: ca.SX, x: ca.SX) -> ca.SX:
     return ca.densify(ca.jacobian(functions, x)) if functions.numel() else ca.SX(0, x.numel())
+
+
+def has_branches(system: FilippovSystem) -> bool:
+    """Whether the field of some mode has branch points."""
+    return any(motion(system, mode).branches for mode in system.modes)
 
 
 def is_flat(system: FilippovSystem) -> bool:

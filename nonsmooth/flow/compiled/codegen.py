@@ -10,7 +10,7 @@ from functools import lru_cache
 from importlib import resources
 
 from ...model import FilippovSystem, motion
-from ...model.programs import is_flat, lanes_program, modes_program
+from ...model.programs import has_branches, is_flat, lanes_program, modes_program
 
 _KINDS = {"surface": 0, "exit": 1, "stop": 2, "reset": 3}
 
@@ -72,7 +72,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     directions = ", ".join(str(d) for _, d in system.stops) or "0"
     defines = (
         f"#define W {width}\n#define SLOTS {slots}\n#define STOPS {len(system.stops)}\n"
-        f"#define CANCELLED {int(cancelled)}\n"
+        f"#define CANCELLED {int(cancelled)}\n#define BRANCHES {int(has_branches(system))}\n"
         f"#define CURVED {int(bool(affine) and not is_flat(system))}\n"
         f"static const int DIRECTION[] = {{{directions}}};\n"
         f"static const int AFFINE[] = {{{', '.join(str(int(a)) for a in affine) or '1'}}};\n"
@@ -119,6 +119,7 @@ def _mode_tables(system: FilippovSystem) -> str:
         f"static const int LETTER[MODES][M1] = {{{letters}}};\n"
         f"static const int MODE_OF[] = {{{', '.join(map(str, by_code))}}};\n"
         f"static const int CANCELLED[MODES] = {{{_list(int(m.cancelled) for m in motions)}}};\n"
+        f"static const int BRANCHES[MODES] = {{{_list(int(m.branches) for m in motions)}}};\n"
         f"static const int GUARDS[MODES] = {{{_list(len(m.guards) for m in motions)}}};\n"
         f"static const int GUARD[MODES][NG1][3] = {{{', '.join(rows)}}};\n"
     )
@@ -134,6 +135,11 @@ def _dispatch(system: FilippovSystem) -> str:
     values = "\n".join(
         f"    case {k}: guard_values_{k}(x, q, value, gradient); break;" for k in modes
     )
+    fields = "\n".join(
+        f"    case {k}: field_{k}(x, q, f); break;"
+        for k, mode in enumerate(system.modes)
+        if motion(system, mode).branches
+    )
     maps = "\n".join(
         f"    case {j}: reset_map_{j}(x, q, y); break;" for j in range(len(system.resets))
     )
@@ -142,6 +148,8 @@ def _dispatch(system: FilippovSystem) -> str:
         f"  switch (mode) {{\n{jets}\n  }}\n}}\n"
         "static void guard_values(int mode, const double *x, const double *q, double *value,\n"
         f"                         double *gradient) {{\n  switch (mode) {{\n{values}\n  }}\n}}\n"
+        "static void field(int mode, const double *x, const double *q, double *f) {\n"
+        f"  (void)x; (void)q; (void)f;\n  switch (mode) {{\n{fields}\n  }}\n}}\n"
         "static void reset_map(int index, const double *x, const double *q, double *y) {\n"
         f"  (void)x; (void)q; (void)y;\n  switch (index) {{\n{maps}\n  }}\n}}\n"
     )

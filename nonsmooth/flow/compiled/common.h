@@ -14,6 +14,8 @@
 #define DEPTH 52
 #define SAFETY 0.05 /* as in stepper.py: local errors add up over a run */
 #define RESOLVED 1e-3 /* as in stepper.py: last terms of a guard's series beside all of them */
+#define WRONG 1e3 /* as in stepper.py: a defect of so many tolerances */
+#define JUST (1 - 1e-9) /* as in stepper.py: of a step, where its defect is looked at */
 #define TIE (8 * EPS) /* as in stepper.py: relative to the time */
 #define ON_SURFACE 16 /* as in stepper.py: roundings */
 #define ROUNDING (4 * EPS) /* as in polynomial.py, relative to the sum of the magnitudes of terms */

@@ -8,7 +8,7 @@
  * neighbours.
  *
  * The generated text defines, besides what common.h asks for: W, SLOTS guards (surface or exit to +,
- * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], CANCELLED, CURVED, prepare(p, q),
+ * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], CANCELLED, CURVED, BRANCHES, prepare(p, q),
  * jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values.
  */
 #define S1 (SLOTS > 0 ? SLOTS : 1)
@@ -334,12 +334,27 @@ INLINE void drop_zeros(const Lanes *s, T *a) {
   }
 }
 
+/* Shorten steps until the series of all guards converge within them, as in the scalar driver. */
+static __attribute__((noinline)) void resolve_steps(const Lanes *s, T g[S1][P + 1], I which, T *h) {
+  for (int j = 0; j < SLOTS; j++) {
+    I active = which;
+    if (M > 0 && j == 1) active &= s->slides;
+    while (any(active)) {
+      T power = BC(1), sum = BC(0), step = *h;
+      for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[j][k]); power *= step; }
+      T last = MAX(ABS(g[j][P]) * step, ABS(g[j][P - 1])) * power, rest = RESOLVED * sum;
+      active &= (last > rest) & (rest > 0) & (rest < INFINITY);
+      *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
+    }
+  }
+}
+
 /* Guards scaled to [0, 1] with their lanes sorted: no root, one root to be polished, or a hard case,
  * whose root is found here. */
 typedef struct { T a[S1][P + 1], end[S1], root[S1], slope[S1]; I one[S1], hard[S1], flipped[S1], wrong_way[S1]; } Guards;
 
-/* Returns the lanes whose surface or exit guard is not positive, or whose step is too long for it. */
-INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j) {
+/* Returns the lanes whose surface or exit guard is not positive. */
+INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j, I *too_long) {
   T *a = v->a[j];
   I counts = s->live, flipped = {0}, wrong_way = {0}, none, unresolved, unclear = {0};
   v->root[j] = BC(INFINITY);
@@ -361,8 +376,8 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
   }
   screen(a, &none, &v->one[j], &unresolved, &v->end[j]);
   I zero = ~(I)(a[0] > 0);
-  unclear = counts & unresolved;
-  if (j < FIRST_STOP) { unclear |= counts & zero; counts &= ~zero; }
+  *too_long |= counts & unresolved;
+  if (j < FIRST_STOP) { unclear = counts & zero; counts &= ~zero; }
   v->hard[j] = counts & ((~none & ~v->one[j]) | (v->one[j] & wrong_way) | zero);
   v->one[j] &= counts & ~v->hard[j];
   v->flipped[j] = flipped;
@@ -441,14 +456,24 @@ INLINE void polish_guards(Guards *v, T margin) {
   }
 }
 
+/* Sorts all guards for steps h, which are shortened where a guard's series needs that. */
+INLINE I sort_guards(const Lanes *s, Guards *v, T g[S1][P + 1], T *h) {
+  for (int first = 1;; first = 0) {
+    T power[P + 1];
+    I unclear = {0}, too_long = {0};
+    power[1] = *h;
+    UNROLL for (int k = 2; k <= P; k++) power[k] = power[k / 2] * power[k - k / 2];
+    UNROLL for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, v, g[j], power, j, &too_long);
+    if (!first || !any(too_long)) return unclear;
+    resolve_steps(s, g, too_long, h);
+  }
+}
+
 /* Time of the first event within h in each lane and its slot + 1; lanes that are not clear. */
-INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T h, T *dt, I *slot, T *slope) {
+INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *slope) {
   Guards v;
-  T power[P + 1];
-  I unclear = {0};
-  power[1] = h;
-  UNROLL for (int k = 2; k <= P; k++) power[k] = power[k / 2] * power[k - k / 2];
-  UNROLL for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, &v, g[j], power, j);
+  I unclear = sort_guards(s, &v, g, steps);
+  T h = *steps;
   I hard = {0};
   UNROLL for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
   if (any(hard)) resolve(&v);
@@ -542,6 +567,25 @@ INLINE void advance(Lanes *s, T c[N][P + 1], T dt) {
   s->drop = (I){0};
 }
 
+/* Lanes whose polynomials do not satisfy the equation at the end of the step. */
+INLINE I wrong_field(const Lanes *s, const Options *o, T c[N][P + 1], T dt) {
+  I wrong = {0};
+#if BRANCHES
+  T x[N], slope[N], f[N];
+  dt *= JUST;
+  UNROLL for (int i = 0; i < N; i++) {
+    T v = c[i][P], d = BC(0);
+    UNROLL for (int k = P - 1; k >= 0; k--) { d = d * dt + v; v = v * dt + c[i][k]; }
+    x[i] = v;
+    slope[i] = d;
+  }
+  field_values(x, s->q, s->slides, s->above, s->lambda, f);
+  for (int i = 0; i < N; i++)
+    wrong |= ~(I)(ABS(f[i] - slope[i]) * dt <= WRONG * SAFETY * (o->atol + o->rtol * ABS(c[i][0])));
+#endif
+  return wrong;
+}
+
 static void finish_lanes(Lanes *s, Work *w, I which, int status) {
   for EACH(l, which & s->live) store(s, w, l, status);
 }
@@ -556,7 +600,9 @@ static void step(Lanes *s, Work *w) {
   unclear |= ~last & (h <= 4 * EPS * MAX(BC(1), ABS(s->t)));
   unclear |= s->steps >= o->max_steps;
   h = SELECT(last, left, h);
-  unclear |= first_hit(s, g, h, &dt, &slot, &slope);
+  unclear |= first_hit(s, g, &h, &dt, &slot, &slope);
+  last &= h >= left;
+  unclear |= wrong_field(s, o, c, dt);
   I was_sliding = s->slides;
   advance(s, c, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};

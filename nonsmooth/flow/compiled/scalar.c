@@ -1,12 +1,12 @@
 /* The reference driver in C: one trajectory, any number of surfaces, every kind of event.
  *
  * The functions have the names and the order of nonsmooth/flow/{driver,stepper,switching}.py; read
- * those first. What is rare and slow anyway (points where the jet is not finite) is handed over to
- * them.
+ * those first. What is rare and slow anyway (points where the jet is not finite, branch points of the
+ * field) is handed over to them.
  *
  * The generated text defines, besides what common.h asks for: MODES, LETTER[MODES][M] (+1, -1, 0),
- * MODE_OF[3^M], CANCELLED[MODES], GUARDS[MODES], GUARD[MODES][NG] = {kind, index, side},
- * jet(mode, x, q, c, g), guard_values(mode, x, q, value, gradient), surface_values(x, q, h,
+ * MODE_OF[3^M], CANCELLED[MODES], BRANCHES[MODES], GUARDS[MODES], GUARD[MODES][NG] = {kind, index, side},
+ * jet(mode, x, q, c, g), field(mode, x, q, f), guard_values(mode, x, q, value, gradient), surface_values(x, q, h,
  * gradient), reset_map(index, x, q, y), prepare(p, q).
  */
 #define HISTORY 48
@@ -47,6 +47,17 @@ static void finish(Run *r, int status, int reason, int where) {
 
 /* Numbers: nonsmooth/flow/stepper.py ------------------------------------------------------- */
 
+/* Rounding in a guard is that times epsilon; infinite slopes, those of a square root at zero, say
+ * nothing and are left out. */
+static double rounding_scale(const Run *r, const double *gradient) {
+  double scale = 0;
+  for (int i = 0; i < N; i++) {
+    double slope = fabs(gradient[i]);
+    scale += slope < INFINITY ? slope * (1 + fabs(r->x[i])) : 0;
+  }
+  return scale;
+}
+
 static void expand(const Run *r, int mode, Expansion *e) {
   double value[NG1];
   e->mode = mode;
@@ -61,12 +72,8 @@ static void expand(const Run *r, int mode, Expansion *e) {
   }
   e->finite = zero + none == 0;
   for (int j = 0; j < GUARDS[mode]; j++) {
-    double s = 0;
-    for (int i = 0; i < N; i++) {
-      e->gradient[j][i] = fabs(e->gradient[j][i]);
-      s += e->gradient[j][i] * (1 + fabs(r->x[i]));
-    }
-    e->scale[j] = s;
+    for (int i = 0; i < N; i++) e->gradient[j][i] = fabs(e->gradient[j][i]);
+    e->scale[j] = rounding_scale(r, e->gradient[j]);
   }
 }
 
@@ -125,6 +132,24 @@ static double step_size(const Run *r, const Expansion *e) {
   double h = step_for(last > 1e-300 ? last : 0, before > 1e-300 ? before : 0);
   for (int j = 0; j < GUARDS[e->mode]; j++) if (small[j]) h = resolve(e->guards[j], h);
   return h;
+}
+
+/* Whether the polynomial of a step satisfies the equation at its end; a branch point of the field may
+ * be passed unseen. */
+static int satisfies(const Run *r, const Expansion *e, double dt) {
+  double x[N], slope[N], f[N];
+  if (!BRANCHES[e->mode]) return 1;
+  dt *= JUST;
+  for (int i = 0; i < N; i++) {
+    const double *c = e->states[i];
+    x[i] = horner(c, P, dt, &slope[i]);
+  }
+  field(e->mode, x, r->q, f);
+  for (int i = 0; i < N; i++) {
+    double allowed = WRONG * SAFETY * (r->o.atol + r->o.rtol * fabs(e->states[i][0]));
+    if (!(fabs(f[i] - slope[i]) * dt <= allowed)) return 0;
+  }
+  return 1;
 }
 
 /* First coefficient of a guard that is not zero to rounding; P + 1 if there is none. */
@@ -229,9 +254,7 @@ static unsigned active_surfaces(const Run *r, unsigned certain, int mode) {
   if (M == 0) return 0;
   surface_values(r->x, r->q, h, &g[0][0]);
   for (int i = 0; i < M; i++) {
-    double scale = 0;
-    for (int l = 0; l < N; l++) scale += fabs(g[i][l]) * (1 + fabs(r->x[l]));
-    if (fabs(h[i]) <= ON_SURFACE * EPS * scale) certain |= 1u << i;
+    if (fabs(h[i]) <= ON_SURFACE * EPS * rounding_scale(r, g[i])) certain |= 1u << i;
   }
   int s = sliding_surface(mode);
   return s >= 0 ? certain | 1u << s : certain;
@@ -334,8 +357,7 @@ static int is_two_fold(const Run *r, int mode, double tolerance) {
   guard_values(mode, r->x, r->q, value, &gradient[0][0]);
   for (int j = 0; j < GUARDS[mode]; j++) {
     if (GUARD[mode][j][0] != EXIT_GUARD) continue;
-    double scale = 0;
-    for (int i = 0; i < N; i++) scale += fabs(gradient[j][i]) * (1 + fabs(r->x[i]));
+    double scale = rounding_scale(r, gradient[j]);
     if (!(fabs(value[j]) <= (tolerance + 2e-14) * scale && scale > 0)) return 0;
   }
   return 1;
@@ -378,8 +400,7 @@ static int decide_quickly(Run *r, int mode, unsigned active, Continuation *resul
   for (int j = 0; j < GUARDS[sliding]; j++) {
     const int *guard = GUARD[sliding][j];
     if (guard[0] != EXIT_GUARD) continue;
-    double scale = 0;
-    for (int l = 0; l < N; l++) scale += fabs(gradient[j][l]) * (1 + fabs(r->x[l]));
+    double scale = rounding_scale(r, gradient[j]);
     if (!(fabs(value[j]) > 64 * EPS * scale && fabs(value[j]) < INFINITY)) return 0;
     fall[guard[2] < 0] = value[j]; /* -L_F1 h, L_F2 h */
   }
@@ -636,6 +657,7 @@ static void step(Run *r) {
   int last = h >= left;
   if (last) h = left;
   int row = first_hit(r, &e, h, &dt);
+  if (!satisfies(r, &e, row >= 0 ? dt : h)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   advance(r, &e, row >= 0 ? dt : h);
   if (row >= 0) serve(r, row);
   else if (last) {

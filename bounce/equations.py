@@ -214,7 +214,8 @@ def free_system(blueprint: ContactModel) -> ns.FilippovSystem:
 
 @lru_cache(maxsize=64)
 def touch_down_function(blueprint: ContactModel) -> ca.Function:
-    """Return (states, parameters) -> lift-off function, its rate and field without friction."""
+    """Return (states, parameters) -> lift-off function, its rate, field without friction, its rate."""
     eq, system = equations(blueprint), free_system(blueprint)
+    field = system.field("")
     rate = system.lie_derivative([""], of=eq.lift_off)
-    return eq.function([eq.lift_off, rate, system.field("")])
+    return eq.function([eq.lift_off, rate, field, ca.jtimes(field, system.extended_states, field)])

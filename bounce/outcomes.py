@@ -277,9 +277,9 @@ class _Batch:
 
         As ``touch_down.approach`` does for one; the two are tested against each other.
         """
-        first, zero = (self._rows(a) for a in self._rise())
+        first, zero, rough = (self._rows(a) for a in self._rise())
         late = (first > 0) & self.going
-        at_once = late & (zero | (first <= _SHORT))
+        at_once = late & (zero | (first <= _SHORT)) | (self.going & (first == 0) & rough)
         # Off a power law's zero; the speeds change by less than rounding in this time.
         self.states[at_once, 0] += _INSTANT * self.states[at_once, 1]
         self.states[at_once, 2] += _INSTANT * self.states[at_once, 3]
@@ -288,7 +288,7 @@ class _Batch:
             longest = _AHEAD[k - 1] / 8 if k <= _AHEAD.size else math.inf
             self._fall(np.flatnonzero(late & (first == k)), longest, t_max, options)
 
-    def _rise(self) -> tuple[NDArray[np.int8], NDArray[np.bool_]]:
+    def _rise(self) -> tuple[NDArray[np.int8], NDArray[np.bool_], NDArray[np.bool_]]:
         """When the load becomes positive, in the shape of the inputs on which this depends.
 
         Returns
@@ -297,6 +297,8 @@ class _Batch:
             0 at once, k by the time ``_AHEAD[k - 1]``, the last of which plus one: later.
         zero : ndarray of bool
             Whether it is zero at touch-down and not negative before that time.
+        rough : ndarray of bool
+            Whether the forces at touch-down change at an infinite rate: a root at its zero.
         """
         names = _load_inputs(self.blueprint)
         states = [self.given[n] if n in names else np.array(0.0) for n in self.equations.names]
@@ -305,7 +307,8 @@ class _Batch:
         shape, flat = arrays[0].shape, np.array([a.ravel() for a in arrays])
         x, p = flat[: len(states)], flat[len(states) :]
         function = touch_down_function(self.blueprint)
-        load, _, field = (np.array(v) for v in function(x, p))
+        load, _, field, change = (np.array(v) for v in function(x, p))
+        rough = ~np.all(np.isfinite(change), axis=0)
         first = np.where(load[0] > 0, 0, _AHEAD.size + 1).astype(np.int8)
         zero = load[0] == 0
         for k, ahead in enumerate(_AHEAD):
@@ -316,7 +319,7 @@ class _Batch:
             zero[waiting[now < 0]] = False
             first[waiting[now > 0]] = k + 1
         zero &= (first > 0) & (first <= _AHEAD.size)
-        return first.reshape(shape), zero.reshape(shape)
+        return first.reshape(shape), zero.reshape(shape), rough.reshape(shape)
 
     def _fall(
         self, rows: NDArray[np.intp], longest: float, t_max: float, options: dict[str, Any]
@@ -329,19 +332,28 @@ class _Batch:
             return
         system, parameters = free_system(self.blueprint), self.parameters(rows)
         runs = ns.ensemble(
-            system, self.states[rows], t_max, parameters=parameters, max_step=longest, **options
+            system,
+            self.states[rows] + _INSTANT * self._derivatives(rows)[2].T,  # off a power law's zero
+            t_max,
+            t_start=_INSTANT,
+            parameters=parameters,
+            max_step=longest,
+            **options,
         )
         self.states[rows], self.time[rows], self.free[rows] = runs.x, runs.t, True
         self.status[rows] = _translate(runs.status)
         surfaced = self.going[rows] & (self.states[rows, 3] > 0)  # y = 0 came before any load
         self.status[rows[surfaced]] = BounceStatus.NO_CONTACT
         rows = rows[self.going[rows]]
+        for _ in range(3):  # onto zero load, to rounding
+            load, rate, field, _ = self._derivatives(rows)
+            self.states[rows] -= (load / rate * field).T
+
+    def _derivatives(self, rows: NDArray[np.intp]) -> list[NDArray[np.float64]]:
+        """What ``touch_down_function`` says of some rows, in columns."""
         parameters = self.parameters(rows)
         p = np.array([np.broadcast_to(parameters[n], rows.size) for n in self.values])
-        for _ in range(3):  # onto zero load, to rounding
-            x = self.states[rows]
-            load, rate, field = (np.array(v) for v in touch_down_function(self.blueprint)(x.T, p))
-            self.states[rows] = x - (load / rate * field).T
+        return [np.array(v) for v in touch_down_function(self.blueprint)(self.states[rows].T, p)]
 
     def bounce(self, t_max: float, options: dict[str, Any]) -> LiftOffs:
         """Follow the contact with friction."""

@@ -53,7 +53,7 @@ def approach(
     """
     p = list(parameters.values())
     function = touch_down_function(blueprint)
-    load, _, field = (np.array(v).ravel() for v in function(start, p))
+    load, _, field, _ = (np.array(v).ravel() for v in function(start, p))
     if not (np.isfinite(load[0]) and np.all(np.isfinite(field))):
         raise LandingError(
             f"load: expected finite forces at touch-down, received a load of {load[0]} and rates of "
@@ -94,7 +94,7 @@ def _onto_zero_load(function: ca.Function, x: NDArray[np.float64], p: list[float
     A ball that rolls at once must not see the negative load of an instant before.
     """
     for _ in range(3):
-        load, rate, field = (np.array(v).ravel() for v in function(x, p))
+        load, rate, field, _ = (np.array(v).ravel() for v in function(x, p))
         x = x - load / rate * field
     return x.tolist()
 

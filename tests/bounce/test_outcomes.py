@@ -20,6 +20,7 @@ MODELS = [
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5),
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5, G=0.01, load="net"),
     bounce.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
+    bounce.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
     bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, d1=0.1, eta=0.5),
     TURF.replace(friction=bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)),
 ]
@@ -40,6 +41,17 @@ def test_agrees_with_single_bounces(model):
         assert abs(many.time[k] - shot.time) < 1e-10
         assert abs(many.slip[k] - shot.slip) < 1e-10
         assert many.itinerary[k] == shot.itinerary
+
+
+@pytest.mark.parametrize("model", MODELS, ids=lambda m: type(m).__name__)
+def test_no_bounce_is_left_to_the_slow_driver(model, monkeypatch):
+    def refuse(*_):
+        raise AssertionError("a bounce was handed to the reference driver")
+
+    monkeypatch.setattr("nonsmooth.flow.chunks._run_reference", refuse)
+    rng = np.random.default_rng(2)
+    many = bounce.lift_off(model, rng.uniform(-1, 1, 500), -1.0, rng.uniform(-2, 2, 500))
+    assert many.complete.all()
 
 
 def test_inputs_and_parameters_broadcast():

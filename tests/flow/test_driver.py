@@ -302,6 +302,46 @@ def test_a_guard_far_below_the_tolerance_keeps_its_sign(engine, tol):
     assert set(many.status) == {ns.Status.REACHED_END}
 
 
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("tol", [1e-4, 1e-7, 1e-10, 1e-13])
+@pytest.mark.parametrize("m", [2, 3])
+def test_a_polynomial_does_not_pass_a_branch_point(m, tol, engine):
+    """x' = -x^(1 - 1/m) from 1 is (1 - t/m)^m, a polynomial, to t = m; beyond, x stays 0."""
+    power = ca.sqrt(x) if m == 2 else x ** (1 - 1 / m)
+    system = ns.FilippovSystem([x, y], field=[-power, 1], surface=y - 4, multipliers=lam)
+    run = ns.simulate(system, [1.0, 0.0], 5.0, tol=tol, engine=engine)
+    exact = np.maximum(0.0, 1 - run.t / m) ** m
+    assert run.status is ns.Status.STEP_TOO_SMALL and "root" in run.message
+    assert np.max(np.abs(run.x[:, 0] - exact)) < 10 * tol
+    assert run.t[-1] > m * (1 - 2 * tol ** (1 / m))
+    many = ns.ensemble(system, np.tile([1.0, 0.0], (100, 1)), 5.0, tol=tol, engine=engine)
+    assert set(many.status) == {ns.Status.STEP_TOO_SMALL}
+    assert np.max(np.abs(many.x - run.x[-1])) < 10 * tol
+    before = ns.simulate(system, [1.0, 0.0], 1.5, tol=tol, engine=engine)
+    assert before.x[-1, 0] == pytest.approx((1 - 1.5 / m) ** m, abs=tol)
+
+
+def test_super_twisting_control_ends_at_its_limit():
+    """s' = v - k1 sqrt|s| sgn s, v' = -k2 sgn s: linear in sqrt|s|, v and the time int dt/(2 sqrt|s|),
+    so that v is multiplied by -exp(-pi k1 / sqrt(8 k2 - k1^2)) from crossing to crossing."""
+    k1, k2 = 1.5, 1.1
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=x,
+        above=[v - k1 * ca.sqrt(x), -k2],
+        below=[v + k1 * ca.sqrt(-x), k2],
+    )
+    ratio = np.exp(-np.pi * k1 / np.sqrt(8 * k2 - k1**2))
+    run = ns.simulate(system, [1.0, 0.5], 10.0)
+    assert run.status is ns.Status.ACCUMULATION
+    met = np.array([e.x[1] for e in events(run, "crossing")])
+    np.testing.assert_allclose(met[:6], met[0] * (-ratio) ** np.arange(6), atol=1e-6)
+    first = run.events[0]
+    left = abs(first.x[1]) * (1 + ratio) / (k2 * (1 - ratio))
+    # v decides by sqrt|s|, and s is known to 1e-10
+    assert run.t[-1] == pytest.approx(first.t + left, abs=1e-5)
+
+
 def test_limits_end_the_run_with_advice():
     run = ns.simulate(relay(), [30.0, 0.0], 1e3, max_events=3)
     assert run.status is ns.Status.TOO_MANY_EVENTS and "max_events" in run.message

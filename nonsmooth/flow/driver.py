@@ -98,7 +98,7 @@ class Driver:
         h = min(h, left)
         hit = self.stepper.first_hit(e, h, self.drops, self.t, self._repelling)
         dt = self.stepper.reach(e, hit.dt if hit else h)
-        if dt == 0.0:
+        if dt is None:
             return self._end(Status.STEP_TOO_SMALL, messages.branch_point(self.t))
         if dt < (hit.dt if hit else h):
             hit, last = None, False

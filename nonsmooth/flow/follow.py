@@ -187,7 +187,7 @@ class _Follower:
             hits = self._zeros(e, h, fresh)
             wanted = min((d for d, _ in hits), default=h)
             dt = self.stepper.reach(e, wanted, self.sign)
-            if dt == 0.0:
+            if dt is None:
                 return Status.STEP_TOO_SMALL, messages.branch_point(self.t)
             if dt < wanted:
                 last, hits = False, []

@@ -207,15 +207,15 @@ class Stepper:
             value += e.states[:, k]
         return value
 
-    def reach(self, e: Expansion, dt: float, sign: float = 1.0) -> float:
+    def reach(self, e: Expansion, dt: float, sign: float = 1.0) -> float | None:
         """Longest of dt, dt/2, dt/4, ... at whose end the polynomial satisfies the equation.
 
         Looked at only where the field has a branch point, which a polynomial may pass unseen.
 
         Returns
         -------
-        float
-            0 after many steps in a row that had to be shortened: the run is at the branch point.
+        float or None
+            None after many steps in a row that had to be shortened: the run is at the branch point.
         """
         if e.mode not in self._fields:
             m = self._motion_of(self.system, e.mode)
@@ -227,7 +227,7 @@ class Stepper:
         while not self._satisfies(e, field, dt * _JUST, sign):
             dt *= 0.5
         self._shortened = max(0.0, self._shortened + (1.0 if dt < wanted else -0.2))
-        return dt if self._shortened < _SHORTENED else 0.0
+        return dt if self._shortened < _SHORTENED else None
 
     def _satisfies(self, e: Expansion, field: Evaluator, dt: float, sign: float) -> bool:
         c = e.states

@@ -17,7 +17,8 @@ import numpy as np
 from ..model import OptionError
 from .compiled.engine import Chunk
 
-_FORMAT = 1
+#: Raised whenever the files or the numbers in them change, so that versions are not mixed.
+_FORMAT = 2
 _ARRAYS = ("x", "t", "status", "itinerary", "kinds", "at_x", "at_t", "totals")
 
 

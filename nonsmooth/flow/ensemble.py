@@ -418,7 +418,8 @@ def _chunks(
 ) -> Generator[tuple[int, Chunk], None, None]:
     """Finished chunks in the order in which they finish; a bounded number is under way."""
     if executor is not None:
-        job = shipped(job)
+        if not isinstance(executor, ThreadPoolExecutor):
+            job = shipped(job)
         away = lambda x, p, out: executor.submit(run_chunk, job, x, p)
         yield from _submit(work, away, _IN_FLIGHT)
     elif workers < 2:

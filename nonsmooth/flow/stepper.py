@@ -18,9 +18,12 @@ from .polynomial import first_crossing, first_root
 
 EPSILON = float(np.finfo(float).eps)
 
-#: Two events closer than this, relative to the time, are simultaneous to rounding; a stop is then
-#: served first.
+#: Two events closer than this, relative to the time, and than the rounding of their roots, are
+#: simultaneous; a stop is then served first.
 _TIE = 8 * EPSILON
+
+#: Rounding in a polynomial, relative to the sum of the magnitudes of its terms.
+_ROOT_ROUNDING = 16 * EPSILON
 
 #: A point is on a surface where h is zero to this many roundings of its terms.
 ON_SURFACE = 16
@@ -181,8 +184,12 @@ class Stepper:
                 hits.append(Hit(dt, row, guard))
         if not hits:
             return None
-        earliest = min(hit.dt for hit in hits)
-        tied = [hit for hit in hits if hit.dt <= earliest + _TIE * max(1.0, abs(t))]
+        first = min(hits, key=lambda hit: hit.dt)
+        if len(hits) == 1:
+            return first
+        blur = [_blur(e.guards[hit.number], hit.dt) for hit in hits]
+        near = first.dt + _TIE * max(1.0, abs(t)) + blur[hits.index(first)]
+        tied = [hit for hit, own in zip(hits, blur, strict=True) if hit.dt <= near + own]
         return min(tied, key=lambda hit: (_PRIORITY[hit.guard.kind], hit.dt))
 
     def _root(
@@ -271,6 +278,14 @@ class Stepper:
                 return c, h
             h *= 0.25
         return c, 0.0
+
+
+def _blur(c: Array, dt: float) -> float:
+    """How far rounding in a guard moves its root; nothing where it has no slope."""
+    powers = _powers(dt, c.size)
+    slope = abs(float(c[1:] @ (np.arange(1, c.size) * powers[:-1])))
+    noise = _ROOT_ROUNDING * float(np.abs(c) @ powers)
+    return noise / slope if noise < 1e-9 * dt * slope else 0.0
 
 
 def _finite(a: Array) -> Array:

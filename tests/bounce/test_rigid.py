@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import bounce
@@ -60,6 +60,8 @@ def test_restitution_series():
     assert math.log(bounce.kelvin_voigt_restitution(d / 2)) == pytest.approx(series, abs=2e-9)
 
 
+# Rolling ends where the load does, but rounding puts the roots of the two 1e-14 apart.
+@example(mu=1.0, d2=0.8984375, xdot=0.0, omega=1.0, inertia=0.5)
 @given(
     mu=st.floats(0.05, 1.0),
     d2=st.floats(0.0, 2.0),

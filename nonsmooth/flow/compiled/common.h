@@ -17,6 +17,7 @@
 #define WRONG 1e3 /* as in stepper.py: a defect of so many tolerances */
 #define JUST (1 - 1e-9) /* as in stepper.py: of a step, where its defect is looked at */
 #define TIE (8 * EPS) /* as in stepper.py: relative to the time */
+#define ROOT_ROUNDING (16 * EPS) /* as in stepper.py: relative to the sum of terms */
 #define ON_SURFACE 16 /* as in stepper.py: roundings */
 #define ROUNDING (4 * EPS) /* as in polynomial.py, relative to the sum of the magnitudes of terms */
 

@@ -14,25 +14,62 @@
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
 #define HEAD 5 /* below P, which is 6 at least */
+#define NEAR 1e-13 /* events closer than this, relative to the time, are left to the scalar driver */
+#define LONG_CODE (1LL << 60)
+#define MEMORY 256
 
 typedef struct {
   T x[N], q[NQ], t, lambda, last_event, shortest;
   I slides, above, drop, live, steps, events, kinds[KINDS], shrinking;
+  I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   int64_t index[W];
-  int32_t itinerary[W];
+  int32_t base[W];
 } Lanes;
 
-/* A batch, and how far it is. */
+/* A batch, and how far it is; nodes of the tree by code, as a memory of the last ones. */
 typedef struct {
   const Batch *b;
   const Options *o;
   Tree *tree;
-  int64_t next;
+  int64_t next, known_code[MEMORY];
+  int32_t known_node[MEMORY];
   int alive;
 } Work;
 
 #define LANE(v, l) (((double *)&(v))[l])
 #define LANE_I(v, l) (((int64_t *)&(v))[l])
+
+/* Itineraries ------------------------------------------------------------------------------------ */
+
+static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
+  for (int shift = 60; shift >= 0; shift -= 2)
+    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
+  return node;
+}
+
+static int32_t itinerary(const Lanes *s, Work *w, int l) {
+  int64_t code = LANE_I(s->code, l);
+  if (s->base[l]) return walk(w->tree, s->base[l], code);
+  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
+  if (w->known_code[slot] != code) {
+    w->known_code[slot] = code;
+    w->known_node[slot] = walk(w->tree, 0, code);
+  }
+  return w->known_node[slot];
+}
+
+static __attribute__((noinline)) void shorten_codes(Lanes *s, Work *w) {
+  for EACH(l, s->code >= LONG_CODE) {
+    s->base[l] = walk(w->tree, s->base[l], LANE_I(s->code, l));
+    LANE_I(s->code, l) = 0;
+  }
+}
+
+static void note_modes(Lanes *s, Work *w, I which) {
+  I digit = 1 + ((s->slides & 2) | (~s->slides & ~s->above & (M > 0)));
+  s->code = (s->code & ~which) | (((s->code << 2) + digit) & which);
+  if (any(s->code >= LONG_CODE)) shorten_codes(s, w);
+}
 
 /* Loading and storing -------------------------------------------------------------------------- */
 
@@ -47,7 +84,7 @@ static void store(Lanes *s, Work *w, int l, int status) {
   if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
-  b->itinerary[i] = s->itinerary[l];
+  b->itinerary[i] = itinerary(s, w, l);
   for (int k = 0; k < KINDS; k++) b->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
   b->kinds[i * KINDS + END] += status == REACHED_END;
 }
@@ -76,10 +113,10 @@ static int load(Lanes *s, Work *w, int l) {
   LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
   LANE(s->shortest, l) = 1e-3;
   LANE_I(s->live, l) = -1;
-  LANE_I(s->steps, l) = LANE_I(s->events, l) = LANE_I(s->shrinking, l) = LANE_I(s->drop, l) = 0;
+  LANE_I(s->code, l) = LANE_I(s->steps, l) = LANE_I(s->events, l) = LANE_I(s->shrinking, l) = LANE_I(s->drop, l) = 0;
   for (int k = 0; k < KINDS; k++) LANE_I(s->kinds[k], l) = 0;
   s->index[l] = i;
-  s->itinerary[l] = 0;
+  s->base[l] = 0;
   w->alive++;
   return 1;
 }
@@ -92,14 +129,6 @@ static I refill(Lanes *s, Work *w) {
 
 static void hand_over(Lanes *s, Work *w, I which) {
   for EACH(l, which & s->live) store(s, w, l, HAND_OVER);
-}
-
-static void note_modes(Lanes *s, Work *w, I which) {
-  unsigned slides = bits(s->slides), above = bits(s->above);
-  for EACH(l, which) {
-    int mode = slides >> l & 1 ? 2 : M > 0 && !(above >> l & 1);
-    s->itinerary[l] = tree_child(w->tree, s->itinerary[l], mode);
-  }
 }
 
 /* The surface -------------------------------------------------------------------------------- */
@@ -477,7 +506,7 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *
   I hard = {0};
   UNROLL for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
   if (any(hard)) resolve(&v);
-  T tie = TIE * MAX(BC(1), ABS(s->t));
+  T tie = NEAR * MAX(BC(1), ABS(s->t));
   if (SLOTS > 0) polish_guards(&v, tie / h);
   T best = BC(INFINITY), second = BC(INFINITY);
   *slot = (I){0};
@@ -637,7 +666,9 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t b
   Work *w = &many->work;
   if (!many->begun) {
     double q[NQ];
-    *w = (Work){b, o, tree, 0, 0};
+    w->b = b;
+    w->o = o;
+    w->tree = tree;
     prepare(b->p, q);
     for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
     many->begun = 1;

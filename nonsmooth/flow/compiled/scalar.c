@@ -183,20 +183,32 @@ static double guard_root(const Expansion *e, int row, int drop, double h) {
   return first_root(c, P - drop, h);
 }
 
+/* How far rounding in a guard moves its root; nothing where it has no slope. */
+static double blur(const double *c, double dt) {
+  double slope, noise = ROOT_ROUNDING * (fabs(c[0]) + rest_of(c, P, dt));
+  horner(c, P, dt, &slope);
+  slope = fabs(slope);
+  return noise < 1e-9 * dt * slope ? noise / slope : 0;
+}
+
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(const Run *r, const Expansion *e, double h, double *dt) {
-  double time[NG1], earliest = INFINITY;
+  double time[NG1];
+  int first = -1, found = 0;
   for (int j = 0; j < GUARDS[e->mode]; j++) {
     time[j] = guard_root(e, j, r->drop[j], h);
-    if (time[j] >= 0 && time[j] < earliest) earliest = time[j];
+    if (time[j] < 0) continue;
+    found++;
+    if (first < 0 || time[j] < time[first]) first = j;
   }
-  int best = -1;
-  double latest = earliest + TIE * larger(fabs(r->t), 1);
-  for (int j = 0; j < GUARDS[e->mode]; j++) {
-    if (time[j] < 0 || time[j] > latest) continue;
-    int rank = PRIORITY[GUARD[e->mode][j][0]];
-    int best_rank = best < 0 ? 9 : PRIORITY[GUARD[e->mode][best][0]];
-    if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
+  int best = first;
+  if (found > 1) {
+    double near = time[first] + TIE * larger(fabs(r->t), 1) + blur(e->guards[first], time[first]);
+    for (int j = 0; j < GUARDS[e->mode]; j++) {
+      if (time[j] < 0 || time[j] > near + blur(e->guards[j], time[j])) continue;
+      int rank = PRIORITY[GUARD[e->mode][j][0]], best_rank = PRIORITY[GUARD[e->mode][best][0]];
+      if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
+    }
   }
   if (best >= 0) *dt = time[best];
   return best;

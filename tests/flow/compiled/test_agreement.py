@@ -198,6 +198,23 @@ def test_curved_surface_keeps_the_slider_on_it():
     np.testing.assert_allclose(chunk.x[:, 0], np.cos(1000.0), atol=1e-9)
 
 
+@pytest.mark.parametrize("t_end", [60.0, 400.0])
+def test_itineraries_of_any_length_in_lanes(t_end):
+    """A square wave switches 40 or 250 times; lanes keep the last 31 modes in one number."""
+    x, t, lam = (ca.SX.sym(s) for s in "xtl")
+    system = FilippovSystem(
+        [x], field=[ca.cos(2 * t)], multipliers=lam, surface=ca.sin(2 * t + 0.1 * x), time=t
+    )
+    starts = np.column_stack([np.linspace(-0.5, 0.5, 20), np.zeros(20)])
+    engine, p = engine_for(system, Options(t_end=t_end)), system.parameter_vector()
+    options = Options(t_end=t_end)
+    lanes, scalar = (engine.run_many(starts, p, options, None, flag) for flag in (True, False))
+    words = [lanes.words[k].split() for k in lanes.itinerary]
+    assert words == [scalar.words[k].split() for k in scalar.itinerary]
+    assert min(map(len, words)) > 0.6 * t_end
+    assert len(set(map(tuple, words))) > 1 and lanes.totals[2] == 0
+
+
 def test_limits_become_the_same_status():
     problem = textbook.by_name("pseudo_hopf")
     for limits in ({"max_events": 5}, {"max_steps": 7}, {"max_step": 0.01}):

@@ -20,6 +20,7 @@ from typing import TypeAlias
 
 import casadi as ca
 
+from .economy import economise
 from .errors import NotSmoothError
 from .graph import Node, depends_on, instructions
 
@@ -136,7 +137,8 @@ class _Expansion:
 
     def __init__(self, states: ca.SX, others: ca.SX, outputs: Sequence[ca.SX]):
         self._inputs = [states, others]
-        self._nodes, self._rows = instructions(self._inputs, outputs)
+        cheaper = economise(self._inputs, outputs, [True, False])
+        self._nodes, self._rows = instructions(self._inputs, cheaper)
         self._moving = depends_on(self._nodes, [True, False])
         self._series: list[_Series] = []  # in the order in which they advance
         self._states: list[Coefficient] = []

@@ -14,6 +14,7 @@
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
 #define HEAD 5 /* below P, which is 6 at least */
+#define MODEL (P < 8 ? P : 8)
 #define NEAR 1e-13 /* events closer than this, relative to the time, are left to the scalar driver */
 #define LONG_CODE (1LL << 60)
 #define MEMORY 256
@@ -306,25 +307,32 @@ INLINE T value_at(const T *a, int n, T s, T z) {
   return even + s * odd;
 }
 
+/* A polynomial of degree n, its derivative and half its second at s: a[0] to a[n - 1] and the top one. */
+INLINE void values_at(const T *a, int n, T top, T s, T *f, T *f1, T *half_f2) {
+  *f = top;
+  *f1 = *half_f2 = BC(0);
+  UNROLL for (int k = n - 1; k >= 0; k--) {
+    *half_f2 = *half_f2 * s + *f1;
+    *f1 = *f1 * s + *f;
+    *f = *f * s + a[k];
+  }
+}
+
 /* The root of a polynomial with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
- * not move any more. */
+ * not move any more. It starts from the root of a parabola with the same end, improved once on a
+ * polynomial of degree MODEL with the same end: one full iteration is then enough as a rule. */
 INLINE T polish(const T *a, T end, I active, T *slope) {
-  T bend = end - a[0] - a[1], lo = BC(0), hi = BC(1), d[P], dd[P];
-  T disc = a[1] * a[1] - 4.0 * a[0] * bend;
+  T lo = BC(0), hi = BC(1), f, f1, half_f2, top = end;
+  T disc = a[1] * a[1] - 4.0 * a[0] * (end - a[0] - a[1]);
   T s = 2.0 * a[0] / (SQRT_(MAX(disc, BC(0))) - a[1]);
   s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
-  /* Once on a model of degree 5 with the same end: a quarter of the price of a full iteration. */
-  T top = bend - a[2] - a[3] - a[4];
-  T m = a[0] + s * (a[1] + s * (a[2] + s * (a[3] + s * (a[4] + s * top))));
-  T m1 = a[1] + s * (2.0 * a[2] + s * (3.0 * a[3] + s * (4.0 * a[4] + s * (5.0 * top))));
-  T m2 = a[2] + s * (3.0 * a[3] + s * (6.0 * a[4] + s * (10.0 * top)));
-  T better = s - m * m1 / (m1 * m1 - m * m2);
+  UNROLL for (int k = 0; k < MODEL; k++) top -= a[k];
+  values_at(a, MODEL, top, s, &f, &f1, &half_f2);
+  T better = s - f * f1 / (f1 * f1 - f * half_f2);
   s = SELECT((better > 0) & (better <= 1), better, s);
-  UNROLL for (int k = 0; k < P; k++) d[k] = (k + 1.0) * a[k + 1];
-  UNROLL for (int k = 0; k < P - 1; k++) dd[k] = 0.5 * (k + 1.0) * d[k + 1];
   for (int it = 0; it < 60; it++) {
-    T z = s * s, f = value_at(a, P, s, z), f1 = value_at(d, P - 1, s, z);
-    T half_f2 = value_at(dd, P - 2, s, z), step = f * f1 / (f1 * f1 - f * half_f2), next = s - step;
+    values_at(a, P, a[P], s, &f, &f1, &half_f2);
+    T step = f * f1 / (f1 * f1 - f * half_f2), next = s - step;
     I positive = f > 0, small = ABS(step) <= 2e-6;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);

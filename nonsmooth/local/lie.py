@@ -20,6 +20,7 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
+    evaluator,
     explain,
     real,
     require_system,
@@ -103,24 +104,20 @@ class Place:
         """Return the mode above (``+``) or below (``-``) the surface."""
         return self.mode[: self.surface] + letter + self.mode[self.surface + 1 :]
 
-    def _function(self) -> Any:
-        system, above, below = self.system, self.side("+"), self.side("-")
-
-        def build() -> Sequence[Any]:
-            lie = [system.lie_derivative([mode], self.surface) for mode in (above, below)]
-            h = system.surface_function(self.surface)
-            fields = [system.field(mode) for mode in (above, below)]
-            gradients = [system.gradient(e) for e in (h, *lie)]
-            return [h, *lie, *gradients, *fields]
-
-        return system.function(("local", self.surface, self.mode), build)
+    def _build(self) -> Sequence[Any]:
+        system, sides = self.system, (self.side("+"), self.side("-"))
+        lie = [system.lie_derivative([mode], self.surface) for mode in sides]
+        h = system.surface_function(self.surface)
+        gradients = [system.gradient(e) for e in (h, *lie)]
+        return [h, *lie, *gradients, *(system.field(mode) for mode in sides)]
 
     def at(self, x: Array) -> Numbers:
         """Evaluate at an extended point (N,); entries may be NaN where a field is undefined."""
-        values = [np.array(v, dtype=float) for v in self._function()(x, self.parameters)]
-        h, l1, l2 = (float(v[0, 0]) for v in values[:3])
-        g, g1, g2, f1, f2 = (v.ravel() for v in values[3:])
-        return Numbers(x, h, g, np.array([f1, f2]), np.array([l1, l2]), np.array([g1, g2]))
+        evaluate = evaluator(self.system, ("local", self.surface, self.mode), self._build)
+        h, l1, l2, *vectors = evaluate.copied(x, self.parameters)
+        g, g1, g2, f1, f2 = (v.ravel() for v in vectors)
+        lie = np.array([l1[0, 0], l2[0, 0]])
+        return Numbers(x, float(h[0, 0]), g, np.array([f1, f2]), lie, np.array([g1, g2]))
 
     def finite_at(self, x: Array) -> Numbers:
         """Evaluate as ``at`` does and refuse NaN and inf.
@@ -148,7 +145,8 @@ class Place:
         """Values (k, 3) and gradients (k, 3, N) of (h, L1, L2) at points (k, N)."""
         if not len(x):
             return np.zeros((0, 3)), np.zeros((0, 3, x.shape[1]))
-        outputs = self._function()(x.T, self.parameters)
+        function = self.system.function(("local", self.surface, self.mode), self._build)
+        outputs = function(x.T, self.parameters)
         values = np.vstack([np.array(v) for v in outputs[:3]])
         k, n = x.shape
         gradients = np.stack([np.array(v).reshape(k, n) for v in outputs[3:6]], axis=1)

@@ -49,28 +49,46 @@ class Root:
     linear: bool
 
 
-def _normalised(equations: Equations, x: Array) -> tuple[Array, Array]:
-    r, jacobian = equations(x)
-    lengths = np.linalg.norm(jacobian, axis=1)
+@dataclass(frozen=True, eq=False)
+class _Values:
+    """Equations at x, with the lengths of their gradients."""
+
+    x: Array
+    values: Array
+    jacobian: Array
+    lengths: Array
+
+    @property
+    def residuals(self) -> Array:
+        return self.values / self.lengths
+
+    @property
+    def residual(self) -> float:
+        return float(np.abs(self.residuals).max())
+
+    @property
+    def directions(self) -> Array:
+        return self.jacobian / self.lengths[:, None]
+
+    @property
+    def finite(self) -> bool:
+        return bool(np.isfinite(self.values).all() and np.isfinite(self.jacobian).all())
+
+
+def _evaluate(equations: Equations, x: Array) -> _Values:
+    values, jacobian = equations(x)
+    lengths = np.sqrt((jacobian * jacobian).sum(axis=1))
     lengths[lengths == 0] = 1.0
-    return r / lengths, jacobian / lengths[:, None]
+    return _Values(x, values, jacobian, lengths)
 
 
-def _finite(*arrays: Array) -> bool:
-    return all(bool(np.all(np.isfinite(a))) for a in arrays)
-
-
-def _damped(equations: Equations, x: Array, r: Array, step: Array) -> tuple[Array, float] | None:
+def _damped(equations: Equations, at: _Values, step: Array) -> tuple[_Values, float] | None:
     """Halve the step until the residual falls; None if it never does."""
-    _, jacobian = equations(x)
-    lengths = np.linalg.norm(jacobian, axis=1)
-    lengths[lengths == 0] = 1.0
-    factor, old = 1.0, float(np.max(np.abs(r)))
+    factor, old = 1.0, at.residual
     for _ in range(_HALVINGS):
-        trial = x + factor * step
-        values, gradients = equations(trial)
-        if _finite(values, gradients):
-            new = float(np.max(np.abs(values / lengths)))
+        trial = _evaluate(equations, at.x + factor * step)
+        if trial.finite:
+            new = float(np.abs(trial.values / at.lengths).max())
             if new <= (1 - 1e-4 * factor) * old:
                 return trial, factor
         factor /= 2
@@ -107,26 +125,24 @@ def solve(
     if isinstance(max_iterations, bool) or int(max_iterations) != max_iterations:
         raise OptionError(f"max_iterations: expected a whole number, received {max_iterations!r}.")
     positive(max_iterations, "max_iterations")
-    x = np.array(start, dtype=float)
-    r, jacobian = _normalised(equations, x)
-    if not _finite(r, jacobian):
+    at = _evaluate(equations, np.array(start, dtype=float))
+    if not at.finite:
         raise PointError(
-            f"near: expected a start where the equations of a {what} are finite, received {x}. "
+            f"near: expected a start where the equations of a {what} are finite, received {at.x}. "
             "A root, logarithm or division of the fields left its domain; move the start."
         )
-    history, steps = [float(np.max(np.abs(r)))], list[float]()
+    history, steps = [at.residual], list[float]()
     while len(steps) < max_iterations:
-        step = np.asarray(-np.linalg.lstsq(jacobian, r, rcond=1e-14)[0], dtype=np.float64)
-        if float(np.linalg.norm(step)) <= 2.0**-51 * float(np.linalg.norm(x)):
+        step = -np.linalg.lstsq(at.directions, at.residuals, rcond=1e-14)[0]
+        if float(np.linalg.norm(step)) <= 2.0**-51 * float(np.linalg.norm(at.x)):
             break
-        damped = _damped(equations, x, r, step)
+        damped = _damped(equations, at, step)
         if damped is None:
             break
-        x, factor = damped
-        r, jacobian = _normalised(equations, x)
-        history.append(float(np.max(np.abs(r))))
+        at, factor = damped
+        history.append(at.residual)
         steps.append(factor * float(np.linalg.norm(step)))
-    return _accept(x, jacobian, history, steps, tol, max_iterations, what)
+    return _accept(at.x, at.directions, history, steps, tol, max_iterations, what)
 
 
 def _accept(

@@ -20,6 +20,7 @@ from .motion import (
     Motion,
     Resets,
     Surfaces,
+    evaluator,
     followed,
     motion,
 )
@@ -47,6 +48,7 @@ __all__ = [
     "Resets",
     "Stop",
     "Surfaces",
+    "evaluator",
     "explain",
     "followed",
     "motion",

@@ -11,7 +11,8 @@ Stops and resets follow the guards as they were given; their direction is the dr
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import threading
+from collections.abc import Callable, Hashable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -211,7 +212,7 @@ class Motion:
 class Evaluator:
     """A CasADi function called without conversions: preallocated inputs and outputs.
 
-    Not for use by two threads at once.
+    Two threads at once may use ``copied`` only.
 
     Parameters
     ----------
@@ -221,6 +222,7 @@ class Evaluator:
 
     def __init__(self, function: ca.Function):
         self._buffer, self._run = function.buffer()
+        self._lock = threading.Lock()
         self._x = np.zeros(function.numel_in(0))
         self._p = np.zeros(function.numel_in(1))
         self.outputs: list[NDArray[np.float64]] = [
@@ -239,6 +241,11 @@ class Evaluator:
         self._p[:] = p
         self._run()
         return self.outputs
+
+    def copied(self, x: Array, p: Array) -> list[Array]:
+        """Evaluate to arrays that are the caller's, from any thread."""
+        with self._lock:
+            return [np.array(output) for output in self(x, p)]
 
 
 class Followed(Motion):
@@ -412,6 +419,16 @@ class Intersection(Motion):
             if all(np.abs(lam - other[-k:]).max() > 1e-7 for other in found):
                 found.append(values)
         return found
+
+
+def evaluator(
+    system: FilippovSystem, key: Hashable, build: Callable[[], Sequence[ca.SX]]
+) -> Evaluator:
+    """Return the evaluator of ``system.function(key, build)``, made once per system."""
+    key = ("evaluator", key)
+    if key not in system._functions:
+        system._functions[key] = Evaluator(system.function(key, build))
+    return system._functions[key]
 
 
 def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -> Followed:

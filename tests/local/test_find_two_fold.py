@@ -2,6 +2,7 @@
 
 import math
 import pickle
+from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 
 import casadi as ca
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.local import TraceError, find_two_fold, trace_two_folds, two_fold
+from nonsmooth.local.lie import place
 from nonsmooth.local.newton import solve
 
 signs = st.sampled_from([(1, -1), (-1, 1), (1, 1), (-1, -1)])
@@ -381,3 +383,32 @@ def test_point_at_far_away_is_found_or_refused():
         fold.point_at([1.1, 0.1])
     assert fold.point_at(np.zeros((0, 2))).shape == (0, 3)
     assert fold.coordinates(np.zeros((0, 3))).shape == (0, 3)
+
+
+def test_threads_share_a_system():
+    """Each finds its own two-fold, although all evaluate the same compiled functions."""
+    x, y, z, a = (ca.SX.sym(s) for s in "xyza")
+    system = ns.FilippovSystem(
+        [x, y, z],
+        surface=x + 0.1 * y * z,
+        above=[-y + a, -1 + 0.3 * z, 0.5 + x],
+        below=[z + 0.2 * y**2, -2, 1 + 0.1 * y],
+        parameters={a: 0.0},
+    )
+    values = np.linspace(-0.5, 0.5, 200)
+    find = lambda value: find_two_fold(system, [0.0, 0.0, 0.0], parameters={"a": value})
+    alone = [find(value) for value in values]
+    with ThreadPoolExecutor(4) as pool:
+        together = list(pool.map(find, values))
+    for one, other in zip(alone, together, strict=True):
+        assert np.array_equal(one.point, other.point) and one.label == other.label
+
+
+def test_numbers_at_a_point_outlive_the_next_evaluation():
+    system, s, _ = hidden((1, -1), (0.5, 1.5), 3)
+    where, x = place(system, s)
+    first = where.at(x)
+    kept = first.lie_gradients.copy(), first.fields.copy(), first.gradient.copy()
+    where.at(x + 0.3)
+    for old, now in zip(kept, (first.lie_gradients, first.fields, first.gradient), strict=True):
+        assert np.array_equal(old, now)

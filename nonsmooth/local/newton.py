@@ -133,7 +133,7 @@ def solve(
         )
     history, steps = [at.residual], list[float]()
     while len(steps) < max_iterations:
-        step = -np.linalg.lstsq(at.directions, at.residuals, rcond=1e-14)[0]
+        step = np.asarray(-np.linalg.lstsq(at.directions, at.residuals, rcond=1e-14)[0], float)
         if float(np.linalg.norm(step)) <= 2.0**-51 * float(np.linalg.norm(at.x)):
             break
         damped = _damped(equations, at, step)

@@ -49,13 +49,13 @@ def economise(
     [SX((x*((p*y)+(-2*z))))]
     """
     reader = _Reader(inputs, outputs, variable)
-    roots = [[reader.sum(j) for j in row] for row in reader.rows]
-    writer = _Writer(reader, [s for row in roots for s in row])
+    writer = _Writer(reader, [reader.sum(j) for row in reader.rows for j in row])
+    entries = iter(writer.expressions())
     results = []
-    for output, row in zip(outputs, roots, strict=True):
+    for output, row in zip(outputs, reader.rows, strict=True):
         result = ca.SX.zeros(*output.shape)
-        for k, terms in enumerate(row):
-            result[k] = writer.write(terms)
+        for k in range(len(row)):
+            result[k] = next(entries)
         results.append(result)
     return results
 
@@ -189,6 +189,10 @@ class _Writer:
         self._group()
         self._count = Counter(product for s in self._sums for product in s)
         self._count.update(list(reader.whole))
+        self._roots = [self._take_out(terms) for terms in roots]
+        for j, factor in enumerate(self._factors):  # which grows
+            sums = tuple(self._take_out(terms) for terms in factor.sums)
+            self._factors[j] = _Factor(factor.node, sums)
 
     def _group(self) -> None:
         """Add terms once that are found together, up to a sign, in the same several sums."""
@@ -224,10 +228,32 @@ class _Writer:
             self._sums[k][(len(self._factors) - 1,)] = ca.SX(sign)
         self._sums.append(common)
 
-    def write(self, terms: Sum) -> ca.SX:
-        """Return the expression of a sum."""
+    def expressions(self) -> list[ca.SX]:
+        """Return the expressions of the roots."""
+        for j in range(len(self._factors)):
+            self._express(j)
+        return [self._write(terms) for terms in self._roots]
+
+    def _express(self, first: int) -> None:
+        """Write a factor and those it needs; a stack, because graphs can be deep."""
+        stack = [first]
+        while stack:
+            if stack[-1] in self._expressions:
+                stack.pop()
+                continue
+            factor = self._factors[stack[-1]]
+            needed = {f for terms in factor.sums for product in terms for f in product}
+            missing = needed.difference(self._expressions)
+            if missing:
+                stack += missing
+                continue
+            j, args = stack.pop(), [self._write(terms) for terms in factor.sums]
+            node = factor.node
+            self._expressions[j] = args[0] if node is None else self._reader.apply(node, args)
+
+    def _write(self, terms: Sum) -> ca.SX:
         total = ca.SX(0)
-        for product, coefficient in self._take_out(terms).items():
+        for product, coefficient in terms.items():
             if coefficient.is_minus_one():
                 total = total - self._multiply(product)
             else:
@@ -237,16 +263,8 @@ class _Writer:
     def _multiply(self, product: Product) -> ca.SX:
         result = ca.SX(1)
         for factor, n in Counter(product).items():
-            result = result * _power(self._expression(factor), n)
+            result = result * _power(self._expressions[factor], n)
         return result
-
-    def _expression(self, j: int) -> ca.SX:
-        if j not in self._expressions:
-            factor = self._factors[j]
-            args = [self.write(s) for s in factor.sums]
-            expression = args[0] if factor.node is None else self._reader.apply(factor.node, args)
-            self._expressions[j] = expression
-        return self._expressions[j]
 
     def _take_out(self, terms: Sum) -> Sum:
         """Take factors that several products have in common out of them, the commonest first.

@@ -101,3 +101,11 @@ def test_jets_are_those_of_the_expression_as_it_stands():
 def test_shapes_are_kept():
     (a, b) = rewrite(ca.reshape(ca.vertcat(x, x * y, p, 0), 2, 2), ca.SX(0, 1))
     assert a.shape == (2, 2) and b.shape == (0, 1)
+
+
+def test_deep_graphs():
+    """A thousand nested products and functions: no recursion over them."""
+    deep = x
+    for _ in range(1000):
+        deep = ca.sin(0.9 * (deep * y + 0.5) * z + deep)
+    assert_same([deep], rewrite(deep))

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters, require_system
+from ..model import Array, FilippovSystem, Parameters, motion, require_system
 from .compiled.convert import trajectory
 from .compiled.engine import engine_for, simulate_arrays
 from .compiled.select import use_compiled
@@ -16,8 +16,9 @@ from .options import Options
 from .status import Status
 from .trajectory import Trajectory
 
-#: Steps that the reference driver takes before a run counts as long.
-_SHORT = 300
+#: Steps that the reference driver takes before a run counts as long: at least so many, and more for
+#: a system whose jets have more instructions than _SMALL together, because compilers take longer.
+_SHORT, _SMALL, _STEPS_PER_INSTRUCTION = 300, 10_000, 0.05
 
 
 def simulate(
@@ -58,8 +59,9 @@ def simulate(
     max_step, max_steps, max_events : optional
         Limits.
     engine : {"auto", "reference", "compiled"}
-        Which driver runs. ``"auto"`` takes the compiled engine for runs of more than 300 steps,
-        where there is a compiler; without one it says so, once.
+        Which driver runs. ``"auto"`` takes the compiled engine for runs of more than 300 steps
+        (more for large systems, which take long to compile), where there is a compiler; without
+        one it says so, once.
 
     Returns
     -------
@@ -108,14 +110,21 @@ def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: s
     The choice depends on the problem alone, never on what happens to be cached, so that the same
     call gives the same bits.
     """
-    compiled = use_compiled(engine, engine_for(system, options) is not None)
-    if compiled and engine == "auto":
-        first = Driver(system, x, p, replace(options, max_steps=min(_SHORT, options.max_steps)))
-        short = first.run()
-        if short.status is not Status.TOO_MANY_STEPS or options.max_steps <= _SHORT:
-            return short
+    available = engine_for(system, options)
+    compiled = use_compiled(engine, available is not None)
+    if compiled and available is not None and engine == "auto":
+        steps = min(_short(system, available.order), options.max_steps)
+        first = Driver(system, x, p, replace(options, max_steps=steps)).run()
+        if first.status is not Status.TOO_MANY_STEPS or options.max_steps <= steps:
+            return first
     if compiled:
         arrays = simulate_arrays(system, x, p, options)
         if arrays is not None:
             return trajectory(system, p, options, arrays)
     return Driver(system, x, p, options).run()
+
+
+def _short(system: FilippovSystem, order: int) -> int:
+    """Steps that take the reference driver about as long as a compiler takes."""
+    one = motion(system, system.modes[0]).jet_function(order).n_instructions()
+    return _SHORT + int(_STEPS_PER_INSTRUCTION * max(0, one * len(system.modes) - _SMALL))

@@ -10,6 +10,7 @@ text, and how it is compiled, is not known here.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -36,6 +37,12 @@ _LIBRARY = {
     for name in "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh "
     "atan2 pow erf hypot expm1 log1p".split()
 } | {"constpow": "pow", "erfinv": "ns_erfinv"}
+
+#: Compilers take more than proportional time for long functions: statements of one that is not
+#: split, and of a part.
+_WHOLE, _PART = 5000, 250
+_NAME = re.compile(r"\b[vr]\d+\b")
+_DEFINED = re.compile(r"  const T ([vr]\d+) =")
 
 #: What only parameters may go through; always on doubles.
 _PARAMETERS_ONLY = {
@@ -242,10 +249,18 @@ class _Graph:
             lines += [f"  {target} = {value};" for target in targets]
         extra = "".join(f", const {t} e{k}" for k, t in enumerate(self.types))
         arrays = "".join(f", T *restrict {a}" for a in function.arrays)
-        return (
-            f"FUNCTION {function.name}(const T *restrict x, const T *restrict q{extra}{arrays}) {{\n"
-            "  (void)x; (void)q;\n" + "\n".join(lines) + "\n}\n"
-        )
+        head = f"{function.name}(const T *restrict x, const T *restrict q{extra}{arrays})"
+        if len(lines) <= _WHOLE:
+            return _define(f"FUNCTION {head}", lines)
+        parts, size = _parts(lines)
+        given = ["x", "q", *(f"e{k}" for k in range(len(self.types))), *function.arrays, "w"]
+        text, calls = "", [f"  T w[{size}];"]
+        for k, part in enumerate(parts):
+            name = f"{function.name}_part{k}"
+            own = head.replace(function.name, name, 1).replace(")", ", T *restrict w)")
+            text += _define(f"static __attribute__((noinline)) void {own}", part)
+            calls.append(f"  {name}({', '.join(given)});")
+        return text + _define(f"FUNCTION {head}", calls)
 
     def _reachable(self, roots: list[int], moving: bool) -> list[int]:
         found: set[int] = set()
@@ -305,6 +320,27 @@ class _Graph:
 
     def _broadcast(self, j: int) -> str:
         return f"BC({self.name(j)})" if self.constant[j] else self.name(j)
+
+
+def _define(head: str, lines: Sequence[str]) -> str:
+    return f"{head} {{\n  (void)x; (void)q;\n" + "\n".join(lines) + "\n}\n"
+
+
+def _parts(lines: Sequence[str]) -> tuple[list[list[str]], int]:
+    """Split a long function; what one part needs of another goes through an array w of that size."""
+    home = {m[1]: k // _PART for k, line in enumerate(lines) if (m := _DEFINED.match(line))}
+    shared: dict[str, int] = {}
+    for k, line in enumerate(lines):
+        for name in _NAME.findall(line):
+            if home[name] != k // _PART:
+                shared.setdefault(name, len(shared))
+    parts: list[list[str]] = [[] for _ in range(0, len(lines), _PART)]
+    for k, line in enumerate(lines):
+        here = lambda m, k=k: m[0] if home[m[0]] == k // _PART else f"w[{shared[m[0]]}]"
+        parts[k // _PART].append(_NAME.sub(here, line))
+        if (m := _DEFINED.match(line)) and m[1] in shared:
+            parts[k // _PART].append(f"  w[{shared[m[1]]}] = {m[1]};")
+    return parts, len(shared)
 
 
 def _place(node: Node) -> tuple[int, int]:

@@ -12,10 +12,11 @@ import nonsmooth.flow.compiled.build as build_module
 import nonsmooth.flow.compiled.engine as engine_module
 import nonsmooth.textbook as textbook
 from nonsmooth.flow.compiled import KINDS, engine_for, find_compiler, simulate_arrays
+from nonsmooth.flow.compiled.codegen import lanes_source, scalar_source
 from nonsmooth.flow.compiled.engine import HAND_OVER, supports_lanes
 from nonsmooth.flow.driver import Driver
 from nonsmooth.flow.options import Options
-from nonsmooth.model import FilippovSystem, Reset, Stop
+from nonsmooth.model import FilippovSystem, Reset, Stop, ccode
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -110,7 +111,10 @@ def test_polynomial_systems(made):
     agree(system, start, options, tolerance=1e-9)
 
 
-def test_every_operation():
+LOOSE = {"rtol": 1e-5, "atol": 1e-5}
+
+
+def every_operation():
     x, y, p, t = (ca.SX.sym(s) for s in ("x", "y", "p", "t"))
     f = (
         ca.sin(x)
@@ -140,7 +144,7 @@ def test_every_operation():
         + ca.fabs(p)
         + ca.erfinv(x / 20)
     )
-    system = FilippovSystem(
+    return FilippovSystem(
         [x, y],
         above=[0.1 * f * ca.fmax(p, 0.1) - x + ca.sin(3 * t), -y - 1],
         below=[0.1 * f - x / p, 2 - y + 0.1 * x],
@@ -148,10 +152,22 @@ def test_every_operation():
         parameters={p: 0.7},
         time=t,
     )
-    loose = {"rtol": 1e-5, "atol": 1e-5}
-    assert agree(system, [0.4, 0.9], Options(t_end=3.0, **loose), None, 1e-9) is not None
-    options = Options(t_end=4.0, t_start=1.0, **loose)
+
+
+def test_every_operation():
+    system = every_operation()
+    assert agree(system, [0.4, 0.9], Options(t_end=3.0, **LOOSE), None, 1e-9) is not None
+    options = Options(t_end=4.0, t_start=1.0, **LOOSE)
     assert agree(system, [0.4, 0.9], options, {"p": 1.5}, 1e-9) is not None
+
+
+@pytest.mark.parametrize("size", [25])
+def test_functions_in_parts(size, monkeypatch):
+    monkeypatch.setattr(ccode, "_WHOLE", 2 * size)
+    monkeypatch.setattr(ccode, "_PART", size)
+    system = every_operation()
+    assert "jet_0_part1(" in scalar_source(system, 6) and "jet_part1(" in lanes_source(system, 6, 8)
+    assert agree(system, [0.4, 0.9], Options(t_end=3.0, **LOOSE), None, 1e-9) is not None
 
 
 def test_resets_and_stops():

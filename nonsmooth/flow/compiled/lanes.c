@@ -307,39 +307,50 @@ INLINE T value_at(const T *a, int n, T s, T z) {
   return even + s * odd;
 }
 
-/* A polynomial of degree n, its derivative and half its second at s: a[0] to a[n - 1] and the top one. */
-INLINE void values_at(const T *a, int n, T top, T s, T *f, T *f1, T *half_f2) {
-  *f = top;
-  *f1 = *half_f2 = BC(0);
+/* The Taylor coefficients f[0] to f[3] at s of a polynomial of degree n: a[0] to a[n - 1], and the top. */
+INLINE void expand(const T *a, int n, T top, T s, T *f) {
+  f[0] = top;
+  f[1] = f[2] = f[3] = BC(0);
   UNROLL for (int k = n - 1; k >= 0; k--) {
-    *half_f2 = *half_f2 * s + *f1;
-    *f1 = *f1 * s + *f;
-    *f = *f * s + a[k];
+    f[3] = f[3] * s + f[2];
+    f[2] = f[2] * s + f[1];
+    f[1] = f[1] * s + f[0];
+    f[0] = f[0] * s + a[k];
   }
+}
+
+INLINE T halley(const T *f) { return f[0] * f[1] / (f[1] * f[1] - f[0] * f[2]); }
+
+/* Where a step of Halley's iteration leaves less than rounding: its error is step^3 times the difference
+ * of (f2/f1)^2 and f3/f1. The size of the step alone says nothing beside another root. */
+INLINE I converged(const T *f, T step) {
+  T bent = step * f[2], error = ABS(step) * (bent * bent + ABS(step * step * f[3] * f[1]));
+  return (ABS(step) <= 2e-6) & (I)(error <= 1e-16 * (f[1] * f[1]));
 }
 
 /* The root of a polynomial with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
  * not move any more. It starts from the root of a parabola with the same end, improved once on a
  * polynomial of degree MODEL with the same end: one full iteration is then enough as a rule. */
 INLINE T polish(const T *a, T end, I active, T *slope) {
-  T lo = BC(0), hi = BC(1), f, f1, half_f2, top = end;
+  T lo = BC(0), hi = BC(1), f[4], top = end;
   T disc = a[1] * a[1] - 4.0 * a[0] * (end - a[0] - a[1]);
   T s = 2.0 * a[0] / (SQRT_(MAX(disc, BC(0))) - a[1]);
   s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
   UNROLL for (int k = 0; k < MODEL; k++) top -= a[k];
-  values_at(a, MODEL, top, s, &f, &f1, &half_f2);
-  T better = s - f * f1 / (f1 * f1 - f * half_f2);
+  expand(a, MODEL, top, s, f);
+  T better = s - halley(f);
   s = SELECT((better > 0) & (better <= 1), better, s);
   for (int it = 0; it < 60; it++) {
-    values_at(a, P, a[P], s, &f, &f1, &half_f2);
-    T step = f * f1 / (f1 * f1 - f * half_f2), next = s - step;
-    I positive = f > 0, small = ABS(step) <= 2e-6;
+    expand(a, P, a[P], s, f);
+    T step = halley(f), next = s - step;
+    I positive = f[0] > 0;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);
+    I small = converged(f, step) | (I)(hi - lo <= 4 * EPS);
     I inside = (next > lo) & (next < hi);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
-    *slope = SELECT(active, f1, *slope);
+    *slope = SELECT(active, f[1], *slope);
     active &= ~small;
     if (!any(active)) break;
   }

@@ -270,3 +270,29 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
     assert [chunk.words[k] for k in chunk.itinerary] == [
         expected.words[k] for k in expected.itinerary
     ]
+
+
+@pytest.mark.parametrize("t_end", [1.0, 10.0, 100.0, 1000.0])
+@pytest.mark.parametrize("kind", ["stop", "surface"])
+@pytest.mark.parametrize(("v0", "a0"), [(0.0, -1.0), (-1e-9, -1.0), (-1e-9, 0.0), (-1e-4, 0.0)])
+def test_roots_with_others_beside_them(v0, a0, kind, t_end):
+    """The root of y0 + v0 t + a0 t^2/2 - t^3/6, early in a step as long as t_end."""
+    y, v, a = (ca.SX.sym(s) for s in "yva")
+    if kind == "stop":
+        system = FilippovSystem([y, v, a], field=[v, a, -1], stops=[Stop(y, -1)])
+    else:
+        system = FilippovSystem([y, v, a], surface=y, above=[v, a, -1], below=[v, a, -2])
+    heights = np.logspace(-12, -2, 128)
+    starts = np.stack([heights, np.full(128, v0), np.full(128, a0)], axis=1)
+    options, kinds = Options(t_end=t_end), list(KINDS)
+    at = (kinds.index("stop" if kind == "stop" else "crossing"), 1)
+    times = np.full(128, 0.6)
+    for _ in range(60):  # Newton from beyond the root of a function that falls ever faster
+        slope = v0 + a0 * times - times**2 / 2
+        times -= (heights + v0 * times + a0 * times**2 / 2 - times**3 / 6) / slope
+    for lanes in (True, False):
+        chunk = engine_for(system, options).run_many(starts, np.zeros(0), options, at, lanes)
+        assert np.abs(chunk.at_t - times).max() < 1e-15 * t_end
+    for k in range(0, 128, 16):
+        event = reference(system, starts[k], np.zeros(0), options).events[0]
+        assert abs(event.t - times[k]) < 1e-15 * t_end

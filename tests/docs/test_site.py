@@ -110,8 +110,11 @@ def test_every_public_name_is_in_the_api():
 def test_sources_load_nothing_from_elsewhere():
     config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     assert "font: false" in config
-    assert "extra_javascript" not in config and "extra_css" not in config
-    assert "http" not in config
+    assert "extra_javascript" not in config
+    assert "http" not in config and "//" not in config
+    for style in re.findall(r"^  - (.*\.css)$", config, re.MULTILINE):
+        text = (DOCS / style).read_text(encoding="utf-8")  # a file of the site
+        assert "url(" not in text and "@import" not in text
     for page in DOCS.glob("*.md"):
         text = page.read_text(encoding="utf-8")
         assert loads(text)[0] == [], page.name

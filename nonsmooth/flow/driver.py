@@ -18,7 +18,7 @@ from . import messages
 from .accumulation import remaining_time
 from .options import Options
 from .status import ADVICE, Status
-from .stepper import EPSILON, ON_SURFACE, Expansion, Hit, Stepper
+from .stepper import EPSILON, ON_SURFACE, Expansion, Hit, Sides, Stepper
 from .switching import Continuation, decide, is_two_fold
 from .trajectory import Event, Segment, Trajectory
 
@@ -64,6 +64,7 @@ class Driver:
         self._limit: float | None = None
         self._repelling = False  # sliding that only start_mode chooses
         self._due: int | None = None  # a reset to be served where the run stands
+        self._sides: Sides = {}
 
     # the loop ----------------------------------------------------------------------------------
 
@@ -96,12 +97,14 @@ class Driver:
             return self._end(Status.STEP_TOO_SMALL, messages.step_too_small(h))
         last = h >= left
         h = min(h, left)
-        hit = self.stepper.first_hit(e, h, self.drops, self.t, self._repelling)
+        hit = self.stepper.first_hit(e, h, self.drops, self.t, self._repelling, self._sides)
         dt = self.stepper.reach(e, hit.dt if hit else h)
         if dt is None:
             return self._end(Status.STEP_TOO_SMALL, messages.branch_point(self.t))
         if dt < (hit.dt if hit else h):
             hit, last = None, False
+        if dt > 0.0:
+            self._sides = self.stepper.sides(e, dt)
         self._advance(e, e.states, dt)
         if hit is not None:
             self._serve(hit)
@@ -145,7 +148,7 @@ class Driver:
             return self._end(
                 Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x.tolist())
             )
-        drops = self.drops
+        drops, self._sides = self.drops, {}
         self._advance(e, coefficients, h)
         self.drops = {row: k for row, k in drops.items() if k > e.guards.shape[1]}
 
@@ -212,7 +215,7 @@ class Driver:
 
     def _reset(self, index: int, name: str) -> None:
         self._event("reset", self.mode, name)
-        self.x = self.resets.apply(index, self.x, self.p)
+        self.x, self._sides = self.resets.apply(index, self.x, self.p), {}
         if not np.all(np.isfinite(self.x)):
             return self._end(Status.NOT_FINITE, messages.reset_not_finite(name, self.t))
         self._note()

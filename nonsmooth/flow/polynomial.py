@@ -72,9 +72,10 @@ def first_root(coefficients: Sequence[float], h: float) -> float | None:
         scaled.append(v * power)
     if c[0] > sum(abs(v) for v in scaled[1:]):
         return None
-    # A touch that reaches zero only by rounding is no root: look for roots of p + noise.
-    noise = _ROUNDING * sum(abs(v) for v in scaled)
-    bernstein = (_to_bernstein(len(c) - 1) @ scaled + noise).tolist()
+    # A touch that reaches zero only by rounding is no root: look for roots of p + rounding, which at t
+    # is _ROUNDING sum |c_k| t^k.
+    raised = [v + _ROUNDING * abs(v) for v in scaled]
+    bernstein = (_to_bernstein(len(c) - 1) @ raised).tolist()
     return _first_in(c, bernstein, 0.0, h)
 
 
@@ -227,3 +228,46 @@ def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> f
         return rise
     fall = first_root(shift(c, rise)[1:], h - rise) if len(c) > 1 and rise < h else None
     return None if fall is None else rise + fall
+
+
+def side_before(coefficients: Sequence[float], t: float, rounding: float) -> int:
+    """Sign of a polynomial just before t > 0; 0 where rounding hides it.
+
+    Parameters
+    ----------
+    coefficients : sequence of float
+        In increasing powers of t.
+    t : float
+    rounding : float
+        Of the function that the polynomial stands for.
+
+    Returns
+    -------
+    {-1, 0, 1}
+
+    Examples
+    --------
+    >>> side_before([0.3, -1.0], 0.3, 1e-16)
+    1
+    """
+    c = _floats(coefficients)
+    value, slope = _horner(c, t)
+    noise = rounding + _ROUNDING * _horner([abs(v) for v in c], t)[0]
+    if abs(value) > noise:
+        return 1 if value > 0.0 else -1
+    if abs(slope) * t > noise:
+        return -1 if slope > 0.0 else 1
+    return 0
+
+
+def passed(coefficients: Sequence[float], side: int, direction: int) -> bool:
+    """Whether a function that was on a side just before has passed zero at once, in a direction.
+
+    Examples
+    --------
+    >>> passed([0.0, -1.0], 1, -1), passed([0.0, 1.0], 1, -1), passed([-1e-17, 1.0], 1, 0)
+    (True, False, True)
+    """
+    if side * direction > 0:
+        return False
+    return next((float(v) for v in coefficients if v != 0.0), 0.0) * side < 0.0

@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
-from .polynomial import first_crossing, first_root
+from .polynomial import first_crossing, first_root, passed, side_before
 
 EPSILON = float(np.finfo(float).eps)
 
@@ -77,6 +77,10 @@ def rounding_scale(gradient: Array, x: Array) -> Array:
     Entries that are not finite, those of a square root at zero, say nothing and are left out.
     """
     return _finite(gradient) @ (1.0 + np.abs(x))
+
+
+#: Signs of stops and resets by kind and index.
+Sides = dict[tuple[str, int], int]
 
 
 @dataclass(frozen=True)
@@ -166,12 +170,29 @@ class Stepper:
                 return k, float(e.guards[row, k])
         return e.guards.shape[1], 0.0
 
+    def sides(self, e: Expansion, dt: float) -> Sides:
+        """Signs of stops and resets just before the end of a step, where they are clear."""
+        result: Sides = {}
+        for row, guard in enumerate(self.guards(e.mode)):
+            if guard.kind in ("stop", "reset"):
+                rounding = ON_SURFACE * EPSILON * float(e.scales[row])
+                result[guard.kind, guard.index] = side_before(e.guards[row].tolist(), dt, rounding)
+        return result
+
     def first_hit(
-        self, e: Expansion, h: float, drops: dict[int, int], t: float, repelling: bool = False
+        self,
+        e: Expansion,
+        h: float,
+        drops: dict[int, int],
+        t: float,
+        repelling: bool = False,
+        sides: Sides | None = None,
     ) -> Hit | None:
         """Earliest guard to end the mode within h; ``drops[row]`` leading coefficients are zero.
 
-        In repelling sliding the exit guards are negative, and rise to zero where it ends.
+        In repelling sliding the exit guards are negative, and rise to zero where it ends. ``sides``
+        are those just before the step: a stop or a reset may be passed at its start, where rounding
+        hid it from the step before.
         """
         if repelling:
             exits = [guard.kind == "exit" for guard in self.guards(e.mode)]
@@ -179,7 +200,10 @@ class Stepper:
         hits = []
         for row, guard in enumerate(self.guards(e.mode)):
             c = e.guards[row, drops.get(row, 0) :]
-            dt = self._root(e, row, guard, c, h, drops.get(row, 0))
+            dropped = drops.get(row, 0)
+            side = sides.get((guard.kind, guard.index), 0) if sides and not dropped else 0
+            at_once = side and passed(c.tolist(), side, guard.side)
+            dt = 0.0 if at_once else self._root(e, row, guard, c, h, dropped)
             if dt is not None:
                 hits.append(Hit(dt, row, guard))
         if not hits:

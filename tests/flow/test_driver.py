@@ -422,3 +422,42 @@ def test_accumulation_does_not_depend_on_the_unit_of_time(unit):
     run = ns.simulate(bounce, [0.0, 1.0], 100.0 * unit)
     assert run.status is ns.Status.ACCUMULATION
     assert run.accumulation_time == pytest.approx(4.0 * unit, rel=1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("offset", [0.0, 1e6, 1e8])
+@pytest.mark.parametrize(("direction", "speed"), [(-1, -1.0), (0, -1.0), (0, 1.0), (1, 1.0)])
+def test_a_stop_at_the_end_of_a_step_is_met(engine, offset, direction, speed):
+    """Steps of max_step end where the stop is, on either side of it by rounding, or on it."""
+    y = ca.SX.sym("y")
+    system = ns.FilippovSystem([y], field=[speed], stops=[ns.Stop(y - offset, direction)])
+    for step in (0.1, 0.7, 0.3, 0.25):
+        starts = offset - speed * step * np.arange(2, 40)[:, None]
+        expected = (offset - starts[:, 0]) / speed
+        many = ns.ensemble(system, starts, 50 * step, max_step=step, engine=engine, progress=False)
+        assert np.all(many.status == ns.Status.STOPPED)
+        np.testing.assert_allclose(many.t, expected, rtol=0, atol=1e-14 * (1 + offset))
+        run = ns.simulate(system, starts[7], 50 * step, max_step=step, engine=engine)
+        assert run.status is ns.Status.STOPPED
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("step", [0.25, 0.1, 0.01])
+def test_a_ball_does_not_fall_through_the_floor_at_the_end_of_a_step(engine, step):
+    y, v = ca.SX.sym("y"), ca.SX.sym("v")
+    system = ns.FilippovSystem([y, v], field=[v, -1], resets=[ns.Reset(y, [y, -0.8 * v], -1)])
+    for n in range(2, 21):
+        fall = n * step
+        run = ns.simulate(system, [fall**2 / 2, 0.0], 2 * fall, max_step=step, engine=engine)
+        assert [e.kind for e in run.events] == ["reset", "end"]
+        assert run.events[0].t == pytest.approx(fall, abs=1e-14)
+        assert run.x[:, 0].min() > -1e-15
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_touch_at_the_end_of_a_step_is_no_event(engine):
+    """A parabola with its vertex on the stop, where steps of max_step end."""
+    y, v = ca.SX.sym("y"), ca.SX.sym("v")
+    system = ns.FilippovSystem([y, v], field=[v, 1], stops=[ns.Stop(y, -1)])
+    run = ns.simulate(system, [0.5, -1.0], 2.0, max_step=0.25, engine=engine)
+    assert run.status is ns.Status.REACHED_END

@@ -162,9 +162,9 @@ static double first_root(const double *c, int n, double h) {
   if (c[0] > rest) return -1;
   a[0] = c[0];
   for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; }
-  double noise = ROUNDING * (fabs(c[0]) + rest); /* a touch that reaches zero by rounding is no root */
+  /* A touch that reaches zero by rounding is no root; rounding at t is ROUNDING sum |c_k| t^k. */
+  for (int k = 0; k <= n; k++) a[k] += ROUNDING * fabs(a[k]);
   bernstein(a, n);
-  for (int k = 0; k <= n; k++) a[k] += noise;
   return first_in(c, n, a, 0, h, 0);
 }
 
@@ -185,6 +185,22 @@ static double first_crossing(const double *given, int n, double h, int direction
   for (int k = 0; k <= n; k++) c[k] = -c[k];
   double fall = first_root(c + 1, n - 1, h - rise);
   return fall < 0 ? -1 : rise + fall;
+}
+
+/* Sign of a polynomial just before t; 0 where rounding hides it. */
+static int side_before(const double *c, int n, double t, double rounding) {
+  double slope, value = horner(c, n, t, &slope), sum = 0;
+  for (int k = n; k >= 0; k--) sum = sum * t + fabs(c[k]);
+  rounding += ROUNDING * sum;
+  if (fabs(value) > rounding) return value > 0 ? 1 : -1;
+  return fabs(slope) * t > rounding ? (slope > 0 ? -1 : 1) : 0;
+}
+
+/* Whether a function that was on a side just before has passed zero at once, in a direction. */
+static int passed(const double *c, int n, int side, int direction) {
+  if (side * direction > 0) return 0;
+  for (int k = 0; k <= n; k++) if (c[k] != 0) return c[k] * side < 0;
+  return 0;
 }
 
 static inline int finite_all(const double *a, int n) {

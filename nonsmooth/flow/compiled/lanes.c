@@ -23,6 +23,7 @@ typedef struct {
   T x[N], q[NQ], t, lambda, last_event, shortest;
   I slides, above, drop, live, steps, events, kinds[KINDS], shrinking;
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
+  I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
   int64_t index[W];
   int32_t base[W];
 } Lanes;
@@ -200,6 +201,8 @@ static void begin(Lanes *s, Work *w, I fresh) {
   stop_values(s->x, s->q, s->slides, s->above, s->lambda, stop, &gradient[0][0]);
   for (int j = 0; j < STOPS; j++)
     unclear |= fresh & (ABS(stop[j]) <= 64 * EPS * rounding_scale(s, gradient[j]));
+  for (int j = 0; j < STOPS; j++)
+    s->above_stop[j] = (s->above_stop[j] & ~fresh) | (fresh & (I)(stop[j] > 0));
 #endif
   set_lambda(s);
   note_modes(s, w, fresh & ~unclear);
@@ -346,7 +349,8 @@ INLINE T polish(const T *a, T end, I active, T *slope) {
     I positive = f[0] > 0;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);
-    I small = converged(f, step) | (I)(hi - lo <= 4 * EPS);
+    I held = (next >= lo - 4 * EPS) & (next <= hi + 4 * EPS); /* or it goes to another root */
+    I small = (converged(f, step) & held) | (I)(hi - lo <= 4 * EPS);
     I inside = (next > lo) & (next < hi);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
@@ -449,10 +453,8 @@ static __attribute__((noinline)) void resolve(Guards *v) {
     UNROLL for (int k = 0; k <= P; k++) b[k] = v->a[SLOTS - 1][k];
     for (int j = 0; j < SLOTS - 1; j++)
       if (any(mine[j])) UNROLL for (int k = 0; k <= P; k++) b[k] = SELECT(mine[j], v->a[j][k], b[k]);
-    T noise = BC(0);
-    UNROLL for (int k = 0; k <= P; k++) noise += ABS(b[k]);
+    UNROLL for (int k = 0; k <= P; k++) b[k] += ROUNDING * ABS(b[k]);
     to_bernstein(b, P);
-    UNROLL for (int k = 0; k <= P; k++) b[k] += ROUNDING * noise;
     I changes = {0}, positive = b[0] > 0, first = positive;
     UNROLL for (int k = 1; k <= P; k++) {
       I next = b[k] > 0;
@@ -638,6 +640,19 @@ static void finish_lanes(Lanes *s, Work *w, I which, int status) {
   for EACH(l, which & s->live) store(s, w, l, status);
 }
 
+/* Lanes where a stop was passed between two steps: rounding hid it from the first. */
+INLINE I passed_between(Lanes *s, T g[S1][P + 1]) {
+  I passed = {0};
+  UNROLL for (int j = 0; j < STOPS; j++) {
+    T value = g[FIRST_STOP + j][0];
+    I above = value > 0, was = s->above_stop[j];
+    if (DIRECTION[j] <= 0) passed |= was & ~above;
+    if (DIRECTION[j] >= 0) passed |= ~was & (I)(value >= 0);
+    s->above_stop[j] = above;
+  }
+  return passed;
+}
+
 static void step(Lanes *s, Work *w) {
   const Options *o = w->o;
   T c[N][P + 1], g[S1][P + 1], dt, slope = BC(0);
@@ -646,7 +661,7 @@ static void step(Lanes *s, Work *w) {
   T h = MIN(step_size(s, o, c, g, &finite), BC(o->max_step)), left = o->t_end - s->t;
   I last = h >= left, unclear = ~finite;
   unclear |= ~last & (h <= 4 * EPS * MAX(BC(1), ABS(s->t)));
-  unclear |= s->steps >= o->max_steps;
+  unclear |= (s->steps >= o->max_steps) | passed_between(s, g);
   h = SELECT(last, left, h);
   unclear |= first_hit(s, g, &h, &dt, &slot, &slope);
   last &= h >= left;

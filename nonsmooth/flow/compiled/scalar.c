@@ -28,6 +28,7 @@ typedef struct {
   Options o;
   double x[N], q[NQ], t, begun, last_event, limit, at_t, at_x[N];
   int32_t mode, status, reason, where, due, drop[NG1];
+  int32_t side[2][NG1]; /* of stops and resets just before, where it is clear */
   int64_t step_count, event_count, kinds[KINDS], segment_steps;
   int32_t itinerary, segment_mode;
   double interval[HISTORY];
@@ -191,12 +192,29 @@ static double blur(const double *c, double dt) {
   return noise < 1e-9 * dt * slope ? noise / slope : 0;
 }
 
+/* A stop or a reset may be passed at the start of a step, where rounding hid it from the one before. */
+static int passed_at_once(const Run *r, const Expansion *e, int row) {
+  const int *guard = GUARD[e->mode][row];
+  if (guard[0] < STOP_GUARD || r->drop[row]) return 0;
+  int side = r->side[guard[0] == RESET_GUARD][guard[1]];
+  return side && passed(e->guards[row], P, side, guard[2]);
+}
+
+static void note_sides(Run *r, const Expansion *e, double dt) {
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    const int *guard = GUARD[e->mode][j];
+    if (guard[0] < STOP_GUARD) continue;
+    r->side[guard[0] == RESET_GUARD][guard[1]] =
+        side_before(e->guards[j], P, dt, ON_SURFACE * EPS * e->scale[j]);
+  }
+}
+
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
 static int first_hit(const Run *r, const Expansion *e, double h, double *dt) {
   double time[NG1];
   int first = -1, found = 0;
   for (int j = 0; j < GUARDS[e->mode]; j++) {
-    time[j] = guard_root(e, j, r->drop[j], h);
+    time[j] = passed_at_once(r, e, j) ? 0 : guard_root(e, j, r->drop[j], h);
     if (time[j] < 0) continue;
     found++;
     if (first < 0 || time[j] < time[first]) first = j;
@@ -603,6 +621,7 @@ static void reset(Run *r, int index, int guard) {
   event(r, RESET, r->mode, guard);
   reset_map(index, r->x, r->q, y);
   memcpy(r->x, y, ND * sizeof(double));
+  memset(r->side, 0, sizeof r->side);
   if (!finite_all(r->x, ND)) { finish(r, NOT_FINITE, RESET_MAP, index); return; }
   note(r);
   int letters = mode_by_signs(r, &finite);
@@ -670,7 +689,9 @@ static void step(Run *r) {
   if (last) h = left;
   int row = first_hit(r, &e, h, &dt);
   if (!satisfies(r, &e, row >= 0 ? dt : h)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  advance(r, &e, row >= 0 ? dt : h);
+  if (row < 0) dt = h;
+  if (dt > 0) note_sides(r, &e, dt);
+  advance(r, &e, dt);
   if (row >= 0) serve(r, row);
   else if (last) {
     r->t = r->o.t_end;

@@ -296,3 +296,48 @@ def test_roots_with_others_beside_them(v0, a0, kind, t_end):
     for k in range(0, 128, 16):
         event = reference(system, starts[k], np.zeros(0), options).events[0]
         assert abs(event.t - times[k]) < 1e-15 * t_end
+
+
+def cubics(draw_outside, seed=0):
+    """Starts of y = (t - r0)(t - r1)(t - r2) with r1 in the step and another root just outside."""
+    rng = np.random.default_rng(seed)
+    inside, outside = rng.uniform(0.05, 0.95, 2000), draw_outside(rng)
+    r0 = -(10.0 ** rng.uniform(-9, 1, 2000)) if outside[0] > 0 else rng.uniform(1.5, 9, 2000)
+    q = [np.poly([a, b, c])[::-1] for a, b, c in zip(r0, inside, outside, strict=True)]
+    sign = np.sign([row[0] for row in q])
+    return np.array([[c[0], c[1], 2 * c[2], 6.0] for c in q]) * sign[:, None], inside
+
+
+@pytest.mark.parametrize(
+    "outside",
+    [
+        lambda rng: 1 + 10.0 ** rng.uniform(-10, -5, 2000),
+        lambda rng: -(10.0 ** rng.uniform(-8, -5, 2000)),
+    ],
+    ids=["after the end", "before the start"],
+)
+def test_roots_just_outside_the_step_are_not_taken(outside):
+    y, v, a, j = (ca.SX.sym(s) for s in "yvaj")
+    system = FilippovSystem([y, v, a, j], field=[v, a, j, 0], stops=[Stop(y, -1)])
+    starts, inside = cubics(outside)
+    options = Options(t_end=1.0)
+    for lanes in (True, False):
+        chunk = engine_for(system, options).run_many(starts, np.zeros(0), options, None, lanes)
+        np.testing.assert_allclose(chunk.t, inside, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize(
+    ("start", "t_end", "expected"), [([2e-4, -0.03, 2.0], 1e6, 0.01), ([2.0, -3.0, 2.0], 1e8, 1.0)]
+)
+def test_pairs_early_in_a_long_step_are_seen(start, t_end, expected):
+    """Rounding at an early root is not that at the end of the step: (t - .01)(t - .02) to 1e6."""
+    y, v, a = (ca.SX.sym(s) for s in "yva")
+    system = FilippovSystem([y, v, a], field=[v, a, 0], stops=[Stop(y, -1)])
+    options = Options(t_end=t_end)
+    x = np.array(start)
+    assert reference(system, x, np.zeros(0), options).t[-1] == pytest.approx(expected, rel=1e-12)
+    for lanes in (True, False):
+        chunk = engine_for(system, options).run_many(
+            np.tile(x, (9, 1)), np.zeros(0), options, None, lanes
+        )
+        np.testing.assert_allclose(chunk.t, expected, rtol=1e-12)

@@ -105,10 +105,9 @@ def _ours(belt: float, tolerance: float, t_end: float, dense: bool) -> Run:
             [STICK_START],
             t_end,
             tol=tolerance,
-            threads=1,
             max_events=10**6,
-            progress=False,
             engine="compiled",
+            work=ns.Work(threads=1, progress=False),
         )
         return many.x[0], _hash(many.itinerary[0])
 

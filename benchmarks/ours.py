@@ -18,7 +18,12 @@ def make(name: str, tolerance: float, threads: int = 1) -> Callable[[Array], End
 
     def solve(starts: Array) -> Ends:
         many = ns.ensemble(
-            system, starts, T_MAX, tol=tolerance, threads=threads, progress=False, engine="compiled"
+            system,
+            starts,
+            T_MAX,
+            tol=tolerance,
+            engine="compiled",
+            work=ns.Work(threads=threads, progress=False),
         )
         numbers = np.array([*map(code, many.itineraries), -1], np.int64)
         if not many.complete.all():

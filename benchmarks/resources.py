@@ -23,7 +23,7 @@ _MEMORY = """
 from benchmarks.problems import bounce_system, random_starts, T_MAX
 import nonsmooth as ns
 x = random_starts({count})
-many = ns.ensemble(bounce_system("linear"), x, T_MAX, tol={tol}, progress=False)
+many = ns.ensemble(bounce_system("linear"), x, T_MAX, tol={tol}, work=ns.Work(progress=False))
 results = (many.x, many.t, many.status, many.itinerary_code, *many.events.values())
 note = dict(
     starts_mib=x.nbytes / 2**20,
@@ -55,7 +55,8 @@ def scaling(quick: bool, tolerance: float = 1e-8) -> dict[str, Any]:
             system = bounce_system(name)
 
             def sweep(system: ns.FilippovSystem = system, **how: Any) -> None:
-                ns.ensemble(system, starts, T_MAX, tol=tolerance, progress=False, **how)
+                work = ns.Work(progress=False, **how)
+                ns.ensemble(system, starts, T_MAX, tol=tolerance, work=work)
 
             work = {
                 "1 thread": lambda sweep=sweep: sweep(threads=1),

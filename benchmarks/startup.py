@@ -15,7 +15,10 @@ from benchmarks.problems import bounce_system, random_starts, T_MAX
 import nonsmooth as ns
 system = bounce_system("linear")
 """
-_ENSEMBLE = _OURS + "note = str(ns.ensemble(system, random_starts(10000), T_MAX, threads=1).t[0])"
+_ENSEMBLE = (
+    _OURS
+    + "note = str(ns.ensemble(system, random_starts(10000), T_MAX, work=ns.Work(threads=1)).t[0])"
+)
 _SIMULATE = _OURS + "note = str(ns.simulate(system, random_starts(1)[0], T_MAX).t[-1])"
 _COMPILED = _SIMULATE.replace("T_MAX)", 'T_MAX, engine="compiled")')
 _PEER = """

@@ -13,7 +13,8 @@ cannot reverse the slip; any tangential compliance can (Biber, Champneys & Szala
 
 ``simulate(model, xdot, ydot, omega)`` follows one bounce. A model is a ``ContactModel``: two forces
 written once, either one of those here or your own. Numbers are dimensionless as the model is;
-``Ball``, ``Landing`` and ``Scaling`` go to SI units and back.
+``Ball``, ``Landing`` and ``Scaling`` go to SI units and back. ``bounce.laws`` has the laws in closed
+form, ``bounce.golf`` what happens before, between and after bounces, ``bounce.plot`` the pictures.
 """
 
 from __future__ import annotations
@@ -21,84 +22,52 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from .algebraic import (
-    TURFS,
-    CrossBounce,
-    PennerBounce,
-    PublishedFit,
-    Rebound,
-    TiltedBounce,
-    penner_restitution,
-    penner_tilt,
-    rebound,
-)
-from .contact import ContactModel
-from .dividing import (
-    DividingCurve,
-    DividingSurface,
-    critical_eta,
-    dividing_curve,
-    dividing_surface,
-)
-from .errors import LandingError, LiftOffError, ModelError, UnknownNameError
-from .fitting import FitError, FitResult, Start, fit
-from .flight import AIRS, QUINTAVALLA, SMITS_SMITH, Air, Flight, flight
-from .friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
-from .generalised import Condition, Conditions, GeneralisedContact
-from .measurements import DataError, Measurements, read_measurements
-from .models import (
+from . import golf, laws
+from .contact.friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
+from .contact.generalised import GeneralisedContact
+from .contact.model import ContactModel
+from .contact.models import (
     DepthDampedKelvinVoigt,
     Hertz,
     HuntCrossley,
     KelvinVoigt,
     KuwabaraKono,
     Maxwell,
+    NormalKelvinVoigt,
     Tsuji,
 )
-from .outcomes import BounceStatus, LiftOffs, OutcomeMap, lift_off, outcome_map
-from .rigid import NormalKelvinVoigt, RigidBounce, RigidShot, kelvin_voigt_restitution
-from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
-from .sensitivity import Sensitivity, sensitivity
-from .shot import Forces, Phase, Shot, State, simulate
-from .tracing import Arc
-from .units import BALLS, BASKETBALL, GOLF, TENNIS, Ball, Landing, Scaling
+from .errors import EnergyWarning, LandingError, LiftOffError, ModelError, UnknownNameError
+from .maps.dividing import (
+    DividingCurve,
+    DividingSurface,
+    critical_eta,
+    dividing_curve,
+    dividing_surface,
+)
+from .maps.lift_offs import lift_off
+from .maps.outcomes import OutcomeMap, outcome_map
+from .maps.results import BounceStatus, LiftOffs
+from .shot.sensitivity import Sensitivity, sensitivity
+from .shot.single import Shot, State, simulate
+from .units import BALLS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
     from . import plot as plot
 
 __all__ = [
-    "AIRS",
     "BALLS",
-    "BASKETBALL",
-    "GOLF",
-    "GREEN_ROLLING_FRICTION",
-    "QUINTAVALLA",
-    "SMITS_SMITH",
-    "TENNIS",
-    "TURFS",
-    "Air",
-    "Arc",
     "Ball",
-    "Bounce",
     "BounceStatus",
-    "Condition",
-    "Conditions",
     "ContactModel",
     "Coulomb",
-    "CrossBounce",
     "Dahl",
-    "DataError",
     "DepthDampedKelvinVoigt",
     "DividingCurve",
     "DividingSurface",
+    "EnergyWarning",
     "ExponentialDecay",
-    "FitError",
-    "FitResult",
-    "Flight",
-    "Forces",
     "FrictionLaw",
     "GeneralisedContact",
-    "Glide",
     "Hertz",
     "HuntCrossley",
     "KelvinVoigt",
@@ -109,42 +78,25 @@ __all__ = [
     "LiftOffs",
     "LuGre",
     "Maxwell",
-    "Measurements",
     "ModelError",
-    "NoRestError",
     "NormalKelvinVoigt",
     "OutcomeMap",
-    "PennerBounce",
-    "Phase",
-    "PublishedFit",
-    "Rebound",
-    "RigidBounce",
-    "RigidShot",
-    "Run",
     "Scaling",
     "Sensitivity",
     "Shot",
-    "Start",
     "State",
     "Stribeck",
-    "TiltedBounce",
     "Tsuji",
     "UnknownNameError",
     "Viscous",
     "critical_eta",
     "dividing_curve",
     "dividing_surface",
-    "fit",
-    "flight",
-    "kelvin_voigt_restitution",
+    "golf",
+    "laws",
     "lift_off",
     "outcome_map",
-    "penner_restitution",
-    "penner_tilt",
-    "play",
     "plot",
-    "read_measurements",
-    "rebound",
     "sensitivity",
     "simulate",
 ]
@@ -155,3 +107,8 @@ def __getattr__(name: str) -> Any:
     if name == "plot":
         return importlib.import_module(".plot", __name__)
     raise AttributeError(f"module 'bounce' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    """Return what the front door offers, without what it needs itself."""
+    return sorted([*__all__, *(name for name in globals() if name.startswith("__"))])

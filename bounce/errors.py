@@ -15,6 +15,10 @@ class UnknownNameError(ModelError, AttributeError):
     """A force asks for a state or parameter that the model does not have."""
 
 
+class EnergyWarning(UserWarning):
+    """A ball leaves faster than it came: the surface did work on it."""
+
+
 class LandingError(ns.PointError):
     """The state at touch-down is not a landing: not finite, above the ground, or moving away."""
 

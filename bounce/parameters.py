@@ -7,6 +7,9 @@ import math
 from collections.abc import Callable, Mapping
 from typing import Any, ClassVar, Self
 
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
 import nonsmooth as ns
 
 from .errors import ModelError, UnknownNameError
@@ -39,6 +42,24 @@ def number(value: Any, what: str, error: type[Exception] = ns.ParameterError) ->
         kind = f" ({type(value).__name__})" if not isinstance(value, float) else ""
         raise error(f"{what}: expected a finite number, received {value!r}{kind}.")
     return result
+
+
+def numbers(
+    value: ArrayLike, what: str, error: type[Exception] = ns.ParameterError
+) -> NDArray[np.float64]:
+    """Turn a number or an array of numbers, finite or not, into an array or raise.
+
+    Examples
+    --------
+    >>> numbers([1, "fast"], "speed")
+    Traceback (most recent call last):
+      ...
+    nonsmooth.model.errors.ParameterError: speed: expected numbers, received [1, 'fast'].
+    """
+    try:
+        return np.asarray(value, dtype=float)
+    except (TypeError, ValueError) as cause:
+        raise error(f"{what}: expected numbers, received {value!r}.") from cause
 
 
 class Parametrised:
@@ -82,6 +103,10 @@ class Parametrised:
         """Every limit, the class's own first."""
         return _merged(cls, "limits")
 
+    def limits_of_values(self) -> dict[str, str]:
+        """Every limit of its values."""
+        return self.declared_limits()
+
     def _checked(
         self, declared: Mapping[str, float | None], values: Mapping[str, float]
     ) -> dict[str, float]:
@@ -99,7 +124,7 @@ class Parametrised:
                 f"{who}: expected a value for {missing}, received none. They have no default: "
                 f"{who}({', '.join(f'{m}=...' for m in missing)})."
             )
-        limits = self.declared_limits()
+        limits = self.limits_of_values()
         result = {name: number(value, f"{who}: {name}") for name, value in merged.items()}
         for name, value in result.items():
             limit = limits.get(name)
@@ -125,7 +150,7 @@ class Parametrised:
         """What besides the values makes two of these different (hashable)."""
         return ()
 
-    def _options(self) -> dict[str, Any]:
+    def options(self) -> dict[str, Any]:
         """Arguments of the constructor besides the parameters."""
         return {}
 
@@ -139,7 +164,7 @@ class Parametrised:
         >>> turf.replace(mu=0.4)
         KelvinVoigt(mu=0.4, d1=0.1, d2=0.1, eta=0.5)
         """
-        return type(self)(**{**self._options(), **self.values, **changes})
+        return type(self)(**{**self.options(), **self.values, **changes})
 
     values: dict[str, float]
 
@@ -161,7 +186,7 @@ class Parametrised:
     def __repr__(self) -> str:
         declared = self.declared()
         shown = [f"{k}={v:.6g}" for k, v in self.values.items() if v != declared.get(k)]
-        shown += [f"{k}={v!r}" for k, v in self._options().items()]
+        shown += [f"{k}={v!r}" for k, v in self.options().items()]
         return f"{type(self).__name__}({', '.join(shown)})"
 
 

@@ -20,12 +20,26 @@ from typing import Literal
 import nonsmooth as ns
 
 from .parameters import LIMITS, number
-from .shot import State
+from .shot.single import State
 
 #: Standard gravity, m/s^2 (BIPM, The International System of Units, 9th ed.).
 GRAVITY = 9.80665
 
-_RPM = 2 * math.pi / 60
+#: Factor of each unit to m/s, rad/s, rad, m or s.
+UNITS: dict[str, dict[str, float]] = {
+    "speed": {"m/s": 1.0, "km/h": 1 / 3.6, "mph": 0.44704, "ft/s": 0.3048},
+    "spin": {
+        "rad/s": 1.0,
+        "rpm": 2 * math.pi / 60,
+        "rev/s": 2 * math.pi,
+        "deg/s": math.pi / 180,
+    },
+    "angle": {"rad": 1.0, "deg": math.pi / 180},
+    "length": {"m": 1.0, "yd": 0.9144, "ft": 0.3048},
+    "time": {"s": 1.0},
+}
+
+_RPM = UNITS["spin"]["rpm"]
 
 
 @dataclass(frozen=True)

@@ -17,7 +17,7 @@ from typing import Any
 import bounce
 import nonsmooth as ns
 from nonsmooth.flow.status import ADVICE
-from nonsmooth.local.classification import TABLE
+from nonsmooth.local.two_folds.classification import TABLE
 
 DOCS = Path(__file__).parent
 EXAMPLES = DOCS / "examples"
@@ -66,7 +66,7 @@ def examples_of_classes() -> str:
     """One two-fold of each class, as the textbook builds it."""
     rows = []
     for label, (sigma, nu) in ns.textbook.TWO_FOLDS.items():
-        found = ns.classify_two_fold(sigma, nu)
+        found = ns.two_folds.classify_two_fold(sigma, nu)
         counts = (
             "∞" if c == float("inf") else f"{c:g}" for c in (found.canards, found.faux_canards)
         )
@@ -81,12 +81,12 @@ def status_table() -> str:
 
 
 def error_table() -> str:
-    """Every exception, which builtin it also is, and when it is raised."""
+    """Every exception and warning, which builtin it also is, and when it is raised."""
     rows = []
-    for module in (ns, bounce):
+    for module in (ns, bounce, bounce.golf):
         for name in module.__all__:
             thing = vars(module).get(name)
-            if not (inspect.isclass(thing) and issubclass(thing, ns.NonsmoothError)):
+            if not (inspect.isclass(thing) and issubclass(thing, (ns.NonsmoothError, Warning))):
                 continue
             builtin = next(c for c in thing.__mro__ if c.__module__ == "builtins").__name__
             rows.append((f"`{module.__name__}.{name}`", f"`{builtin}`", first_line(thing)))
@@ -163,12 +163,17 @@ def gallery() -> str:
 
 # API ----------------------------------------------------------------------------------------------
 
-#: Page, its first lines, and whose names it lists.
+#: Page, its first lines, and whose names of the top level it lists.
 FLOORS = {
     "model": "What a nonsmooth system is: states, parameters, fields, surfaces, stops and resets.",
     "local": "What happens at a point of a surface, without time stepping.",
     "flow": "Moving through time.",
+    "orbit": "What needs both: sets of futures, curves of two-folds.",
 }
+
+
+#: Rooms of the ball whose types are met as attributes of results, and are not at the top.
+ROOMS = ("contact", "shot", "maps")
 
 
 def api_pages() -> dict[str, str]:
@@ -177,13 +182,17 @@ def api_pages() -> dict[str, str]:
     for floor, about in FLOORS.items():
         names = [n for n in ns.__all__ if _floor(ns, n) == floor]
         pages[f"api/{floor}.md"] = _page(f"nonsmooth: {floor}", about, "nonsmooth", names)
-    for package in (ns.plot, ns.textbook):
+    pages["api/local.md"] += "\n" + _members("nonsmooth.local", returned_types())
+    for package in (ns.plot, ns.textbook, ns.two_folds, ns.plot.style):
         short = package.__name__.rpartition(".")[2]
-        about = first_line(package)
-        names = sorted(n for n in package.__all__ if _documented(getattr(package, n)))
-        pages[f"api/{short}.md"] = _page(f"nonsmooth.{short}", about, package.__name__, names)
+        path = "nonsmooth." + ("plot.style" if package is ns.plot.style else short)
+        pages[f"api/{short}.md"] = _page(path, _words(package), path, _own(package))
     names = [n for n in bounce.__all__ if _documented(getattr(bounce, n))]
+    names += [f"{r}.{n}" for r in ROOMS for n in getattr(bounce, r).__all__]
     pages["api/bounce.md"] = _page("bounce", first_line(bounce), "bounce", names)
+    for room in (bounce.golf, bounce.laws):
+        path = room.__name__
+        pages[f"api/{path.replace('.', '_')}.md"] = _page(path, _words(room), path, _own(room))
     names = [n for n, thing in vars(bounce.plot).items() if _draws(n, thing)]
     pages["api/bounce_plot.md"] = _page(
         "bounce.plot", first_line(bounce.plot), "bounce.plot", names
@@ -193,19 +202,59 @@ def api_pages() -> dict[str, str]:
 
 def _overview() -> str:
     lists = []
-    for module in (ns, bounce):
-        rows = []
-        for name in module.__all__:
-            thing = getattr(module, name)
-            if _documented(thing):
-                rows.append((f"[`{name}`][{module.__name__}.{name}]", first_line(thing)))
-        lists.append(f"## {module.__name__}\n\n" + table(("name", "what it is"), rows))
-    intro = "Both packages have one front door: the names below, imported from the top level."
+    doors = {
+        "nonsmooth": (ns, ns.__all__),
+        "nonsmooth.two_folds": (ns.two_folds, ns.two_folds.__all__),
+        "nonsmooth.local": (ns.local, returned_types()),
+        "bounce": (bounce, bounce.__all__),
+        "bounce.golf": (bounce.golf, bounce.golf.__all__),
+        "bounce.laws": (bounce.laws, bounce.laws.__all__),
+    }
+    for path, (module, names) in doors.items():
+        rows = [
+            (f"[`{name}`][{path}.{name}]", first_line(getattr(module, name)))
+            for name in names
+            if _documented(getattr(module, name))
+        ]
+        lists.append(f"## {path}\n\n" + table(("name", "what it is"), rows))
+    intro = (
+        "Both packages have one front door: their top level, with the verbs, the nouns and the "
+        "errors. The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`, and "
+        "the types that questions about a point return are in `nonsmooth.local`. What is before, between "
+        "and after bounces is in `bounce.golf`, laws in closed form are in `bounce.laws`."
+    )
     return "# Every name\n\n" + intro + "\n\n" + "\n\n".join(lists) + "\n"
 
 
+def returned_types() -> list[str]:
+    """What questions about a point return, and the top level does not name."""
+    names = [n for n in ns.local.__all__ if n not in ns.__all__]
+    return [n for n in names if inspect.isclass(getattr(ns.local, n))]
+
+
+def _own(package: ModuleType) -> list[str]:
+    """Documented names that a package or module offers."""
+    listed = getattr(package, "__all__", None)
+    names = listed or [n for n, t in vars(package).items() if _from(t, package)]
+    return sorted(n for n in names if _documented(getattr(package, n)))
+
+
+def _from(thing: object, module: ModuleType) -> bool:
+    return _documented(thing) and getattr(thing, "__module__", "") == module.__name__
+
+
+def _words(package: ModuleType) -> str:
+    """The docstring of a module without its examples."""
+    text = (inspect.getdoc(package) or "").partition("\n\nExamples\n")[0]
+    return text.replace("``", "`")
+
+
 def _page(title: str, about: str, path: str, names: Iterable[str]) -> str:
-    return f"# {title}\n\n{about}\n\n" + "\n".join(f"::: {path}.{name}\n" for name in names)
+    return f"# {title}\n\n{about}\n\n" + _members(path, names)
+
+
+def _members(path: str, names: Iterable[str]) -> str:
+    return "\n".join(f"::: {path}.{name}\n" for name in names)
 
 
 def _floor(package: ModuleType, name: str) -> str:

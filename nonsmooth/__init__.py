@@ -18,74 +18,57 @@ jet, integrates, locates events, tells a fold from a cusp and gives the normal f
 Conventions: one letter per surface names a mode, ``+`` ``-`` or ``s`` (sliding), and an itinerary
 is the sequence of modes. States are on the last axis, float64. Every run ends in a named status and
 never guesses where the future is not unique. Every error derives from NonsmoothError.
+
+Here are the verbs, the nouns and the errors. The algebra of two-folds, which needs no system, is in
+``two_folds``; the types that questions about a point return are in ``local``; pictures are in
+``plot`` and named systems with their closed-form answers in ``textbook``.
 """
 
 from __future__ import annotations
 
-import importlib
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
+from . import local
 from .flow import (
     Ensemble,
     Event,
-    Funnel,
     Segment,
     Status,
     Trajectory,
+    Work,
     ensemble,
     first_crossing,
     first_root,
     follow,
-    funnel,
     simulate,
 )
 from .local import (
-    Boundary,
-    BoundaryEquilibrium,
-    Classification,
-    Equilibrium,
-    Fold,
-    FoldFold,
-    LocalObject,
-    NormalForm,
-    PseudoEquilibrium,
-    ReducedFlow,
     Region,
-    SlidingBranch,
-    Slopes,
-    TraceError,
     TwoFold,
-    accumulation_time,
     alpha,
     boundary_equilibrium,
     classify,
-    classify_two_fold,
-    diabolo_slopes,
     find_all,
     find_boundary_equilibrium,
     find_equilibrium,
     find_fold,
     find_pseudo_equilibrium,
     find_two_fold,
-    flight_above,
-    flight_below,
     fold,
     fold_fold,
     intersection_range,
-    max_flights,
-    normal_form,
     region,
-    return_matrix,
     sliding_branches,
     sliding_field,
-    trace_two_folds,
     two_fold,
+    two_folds,
 )
 from .model import (
     ConvergenceError,
     DefinitionError,
     DegenerateError,
     FilippovSystem,
+    Impact,
     NonsmoothError,
     NotSmoothError,
     OptionError,
@@ -95,6 +78,7 @@ from .model import (
     Stop,
     regularise,
 )
+from .orbit import Funnel, TraceError, funnel, trace_two_folds
 
 if TYPE_CHECKING:
     from . import plot, textbook
@@ -102,44 +86,31 @@ if TYPE_CHECKING:
 __version__ = "0.1.0.dev0"
 
 __all__ = [
-    "Boundary",
-    "BoundaryEquilibrium",
-    "Classification",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
     "Ensemble",
-    "Equilibrium",
     "Event",
     "FilippovSystem",
-    "Fold",
-    "FoldFold",
     "Funnel",
-    "LocalObject",
+    "Impact",
     "NonsmoothError",
-    "NormalForm",
     "NotSmoothError",
     "OptionError",
     "ParameterError",
     "PointError",
-    "PseudoEquilibrium",
-    "ReducedFlow",
     "Region",
     "Reset",
     "Segment",
-    "SlidingBranch",
-    "Slopes",
     "Status",
     "Stop",
     "TraceError",
     "Trajectory",
     "TwoFold",
-    "accumulation_time",
+    "Work",
     "alpha",
     "boundary_equilibrium",
     "classify",
-    "classify_two_fold",
-    "diabolo_slopes",
     "ensemble",
     "find_all",
     "find_boundary_equilibrium",
@@ -149,30 +120,33 @@ __all__ = [
     "find_two_fold",
     "first_crossing",
     "first_root",
-    "flight_above",
-    "flight_below",
     "fold",
     "fold_fold",
     "follow",
     "funnel",
     "intersection_range",
-    "max_flights",
-    "normal_form",
+    "local",
     "plot",
     "region",
     "regularise",
-    "return_matrix",
     "simulate",
     "sliding_branches",
     "sliding_field",
     "textbook",
     "trace_two_folds",
     "two_fold",
+    "two_folds",
 ]
 
 
-def __getattr__(name: str) -> Any:
+def __getattr__(name: str) -> object:
     """Load pictures and textbook only when they are asked for (matplotlib is slow to import)."""
     if name in ("plot", "textbook"):
+        import importlib
+
         return importlib.import_module(f".{name}", __name__)
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return [*__all__, "__version__"]

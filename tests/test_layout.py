@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[1]
-LONGEST_FUNCTION = 70  # lines, from `def` to its last, the docstring not counted
+LONGEST_FUNCTION = 60  # lines, from `def` to its last, the docstring not counted
 
 # Words of the client. The bouncing ball is also a classic of the general theory (impacts that
 # accumulate), so nonsmooth/textbook may say those two words, and no others.
@@ -83,7 +83,7 @@ def test_no_tracked_line_names_a_machine_or_a_registry():
     assert not found, "\n".join(found)
 
 
-@pytest.mark.parametrize("package", ["nonsmooth", "bounce"])
+@pytest.mark.parametrize("package", ["nonsmooth", "bounce", "bounce.golf", "bounce.laws"])
 def test_every_public_name_is_documented(package):
     module = importlib.import_module(package)
     assert inspect.getdoc(module)

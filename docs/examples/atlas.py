@@ -8,7 +8,7 @@ whether the future is unique behind it.
 import nonsmooth as ns
 
 classes = {
-    label: ns.classify_two_fold(sigma, nu)
+    label: ns.two_folds.classify_two_fold(sigma, nu)
     for label, (sigma, nu) in ns.textbook.TWO_FOLDS.items()
 }  # fmt: skip
 

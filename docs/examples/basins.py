@@ -21,7 +21,7 @@ system = ns.FilippovSystem(
 )
 side = 300
 starts = np.stack(np.meshgrid(np.linspace(-2, 2, side), np.linspace(-2, 2, side)), axis=-1)
-many = ns.ensemble(system, starts, t_end=60.0, progress=False)
+many = ns.ensemble(system, starts, t_end=60.0, work=ns.Work(progress=False))
 
 at_rest = np.array(["s" == word[-1] for word in many.itineraries])[many.itinerary_code]
 where = np.digitize(many.x[..., 0], [-0.5, 0.5]) - 1  # -1 left, 0 on the hill, 1 right

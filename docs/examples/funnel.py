@@ -19,8 +19,8 @@ futures = ns.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
 figure = Figure(figsize=(9.0, 4.2), layout="constrained")
 height, plane = figure.subplots(1, 2)
 STYLE = {
-    "+": dict(color="#D55E00", linewidth=0.8),
-    "-": dict(color="#0072B2", linewidth=0.8, linestyle="--"),
+    "+": dict(color=ns.plot.style.ABOVE, linewidth=0.8),
+    "-": dict(color=ns.plot.style.BELOW, linewidth=0.8, linestyle="--"),
     "s": dict(color="black", linewidth=2.0),
 }
 before = np.linspace(0.0, futures.t, 100)

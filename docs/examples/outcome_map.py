@@ -12,7 +12,7 @@ import bounce
 
 turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 speeds, spins = np.linspace(-2, 2, 400), np.linspace(-4, 4, 400)
-outcomes = bounce.outcome_map(turf, over={"xdot": speeds, "omega": spins}, progress=False)
+outcomes = bounce.outcome_map(turf, over={"xdot": speeds, "omega": spins})
 curve = bounce.dividing_curve(turf, ydot=-1.0)
 
 figure = bounce.plot.outcome_map(outcomes, curve=curve)

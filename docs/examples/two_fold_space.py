@@ -9,8 +9,8 @@ then slides; all others spiral away.
 import nonsmooth as ns
 
 nu = (-2.0, -1.0)
-expanding, contracting = ns.diabolo_slopes(nu)
-time_to_fold = ns.accumulation_time(nu)  # along the contracting line, per |z2| = 1
+expanding, contracting = ns.two_folds.diabolo_slopes(nu)
+time_to_fold = ns.two_folds.accumulation_time(nu)  # along the contracting line, per |z2| = 1
 
 figure = ns.plot.two_fold_3d(((-1, 1), nu))
 

@@ -15,7 +15,7 @@ from zipfile import BadZipFile
 import numpy as np
 
 from ..model import OptionError
-from .compiled.engine import Chunk
+from .results import Chunk
 
 #: Raised whenever the files or the numbers in them change, so that versions are not mixed.
 _FORMAT = 2

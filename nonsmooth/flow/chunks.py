@@ -11,9 +11,11 @@ from functools import lru_cache
 import numpy as np
 
 from ..model import Array, FilippovSystem
-from .compiled.engine import HAND_OVER, KINDS, Chunk, Stopped, engine_for
-from .driver import Driver
+from .compiled.engine import engine_for
+from .facts import HAND_OVER, KINDS
 from .options import Options
+from .reference.driver import Driver
+from .results import Chunk, Stopped
 from .status import Status
 
 #: The reference driver's functions are built and evaluated by one thread at a time.

@@ -8,6 +8,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,21 +17,25 @@ from numpy.typing import ArrayLike
 
 from ..model import (
     Array,
+    Coupled,
     FilippovSystem,
-    Followed,
+    Guard,
     OptionError,
     Parameters,
     Surfaces,
     followed,
     real,
     require_system,
+    watched_functions,
 )
 from . import messages
 from .options import Options
-from .polynomial import first_crossing
-from .status import ADVICE, Status
-from .stepper import Expansion, Stepper
-from .trajectory import Event, Segment, Trajectory
+from .reference.modes import CoupledModes, Expansion, Modes, SeparateModes, powers
+from .reference.polynomial import first_crossing
+from .reference.record import Record
+from .reference.stepper import Hit, Stepper
+from .status import Status
+from .trajectory import Segment, Trajectory
 
 
 def follow(
@@ -100,8 +106,9 @@ def follow(
     )
     ends, further = _several(until), _several(watch)
     expressions = [u for u in ends if not isinstance(u, str)] + further
-    motion = followed(system, mode, expressions)
-    names = [g.name for g in motion.guards]
+    p = system.parameter_vector(parameters)
+    chosen = _chosen(system, mode, expressions, p, options)
+    names = [g.name for g in chosen.guards]
     ending = {f"f{k}" for k in range(sum(not isinstance(u, str) for u in ends))}
     for name in (u for u in ends if isinstance(u, str)):
         if name not in names:
@@ -110,12 +117,37 @@ def follow(
             )
         ending.add(name)
     x = system.extended_point(point, t_start)
-    p = system.parameter_vector(parameters)
-    return _Follower(system, motion, x, p, options, t_start, t_end, ending).run()
+    return _Follower(system, chosen, x, p, options, t_start, t_end, ending).run()
 
 
 def _several(value: Any) -> list[Any]:
     return list(value) if isinstance(value, (list, tuple)) else [value]
+
+
+@dataclass(frozen=True)
+class _Chosen:
+    """The one mode that is followed, with its guards and the watched functions only watched."""
+
+    mode: str
+    modes: Modes
+    sliding: list[int]
+
+    @property
+    def guards(self) -> tuple[Guard, ...]:
+        return self.modes.guards(self.mode)
+
+
+def _chosen(
+    system: FilippovSystem, mode: str, watched: Sequence[Any], p: Array, options: Options
+) -> _Chosen:
+    signs = system.parse_mode(mode)
+    sliding = [i for i, sign in enumerate(signs) if sign == 0]
+    if len(sliding) > 1 or any(system.nonlinear[i] for i in sliding):
+        coupled = Coupled(system, watched_functions(system, watched))
+        zeros = tuple(Guard("zero", k, 0, g.name) for k, g in enumerate(coupled.guards(mode)))
+        return _Chosen(mode, CoupledModes(system, coupled, p, options, lambda m: zeros), sliding)
+    motion = followed(system, mode, watched)
+    return _Chosen(mode, SeparateModes(system, p, options, lambda s, m: motion), sliding)
 
 
 class _Follower:
@@ -124,7 +156,7 @@ class _Follower:
     def __init__(
         self,
         system: FilippovSystem,
-        motion: Followed,
+        chosen: _Chosen,
         x: Array,
         p: Array,
         options: Options,
@@ -132,121 +164,115 @@ class _Follower:
         t_end: float,
         ending: set[str],
     ):
-        self.system, self.motion, self.p, self.options = system, motion, p, options
-        self.stepper = Stepper(system, p, options.rtol, options.atol, lambda s, m: motion)
+        self.system, self.p, self.options = system, p, options
+        self.mode, self.modes, self.sliding = chosen.mode, chosen.modes, chosen.sliding
+        self.guards = chosen.guards
+        self.stepper = Stepper(system, self.modes, options)
         self.surfaces = Surfaces(system)
+        self.unknowns = np.zeros(system.surface_count)  # multipliers of what slides
         self.x, self.t, self.t_end, self.ending = x, t_start, t_end, ending
         self.sign = -1.0 if t_end < t_start else 1.0
-        self.level = 0.0
-        if motion.sliding is not None:
-            self.level = float(self.surfaces.values(x, p)[0][motion.sliding])
-        self.times, self.points = [t_start], [x[: system.dimension].copy()]
-        self.starts: list[float] = []
-        self.coefficients: list[Array] = []
-        self.events: list[Event] = []
+        self.levels = self.surfaces.values(x, p)[0][self.sliding]
+        self.record = Record(system, p)
+        self.record.point(t_start, x)
+        # functions whose zero here is not news, and how many coefficients are known to vanish
+        self.fresh = dict.fromkeys(range(len(self.guards)), 0)
 
     def run(self) -> Trajectory:
-        status, message = self._loop()
-        mode = self.motion.mode
+        solutions = self.modes.solutions(self.mode, self.x, stable_only=False)
+        if len(solutions) == 1:
+            self.unknowns = solutions[0]
+            status, message = self._loop()
+        else:
+            message = messages.start_solutions(self.mode, len(solutions))
+            status = Status.NON_UNIQUE
+        mode, record = self.mode, self.record
         if status is not Status.STOPPED:
-            self.events.append(Event("end", self.t, self.points[-1], mode, mode, str(status)))
-        span = Segment(mode, self.times[0], self.t, 0, len(self.starts))
-        return Trajectory(
-            system=self.system,
-            parameters=dict(zip(self.system.parameter_names, self.p.tolist(), strict=True)),
-            t=np.array(self.times),
-            x=np.array(self.points),
-            events=self.events,
-            segments=[span],
-            status=status,
-            message=f"{message} {ADVICE[status]}",
-            _starts=np.array(self.starts),
-            _coefficients=self.coefficients,
-        )
+            record.event("end", self.t, self.x, mode, mode, str(status))
+        record.segments.append(Segment(mode, record.t[0], self.t, 0, len(record.starts)))
+        return record.trajectory(status, message)
 
     def _loop(self) -> tuple[Status, str]:
-        # functions whose zero here is not news, and how many coefficients are known to vanish
-        fresh = dict.fromkeys(range(len(self.motion.guards)), 0)
         while True:
             left = abs(self.t_end - self.t)
             if left == 0.0:
                 return Status.REACHED_END, f"t = {self.t_end:g} reached."
-            if len(self.starts) >= self.options.max_steps:
+            if len(self.record.starts) >= self.options.max_steps:
                 return Status.TOO_MANY_STEPS, messages.too_many("steps", self.options.max_steps)
             e = self._expand()
             if not np.all(np.isfinite(e.states)):
                 if self._leave_singular_point(e, left):
                     continue
-                return Status.NOT_FINITE, messages.field_not_finite(
-                    self.motion.mode, self.x.tolist()
-                )
-            h = min(self.stepper.step_size(e), self.options.max_step)
-            if h <= 1e-15 * max(1.0, abs(self.t)) and h < left:
-                return Status.STEP_TOO_SMALL, messages.step_too_small(h)
-            last, h = h >= left, min(h, left)
-            hits = self._zeros(e, h, fresh)
-            wanted = min((d for d, _ in hits), default=h)
-            dt = self.stepper.reach(e, wanted, self.sign)
-            if dt is None:
-                return Status.STEP_TOO_SMALL, messages.branch_point(self.t)
-            if dt < wanted:
-                last, hits = False, []
-            self._advance(e, dt)
-            if last and not hits:
-                self.t = self.times[-1] = self.t_end
-            found = [row for d, row in hits if d <= dt + 1e-14 * max(1.0, abs(self.t))]
-            fresh = dict.fromkeys(found, 1)
+                return Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x.tolist())
+            find = partial(self._zeros, e)
+            plan = self.stepper.plan(e, left, self.options.max_step, self.t, find, self.sign)
+            if plan.fault:
+                return Status.STEP_TOO_SMALL, plan.fault
+            if not self._advance(e, plan.dt):
+                return Status.NOT_FINITE, messages.state_not_finite(self.t)
+            if plan.last:
+                self.t = self.record.t[-1] = self.t_end
+            found = [hit.number for hit in plan.hits if hit.dt <= plan.dt + self._blur()]
+            self.fresh = dict.fromkeys(found, 1)
             stopped = self._report(found)
             if stopped:
                 return Status.STOPPED, f"{stopped!r} is zero at t = {self.t:.10g}."
 
+    def _blur(self) -> float:
+        """Zeros closer than this are one instant."""
+        return 1e-14 * max(1.0, abs(self.t))
+
     def _expand(self) -> Expansion:
-        e = self.stepper.expand(self.motion.mode, self.x)
+        e = self.stepper.expand(self.mode, self.x, self.unknowns)
         if self.sign > 0:
             return e
         flip = self.sign ** np.arange(e.states.shape[1])
-        return Expansion(e.mode, e.states * flip, e.guards * flip, e.scales, e.gradient, e.finite)
+        return replace(
+            e, states=e.states * flip, guards=e.guards * flip, unknowns=e.unknowns * flip
+        )
 
     def _leave_singular_point(self, e: Expansion, left: float) -> bool:
         """Take the driver's short step where high derivatives do not exist; forward only."""
         if self.sign < 0:
             return False
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
-        if h > 0.0:
-            self._advance(Expansion(e.mode, coefficients, e.guards, e.scales, e.gradient, True), h)
-        return h > 0.0
+        return h > 0.0 and self._advance(replace(e, states=coefficients, finite=True), h)
 
-    def _zeros(self, e: Expansion, h: float, fresh: dict[int, int]) -> list[tuple[float, int]]:
+    def _zeros(self, e: Expansion, h: float) -> list[Hit]:
         hits = []
-        for row in range(len(self.motion.guards)):
+        for row, guard in enumerate(self.guards):
             c = e.guards[row]
             if not np.all(np.isfinite(c)):
                 continue
-            drop = self.stepper.leading(e, row, fresh[row])[0] if row in fresh else 0
+            drop = self.stepper.leading(e, row, self.fresh[row])[0] if row in self.fresh else 0
             dt = first_crossing(c[drop:].tolist(), h, 0)
             if dt is not None:
-                hits.append((dt, row))
+                hits.append(Hit(dt, row, guard))
         return hits
 
-    def _advance(self, e: Expansion, dt: float) -> None:
-        self.starts.append(self.t)
-        flip = self.sign ** np.arange(e.states.shape[1])
-        self.coefficients.append(e.states * flip)
+    def _advance(self, e: Expansion, dt: float) -> bool:
         x = self.stepper.advance(e, dt)
+        if not np.all(np.isfinite(x)):
+            return False
+        flip = self.sign ** np.arange(e.states.shape[1])
+        self.record.step(self.t, e.states * flip)
         self.t += self.sign * dt
         if self.system.time_dependent:
             x[-1] = self.t
-        if self.motion.sliding is not None:
-            x = self.surfaces.project(x, self.p, [self.motion.sliding], self.level)
+        if self.sliding:
+            x = self.surfaces.project(x, self.p, self.sliding, self.levels)
+            if e.unknowns.size:
+                ahead = e.unknowns @ powers(dt, e.unknowns.shape[1])
+                self.unknowns = self.modes.improve(self.mode, x, ahead)
         self.x = x
-        self.times.append(self.t)
-        self.points.append(x[: self.system.dimension].copy())
+        self.record.point(self.t, x)
+        return True
 
     def _report(self, rows: list[int]) -> str | None:
-        stopped, mode = None, self.motion.mode
+        stopped, mode = None, self.mode
         for row in rows:
-            name = self.motion.guards[row].name
+            name = self.guards[row].name
             kind = "stop" if name in self.ending else "zero"
             stopped = name if kind == "stop" else stopped
-            self.events.append(Event(kind, self.t, self.points[-1], mode, mode, name))
+            self.record.event(kind, self.t, self.x, mode, mode, name)
         return stopped

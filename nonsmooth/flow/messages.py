@@ -32,6 +32,14 @@ def ambiguous(modes: Sequence[str]) -> str:
     )
 
 
+def multiple_zero(surface: int) -> str:
+    """The gradient of a switching function vanishes with it."""
+    return (
+        f"The gradient of h{surface} vanishes where h{surface} does: a multiple zero, which cannot be "
+        "located to rounding. Write the surface with a simple zero, x - 1 instead of (x - 1)**3."
+    )
+
+
 def degenerate() -> str:
     """No mode can continue, to rounding."""
     return "No mode continues from here to rounding: a degenerate tangency."
@@ -40,6 +48,14 @@ def degenerate() -> str:
 def no_stable_motion(surfaces: Sequence[int]) -> str:
     """No mode leaves an intersection or slides stably along it."""
     return f"No mode leaves or slides stably along {' and '.join(f'h{i}' for i in surfaces)} = 0."
+
+
+def possibly_several(surfaces: Sequence[int]) -> str:
+    """A complementarity problem without a proof of uniqueness."""
+    return (
+        f"On {' and '.join(f'h{i}' for i in surfaces)} = 0 more than one set of multipliers may hold: "
+        "the matrix dh/dx df/dlambda is not known to be of the kind for which there is one."
+    )
 
 
 def wrong_start(asked: str, actual: str) -> str:
@@ -52,9 +68,19 @@ def impossible_start(asked: str) -> str:
     return f"start_mode {asked!r} cannot continue from the start: its field points elsewhere."
 
 
+def start_solutions(asked: str, count: int) -> str:
+    """The mode asked for has no multipliers, or several sets."""
+    return f"start_mode {asked!r} has {count} sliding solutions here."
+
+
 def field_not_finite(mode: str, x: Sequence[float]) -> str:
     """The field of a mode is not finite at a state."""
     return f"The field of mode {mode!r} at ({', '.join(f'{v:.6g}' for v in x)})."
+
+
+def state_not_finite(t: float) -> str:
+    """A step ends outside the numbers."""
+    return f"The state after a step from t = {t:.10g}."
 
 
 def surface_not_finite() -> str:
@@ -80,6 +106,38 @@ def stopped(name: str, t: float) -> str:
 def accumulation(events: int, limit: float) -> str:
     """Events accumulate."""
     return f"After {events} events; estimated limit t = {limit:.12g}."
+
+
+def behind(name: str, t: float) -> str:
+    """A gap is negative."""
+    return f"The gap of {name!r} is negative at t = {t:.10g}."
+
+
+def no_impulse(name: str, t: float) -> str:
+    """No impulses satisfy the law of impact and friction."""
+    return f"No impulse fits the impact {name!r} at t = {t:.10g}."
+
+
+def no_reaction(names: Sequence[str]) -> str:
+    """No reactions are consistent with closed or opening contacts."""
+    return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds."
+
+
+def pressed(name: str, t: float) -> str:
+    """A reset leaves the motion pressed against its zero."""
+    return (
+        f"Reset {name!r} leaves the motion pressed against its zero at t = {t:.10g}: it rests there. "
+        "Declare nonsmooth.Impact for a contact that lasts."
+    )
+
+
+def two_sided(name: str) -> str:
+    """A start on the zero of a reset that could be met from either side."""
+    return (
+        f"The run is on the zero of reset {name!r}, which has no direction and would turn the motion "
+        "round: it may be a floor or a ceiling. Give it a direction: -1 where its function falls to "
+        "zero, 1 where it rises."
+    )
 
 
 def too_many(what: str, count: int) -> str:

@@ -10,9 +10,9 @@ from numpy.typing import ArrayLike
 from ..model import Array, FilippovSystem, Parameters, motion, require_system
 from .compiled.convert import trajectory
 from .compiled.engine import engine_for, simulate_arrays
-from .compiled.select import use_compiled
-from .driver import Driver
 from .options import Options
+from .reference.driver import Driver
+from .select import use_compiled
 from .status import Status
 from .trajectory import Trajectory
 

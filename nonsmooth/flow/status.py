@@ -20,6 +20,7 @@ class Status(IntEnum):
     NOT_FINITE = 6
     TOO_MANY_EVENTS = 7
     TOO_MANY_STEPS = 8
+    INCONSISTENT = 9
 
     def __str__(self) -> str:
         return self.name
@@ -39,6 +40,8 @@ ADVICE: dict[Status, str] = {
     "the motion that holds there.",
     Status.INTERSECTION: "At this intersection of surfaces Filippov's convention with independent "
     "multipliers has no stable motion; look at the fields around the last state.",
+    Status.INCONSISTENT: "A constraint cannot hold here: the state is behind it, or no reaction (or "
+    "more than one) keeps the contact (Painleve's paradox); look at the gaps and at friction.",
     Status.STEP_TOO_SMALL: "The solution has a singularity here, or the tolerance is below "
     "rounding: loosen tol or look at the fields near the last state.",
     Status.NOT_FINITE: "A field or a switching function is not a finite number here: check "

@@ -24,9 +24,12 @@ class Event:
     x : ndarray (n,)
         State before a reset, on the surface otherwise.
     mode_before, mode_after : str
-        Equal at a stop, a zero and the end.
+        Equal at a stop, a zero and the end. After a reset the mode that starts there, also where
+        the jump went through a surface.
     name : str
         Of the surface (``h0``, ``h1``, ...), stop, reset or function.
+    x_after : ndarray (n,)
+        State after a reset, ``x`` otherwise.
     """
 
     kind: str
@@ -35,6 +38,11 @@ class Event:
     mode_before: str
     mode_after: str
     name: str = ""
+    x_after: Array = None  # type: ignore[assignment]  # x unless given
+
+    def __post_init__(self) -> None:
+        if self.x_after is None:
+            object.__setattr__(self, "x_after", self.x)
 
 
 @dataclass(frozen=True)
@@ -46,6 +54,46 @@ class Segment:
     t_end: float
     first: int
     last: int
+
+
+@dataclass(frozen=True)
+class Steps:
+    """Accepted steps with the Taylor polynomials of the states.
+
+    Attributes
+    ----------
+    starts : ndarray (s,)
+        Times at which they begin.
+    coefficients : sequence of ndarray (N, P+1)
+        Of the states (time included where the system depends on it), in powers of the time since
+        the start of the step. A step whose series ends early has fewer.
+    """
+
+    starts: Array = field(default_factory=lambda: np.zeros(0))
+    coefficients: Sequence[Array] | Array = ()
+
+    def __len__(self) -> int:
+        return len(self.coefficients)
+
+    def part(self, first: int, last: int) -> Steps:
+        """Return the steps first to last - 1."""
+        return Steps(self.starts[first:last], self.coefficients[first:last])
+
+    def at(self, t: Array, n: int, forward: bool = True) -> Array:
+        """Evaluate the first n states at times (m,); (m, n)."""
+        starts = self.starts if forward else -self.starts
+        step = np.searchsorted(starts, t if forward else -t, side="right") - 1
+        step = np.clip(step, 0, len(starts) - 1)
+        result = np.empty((t.size, n))
+        for k in np.unique(step):
+            chosen = step == k
+            s = (t[chosen] - self.starts[k])[:, None]
+            c = self.coefficients[k][:n]
+            value = np.broadcast_to(c[:, -1], (s.shape[0], n))
+            for j in range(c.shape[1] - 2, -1, -1):
+                value = value * s + c[:, j]
+            result[chosen] = value
+        return result
 
 
 @dataclass(frozen=True, repr=False)
@@ -68,6 +116,8 @@ class Trajectory:
         What happened, in words.
     accumulation_time : float or None
         Estimated limit of the event times when the status is ACCUMULATION.
+    steps : Steps
+        Accepted steps with their Taylor polynomials.
     """
 
     system: FilippovSystem
@@ -79,8 +129,7 @@ class Trajectory:
     status: Status
     message: str
     accumulation_time: float | None = None
-    _starts: Array = field(default_factory=lambda: np.zeros(0))
-    _coefficients: Sequence[Array] | Array = ()
+    steps: Steps = field(default_factory=Steps)
 
     @property
     def itinerary(self) -> str:
@@ -113,23 +162,10 @@ class Trajectory:
                 f"{times.max()}. The run ended with status {self.status}: {self.message}"
             )
         n = self.x.shape[1]
-        if not len(self._coefficients):
+        if not len(self.steps):
             return np.broadcast_to(self.x[-1], (*times.shape, n)).copy()
-        flat = times.ravel()
-        forward = self.t[-1] >= self.t[0]
-        starts = self._starts if forward else -self._starts
-        step = np.searchsorted(starts, flat if forward else -flat, side="right") - 1
-        step = np.clip(step, 0, len(starts) - 1)
-        result = np.empty((flat.size, n))
-        for k in np.unique(step):
-            chosen = step == k
-            s = (flat[chosen] - self._starts[k])[:, None]
-            c = self._coefficients[k][:n]
-            value = np.broadcast_to(c[:, -1], (s.shape[0], n))
-            for j in range(c.shape[1] - 2, -1, -1):
-                value = value * s + c[:, j]
-            result[chosen] = value
-        return result.reshape(*times.shape, n)
+        forward = bool(self.t[-1] >= self.t[0])
+        return self.steps.at(times.ravel(), n, forward).reshape(*times.shape, n)
 
     def __repr__(self) -> str:
         return (

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, FilippovSystem, Intersection, Parameters, require_system
+from ..model import Array, FilippovSystem, Parameters, coupled_of, require_system
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,14 +82,18 @@ def sliding_branches(
     [0.5] False [0.  0.5]
     """
     require_system(system)
-    of_mode = Intersection(system, "s" * system.surface_count if mode is None else mode)
+    coupled = coupled_of(system)
+    mode = "s" * system.surface_count if mode is None else mode
+    held = coupled.held(mode)
     x, p = system.extended_point(point, t), system.parameter_vector(parameters)
-    found = of_mode.solutions(x, p, stable_only=False)
-    branches = [_branch(of_mode, values, p, system.dimension) for values in found]
+    sliding, branches = coupled.sliding(mode), []
+    for unknowns in coupled.solutions(mode, x, p, stable_only=False):
+        marks = coupled.yardsticks(x, held, unknowns, p)
+        multipliers = (unknowns / marks.factors)[sliding]
+        if np.abs(multipliers).max(initial=0.0) > 1.0 + 1e-9:
+            continue
+        slope = (marks.slope * marks.factors)[np.ix_(sliding, sliding)]
+        velocity = coupled.values(x, held, unknowns, p)[0][: system.dimension]
+        rates = np.linalg.eigvals(slope).astype(complex)
+        branches.append(SlidingBranch(multipliers, velocity, rates))
     return sorted(branches, key=lambda b: float(b.multipliers[0]))
-
-
-def _branch(of_mode: Intersection, values: Array, p: Array, n: int) -> SlidingBranch:
-    k = len(of_mode.surfaces)
-    velocity, slope = of_mode.velocity_and_slope(values, p)
-    return SlidingBranch(values[-k:].copy(), velocity[:n], np.linalg.eigvals(slope).astype(complex))

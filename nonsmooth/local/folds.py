@@ -9,26 +9,16 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import (
-    Array,
-    DefinitionError,
-    FilippovSystem,
-    Parameters,
-    PointError,
-    explain,
-    motion,
-)
-from .lie import TOLERANCE, Place, on_surface, place, positive
-from .newton import solve
-
-Side = Literal["above", "below"]
-
-_LETTERS = {"above": "+", "below": "-"}
+from ..model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
+from .checks import positive
+from .numbers import Numbers
+from .place import TOLERANCE, Place, on_surface, place
+from .search import Found, search, unknowns
+from .sides import FIELDS, Side, side_index
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,7 +28,7 @@ class Fold:
     Attributes
     ----------
     point : ndarray (n,)
-    side : {"above", "below"}
+    side : {"+", "-"}
         Of the field F1 (h > 0) or F2 (h < 0).
     order : int or None
         First k with L^k h != 0; None if there is none up to the order that was looked at.
@@ -68,7 +58,6 @@ class Fold:
     iterations: int
 
     def __str__(self) -> str:
-        field = "F1 (above)" if self.side == "above" else "F2 (below)"
         if self.order is None:
             contact = (
                 f"no nonzero derivative of h along it up to order {len(self.lie) - 1}: an "
@@ -80,21 +69,16 @@ class Fold:
                 f"{self.kind} {name}" if name != self.kind else name
             ) + f" of order {self.order}, L^{self.order} h = {self.lie[self.order]:.6g}"
         found = f"; found {self.distance:.3g} from the start" if self.iterations else ""
-        return f"{field} at {self.point.tolist()}: {contact}{found}."
+        return f"{FIELDS[self.side]} at {self.point.tolist()}: {contact}{found}."
 
 
-def contact(where: Place, x: Array, letter: str, max_order: int, tol: float) -> Array:
+def contact(where: Place, x: Array, side: Side, max_order: int, tol: float) -> Array:
     """Derivatives L^k h for k = 0..max_order, with rounding-level values set to zero.
 
     The k-th Taylor coefficient counts as zero below ``tol |grad h| |F| r^(k-1)``, where r is the
     rate, per time, at which the coefficients of the orbit and of h grow.
     """
-    system = where.system
-    mode = where.side(letter)
-    states, guards = motion(system, mode).jet_function(max_order)(x, where.parameters)
-    states = np.array(states, dtype=float)
-    sign = 1.0 if letter == "+" else -1.0
-    h = sign * np.array(guards, dtype=float)[where.surface]
+    states, h = where.orbit(x, side, max_order)
     speed = float(np.linalg.norm(states[:, 1]))
     size = speed * float(np.linalg.norm(where.at(x).gradient))
     if not (np.all(np.isfinite(states)) and np.all(np.isfinite(h))):
@@ -112,35 +96,40 @@ def contact(where: Place, x: Array, letter: str, max_order: int, tol: float) -> 
     return h * np.array([math.factorial(k) for k in range(max_order + 1)])
 
 
-def _name(order: int | None, value: float, letter: str) -> str:
+def bend(numbers: Numbers, k: int, second: float) -> float:
+    """Curvature of an orbit of field k against the surface, times 1 + |x|: zero at a cusp."""
+    speed, slope = float(np.linalg.norm(numbers.fields[k])), float(np.linalg.norm(numbers.gradient))
+    return abs(second) / (speed**2 * slope) * (1 + float(np.linalg.norm(numbers.x)))
+
+
+def _kind(order: int | None, value: float, side: Side) -> str:
     if order == 2:
-        return "visible" if (value > 0) == (letter == "+") else "invisible"
+        return "visible" if (value > 0) == (side == "+") else "invisible"
     return "cusp" if order == 3 else "degenerate"
 
 
-def _build(
-    where: Place, x: Array, side: Side, max_order: int, tol: float, search: tuple[float, float, int]
-) -> Fold:
-    letter = _LETTERS[side]
-    lie = contact(where, x, letter, max_order, tol)
+def fold_at(where: Place, found: Found, side: Side, max_order: int, tol: float) -> Fold:
+    """Describe the fold at a point where L_i h = 0."""
+    lie = contact(where, found.x, side, max_order, tol)
     lie[1] = 0.0
     nonzero = np.flatnonzero(lie[2:])
     order = int(nonzero[0]) + 2 if nonzero.size else None
-    kind = _name(order, float(lie[order]) if order else 0.0, letter)
-    other = float(where.at(x).lie[1 if letter == "+" else 0])
-    return Fold(x[: where.system.dimension], side, order, kind, lie, other, *search)
+    kind = _kind(order, float(lie[order]) if order else 0.0, side)
+    other = float(where.at(found.x).lie[1 - side_index(side)])
+    return Fold(
+        found.x[: where.system.dimension],
+        side,
+        order,
+        kind,
+        lie,
+        other,
+        found.distance,
+        found.residual,
+        found.iterations,
+    )
 
 
-def _check(side: str, max_order: int) -> None:
-    if side not in _LETTERS:
-        raise DefinitionError(
-            explain(
-                "side",
-                expected="'above' (F1, h > 0) or 'below' (F2, h < 0)",
-                received=repr(side),
-                advice="A fold belongs to one of the two fields.",
-            )
-        )
+def _check_order(max_order: int) -> None:
     if isinstance(max_order, bool) or not isinstance(max_order, int) or max_order < 2:
         raise DefinitionError(f"max_order: expected a whole number >= 2, received {max_order!r}.")
 
@@ -149,7 +138,7 @@ def fold(
     system: FilippovSystem,
     point: ArrayLike,
     *,
-    side: Side = "above",
+    side: Side = "+",
     parameters: Parameters | None = None,
     t: float = 0.0,
     surface: int = 0,
@@ -163,7 +152,7 @@ def fold(
     ----------
     system, point, parameters, t, surface, mode, tol
         As in :func:`region`.
-    side : {"above", "below"}
+    side : {"+", "-"}
     max_order : int, optional
         Highest order of contact to look at.
 
@@ -185,29 +174,29 @@ def fold(
     >>> print(fold(s, [0, 0]))
     F1 (above) at [0.0, 0.0]: visible fold of order 2, L^2 h = 1.
     """
-    _check(side, max_order)
+    k = side_index(side)
+    _check_order(max_order)
     where, x = place(system, point, parameters, t, surface, mode)
     numbers = on_surface(where, x, positive(tol, "tol"))
-    k = 0 if side == "above" else 1
     if abs(numbers.angles[k]) > tol:
         raise PointError(
             explain(
                 f"point {x}",
-                expected=f"L{k + 1} = 0, the field {side} tangent to the surface",
+                expected=f"L{k + 1} = 0, the field {FIELDS[side]} tangent to the surface",
                 received=f"L{k + 1} = {numbers.lie[k]:.6g}",
                 advice="find_fold(system, near=point) goes to the nearest fold.",
             )
         )
     length = float(np.linalg.norm(numbers.lie_gradients[k])) or 1.0
     residual = max(numbers.distance, abs(float(numbers.lie[k])) / length)
-    return _build(where, x, side, max_order, tol, (0.0, residual, 0))
+    return fold_at(where, Found(x, residual=residual), side, max_order, tol)
 
 
 def find_fold(
     system: FilippovSystem,
     near: ArrayLike,
     *,
-    side: Side = "above",
+    side: Side = "+",
     parameters: Parameters | None = None,
     t: float = 0.0,
     surface: int = 0,
@@ -228,7 +217,7 @@ def find_fold(
     system, parameters, t, surface, mode
         As in :func:`region`; the point need not be on the surface.
     near : array_like (n,)
-    side : {"above", "below"}
+    side : {"+", "-"}, optional
         Whose fold: of F1 or F2.
     hold : sequence of str, optional
         Names of states that keep their value.
@@ -256,57 +245,17 @@ def find_fold(
     >>> print(find_fold(s, [3.0, 0.1]).kind, find_fold(s, [0.2, 0.1]).kind)
     invisible visible
     """
-    _check(side, max_order)
+    k = side_index(side)
+    _check_order(max_order)
     where, x = place(system, near, parameters, t, surface, mode)
     free = unknowns(system, hold, 2, "fold")
-    k = 0 if side == "above" else 1
 
     def equations(u: Array) -> tuple[Array, Array]:
-        full = x.copy()
-        full[free] = u
-        numbers = where.at(full)
+        numbers = where.at(u)
         values = np.array([numbers.h, numbers.lie[k]])
-        return values, np.vstack([numbers.gradient, numbers.lie_gradients[k]])[:, free]
+        return values, np.vstack([numbers.gradient, numbers.lie_gradients[k]])
 
-    root = solve(equations, x[free], tol=tol, max_iterations=max_iterations, what=f"fold {side}")
-    point = x.copy()
-    point[free] = root.x
-    search = (float(np.linalg.norm(point - x)), root.residual, root.iterations)
+    what = f"fold of {FIELDS[side]}"
+    found = search(equations, x, free, tol=tol, max_iterations=max_iterations, what=what)
     # a multiple root is a cusp or worse, known to the square root of rounding only
-    zero = 1e-5 if root.linear else TOLERANCE
-    return _build(where, point, side, max_order, zero, search)
-
-
-def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: str) -> list[int]:
-    """Indices of the states that a search may change.
-
-    Raises
-    ------
-    DefinitionError
-        An unknown state, or fewer free states than equations.
-    """
-    names = [hold] if isinstance(hold, str) else [str(name) for name in hold]
-    unknown = [name for name in names if name not in system.state_names]
-    if unknown:
-        raise DefinitionError(
-            explain(
-                "hold",
-                expected=f"names of states among {list(system.state_names)}",
-                received=str(unknown),
-                advice="Parameters keep their value anyway.",
-            )
-        )
-    free = [i for i, name in enumerate(system.state_names) if name not in names]
-    if len(free) < equations:
-        raise DefinitionError(
-            explain(
-                what,
-                expected=f"at least {equations} free states, one for each equation",
-                received=f"{len(free)} ({system.dimension} states, {len(names)} held)",
-                advice="In the plane a two-fold (fold-fold) happens at isolated values of a "
-                "parameter: make that parameter a state with derivative 0 to find it."
-                if equations == 3 and system.dimension < 3
-                else "Hold fewer states.",
-            )
-        )
-    return free
+    return fold_at(where, found, side, max_order, 1e-5 if found.linear else TOLERANCE)

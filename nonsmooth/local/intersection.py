@@ -25,7 +25,7 @@ from ..model import (
     read_function,
     require_system,
 )
-from .lie import TOLERANCE
+from .place import TOLERANCE
 
 
 def intersection_range(
@@ -76,7 +76,7 @@ def intersection_range(
 
     require_system(system)
     chosen = _chosen(system, surfaces)
-    of = read_function(system, of, "of")
+    of = read_function(system.definition, of, "of")
     every = range(system.surface_count)
     h = [system.evaluate(system.surface_function(i), point, parameters, t).item() for i in every]
     _refuse_distance(system, point, parameters, t, {i: h[i] for i in chosen})
@@ -103,7 +103,7 @@ def _chosen(system: FilippovSystem, surfaces: Sequence[int] | None) -> list[int]
     items: Any = range(system.surface_count) if surfaces is None else surfaces
     if isinstance(items, (str, bytes)) or not isinstance(items, (Sequence, np.ndarray)):
         items = [items]
-    chosen = [system._index(i) for i in items]
+    chosen = [system.surface_index(i) for i in items]
     if not chosen or len(set(chosen)) < len(chosen):
         raise DefinitionError(
             f"surfaces: expected different indices below {system.surface_count}, at least one, "

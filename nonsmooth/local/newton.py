@@ -15,7 +15,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..model import Array, ConvergenceError, OptionError, PointError
-from .lie import positive
+from .checks import positive
 
 Equations = Callable[[Array], tuple[Array, Array]]
 

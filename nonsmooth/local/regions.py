@@ -8,7 +8,9 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, Parameters, PointError, explain, motion
-from .lie import TOLERANCE, Numbers, on_surface, place, positive
+from .checks import positive
+from .numbers import Numbers
+from .place import TOLERANCE, on_surface, place
 
 
 class Region(Enum):

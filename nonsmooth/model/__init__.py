@@ -1,6 +1,8 @@
 """WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
 
 from .checks import real, real_array, require_system, whole
+from .coupled import Coupled, coupled_of
+from .definition import Impact, Reset, Stop, read_function
 from .errors import (
     ConvergenceError,
     DefinitionError,
@@ -12,31 +14,24 @@ from .errors import (
     PointError,
     explain,
 )
-from .motion import (
-    Evaluator,
-    Followed,
-    Guard,
-    Intersection,
-    Motion,
-    Resets,
-    Surfaces,
-    evaluator,
-    followed,
-    motion,
-)
+from .evaluators import Evaluator, Resets, Surfaces, evaluator
+from .motion import Motion, followed, motion, watched_functions
+from .reading import Parameters
 from .regularise import regularise
-from .system import Array, FilippovSystem, Parameters, Reset, Stop, read_function
+from .switches import Guard
+from .system import FilippovSystem
+from .values import Array
 
 __all__ = [
     "Array",
     "ConvergenceError",
+    "Coupled",
     "DefinitionError",
     "DegenerateError",
     "Evaluator",
     "FilippovSystem",
-    "Followed",
     "Guard",
-    "Intersection",
+    "Impact",
     "Motion",
     "NonsmoothError",
     "NotSmoothError",
@@ -48,6 +43,7 @@ __all__ = [
     "Resets",
     "Stop",
     "Surfaces",
+    "coupled_of",
     "evaluator",
     "explain",
     "followed",
@@ -57,5 +53,6 @@ __all__ = [
     "real_array",
     "regularise",
     "require_system",
+    "watched_functions",
     "whole",
 ]

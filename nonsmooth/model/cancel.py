@@ -10,10 +10,11 @@ but products of two sums stay products, so nothing is expanded.
 from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
 
 import casadi as ca
 
-from .graph import instructions
+from .graph import evaluate, instructions, operation
 
 Monomial = tuple[tuple[int, int], ...]  # ((atom, power), ...) sorted by atom
 Sum = dict[Monomial, float]
@@ -40,7 +41,7 @@ def _common(monomials: Sequence[Monomial]) -> Monomial:
     return tuple(sorted((k, v) for k, v in low.items() if v))
 
 
-class _Forms:
+class Forms:
     """Normal forms of the nodes of one graph and the atoms they are made of."""
 
     def __init__(self) -> None:
@@ -120,34 +121,51 @@ class _Forms:
         return top / bottom
 
 
-def _normal_forms(
+@dataclass(frozen=True)
+class _Value:
+    """A node's normal form, and the expression as it was written."""
+
+    form: Sum
+    expression: ca.SX
+
+
+class _Normal:
+    """The algebra of normal forms over the symbols of a graph."""
+
+    def __init__(self, inputs: Sequence[ca.SX]):
+        self.inputs, self.forms = inputs, Forms()
+
+    def constant(self, value: float) -> _Value:
+        return _Value({(): value} if value else {}, ca.SX(value))
+
+    def symbol(self, vector: int, position: int) -> _Value:
+        expression = self.inputs[vector][position]
+        return _Value(self.forms.atom(("input", vector, position), expression), expression)
+
+    def apply(self, op: str, args: Sequence[_Value]) -> _Value:
+        expression = operation(op, [a.expression for a in args])
+        return _Value(_combine(self.forms, op, [a.form for a in args], expression), expression)
+
+
+def normal_forms(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
-) -> tuple[_Forms, list[list[Sum]]]:
+) -> tuple[Forms, list[list[Sum]]]:
+    """Sums of coefficient times monomial for each entry of each output, and what they are made of.
+
+    Parameters
+    ----------
+    inputs : sequence of SX
+        Symbol vectors.
+    outputs : sequence of SX
+        Expressions in these symbols.
+    """
     nodes, rows = instructions(inputs, outputs)
-    forms, values, exact = _Forms(), list[Sum](), list[ca.SX]()
-    for node in nodes:
-        args = [values[k] for k in node.args]
-        if node.op == "const":
-            value: Sum = {(): node.payload} if node.payload else {}  # type: ignore[dict-item]
-            expression = ca.SX(node.payload)
-        elif node.op == "input":
-            vector, position = node.place
-            expression = inputs[vector][position]
-            value = forms.atom(("input", node.payload), expression)
-        else:
-            expression = _apply(node.op, [exact[k] for k in node.args])
-            value = _combine(forms, node.op, args, expression)
-        values.append(value)
-        exact.append(expression)
-    return forms, [[values[k] for k in row] for row in rows]
+    algebra = _Normal(inputs)
+    values = evaluate(nodes, algebra)
+    return algebra.forms, [[values[k].form for k in row] for row in rows]
 
 
-def _apply(op: str, args: list[ca.SX]) -> ca.SX:
-    code = getattr(ca, "OP_" + op.upper())
-    return ca.SX.unary(code, args[0]) if len(args) == 1 else ca.SX.binary(code, args[0], args[1])
-
-
-def _combine(forms: _Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
+def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
     if op == "add":
         return forms.add(args[0], args[1])
     if op == "sub":
@@ -165,6 +183,40 @@ def _combine(forms: _Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
     if op == "inv" and args[0]:
         return forms.reciprocal(args[0])
     return forms.atom((op, *(tuple(sorted(a.items())) for a in args)), expression)
+
+
+def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.SX, int]]:
+    """Factors of a scalar expression, with their powers, as far as they are in sight.
+
+    Examples
+    --------
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> powers(3 * (x - 1) ** 3 * y, ca.vertcat(x, y), ca.SX(0, 1))
+    [(SX((1-x)), 3), (SX(y), 1)]
+    """
+    forms, rows = normal_forms([variables, others], [expression])
+    if not rows[0][0]:
+        return []
+    _, monomial = forms.factor(rows[0][0])
+    return [(forms.atoms[atom], power) for atom, power in monomial]
+
+
+def simple_zeros(expression: ca.SX, variables: ca.SX, others: ca.SX) -> ca.SX:
+    """Return an expression of the same sign without the powers that are in sight.
+
+    Examples
+    --------
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> simple_zeros(-(x**2) * (y - 1) ** 3, ca.vertcat(x, y), ca.SX(0, 1))
+    SX((1-y))
+    """
+    forms, rows = normal_forms([variables, others], [expression])
+    if not rows[0][0]:
+        return expression
+    c, monomial = forms.factor(rows[0][0])
+    if all(abs(power) < 2 for _, power in monomial):
+        return expression
+    return forms.product(c, tuple((atom, 1) for atom, power in monomial if power % 2))
 
 
 def cancel_common_factor(
@@ -193,7 +245,7 @@ def cancel_common_factor(
     >>> n, a, b
     (SX((x+y)), SX(mu), SX(2))
     """
-    forms, rows = _normal_forms([variables, others], expressions)
+    forms, rows = normal_forms([variables, others], expressions)
     sums = [row[0] for row in rows]
     factored = [forms.factor(s) if s else None for s in sums]
     monomials = [f[1] for f in factored if f is not None]

@@ -15,7 +15,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from .graph import Node, depends_on, instructions
+from .graph import Node, depends_on, instructions, operation
 
 Product = tuple[int, ...]  # factors, sorted; () is the constant term
 Sum = dict[Product, ca.SX]  # coefficients that do not depend on the variables
@@ -103,8 +103,7 @@ class _Reader:
         if node.op == "input":
             vector, position = node.place
             return self._inputs[vector][position]
-        code = getattr(ca, "OP_" + node.op.upper())
-        return ca.SX.unary(code, *args) if len(args) == 1 else ca.SX.binary(code, *args)
+        return operation(node.op, args)
 
     def _constant(self, j: int) -> ca.SX:
         return self._sums[j][()]

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Hashable, Sequence
 from dataclasses import dataclass
-from typing import cast
+from typing import Protocol, TypeVar, cast
 
 import casadi as ca
 
@@ -23,7 +23,7 @@ OPERATIONS: dict[int, str] = {
 #: Operations without derivatives of every order, and the declaration that replaces each.
 NOT_SMOOTH: dict[str, str] = {
     "sign": "sign",
-    "fabs": "fabs (absolute value)",
+    "fabs": "fabs (absolute value; sqrt(e**2) becomes fabs(e) in CasADi)",
     "fmin": "fmin",
     "fmax": "fmax",
     "if_else_zero": "if_else",
@@ -102,6 +102,63 @@ def instructions(
         else:
             register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
     return nodes, rows
+
+
+V = TypeVar("V")
+
+
+class Algebra(Protocol[V]):
+    """What a graph can be evaluated in: expressions, numbers, enclosures, normal forms."""
+
+    def constant(self, value: float) -> V:
+        """Return a constant of the graph."""
+        ...
+
+    def symbol(self, vector: int, position: int) -> V:
+        """Return an entry of an input vector."""
+        ...
+
+    def apply(self, op: str, args: Sequence[V]) -> V:
+        """Return the value of an operation, named as in ``OPERATIONS``."""
+        ...
+
+
+def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
+    """Values of all nodes of a graph in an algebra.
+
+    Parameters
+    ----------
+    nodes : sequence of Node
+        As ``instructions`` returns them.
+    algebra : Algebra
+
+    Returns
+    -------
+    list
+        One value for each node.
+    """
+    values: list[V] = []
+    for node in nodes:
+        if node.op == "const":
+            values.append(algebra.constant(cast("float", node.payload)))
+        elif node.op == "input":
+            values.append(algebra.symbol(*node.place))
+        else:
+            values.append(algebra.apply(node.op, [values[k] for k in node.args]))
+    return values
+
+
+def operation(op: str, args: Sequence[ca.SX]) -> ca.SX:
+    """Return the expression of an operation, named as in ``OPERATIONS``.
+
+    Examples
+    --------
+    >>> x = ca.SX.sym("x")
+    >>> operation("mul", [x, operation("sin", [x])])
+    SX((x*sin(x)))
+    """
+    code = getattr(ca, "OP_" + op.upper())
+    return ca.SX.unary(code, args[0]) if len(args) == 1 else ca.SX.binary(code, *args)
 
 
 def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:

@@ -1,11 +1,10 @@
 """Jets: exact Taylor coefficients in time of a flow and of functions along it.
 
 The solution of x' = f(x) is expanded order by order: from the coefficients 0..k of x follow those
-of f(x), and x_{k+1} = f_k/(k+1). Each operation of the graph has one recurrence, below, the only
-place in the library that knows how to differentiate along a flow. The recurrences act on CasADi
-scalars, so a jet is itself a CasADi expression: it is evaluated by CasADi's virtual machine in the
-reference driver and printed as C by the compiled engine. Structural zeros (constants, polynomials)
-disappear on the way.
+of f(x), and x_{k+1} = f_k/(k+1). Each rule (``rules``) has one recurrence, below, the only place in
+Python that knows how to differentiate along a flow. The recurrences act on any arithmetic: on CasADi
+scalars, so that a jet is itself a CasADi expression, evaluated by CasADi's virtual machine or printed
+as C; or on numbers. Structural zeros (constants, polynomials) disappear on the way.
 
 Sources: Moore 1966; Jorba & Zou 2005, "A software package for the numerical integration of ODEs by
 means of high-order Taylor methods", Prop. 2.1. Declined: repeated CasADi ``jtimes`` (exponential
@@ -14,17 +13,56 @@ growth of the expression with the order) and finite differences (not exact).
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
-from typing import TypeAlias
+from typing import Any, Protocol, TypeAlias
 
 import casadi as ca
 
 from .economy import economise
-from .errors import NotSmoothError
-from .graph import Node, depends_on, instructions
+from .graph import depends_on, instructions, operation
+from .rules import Rule, lower
 
 Coefficient: TypeAlias = "ca.SX | None"  # None is a structural zero
+
+
+class Arithmetic(Protocol):
+    """Numbers that coefficients are made of, with None for a structural zero."""
+
+    def number(self, value: float) -> Any:
+        """Return a constant, None for 0."""
+        ...
+
+    def clean(self, a: Any) -> Any:
+        """Return None for what is zero and known to be."""
+        ...
+
+    def divide(self, a: Any, b: Any) -> Any:
+        """Return a quotient; a division by zero is no error."""
+        ...
+
+    def apply(self, op: str, args: Sequence[Any]) -> Any:
+        """Return an operation of values, with 0 for None."""
+        ...
+
+
+class Expressions:
+    """The arithmetic of CasADi scalars."""
+
+    def number(self, value: float) -> Coefficient:
+        """Return a constant."""
+        return None if value == 0 else ca.SX(value)
+
+    def clean(self, a: ca.SX) -> Coefficient:
+        """Return None for zero."""
+        return None if a.is_zero() else a
+
+    def divide(self, a: ca.SX, b: Coefficient) -> ca.SX:
+        """Return a quotient."""
+        return a / value_of(b)
+
+    def apply(self, op: str, args: Sequence[Coefficient]) -> ca.SX:
+        """Return an operation of values."""
+        return operation(op, [value_of(a) for a in args])
 
 
 def taylor(
@@ -56,7 +94,7 @@ def taylor(
     DM([[9, 18, 18]])
     """
     n, m = rhs.numel(), functions.numel()
-    expansion = _Expansion(states, others, [rhs, functions])
+    expansion = expansion_of([rhs, functions], states, others)
     jet: list[list[Coefficient]] = [[states[i]] for i in range(n)]
     values: list[list[Coefficient]] = [[] for _ in range(m)]
     for k in range(order + 1):
@@ -65,8 +103,21 @@ def taylor(
             values[j].append(outputs[j])
         if k < order:
             for i in range(n):
-                jet[i].append(_scale(field[i], 1.0 / (k + 1)))
+                jet[i].append(scaled(field[i], 1.0 / (k + 1)))
     return _matrix(jet, n, order + 1), _matrix(values, m, order + 1)
+
+
+def expansion_of(outputs: Sequence[ca.SX], states: ca.SX, others: ca.SX) -> Expansion:
+    """Return the expansion of expressions in ``states`` and ``others``, which do not move.
+
+    The expressions are rewritten first so that their jets need fewer products.
+    """
+    inputs = [states, others]
+    nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
+    rules, place = lower(nodes, depends_on(nodes, [True, False]))
+    rows = [[place[j] for j in row] for row in rows]
+    still = [others[i] for i in range(others.numel())]
+    return Expansion(rules, rows, still, Expressions())
 
 
 def _matrix(rows: Sequence[Sequence[Coefficient]], n: int, width: int) -> ca.SX:
@@ -78,328 +129,216 @@ def _matrix(rows: Sequence[Sequence[Coefficient]], n: int, width: int) -> ca.SX:
     return result
 
 
-# Coefficients with structural zeros ------------------------------------------------------------
-
-
-def _clean(a: ca.SX) -> Coefficient:
-    return None if a.is_zero() else a
-
-
-def _scale(a: Coefficient, factor: float) -> Coefficient:
-    return None if a is None else (a if factor == 1.0 else _clean(factor * a))
-
-
-def _add(a: Coefficient, b: Coefficient) -> Coefficient:
-    return b if a is None else (a if b is None else _clean(a + b))
-
-
-def _sub(a: Coefficient, b: Coefficient) -> Coefficient:
-    if b is None:
+def scaled(a: Coefficient, factor: float) -> Coefficient:
+    """Multiply a coefficient by a number."""
+    if a is None or factor == 1.0:
         return a
-    return _clean(-b) if a is None else _clean(a - b)
+    product = factor * a
+    return None if product.is_zero() else product
 
 
-def _mul(a: Coefficient, b: Coefficient) -> Coefficient:
-    return None if a is None or b is None else _clean(a * b)
-
-
-def _div(a: Coefficient, b: Coefficient) -> Coefficient:
-    return None if a is None else a / (ca.SX(0) if b is None else b)
-
-
-def _value(a: Coefficient) -> ca.SX:
+def value_of(a: Coefficient) -> ca.SX:
+    """Return a coefficient as an expression, 0 for a structural zero."""
     return ca.SX(0) if a is None else a
-
-
-def _sum(terms: Sequence[Coefficient]) -> Coefficient:
-    total: Coefficient = None
-    for term in terms:
-        total = _add(total, term)
-    return total
 
 
 # The recurrences -------------------------------------------------------------------------------
 
 
-class _Series:
-    """Coefficients of one node, appended one order at a time."""
+class Expansion:
+    """All series of a list of rules, expanded together.
 
-    def __init__(self, recurrence: Callable[[int], Coefficient]):
-        self.c: list[Coefficient] = []
-        self.recurrence = recurrence
+    Parameters
+    ----------
+    rules : sequence of Rule
+    rows : sequence of sequence of int
+        Numbers of the rules of each output's entries.
+    still : sequence
+        Values of the input vector 1, which does not move; vector 0 moves.
+    arithmetic : Arithmetic
+    """
 
-    def advance(self, k: int) -> None:
-        self.c.append(self.recurrence(k))
+    def __init__(
+        self,
+        rules: Sequence[Rule],
+        rows: Sequence[Sequence[int]],
+        still: Sequence[Any],
+        arithmetic: Arithmetic,
+    ):
+        self._rows, self._still, self._on = rows, still, arithmetic
+        self.series: list[list[Any]] = [[] for _ in rules]
+        self._moving: Sequence[Any] = ()
+        self._recurrences = [self._recurrence(j, rule) for j, rule in enumerate(rules)]
 
+    def restart(self, still: Sequence[Any]) -> None:
+        """Forget all coefficients; vector 1 has new values."""
+        self._still = still
+        for c in self.series:
+            c.clear()
 
-class _Expansion:
-    """All nodes of a graph, expanded together."""
+    def advance(self, k: int, moving: Sequence[Any]) -> list[list[Any]]:
+        """Expand everything to order k, given coefficient k of vector 0; the outputs' coefficients."""
+        self._moving = moving
+        for c, recurrence in zip(self.series, self._recurrences, strict=True):
+            c.append(recurrence(k))
+        return self.outputs(k)
 
-    def __init__(self, states: ca.SX, others: ca.SX, outputs: Sequence[ca.SX]):
-        self._inputs = [states, others]
-        cheaper = economise(self._inputs, outputs, [True, False])
-        self._nodes, self._rows = instructions(self._inputs, cheaper)
-        self._moving = depends_on(self._nodes, [True, False])
-        self._series: list[_Series] = []  # in the order in which they advance
-        self._states: list[Coefficient] = []
-        self._node: list[_Series] = []
-        for j, node in enumerate(self._nodes):
-            self._node.append(self._expand(node, self._moving[j]))
+    def again(self, k: int, moving: Sequence[Any], which: Sequence[int]) -> list[list[Any]]:
+        """Expand some rules once more to the same order, with other coefficients of vector 0."""
+        self._moving = moving
+        for j in which:
+            self.series[j][k] = self._recurrences[j](k)
+        return self.outputs(k)
 
-    def advance(
-        self, k: int, states: Sequence[Coefficient]
-    ) -> tuple[list[Coefficient], list[Coefficient]]:
-        """Expand every node to order k, given coefficient k of the states."""
-        self._states = list(states)
-        for series in self._series:
-            series.advance(k)
-        field, functions = ([self._node[j].c[k] for j in row] for row in self._rows)
-        return field, functions
+    def outputs(self, k: int) -> list[list[Any]]:
+        """Return coefficient k of every entry of every output."""
+        return [[self.series[j][k] for j in row] for row in self._rows]
 
-    def _new(self, recurrence: Callable[[int], Coefficient]) -> _Series:
-        series = _Series(recurrence)
-        self._series.append(series)
-        return series
+    # arithmetic with structural zeros -----------------------------------------------------------
 
-    def _expand(self, node: Node, moving: bool) -> _Series:
-        args = [self._node[a] for a in node.args]
-        if node.op == "const":
-            value = None if node.payload == 0 else ca.SX(node.payload)
-            return self._new(lambda k: value if k == 0 else None)
-        if node.op == "input":
-            vector, position = node.place
-            if vector == 0:
-                return self._new(lambda k: self._states[position])
-            symbol = self._inputs[vector][position]
-            return self._new(lambda k: symbol if k == 0 else None)
-        if not moving:
-            return self._new(lambda k: _apply(node.op, args) if k == 0 else None)
-        if node.op in ("pow", "constpow"):
-            return self._power(args[0], args[1], self._nodes[node.args[1]], node.args[1])
-        rule = getattr(self, "_" + node.op, None)
-        if rule is None:
-            raise NotSmoothError(
-                f"CasADi's operation {node.op!r}: expected one with a Taylor recurrence (arithmetic, "
-                "powers, sqrt, exp, log, trigonometric and hyperbolic functions and their inverses, "
-                "atan2, erf), received another. Write it with these."
-            )
-        return rule(*args)
+    def _sum(self, a: Any, b: Any) -> Any:
+        return b if a is None else (a if b is None else self._on.clean(a + b))
 
-    # linear
-    def _assign(self, u: _Series) -> _Series:
-        return u
+    def _difference(self, a: Any, b: Any) -> Any:
+        if b is None:
+            return a
+        return self._on.clean(-b) if a is None else self._on.clean(a - b)
 
-    def _add(self, u: _Series, v: _Series) -> _Series:
-        return self._new(lambda k: _add(u.c[k], v.c[k]))
+    def _product(self, a: Any, b: Any) -> Any:
+        return None if a is None or b is None else self._on.clean(a * b)
 
-    def _sub(self, u: _Series, v: _Series) -> _Series:
-        return self._new(lambda k: _sub(u.c[k], v.c[k]))
+    def _scaled(self, a: Any, factor: float) -> Any:
+        return a if a is None or factor == 1.0 else self._on.clean(factor * a)
 
-    def _neg(self, u: _Series) -> _Series:
-        return self._new(lambda k: _sub(None, u.c[k]))
+    def _quotient_of(self, a: Any, b: Any) -> Any:
+        return None if a is None else self._on.divide(a, b)
 
-    def _twice(self, u: _Series) -> _Series:
-        return self._new(lambda k: _add(u.c[k], u.c[k]))
+    def _convolve(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
+        """Sum of u_i v_(k-i) for i from first to last."""
+        total = None
+        for i in range(first, last + 1):
+            total = self._sum(total, self._product(u[i], v[k - i]))
+        return total
 
-    # products and quotients
-    def _mul(self, u: _Series, v: _Series) -> _Series:
-        return self._new(lambda k: _sum([_mul(u.c[i], v.c[k - i]) for i in range(k + 1)]))
+    def _weigh(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
+        """Sum of i u_i v_(k-i) for i from first to last."""
+        total = None
+        for i in range(first, last + 1):
+            total = self._sum(total, self._scaled(self._product(u[i], v[k - i]), float(i)))
+        return total
 
-    def _sq(self, u: _Series) -> _Series:
-        def square(k: int) -> Coefficient:
-            half = _sum([_mul(u.c[i], u.c[k - i]) for i in range((k + 1) // 2)])
-            middle = None if k % 2 else _mul(u.c[k // 2], u.c[k // 2])
-            return _add(_scale(half, 2.0), middle)
+    # one recurrence for each rule ---------------------------------------------------------------
 
-        return self._new(square)
+    def _recurrence(self, j: int, rule: Rule) -> Callable[[int], Any]:
+        build = getattr(self, "_" + rule.rule)
+        recurrence: Callable[[int], Any] = build(rule, self.series[j], *self._arguments(rule))
+        return recurrence
 
-    def _div(self, u: _Series, v: _Series) -> _Series:
-        def quotient(k: int) -> Coefficient:
-            known = _sum([_mul(w.c[i], v.c[k - i]) for i in range(k)])
-            return _div(_sub(u.c[k], known), v.c[0])
+    def _arguments(self, rule: Rule) -> list[list[Any]]:
+        return [self.series[a] for a in rule.args]
 
-        w = self._new(quotient)
-        return w
+    def _constant(self, rule: Rule, _: list[Any]) -> Callable[[int], Any]:
+        value = self._on.number(rule.numbers[0])
+        return lambda k: None if k else value
 
-    def _inv(self, v: _Series) -> _Series:
-        return self._div(self._constant(1.0), v)
+    def _input(self, rule: Rule, _: list[Any]) -> Callable[[int], Any]:
+        vector, position = rule.place
+        if vector == 0:
+            return lambda k: self._moving[position]
+        return lambda k: None if k else self._still[position]
 
-    def _sqrt(self, u: _Series) -> _Series:
-        def root(k: int) -> Coefficient:
+    def _apply(self, rule: Rule, _: list[Any], *args: list[Any]) -> Callable[[int], Any]:
+        value = lambda: self._on.clean(self._on.apply(rule.operation, [a[0] for a in args]))
+        return lambda k: None if k else value()
+
+    def _add(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+        return lambda k: self._sum(u[k], v[k])
+
+    def _sub(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+        return lambda k: self._difference(u[k], v[k])
+
+    def _neg(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
+        return lambda k: self._difference(None, u[k])
+
+    def _twice(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
+        return lambda k: self._sum(u[k], u[k])
+
+    def _mul(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+        return lambda k: self._convolve(u, v, k, 0, k)
+
+    def _sq(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
+        def square(k: int) -> Any:
+            half = self._scaled(self._convolve(u, u, k, 0, (k + 1) // 2 - 1), 2.0)
+            return half if k % 2 else self._sum(half, self._product(u[k // 2], u[k // 2]))
+
+        return square
+
+    def _div(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+        return lambda k: self._quotient_of(
+            self._difference(u[k], self._convolve(w, v, k, 0, k - 1)), v[0]
+        )
+
+    def _sqrt(self, _: Rule, w: list[Any], u: list[Any]) -> Callable[[int], Any]:
+        def root(k: int) -> Any:
             if k == 0:
-                return _apply("sqrt", [u])
-            known = _sum([_mul(w.c[i], w.c[k - i]) for i in range(1, k)])
-            return _div(_scale(_sub(u.c[k], known), 0.5), w.c[0])
+                return self._on.apply("sqrt", [u[0]])
+            known = self._convolve(w, w, k, 1, k - 1)
+            return self._quotient_of(self._scaled(self._difference(u[k], known), 0.5), w[0])
 
-        w = self._new(root)
-        return w
+        return root
 
-    def _power(self, u: _Series, v: _Series, exponent: Node, number: int) -> _Series:
-        """u^v; natural powers by squaring, so that u = 0 is a regular point."""
-        if self._moving[number]:
-            return self._exp(self._mul(v, self._log(u)))
-        a = float(exponent.payload) if exponent.op == "const" else 0.5  # type: ignore[arg-type]
-        if a.is_integer() and 0 < abs(a) <= 64:
-            power = self._natural_power(u, int(abs(a)))
-            return power if a > 0 else self._inv(power)
-
-        def general(k: int) -> Coefficient:
+    def _power(self, _: Rule, w: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+        def power(k: int) -> Any:
             if k == 0:
-                return _apply("pow", [u, v])
-            a = _value(v.c[0])
-            terms = [_mul(_clean(a * (k - j) - j), _mul(u.c[k - j], w.c[j])) for j in range(k)]
-            return _scale(_div(_sum(terms), u.c[0]), 1.0 / k)
+                return self._on.apply("pow", [u[0], v[0]])
+            total = None
+            for j in range(k):
+                factor = self._difference(self._scaled(v[0], float(k - j)), self._on.number(j))
+                term = self._product(factor, self._product(u[k - j], w[j]))
+                total = self._sum(total, term)
+            return self._scaled(self._quotient_of(total, u[0]), 1.0 / k)
 
-        w = self._new(general)
-        return w
+        return power
 
-    def _natural_power(self, u: _Series, n: int) -> _Series:
-        result: _Series | None = None
-        while True:
-            if n & 1:
-                result = u if result is None else self._mul(result, u)
-            n >>= 1
-            if not n:
-                assert result is not None
-                return result
-            u = self._sq(u)
+    def _affine(self, rule: Rule, _: list[Any], u: list[Any]) -> Callable[[int], Any]:
+        offset, factor = rule.numbers
+        constant = self._on.number(offset)
+        return lambda k: self._sum(None if k else constant, self._scaled(u[k], factor))
 
-    def _hypot(self, u: _Series, v: _Series) -> _Series:
-        return self._sqrt(self._add(self._sq(u), self._sq(v)))
+    def _integral(
+        self, rule: Rule, _: list[Any], u: list[Any], g: list[Any]
+    ) -> Callable[[int], Any]:
+        (sign,) = rule.numbers
 
-    # integrals: w' = g u' and w' = u'/g
-    def _constant(self, value: float) -> _Series:
-        return self._new(lambda k: ca.SX(value) if k == 0 else None)
-
-    def _affine(self, u: _Series, offset: float, factor: float = 1.0) -> _Series:
-        """Offset + factor*u."""
-        return self._new(lambda k: _add(ca.SX(offset) if k == 0 else None, _scale(u.c[k], factor)))
-
-    def _integral(self, op: str, u: _Series, factor: list[_Series], sign: float = 1.0) -> _Series:
-        """w = op(u) with w' = sign*g*u'; the caller puts g, which may need w, into ``factor``."""
-
-        def recurrence(k: int) -> Coefficient:
+        def integral(k: int) -> Any:
             if k == 0:
-                return _apply(op, [u])
-            g = factor[0]
-            terms = [_scale(_mul(u.c[j], g.c[k - j]), float(j)) for j in range(1, k + 1)]
-            return _scale(_sum(terms), sign / k)
+                return self._on.apply(rule.operation, [u[0]])
+            return self._scaled(self._weigh(u, g, k, 1, k), sign / k)
 
-        return self._new(recurrence)
+        return integral
 
-    def _quotient(self, op: str, u: _Series, g: _Series, sign: float = 1.0) -> _Series:
-        """w = op(u) with w' = sign*u'/g."""
+    def _quotient(
+        self, rule: Rule, w: list[Any], u: list[Any], g: list[Any]
+    ) -> Callable[[int], Any]:
+        (sign,) = rule.numbers
 
-        def recurrence(k: int) -> Coefficient:
+        def quotient(k: int) -> Any:
             if k == 0:
-                return _apply(op, [u])
-            known = [_scale(_mul(w.c[j], g.c[k - j]), float(j)) for j in range(1, k)]
-            top = _sub(_scale(u.c[k], sign * k), _sum(known))
-            return _scale(_div(top, g.c[0]), 1.0 / k)
+                return self._on.apply(rule.operation, [u[0]])
+            known = self._weigh(w, g, k, 1, k - 1)
+            top = self._difference(self._scaled(u[k], sign * k), known)
+            return self._scaled(self._quotient_of(top, g[0]), 1.0 / k)
 
-        w = self._new(recurrence)
-        return w
+        return quotient
 
-    def _exp(self, u: _Series) -> _Series:
-        factor: list[_Series] = []
-        factor.append(self._integral("exp", u, factor))
-        return factor[0]
-
-    def _expm1(self, u: _Series) -> _Series:
-        factor: list[_Series] = []
-        w = self._integral("expm1", u, factor)
-        factor.append(self._affine(w, 1.0))
-        return w
-
-    def _log(self, u: _Series) -> _Series:
-        return self._quotient("log", u, u)
-
-    def _log1p(self, u: _Series) -> _Series:
-        return self._quotient("log1p", u, self._affine(u, 1.0))
-
-    def _pair(self, one: str, other: str, u: _Series, signs: tuple[float, float]) -> _Series:
-        of_one: list[_Series] = []
-        of_other: list[_Series] = []
-        of_other.append(self._integral(one, u, of_one, signs[0]))
-        of_one.append(self._integral(other, u, of_other, signs[1]))
-        return of_other[0]
-
-    def _sin(self, u: _Series) -> _Series:
-        return self._pair("sin", "cos", u, (1.0, -1.0))
-
-    def _cos(self, u: _Series) -> _Series:
-        return self._pair("cos", "sin", u, (-1.0, 1.0))
-
-    def _sinh(self, u: _Series) -> _Series:
-        return self._pair("sinh", "cosh", u, (1.0, 1.0))
-
-    def _cosh(self, u: _Series) -> _Series:
-        return self._pair("cosh", "sinh", u, (1.0, 1.0))
-
-    def _tan(self, u: _Series) -> _Series:
-        factor: list[_Series] = []
-        w = self._integral("tan", u, factor)
-        factor.append(self._affine(self._sq(w), 1.0))
-        return w
-
-    def _tanh(self, u: _Series) -> _Series:
-        factor: list[_Series] = []
-        w = self._integral("tanh", u, factor)
-        factor.append(self._affine(self._sq(w), 1.0, -1.0))
-        return w
-
-    def _erf(self, u: _Series) -> _Series:
-        bell = self._exp(self._neg(self._sq(u)))
-        return self._integral("erf", u, [bell], 2.0 / math.sqrt(math.pi))
-
-    def _erfinv(self, u: _Series) -> _Series:
-        factor: list[_Series] = []
-        w = self._integral("erfinv", u, factor, math.sqrt(math.pi) / 2.0)
-        factor.append(self._exp(self._sq(w)))
-        return w
-
-    def _asin(self, u: _Series) -> _Series:
-        return self._quotient("asin", u, self._sqrt(self._affine(self._sq(u), 1.0, -1.0)))
-
-    def _acos(self, u: _Series) -> _Series:
-        return self._quotient("acos", u, self._sqrt(self._affine(self._sq(u), 1.0, -1.0)), -1.0)
-
-    def _atan(self, u: _Series) -> _Series:
-        return self._quotient("atan", u, self._affine(self._sq(u), 1.0))
-
-    def _asinh(self, u: _Series) -> _Series:
-        return self._quotient("asinh", u, self._sqrt(self._affine(self._sq(u), 1.0)))
-
-    def _acosh(self, u: _Series) -> _Series:
-        return self._quotient("acosh", u, self._sqrt(self._affine(self._sq(u), -1.0)))
-
-    def _atanh(self, u: _Series) -> _Series:
-        return self._quotient("atanh", u, self._affine(self._sq(u), 1.0, -1.0))
-
-    def _atan2(self, y: _Series, x: _Series) -> _Series:
-        radius = self._add(self._sq(x), self._sq(y))
-
-        def recurrence(k: int) -> Coefficient:
+    def _atan2(
+        self, _: Rule, w: list[Any], y: list[Any], x: list[Any], radius: list[Any]
+    ) -> Callable[[int], Any]:
+        def angle(k: int) -> Any:
             if k == 0:
-                return _apply("atan2", [y, x])
-            turn = [
-                _sub(
-                    _scale(_mul(x.c[k - j], y.c[j]), float(j)),
-                    _scale(_mul(y.c[k - j], x.c[j]), float(j)),
-                )
-                for j in range(1, k + 1)
-            ]
-            known = [_scale(_mul(w.c[j], radius.c[k - j]), float(j)) for j in range(1, k)]
-            return _scale(_div(_sub(_sum(turn), _sum(known)), radius.c[0]), 1.0 / k)
+                return self._on.apply("atan2", [y[0], x[0]])
+            turn = self._difference(self._weigh(y, x, k, 1, k), self._weigh(x, y, k, 1, k))
+            top = self._difference(turn, self._weigh(w, radius, k, 1, k - 1))
+            return self._scaled(self._quotient_of(top, radius[0]), 1.0 / k)
 
-        w = self._new(recurrence)
-        return w
-
-
-def _apply(op: str, args: Sequence[_Series]) -> ca.SX:
-    """Evaluate an operation at order zero."""
-    code = getattr(ca, "OP_" + op.upper())
-    values = [_value(a.c[0]) for a in args]
-    if len(values) == 1:
-        return ca.SX.unary(code, values[0])
-    return ca.SX.binary(code, values[0], values[1])
+        return angle

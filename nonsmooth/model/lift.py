@@ -34,9 +34,9 @@ from itertools import product
 
 import casadi as ca
 
-from .cancel import Sum, _apply, _normal_forms
+from .cancel import Sum, normal_forms, simple_zeros
 from .errors import DefinitionError, NotSmoothError, explain
-from .graph import NOT_SMOOTH, Node, instructions
+from .graph import NOT_SMOOTH, evaluate, instructions, operation
 
 #: A switch that depends on more switches than this is refused: 2^n copies of it would be needed.
 _MOST_NESTED = 6
@@ -168,19 +168,12 @@ class _Lifter:
         self.states, self.moving = states, self.inputs[0]
         self.nodes, self.rows = instructions(self.inputs, [rhs])
         self.switches: list[_Switch] = []
+        self.done = 0  # nodes evaluated: the number of the one under way
         names = {str(s) for s in ca.vertsplit(ca.vertcat(*self.inputs))}
         self.prefix = next(p for p in _prefixes() if not any(n.startswith(p) for n in names))
 
     def run(self) -> Lifting:
-        values: list[_Value] = []
-        for number, node in enumerate(self.nodes):
-            args = [values[k] for k in node.args]
-            try:
-                values.append(self._value(node, args))
-            except NotSmoothError as error:
-                raise type(error)(f"{self._entry_of(number)}: {error}") from None
-            except DefinitionError as error:
-                raise DefinitionError(f"{self._entry_of(number)}: {error}") from None
+        values = evaluate(self.nodes, self)
         entries = [self._affine(values[k]) for k in self.rows[0]]
         return self._finish(ca.vertcat(*entries))
 
@@ -200,18 +193,35 @@ class _Lifter:
 
     # one node ----------------------------------------------------------------------------------
 
-    def _value(self, node: Node, args: list[_Value]) -> _Value:
-        if node.op == "const":
-            return _Value(ca.SX(node.payload))
-        if node.op == "input":
-            vector, position = node.place
-            return _Value(self.inputs[vector][position])
-        if node.op == "if_else_zero":
+    def constant(self, value: float) -> _Value:
+        """Part of the graph's evaluation."""
+        return self._counted(_Value(ca.SX(value)))
+
+    def symbol(self, vector: int, position: int) -> _Value:
+        """Part of the graph's evaluation."""
+        return self._counted(_Value(self.inputs[vector][position]))
+
+    def apply(self, op: str, args: Sequence[_Value]) -> _Value:
+        """Part of the graph's evaluation."""
+        try:
+            return self._counted(self._operation(op, args))
+        except (NotSmoothError, DefinitionError) as error:
+            raise type(error)(f"{self._entry_of(self.done)}: {error}") from None
+
+    def _counted(self, value: _Value) -> _Value:
+        self.done += 1
+        return value
+
+    def _operation(self, op: str, args: Sequence[_Value]) -> _Value:
+        if op == "if_else_zero":
             return self._if_else(*args)
         inside = frozenset().union(*(a.inside for a in args))
-        if node.op in NOT_SMOOTH:
-            return self._over_sides(args, inside, lambda e: self._switch(node.op, e))
-        return _Value(_apply(node.op, [a.e for a in args]), inside)
+        if op in NOT_SMOOTH:
+            return self._over_sides(list(args), inside, lambda e: self._switch(op, e))
+        if op == "sqrt" and args[0].e.op() == ca.OP_SQ:  # CasADi would make it fabs by itself
+            inner = [_Value(args[0].e.dep(0), inside)]
+            return self._over_sides(inner, inside, lambda e: self._switch("fabs", e))
+        return _Value(operation(op, [a.e for a in args]), inside)
 
     def _over_sides(
         self,
@@ -270,12 +280,12 @@ class _Lifter:
         condition, value = args
         if ca.depends_on(condition.e, self.moving):
             raise _cannot("if_else", "a condition that is not a comparison", condition.e, _EQUALITY)
-        return _Value(_apply("if_else_zero", [condition.e, value.e]), value.inside)
+        return _Value(operation("if_else_zero", [condition.e, value.e]), value.inside)
 
     def _switch(self, op: str, args: list[_Value]) -> _Value:
         e = [a.e for a in args]
         if not any(ca.depends_on(a, self.moving) for a in e):
-            return _Value(_apply(op, e))
+            return _Value(operation(op, e))
         if op == "sign":
             return self._sign(e[0], "sign")
         if op == "fabs":
@@ -289,15 +299,15 @@ class _Lifter:
             larger, smaller = (0, 1) if op == "fmax" else (1, 0)
             return self._choice(e[0] - e[1], e[larger], e[smaller], op)
         if op == "copysign":
-            size, side = self._choice(e[0], e[0], -e[0], op), self._sign(e[1], op)
+            size, side = self._choice(e[0], e[0], -e[0], op), self._sign(e[1], op, of_zero=1)
             return _Value(size.e * side.e, size.inside | side.inside)
         advice = _REFUSED.get(op, "A number that moves is no condition: compare it with another.")
-        raise _cannot(NOT_SMOOTH[op], "one of the states", _apply(op, e), advice)
+        raise _cannot(NOT_SMOOTH[op], "one of the states", operation(op, e), advice)
 
-    def _sign(self, h: ca.SX, origin: str) -> _Value:
+    def _sign(self, h: ca.SX, origin: str, of_zero: int = 0) -> _Value:
         number, side = self._surface(h, origin)
         if number is None:
-            return _Value(ca.SX(side))
+            return _Value(ca.SX(side or of_zero))
         return _Value(side * self.switches[number].lam, frozenset([number]))
 
     def _choice(self, h: ca.SX, above: ca.SX, below: ca.SX, origin: str) -> _Value:
@@ -315,6 +325,7 @@ class _Lifter:
 
         The number is None where h is a constant; then the sign is that of h.
         """
+        h = simple_zeros(h, *self.inputs)
         forms = self._forms([h, *(s.h for s in self.switches)])
         if all(monomial == () for monomial in forms[0]):
             c = forms[0].get((), 0.0)
@@ -340,7 +351,7 @@ class _Lifter:
         return k, 1
 
     def _forms(self, expressions: list[ca.SX]) -> list[Sum]:
-        return [row[0] for row in _normal_forms(self.inputs, expressions)[1]]
+        return [row[0] for row in normal_forms(self.inputs, expressions)[1]]
 
     # the result --------------------------------------------------------------------------------
 

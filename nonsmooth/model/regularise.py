@@ -31,9 +31,10 @@ from dataclasses import dataclass
 import casadi as ca
 
 from .checks import real, require_system
+from .definition import Reset, Stop
 from .errors import DefinitionError, OptionError, explain
-from .system import FilippovSystem, Reset, Stop
-from .system import _expression as read_value
+from .reading import scalar
+from .system import FilippovSystem
 
 
 @dataclass(frozen=True)
@@ -136,13 +137,17 @@ def regularise(
     width = ca.SX.sym(name)
     surfaces = [system.surface_function(i) for i in range(system.surface_count)]
     multipliers = ca.vertcat(*[ca.SX(chosen.phi(h / width)) for h in surfaces])
-    symbols = system.parameter_symbols
-    known = dict(
-        zip([symbols[i] for i in range(symbols.numel())], system._defaults.values(), strict=True)
-    )
+    p = system.parameter_symbols
+    symbols = [p[i] for i in range(p.numel())]
+    known = dict(zip(symbols, system.definition.defaults.values(), strict=True))
     n, stops = system.dimension, system.stops
     resets = [
-        Reset(system._guards[len(stops) + j], ca.vertsplit(system._maps[:, j]), direction, label)
+        Reset(
+            system.definition.guards[len(stops) + j],
+            ca.vertsplit(system.definition.maps[:, j]),
+            direction,
+            label,
+        )
         for j, (label, direction) in enumerate(system.resets)
     ]
     if edges:
@@ -152,7 +157,7 @@ def regularise(
         field=ca.vertsplit(system.field_with(multipliers))[:n],
         parameters={**known, width: eps},
         time=system.extended_states[n] if system.time_dependent else None,
-        stops=[Stop(system._guards[i], d, label) for i, (label, d) in enumerate(stops)],
+        stops=[Stop(system.definition.guards[i], d, label) for i, (label, d) in enumerate(stops)],
         resets=resets,
     )
 
@@ -162,7 +167,7 @@ def _chosen(transition: str | Callable[[ca.SX], ca.SX]) -> Transition:
         return TRANSITIONS[transition]
     if callable(transition):
         s = ca.SX.sym("s")
-        phi = read_value(transition(s), "transition")
+        phi = scalar(transition(s), "transition")
         values = ca.Function("phi", [s], [phi])
         low, high = float(values(-1e12)), float(values(1e12))
         if abs(low + 1.0) < 1e-6 and abs(high - 1.0) < 1e-6:

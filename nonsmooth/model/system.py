@@ -1,73 +1,28 @@
 """WHAT a nonsmooth system is: states, parameters, fields, switching surfaces, stops and resets.
 
-One representation serves both ways in. Internally the state carries the time as a last component
-when the system depends on it, so Lie derivatives and jets include the explicit-time terms without
-any special case.
+Internally the state carries the time as a last component when the system depends on it, so Lie
+derivatives and jets include the explicit-time terms without any special case.
 """
 
 from __future__ import annotations
 
 import hashlib
-import math
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Hashable, Sequence
+from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from .checks import real, real_array
-from .errors import DefinitionError, ParameterError, PointError, explain
-from .graph import require_smooth
+from .cache import Cache, Content
+from .checks import real
+from .definition import Definition, Impact, Reset, Stop, read_definition
+from .errors import DefinitionError, PointError, explain
 from .lift import LiftedSwitch, lift
+from .reading import Expression, Parameters, column, listed, matrix, require_known, scalar
+from .values import Array, parameter_values, state_values
 
-Array = NDArray[np.float64]
-Expression = Any  # a CasADi SX scalar, a number, or (for vectors) a sequence of these
-Parameters = Mapping[Any, float | None]
-
-_DIRECTIONS = (-1, 0, 1)
-
-
-@dataclass(frozen=True)
-class Stop:
-    """A surface that ends a run.
-
-    Parameters
-    ----------
-    function : expression
-        The run ends where it is zero.
-    direction : {-1, 0, 1}
-        Only when falling, either way, only when rising.
-    name : str
-        Shown in events and messages.
-    """
-
-    function: Expression
-    direction: int = 0
-    name: str = "stop"
-
-
-@dataclass(frozen=True)
-class Reset:
-    """A surface on which the state jumps, x -> ``map``.
-
-    Parameters
-    ----------
-    function : expression
-        The jump happens where it is zero.
-    map : sequence of expressions
-        The new state, in the order of the states.
-    direction : {-1, 0, 1}
-        Only when falling, either way, only when rising.
-    name : str
-        Shown in events and messages.
-    """
-
-    function: Expression
-    map: Sequence[Expression]
-    direction: int = 0
-    name: str = "reset"
+T = TypeVar("T")
 
 
 class FilippovSystem:
@@ -97,6 +52,8 @@ class FilippovSystem:
         The symbol of time if the system depends on it.
     stops : sequence of Stop, optional
     resets : sequence of Reset, optional
+    impacts : sequence of Impact, optional
+        Contacts that cannot be passed.
     hidden : bool, optional
         Allow multipliers that enter nonlinearly (hidden dynamics, Jeffrey 2018): sliding then
         follows a stable solution lambda of grad h . f(x, lambda) = 0.
@@ -133,45 +90,26 @@ class FilippovSystem:
         parameters: Parameters | Sequence[Expression] | None = None,
         time: Expression | None = None,
         stops: Sequence[Stop] = (),
-        resets: Sequence[Reset] = (),
+        resets: Sequence[Reset] | Reset = (),
+        impacts: Sequence[Impact] | Impact = (),
         hidden: bool = False,
     ):
-        x = _symbols(states, "states")
-        if x.numel() == 0:
-            raise DefinitionError("states: expected at least one symbol, received none.")
-        t = _symbols([time], "time") if time is not None else ca.SX(0, 1)
-        p, self._defaults = _parameter_symbols(parameters)
-        h = _surface_expressions(surface, surfaces)
-        if above is not None or below is not None:
-            lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
-        else:
-            lam = _symbols(_listed(multipliers), "multipliers")
-            f = _column(field, "field", x.numel())
-        if lam.numel() != h.numel():
-            raise DefinitionError(
-                explain(
-                    "multipliers",
-                    expected=f"one for each of the {h.numel()} surfaces",
-                    received=str(lam.numel()),
-                    advice="Surface i switches multiplier i.",
-                )
-            )
-        stops, resets = _items(stops, Stop, "stops"), _items(resets, Reset, "resets")
-        guards = [_column([s.function], f"stop {s.name!r}", 1) for s in stops]
-        guards += [_column([r.function], f"reset {r.name!r}", 1) for r in resets]
-        maps = [_column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
-        items: list[Stop | Reset] = [*stops, *resets]
-        for item in items:
-            if isinstance(item.direction, bool) or item.direction not in _DIRECTIONS:
-                raise DefinitionError(
-                    f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
-                    f"received {item.direction!r}."
-                )
-        self._adopt(x, t, p, lam, f, h, ca.vertcat(*guards), ca.horzcat(*maps))
-        self.stops = tuple((s.name, s.direction) for s in stops)
-        self.resets = tuple((r.name, r.direction) for r in resets)
-        self.hidden = hidden
-        self._check()
+        definition = read_definition(
+            states,
+            surface=surface,
+            above=above,
+            below=below,
+            field=field,
+            multipliers=multipliers,
+            surfaces=surfaces,
+            parameters=parameters,
+            time=time,
+            stops=stops,
+            resets=resets,
+            impacts=impacts,
+            hidden=hidden,
+        )
+        self._adopt(definition)
 
     # construction ------------------------------------------------------------------------------
 
@@ -187,7 +125,8 @@ class FilippovSystem:
         parameters: Parameters | Sequence[Expression] | None = None,
         time: Expression | None = None,
         stops: Sequence[Stop] = (),
-        resets: Sequence[Reset] = (),
+        resets: Sequence[Reset] | Reset = (),
+        impacts: Sequence[Impact] | Impact = (),
         hidden: bool = False,
     ) -> FilippovSystem:
         """Find sign, fabs, fmin, fmax and if_else in x' = ``rhs`` and make them surfaces.
@@ -199,8 +138,8 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets
-            As for the class. Stops and resets must be smooth.
+        states, parameters, time, stops, resets, impacts
+            As for the class. Stops, resets and gaps must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
         hidden : bool, optional
@@ -232,12 +171,12 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        n = len(_listed(states))
-        frame = cls(states, field=[0] * n, parameters=parameters, time=time)
-        entries = _column(rhs, "rhs", n)
-        known = ca.vertcat(frame.extended_states, frame._p)
-        _no_foreign_symbols(entries, known, "rhs", frame)
-        found = lift(entries, frame._x, frame._t, frame._p, hidden=hidden)
+        n = len(listed(states))
+        frame = cls(states, field=[0] * n, parameters=parameters, time=time).definition
+        entries = column(rhs, "rhs", n)
+        known = ca.vertcat(frame.extended_states, frame.parameters)
+        require_known(entries, known, "rhs", **frame.names)
+        found = lift(entries, frame.states, frame.time, frame.parameters, hidden=hidden)
         system = cls(
             states,
             field=found.field,
@@ -247,65 +186,24 @@ class FilippovSystem:
             time=time,
             stops=stops,
             resets=resets,
+            impacts=impacts,
             hidden=hidden,
         )
         system.lifted = found.switches
         return system
 
-    def _adopt(
-        self,
-        x: ca.SX,
-        t: ca.SX,
-        p: ca.SX,
-        lam: ca.SX,
-        f: ca.SX,
-        h: ca.SX,
-        guards: ca.SX,
-        maps: ca.SX,
-    ) -> None:
-        self._x, self._t, self._p, self._lam = x, t, p, lam
-        self._f, self._h = f, h
-        self._guards, self._maps = guards, maps
-        self._functions: dict[Any, Any] = {}
-        self.nonlinear = tuple(not ca.is_linear(f, lam[i]) for i in range(lam.numel()))
-        self.state_names = tuple(s.name() for s in ca.vertsplit(x))
-        self.parameter_names = tuple(s.name() for s in ca.vertsplit(p)) if p.numel() else ()
-
-    def _check(self) -> None:
-        named = [("field", self._f, True)]
-        named += [(f"surface {i}", self._h[i], False) for i in range(self.surface_count)]
-        guard_names = [f"stop {n!r}" for n, _ in self.stops]
-        guard_names += [f"reset {n!r}" for n, _ in self.resets]
-        named += [(name, self._guards[i], False) for i, name in enumerate(guard_names)]
-        named += [
-            (f"map of reset {self.resets[j][0]!r}", self._maps[:, j], False)
-            for j in range(len(self.resets))
-        ]
-        known = ca.vertcat(self.extended_states, self._p, self._lam)
-        _unique(known)
-        moving = ca.vertcat(self.extended_states, self._lam)
-        for what, expression, multipliers in named:
-            _no_foreign_symbols(expression, known, what, self)
-            if not multipliers and ca.depends_on(expression, self._lam):
-                raise DefinitionError(
-                    f"{what}: expected an expression in states, time and parameters, received one "
-                    "with a multiplier. Only the field may contain multipliers."
-                )
-            _finite_constants(expression, known, what)
-            require_smooth(expression, moving, self._p, what)
-        for i, name in enumerate(guard_names):
-            if not ca.depends_on(self._guards[i], self.extended_states):
-                raise DefinitionError(_without_states(name, self._guards[i], self))
-        for i in range(self.surface_count):
-            if not ca.depends_on(self._h[i], self._x):
-                raise DefinitionError(_without_states(f"surface {i}", self._h[i], self))
-            if self.nonlinear[i] and not self.hidden:
-                raise DefinitionError(
-                    f"multiplier {self._lam[i]}: expected a field linear in it (Filippov's convex "
-                    "combination), received a nonlinear one. Nonlinear multipliers are hidden "
-                    "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
-                    "different multipliers are fine."
-                )
+    def _adopt(self, definition: Definition) -> None:
+        self.definition = definition
+        self.stops, self.resets = definition.stops, definition.resets
+        self.impacts = definition.impacts
+        self.hidden = definition.hidden
+        field, multipliers = definition.field, listed(definition.multipliers)
+        self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
+        names = definition.names
+        self.state_names = tuple(names["states"])
+        self.parameter_names = tuple(names["parameters"])
+        self._extended_states = definition.extended_states
+        self._cache = Cache()
 
     def __repr__(self) -> str:
         parts = [
@@ -316,64 +214,55 @@ class FilippovSystem:
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
         if self.time_dependent:
-            parts.append(f"time {self._t}")
+            parts.append(f"time {self.definition.time}")
         parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
+        parts += [f"impact {n!r}" for n in self.impacts]
         return f"FilippovSystem({'; '.join(parts)})"
 
     def __getstate__(self) -> dict[str, Any]:
-        inputs = [self._x, self._t, self._p, self._lam]
-        outputs = [self._f, self._h, self._guards, self._maps]
-        return {
-            "definition": ca.Function("definition", inputs, outputs).serialize(),
-            "names": [[str(s) for s in ca.vertsplit(v)] if v.numel() else [] for v in inputs],
-            "defaults": self._defaults,
-            "stops": self.stops,
-            "resets": self.resets,
-            "hidden": self.hidden,
-            "lifted": self.lifted,
-        }
+        return {**self.definition.state(), "lifted": self.lifted}
 
     def __setstate__(self, state: dict[str, Any]) -> None:
-        definition = ca.Function.deserialize(state["definition"])
-        vectors = [ca.vertcat(*map(ca.SX.sym, names)) for names in state["names"]]
-        vectors = [v if v.numel() else ca.SX(0, 1) for v in vectors]
-        self._adopt(*vectors, *(ca.SX(e) for e in definition.call(vectors)))
-        self._defaults = state["defaults"]
-        self.stops, self.resets = state["stops"], state["resets"]
-        self.lifted = state.get("lifted", ())
-        self.hidden = state["hidden"]
+        self._adopt(Definition.from_state(state))
+        self.lifted = state["lifted"]
 
     # shape -------------------------------------------------------------------------------------
 
     @property
     def dimension(self) -> int:
         """Number n of states."""
-        return int(self._x.numel())
+        return int(self.definition.states.numel())
 
     @property
     def surface_count(self) -> int:
         """Number of switching surfaces."""
-        return int(self._h.numel())
+        return int(self.definition.surfaces.numel())
+
+    @property
+    def coupled(self) -> bool:
+        """Whether multipliers are not eliminated: several surfaces, one that enters nonlinearly, or
+        reactions."""
+        return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
 
     @property
     def time_dependent(self) -> bool:
         """Whether the system depends on time explicitly."""
-        return bool(self._t.numel())
+        return bool(self.definition.time.numel())
 
     @property
     def extended_dimension(self) -> int:
         """Number of states, plus one if the system depends on time."""
-        return int(self._x.numel() + self._t.numel())
+        return int(self.definition.states.numel() + self.definition.time.numel())
 
     @property
     def extended_states(self) -> ca.SX:
         """The states, followed by the time where the system depends on it (SX column)."""
-        return ca.vertcat(self._x, self._t)
+        return self._extended_states
 
     @property
     def parameter_symbols(self) -> ca.SX:
         """The parameters as an SX column, in the order of ``parameter_names``."""
-        return self._p
+        return self.definition.parameters
 
     @property
     def modes(self) -> tuple[str, ...]:
@@ -393,7 +282,7 @@ class FilippovSystem:
 
     def surface_function(self, surface: int = 0) -> ca.SX:
         """Return the switching function h of a surface (SX scalar)."""
-        return self._h[self._index(surface)]
+        return self.definition.surfaces[self.surface_index(surface)]
 
     def field(self, mode: str) -> ca.SX:
         """Right-hand side of a mode without sliding, time row included (SX, extended dimension).
@@ -408,30 +297,90 @@ class FilippovSystem:
             raise DefinitionError(f"field: expected a mode of + and -, received {mode!r}.")
         return self.field_with(ca.DM(list(signs)))
 
-    def field_with(self, multipliers: Any) -> ca.SX:
-        """Right-hand side for given multipliers (values or expressions), time row included."""
-        f = ca.substitute(self._f, self._lam, multipliers) if self.surface_count else self._f
-        return ca.vertcat(f, ca.SX.ones(self._t.numel(), 1))
+    def mode_field(self, mode: str) -> ca.SX:
+        """Right-hand side of any mode, sliding included, time row included (SX, extended dimension).
+
+        Parameters
+        ----------
+        mode : str
+            One letter for each surface; at most one ``s``, of a surface whose multiplier is linear.
+
+        Returns
+        -------
+        SX
+            While sliding Filippov's field, with the factor cancelled that makes it 0/0 where both
+            fields coincide.
+
+        Raises
+        ------
+        DefinitionError
+            A mode whose multipliers are only known implicitly.
+
+        Examples
+        --------
+        >>> import casadi as ca
+        >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+        >>> FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1]).mode_field("s")
+        SX([2, 0])
+        """
+        from .motion import motion  # which is built on this class
+
+        found = motion(self, mode)
+        if found.states.numel() != self.extended_dimension:
+            raise DefinitionError(
+                f"mode_field: expected a mode whose field is explicit, received {mode!r}. On several "
+                "surfaces, or where a multiplier enters nonlinearly, only an equation for the "
+                "multipliers is known: use sliding_branches for their values at a point."
+            )
+        return found.field
+
+    def field_with(self, multipliers: Any, reactions: Any = None) -> ca.SX:
+        """Right-hand side for given multipliers (values or expressions), time row included.
+
+        Reactions of impacts are zero unless given.
+        """
+        d, f = self.definition, self.definition.field
+        if self.surface_count:
+            f = ca.substitute(f, d.multipliers, multipliers)
+        if self.impacts:
+            f = ca.substitute(f, d.reactions, 0 if reactions is None else reactions)
+        return ca.vertcat(f, ca.SX.ones(d.time.numel(), 1))
 
     def parse_mode(self, mode: str) -> tuple[int, ...]:
-        """Turn letters into signs: ``+`` 1, ``-`` -1, ``s`` 0.
+        """Turn the letters of the surfaces into signs: ``+`` 1, ``-`` -1, ``s`` 0.
 
         Raises
         ------
         DefinitionError
             A wrong number of letters or another letter.
         """
-        letters = {"+": 1, "-": -1, "s": 0}
-        if not isinstance(mode, str) or len(mode) != self.surface_count or set(mode) - set(letters):
+        return self.parse_letters(mode)[: self.surface_count]
+
+    def parse_letters(self, mode: str) -> tuple[int, ...]:
+        """Turn the letters of surfaces and impacts into signs: ``+`` 1, ``-`` -1, ``s`` 0, ``o`` 1
+        and ``c`` 0. Letters of the impacts may be missing: open.
+
+        Raises
+        ------
+        DefinitionError
+            A wrong number of letters or another letter.
+        """
+        letters = {"+": 1, "-": -1, "s": 0, "o": 1, "c": 0}
+        m, c = self.surface_count, len(self.impacts)
+        whole = mode + "o" * c if isinstance(mode, str) and len(mode) == m else mode
+        fits = isinstance(whole, str) and len(whole) == m + c
+        if not fits or set(whole[:m]) - set("+-s") or set(whole[m:]) - set("oc"):
+            contacts = f", and {c}, each of o c, one per impact" if c else ""
             raise DefinitionError(
                 explain(
                     "mode",
-                    expected=f"{self.surface_count} letter(s), each of + - s, one per surface",
+                    expected=f"{m} letter(s), each of + - s, one per surface{contacts}",
                     received=repr(mode),
-                    advice="'+' is h > 0, '-' is h < 0, 's' is sliding.",
+                    advice="'+' is h > 0, '-' is h < 0, 's' is sliding"
+                    + ("; 'o' is an open contact, 'c' a closed one." if c else "."),
                 )
             )
-        return tuple(letters[c] for c in mode)
+        return tuple(letters[letter] for letter in whole)
 
     def lie_derivative(
         self, fields: str | Sequence[str], surface: int = 0, of: Expression | None = None
@@ -459,17 +408,17 @@ class FilippovSystem:
         >>> s.lie_derivative("+"), s.lie_derivative("++"), s.lie_derivative("+-")
         (SX((-y)), SX(-1), SX(2))
         """
-        key = ("lie", tuple(fields), surface)
-        if of is None and key in self._functions:
-            return self._functions[key]
-        expression = self.surface_function(surface) if of is None else ca.SX(of)
+        if of is None:
+            key = ("Lie derivative", tuple(fields), surface)
+            function = self.surface_function(surface)
+            return self.cached(key, lambda: self._derive(fields, function))
+        return self._derive(fields, ca.SX(of))
+
+    def _derive(self, fields: str | Sequence[str], expression: ca.SX) -> ca.SX:
         for mode in reversed(list(fields)):
             gradient = ca.jacobian(expression, self.extended_states)
             expression = ca.mtimes(gradient, self.field(mode))
-        expression = ca.simplify(expression)
-        if of is None:
-            self._functions[key] = expression
-        return expression
+        return ca.simplify(expression)
 
     def gradient(self, expression: Expression) -> ca.SX:
         """Derivatives of a scalar with respect to the states, then time if it depends on it.
@@ -485,19 +434,42 @@ class FilippovSystem:
         >>> ns.FilippovSystem([x, v], surface=v, above=[v, -x - 1], below=[v, 1 - x]).gradient(x * v)
         SX([[v, x]])
         """
-        return ca.densify(ca.jacobian(_expression(expression, "expression"), self.extended_states))
+        return ca.densify(ca.jacobian(scalar(expression, "expression"), self.extended_states))
+
+    def parameter_gradient(self, expression: Expression) -> ca.SX:
+        """Derivatives of a scalar with respect to the parameters, in the order of their names.
+
+        Returns
+        -------
+        SX row (1, number of parameters)
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, a, b = ca.SX.sym("x"), ca.SX.sym("a"), ca.SX.sym("b")
+        >>> system = ns.FilippovSystem([x], field=[a * x], parameters=[a, b])
+        >>> system.parameter_gradient(a * x + b)
+        SX([[x, 1]])
+        """
+        return ca.densify(ca.jacobian(scalar(expression, "expression"), self.parameter_symbols))
 
     # numeric -----------------------------------------------------------------------------------
 
+    def cached(self, key: Hashable, build: Callable[[], T]) -> T:
+        """Return what was built for a key, or build it; the last 256 things are kept."""
+        return self._cache.get(key, build)
+
     def function(
-        self, key: Any, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
+        self, key: Hashable, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
     ) -> ca.Function:
         """Return the cached CasADi function (states, p) -> ``build()``; states as extended."""
-        if key not in self._functions:
+
+        def made() -> ca.Function:
             outputs = [ca.densify(ca.SX(e)) for e in build()]
             x = self.extended_states if states is None else states
-            self._functions[key] = ca.Function("f", [x, self._p], outputs, {"cse": True})
-        return self._functions[key]
+            return ca.Function("f", [x, self.parameter_symbols], outputs, {"cse": True})
+
+        return self.cached(("function", key), made)
 
     def evaluate(
         self,
@@ -534,19 +506,14 @@ class FilippovSystem:
         3.0
         """
         values, p = self.extended_point(point, t), self.parameter_vector(parameters)
-        return np.array(self._function_of(_matrix(expression))(values, p))
+        return np.array(self._function_of(matrix(expression))(values, p))
 
     def _function_of(self, expression: ca.SX) -> ca.Function:
         """Return the function of an expression, the same for the same expression object."""
-        entries = ca.vertsplit(ca.vec(expression)) if expression.numel() else []
-        key = ("expression", expression.shape, tuple(e.element_hash() for e in entries))
-        if key not in self._functions:
-            known = ca.vertcat(self.extended_states, self._p)
-            _no_foreign_symbols(expression, known, "expression", self)
-            # The expression stays alive beside its function: hashes are those of live nodes.
-            self._functions["alive", key] = expression
-            self.function(key, lambda: [expression])
-        return self._functions[key]
+        known = ca.vertcat(self.extended_states, self.parameter_symbols)
+        require_known(expression, known, "expression", **self.definition.names)
+        symbols = [self.extended_states, self.parameter_symbols]
+        return self.function(Content(symbols, expression), lambda: [expression])
 
     def parameter_vector(self, parameters: Parameters | None = None) -> Array:
         """Numbers for all parameters, defaults replaced by ``parameters`` (keys: symbols or names).
@@ -560,46 +527,7 @@ class FilippovSystem:
         ParameterError
             An unknown name, a missing value or one that is not a finite number.
         """
-        values, given = dict(self._defaults), dict[str, Any]()
-        if parameters is not None and not isinstance(parameters, Mapping):
-            raise ParameterError(
-                explain(
-                    "parameters",
-                    expected="a mapping from names or symbols to numbers",
-                    received=f"{parameters!r} ({type(parameters).__name__})",
-                    advice=f"The names are {list(self.parameter_names)}.",
-                )
-            )
-        for key, value in (parameters or {}).items():
-            name = key if isinstance(key, str) else str(key)
-            if name in given:
-                raise ParameterError(
-                    f"parameters: expected one value for {name!r}, received {given[name]!r} and "
-                    f"{value!r}, under its name and its symbol. Keep one of them."
-                )
-            given[name] = value
-            if name not in values:
-                raise ParameterError(
-                    explain(
-                        "parameters",
-                        expected=f"names among {list(self.parameter_names)}",
-                        received=repr(name),
-                        advice="Declare it in the system's parameters=, or correct the name.",
-                    )
-                )
-            values[name] = value
-        missing = [name for name, value in values.items() if value is None]
-        if missing:
-            raise ParameterError(
-                f"parameters: expected a value for {missing}, received none. They have no default: "
-                "pass parameters={name: value}."
-            )
-        return np.array(
-            [
-                real(values[n], f"parameter {n!r}", error=ParameterError)
-                for n in self.parameter_names
-            ]
-        )
+        return parameter_values(self.parameter_names, self.definition.defaults, parameters)
 
     def extended_point(self, point: ArrayLike, t: float = 0.0) -> Array:
         """Check a state and append the time where the system depends on it.
@@ -609,29 +537,17 @@ class FilippovSystem:
         PointError
             Wrong shape, not numbers, NaN or inf.
         """
-        values = real_array(point, "point", f"{self.dimension} numbers")
-        if values.shape != (self.dimension,):
-            raise PointError(
-                explain(
-                    "point",
-                    expected=f"shape ({self.dimension},) for the states {self.state_names}",
-                    received=f"shape {values.shape}",
-                    advice="Give one number for each state.",
-                )
-            )
-        if not np.all(np.isfinite(values)):
-            raise PointError(
-                explain(
-                    "point",
-                    expected="finite numbers",
-                    received=str(values),
-                    advice="NaN or inf often comes from an earlier division by zero.",
-                )
-            )
+        values = state_values(self.state_names, point)
         moment = real(t, "time", error=PointError)
         return np.append(values, moment) if self.time_dependent else values
 
-    def _index(self, surface: int) -> int:
+    def surface_index(self, surface: int) -> int:
+        """Check the number of a surface.
+
+        Raises
+        ------
+        DefinitionError
+        """
         if isinstance(surface, bool) or not isinstance(surface, (int, np.integer)):
             raise DefinitionError(f"surface: expected an index (int), received {surface!r}.")
         if not 0 <= surface < self.surface_count:
@@ -639,228 +555,3 @@ class FilippovSystem:
                 f"surface: expected an index below {self.surface_count}, received {surface}."
             )
         return int(surface)
-
-
-# Reading a definition --------------------------------------------------------------------------
-
-
-def _listed(value: Any) -> list[Any]:
-    if value is None:
-        return []
-    if isinstance(value, (ca.SX, ca.DM)):
-        return ca.vertsplit(ca.vec(ca.SX(value))) if value.numel() else []
-    if isinstance(value, (str, bytes)) or not isinstance(value, (Sequence, np.ndarray)):
-        return [value]
-    return list(value)
-
-
-def _expression(value: Any, what: str) -> ca.SX:
-    if isinstance(value, ca.MX):
-        raise DefinitionError(
-            f"{what}: expected CasADi SX expressions, received MX. Make the symbols with "
-            "casadi.SX.sym."
-        )
-    try:
-        result = ca.SX(value) if isinstance(value, (ca.SX, ca.DM)) else ca.SX(float(value))
-    except (TypeError, ValueError, NotImplementedError) as error:
-        raise DefinitionError(
-            f"{what}: expected a CasADi SX expression or a number, received {value!r} "
-            f"({type(value).__name__})."
-        ) from error
-    if result.shape != (1, 1):
-        raise DefinitionError(f"{what}: expected a scalar, received shape {result.shape}.")
-    return ca.densify(result)
-
-
-def _matrix(value: Any) -> ca.SX:
-    """Read an expression of any shape: an SX, or a (nested) sequence of scalars."""
-    if not isinstance(value, (list, tuple, np.ndarray)):
-        return (
-            ca.densify(ca.SX(value))
-            if isinstance(value, (ca.SX, ca.DM))
-            else _expression(value, "expression")
-        )
-    return ca.densify(ca.vertcat(*[_matrix(v).T for v in value]))
-
-
-def read_function(system: FilippovSystem, value: Any, what: str) -> ca.SX:
-    """Check a scalar function of states, parameters and time that a user gave.
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError
-    """
-    expression = _expression(value, what)
-    known = ca.vertcat(system.extended_states, system.parameter_symbols)
-    _no_foreign_symbols(expression, known, what, system)
-    require_smooth(expression, system.extended_states, system.parameter_symbols, what)
-    return expression
-
-
-def _column(values: Any, what: str, length: int) -> ca.SX:
-    if values is None:
-        raise DefinitionError(
-            f"{what}: expected {length} expressions, received none. Give above= and below= with "
-            "surface=, or field= with multipliers= and surfaces=."
-        )
-    items = _listed(values)
-    if len(items) != length:
-        raise DefinitionError(
-            explain(
-                what,
-                expected=f"{length} expressions, one for each state"
-                if length != 1
-                else "one expression",
-                received=str(len(items)),
-                advice="The order is that of the states.",
-            )
-        )
-    return ca.vertcat(*[_expression(v, f"{what}[{i}]") for i, v in enumerate(items)])
-
-
-def _symbols(values: Any, what: str) -> ca.SX:
-    items = _listed(values)
-    for i, item in enumerate(items):
-        if not (isinstance(item, ca.SX) and item.is_scalar() and item.is_symbolic()):
-            raise DefinitionError(
-                explain(
-                    f"{what}[{i}]",
-                    expected="a scalar symbol made by casadi.SX.sym",
-                    received=f"{item!r} ({type(item).__name__})",
-                    advice="MX symbols, expressions and strings are not symbols.",
-                )
-            )
-    return ca.vertcat(*items) if items else ca.SX(0, 1)
-
-
-def _parameter_symbols(
-    parameters: Parameters | Sequence[Expression] | None,
-) -> tuple[ca.SX, dict[str, float | None]]:
-    if isinstance(parameters, Mapping):
-        symbols, values = list(parameters), list(parameters.values())
-    else:
-        symbols = _listed(parameters)
-        values = [None] * len(symbols)
-    p = _symbols(symbols, "parameters")
-    defaults = {
-        s.name(): None if v is None else real(v, f"parameter {s.name()!r}", error=ParameterError)
-        for s, v in zip(symbols, values, strict=True)
-    }
-    return p, defaults
-
-
-def _surface_expressions(
-    surface: Expression | None, surfaces: Sequence[Expression] | None
-) -> ca.SX:
-    if surface is not None and surfaces is not None:
-        raise DefinitionError(
-            "surface: expected either surface= or surfaces=, received both. One switching "
-            "function goes to surface=, several to surfaces=."
-        )
-    items = [surface] if surface is not None else _listed(surfaces)
-    expressions = [_expression(v, f"surface {i}") for i, v in enumerate(items)]
-    return ca.vertcat(*expressions) if expressions else ca.SX(0, 1)
-
-
-def _without_states(what: str, function: ca.SX, system: FilippovSystem) -> str:
-    """Message for a surface, stop or reset that no motion can cross."""
-    if system.time_dependent and ca.depends_on(function, system._t):
-        received, advice = (
-            f"the function {function} of time alone",
-            "Make a clock a state: c with c' = 1, started at the time, and the surface a function "
-            "of c.",
-        )
-    else:
-        received = f"the constant {function}"
-        advice = "A surface is the zero set of a function of the states."
-    return explain(
-        what,
-        expected=f"a function of the states {system.state_names}",
-        received=received,
-        advice=advice,
-    )
-
-
-def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops= or resets=: one, or a sequence of them."""
-    items = [values] if isinstance(values, kind) else _listed(values)
-    for i, item in enumerate(items):
-        if not isinstance(item, kind):
-            raise DefinitionError(
-                explain(
-                    f"{what}[{i}]",
-                    expected=f"a {kind.__name__}",
-                    received=f"{item!r} ({type(item).__name__})",
-                    advice=f"Write {what}=[nonsmooth.{kind.__name__}(function, ...)].",
-                )
-            )
-    return items
-
-
-def _two_fields(
-    above: Any, below: Any, field: Any, multipliers: Any, h: ca.SX, n: int
-) -> tuple[ca.SX, ca.SX]:
-    if field is not None or multipliers is not None or h.numel() != 1:
-        raise DefinitionError(
-            explain(
-                "definition",
-                expected="above= and below= with one surface=, or field= with multipliers= and "
-                "surfaces=",
-                received="a mixture of the two forms"
-                if h.numel() == 1
-                else f"{h.numel()} surfaces",
-                advice="Two fields belong to exactly one surface.",
-            )
-        )
-    f1, f2 = _column(above, "above", n), _column(below, "below", n)
-    lam = ca.SX.sym("lambda")
-    entries = []
-    for a, b in zip(ca.vertsplit(f1), ca.vertsplit(f2), strict=True):
-        # This form folds back to exactly a and b at lambda = +1 and -1.
-        same = ca.is_equal(a, b, 10)
-        entries.append(a if same else (1 + lam) / 2 * a + (1 - lam) / 2 * b)
-    return lam, ca.vertcat(*entries)
-
-
-def _unique(symbols: ca.SX) -> None:
-    names = [str(s) for s in ca.vertsplit(symbols)]
-    twice = sorted({n for n in names if names.count(n) > 1})
-    if twice:
-        raise DefinitionError(
-            f"symbols: expected one name for each state, parameter, multiplier and time, received "
-            f"{twice} more than once. Names are how parameters are set and results are labelled."
-        )
-
-
-def _no_foreign_symbols(expression: ca.SX, known: ca.SX, what: str, system: FilippovSystem) -> None:
-    present = ca.symvar(expression)
-    listed = ca.vertsplit(known)
-    foreign = [s for s in present if not any(ca.is_equal(s, k) for k in listed)]
-    if foreign:
-        names = {str(k) for k in listed}
-        clash = [str(s) for s in foreign if str(s) in names]
-        cause = (
-            f"{clash} has the name of a declared symbol but is another symbol: create each symbol "
-            "once and reuse it."
-            if clash
-            else "Add it to states=, parameters= or time=, or give it a number."
-        )
-        raise DefinitionError(
-            explain(
-                what,
-                expected=f"the states {list(system.state_names)} and parameters "
-                f"{list(system.parameter_names)}",
-                received=f"also {[str(s) for s in foreign]}",
-                advice=cause,
-            )
-        )
-
-
-def _finite_constants(expression: ca.SX, known: ca.SX, what: str) -> None:
-    f = ca.Function("constants", [known], [expression])
-    for k in range(f.n_instructions()):
-        if f.instruction_id(k) == ca.OP_CONST and not math.isfinite(f.instruction_constant(k)):
-            raise DefinitionError(
-                f"{what}: expected finite constants, received {f.instruction_constant(k)} in "
-                f"{expression}."
-            )

@@ -1,18 +1,21 @@
 """Pictures (matplotlib): two-folds, trajectories, phase portraits. Imported only on use.
 
-Every function returns a matplotlib Figure and leaves matplotlib's global settings alone.
+Every function returns a matplotlib Figure and leaves matplotlib's global settings alone. What they
+share of colours, dashes and arrows is in ``style``, for pictures of one's own.
 """
 
-from .atlas import two_fold_atlas, two_fold_map
-from .plane import phase_portrait
-from .portrait import two_fold
-from .runs import trajectory
+from . import style
+from .phase_portrait import phase_portrait
 from .sliding_portrait import sliding_portrait
-from .space import two_fold_3d
+from .trajectory import trajectory
+from .two_fold_atlas import two_fold_atlas, two_fold_map
+from .two_fold_portrait import two_fold
+from .two_fold_space import two_fold_3d
 
 __all__ = [
     "phase_portrait",
     "sliding_portrait",
+    "style",
     "trajectory",
     "two_fold",
     "two_fold_3d",

@@ -12,14 +12,15 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 from numpy.typing import NDArray
-from scipy.ndimage import binary_dilation, distance_transform_edt, label
 
-from ..local import TwoFold
+from ..local.box import Box
+from ..local.regions import Region
+from ..local.surface_scan import REGIONS, SurfaceScan
 from ..model import Array, DefinitionError, FilippovSystem, OptionError, Parameters, explain, real
+from ..orbit.sliding_orbits import SlidingOrbits
 from . import style
-from .surface import Fold, Sheet
 
-_ATTRACTING, _REPELLING, _UP, _DOWN = 0, 1, 2, 3
+_ATTRACTING, _REPELLING = REGIONS.index(Region.ATTRACTING), REGIONS.index(Region.REPELLING)
 _NAMES = ("$D_a$", "$D_r$", "$C_1$", "$C_2$")
 _TINTS = (style.TINT_ATTRACTING, style.TINT_REPELLING, style.TINT_CROSSING, "#E4E4E4")
 _TEXTS = (
@@ -28,7 +29,7 @@ _TEXTS = (
     "$C_1$: crossing up",
     "$C_2$: crossing down",
 )
-_DASHES: dict[bool, Any] = {True: "-", False: (0, (5, 2.5))}
+_DASHES: dict[bool, Any] = {True: "-", False: style.DASHED}
 _CANARD, _FAUX, _MANIFOLD = "canard", "faux canard", "manifold of a pseudo-saddle"
 _SPECIAL: dict[str, tuple[str, Any]] = {
     _CANARD: (style.CANARD, "-"),
@@ -64,7 +65,7 @@ def sliding_portrait(
     ----------
     system : FilippovSystem
         Three states, one surface, no explicit time.
-    box : (umin, umax, vmin, vmax) or ((umin, umax), (vmin, vmax))
+    box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
         Limits of the two coordinates.
     coordinates : (str, str), optional
         Names of the states drawn to the right and up. By default the state along which the
@@ -103,14 +104,13 @@ def sliding_portrait(
     _check(system)
     if isinstance(orbits, bool) or not isinstance(orbits, int) or orbits < 0:
         raise OptionError(f"orbits: expected a whole number >= 0, received {orbits!r}.")
-    limits = _limits(box)
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
-    sheet = Sheet.of(system, values, limits, coordinates, real(guess, "guess"))
+    scan = SurfaceScan.of(system, values, Box.read(box), coordinates, real(guess, "guess"))
     with style.settings():
         figure, axes = style.axes_for(ax, size)
-        portrait = _Portrait(axes, sheet)
+        portrait = _Portrait(axes, scan)
         portrait.draw(orbits)
-        names = [system.state_names[i] for i in sheet.shown]
+        names, limits = [system.state_names[i] for i in scan.shown], scan.box.limits
         axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
         if title is not None:
             axes.set_title(title)
@@ -143,34 +143,12 @@ def _check(system: object) -> None:
     )
 
 
-def _limits(box: object) -> tuple[float, float, float, float]:
-    try:
-        values = np.asarray(box, dtype=float).ravel()
-    except (TypeError, ValueError):
-        values = np.empty(0)
-    finite = values.shape == (4,) and bool(np.all(np.isfinite(values)))
-    if not finite or not (values[0] < values[1] and values[2] < values[3]):
-        raise OptionError(
-            explain(
-                "box",
-                expected="(umin, umax, vmin, vmax) with umin < umax and vmin < vmax",
-                received=repr(box),
-                advice="For example (-1, 1, -2, 2).",
-            )
-        )
-    u0, u1, v0, v1 = values.tolist()
-    return u0, u1, v0, v1
-
-
 class _Portrait:
     """Draws one portrait."""
 
-    def __init__(self, ax: Axes, sheet: Sheet):
-        self.ax, self.sheet = ax, sheet
-        self.regions = sheet.regions()
-        self.folds: list[Fold] = sheet.folds()
-        self.two_folds = sheet.two_folds()
-        self.rest = sheet.pseudo_equilibria()
+    def __init__(self, ax: Axes, scan: SurfaceScan):
+        self.ax, self.scan = ax, scan
+        self.flow = SlidingOrbits(scan)
         self.drawn: set[str] = set()
         self.separated: list[Array] = []
 
@@ -180,8 +158,8 @@ class _Portrait:
         self.separatrices()
         if orbits:
             self.orbits(orbits)
-        for fold in self.folds:
-            color = style.ABOVE if fold.side > 0 else style.BELOW
+        for fold in self.scan.folds:
+            color = style.FIELDS[fold.side]
             for piece, visible in fold.pieces:
                 self.ax.plot(
                     *piece.T,
@@ -196,8 +174,8 @@ class _Portrait:
 
     def tints(self) -> None:
         """Colour the regions."""
-        u, v = self.sheet.mesh
-        shown = np.ma.masked_less(self.regions, 0)
+        u, v = self.scan.mesh
+        shown = np.ma.masked_less(self.scan.regions, 0)
         self.ax.pcolormesh(
             u,
             v,
@@ -212,62 +190,46 @@ class _Portrait:
 
     def separatrices(self) -> None:
         """Eigenlines of two-folds and manifolds of pseudo-saddles."""
-        special = [line for fold in self.two_folds for line in self._eigenlines(fold)]
-        for found in self.rest:
+        for fold in self.scan.two_folds:
+            for name, curve in self.flow.eigenlines(fold):
+                self._separatrix(name, curve)
+        for found in self.scan.pseudo_equilibria:
             if found.kind == "pseudo-saddle":
-                special += [(*line, _MANIFOLD) for line in self.sheet.manifolds(found)]
-        if not special:
-            return
-        starts, ahead, names = zip(*special, strict=True)
-        curves = self.sheet.sliding(np.array(starts), ahead)
-        for curve, way, name in zip(curves, ahead, names, strict=True):
-            if len(curve) < 3:
-                continue
-            color, dashes = _SPECIAL[name]
-            self.ax.plot(
-                *curve.T,
-                color=color,
-                linewidth=2.4,
-                linestyle=dashes,
-                zorder=3,
-                gid=name,
-                path_effects=style.halo(3.6),
-            )
-            style.arrowhead(self.ax, curve[::way], 0.5, color, mutation_scale=15, zorder=3.1)
-            self.drawn.add(name)
-            self.separated.append(curve)
+                for curve in self.flow.manifolds(found):
+                    self._separatrix(_MANIFOLD, curve)
 
-    def _eigenlines(self, fold: TwoFold) -> list[tuple[Array, int, str]]:
-        """Start, way to go and name of each half of the sliding eigenlines of a two-fold."""
-        if fold.discriminant < 0:
-            return []
-        halves = []
-        for value, slope in zip(np.real(fold.eigenvalues), np.real(fold.slopes), strict=True):
-            if not slope > 0 or abs(value) < 1e-9:
-                continue
-            line = np.array([1.0, slope]) / np.hypot(1.0, slope)
-            starts = fold.point_at(1e-3 * np.array([line, -line]) * self.sheet.reach(fold))
-            # a canard comes to s in Da and goes away in Dr
-            ways = (-1, 1) if value < 0 else (1, -1)
-            name = _CANARD if value < 0 else _FAUX
-            halves += [(s, way, name) for s, way in zip(starts, ways, strict=True)]
-        return halves
+    def _separatrix(self, name: str, curve: Array) -> None:
+        if len(curve) < 3:
+            return
+        color, dashes = _SPECIAL[name]
+        self.ax.plot(
+            *curve.T,
+            color=color,
+            linewidth=2.4,
+            linestyle=dashes,
+            zorder=3,
+            gid=name,
+            path_effects=style.halo(3.6),
+        )
+        style.arrowhead(self.ax, curve, 0.5, color, mutation_scale=15, zorder=3.1)
+        self.drawn.add(name)
+        self.separated.append(curve)
 
     def orbits(self, count: int) -> None:
         """Sliding orbits, about evenly spaced."""
-        for curve, attracting in self.sheet.orbits(count):
+        for curve, attracting in self.flow.spaced(count, self.separated):
             color = style.ATTRACTING if attracting else style.REPELLING
             self.ax.plot(*curve.T, color=color, linewidth=0.9, zorder=2, gid="orbit")
-            if self.sheet.length(curve) > 0.1:
+            if self.scan.box.length(curve) > 0.1:
                 style.arrowhead(self.ax, curve, 0.55, color, mutation_scale=10, zorder=2.1)
 
     def marks(self) -> None:
         """Cusps, two-folds and pseudo-equilibria."""
-        for fold in self.folds:
+        for fold in self.scan.folds:
             for cusp in fold.cusps:
-                self._mark(cusp, "^", style.ABOVE if fold.side > 0 else style.BELOW, gid="cusp")
-        for found in self.two_folds:
-            place = found.point[list(self.sheet.shown)]
+                self._mark(cusp, "^", style.FIELDS[fold.side], gid="cusp")
+        for found in self.scan.two_folds:
+            place = self.scan.flat(found.point)
             self._mark(place, "o", style.BLACK, gid="two-fold")
             self.ax.annotate(
                 found.label.removeprefix("boundary ").replace("Delta", "Δ").replace("nu", "ν"),
@@ -278,10 +240,10 @@ class _Portrait:
                 zorder=8,
                 path_effects=style.halo(3.0),
             )
-        for rest in self.rest:
+        for rest in self.scan.pseudo_equilibria:
             marker = _MARKERS.get(rest.kind.rpartition("-")[2], "P")
             fill = style.BLACK if rest.stable or "saddle" in rest.kind else "white"
-            place = rest.point[list(self.sheet.shown)]
+            place = self.scan.flat(rest.point)
             self._mark(place, marker, fill, gid=rest.kind, markersize=8)
 
     def _mark(self, place: Array, marker: str, fill: str, **options: Any) -> None:
@@ -290,21 +252,26 @@ class _Portrait:
 
     def _free(self) -> NDArray[np.bool_]:
         """Grid points that are not close to a mark or a separatrix."""
-        shown = list(self.sheet.shown)
-        marks = [f.point[shown] for f in self.two_folds] + [r.point[shown] for r in self.rest]
+        from scipy.ndimage import binary_dilation
+
+        scan, regions = self.scan, self.scan.regions
+        marks = [scan.flat(f.point) for f in scan.two_folds]
+        marks += [scan.flat(e.point) for e in scan.pseudo_equilibria]
         points = np.vstack([np.reshape(marks, (-1, 2)), *self.separated])
-        corner, n = np.array(self.sheet.box[::2]), len(self.regions)
-        j, i = np.clip((points - corner) / self.sheet.scale * n, 0, n - 1).astype(int).T
-        taken = np.zeros(self.regions.shape, dtype=bool)
+        n = len(regions)
+        j, i = np.clip((points - scan.box.corner) / scan.box.size * n, 0, n - 1).astype(int).T
+        taken = np.zeros(regions.shape, dtype=bool)
         taken[i, j] = True
-        return ~binary_dilation(taken, iterations=n // 18)
+        return np.asarray(~binary_dilation(taken, iterations=n // 18))
 
     def names(self) -> None:
         """Write the name of each region where there is most room."""
-        (u, v), free = self.sheet.mesh, self._free()
+        from scipy.ndimage import distance_transform_edt, label
+
+        (u, v), free = self.scan.mesh, self._free()
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
         for kind, name in enumerate(_NAMES):
-            parts, count = label(self.regions == kind)
+            parts, count = label(self.scan.regions == kind)
             for k in range(1, count + 1):
                 part = parts == k
                 if part.mean() < _SMALLEST:
@@ -320,46 +287,29 @@ class _Portrait:
         handles: list[Line2D | Patch] = [
             Patch(facecolor=_TINTS[k], edgecolor="#BBBBBB", label=_TEXTS[k])
             for k in range(4)
-            if np.any(self.regions == k)
+            if np.any(self.scan.regions == k)
         ]
-        for side, name, color in ((1, "F_1", style.ABOVE), (-1, "F_2", style.BELOW)):
+        for side, name in (("+", "F_1"), ("-", "F_2")):
             for visible, word in ((True, "visible"), (False, "invisible")):
-                folds = [f for f in self.folds if f.side == side]
+                folds = [f for f in self.scan.folds if f.side == side]
                 if any(seen is visible for f in folds for _, seen in f.pieces):
-                    dashes = _DASHES[visible]
-                    handles.append(_line(color, f"fold of ${name}$, {word}", 2.2, dashes))
-        if np.any(self.regions == _ATTRACTING):
-            handles.append(_line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
-        if np.any(self.regions == _REPELLING):
-            handles.append(_line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
+                    look = (style.FIELDS[side], f"fold of ${name}$, {word}", 2.2, _DASHES[visible])
+                    handles.append(style.line(*look))
+        if np.any(self.scan.regions == _ATTRACTING):
+            handles.append(style.line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
+        if np.any(self.scan.regions == _REPELLING):
+            handles.append(style.line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
         for name, (color, dashes) in _SPECIAL.items():
             if name in self.drawn:
-                handles.append(_line(color, name, 2.4, dashes))
-        if self.two_folds:
-            handles.append(_point("o", style.BLACK, "two-fold"))
-        if any(fold.cusps.size for fold in self.folds):
-            handles.append(_point("^", style.GREY, "cusp"))
-        for kind in dict.fromkeys(rest.kind for rest in self.rest):
+                handles.append(style.line(color, name, 2.4, dashes))
+        if self.scan.two_folds:
+            handles.append(style.marker("o", "two-fold", style.BLACK))
+        if any(fold.cusps.size for fold in self.scan.folds):
+            handles.append(style.marker("^", "cusp", style.GREY))
+        for kind in dict.fromkeys(rest.kind for rest in self.scan.pseudo_equilibria):
             filled = "saddle" in kind or kind.startswith("stable")
-            marker = _MARKERS.get(kind.rpartition("-")[2], "P")
-            handles.append(_point(marker, style.BLACK if filled else "white", kind))
+            shape = _MARKERS.get(kind.rpartition("-")[2], "P")
+            handles.append(style.marker(shape, kind, style.BLACK if filled else "white"))
         self.ax.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0
         )
-
-
-def _line(color: str, text: str, width: float, dashes: Any = "-") -> Line2D:
-    return Line2D([], [], color=color, linewidth=width, linestyle=dashes, label=text)
-
-
-def _point(marker: str, fill: str, text: str) -> Line2D:
-    return Line2D(
-        [],
-        [],
-        linestyle="none",
-        marker=marker,
-        markersize=6,
-        markeredgecolor=style.BLACK,
-        markerfacecolor=fill,
-        label=text,
-    )

@@ -1,12 +1,28 @@
 """How every picture looks: colours that colour-blind readers tell apart, lines that print in grey.
 
+For pictures of one's own beside those of the library. The palette is that of Okabe & Ito 2008:
+``BLACK``, ``ORANGE``, ``SKY``, ``GREEN``, ``YELLOW``, ``BLUE``, ``VERMILLION``, ``PURPLE``, ``GREY``.
+By what they mean: ``ABOVE`` and ``BELOW`` for the fields F1 and F2 (``FIELDS`` has them by the letter
+of the side), ``ATTRACTING`` and ``REPELLING`` for sliding orbits, ``TINT_ATTRACTING``,
+``TINT_REPELLING`` and ``TINT_CROSSING`` for regions, ``CANARD`` and ``FAUX_CANARD``. Dashes:
+``DASHED`` (invisible folds), ``LONG_DASH``, ``DASH_DOT``, ``DOTS``.
+
 Nothing here touches matplotlib's global settings: pictures are built inside ``settings()`` on
 figures that pyplot does not know. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
+
+Examples
+--------
+>>> import nonsmooth as ns
+>>> with ns.plot.style.settings():
+...     figure = ns.plot.style.new_figure((4, 3))
+...     line, = figure.add_subplot().plot([0, 1], [0, 1], color=ns.plot.style.ABOVE)
+>>> line.get_color()
+'#D55E00'
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from typing import Any
 
@@ -15,6 +31,7 @@ import matplotlib.patheffects as effects
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import ArrayLike
 
@@ -33,12 +50,15 @@ GREY = "#7F7F7F"
 
 #: The two fields: F1 (h > 0) and F2 (h < 0). F2 is also drawn dashed where the two meet.
 ABOVE, BELOW = VERMILLION, BLUE
+#: The same by the letter of the side.
+FIELDS = {"+": ABOVE, "-": BELOW}
 #: Sliding orbits in the attracting and the repelling region.
 ATTRACTING, REPELLING = "#1A1A1A", "#8A5A00"
 #: Tints of the regions; their greys differ too (0.91, 0.81, 0.97).
 TINT_ATTRACTING, TINT_REPELLING, TINT_CROSSING = "#DCEBF5", "#EFCB8C", "#F7F7F7"
 CANARD, FAUX_CANARD = "#A8005C", GREEN
 
+DASHED: Any = (0, (5, 2.5))
 DASH_DOT: Any = (0, (4, 1.5, 1, 1.5))
 DOTS: Any = (0, (1.2, 1.6))
 LONG_DASH: Any = (0, (7, 1.0))
@@ -72,8 +92,13 @@ _SETTINGS: Any = {
 
 
 @contextmanager
-def settings() -> Iterator[None]:
+def settings(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
     """Apply the look inside a ``with`` block; the user's settings come back after it.
+
+    Parameters
+    ----------
+    changes : mapping, optional
+        Names and values of matplotlib's ``rcParams`` that are to differ.
 
     Examples
     --------
@@ -84,12 +109,21 @@ def settings() -> Iterator[None]:
     >>> matplotlib.rcParams["font.size"] == before
     True
     """
-    with mpl.rc_context(_SETTINGS):
+    chosen: Any = {**_SETTINGS, **(changes or {})}
+    with mpl.rc_context(chosen):
         yield
 
 
 def check_size(size: object) -> tuple[float, float]:
     """Return (width, height) in inches.
+
+    Parameters
+    ----------
+    size : (float, float)
+
+    Returns
+    -------
+    (float, float)
 
     Raises
     ------
@@ -118,17 +152,54 @@ def check_size(size: object) -> tuple[float, float]:
 
 
 def new_figure(size: object) -> Figure:
-    """Return an empty figure that pyplot does not keep."""
+    """Return an empty figure that pyplot does not keep.
+
+    Parameters
+    ----------
+    size : (float, float)
+        Width and height in inches.
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    OptionError
+        Not two positive numbers.
+
+    Examples
+    --------
+    >>> new_figure((6, 4)).get_size_inches()
+    array([6., 4.])
+    """
     return Figure(figsize=check_size(size), layout="constrained")
 
 
 def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
-    """Return the axes to draw on: the given ones, or those of a new figure.
+    """Return the axes to draw on, with their figure: the given ones, or those of a new figure.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes or None
+    size : (float, float)
+        Width and height in inches, of a new figure.
+
+    Returns
+    -------
+    figure : matplotlib Figure
+    ax : matplotlib Axes
 
     Raises
     ------
     OptionError
         ``ax`` is not matplotlib axes.
+
+    Examples
+    --------
+    >>> figure, ax = axes_for(None, (6, 4))
+    >>> axes_for(ax, None)[0] is figure
+    True
     """
     if ax is None:
         figure = new_figure(size)
@@ -142,16 +213,40 @@ def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
                 advice="For example ax=pyplot.subplots()[1].",
             )
         )
-    return ax.figure, ax  # type: ignore[return-value]
+    parent = ax.get_figure(root=True)
+    assert parent is not None
+    return parent, ax
 
 
 def halo(width: float = 2.5, color: str = "white") -> list[Any]:
-    """Return path effects that keep a line or a text legible on top of others."""
+    """Return path effects that keep a line or a text legible on top of others.
+
+    Parameters
+    ----------
+    width : float, optional
+        In points.
+    color : str, optional
+
+    Returns
+    -------
+    list
+        For ``path_effects=``.
+    """
     return [effects.Stroke(linewidth=width, foreground=color), effects.Normal()]
 
 
-def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str, **options: Any) -> None:
-    """Draw a straight arrow between two points in data coordinates, clipped to the axes."""
+def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str = BLACK, **options: Any) -> None:
+    """Draw a straight arrow between two points, clipped to the axes.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    start, end : array_like (2,)
+        In data coordinates.
+    color : str, optional
+    **options
+        Of ``matplotlib.patches.FancyArrowPatch``.
+    """
     options = {"arrowstyle": "-|>", "mutation_scale": 11, "linewidth": 1.0, **options}
     patch = FancyArrowPatch(
         tuple(np.asarray(start, float)),
@@ -166,15 +261,48 @@ def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str, **options: Any
 
 
 def write(ax: Axes, place: ArrayLike, text: str, **options: Any) -> None:
-    """Write a text centred on a point in data coordinates."""
+    """Write a text centred on a point.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    place : array_like (2,)
+        In data coordinates.
+    text : str
+    **options
+        Of ``Axes.text``.
+    """
     x, y = np.asarray(place, dtype=float)
     ax.text(x, y, text, **{"ha": "center", "va": "center", **options})
 
 
-def arrowhead(ax: Axes, curve: ArrayLike, at: float, color: str, **options: Any) -> None:
-    """Put an arrowhead on a polyline (m, 2) at a fraction of its length, along its direction."""
+def arrowhead(
+    ax: Axes,
+    curve: ArrayLike,
+    at: float,
+    color: str,
+    *,
+    scale: ArrayLike = (1.0, 1.0),
+    **options: Any,
+) -> None:
+    """Put an arrowhead on a polyline at a fraction of its length, along its direction.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    curve : array_like (m, 2)
+        In data coordinates.
+    at : float
+        From 0 at the start to 1 at the end.
+    color : str
+    scale : array_like (2,), optional
+        Units of the two coordinates in which the length is measured; where the axes have very
+        different ones, the widths of what is shown.
+    **options
+        Of :func:`arrow`.
+    """
     points = np.asarray(curve, dtype=float)
-    steps = np.hypot(*np.diff(points, axis=0).T)
+    steps = np.hypot(*(np.diff(points, axis=0) / np.asarray(scale, dtype=float)).T)
     length = np.concatenate([[0.0], np.cumsum(steps)])
     if not length[-1] > 0:
         return
@@ -187,7 +315,17 @@ def arrowhead(ax: Axes, curve: ArrayLike, at: float, color: str, **options: Any)
 
 
 def inside(curve: ArrayLike, box: tuple[float, float, float, float]) -> list[Array]:
-    """Return the pieces of a polyline (m, 2) with all points in (xmin, xmax, ymin, ymax).
+    """Return the pieces of a polyline with all points in a box.
+
+    Parameters
+    ----------
+    curve : array_like (m, 2)
+    box : (float, float, float, float)
+        xmin, xmax, ymin, ymax.
+
+    Returns
+    -------
+    list of ndarray (k, 2)
 
     Examples
     --------
@@ -199,3 +337,56 @@ def inside(curve: ArrayLike, box: tuple[float, float, float, float]) -> list[Arr
     good = (box[0] <= x) & (x <= box[1]) & (box[2] <= y) & (y <= box[3])
     edges = np.flatnonzero(np.diff(np.concatenate([[0], good.astype(int), [0]])))
     return [points[a:b] for a, b in zip(edges[::2], edges[1::2], strict=True)]
+
+
+def line(
+    color: str,
+    label: str,
+    width: float = 1.4,
+    dashes: Any = "-",
+    alpha: float | None = None,
+) -> Line2D:
+    """Return an entry of a legend: a line.
+
+    Parameters
+    ----------
+    color, label : str
+    width : float, optional
+        In points.
+    dashes : optional
+        A line style of matplotlib.
+    alpha : float, optional
+
+    Returns
+    -------
+    matplotlib Line2D
+
+    Examples
+    --------
+    >>> line(ABOVE, "orbits above").get_label()
+    'orbits above'
+    """
+    return Line2D([], [], color=color, linewidth=width, linestyle=dashes, label=label, alpha=alpha)
+
+
+def marker(shape: str, label: str, fill: str = BLACK, size: float = 6.0, **options: Any) -> Line2D:
+    """Return an entry of a legend: a marker with a black edge.
+
+    Parameters
+    ----------
+    shape : str
+        A marker of matplotlib.
+    label : str
+    fill : str, optional
+        Colour inside.
+    size : float, optional
+        In points.
+    **options
+        Of ``matplotlib.lines.Line2D``.
+
+    Returns
+    -------
+    matplotlib Line2D
+    """
+    look = {"markeredgecolor": BLACK, "markerfacecolor": fill, "markersize": size, **options}
+    return Line2D([], [], linestyle="none", marker=shape, label=label, **look)

@@ -13,7 +13,7 @@ from .results import kv_pert_data, kv_pert_shot
 RUNS = (
     ("A", "A_exact", look.BLACK, "-"),
     ("B", "B", look.ABOVE, look.DASHED),
-    ("C", "C", look.BELOW, look.DASHDOT),
+    ("C", "C", look.BELOW, look.DASH_DOT),
 )
 _UNIT = 1e4  # figures are in units of 1e-4
 
@@ -45,7 +45,7 @@ def kv_pert_cone() -> Figure:
             shown = _UNIT * forces.load <= top
             x, y = _UNIT * forces.friction[shown], _UNIT * forces.load[shown]
             axes.plot(x, y, color=color, linestyle=style, linewidth=2.2, label=f"({label})")
-            look.direction(axes, np.column_stack([x, y]), 0.35, color)
+            look.arrowhead(axes, np.column_stack([x, y]), 0.35, color, mutation_scale=13, zorder=8)
             axes.text(x[0], top + 0.12, f"({label})", color=color, ha="center", va="bottom")
             inset.plot(forces.friction, forces.load, color=color, linestyle=style, linewidth=1.3)
         axes.plot(0, 0, "D", color="white", markeredgecolor="black", markersize=9, zorder=9)

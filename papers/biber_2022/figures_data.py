@@ -53,7 +53,7 @@ def trajectories() -> Figure:
                 )
                 points = np.array([(side * a, b) for a, b in ends])
                 axes.plot(*points[:2].T, color=color, linestyle=style, linewidth=1.5, zorder=2)
-                look.direction(axes, points[:2], 0.5, color)
+                look.arrowhead(axes, points[:2], 0.5, color, mutation_scale=13, zorder=8)
                 axes.plot(*points[0], "o", color="black", markersize=5, zorder=4)
                 axes.plot(*points[-1], "D", color="white", markeredgecolor="black", zorder=5)
             for edge in edges:
@@ -68,7 +68,7 @@ def trajectories() -> Figure:
                     va="center",
                 )
         roll = np.array([(0.0, -0.67), (0.0, r)])
-        axes.plot(*roll.T, color=look.SLIDING, linewidth=2.4, zorder=3)
+        axes.plot(*roll.T, color=look.BLACK, linewidth=2.4, zorder=3)
         axes.text(0.07, 0.3, "roll", va="center", path_effects=look.halo(), zorder=6)
         axes.axhline(0, color="0.5", linewidth=0.8, zorder=0)
         axes.axvline(0, color="0.5", linewidth=0.8, zorder=0)

@@ -120,7 +120,7 @@ class Scene:
         points = project(z)
         self.axes.plot(*points.T, color=color, linestyle=style, linewidth=width, zorder=order)
         for fraction in at:
-            look.direction(self.axes, points, fraction, color, size=11)
+            look.arrowhead(self.axes, points, fraction, color, mutation_scale=11, zorder=8)
 
     def text(self, z: Sequence[float], words: str, **options: object) -> None:
         """Write at a point of space."""
@@ -139,7 +139,7 @@ class Scene:
         styles = {
             "+": (look.ABOVE, "-", ABOVE),
             "-": (look.BELOW, look.DASHED, FRONT_BELOW),
-            "s": (look.SLIDING, "-", SURFACE + 1.5),
+            "s": (look.BLACK, "-", SURFACE + 1.5),
         }
         for segment in run.segments:
             color, style, order = styles[segment.mode]

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -17,18 +16,14 @@ from ..pictures import Picture
 from .model import BEND, CALM, CLASSES, RECURRENT, excursions, recurrent, slid_from
 
 
-def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
-    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
-
-
 def _legend() -> list[Line2D | Patch]:
     return [
-        _entry(look.ABOVE, "fold of $x > 0$, visible", width=2.2),
-        _entry(look.ABOVE, "the same, invisible", look.DASHED, 2.2),
-        _entry(look.BELOW, "fold of $x < 0$, visible", width=2.2),
-        _entry(look.BELOW, "the same, invisible", look.DASHED, 2.2),
-        _entry(look.CANARD, "canard", width=2.6),
-        _entry(look.GREEN, "faux canard", look.DASHED, 2.6),
+        look.line(look.ABOVE, "fold of $x > 0$, visible", 2.2),
+        look.line(look.ABOVE, "the same, invisible", 2.2, look.DASHED),
+        look.line(look.BELOW, "fold of $x < 0$, visible", 2.2),
+        look.line(look.BELOW, "the same, invisible", 2.2, look.DASHED),
+        look.line(look.CANARD, "canard", 2.6),
+        look.line(look.GREEN, "faux canard", 2.6, look.DASHED),
         Patch(
             facecolor="white", edgecolor=look.GREY, hatch="////", label="all pass $D_a$ to $D_r$"
         ),

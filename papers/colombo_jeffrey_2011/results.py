@@ -93,7 +93,7 @@ def canards() -> Claim:
         reaches, beside = _either_side(name, slope)
         checks.append(Check(f"{name}: the orbit of slope {slope:.6f} reaches it", reaches))
         checks.append(Check(f"{name}: .001 to either side {beside}", beside == expected))
-        label = ns.classify_two_fold(*CLASSES[name])
+        label = ns.two_folds.classify_two_fold(*CLASSES[name])
         checks.append(close(f"{name}: slope by formula", label.into.low, slope, 1e-12))
     return Claim(
         "single-canards",
@@ -139,7 +139,7 @@ def severed() -> Claim:
 def open_sets() -> Claim:
     """Which classes lose determinism on an open set."""
     names = [name for name, numbers in CLASSES.items() if arrivals(numbers) > 1]
-    kinds_ = {name: ns.classify_two_fold(*CLASSES[name]).into.kind for name in CLASSES}
+    kinds_ = {name: ns.two_folds.classify_two_fold(*CLASSES[name]).into.kind for name in CLASSES}
     expected = {"II-C": "all", "mix-C": "sector"}
     found = {name: kinds_[name] for name in names}
     return Claim(

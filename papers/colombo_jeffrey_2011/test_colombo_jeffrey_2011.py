@@ -12,7 +12,7 @@ from papers.colombo_jeffrey_2011 import model, results
 @pytest.mark.parametrize("name", model.CLASSES)
 def test_classes_have_their_label_and_their_ring_counts(name):
     numbers = model.CLASSES[name]
-    assert ns.classify_two_fold(*numbers).label == name
+    assert ns.two_folds.classify_two_fold(*numbers).label == name
     found = (model.arrivals(numbers), model.repelling_arrivals(numbers))
     assert found == results.COUNTS[name]
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -48,20 +47,16 @@ def space() -> Figure:
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
             ns.plot.two_fold_3d((SIGMA, v), ax=ax, legend=False, title=title)
         handles = [
-            _entry(look.ABOVE, "orbits in $x > 0$"),
-            _entry(look.BELOW, "orbits in $x < 0$", look.DASHED),
-            _entry(look.CANARD, "canard", width=2.4),
-            _entry(look.GREEN, "faux canard", look.DASHED, 2.4),
-            _entry(look.BLACK, "pseudo-equilibria", look.DOTTED, 2.4),
+            look.line(look.ABOVE, "orbits in $x > 0$"),
+            look.line(look.BELOW, "orbits in $x < 0$", dashes=look.DASHED),
+            look.line(look.CANARD, "canard", 2.4),
+            look.line(look.GREEN, "faux canard", 2.4, look.DASHED),
+            look.line(look.BLACK, "pseudo-equilibria", 2.4, look.DOTS),
             Patch(color=look.CANARD, alpha=0.2, label="diabolo: orbits fall in"),
             Patch(color=look.GREEN, alpha=0.2, label="diabolo: orbits come out"),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=7)
     return figure
-
-
-def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
-    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
 
 
 def sliding() -> Figure:
@@ -73,14 +68,14 @@ def sliding() -> Figure:
             ns.plot.two_fold((SIGMA, v), ax=ax, legend=False, title=title)
             ax.set(xlabel="$y$", ylabel="$z$")
         handles = [
-            _entry(look.BLACK, "sliding orbits"),
-            _entry(look.ABOVE, "invisible fold of $x > 0$", look.DASHED, 2.2),
-            _entry(look.BELOW, "invisible fold of $x < 0$", look.DASHED, 2.2),
-            _entry(look.CANARD, "canard", width=2.4),
-            _entry(look.GREEN, "faux canard", look.DASHED, 2.4),
-            _entry(look.BLACK, "pseudo-equilibria", look.DOTTED, 2.4),
-            _entry(look.CANARD, "diabolo: orbits fall in", look.DASHDOT),
-            _entry(look.GREEN, "diabolo: orbits come out", look.DOTTED),
+            look.line(look.BLACK, "sliding orbits"),
+            look.line(look.ABOVE, "invisible fold of $x > 0$", 2.2, look.DASHED),
+            look.line(look.BELOW, "invisible fold of $x < 0$", 2.2, look.DASHED),
+            look.line(look.CANARD, "canard", 2.4),
+            look.line(look.GREEN, "faux canard", 2.4, look.DASHED),
+            look.line(look.BLACK, "pseudo-equilibria", 2.4, look.DOTS),
+            look.line(look.CANARD, "diabolo: orbits fall in", dashes=look.DASH_DOT),
+            look.line(look.GREEN, "diabolo: orbits come out", dashes=look.DOTS),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=4)
     return figure
@@ -88,7 +83,7 @@ def sliding() -> Figure:
 
 def _arcs(start: Array, above: bool) -> tuple[Array, Array, Array]:
     """Surface of the arcs over or under the segment from 0 to ``start``, as large as the frame."""
-    flight = ns.flight_above if above else ns.flight_below
+    flight = ns.two_folds.flight_above if above else ns.two_folds.flight_below
     reach = max(np.abs(start).max(), np.abs(flight(start, AFTER)).max())
     size, share = np.meshgrid(np.linspace(0.0, 1.0 / reach, 25), np.linspace(0.0, 1.0, 25))
     y, z = size * start[0], size * start[1]
@@ -101,13 +96,13 @@ def _arcs(start: Array, above: bool) -> tuple[Array, Array, Array]:
 
 def diabolo() -> Figure:
     """The pair of invariant surfaces with an orbit on the one whose orbits fall in."""
-    low, high = ns.diabolo_slopes(AFTER)
+    low, high = ns.two_folds.diabolo_slopes(AFTER)
     with look.settings():
         figure = look.new_figure(7.6, 6.2)
         ax = figure.add_subplot(projection="3d", computed_zorder=False)
         for slope, color in ((high, look.CANARD), (low, look.GREEN)):
             up = np.array([-1.0, slope])
-            for start, above in ((up, True), (ns.flight_above(up, AFTER), False)):
+            for start, above in ((up, True), (ns.two_folds.flight_above(up, AFTER), False)):
                 x, y, z = _arcs(start, above)
                 ax.plot_surface(y, z, x, color=color, alpha=0.3, linewidth=0, zorder=2)
                 for edge in (0, -1):
@@ -129,9 +124,9 @@ def diabolo() -> Figure:
         handles = [
             Patch(color=look.CANARD, alpha=0.4, label="surface on which orbits fall in"),
             Patch(color=look.GREEN, alpha=0.4, label="surface on which orbits come out"),
-            _entry(look.ABOVE, "an orbit, $x > 0$"),
-            _entry(look.BELOW, "the same orbit, $x < 0$"),
-            _entry(look.GREY, "folds, on $x = 0$", look.DASHED, 0.8),
+            look.line(look.ABOVE, "an orbit, $x > 0$"),
+            look.line(look.BELOW, "the same orbit, $x < 0$"),
+            look.line(look.GREY, "folds, on $x = 0$", 0.8, look.DASHED),
         ]
         ax.legend(handles=handles, loc="upper left")
     return figure
@@ -174,9 +169,11 @@ def _dress(ax: Axes, v: V) -> None:
     for x, y in (([-1, 1], [0, 0]), ([0, 0], [-1, 1])):
         ax.plot(x, y, color="black", linewidth=1.6, linestyle=look.DASHED)
     if v[0] * v[1] > 1:
-        for slope, color in zip(ns.diabolo_slopes(v), (look.GREEN, look.CANARD), strict=True):
+        for slope, color in zip(
+            ns.two_folds.diabolo_slopes(v), (look.GREEN, look.CANARD), strict=True
+        ):
             start = np.array([-1.0, slope])
-            for z in (start, ns.flight_above(start, v)):
+            for z in (start, ns.two_folds.flight_above(start, v)):
                 ax.plot(*np.array([0 * z, z / np.abs(z).max()]).T, color=color, linewidth=2.2)
     ax.text(0.5, 0.5, "attracting\nsliding", ha="center", va="center")
     ax.text(-0.5, -0.5, "repelling\nsliding", ha="center", va="center")
@@ -214,7 +211,7 @@ def eigenvalues() -> Figure:
         circle = np.linspace(0, 2 * math.pi, 200)
         left.plot(np.cos(circle), np.sin(circle), color=look.GREY, linewidth=0.8)
         for p in (0.05, 0.25, 0.5, 0.75, 0.9, 1.0, 1.05, 1.2):
-            values = np.linalg.eigvals(ns.return_matrix((-p, -1.0)))
+            values = np.linalg.eigvals(ns.two_folds.return_matrix((-p, -1.0)))
             color = look.BLUE if p < 1 else look.VERMILLION
             left.plot(values.real, values.imag, "o" if p < 1 else "D", color=color, markersize=5)
             left.annotate(

@@ -81,7 +81,7 @@ def return_map() -> Claim:
     for v in (BEFORE, AFTER, (-0.9, -1.0)):
         p = v[0] * v[1]
         matrix = simulated_return_matrix(v)
-        formula = ns.return_matrix(v)
+        formula = ns.two_folds.return_matrix(v)
         checks.append(
             close(f"V = {v}: error of the matrix", np.abs(matrix - formula).max(), 0, 1e-9)
         )
@@ -152,7 +152,7 @@ def crossings() -> Claim:
 def repelling_before() -> Claim:
     """Below the bifurcation no orbit of the ring reaches the singularity."""
     counts = [reached(v) for v in (BEFORE, (-0.9, -1.0))]
-    label = ns.classify_two_fold(SIGMA, BEFORE)
+    label = ns.two_folds.classify_two_fold(SIGMA, BEFORE)
     return Claim(
         "initially-repelling",
         "from memory: abstract",
@@ -173,14 +173,17 @@ def bifurcation() -> Claim:
     none = []
     for v in (BEFORE, (-0.99, -1.0)):
         try:
-            ns.diabolo_slopes(v)
+            ns.two_folds.diabolo_slopes(v)
         except ns.OptionError:
             none.append(v)
-    low, high = ns.diabolo_slopes(AFTER)
-    images = [ns.flight_below(ns.flight_above([-1.0, r], AFTER), AFTER) for r in (low, high)]
+    low, high = ns.two_folds.diabolo_slopes(AFTER)
+    images = [
+        ns.two_folds.flight_below(ns.two_folds.flight_above([-1.0, r], AFTER), AFTER)
+        for r in (low, high)
+    ]
     ratios = [float(-image[1] / image[0]) for image in images]
     shrink, grow = (float(-image[0]) for image in reversed(images))
-    label = ns.classify_two_fold(SIGMA, AT).label
+    label = ns.two_folds.classify_two_fold(SIGMA, AT).label
     return Claim(
         "diabolo-bifurcation",
         "from memory: abstract",
@@ -203,7 +206,7 @@ def bifurcation() -> Claim:
 
 def parabolic() -> Claim:
     """The invariant surfaces are parabolic and have an edge on the discontinuity surface."""
-    _, high = ns.diabolo_slopes(AFTER)
+    _, high = ns.two_folds.diabolo_slopes(AFTER)
     heights = []
     for size in (1.0, 0.1, 0.01):
         r = run(AFTER, (-size, high * size), 1.9 * size)
@@ -228,7 +231,7 @@ def parabolic() -> Claim:
 
 def attraction() -> Claim:
     """The surfaces divide attraction from repulsion."""
-    low, high = ns.diabolo_slopes(AFTER)
+    low, high = ns.two_folds.diabolo_slopes(AFTER)
     inside = [high * f for f in (1.001, 1.1, 2.0, 10.0)]
     outside = [high * 0.999, (low + high) / 2, low, low / 2, 0.01]
     attracted = [run(AFTER, (-1.0, m), 100.0) for m in inside]
@@ -256,9 +259,9 @@ def attraction() -> Claim:
 
 def accumulation() -> Claim:
     """On the line itself infinitely many crossings happen in finite time."""
-    _, high = ns.diabolo_slopes(AFTER)
+    _, high = ns.two_folds.diabolo_slopes(AFTER)
     r = run(AFTER, (-1.0, high), 10.0, tol=1e-13)
-    formula = ns.accumulation_time(AFTER)
+    formula = ns.two_folds.accumulation_time(AFTER)
     estimate = float("nan") if r.accumulation_time is None else r.accumulation_time
     times = np.diff([0.0, *(e.t for e in r.events if e.kind == "crossing")])[:8]
     ratios = times[2:] / times[:-2]

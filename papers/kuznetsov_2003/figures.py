@@ -38,28 +38,18 @@ _STAR: dict[str, Any] = {
 Box = tuple[float, float, float, float]
 
 
-def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
-    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
-
-
-def _mark(marker: str, text: str, fill: str = look.BLACK) -> Line2D:
-    return Line2D(
-        [], [], marker=marker, ls="none", markerfacecolor=fill, markeredgecolor="black", label=text
-    )
-
-
 def _legend() -> list[Line2D]:
     return [
-        _entry(look.BLACK, "sliding", width=3.4),
-        _entry(look.GREY, "crossing", width=1.2),
-        _entry(look.GREEN, "orbit through a visible fold", width=1.6),
-        _entry(look.CANARD, "separatrix", width=1.8),
-        _mark("D", "visible fold"),
-        _mark("D", "invisible fold", "white"),
-        _mark("o", "stable equilibrium"),
-        _mark("o", "unstable equilibrium", "white"),
-        _mark("s", "stable pseudo-node"),
-        _mark("X", "pseudo-saddle"),
+        look.line(look.BLACK, "sliding", 3.4),
+        look.line(look.GREY, "crossing", 1.2),
+        look.line(look.GREEN, "orbit through a visible fold", 1.6),
+        look.line(look.CANARD, "separatrix", 1.8),
+        look.marker("D", "visible fold"),
+        look.marker("D", "invisible fold", "white"),
+        look.marker("o", "stable equilibrium"),
+        look.marker("o", "unstable equilibrium", "white"),
+        look.marker("s", "stable pseudo-node"),
+        look.marker("X", "pseudo-saddle"),
     ]
 
 
@@ -141,7 +131,7 @@ def cycles() -> Figure:
             *curve.T, color=look.BLACK, linewidth=1.2, linestyle=look.DASHED, label="no harvest"
         )
         ax.plot(FREE_FOLD, top, "D", color=look.BLACK, markersize=5)
-        ax.axvline(FREE_FOLD, color=look.GREY, linewidth=0.7, linestyle=look.DOTTED)
+        ax.axvline(FREE_FOLD, color=look.GREY, linewidth=0.7, linestyle=look.DOTS)
         ax.set(xlabel="$x_1$", ylabel="$x_2$", xlim=(0, 1), ylim=(0, 2.6))
         ax.legend(loc="upper right", title="thick: sliding")
     return figure
@@ -169,7 +159,7 @@ def diagram() -> Figure:
         landings = np.array([landing(float(a))[1] for a in levels])
         born = sliding_homoclinic()
         upper.plot(
-            levels[levels < born], landings[levels < born], color=look.GREEN, linestyle=look.DOTTED
+            levels[levels < born], landings[levels < born], color=look.GREEN, linestyle=look.DOTS
         )
         upper.plot(
             levels[levels >= born], landings[levels >= born], color=look.GREEN, linewidth=1.8
@@ -194,7 +184,7 @@ def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:
     )
     for value, name in names:
         for ax in (upper, lower):
-            ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTTED)
+            ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTS)
         right = value == top
         upper.text(
             value - 0.01 if right else value + 0.01,
@@ -209,14 +199,14 @@ def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:
 
 def _diagram_legend() -> list[Line2D]:
     return [
-        _entry(look.BELOW, "fold of the free field, visible", width=2.0),
-        _entry(look.BELOW, "the same, invisible", look.DASHED, 2.0),
-        _entry(look.ABOVE, "fold of the harvested field, visible", width=2.0),
-        _entry(look.ABOVE, "the same, invisible", look.DASHED, 2.0),
-        _entry(look.BLACK, "stable pseudo-node", width=1.6),
-        _entry(look.BLACK, "pseudo-saddle", look.DASHED, 1.6),
-        _entry(look.GREEN, "landing of the sliding cycle", width=1.8),
-        _entry(look.GREEN, "landing of the fold's orbit", look.DOTTED),
+        look.line(look.BELOW, "fold of the free field, visible", 2.0),
+        look.line(look.BELOW, "the same, invisible", 2.0, look.DASHED),
+        look.line(look.ABOVE, "fold of the harvested field, visible", 2.0),
+        look.line(look.ABOVE, "the same, invisible", 2.0, look.DASHED),
+        look.line(look.BLACK, "stable pseudo-node", 1.6),
+        look.line(look.BLACK, "pseudo-saddle", 1.6, look.DASHED),
+        look.line(look.GREEN, "landing of the sliding cycle", 1.8),
+        look.line(look.GREEN, "landing of the fold's orbit", dashes=look.DOTS),
     ]
 
 

@@ -41,8 +41,8 @@ def _kind(point: list[float], alpha: float) -> str:
 
 def folds() -> Claim:
     """Folds and the sliding segment between them."""
-    free = ns.find_fold(SYSTEM, [0.05, 0.9], side="below", parameters=at(0.9))
-    harvested = ns.find_fold(SYSTEM, [0.7, 0.9], side="above", parameters=at(0.9))
+    free = ns.find_fold(SYSTEM, [0.05, 0.9], side="-", parameters=at(0.9))
+    harvested = ns.find_fold(SYSTEM, [0.7, 0.9], side="+", parameters=at(0.9))
     middle = _kind([0.4, 0.9], 0.9)
     outside = [_kind([x, 0.9], 0.9) for x in (0.02, 0.9)]
     return Claim(
@@ -96,12 +96,13 @@ def pseudo() -> Claim:
 
 def boundary_focus() -> Claim:
     """The equilibrium of the free field on the threshold."""
-    point, alpha = ns.find_boundary_equilibrium(
-        SYSTEM, [0.04, 0.92], vary="alpha", side="below", parameters=at(0.9)
+    at_surface = ns.find_boundary_equilibrium(
+        SYSTEM, [0.04, 0.92], vary="alpha", side="-", parameters=at(0.9)
     )
-    found = ns.classify(SYSTEM, point, parameters=at(alpha))
+    point, alpha = at_surface.point, at_surface.value
+    found = ns.classify(SYSTEM, point, parameters=at_surface.parameters)
     status = [
-        ns.find_equilibrium(SYSTEM, point, side="below", parameters=at(alpha + d))
+        ns.find_equilibrium(SYSTEM, point, side="-", parameters=at(alpha + d))
         for d in (-0.02, 0.02)
     ]
     beyond = found.evidence["landing"] / found.evidence["pseudo"]
@@ -119,8 +120,8 @@ def boundary_focus() -> Claim:
             close("alpha", alpha, _reference("boundary focus"), 1e-12),
             close("by formula", BOUNDARY_FOCUS, _reference("boundary focus"), 1e-14),
             Check(
-                f"class {found.label} of {found.side}",
-                (found.label, found.side) == ("BF3", "below"),
+                f"class {found.label} of the field on the side {found.side}",
+                (found.label, found.side) == ("BF3", "-"),
             ),
             Check(found.detail.unfolding, found.detail.unfolding == "nonsmooth fold"),
             Check(
@@ -154,11 +155,12 @@ def no_small_cycle() -> Claim:
 
 def boundary_node() -> Claim:
     """The equilibrium of the harvested field on the threshold."""
-    point, alpha = ns.find_boundary_equilibrium(
-        SYSTEM, [0.72, 0.8], vary="alpha", side="above", parameters=at(0.8)
+    at_surface = ns.find_boundary_equilibrium(
+        SYSTEM, [0.72, 0.8], vary="alpha", side="+", parameters=at(0.8)
     )
-    found = ns.classify(SYSTEM, point, parameters=at(alpha))
-    before = ns.find_equilibrium(SYSTEM, point, side="above", parameters=at(alpha - 0.02))
+    point, alpha = at_surface.point, at_surface.value
+    found = ns.classify(SYSTEM, point, parameters=at_surface.parameters)
+    before = ns.find_equilibrium(SYSTEM, point, side="+", parameters=at(alpha - 0.02))
     after = ns.find_pseudo_equilibrium(
         SYSTEM, [pseudo_equilibria(alpha + 0.02)[1], alpha], parameters=at(alpha + 0.02)
     )
@@ -174,8 +176,8 @@ def boundary_node() -> Claim:
             close("alpha", alpha, _reference("boundary node"), 1e-12),
             close("by formula", BOUNDARY_NODE, _reference("boundary node"), 1e-14),
             Check(
-                f"class {found.label} of {found.side}",
-                (found.label, found.side) == ("BN1", "above"),
+                f"class {found.label} of the field on the side {found.side}",
+                (found.label, found.side) == ("BN1", "+"),
             ),
             Check(found.detail.unfolding, found.detail.unfolding == "persistence"),
             Check(

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
@@ -33,16 +31,6 @@ from .model import (
 _LEVELS = (-0.06, -0.03, -0.01, 0.0, 0.05, 0.22)
 
 
-def _entry(color: str, text: str, dashes: Any = "-", width: float = 1.4) -> Line2D:
-    return Line2D([], [], color=color, label=text, linestyle=dashes, linewidth=width)
-
-
-def _mark(marker: str, text: str, fill: str = look.BLACK) -> Line2D:
-    return Line2D(
-        [], [], marker=marker, ls="none", markerfacecolor=fill, markeredgecolor="black", label=text
-    )
-
-
 def _cycle_points(eps: float) -> tuple[Array, Array, Array]:
     """Times over one period of the cycle, its states, and whether it mixes."""
     temperature, period, _ = cycle(eps)
@@ -70,18 +58,18 @@ def portraits() -> Figure:
                 ax.plot(*_cycle_points(eps)[1].T, color=look.PURPLE, linewidth=2.6, zorder=5)
             ax.set(xlabel="$T$", ylabel="$S$")
         handles = [
-            _entry(look.BLACK, "sliding, attracting", width=3.4),
-            _entry(look.ORANGE, "sliding, repelling", look.DASHED, 3.4),
-            _entry(look.GREY, "crossing", width=1.2),
-            _entry(look.PURPLE, "stable cycle", width=2.6),
-            _entry(look.CANARD, "separatrix", width=1.8),
-            _entry(look.GREEN, "orbit through a visible fold", width=1.5),
-            _mark("D", "visible fold"),
-            _mark("D", "invisible fold", "white"),
-            _mark("o", "stable equilibrium"),
-            _mark("s", "stable pseudo-node"),
-            _mark("s", "unstable pseudo-node", "white"),
-            _mark("X", "pseudo-saddle"),
+            look.line(look.BLACK, "sliding, attracting", 3.4),
+            look.line(look.ORANGE, "sliding, repelling", 3.4, look.DASHED),
+            look.line(look.GREY, "crossing", 1.2),
+            look.line(look.PURPLE, "stable cycle", 2.6),
+            look.line(look.CANARD, "separatrix", 1.8),
+            look.line(look.GREEN, "orbit through a visible fold", 1.5),
+            look.marker("D", "visible fold"),
+            look.marker("D", "invisible fold", "white"),
+            look.marker("o", "stable equilibrium"),
+            look.marker("s", "stable pseudo-node"),
+            look.marker("s", "unstable pseudo-node", "white"),
+            look.marker("X", "pseudo-saddle"),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=6)
     return figure
@@ -101,14 +89,14 @@ def oscillation() -> Figure:
             bottom.plot(now, x[:, 1] - A * x[:, 0], color=look.BLACK, linewidth=1.6)
             for ax in (top, bottom):
                 ax.axvspan(now[mixing][0], now[mixing][-1], color="#EFCB8C", alpha=0.6, linewidth=0)
-        bottom.axhline(eps, color=look.GREY, linewidth=0.9, linestyle=look.DOTTED)
+        bottom.axhline(eps, color=look.GREY, linewidth=0.9, linestyle=look.DOTS)
         top.set(ylabel="temperature, salinity", xlim=(0, 3 * t[-1]))
         bottom.set(ylabel="density $S - aT$", xlabel="time")
         handles: list[Line2D | Patch] = [
-            _entry(look.VERMILLION, "$T$", width=1.6),
-            _entry(look.BLUE, "$S$", look.DASHED, 1.6),
+            look.line(look.VERMILLION, "$T$", 1.6),
+            look.line(look.BLUE, "$S$", 1.6, look.DASHED),
             Patch(color="#EFCB8C", alpha=0.6, label="mixing"),
-            _entry(look.GREY, r"threshold $\varepsilon$", look.DOTTED, 0.9),
+            look.line(look.GREY, r"threshold $\varepsilon$", 0.9, look.DOTS),
         ]
         figure.legend(handles=handles, loc="outside upper center", ncols=4)
     return figure
@@ -139,17 +127,17 @@ def diagram() -> Figure:
         upper.plot(0, FOLD_FOLD[0], "*", color="#F0E442", markeredgecolor="black", markersize=12)
         for value in (BOUNDARY_MIXED, 0.0, BOUNDARY_RESTING):
             for ax in (upper, lower):
-                ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTTED)
+                ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTS)
         upper.set(ylabel="$T$", xlim=(-0.08, 0.25), ylim=(0, 1.1))
         lower.set(xlabel=r"$\varepsilon$", ylabel="period", ylim=(0, None))
         handles = [
-            _entry(look.ABOVE, "mixed equilibrium, stable", width=2.2),
-            _entry(look.BELOW, "resting equilibrium, stable", width=2.2),
-            _entry(look.BLACK, "stable pseudo-node", width=1.8),
-            _entry(look.BLACK, "pseudo-saddle", look.DASHED, 1.8),
-            _entry(look.ORANGE, "unstable pseudo-node", look.DASHED, 1.8),
-            _entry(look.PURPLE, "cycle: least and largest $T$", width=1.8),
-            _mark("*", "fused focus", "#F0E442"),
+            look.line(look.ABOVE, "mixed equilibrium, stable", 2.2),
+            look.line(look.BELOW, "resting equilibrium, stable", 2.2),
+            look.line(look.BLACK, "stable pseudo-node", 1.8),
+            look.line(look.BLACK, "pseudo-saddle", 1.8, look.DASHED),
+            look.line(look.ORANGE, "unstable pseudo-node", 1.8, look.DASHED),
+            look.line(look.PURPLE, "cycle: least and largest $T$", 1.8),
+            look.marker("*", "fused focus", "#F0E442"),
         ]
         upper.legend(handles=handles, loc="lower right")
     return figure

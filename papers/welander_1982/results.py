@@ -62,11 +62,12 @@ def oscillation() -> Claim:
 
 def resting_equilibrium() -> Claim:
     """The equilibrium of the box that does not mix, on the surface."""
-    place, eps = ns.find_boundary_equilibrium(
-        SYSTEM, RESTING, vary="eps", side="below", parameters=at(0.19)
+    at_surface = ns.find_boundary_equilibrium(
+        SYSTEM, RESTING, vary="eps", side="-", parameters=at(0.19)
     )
-    found = ns.classify(SYSTEM, place, parameters=at(eps))
-    real = ns.find_equilibrium(SYSTEM, RESTING, side="below", parameters=at(0.22))
+    eps = at_surface.value
+    found = ns.classify(SYSTEM, at_surface.point, parameters=at_surface.parameters)
+    real = ns.find_equilibrium(SYSTEM, RESTING, side="-", parameters=at(0.22))
     pseudo = ns.find_pseudo_equilibrium(SYSTEM, [0.99, 0.97], parameters=at(0.18))
     return Claim(
         "boundary-equilibrium-resting",
@@ -80,8 +81,8 @@ def resting_equilibrium() -> Claim:
             close("eps", eps, _reference("boundary equilibrium, k = 0"), 1e-12),
             close("by formula, 1 - a", BOUNDARY_RESTING, 0.2, 1e-15),
             Check(
-                f"class {found.label} of {found.side}",
-                (found.label, found.side) == ("BN1", "below"),
+                f"class {found.label} of the field on the side {found.side}",
+                (found.label, found.side) == ("BN1", "-"),
             ),
             Check(
                 f"{real.status} {real.kind}", (real.status, real.kind) == ("real", "stable node")
@@ -122,7 +123,7 @@ def sliding_changes() -> Claim:
     for eps in (-0.02, -0.005, 0.005, 0.02):
         ends = [
             ns.find_fold(SYSTEM, FOLD_FOLD, side=side, parameters=at(eps)).point[0]
-            for side in ("above", "below")
+            for side in ("+", "-")
         ]
         middle = ns.region(SYSTEM, point(sum(ends) / 2, eps), parameters=at(eps))
         rows.append((eps, middle, abs(ends[1] - ends[0])))
@@ -178,13 +179,14 @@ def pseudo_hopf() -> Claim:
 
 def mixed_equilibrium() -> Claim:
     """The equilibrium of the mixing box, on the surface."""
-    place, eps = ns.find_boundary_equilibrium(
-        SYSTEM, MIXED, vary="eps", side="above", parameters=at(-0.04)
+    at_surface = ns.find_boundary_equilibrium(
+        SYSTEM, MIXED, vary="eps", side="+", parameters=at(-0.04)
     )
-    found = ns.classify(SYSTEM, place, parameters=at(eps))
-    real = ns.find_equilibrium(SYSTEM, MIXED, side="above", parameters=at(eps - 1e-3))
+    eps = at_surface.value
+    found = ns.classify(SYSTEM, at_surface.point, parameters=at_surface.parameters)
+    real = ns.find_equilibrium(SYSTEM, MIXED, side="+", parameters=at(eps - 1e-3))
     saddle = ns.find_pseudo_equilibrium(SYSTEM, [0.17, 0.09], parameters=at(eps - 1e-3))
-    virtual = ns.find_equilibrium(SYSTEM, MIXED, side="above", parameters=at(eps + 1e-3))
+    virtual = ns.find_equilibrium(SYSTEM, MIXED, side="+", parameters=at(eps + 1e-3))
     return Claim(
         "boundary-equilibrium-mixed",
         "from memory: nonsmooth form in the later literature",

@@ -20,12 +20,12 @@ def test_polar():
 
 @pytest.mark.parametrize("convention", ["length", "speed"])
 def test_round_trip(convention):
-    units = bounce.Scaling.from_stiffness(bounce.GOLF, 2e4, convention)
+    units = bounce.Scaling.from_stiffness(bounce.golf.GOLF, 2e4, convention)
     back = units.landing(units.state(LANDING))
     for name in ("xdot", "ydot", "omega"):
         assert getattr(back, name) == pytest.approx(getattr(LANDING, name), rel=1e-14)
     # The slip of the contact point is a speed in both: xdot + omega R.
-    slip = LANDING.xdot + LANDING.omega * bounce.GOLF.radius
+    slip = LANDING.xdot + LANDING.omega * bounce.golf.GOLF.radius
     assert units.state(LANDING).slip * units.speed == pytest.approx(slip)
 
 
@@ -33,7 +33,7 @@ def test_both_scalings_give_one_bounce():
     """The linear model is homogeneous, so the two scalings differ by one factor throughout."""
     results = []
     for convention in ("length", "speed"):
-        units = bounce.Scaling.from_stiffness(bounce.GOLF, 2e4, convention)
+        units = bounce.Scaling.from_stiffness(bounce.golf.GOLF, 2e4, convention)
         start = units.state(LANDING)
         turf = bounce.KelvinVoigt(mu=0.4, d1=0.1, d2=0.2, eta=0.5, G=units.gravity)
         shot = bounce.simulate(turf, start.xdot, start.ydot, start.omega, tol=1e-13)
@@ -44,15 +44,15 @@ def test_both_scalings_give_one_bounce():
 
 def test_against_newton_in_si():
     """The scaled equations are m y'' = -k y - m g: the depth at rest is m g / k."""
-    units = bounce.Scaling.from_stiffness(bounce.TENNIS, 3e4)
-    depth = bounce.TENNIS.mass * 9.80665 / 3e4
+    units = bounce.Scaling.from_stiffness(bounce.BALLS["tennis"], 3e4)
+    depth = bounce.BALLS["tennis"].mass * 9.80665 / 3e4
     assert units.gravity * units.length == pytest.approx(depth)
     assert units.force / units.length == pytest.approx(3e4)
 
 
 def test_table_of_the_paper_is_in_radii_per_second():
     """1.53 m/s is 71.7 radii per second (the paper prints 71.1), with a golf ball's radius."""
-    units = bounce.Scaling(bounce.GOLF, time=1e-3, convention="speed")
+    units = bounce.Scaling(bounce.golf.GOLF, time=1e-3, convention="speed")
     assert units.state(bounce.Landing(1.53, -4.61, 0.0)).xdot == pytest.approx(71.7, abs=0.05)
     assert units.state(bounce.Landing(1.53, -4.61, 0.0)).ydot == pytest.approx(-216, abs=0.5)
 
@@ -71,9 +71,15 @@ def test_balls_have_sources():
         (lambda: bounce.Landing(1.0, math.inf, 0.0), "Landing: ydot: expected a finite"),
         (lambda: bounce.Landing.polar(-1.0, 0.5, 0.0), "speed: expected a positive number of m/s"),
         (lambda: bounce.Landing.polar(28.5, 37.3, 0.0), "Degrees go through math.radians"),
-        (lambda: bounce.Scaling(bounce.GOLF, 0.0), "time: expected a positive number of seconds"),
-        (lambda: bounce.Scaling(bounce.GOLF, 1e-3, "both"), "convention: expected 'length' or"),
-        (lambda: bounce.Scaling.from_stiffness(bounce.GOLF, -1.0), "positive number of N/m"),
+        (
+            lambda: bounce.Scaling(bounce.golf.GOLF, 0.0),
+            "time: expected a positive number of seconds",
+        ),
+        (
+            lambda: bounce.Scaling(bounce.golf.GOLF, 1e-3, "both"),
+            "convention: expected 'length' or",
+        ),
+        (lambda: bounce.Scaling.from_stiffness(bounce.golf.GOLF, -1.0), "positive number of N/m"),
     ],
 )
 def test_messages(call, message):

@@ -14,7 +14,7 @@ import pytest
 import bounce
 import nonsmooth as ns
 from nonsmooth.flow.status import ADVICE
-from nonsmooth.local.classification import TABLE
+from nonsmooth.local.two_folds.classification import TABLE
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -77,7 +77,7 @@ def test_every_status_is_listed_with_its_advice():
 
 def test_every_exception_is_listed():
     text = generate.error_table()
-    classes = [getattr(m, n) for m in (ns, bounce) for n in m.__all__]
+    classes = [getattr(m, n) for m in (ns, bounce, bounce.golf) for n in m.__all__]
     errors = [c for c in classes if isinstance(c, type) and issubclass(c, ns.NonsmoothError)]
     assert len(errors) > 8
     assert [c.__name__ for c in errors if f"{c.__name__}`" not in text] == []
@@ -100,11 +100,17 @@ def test_every_marker_has_its_part_and_every_part_its_marker():
 
 def test_every_public_name_is_in_the_api():
     pages = "\n".join(text for uri, text in generate.api_pages().items() if "index" not in uri)
-    for module in (ns, bounce):
+    for module in (ns, bounce, bounce.golf, bounce.laws):
         things = {n: getattr(module, n) for n in module.__all__}
         wanted = [n for n, t in things.items() if generate._documented(t)]
         assert wanted
         assert [n for n in wanted if f"::: {module.__name__}.{n}\n" not in pages] == []
+    for path, names in (
+        ("nonsmooth.two_folds", ns.two_folds.__all__),
+        ("nonsmooth.local", generate.returned_types()),
+        ("nonsmooth.plot.style", ("settings", "arrowhead", "line", "marker")),
+    ):
+        assert [n for n in names if f"::: {path}.{n}\n" not in pages] == []
 
 
 def test_sources_load_nothing_from_elsewhere():

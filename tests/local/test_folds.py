@@ -14,15 +14,15 @@ from nonsmooth.local import find_fold, fold
 x, y, z, w, t = (ca.SX.sym(s) for s in "xyzwt")
 
 
-def jordan(order, side="above", sign=1):
+def jordan(order, side="+", sign=1):
     """h = y and along the field y = sign t^order/order!: x is the time."""
     field = [1, sign * x ** (order - 1) / math.factorial(order - 1)]
-    other = [0, 1 if side == "above" else -1]
-    above, below = (field, other) if side == "above" else (other, field)
+    other = [0, 1 if side == "+" else -1]
+    above, below = (field, other) if side == "+" else (other, field)
     return ns.FilippovSystem([x, y], surface=y, above=above, below=below)
 
 
-@pytest.mark.parametrize("side", ["above", "below"])
+@pytest.mark.parametrize("side", "+-")
 @pytest.mark.parametrize("sign", [1, -1])
 @pytest.mark.parametrize("order", [2, 3, 4, 5])
 def test_order_of_contact(order, sign, side):
@@ -32,7 +32,7 @@ def test_order_of_contact(order, sign, side):
     expected[order] = sign
     np.testing.assert_allclose(found.lie, expected, atol=1e-14)
     if order == 2:
-        assert found.kind == ("visible" if (sign > 0) == (side == "above") else "invisible")
+        assert found.kind == ("visible" if (sign > 0) == (side == "+") else "invisible")
     else:
         assert found.kind == ("cusp" if order == 3 else "degenerate")
 
@@ -93,7 +93,7 @@ def test_search_reports_where_it_went():
 
 def test_both_sides_and_what_the_other_field_does():
     system = ns.FilippovSystem([x, y], surface=y, above=[1, x - 1], below=[1, x + 1])
-    above, below = find_fold(system, [0.5, 0]), find_fold(system, [0.5, 0], side="below")
+    above, below = find_fold(system, [0.5, 0]), find_fold(system, [0.5, 0], side="-")
     np.testing.assert_allclose(above.point, [1, 0], atol=1e-15)
     np.testing.assert_allclose(below.point, [-1, 0], atol=1e-15)
     assert (above.kind, below.kind) == ("visible", "invisible")
@@ -105,7 +105,7 @@ def test_words():
         "F1 (above) at [0.0, 0.0]: visible fold of order 2, L^2 h = 1."
     )
     assert "F2 (below) at [0.0, 0.0]: cusp of order 3" in str(
-        fold(jordan(3, "below"), [0, 0], side="below")
+        fold(jordan(3, "-"), [0, 0], side="-")
     )
     assert "degenerate tangency of order 5" in str(fold(jordan(5), [0, 0]))
     inside = ns.FilippovSystem([x, y], surface=y, above=[1, 0], below=[1, 1])
@@ -129,17 +129,17 @@ def test_explicit_time():
     [
         (lambda s: fold(s, [0.5, 0]), ns.PointError, "L1 = 0.5.*find_fold"),
         (lambda s: fold(s, [0.5, 0.1]), ns.PointError, "h = 0.1"),
-        (lambda s: fold(s, [0, 0], side="left"), ns.DefinitionError, "'above' .* received 'left'"),
+        (lambda s: fold(s, [0, 0], side="left"), ns.DefinitionError, r"'\+' .* received 'left'"),
         (lambda s: fold(s, [0, 0], max_order=1), ns.DefinitionError, "max_order"),
-        (lambda s: find_fold(s, [0, 0], side="+"), ns.DefinitionError, r"received '\+'"),
+        (lambda s: find_fold(s, [0, 0], side="above"), ns.DefinitionError, "received 'above'"),
         (lambda s: find_fold(s, [0, math.nan]), ns.PointError, "finite"),
         (lambda s: find_fold(s, [0, 0, 0]), ns.PointError, r"shape \(2,\)"),
         (lambda s: find_fold(s, [0, 0], hold="x"), ns.DefinitionError, "at least 2 free states"),
         (lambda s: find_fold(s, [0, 0], parameters={"q": 1}), ns.ParameterError, "'q'"),
         (
-            lambda s: find_fold(s, [0, 0], side="below"),
+            lambda s: find_fold(s, [0, 0], side="-"),
             ns.ConvergenceError,
-            "fold below.*expected a res",
+            r"fold of F2 \(below\).*expected a res",
         ),
         (lambda s: find_fold(s, [0, 0], tol=math.nan), ns.OptionError, "tol"),
     ],

@@ -104,6 +104,14 @@ WRONG = {
     "both forms": ({"field": [v, x]}, "a mixture of the two forms"),
     "surface twice": ({"surfaces": [v]}, "received both"),
     "a wrong direction": ({"stops": [ns.Stop(x, 2)]}, "direction of 'stop'"),
+    "a surface with a multiple zero": (
+        {"surface": (v - 1) ** 3},
+        "surface 0: expected a function with simple",
+    ),
+    "a stop with a double zero": (
+        {"stops": [ns.Stop(x * (v - x) ** 2)]},
+        "stop 'stop': expected a function with simple",
+    ),
     "a reset map of the wrong length": ({"resets": [ns.Reset(x, [x])]}, "map of reset 'reset'"),
 }
 
@@ -197,7 +205,29 @@ def test_a_field_continuous_across_the_surface_is_seen_however_it_is_written():
     system = ns.FilippovSystem(
         [x, v], surface=v - 1, above=[a * b, v], below=[(a + (v - 1)) * b, v * v]
     )
-    assert motion(system, "s").cancelled
+    assert motion(system, "s").regular
     run = ns.simulate(ns.FilippovSystem([x, v], surface=v, above=[1, a * v], below=[1, (a + v) * v]),
                       [0.0, 0.0], 1.0)  # fmt: skip
     assert run.status is ns.Status.REACHED_END
+
+
+def test_field_of_a_mode_slides_too():
+    """Filippov's convex combination: the one that keeps h at zero, and each side's own."""
+    x, y, a = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("a")
+    system = ns.FilippovSystem(
+        [x, y], surface=y, above=[1, -a], below=[3 * x, 1], parameters={a: 2.0}
+    )
+    point = [0.5, 0.0]
+    assert system.evaluate(system.mode_field("+"), point).ravel().tolist() == [1.0, -2.0]
+    sliding = system.evaluate(system.mode_field("s"), point).ravel()
+    assert sliding == pytest.approx(ns.sliding_field(system, point), abs=1e-15)
+    assert sliding == pytest.approx([1.0 / 3 + 2.0 / 3 * 1.5, 0.0], abs=1e-15)
+
+
+def test_a_field_that_is_known_implicitly_is_refused():
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    lam = ca.SX.sym("lam", 2)
+    system = ns.FilippovSystem([x, y], field=[-lam[0], -lam[1]], multipliers=lam, surfaces=[x, y])
+    assert system.mode_field("s+").numel() == 2
+    with pytest.raises(ns.DefinitionError, match="received 'ss'"):
+        system.mode_field("ss")

@@ -4,10 +4,8 @@ import casadi as ca
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
-from scipy.linalg import expm
 
 import nonsmooth as ns
-from nonsmooth.plot.surface import Sheet
 
 x, y, z = (ca.SX.sym(name) for name in "xyz")
 BOX = (-1.0, 1.0, -1.0, 1.0)
@@ -46,28 +44,6 @@ def test_normal_form_has_its_folds_on_the_axes_and_its_class(label, words):
     assert len(drawn(figure, "faux canard")) == (2 if label == "mix-S" else 0)
 
 
-def test_regions_are_those_of_the_signs():
-    sheet = Sheet.of(ns.textbook.two_fold("II-C").system, {}, (-1, 1.01, -1, 1.01), None, 0.0)
-    u, v = sheet.mesh
-    z2, z3 = np.meshgrid(u, v)
-    expected = np.where(z2 > 0, np.where(z3 > 0, 0, 3), np.where(z3 > 0, 2, 1))
-    away = (np.abs(z2) > 1e-9) & (np.abs(z3) > 1e-9)
-    assert np.array_equal(sheet.regions()[away], expected[away])
-
-
-def test_sliding_orbits_are_those_of_the_linear_flow():
-    # z' = M z/(z2 + z3) has the orbits of exp(M r) z: every point drawn is on that curve
-    problem = ns.textbook.two_fold("mix-0")
-    sheet = Sheet.of(problem.system, {}, BOX, None, 0.0)
-    (curve,) = sheet.sliding(np.array([[0.0, 0.5, 0.2]]), [1])
-    matrix = np.array([[0.5, -1.0], [1.0, 0.0]])  # nu = (0, .5), sigma = (1, 1)
-    fine = np.array([expm(matrix * r) @ [0.5, 0.2] for r in np.linspace(0, 3, 3001)])
-    gaps = np.linalg.norm(curve[:-1, None] - fine[None], axis=2).min(axis=1)
-    assert gaps.max() < 1e-3
-    first = int(np.argmax(fine[:, 0] < 0))  # it leaves through z2 = 0, the visible fold
-    assert_allclose(curve[-1], [0, fine[first, 1]], atol=1e-3)
-
-
 @pytest.mark.parametrize("centre", [(0.0, 0.0), (1.5, 1.0)])
 def test_pseudo_saddle_and_its_manifolds(centre):
     # L1 = -1, L2 = 1: the sliding field is the mean of the two fields
@@ -86,14 +62,13 @@ def test_cusp_parts_the_visible_from_the_invisible_fold():
     s = system([z + y**2 - 0.3, 1, 0.2], [1, 0.3, 0.1 - z])
     figure = ns.plot.sliding_portrait(s, (-2, 2, -2, 2))
     (cusp,) = drawn(figure, "cusp")
-    assert_allclose(cusp.get_xydata()[0], [-0.1, 0.29], atol=1e-4)
+    assert_allclose(cusp.get_xydata()[0], [-0.1, 0.29], atol=1e-12)
     (visible,), (invisible,) = drawn(figure, "visible fold"), drawn(figure, "invisible fold")
-    assert visible.get_xydata()[:, 0].min() > -0.1001
-    assert invisible.get_xydata()[:, 0].max() < -0.0999
+    assert visible.get_xydata()[:, 0].min() > -0.1 - 1e-12
+    assert invisible.get_xydata()[:, 0].max() < -0.1 + 1e-12
     for line in (visible, invisible):
         a, b = line.get_xydata().T
-        inner = np.abs(a + 0.1) > 1e-3
-        assert np.abs(b + a**2 - 0.3)[inner].max() < 1e-12
+        assert np.abs(b + a**2 - 0.3).max() < 1e-12
 
 
 def test_curved_surface_is_drawn_over_chosen_coordinates():
@@ -123,8 +98,8 @@ def test_each_region_is_named_once():
             ns.DefinitionError,
             "phase_portrait",
         ),
-        (lambda s: ns.plot.sliding_portrait(s, (1, 0, 0, 1)), ns.OptionError, "umin < umax"),
-        (lambda s: ns.plot.sliding_portrait(s, "box"), ns.OptionError, "umin < umax"),
+        (lambda s: ns.plot.sliding_portrait(s, (1, 0, 0, 1)), ns.OptionError, "xmin < xmax"),
+        (lambda s: ns.plot.sliding_portrait(s, "box"), ns.OptionError, "xmin < xmax"),
         (
             lambda s: ns.plot.sliding_portrait(s, BOX, coordinates=("z2", "q")),
             ns.DefinitionError,

@@ -6,13 +6,14 @@ those of one surface without resets, eight trajectories in step.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from importlib import resources
 
 from ...model import FilippovSystem, motion
-from ...model.programs import has_branches, is_flat, lanes_program, modes_program
-
-_KINDS = {"surface": 0, "exit": 1, "stop": 2, "reset": 3}
+from ...model.printing.programs import is_flat, lanes_program, modes_program
+from .. import facts
+from ..status import Status
 
 #: More modes than this (four surfaces) compile for too long: the reference driver serves them.
 MAX_MODES = 20
@@ -36,14 +37,18 @@ def _driver(name: str) -> str:
 
 def supports_scalar(system: FilippovSystem) -> bool:
     """Whether the scalar engine can be generated for a system."""
-    if any(system.nonlinear):  # hidden dynamics has multipliers as states: the reference driver's
+    if (
+        any(system.nonlinear) or system.impacts
+    ):  # hidden dynamics has multipliers as states: the reference driver's
         return False
     return system.surface_count < 8 and len(system.modes) <= MAX_MODES
 
 
 def supports_lanes(system: FilippovSystem) -> bool:
     """Whether the lanes engine can be generated for a system."""
-    return system.surface_count <= 1 and not system.resets and not any(system.nonlinear)
+    return system.surface_count <= 1 and not (
+        system.resets or system.impacts or any(system.nonlinear)
+    )
 
 
 def scalar_source(system: FilippovSystem, order: int) -> str:
@@ -52,6 +57,7 @@ def scalar_source(system: FilippovSystem, order: int) -> str:
     calls += "#define ERFINV_ ns_erfinv\n"
     return "".join(
         [
+            facts_header(),
             _sizes(system, order),
             _driver("common.h"),
             _SCALAR_TYPE,
@@ -66,19 +72,24 @@ def scalar_source(system: FilippovSystem, order: int) -> str:
 
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
-    program, affine = lanes_program(system, order)
+    program, blend = lanes_program(system, order)
+    (rows, checked), affine = blend.checked, blend.affine
     slots = 2 * system.surface_count + len(system.stops)
-    cancelled = system.surface_count == 0 or motion(system, "s").cancelled
+    cancelled = system.surface_count == 0 or motion(system, "s").regular
     directions = ", ".join(str(d) for _, d in system.stops) or "0"
     defines = (
         f"#define W {width}\n#define SLOTS {slots}\n#define STOPS {len(system.stops)}\n"
-        f"#define CANCELLED {int(cancelled)}\n#define BRANCHES {int(has_branches(system))}\n"
+        f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(rows)}\n"
+        f"#define GUARDS {len(checked)}\n"
         f"#define CURVED {int(bool(affine) and not is_flat(system))}\n"
         f"static const int DIRECTION[] = {{{directions}}};\n"
+        f"static const long long AFFINE_MODES[] = {{{_list(_affine_modes(system))}}};\n"
+        f"static const int ROW[] = {{{_list(rows) or 0}}}, SLOT[] = {{{_list(checked) or 0}}};\n"
         f"static const int AFFINE[] = {{{', '.join(str(int(a)) for a in affine) or '1'}}};\n"
     )
     return "".join(
         [
+            facts_header(),
             _sizes(system, order),
             defines,
             _driver("common.h"),
@@ -87,6 +98,32 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
             _driver("lanes.c"),
         ]
     )
+
+
+def _affine_modes(system: FilippovSystem) -> list[int]:
+    """Of above, below and sliding; a system without a surface has one mode."""
+    modes = ["+", "-", "s"] if system.surface_count else [""] * 3
+    return [int(motion(system, mode).affine) for mode in modes]
+
+
+@lru_cache(maxsize=1)
+def facts_header() -> str:
+    """C of ``flow/facts.py`` and of the statuses: constants, enumerations, priorities."""
+    numbers = {n: v for n, v in vars(facts).items() if n.isupper() and isinstance(v, (int, float))}
+    states = [n for n, v in numbers.items() if isinstance(v, int) and v < 0]
+    lines = [f"#define {n} {v!r}" for n, v in numbers.items() if n not in states]
+    statuses = ", ".join(f"{s.name} = {s.value}" for s in Status)
+    lines.append(f"enum {{ {statuses}, {', '.join(f'{n} = {numbers[n]}' for n in states)} }};")
+    lines.append(f"enum {{ {', '.join(k.upper() for k in facts.KINDS)}, KINDS }};")
+    lines.append(f"enum {{ {', '.join(k.upper() + '_GUARD' for k in facts.GUARDS)} }};")
+    lines.append(f"enum {{ {', '.join(r.upper() or 'NO_REASON' for r in facts.REASONS)} }};")
+    lines.append(_table("PRIORITY", [facts.PRIORITY[k] for k in facts.GUARDS]))
+    lines.append(f"enum {{ LAG_COUNT = {len(facts.LAGS)} }};\n{_table('LAGS', facts.LAGS)}")
+    return "\n".join(lines) + "\n"
+
+
+def _table(name: str, values: Sequence[int]) -> str:
+    return f"__attribute__((unused)) static const int {name}[] = {{{_list(values)}}};"
 
 
 def _sizes(system: FilippovSystem, order: int) -> str:
@@ -112,21 +149,21 @@ def _mode_tables(system: FilippovSystem) -> str:
     width = max(1, max(len(m.guards) for m in motions))
     rows = []
     for m in motions:
-        row = [f"{{{_KINDS[g.kind]}, {g.index}, {g.side}}}" for g in m.guards]
+        row = [f"{{{facts.GUARDS.index(g.kind)}, {g.index}, {g.side}}}" for g in m.guards]
         rows.append("{" + ", ".join(row + ["{0, 0, 0}"] * (width - len(row))) + "}")
     letters = ", ".join("{" + (", ".join(map(str, s)) or "0") + "}" for s in signs)
     return (
         f"static const int LETTER[MODES][M1] = {{{letters}}};\n"
         f"static const int MODE_OF[] = {{{', '.join(map(str, by_code))}}};\n"
-        f"static const int CANCELLED[MODES] = {{{_list(int(m.cancelled) for m in motions)}}};\n"
-        f"static const int BRANCHES[MODES] = {{{_list(int(m.branches) for m in motions)}}};\n"
+        f"static const int CANCELLED[MODES] = {{{_list(int(m.regular) for m in motions)}}};\n"
+        f"static const int AFFINE[MODES] = {{{_list(int(m.affine) for m in motions)}}};\n"
         f"static const int GUARDS[MODES] = {{{_list(len(m.guards) for m in motions)}}};\n"
         f"static const int GUARD[MODES][NG1][3] = {{{', '.join(rows)}}};\n"
     )
 
 
-def _list(values: object) -> str:
-    return ", ".join(str(v) for v in values)  # type: ignore[attr-defined]
+def _list(values: Iterable[int]) -> str:
+    return ", ".join(str(v) for v in values)
 
 
 def _dispatch(system: FilippovSystem) -> str:
@@ -135,10 +172,10 @@ def _dispatch(system: FilippovSystem) -> str:
     values = "\n".join(
         f"    case {k}: guard_values_{k}(x, q, value, gradient); break;" for k in modes
     )
-    fields = "\n".join(
-        f"    case {k}: field_{k}(x, q, f); break;"
+    checks = "\n".join(
+        f"    case {k}: values_{k}(x, q, f, g); break;"
         for k, mode in enumerate(system.modes)
-        if motion(system, mode).branches
+        if not motion(system, mode).affine
     )
     maps = "\n".join(
         f"    case {j}: reset_map_{j}(x, q, y); break;" for j in range(len(system.resets))
@@ -148,8 +185,8 @@ def _dispatch(system: FilippovSystem) -> str:
         f"  switch (mode) {{\n{jets}\n  }}\n}}\n"
         "static void guard_values(int mode, const double *x, const double *q, double *value,\n"
         f"                         double *gradient) {{\n  switch (mode) {{\n{values}\n  }}\n}}\n"
-        "static void field(int mode, const double *x, const double *q, double *f) {\n"
-        f"  (void)x; (void)q; (void)f;\n  switch (mode) {{\n{fields}\n  }}\n}}\n"
+        "static void values(int mode, const double *x, const double *q, double *f, double *g) {\n"
+        f"  (void)x; (void)q; (void)f; (void)g;\n  switch (mode) {{\n{checks}\n  }}\n}}\n"
         "static void reset_map(int index, const double *x, const double *q, double *y) {\n"
         f"  (void)x; (void)q; (void)y;\n  switch (index) {{\n{maps}\n  }}\n}}\n"
     )

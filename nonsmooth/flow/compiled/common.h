@@ -1,32 +1,17 @@
 /* What both drivers share: limits, operations on double, first root of a polynomial.
  *
- * The generated text defines before this file: N states with time, ND without, P order, M surfaces,
- * NG guards of a mode at most, TIMED whether time is a state.
+ * The generated text defines before this file: the facts of nonsmooth/flow/facts.py under their names in
+ * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); N
+ * states with time, ND without, P order, M surfaces, NG guards of a mode at most, TIMED whether time is a
+ * state.
  */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define EPS 2.220446049250313e-16
 #define M1 (M > 0 ? M : 1)
 #define NG1 (NG > 0 ? NG : 1)
-#define DEPTH 52
-#define SAFETY 0.05 /* as in stepper.py: local errors add up over a run */
-#define RESOLVED 1e-3 /* as in stepper.py: last terms of a guard's series beside all of them */
-#define WRONG 1e3 /* as in stepper.py: a defect of so many tolerances */
-#define JUST (1 - 1e-9) /* as in stepper.py: of a step, where its defect is looked at */
-#define TIE (8 * EPS) /* as in stepper.py: relative to the time */
-#define ROOT_ROUNDING (16 * EPS) /* as in stepper.py: relative to the sum of terms */
-#define ON_SURFACE 16 /* as in stepper.py: roundings */
-#define ROUNDING (4 * EPS) /* as in polynomial.py, relative to the sum of the magnitudes of terms */
-
-enum { REACHED_END, STOPPED, NON_UNIQUE, ACCUMULATION, INTERSECTION, STEP_TOO_SMALL, NOT_FINITE,
-       TOO_MANY_EVENTS, TOO_MANY_STEPS };
-/* Not final: the run goes on in the next call, after the arrays were emptied, or elsewhere. */
-enum { RUNNING = -1, FULL = -2, HAND_OVER = -3 };
-enum { CROSSING, ENTRY, EXIT, STOP, RESET, END, KINDS };
-
 typedef struct {
   double t_end, rtol, atol, max_step;
   int64_t max_steps, max_events;
@@ -47,6 +32,10 @@ typedef struct {
   double *at_x, *at_t;
   int64_t *totals;
 } Batch;
+
+/* Sizes of what Python and C share, compared when a library is loaded. */
+int64_t options_size(void) { return sizeof(Options); }
+int64_t batch_size(void) { return sizeof(Batch); }
 
 /* As fmax and fmin where b is a number, without the calls. */
 static inline double larger(double a, double b) { return a > b ? a : b; }
@@ -154,12 +143,22 @@ static inline double rest_of(const double *c, int n, double h) {
   return odd * h + even * z;
 }
 
+/* Bound of the magnitudes of all roots (Fujiwara 1916), with a margin for rounding. */
+static double largest_root(const double *c, int n) {
+  double most = 0;
+  while (n > 0 && c[n] == 0) n--;
+  for (int k = 0; k < n; k++) most = larger(pow(fabs(c[k] / c[n]), 1.0 / (n - k)), most);
+  return 2.5 * most;
+}
+
 /* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
  * it stays positive. */
 static double first_root(const double *c, int n, double h) {
   if (c[0] <= 0) return 0;
   double a[P + 1], power = 1, rest = rest_of(c, n, h);
   if (c[0] > rest) return -1;
+  /* More halvings than there are would be needed, or an overflow. */
+  if (!(rest < ldexp(c[0], DEPTH))) h = smaller(h, largest_root(c, n));
   a[0] = c[0];
   for (int k = 1; k <= n; k++) { power *= h; a[k] = c[k] * power; }
   /* A touch that reaches zero by rounding is no root; rounding at t is ROUNDING sum |c_k| t^k. */

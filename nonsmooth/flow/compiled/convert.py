@@ -8,10 +8,11 @@ import numpy as np
 
 from ...model import Array, FilippovSystem, motion
 from .. import messages
+from ..facts import KINDS, REASONS
 from ..options import Options
 from ..status import ADVICE, Status
-from ..trajectory import Event, Segment, Trajectory
-from .engine import KINDS, REASONS, Run
+from ..trajectory import Event, Segment, Steps, Trajectory
+from .engine import Run
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
@@ -46,8 +47,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         status=status,
         message=f"{_message(system, options, run)} {ADVICE[status]}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
-        _starts=run.starts,
-        _coefficients=run.coefficients,
+        steps=Steps(run.starts, run.coefficients),
     )
 
 
@@ -57,7 +57,8 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
         before, after = modes[run.event_before[k]], modes[run.event_after[k]]
         name = motion(system, before).guards[run.event_guards[k]].name
         t = float(run.event_t[k])
-        found.append(Event(KINDS[kind], t, run.event_x[k].copy(), before, after, name))
+        states = run.event_x[k].copy(), run.event_after_x[k].copy()
+        found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1]))
     return found
 
 
@@ -81,12 +82,16 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.reached_end(options.t_end)
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
+    if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":
+        return messages.pressed(system.resets[run.where][0], t)
     if status is Status.ACCUMULATION:
         return messages.accumulation(len(run.event_kinds), run.limit)
     if status is Status.TOO_MANY_EVENTS:
         return messages.too_many("events", options.max_events)
     if status is Status.TOO_MANY_STEPS:
         return messages.too_many("steps", options.max_steps)
+    if status is Status.STEP_TOO_SMALL and REASONS[run.reason] == "branch_point":
+        return messages.branch_point(t)
     if status is Status.STEP_TOO_SMALL:
         return messages.step_too_small(4e-16 * max(1.0, abs(t)))
     return _reason(system, options, run)
@@ -105,6 +110,12 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.wrong_start(str(options.start_mode), modes[run.where])
     if reason == "field":
         return messages.field_not_finite(modes[run.mode], run.x[-1].tolist())
+    if reason == "state":
+        return messages.state_not_finite(t)
+    if reason == "multiple_zero":
+        return messages.multiple_zero(run.where)
+    if reason == "two_sided":
+        return messages.two_sided(system.resets[run.where][0])
     if reason == "reset_map":
         return messages.reset_not_finite(system.resets[run.where][0], t)
     return messages.surface_not_finite() if reason == "surface" else messages.degenerate()

@@ -4,27 +4,19 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
+from ..facts import FULL, HAND_OVER, KINDS
 from ..options import Options
-from ..status import Status
-from ..stepper import _SAFETY as SAFETY
-from ..stepper import order_for
-from .build import build, lane_width
-from .codegen import lanes_source, scalar_source, supports_lanes, supports_scalar
-
-#: Event kinds by number, as in the C enumeration.
-KINDS = ("crossing", "entry", "exit", "stop", "reset", "end")
-
-#: Status of a trajectory that another engine must run.
-HAND_OVER = -3
-_FULL = -2
+from ..results import Chunk, Stopped
+from .build import CompilerError, build, lane_width
+from .codegen import lanes_source, scalar_source, supports_scalar
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 _BURST = 4096
@@ -53,6 +45,7 @@ _OUTPUT_ARRAYS = {
     "point_x": (float, "point"),
     "event_t": (float, "event"),
     "event_x": (float, "event"),
+    "event_after_x": (float, "event"),
     "step_mode": (np.int32, "step"),
     "event_kind": (np.int32, "event"),
     "event_before": (np.int32, "event"),
@@ -88,13 +81,14 @@ class Run:
     status : int
         A Status, or HAND_OVER: the reference driver must repeat the run.
     reason, where : int
-        Why, for the message (see ``REASONS``): a surface, a stop, or a set of modes as bits.
+        Why, for the message (see ``facts.REASONS``): a surface, a stop, or a set of modes as bits.
     t, x : ndarray (m,), (m, n)
         Points: start, steps and events; a reset appears twice.
     starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
         Steps: start times, Taylor coefficients, mode numbers (positions in ``system.modes``).
-    event_kinds, event_t, event_x, event_before, event_after, event_guards : ndarray (e,) or (e, n)
-        Events: kind (position in ``KINDS``), modes before and after, row of the guard in
+    event_kinds, event_t, event_x, event_after_x : ndarray (e,) or (e, n)
+    event_before, event_after, event_guards : ndarray (e,)
+        Events: kind (position in ``facts.KINDS``), modes before and after, row of the guard in
         ``motion(system, mode_before).guards``. The final "end" is not among them.
     limit : float
         Accumulation time or NaN.
@@ -115,69 +109,10 @@ class Run:
     event_kinds: NDArray[np.int32]
     event_t: Array
     event_x: Array
+    event_after_x: Array
     event_before: NDArray[np.int32]
     event_after: NDArray[np.int32]
     event_guards: NDArray[np.int32]
-
-
-#: Names of the C reasons.
-REASONS = (
-    "",
-    "two_fold",
-    "slid_to_two_fold",
-    "ambiguous",
-    "no_mode",
-    "degenerate",
-    "wrong_start",
-    "field",
-    "surface",
-    "reset_map",
-)
-
-
-@dataclass
-class Chunk:
-    """Results of some trajectories; itineraries as numbers into ``words``, which are sorted.
-
-    ``totals``: steps, events and trajectories handed over by the lanes.
-    """
-
-    x: Array
-    t: Array
-    status: NDArray[np.int8]
-    itinerary: NDArray[np.int32]
-    words: list[str]
-    kinds: NDArray[np.int32]
-    at_x: Array | None
-    at_t: Array | None
-    totals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(4, np.int64))
-
-    @classmethod
-    def empty(cls, count: int, n: int, at: bool) -> Chunk:
-        """Arrays without values for ``count`` trajectories of ``n`` states."""
-        return cls(
-            x=np.empty((count, n)),
-            t=np.empty(count),
-            status=np.empty(count, np.int8),
-            itinerary=np.empty(count, np.int32),
-            words=[],
-            kinds=np.empty((count, len(KINDS)), np.int32),
-            at_x=np.empty((count, n)) if at else None,
-            at_t=np.empty(count) if at else None,
-        )
-
-    def rename(self, words: Mapping[int, str]) -> None:
-        """Number the itineraries in the order of their words, those in use only."""
-        self.words = sorted(set(words.values()))
-        number = {word: k for k, word in enumerate(self.words)}
-        table = np.zeros(max(words, default=0) + 1, np.int32)
-        for code, word in words.items():
-            table[code] = number[word]
-        self.itinerary[:] = table[self.itinerary]
-
-
-class Stopped(Exception):
-    """The work was told to stop before it was done."""
 
 
 class Engine:
@@ -231,7 +166,7 @@ class Engine:
                 numbers, counts = self._read(state)
                 sizes = dict(zip(("step", "point", "event"), counts[7:10], strict=True))
                 parts.append({k: a[: sizes[_OUTPUT_ARRAYS[k][1]]] for k, a in arrays.items()})
-                if status != _FULL:
+                if status != FULL:
                     break
                 steps = min(4 * steps, _MOST_STEPS)
                 arrays, output = self._output(steps)
@@ -255,6 +190,7 @@ class Engine:
             "coefficients": (n, self.order + 1),
             "point_x": (n,),
             "event_x": (n,),
+            "event_after_x": (n,),
         }
         return {
             name: np.empty((rooms[room], *shapes.get(name, ())), dtype)
@@ -292,6 +228,7 @@ class Engine:
             event_kinds=whole["event_kind"],
             event_t=whole["event_t"],
             event_x=whole["event_x"][:, :n],
+            event_after_x=whole["event_after_x"][:, :n],
             event_before=whole["event_before"],
             event_after=whole["event_after"],
             event_guards=whole["event_guard"],
@@ -373,6 +310,8 @@ class Engine:
 
 
 def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
+    _require_size(library.options_size, _COptions)
+    _require_size(library.batch_size, _CBatch)
     library.tree_new.restype = _POINTER
     library.tree_size.argtypes = [_POINTER]
     library.tree_read.argtypes = [_POINTER] * 3
@@ -381,12 +320,23 @@ def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
     library.run_many.argtypes = [*[_POINTER] * 4, _I64]
     if not hasattr(library, "run_size"):
         return library
+    _require_size(library.output_size, _COutput)
     library.run_size.restype = _I64
     library.run_begin.argtypes = [*[_POINTER] * 6, _D]
     library.run_continue.argtypes = [_POINTER]
     library.run_read.argtypes = [_POINTER] * 3
     library.run_resume.argtypes = [_POINTER] * 2
     return library
+
+
+def _require_size(size: Any, structure: type[ctypes.Structure]) -> None:
+    """Refuse a library whose structure is not laid out as ours."""
+    size.restype = _I64
+    if size() != ctypes.sizeof(structure):
+        raise CompilerError(
+            f"{structure.__name__}: expected {ctypes.sizeof(structure)} bytes, received {size()} "
+            "from the compiled library. Its compiler lays out structures in another way."
+        )
 
 
 def _address(a: NDArray[Any] | None) -> int | None:
@@ -438,11 +388,8 @@ def engine_for(system: FilippovSystem, options: Options) -> Engine | None:
         return None
     if options.start_mode is not None and options.start_mode not in system.modes:
         return None
-    order = order_for(SAFETY * min(options.rtol, options.atol))
-    key = ("engine", order)
-    if key not in system._functions:
-        system._functions[key] = Engine(system, order)
-    return system._functions[key]
+    order = options.order
+    return system.cached(("engine", order), lambda: Engine(system, order))
 
 
 def simulate_arrays(system: FilippovSystem, x: Array, p: Array, options: Options) -> Run | None:
@@ -466,18 +413,3 @@ def simulate_arrays(system: FilippovSystem, x: Array, p: Array, options: Options
         return None
     run = engine.run(x, p, options)
     return None if run.status == HAND_OVER else run
-
-
-__all__ = [
-    "HAND_OVER",
-    "KINDS",
-    "REASONS",
-    "Chunk",
-    "Engine",
-    "Run",
-    "Status",
-    "Stopped",
-    "engine_for",
-    "simulate_arrays",
-    "supports_lanes",
-]

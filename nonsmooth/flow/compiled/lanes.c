@@ -8,22 +8,24 @@
  * neighbours.
  *
  * The generated text defines, besides what common.h asks for: W, SLOTS guards (surface or exit to +,
- * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], CANCELLED, CURVED, BRANCHES, prepare(p, q),
- * jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values.
+ * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding), CANCELLED,
+ * CURVED, prepare(p, q), jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values;
+ * ROW[ROWS] of the field and SLOT[GUARDS] are not affine, and check_values gives them.
  */
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
 #define HEAD 5 /* below P, which is 6 at least */
 #define MODEL (P < 8 ? P : 8)
-#define NEAR 1e-13 /* events closer than this, relative to the time, are left to the scalar driver */
+#define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
 #define MEMORY 256
 
 typedef struct {
-  T x[N], q[NQ], t, lambda, last_event, shortest;
+  T x[N], q[NQ], t, lambda, last_event, shortest, length; /* of the step before in the same mode, or 0 */
   I slides, above, drop, live, steps, events, kinds[KINDS], shrinking;
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
+  double size; /* of states at which both tolerances are as large */
   int64_t index[W];
   int32_t base[W];
 } Lanes;
@@ -82,6 +84,9 @@ static void store(Lanes *s, Work *w, int l, int status) {
   w->alive--;
   b->totals[0] += LANE_I(s->steps, l);
   b->totals[1] += LANE_I(s->events, l);
+  int finite = 1;
+  for (int k = 0; k < ND; k++) finite &= isfinite(LANE(s->x[k], l)) != 0;
+  if (!finite) status = HAND_OVER;
   b->status[i] = (int8_t)status;
   if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
@@ -114,6 +119,7 @@ static int load(Lanes *s, Work *w, int l) {
   }
   LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
   LANE(s->shortest, l) = 1e-3;
+  LANE(s->length, l) = 0;
   LANE_I(s->live, l) = -1;
   LANE_I(s->code, l) = LANE_I(s->steps, l) = LANE_I(s->events, l) = LANE_I(s->shrinking, l) = LANE_I(s->drop, l) = 0;
   for (int k = 0; k < KINDS; k++) LANE_I(s->kinds[k], l) = 0;
@@ -135,8 +141,12 @@ static void hand_over(Lanes *s, Work *w, I which) {
 
 /* The surface -------------------------------------------------------------------------------- */
 
-/* Newton steps of the states (not the time) along the gradient. */
-INLINE void project(Lanes *s, I which) {
+INLINE T rounding_scale(const Lanes *s, const T *gradient);
+
+/* Newton steps of the states (not the time) along the gradient; lanes that they do not lead onto the
+ * surface, because its zero is a multiple one. */
+INLINE I project(Lanes *s, I which) {
+  I off = {0};
 #if M > 0
   for (int iteration = 0; iteration < (CURVED ? 3 : 1); iteration++) {
     T h, g[N], size = BC(0);
@@ -145,20 +155,26 @@ INLINE void project(Lanes *s, I which) {
     T step = SELECT(which & (I)(h != 0), h / size, BC(0));
     UNROLL for (int i = 0; i < ND; i++) s->x[i] -= step * g[i];
   }
+  if (CURVED) {
+    T h, g[N];
+    surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
+    off = which & ~(I)(ABS(h) <= VANISHES * rounding_scale(s, g));
+  }
 #endif
+  return off;
 }
 
-/* sum of |gradient| (1 + |x|): rounding in a function is that times epsilon. */
+/* sum of |gradient| (size + |x|): rounding in a function is that times epsilon. */
 INLINE T rounding_scale(const Lanes *s, const T *gradient) {
   T scale = BC(0);
-  UNROLL for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (1.0 + ABS(s->x[i]));
+  UNROLL for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (s->size + ABS(s->x[i]));
   return scale;
 }
 
 /* Lanes on the surface whose fields are both clearly transversal get their mode and the number of
  * coefficients to drop; the mask of those that are not clear is returned. */
 INLINE I decide(Lanes *s, I which, const T *lie, const T *scale) {
-  I clear = (ABS(lie[0]) > 64 * EPS * scale[0]) & (ABS(lie[1]) > 64 * EPS * scale[1]);
+  I clear = (ABS(lie[0]) > VANISHES * scale[0]) & (ABS(lie[1]) > VANISHES * scale[1]);
   I up0 = lie[0] > 0, up1 = lie[1] > 0;
   clear &= ~(up0 & ~up1);
   I mine = which & clear;
@@ -187,7 +203,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
 #if M > 0
   T h, g[N], value[2], scale[2];
   surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
-  I on = fresh & (ABS(h) <= ON_SURFACE * EPS * rounding_scale(s, g));
+  I on = fresh & (ABS(h) <= ON_SURFACE * rounding_scale(s, g));
   unclear |= fresh & ~(ABS(h) < INFINITY);
   s->above |= fresh & (h > 0);
   if (any(on)) {
@@ -200,7 +216,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
   T stop[STOPS], gradient[STOPS][N];
   stop_values(s->x, s->q, s->slides, s->above, s->lambda, stop, &gradient[0][0]);
   for (int j = 0; j < STOPS; j++)
-    unclear |= fresh & (ABS(stop[j]) <= 64 * EPS * rounding_scale(s, gradient[j]));
+    unclear |= fresh & (ABS(stop[j]) <= VANISHES * rounding_scale(s, gradient[j]));
   for (int j = 0; j < STOPS; j++)
     s->above_stop[j] = (s->above_stop[j] & ~fresh) | (fresh & (I)(stop[j] > 0));
 #endif
@@ -213,8 +229,8 @@ static void begin(Lanes *s, Work *w, I fresh) {
 
 /* Ratios of the last two terms of the guards that are not affine to their allowances (an affine
  * guard is bounded by the states). */
-INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g[S1][P + 1], T *last,
-                         T *before, T *sum) {
+INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *of_guards, T g[S1][P + 1],
+                         T *last, T *before, T *sum) {
   T gradient[S1][N], value[S1];
 #if M > 0
   if (!AFFINE[0] || !AFFINE[1]) {
@@ -234,6 +250,7 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g
     if (AFFINE[j]) { *sum += g[j][P] + g[j][P - 1]; continue; }
     T a = o->rtol * ABS(g[j][0]) + 1e-290;
     UNROLL for (int i = 0; i < ND; i++) a += ABS(gradient[j][i]) * allowed[i];
+    of_guards[j] = a - (1 - SAFETY) * o->rtol * ABS(g[j][0]);
     T r = ROUGH_INVERSE(a), p = ABS(g[j][P]) * r, b = ABS(g[j][P - 1]) * r;
     I counts = M > 0 && j == 1 ? s->slides : ~(I){0};
     counts &= a > 1e-280;
@@ -243,8 +260,10 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T g
   }
 }
 
-INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], I *finite) {
-  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), allowed[N];
+/* ``allowed`` and ``of_guards`` are the tolerances of states and of guards that are not affine. */
+INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], T *allowed, T *of_guards,
+                   I *finite) {
+  T last = BC(1e-300), before = BC(1e-300), sum = BC(0);
   UNROLL for (int i = 0; i < N; i++) {
     allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
     if (i >= ND) continue;
@@ -253,7 +272,7 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
     last = MAX(last, p);
     before = MAX(before, b);
   }
-  guard_ratios(s, o, allowed, g, &last, &before, &sum);
+  guard_ratios(s, o, allowed, of_guards, g, &last, &before, &sum);
   *finite = ABS(sum) < INFINITY;
   T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
   return EXP2(MIN(h1, h2));
@@ -349,8 +368,8 @@ INLINE T polish(const T *a, T end, I active, T *slope) {
     I positive = f[0] > 0;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);
-    I held = (next >= lo - 4 * EPS) & (next <= hi + 4 * EPS); /* or it goes to another root */
-    I small = (converged(f, step) & held) | (I)(hi - lo <= 4 * EPS);
+    I held = (next >= lo - 4 * EPSILON) & (next <= hi + 4 * EPSILON); /* or it goes to another root */
+    I small = (converged(f, step) & held) | (I)(hi - lo <= 4 * EPSILON);
     I inside = (next > lo) & (next < hi);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
@@ -548,7 +567,7 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *
 /* Zeno: ever shorter intervals are left to the scalar driver, which knows their limit. */
 INLINE I watch_intervals(Lanes *s, I which) {
   T interval = s->t - s->last_event;
-  I shorter = which & (interval < 0.9999 * s->shortest);
+  I shorter = which & (interval < SHRINKS * s->shortest);
   s->last_event = SELECT(which, s->t, s->last_event);
   s->shortest = SELECT(shorter, interval, s->shortest);
   s->shrinking -= shorter;
@@ -575,7 +594,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
   I steep = slope < -1e-10 * MAX(scale[0], scale[1]);
-  double clear = CANCELLED ? 64 * EPS : 2 * (w->o->rtol + 2e-14); /* not an exit at a two-fold */
+  double clear = CANCELLED ? VANISHES : 2 * (w->o->rtol + TANGENT); /* not an exit at a two-fold */
   I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);
   I was_above = s->above;
@@ -590,6 +609,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   count(s, w, EXIT, all & ends);
   count(s, w, CROSSING, changed & ~ends & ~entered);
   unclear |= watch_intervals(s, all);
+  s->length = SELECT(all, BC(0), s->length);
   unclear |= s->events >= w->o->max_events;
   set_lambda(s);
   note_modes(s, w, all & ~unclear);
@@ -600,38 +620,69 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
 INLINE I near_two_fold(const Lanes *s, double tolerance) {
   T value[2], scale[2];
   lie(s, value, scale);
-  return (ABS(value[0]) <= 2 * (tolerance + 2e-14) * scale[0])
-         & (ABS(value[1]) <= 2 * (tolerance + 2e-14) * scale[1]);
+  return (ABS(value[0]) <= 2 * (tolerance + TANGENT) * scale[0])
+         & (ABS(value[1]) <= 2 * (tolerance + TANGENT) * scale[1]);
 }
 #endif
 
-INLINE void advance(Lanes *s, T c[N][P + 1], T dt) {
+INLINE void state_at(T *x, T c[N][P + 1], T dt, int degree) {
   UNROLL for (int i = 0; i < N; i++) {
-    T v = c[i][P];
-    UNROLL for (int k = P - 1; k >= 0; k--) v = v * dt + c[i][k];
-    s->x[i] = v;
+    T v = c[i][degree];
+    UNROLL for (int k = degree - 1; k >= 0; k--) v = v * dt + c[i][k];
+    x[i] = v;
   }
+}
+
+INLINE void advance(Lanes *s, const T *x, T dt) {
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = x[i];
   s->t += dt;
   if (TIMED) s->x[N - 1] = s->t;
   s->steps += 1;
   s->drop = (I){0};
 }
 
-/* Lanes whose polynomials do not satisfy the equation at the end of the step. */
-INLINE I wrong_field(const Lanes *s, const Options *o, T c[N][P + 1], T dt) {
+#if ROWS + GUARDS > 0
+/* Lanes where field and guards at a time of the step are not those of the polynomials. */
+INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, const T *allowed,
+                   const T *of_guards, T at, T dt, int degree) {
+  T f[ROWS + 1], guard[GUARDS + 1];
   I wrong = {0};
-#if BRANCHES
-  T x[N], slope[N], f[N];
-  dt *= JUST;
-  UNROLL for (int i = 0; i < N; i++) {
-    T v = c[i][P], d = BC(0);
-    UNROLL for (int k = P - 1; k >= 0; k--) { d = d * dt + v; v = v * dt + c[i][k]; }
-    x[i] = v;
-    slope[i] = d;
+  check_values(x, s->q, s->slides, s->above, s->lambda, f, guard);
+  UNROLL for (int m = 0; m < ROWS; m++) {
+    const T *row = c[ROW[m]];
+    T d = degree * row[degree];
+    UNROLL for (int k = degree - 1; k >= 1; k--) d = d * at + k * row[k];
+    wrong |= ~(I)(ABS(f[m] - d) * dt <= WRONG * allowed[ROW[m]] + VANISHES * dt * ABS(d));
   }
-  field_values(x, s->q, s->slides, s->above, s->lambda, f);
-  for (int i = 0; i < N; i++)
-    wrong |= ~(I)(ABS(f[i] - slope[i]) * dt <= WRONG * SAFETY * (o->atol + o->rtol * ABS(c[i][0])));
+  UNROLL for (int m = 0; m < GUARDS; m++) {
+    int j = SLOT[m];
+    T v = g[j][degree];
+    UNROLL for (int k = degree - 1; k >= 0; k--) v = v * at + g[j][k];
+    I counts = M > 0 && j == 1 ? s->slides : ~(I){0};
+    wrong |= counts & ~(I)(ABS(guard[m] - v) <= WRONG * of_guards[j]);
+  }
+  return wrong;
+}
+#endif
+
+/* Lanes whose step is left to the scalar driver: it would be held back, or its defect is too large. */
+INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
+                   const T *of_guards, T by_series, T h, T dt, const T *end) {
+  I wrong = {0};
+#if ROWS + GUARDS > 0
+  I same = s->length > 0;
+  wrong |= same & (I)(by_series > GROWTH * s->length);
+  UNROLL for (int i = 0; i < N; i++)
+    wrong |= ~same & (I)(by_series * ABS(c[i][1]) > FAR * (ABS(c[i][0]) + s->size));
+  for (int k = 1; k <= CHECKS; k++) {
+    T x[N], at = dt * ((double)k / (CHECKS + 1));
+    state_at(x, c, at, INNER);
+    wrong |= disagrees(s, c, g, x, allowed, of_guards, at, dt, INNER);
+  }
+  wrong |= disagrees(s, c, g, end, allowed, of_guards, dt, dt, P);
+  s->length = h;
+  wrong &= ~((s->slides & -AFFINE_MODES[2]) | (~s->slides & s->above & -AFFINE_MODES[0])
+             | (~s->slides & ~s->above & -AFFINE_MODES[1]));
 #endif
   return wrong;
 }
@@ -655,25 +706,32 @@ INLINE I passed_between(Lanes *s, T g[S1][P + 1]) {
 
 static void step(Lanes *s, Work *w) {
   const Options *o = w->o;
-  T c[N][P + 1], g[S1][P + 1], dt, slope = BC(0);
+  T c[N][P + 1], g[S1][P + 1], dt, slope = BC(0), allowed[N], of_guards[S1];
   I finite, slot;
   jet(s->x, s->q, s->slides, s->above, s->lambda, &c[0][0], &g[0][0]);
-  T h = MIN(step_size(s, o, c, g, &finite), BC(o->max_step)), left = o->t_end - s->t;
+  T by_series = step_size(s, o, c, g, allowed, of_guards, &finite);
+  T h = MIN(by_series, BC(o->max_step)), left = o->t_end - s->t;
   I last = h >= left, unclear = ~finite;
-  unclear |= ~last & (h <= 4 * EPS * MAX(BC(1), ABS(s->t)));
+  unclear |= ~last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
   unclear |= (s->steps >= o->max_steps) | passed_between(s, g);
-  h = SELECT(last, left, h);
+  /* What happens at the end, to rounding, happens. */
+  h = SELECT(last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
   unclear |= first_hit(s, g, &h, &dt, &slot, &slope);
   last &= h >= left;
-  unclear |= wrong_field(s, o, c, dt);
+  dt = MIN(dt, SELECT(last, left, dt));
+  unclear |= last & (dt == left) & (slot != 0) & (slot <= FIRST_STOP); /* a mode without a step */
+  h = MIN(h, left);
+  T end[N];
+  state_at(end, c, dt, P);
+  unclear |= unchecked(s, o, c, g, allowed, of_guards, by_series, h, dt, end);
   I was_sliding = s->slides;
-  advance(s, c, dt);
+  advance(s, end, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
 #if M > 0
   met = live & ~was_sliding & (slot == 1);
   up = live & was_sliding & (slot == 1);
   down = live & (slot == 2);
-  if (any(met | (live & was_sliding))) project(s, met | was_sliding);
+  if (any(met | (live & was_sliding))) unclear |= project(s, met | was_sliding);
   I on = live & was_sliding & (slot == 0) & ~last;
   if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, o->rtol);
   if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, slope);
@@ -682,8 +740,8 @@ static void step(Lanes *s, Work *w) {
   stopped = live & (slot > FIRST_STOP);
   if (any(stopped)) count(s, w, STOP, stopped);
 #endif
+  s->t = SELECT(live & last & (I)(dt == left), BC(o->t_end), s->t);
   last &= live & (slot == 0);
-  s->t = SELECT(last, BC(o->t_end), s->t);
   hand_over(s, w, unclear);
   finish_lanes(s, w, stopped & ~unclear, STOPPED);
   finish_lanes(s, w, last & ~unclear, REACHED_END);
@@ -703,6 +761,7 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t b
     w->b = b;
     w->o = o;
     w->tree = tree;
+    s->size = o->atol / o->rtol;
     prepare(b->p, q);
     for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
     many->begun = 1;

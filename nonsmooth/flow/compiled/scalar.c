@@ -5,14 +5,11 @@
  * field) is handed over to them.
  *
  * The generated text defines, besides what common.h asks for: MODES, LETTER[MODES][M] (+1, -1, 0),
- * MODE_OF[3^M], CANCELLED[MODES], BRANCHES[MODES], GUARDS[MODES], GUARD[MODES][NG] = {kind, index, side},
- * jet(mode, x, q, c, g), field(mode, x, q, f), guard_values(mode, x, q, value, gradient), surface_values(x, q, h,
+ * MODE_OF[3^M], CANCELLED[MODES], AFFINE[MODES], GUARDS[MODES], GUARD[MODES][NG] = {kind, index, side},
+ * jet(mode, x, q, c, g), values(mode, x, q, f, g), guard_values(mode, x, q, value, gradient), surface_values(x, q, h,
  * gradient), reset_map(index, x, q, y), prepare(p, q).
  */
 #define HISTORY 48
-
-enum { SURFACE_GUARD, EXIT_GUARD, STOP_GUARD, RESET_GUARD };
-static const int PRIORITY[] = {2, 3, 0, 1};
 
 typedef struct { double states[N][P + 1], guards[NG1][P + 1], gradient[NG1][N], scale[NG1];
                  int mode, finite; } Expansion;
@@ -20,7 +17,7 @@ typedef struct { double states[N][P + 1], guards[NG1][P + 1], gradient[NG1][N], 
 /* What a run writes, when dense: steps, points and events, emptied by the caller when full. */
 typedef struct {
   int64_t steps, points, events, step_room, point_room, event_room;
-  double *start, *coefficients, *point_t, *point_x, *event_t, *event_x;
+  double *start, *coefficients, *point_t, *point_x, *event_t, *event_x, *event_after_x;
   int32_t *step_mode, *event_kind, *event_before, *event_after, *event_guard;
 } Output;
 
@@ -29,24 +26,24 @@ typedef struct {
   double x[N], q[NQ], t, begun, last_event, limit, at_t, at_x[N];
   int32_t mode, status, reason, where, due, drop[NG1];
   int32_t side[2][NG1]; /* of stops and resets just before, where it is clear */
+  int32_t fired[NG1]; /* resets since the motion last moved */
   int64_t step_count, event_count, kinds[KINDS], segment_steps;
   int32_t itinerary, segment_mode;
   double interval[HISTORY];
   int32_t pattern[HISTORY];
   int64_t history;
+  double size; /* of states at which both tolerances are as large */
+  double length, shortened; /* of the step before */
+  int32_t length_mode;
   Output out;
   Tree *tree;
 } Run;
-
-/* Reasons, for the message of a status. */
-enum { NO_REASON, TWO_FOLD, SLID_TO_TWO_FOLD, AMBIGUOUS, NO_MODE, DEGENERATE, WRONG_START, FIELD,
-       SURFACE, RESET_MAP };
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }
 }
 
-/* Numbers: nonsmooth/flow/stepper.py ------------------------------------------------------- */
+/* Numbers: nonsmooth/flow/reference/stepper.py ------------------------------------------------------- */
 
 /* Rounding in a guard is that times epsilon; infinite slopes, those of a square root at zero, say
  * nothing and are left out. */
@@ -54,7 +51,7 @@ static double rounding_scale(const Run *r, const double *gradient) {
   double scale = 0;
   for (int i = 0; i < N; i++) {
     double slope = fabs(gradient[i]);
-    scale += slope < INFINITY ? slope * (1 + fabs(r->x[i])) : 0;
+    scale += slope < INFINITY ? slope * (r->size + fabs(r->x[i])) : 0;
   }
   return scale;
 }
@@ -64,12 +61,16 @@ static void expand(const Run *r, int mode, Expansion *e) {
   e->mode = mode;
   jet(mode, r->x, r->q, &e->states[0][0], &e->guards[0][0]);
   guard_values(mode, r->x, r->q, value, &e->gradient[0][0]);
-  /* A coefficient that is not finite makes all later ones so: the last two tell. */
+  /* A coefficient that is not finite makes all later ones so, or is the first: the field, which is not
+   * used again where a logarithm's argument is negative. */
   double zero = 0, none = 0;
-  for (int i = 0; i < N; i++) { zero += 0 * e->states[i][P]; none += 0 * e->states[i][P - 1]; }
+  for (int i = 0; i < N; i++) {
+    zero += 0 * e->states[i][P];
+    none += 0 * e->states[i][P - 1] + 0 * e->states[i][1];
+  }
   for (int j = 0; j < GUARDS[mode]; j++) {
     zero += 0 * e->guards[j][P];
-    none += 0 * e->guards[j][P - 1];
+    none += 0 * e->guards[j][P - 1] + 0 * e->guards[j][0];
   }
   e->finite = zero + none == 0;
   for (int j = 0; j < GUARDS[mode]; j++) {
@@ -135,22 +136,52 @@ static double step_size(const Run *r, const Expansion *e) {
   return h;
 }
 
-/* Whether the polynomial of a step satisfies the equation at its end; a branch point of the field may
- * be passed unseen. */
-static int satisfies(const Run *r, const Expansion *e, double dt) {
-  double x[N], slope[N], f[N];
-  if (!BRANCHES[e->mode]) return 1;
-  dt *= JUST;
-  for (int i = 0; i < N; i++) {
-    const double *c = e->states[i];
-    x[i] = horner(c, P, dt, &slope[i]);
-  }
-  field(e->mode, x, r->q, f);
-  for (int i = 0; i < N; i++) {
-    double allowed = WRONG * SAFETY * (r->o.atol + r->o.rtol * fabs(e->states[i][0]));
-    if (!(fabs(f[i] - slope[i]) * dt <= allowed)) return 0;
+/* A length beyond which the step h that the series allows may not see what comes. */
+static double safe_length(const Run *r, const Expansion *e, double h) {
+  if (AFFINE[e->mode]) return INFINITY;
+  if (e->mode == r->length_mode) return h > GROWTH * r->length ? r->length : INFINITY;
+  double natural = INFINITY;
+  for (int i = 0; i < N; i++)
+    natural = smaller((fabs(e->states[i][0]) + r->size) / fabs(e->states[i][1]), natural);
+  return h > FAR * natural ? FIRST * natural : INFINITY;
+}
+
+/* Whether field and guards at a time of the step are those of the polynomials. */
+static int agrees(const Run *r, const Expansion *e, const double *allowed, const double *of_guards, double s,
+                  double dt) {
+  double x[N], slope[N], f[N], g[NG1], ignored;
+  for (int i = 0; i < N; i++) x[i] = horner(e->states[i], P, s, &slope[i]);
+  values(e->mode, x, r->q, f, g);
+  for (int i = 0; i < N; i++)
+    if (!(fabs(f[i] - slope[i]) * dt <= WRONG * allowed[i] + VANISHES * dt * fabs(slope[i]))) return 0;
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    double miss = fabs(g[j] - horner(e->guards[j], P, s, &ignored));
+    if (!(miss <= WRONG * of_guards[j] + VANISHES * e->scale[j])) return 0;
   }
   return 1;
+}
+
+/* dt where the polynomials agree at the part ``end`` of a step and at points inside, else half of the
+ * first point where they do not. */
+static double verified(const Run *r, const Expansion *e, double dt, double end, double safe) {
+  double allowed[N], of_guards[NG1], low = isinf(safe) ? dt : 0.5 * dt;
+  if (AFFINE[e->mode]) return dt;
+  for (int i = 0; i < N; i++) allowed[i] = SAFETY * (r->o.atol + r->o.rtol * fabs(e->states[i][0]));
+  for (int j = 0; j < GUARDS[e->mode]; j++) {
+    of_guards[j] = SAFETY * r->o.rtol * fabs(e->guards[j][0]);
+    for (int i = 0; i < N; i++) of_guards[j] += e->gradient[j][i] * allowed[i];
+  }
+  while (low > safe) low *= 0.5;
+  for (; low < dt; low *= 2)
+    for (int k = 0; k < OCTAVE; k++) {
+      double s = low * (1 + (double)k / OCTAVE);
+      if (!agrees(r, e, allowed, of_guards, s, dt)) return s > 2.2250738585072014e-308 ? 0.5 * s : 0;
+    }
+  for (int k = 1; k <= CHECKS; k++) {
+    double s = dt * k / (CHECKS + 1);
+    if (!agrees(r, e, allowed, of_guards, s, dt)) return s > 2.2250738585072014e-308 ? 0.5 * s : 0;
+  }
+  return agrees(r, e, allowed, of_guards, end * dt, dt) ? dt : dt > 2.2250738585072014e-308 ? 0.5 * dt : 0;
 }
 
 /* First coefficient of a guard that is not zero to rounding; P + 1 if there is none. */
@@ -164,7 +195,7 @@ static int leading(const Expansion *e, int row, int zeros, double *value) {
       for (int i = 0; i < N; i++) speed = larger(fabs(e->states[i][k]), speed);
       noise = sum * speed * (k + 1);
     }
-    if (fabs(e->guards[row][k]) > 64 * EPS * noise) { *value = e->guards[row][k]; return k; }
+    if (fabs(e->guards[row][k]) > VANISHES * noise) { *value = e->guards[row][k]; return k; }
   }
   *value = 0;
   return P + 1;
@@ -205,7 +236,7 @@ static void note_sides(Run *r, const Expansion *e, double dt) {
     const int *guard = GUARD[e->mode][j];
     if (guard[0] < STOP_GUARD) continue;
     r->side[guard[0] == RESET_GUARD][guard[1]] =
-        side_before(e->guards[j], P, dt, ON_SURFACE * EPS * e->scale[j]);
+        side_before(e->guards[j], P, dt, ON_SURFACE * e->scale[j]);
   }
 }
 
@@ -278,13 +309,20 @@ static void project(Run *r, unsigned which) {
   }
 }
 
+/* Whether Newton's steps have led onto a surface: not where its zero is a multiple one. */
+static int is_on(const Run *r, int surface) {
+  double h[M1], g[M1][N];
+  surface_values(r->x, r->q, h, &g[0][0]);
+  return fabs(h[surface]) <= VANISHES * rounding_scale(r, g[surface]);
+}
+
 /* Surfaces through the present state, to rounding, and those known to be. */
 static unsigned active_surfaces(const Run *r, unsigned certain, int mode) {
   double h[M1], g[M1][N];
   if (M == 0) return 0;
   surface_values(r->x, r->q, h, &g[0][0]);
   for (int i = 0; i < M; i++) {
-    if (fabs(h[i]) <= ON_SURFACE * EPS * rounding_scale(r, g[i])) certain |= 1u << i;
+    if (fabs(h[i]) <= ON_SURFACE * rounding_scale(r, g[i])) certain |= 1u << i;
   }
   int s = sliding_surface(mode);
   return s >= 0 ? certain | 1u << s : certain;
@@ -315,18 +353,20 @@ static void enter_segment(Run *r, int mode) {
 
 static void limit_of_events(Run *r);
 
-static void event(Run *r, int kind, int before, int guard) {
+/* ``x`` is the state at the event, the present one unless the event changed it. */
+static void event(Run *r, int kind, int before, int guard, const double *x) {
   r->kinds[kind]++;
   r->event_count++;
   if (kind == r->o.at_kind && r->kinds[kind] == r->o.at_count) {
     r->at_t = r->t;
-    memcpy(r->at_x, r->x, sizeof r->x);
+    memcpy(r->at_x, x, sizeof r->x);
   }
   if (r->o.dense) {
     int64_t k = r->out.events++;
     r->out.event_kind[k] = kind;
     r->out.event_t[k] = r->t;
-    memcpy(r->out.event_x + k * N, r->x, sizeof r->x);
+    memcpy(r->out.event_x + k * N, x, sizeof r->x);
+    memcpy(r->out.event_after_x + k * N, r->x, sizeof r->x);
     r->out.event_before[k] = before;
     r->out.event_after[k] = r->mode;
     r->out.event_guard[k] = guard;
@@ -337,39 +377,39 @@ static void event(Run *r, int kind, int before, int guard) {
   r->pattern[at] = ((kind * 64 + guard + 1) * (MODES + 1) + before + 1) * (MODES + 1) + r->mode + 1;
   r->last_event = r->t;
   limit_of_events(r);
+  if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }
 
-/* nonsmooth/flow/accumulation.py */
+/* nonsmooth/flow/reference/accumulation.py */
 static double interval_back(const Run *r, int back) { return r->interval[(r->history - back) % HISTORY]; }
 static int pattern_back(const Run *r, int back) { return r->pattern[(r->history - back) % HISTORY]; }
 
 static void limit_of_events(Run *r) {
-  static const int LAGS[] = {1, 2, 3, 4, 6};
-  if (r->history > 40) {
+  if (r->history > AT_ONCE) {
     int all_zero = 1;
-    for (int k = 1; k <= 40; k++) all_zero &= interval_back(r, k) == 0;
+    for (int k = 1; k <= AT_ONCE; k++) all_zero &= interval_back(r, k) == 0;
     if (all_zero) { r->limit = r->t; finish(r, ACCUMULATION, NO_REASON, 0); return; }
   }
-  for (int l = 0; l < 5; l++) {
-    int lag = LAGS[l], need = 6 * lag, same = 1;
+  for (int l = 0; l < LAG_COUNT; l++) {
+    int lag = LAGS[l], need = BLOCKS * lag, same = 1;
     if (r->history < need + lag) return;
     for (int k = 1; k <= need && same; k++) same = pattern_back(r, k) == pattern_back(r, k + lag);
     if (!same) continue;
-    double block[6], least = INFINITY, low = INFINITY, high = 0, ratio = 0;
-    for (int b = 0; b < 6; b++) {
+    double block[BLOCKS], least = INFINITY, low = INFINITY, high = 0, ratio = 0;
+    for (int b = 0; b < BLOCKS; b++) {
       block[b] = 0;
       for (int k = 0; k < lag; k++) block[b] += interval_back(r, need - b * lag - k);
       least = fmin(least, block[b]);
     }
     if (!(least > 0)) continue;
-    for (int b = 1; b < 6; b++) {
+    for (int b = 1; b < BLOCKS; b++) {
       ratio = block[b] / block[b - 1];
       low = fmin(low, ratio);
       high = fmax(high, ratio);
     }
-    if (!(high < 0.9999 && high - low <= 0.02 * (1 - ratio))) continue;
-    double left = block[5] * ratio / (1 - ratio);
-    if (left < 1e-6 * (r->t - r->begun)) {
+    if (!(high < SHRINKS && high - low <= SPREAD * (1 - ratio))) continue;
+    double left = block[BLOCKS - 1] * ratio / (1 - ratio);
+    if (left < REMAINING * (r->t - r->begun)) {
       r->limit = r->t + left;
       finish(r, ACCUMULATION, NO_REASON, 0);
       return;
@@ -377,7 +417,7 @@ static void limit_of_events(Run *r) {
   }
 }
 
-/* Filippov's logic: nonsmooth/flow/switching.py ---------------------------------------------- */
+/* Filippov's logic: nonsmooth/flow/reference/switching.py ---------------------------------------------- */
 
 typedef struct { int mode, strict, drop[NG1]; } Continuation;
 
@@ -388,7 +428,7 @@ static int is_two_fold(const Run *r, int mode, double tolerance) {
   for (int j = 0; j < GUARDS[mode]; j++) {
     if (GUARD[mode][j][0] != EXIT_GUARD) continue;
     double scale = rounding_scale(r, gradient[j]);
-    if (!(fabs(value[j]) <= (tolerance + 2e-14) * scale && scale > 0)) return 0;
+    if (!(fabs(value[j]) <= (tolerance + TANGENT) * scale && scale > 0)) return 0;
   }
   return 1;
 }
@@ -431,7 +471,7 @@ static int decide_quickly(Run *r, int mode, unsigned active, Continuation *resul
     const int *guard = GUARD[sliding][j];
     if (guard[0] != EXIT_GUARD) continue;
     double scale = rounding_scale(r, gradient[j]);
-    if (!(fabs(value[j]) > 64 * EPS * scale && fabs(value[j]) < INFINITY)) return 0;
+    if (!(fabs(value[j]) > VANISHES * scale && fabs(value[j]) < INFINITY)) return 0;
     fall[guard[2] < 0] = value[j]; /* -L_F1 h, L_F2 h */
   }
   if (fall[0] < 0 && fall[1] > 0) letters[i] = 1;
@@ -521,7 +561,7 @@ static int decide(Run *r, int mode, unsigned active, int exit_index, int exit_si
   return 1;
 }
 
-/* Events: nonsmooth/flow/driver.py ----------------------------------------------------------- */
+/* Events: nonsmooth/flow/reference/driver.py ----------------------------------------------------------- */
 
 static int change_kind(int before, int after) {
   int was = sliding_surface(before) >= 0, is = sliding_surface(after) >= 0;
@@ -534,31 +574,12 @@ static void adopt(Run *r, const Continuation *c) {
   memcpy(r->drop, c->drop, sizeof r->drop);
 }
 
-static void proceed(Run *r, int letters, unsigned active, int exit_index, int exit_side, int guard) {
+/* Adopt the mode that continues; 0 where there is none or more than one. */
+static int choose(Run *r, int letters, unsigned active, int exit_index, int exit_side) {
   Continuation c = {letters, 1, {0}};
-  int before = r->mode;
-  if (active && !decide(r, letters, active, exit_index, exit_side, &c)) return;
+  if (active && !decide(r, letters, active, exit_index, exit_side, &c)) return 0;
   adopt(r, &c);
-  if (r->mode != before) event(r, change_kind(before, r->mode), before, guard);
-  if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
-}
-
-/* A start on a stopping surface is not an event; one pressed into a reset is. */
-static void drop_zero_guards(Run *r) {
-  int needed = 0;
-  r->due = -1;
-  if (r->status != RUNNING) return;
-  for (int j = 0; j < GUARDS[r->mode]; j++) needed |= GUARD[r->mode][j][0] >= STOP_GUARD;
-  if (!needed) return;
-  Expansion e;
-  expand(r, r->mode, &e);
-  for (int j = 0; j < GUARDS[r->mode]; j++) {
-    const int *guard = GUARD[r->mode][j];
-    double value;
-    if (guard[0] < STOP_GUARD) continue;
-    r->drop[j] = leading(&e, j, 0, &value);
-    if (guard[0] == RESET_GUARD && r->drop[j] > 0 && value * guard[2] > 0) r->due = j;
-  }
+  return 1;
 }
 
 static int mode_by_signs(const Run *r, int *finite) {
@@ -595,6 +616,56 @@ static void start_in(Run *r, int mode, unsigned active) {
   }
 }
 
+/* After a reset that stays on its zero the motion turns round or passes; or it is pressed. */
+static void pass(Run *r, const int *guard, int zeros, double value, int side) {
+  int heading = side ? -side : guard[2];
+  if (zeros > 1 && value * heading > 0) {
+    r->limit = r->t;
+    finish(r, ACCUMULATION, PRESSED, guard[1]);
+  }
+}
+
+/* Whether a start on the zero of a reset is met at once. */
+static int is_pressed(Run *r, int row, double value) {
+  const int *guard = GUARD[r->mode][row];
+  if (guard[2]) return value * guard[2] > 0;
+  Run after = *r;
+  Expansion e;
+  double back;
+  reset_map(guard[1], r->x, r->q, after.x);
+  if (TIMED) after.x[N - 1] = r->x[N - 1];
+  expand(&after, r->mode, &e);
+  int zeros = leading(&e, row, 0, &back), least = zeros < r->drop[row] ? zeros : r->drop[row];
+  if (zeros > 0 && (back * value <= 0 || least > 1)) finish(r, NON_UNIQUE, TWO_SIDED, guard[1]);
+  return 0;
+}
+
+/* The stop or reset, on whose zero the run stands, that is met; ``fired`` is the reset that led here or
+ * -1. */
+static void arm(Run *r, int fired) {
+  int needed = 0;
+  r->due = -1;
+  if (r->status != RUNNING) return;
+  for (int j = 0; j < GUARDS[r->mode]; j++) needed |= GUARD[r->mode][j][0] >= STOP_GUARD;
+  if (!needed) return;
+  Expansion e;
+  expand(r, r->mode, &e);
+  for (int j = 0; j < GUARDS[r->mode]; j++) {
+    const int *guard = GUARD[r->mode][j];
+    double value;
+    if (guard[0] < STOP_GUARD) continue;
+    r->drop[j] = leading(&e, j, 0, &value);
+    int resets = guard[0] == RESET_GUARD, *kept = &r->side[resets][guard[1]], side = *kept, met = 0;
+    if (r->drop[j] == 0) *kept = value > 0 ? 1 : -1; /* where a jump carried it is no passage */
+    if (r->drop[j] == 0 || value == 0) continue;
+    if (resets && guard[1] == fired) pass(r, guard, r->drop[j], value, side);
+    else if (resets && r->fired[guard[1]]) continue;
+    else if (side) met = side * value < 0 && side * guard[2] <= 0;
+    else if (resets) met = is_pressed(r, j, value);
+    if (met && (r->due < 0 || PRIORITY[guard[0]] < PRIORITY[GUARD[r->mode][r->due][0]])) r->due = j;
+  }
+}
+
 static void begin(Run *r) {
   int finite;
   note(r);
@@ -612,21 +683,25 @@ static void begin(Run *r) {
     }
   }
   enter_segment(r, r->mode);
-  drop_zero_guards(r);
+  arm(r, -1);
 }
 
-static void reset(Run *r, int index, int guard) {
-  double y[N];
-  int finite;
-  event(r, RESET, r->mode, guard);
-  reset_map(index, r->x, r->q, y);
-  memcpy(r->x, y, ND * sizeof(double));
-  memset(r->side, 0, sizeof r->side);
-  if (!finite_all(r->x, ND)) { finish(r, NOT_FINITE, RESET_MAP, index); return; }
-  note(r);
-  int letters = mode_by_signs(r, &finite);
-  proceed(r, letters, active_surfaces(r, 0, letters), -1, 0, guard);
-  drop_zero_guards(r);
+static void reset(Run *r, int row) {
+  double x[N];
+  int finite, before = r->mode, index = GUARD[before][row][1];
+  memcpy(x, r->x, sizeof x);
+  reset_map(index, x, r->q, r->x);
+  if (finite_all(r->x, ND)) {
+    note(r);
+    int letters = mode_by_signs(r, &finite);
+    choose(r, letters, active_surfaces(r, 0, letters), -1, 0);
+  } else {
+    memcpy(r->x, x, sizeof x);
+    finish(r, NOT_FINITE, RESET_MAP, index);
+  }
+  event(r, RESET, before, row, x);
+  r->fired[index] = 1;
+  arm(r, index);
 }
 
 static void watch_two_fold(Run *r) {
@@ -638,33 +713,40 @@ static void watch_two_fold(Run *r) {
 static void serve(Run *r, int row) {
   const int *guard = GUARD[r->mode][row];
   if (guard[0] == STOP_GUARD) {
-    event(r, STOP, r->mode, row);
+    event(r, STOP, r->mode, row, r->x);
     finish(r, STOPPED, NO_REASON, guard[1]);
   } else if (guard[0] == RESET_GUARD) {
-    reset(r, guard[1], row);
+    reset(r, row);
   } else {
     unsigned active = active_surfaces(r, 1u << guard[1], r->mode);
     int exits = guard[0] == EXIT_GUARD;
     project(r, active);
     renote(r);
     if (exits) watch_two_fold(r);
+    else if (!is_on(r, guard[1])) finish(r, NON_UNIQUE, MULTIPLE_ZERO, guard[1]);
     if (r->status != RUNNING) return;
-    proceed(r, r->mode, active, exits ? guard[1] : -1, guard[2], row);
+    int before = r->mode;
+    if (choose(r, before, active, exits ? guard[1] : -1, guard[2]) && r->mode != before)
+      event(r, change_kind(before, r->mode), before, row, r->x);
   }
 }
 
-static void advance(Run *r, const Expansion *e, double dt) {
+/* 0 where the state after the step is not finite; the run then ends before it. */
+static int advance(Run *r, const Expansion *e, double dt) {
+  double x[N];
+  for (int i = 0; i < N; i++) {
+    double v = e->states[i][P];
+    for (int k = P - 1; k >= 0; k--) v = v * dt + e->states[i][k];
+    x[i] = v;
+  }
+  if (!finite_all(x, N)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
   if (r->o.dense) {
     int64_t k = r->out.steps++;
     r->out.start[k] = r->t;
     r->out.step_mode[k] = r->mode;
     memcpy(r->out.coefficients + k * N * (P + 1), e->states, sizeof e->states);
   }
-  for (int i = 0; i < N; i++) {
-    double v = e->states[i][P];
-    for (int k = P - 1; k >= 0; k--) v = v * dt + e->states[i][k];
-    r->x[i] = v;
-  }
+  memcpy(r->x, x, sizeof x);
   r->t += dt;
   r->step_count++;
   r->segment_steps++;
@@ -673,30 +755,49 @@ static void advance(Run *r, const Expansion *e, double dt) {
   if (s >= 0) project(r, 1u << s);
   memset(r->drop, 0, sizeof r->drop);
   note(r);
+  return 1;
 }
 
 static void step(Run *r) {
-  if (r->due >= 0) { reset(r, GUARD[r->mode][r->due][1], r->due); return; }
+  if (r->due >= 0) { serve(r, r->due); return; }
   double left = r->o.t_end - r->t, dt;
   if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
   if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
   Expansion e;
   expand(r, r->mode, &e);
   if (!e.finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  double h = smaller(step_size(r, &e), r->o.max_step);
-  if (h <= 4 * EPS * larger(fabs(r->t), 1) && h < left) { finish(r, STEP_TOO_SMALL, NO_REASON, 0); return; }
+  double by_series = step_size(r, &e), h = smaller(by_series, r->o.max_step);
+  if (h <= SHORTEST * larger(fabs(r->t), 1) && h < left) {
+    finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
+    return;
+  }
   int last = h >= left;
   if (last) h = left;
-  int row = first_hit(r, &e, h, &dt);
-  if (!satisfies(r, &e, row >= 0 ? dt : h)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
-  if (row < 0) dt = h;
-  if (dt > 0) note_sides(r, &e, dt);
-  advance(r, &e, dt);
-  if (row >= 0) serve(r, row);
-  else if (last) {
+  /* What happens at the end, to rounding, happens. */
+  int row = first_hit(r, &e, last ? h + AT_END * larger(1, fabs(r->t + h)) : h, &dt);
+  dt = row < 0 ? h : smaller(dt, h);
+  double wanted = dt;
+  double safe = safe_length(r, &e, by_series), good;
+  while (dt > 0 && (good = verified(r, &e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt)
+    dt = good;
+  r->length_mode = r->mode;
+  r->length = dt == wanted ? h : dt;
+  r->shortened = larger(0, r->shortened + (dt < wanted ? 1 : -0.2));
+  if (r->shortened >= SHORTENED || (dt == 0 && wanted > 0)) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
+  if (dt < wanted) { row = -1; last = 0; }
+  if (dt > 0) {
+    note_sides(r, &e, dt);
+    memset(r->fired, 0, sizeof r->fired);
+  }
+  if (!advance(r, &e, dt)) return;
+  last &= dt == h;
+  if (last) {
     r->t = r->o.t_end;
+    if (TIMED) r->x[N - 1] = r->t;
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
-  } else watch_two_fold(r);
+  }
+  if (row >= 0) serve(r, row);
+  else if (!last) watch_two_fold(r);
 }
 
 /* The last mode counts only if it lasted for a step (or is the only one). */
@@ -708,11 +809,13 @@ static int32_t final_itinerary(const Run *r) {
 /* Entry points --------------------------------------------------------------------------------- */
 
 int64_t run_size(void) { return sizeof(Run); }
+int64_t output_size(void) { return sizeof(Output); }
 
 void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const double *x,
                const double *p, double t) {
   memset(r, 0, sizeof *r);
   r->o = *o;
+  r->size = o->atol / o->rtol;
   r->out = *out;
   r->tree = tree;
   memcpy(r->x, x, sizeof r->x);
@@ -721,7 +824,7 @@ void run_begin(Run *r, const Options *o, const Output *out, Tree *tree, const do
   r->limit = r->at_t = NAN;
   for (int i = 0; i < N; i++) r->at_x[i] = NAN;
   r->status = RUNNING;
-  r->segment_mode = r->due = -1;
+  r->segment_mode = r->due = r->length_mode = -1;
   if (finite_all(r->x, N)) begin(r);
   else { r->status = NOT_FINITE; r->reason = SURFACE; }
 }

@@ -11,12 +11,13 @@ from hypothesis import strategies as st
 import nonsmooth.flow.compiled.build as build_module
 import nonsmooth.flow.compiled.engine as engine_module
 import nonsmooth.textbook as textbook
-from nonsmooth.flow.compiled import KINDS, engine_for, find_compiler, simulate_arrays
-from nonsmooth.flow.compiled.codegen import lanes_source, scalar_source
-from nonsmooth.flow.compiled.engine import HAND_OVER, supports_lanes
-from nonsmooth.flow.driver import Driver
+from nonsmooth.flow.compiled import engine_for, find_compiler, simulate_arrays
+from nonsmooth.flow.compiled.codegen import lanes_source, scalar_source, supports_lanes
+from nonsmooth.flow.facts import HAND_OVER, KINDS
 from nonsmooth.flow.options import Options
-from nonsmooth.model import FilippovSystem, Reset, Stop, ccode
+from nonsmooth.flow.reference.driver import Driver
+from nonsmooth.model import FilippovSystem, Reset, Stop
+from nonsmooth.model.printing import ccode
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

@@ -17,6 +17,7 @@ from nonsmooth.flow import Status, simulate
 from nonsmooth.flow.checkpoint import Checkpoint
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.ensemble import ensemble
+from nonsmooth.flow.work import Work
 from nonsmooth.model import (
     FilippovSystem,
     NonsmoothError,
@@ -84,9 +85,9 @@ def test_each_start_as_by_simulate(system, starts):
 
 @needs_compiler
 def test_bit_identical_for_any_threads_and_chunks(system, starts):
-    one = ensemble(system, starts, 8.0, threads=1, at_event=("exit", 1))
+    one = ensemble(system, starts, 8.0, at_event=("exit", 1), work=Work(threads=1))
     for options in ({"threads": 2, "chunk": 7}, {"threads": 3, "chunk": 64}, {"chunk": 299}):
-        same(one, ensemble(system, starts, 8.0, at_event=("exit", 1), **options))
+        same(one, ensemble(system, starts, 8.0, at_event=("exit", 1), work=Work(**options)))
 
 
 def test_starts_and_parameters_broadcast(system):
@@ -131,11 +132,17 @@ def test_reference_and_compiled_engines_agree(system, starts):
 
 @needs_compiler
 def test_process_pool_gives_the_same_bits(system, starts):
-    here = ensemble(system, starts, 5.0, chunk=50)
+    here = ensemble(system, starts, 5.0, work=Work(chunk=50))
     context = multiprocessing.get_context("spawn")
     with concurrent.futures.ProcessPoolExecutor(2, mp_context=context) as pool:
         same(
-            here, ensemble(pickle.loads(pickle.dumps(system)), starts, 5.0, chunk=50, executor=pool)
+            here,
+            ensemble(
+                pickle.loads(pickle.dumps(system)),
+                starts,
+                5.0,
+                work=Work(chunk=50, executor=pool),
+            ),
         )
 
 
@@ -143,14 +150,17 @@ def test_process_pool_gives_the_same_bits(system, starts):
 @pytest.mark.slow
 def test_dask_cluster_gives_the_same_bits(system, starts):
     distributed = pytest.importorskip("dask.distributed")
-    here = ensemble(system, starts, 5.0, chunk=50)
+    here = ensemble(system, starts, 5.0, work=Work(chunk=50))
     with (
         distributed.LocalCluster(
             n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None
         ) as cluster,
         distributed.Client(cluster) as client,
     ):
-        same(here, ensemble(system, starts, 5.0, chunk=50, executor=client.get_executor()))
+        same(
+            here,
+            ensemble(system, starts, 5.0, work=Work(chunk=50, executor=client.get_executor())),
+        )
 
 
 class _Interrupt(concurrent.futures.Executor):
@@ -173,9 +183,11 @@ class _Interrupt(concurrent.futures.Executor):
 def test_interrupted_sweep_goes_on_where_it_was(system, starts, tmp_path, monkeypatch):
     whole = ensemble(system, starts, 5.0, at_event=("entry", 1))
     folder = tmp_path / "sweep"
-    options = {"at_event": ("entry", 1), "checkpoint": folder}
+    options = {"at_event": ("entry", 1)}
+    again = Work(checkpoint=folder)
     with pytest.raises(KeyboardInterrupt):
-        ensemble(system, starts, 5.0, chunk=40, executor=_Interrupt(3), **options)
+        work = Work(chunk=40, executor=_Interrupt(3), checkpoint=folder)
+        ensemble(system, starts, 5.0, **options, work=work)
     finished = len(list(folder.glob("chunk-*.npz")))
     assert 0 < finished < 8
     saved = []
@@ -183,10 +195,11 @@ def test_interrupted_sweep_goes_on_where_it_was(system, starts, tmp_path, monkey
     monkeypatch.setattr(
         Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
     )
-    same(whole, ensemble(system, starts, 5.0, **options))  # the folder knows its chunk
+    same(whole, ensemble(system, starts, 5.0, **options, work=again))  # the folder knows its chunk
     assert len(saved) == 8 - finished
     next(folder.glob("chunk-*.npz")).write_bytes(b"cut off")
-    same(whole, ensemble(pickle.loads(pickle.dumps(system)), starts, 5.0, **options))
+    copy = pickle.loads(pickle.dumps(system))
+    same(whole, ensemble(copy, starts, 5.0, **options, work=again))
     assert len(saved) == 8 - finished + 1
 
 
@@ -215,33 +228,42 @@ def test_a_sweep_whose_worker_was_killed_goes_on_where_it_was(
         _Murdered(1, mp_context=context) as pool,
         pytest.raises(concurrent.futures.BrokenExecutor),
     ):
-        ensemble(system, starts, 5.0, chunk=40, executor=pool, checkpoint=tmp_path / "sweep")
+        ensemble(
+            system,
+            starts,
+            5.0,
+            work=Work(chunk=40, executor=pool, checkpoint=tmp_path / "sweep"),
+        )
     assert len(list((tmp_path / "sweep").glob("chunk-*.npz"))) == 3
     saved = []
     original = Checkpoint.save
     monkeypatch.setattr(
         Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
     )
-    same(whole, ensemble(system, starts, 5.0, checkpoint=tmp_path / "sweep"))
+    same(whole, ensemble(system, starts, 5.0, work=Work(checkpoint=tmp_path / "sweep")))
     assert sorted(saved) == [3, 4, 5, 6, 7]
 
 
 def test_checkpoint_of_another_problem_is_refused(system, starts, tmp_path):
     few = starts[:4]
-    ensemble(system, few, 1.0, checkpoint=tmp_path / "a")
+    ensemble(system, few, 1.0, work=Work(checkpoint=tmp_path / "a"))
     for other in (
-        lambda path: ensemble(system, few + 1e-16, 2.0, checkpoint=path),
-        lambda path: ensemble(system, few[:3], 1.0, checkpoint=path),
-        lambda path: ensemble(system, few, 1.0, tol=1e-9, checkpoint=path),
-        lambda path: ensemble(system, few, 1.0, parameters={"belt": 0.2}, checkpoint=path),
-        lambda path: ensemble(system, few, 1.0, parameters={"belt": np.ones(4)}, checkpoint=path),
+        lambda path: ensemble(system, few + 1e-16, 2.0, work=Work(checkpoint=path)),
+        lambda path: ensemble(system, few[:3], 1.0, work=Work(checkpoint=path)),
+        lambda path: ensemble(system, few, 1.0, tol=1e-9, work=Work(checkpoint=path)),
+        lambda path: ensemble(
+            system, few, 1.0, parameters={"belt": 0.2}, work=Work(checkpoint=path)
+        ),
+        lambda path: ensemble(
+            system, few, 1.0, parameters={"belt": np.ones(4)}, work=Work(checkpoint=path)
+        ),
     ):
         with pytest.raises(OptionError, match="another"):
             other(tmp_path / "a")
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "thesis.tex").write_text("precious")
     with pytest.raises(OptionError, match="something else"):
-        ensemble(system, few, 1.0, checkpoint=tmp_path / "b")
+        ensemble(system, few, 1.0, work=Work(checkpoint=tmp_path / "b"))
 
 
 def test_bad_input(system):
@@ -257,17 +279,23 @@ def test_bad_input(system):
         {"at_event": ("hop", 1)},
         {"at_event": ("exit", 0)},
         {"at_event": 3},
-        {"threads": 0},
-        {"chunk": -1},
         {"engine": "warp"},
         {"tol": 2.0},
     ):
         with pytest.raises(OptionError):
             ensemble(system, np.zeros((4, 2)), 1.0, **options)
+    for options in ({"threads": 0}, {"chunk": -1}, {"chunk": 2.5}):
+        with pytest.raises(OptionError):
+            Work(**options)
+
+
+def test_an_executor_of_another_kind_is_refused():
+    with pytest.raises(OptionError, match=r"executor: expected a concurrent\.futures\.Executor"):
+        Work(executor=3)
 
 
 def test_quiet_without_a_terminal(system, starts, capfd):
-    ensemble(system, starts[:5], 1.0, progress=True)
+    ensemble(system, starts[:5], 1.0, work=Work(progress=True))
     out, err = capfd.readouterr()
     assert out == "" and err == ""
 
@@ -275,13 +303,14 @@ def test_quiet_without_a_terminal(system, starts, capfd):
 ENDLESS = """
 import sys, casadi as ca, numpy as np
 from nonsmooth.flow.ensemble import ensemble
+from nonsmooth.flow.work import Work
 from nonsmooth.model import FilippovSystem
 x, v = ca.SX.sym("x"), ca.SX.sym("v")
 system = FilippovSystem([x, v], surface=v - 9, above=[v, -x - 1], below=[v, -x])
 starts = np.random.default_rng(0).normal(size=(400, 2))
-ensemble(system, starts[:100], 1.0, chunk=50, threads=1)
+ensemble(system, starts[:100], 1.0, work=Work(chunk=50, threads=1))
 print("ready", flush=True)
-ensemble(system, starts, 1e8, max_steps=10**12, chunk=50, threads=int(sys.argv[1]))
+ensemble(system, starts, 1e8, max_steps=10**12, work=Work(chunk=50, threads=int(sys.argv[1])))
 """
 
 
@@ -311,7 +340,7 @@ def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(threads):
     [
         ({"system": None}, "system: expected a FilippovSystem"),
         ({"parameters": [0.3]}, "expected a mapping"),
-        ({"executor": 3}, "executor: expected a concurrent.futures.Executor"),
+        ({"work": 3}, "work: expected a Work"),
     ],
 )
 def test_arguments_of_another_kind_are_refused(arguments, message):

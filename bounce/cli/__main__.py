@@ -1,0 +1,7 @@
+"""``python -m bounce.cli`` is ``bounce``."""
+
+import sys
+
+from .main import main
+
+sys.exit(main())

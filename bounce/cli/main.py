@@ -1,0 +1,104 @@
+"""The command ``bounce``: its parser, its exit codes, its errors in one line."""
+
+from __future__ import annotations
+
+import argparse
+import re
+import sys
+import warnings
+from collections.abc import Sequence
+from typing import Any, NoReturn
+
+import nonsmooth as ns
+
+from . import fit, flight, map, models, shot
+
+_COMMANDS = (shot, flight, map, fit, models)
+_USAGE = (ns.ParameterError, ns.OptionError, ns.DefinitionError, ns.PointError)
+
+
+class _Parser(argparse.ArgumentParser):
+    """Errors in one line."""
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+
+
+class _Help(argparse.ArgumentDefaultsHelpFormatter):
+    """Help that says every default there is."""
+
+    def _get_help_string(self, action: argparse.Action) -> str | None:
+        said = "(default" in (action.help or "")
+        none = action.default is None or action.default is False or action.default == []
+        return action.help if said or none else super()._get_help_string(action)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run a command.
+
+    Parameters
+    ----------
+    argv : sequence of str, optional
+        Arguments; those of the process by default.
+
+    Returns
+    -------
+    int
+        0 done, 1 not computable or readable, 2 wrong usage, 3 a fit whose data do not determine a
+        parameter.
+
+    Examples
+    --------
+    >>> main("shot --speed 28.5 --angle 37.3 --spin 2094 --turf natural".split())
+    lift-off  10.71 m/s, 37.3 deg, -4536 rpm, slip -1.61 m/s (III+)
+    run       23.19 m in 4.94 s: 13 bounces (10 of them outside the fit), the first 2.14 m high, over
+        23.00 m; rolls 0.18 m
+    0
+    """
+    parser = _arguments()
+    try:
+        args = parser.parse_args(_joined(sys.argv[1:] if argv is None else argv))
+        with warnings.catch_warnings():
+            warnings.simplefilter("always", UserWarning)
+            warnings.showwarning = _caution
+            return int(args.run(args))
+    except SystemExit as stop:
+        return int(stop.code or 0)
+    except (ns.NonsmoothError, OSError) as error:
+        line = " ".join(str(error).split())
+        print(f"bounce: error: {line}", file=sys.stderr)
+        return 2 if isinstance(error, _USAGE) else 1
+    except KeyboardInterrupt:
+        print("bounce: interrupted", file=sys.stderr)
+        return 130
+
+
+def _arguments() -> argparse.ArgumentParser:
+    parser = _Parser(prog="bounce", description="The bounce of a spinning ball on the ground.")
+    parser.add_argument("--version", action="version", version=f"bounce {ns.__version__}")
+    commands = parser.add_subparsers(metavar="command", required=True, parser_class=_Parser)
+    for command in _COMMANDS:
+        name = command.__name__.rpartition(".")[2]
+        one = commands.add_parser(
+            name, help=command.HELP, description=command.ABOUT, formatter_class=_Help
+        )
+        command.arguments(one)
+        one.set_defaults(run=command.run, command=name)
+    return parser
+
+
+def _joined(argv: Sequence[str]) -> list[str]:
+    """Give an option its negative number with a unit, which argparse would take for an option."""
+    joined: list[str] = []
+    for word in argv:
+        before = joined[-1] if joined else ""
+        if re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z-]+", before):
+            joined[-1] = f"{before}={word}"
+        else:
+            joined.append(word)
+    return joined
+
+
+def _caution(message: Warning | str, *_: Any, **__: Any) -> None:
+    """Show a warning as one line."""
+    print(f"bounce: caution: {' '.join(str(message).split())}", file=sys.stderr)

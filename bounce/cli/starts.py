@@ -1,0 +1,88 @@
+"""What a ball starts with: one speed, angle and spin, or a table of them."""
+
+from __future__ import annotations
+
+import argparse
+import math
+from collections.abc import Iterator
+
+import nonsmooth as ns
+
+from ..golf.columns import read_columns
+from ..units import Landing
+from .values import KINDS, SYSTEMS, Quantity, factor, quantity
+
+NAMES = ("speed", "angle", "spin")
+_HELP = dict(
+    speed="such as 28.5, 64mph or 103km/h",
+    angle="between path and ground, such as 37.3 or 0.65rad",
+    spin="backspin positive, such as 2094 or 219rad/s",
+)
+
+
+def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
+    """Add the arguments of a start."""
+    for name in NAMES:
+        parser.add_argument(f"--{name}", type=quantity(name), help=f"of the {what}: {_HELP[name]}")
+    parser.add_argument(
+        "--input",
+        metavar="FILE",
+        help="CSV instead of one start: columns speed, angle, spin, with units as in 'speed [mph]'",
+    )
+    parser.add_argument(
+        "--output", metavar="FILE", help="of --input: CSV, to the terminal if not given"
+    )
+
+
+def starts(args: argparse.Namespace, up: bool) -> Iterator[tuple[Landing | None, str]]:
+    """Give each start, or None and what is wrong with it.
+
+    Raises
+    ------
+    nonsmooth.OptionError
+        Neither one start nor a table, or both; of one start also what is wrong with it.
+    """
+    given = {name: getattr(args, name) for name in NAMES}
+    missing = [name for name, value in given.items() if value is None]
+    if args.input is None:
+        if missing:
+            raise ns.OptionError(
+                f"{', '.join('--' + m for m in missing)}: expected a number, or --input FILE, received "
+                "none."
+            )
+        yield _start(given, args.units, up, "--"), ""
+        return
+    if len(missing) < len(NAMES):
+        raise ns.OptionError(
+            f"--input: expected instead of {', '.join('--' + n for n in NAMES)}, received both."
+        )
+    columns, si, titles = read_columns(args.input, {name: KINDS[name] for name in NAMES})
+    absent = [name for name in NAMES if name not in columns]
+    if absent:
+        raise ns.OptionError(f"--input: expected columns {absent}, received {titles}.")
+    for row in zip(*(columns[name].tolist() for name in NAMES), strict=True):
+        sizes = [factor(name, SYSTEMS[args.units][name]) if si else 1.0 for name in NAMES]
+        values = zip(NAMES, row, sizes, strict=True)
+        typed = {name: Quantity(value / size, None, name) for name, value, size in values}
+        try:
+            yield _start(typed, args.units, up, ""), ""
+        except ns.OptionError as error:
+            yield None, " ".join(str(error).split())
+
+
+def _start(given: dict[str, Quantity], system: str, up: bool, prefix: str) -> Landing:
+    speed, angle, spin = (given[name].si(system) for name in NAMES)
+    if not 0.0 < speed < math.inf:
+        raise ns.OptionError(
+            f"{prefix}speed: expected a positive speed, received {given['speed'].said(system)}."
+        )
+    if not 0.0 < angle <= math.pi / 2 * (1 + 1e-12):
+        most = "pi/2 rad" if given["angle"].named(system) == "rad" else "90 deg"
+        raise ns.OptionError(
+            f"{prefix}angle: expected an angle between path and ground, above 0 and at most {most}, "
+            f"received {given['angle'].said(system)}."
+        )
+    if not math.isfinite(spin):
+        raise ns.OptionError(f"{prefix}spin: expected a number, received {given['spin'].value!r}.")
+    start = Landing.polar(speed, min(angle, math.pi / 2), spin * 30 / math.pi)
+    return Landing(start.xdot, -start.ydot, start.omega) if up else start

@@ -1,0 +1,172 @@
+"""What a fit finds: parameters, their errors, and what they leave."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import nonsmooth as ns
+
+from .ground import Model
+from .measurements import Measurements
+
+Array = NDArray[np.float64]
+
+#: Half a confidence interval that is this many times the value says nothing of it.
+_WIDE = 3.0
+
+
+class IdentifiabilityWarning(UserWarning):
+    """The data of a fit do not determine one of its parameters."""
+
+
+class FitError(ns.NonsmoothError, RuntimeError):
+    """No fit: no start at which every bounce can be simulated, or fewer numbers than parameters."""
+
+
+@dataclass(frozen=True)
+class Start:
+    """One of the starts of a fit.
+
+    Attributes
+    ----------
+    values : dict of str to float
+    cost : float
+        Sum of squares there; infinite where not every bounce could be simulated.
+    problem : str
+        Why not.
+    fitted : dict of str to float or None
+        Where the least squares from here ended, or was after a dozen steps if another was better
+        then; None if it was not among the best.
+    fitted_cost : float
+    """
+
+    values: dict[str, float]
+    cost: float
+    problem: str
+    fitted: dict[str, float] | None = None
+    fitted_cost: float = math.inf
+
+
+@dataclass(frozen=True, repr=False)
+class FitResult:
+    """Fitted parameters and what they leave.
+
+    Attributes
+    ----------
+    model : BounceLaw or ContactModel
+        With the fitted values.
+    values, errors : dict of str to float
+        Fitted values and their standard errors (infinite where the data do not determine one).
+    covariance : ndarray (k, k)
+    residuals : dict of str to ndarray (n,)
+        Predicted less measured, for each component measured; m/s, spins as surface speeds (without
+        units: in the model's).
+    measurements : Measurements
+        What was fitted; ``measurements.left_out`` names what was not.
+    degrees_of_freedom : int
+    starts : tuple of Start
+    at_bound : tuple of str
+        Parameters that ended on a bound; errors and intervals assume that they do not.
+    condition : float
+        Condition number of the derivatives by relative changes of the parameters: large where a
+        combination of them hardly has an effect on what was measured.
+    message : str
+        Why the least squares stopped.
+    """
+
+    model: Model
+    values: dict[str, float]
+    errors: dict[str, float]
+    covariance: Array
+    residuals: dict[str, Array]
+    measurements: Measurements
+    degrees_of_freedom: int
+    starts: tuple[Start, ...]
+    at_bound: tuple[str, ...]
+    condition: float
+    message: str
+
+    @property
+    def undetermined(self) -> tuple[str, ...]:
+        """Parameters that the data do not determine.
+
+        Their 95 % interval reaches further than three times the larger of the fitted value and the
+        one started from.
+        """
+        wide = []
+        for name, (low, high) in self.interval().items():
+            size = max(abs(self.values[name]), abs(self.starts[0].values[name]))
+            if not 0.5 * (high - low) <= _WIDE * size and high > low:
+                wide.append(name)
+        return tuple(wide)
+
+    @property
+    def rms(self) -> dict[str, float]:
+        """Root mean square residual of each component."""
+        return {n: float(np.sqrt(np.mean(r**2))) for n, r in self.residuals.items()}
+
+    def interval(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Return confidence intervals: Student's t about the linearised fit.
+
+        Parameters
+        ----------
+        level : float, optional
+            In (0, 1).
+        """
+        from scipy.stats import t
+
+        if not 0.0 < level < 1.0:
+            raise ns.OptionError(f"level: expected a number in (0, 1), received {level!r}.")
+        width = float(t.ppf((1 + level) / 2, self.degrees_of_freedom))
+        return {
+            n: (v - width * self.errors[n], v + width * self.errors[n])
+            for n, v in self.values.items()
+        }
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the numbers as plain Python, for JSON; None is infinite."""
+        return dict(
+            model=type(self.model).__name__,
+            values=self.values,
+            errors={n: _finite(v) for n, v in self.errors.items()},
+            interval_95={n: [_finite(v) for v in pair] for n, pair in self.interval().items()},
+            rms=self.rms,
+            bounces=len(self.measurements.rows),
+            left_out=[list(pair) for pair in self.measurements.left_out],
+            at_bound=list(self.at_bound),
+            undetermined=list(self.undetermined),
+            condition=_finite(self.condition),
+            message=self.message,
+        )
+
+    def __repr__(self) -> str:
+        lines = [f"{type(self.model).__name__} fitted to {len(self.measurements.rows)} bounces"]
+        for name, (low, high) in self.interval().items():
+            note = "  (on its bound)" if name in self.at_bound else ""
+            if name in self.undetermined:
+                note += "  (not determined by these data)"
+            lines.append(
+                f"  {name} = {self.values[name]:.6g}  95 % in [{low:.6g}, {high:.6g}]{note}"
+            )
+        rms = ", ".join(f"{n} {v:.3g}" for n, v in self.rms.items())
+        lines.append(f"  rms residuals: {rms}{' m/s' if self.measurements.si else ''}")
+        if self.measurements.left_out:
+            lines.append(f"  left out: {listed(dict(self.measurements.left_out))}")
+        return "\n".join(lines)
+
+
+def _finite(value: float) -> float | None:
+    return value if math.isfinite(value) else None
+
+
+def listed(problems: Mapping[int, str], most: int = 8) -> str:
+    """Rows and reasons in one line."""
+    items = [f"row {row}: {why}" for row, why in list(problems.items())[:most]]
+    more = f"; and {len(problems) - most} more" if len(problems) > most else ""
+    return "; ".join(items) + more

@@ -1,0 +1,175 @@
+"""The verb ``fit``: parameters of a law or contact model from measured bounces."""
+
+from __future__ import annotations
+
+import math
+import warnings
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import nonsmooth as ns
+
+from ..parameters import number
+from ..units import GOLF, Ball, Scaling
+from .fit_result import FitError, FitResult, IdentifiabilityWarning, Start
+from .ground import Model
+from .least_squares import Problem
+from .measurements import read_measurements
+
+Array = NDArray[np.float64]
+
+
+def fit(
+    model: Model,
+    data: Any,
+    *,
+    parameters: Sequence[str],
+    ball: Ball = GOLF,
+    scaling: Scaling | None = None,
+    bounds: Mapping[str, tuple[float, float]] | None = None,
+    weights: Mapping[str, float] | None = None,
+    starts: int | Sequence[Mapping[str, float]] = 16,
+    polish: int | None = None,
+    seed: int = 0,
+    bad_rows: str = "raise",
+    tol: float = 1e-10,
+    progress: bool = False,
+) -> FitResult:
+    """Fit parameters to measured landings and lift-offs.
+
+    The sum of squares is of predicted less measured speeds at lift-off, spins as surface speeds,
+    all in one unit. Its gradient is exact through the events for a contact model
+    (:func:`sensitivity`), and by central differences for a law in closed form. Where a bounce
+    changes its itinerary the gradient jumps; the steps of the trust region cope with that.
+
+    Parameters
+    ----------
+    model : ContactModel or BounceLaw
+        Its values are the first start; those not among ``parameters`` stay.
+    data : path, mapping of str to array_like, table or sequence of dicts
+        See :func:`read_measurements`.
+    parameters : sequence of str
+        Names to fit; for a law also "restitution" and "tilt" where they are numbers.
+    ball : Ball, optional
+    scaling : Scaling, optional
+        The units of a contact model; needed for data with units.
+    bounds : mapping of str to (float, float), optional
+        By default what the model's limits say.
+    weights : mapping of str to float, optional
+        Factors of the residuals of xdot, ydot, omega; 1 by default.
+    starts : int or sequence of mappings, optional
+        Points compared besides the model's own: this many drawn within the bounds (where those are
+        infinite within a factor of 4 of the model's value), or these.
+    polish : int, optional
+        How many of the best points the least squares takes its first dozen steps from, besides the
+        model's own values; it goes on from the best. By default 3 for a contact model, 10 for a law.
+    seed : int, optional
+        Of the draws.
+    bad_rows : {"raise", "leave out"}, optional
+        What to do with rows that cannot be read or cannot be simulated at the model's own values:
+        an error that names them, or a fit without them that names them in ``left_out``.
+    tol : float, optional
+    progress : bool, optional
+        Show a bar (only on a terminal).
+
+    Returns
+    -------
+    FitResult
+
+    Raises
+    ------
+    DataError, FitError, ModelError, nonsmooth.ParameterError, nonsmooth.OptionError
+
+    Warns
+    -----
+    IdentifiabilityWarning
+        The data do not determine a parameter, see :attr:`FitResult.undetermined`.
+
+    Examples
+    --------
+    >>> import numpy as np, bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> u, w = np.random.default_rng(0).uniform(-1, 1, (2, 12))
+    >>> many = bounce.lift_off(turf, u, -1.0, w)
+    >>> data = dict(xdot=u, ydot=-np.ones(12), omega=w, lift_off_xdot=many.xdot,
+    ...             lift_off_ydot=many.ydot, lift_off_omega=many.omega)
+    >>> found = bounce.golf.fit(turf.replace(mu=0.5, eta=0.8), data, parameters=["mu", "eta"], starts=4)
+    >>> {name: round(value, 7) for name, value in found.values.items()}
+    {'mu': 0.3, 'eta': 0.5}
+    """
+    measurements = read_measurements(data, ball, bad_rows=bad_rows)
+    problem = Problem(model, measurements, list(parameters), scaling, ball, weights, tol)
+    problem.leave_out(bad_rows)
+    low, high = problem.bounds(bounds)
+    points = _points(problem, starts, low, high, seed)
+    tried = [problem.start(values) for values in points]
+    order = sorted(range(len(tried)), key=lambda k: tried[k].cost)
+    most = problem.predictions.polish if polish is None else max(1, polish)
+    best = [k for k in order if math.isfinite(tried[k].cost)][:most]
+    best += [0] if 0 not in best and math.isfinite(tried[0].cost) else []
+    if not best:
+        raise FitError(
+            f"starts: expected one at which every bounce can be simulated, received none of "
+            f"{len(tried)}. The first: {tried[0].problem}"
+        )
+    runs = {k: problem.solve(points[k], low, high, 12) for k in _bar(best, progress)}
+    winner = min(runs, key=lambda k: float(runs[k].cost))
+    if runs[winner].status == 0:  # the first steps tell which is best; go on with that one
+        runs[winner] = problem.solve(runs[winner].x, low, high, 200)
+    for k, run in runs.items():
+        fitted = problem.named(run.x)
+        tried[k] = Start(tried[k].values, tried[k].cost, "", fitted, float(2 * run.cost))
+    found = problem.result(runs[winner], tuple(tried), low, high)
+    if found.undetermined:
+        said = "; ".join(f"{n}: not determined by these data" for n in found.undetermined)
+        warnings.warn(
+            f"{said}. What was measured hardly depends on it, or only together with others (condition "
+            f"number {found.condition:.3g}): leave it out of the fit, or measure landings that depend "
+            "on it.",
+            IdentifiabilityWarning,
+            stacklevel=2,
+        )
+    return found
+
+
+def _bar(items: list[int], progress: bool) -> Any:
+    if not progress:
+        return items
+    from tqdm import tqdm
+
+    return tqdm(items, desc="fit", unit="start", disable=None, leave=False)
+
+
+def _points(
+    problem: Problem,
+    starts: int | Sequence[Mapping[str, float]],
+    low: Array,
+    high: Array,
+    seed: int,
+) -> list[Array]:
+    """The model's own values and the starts."""
+    own = np.clip(problem.initial, low, high)
+    if isinstance(starts, int):
+        if starts < 0:
+            raise ns.OptionError(f"starts: expected a number >= 0, received {starts!r}.")
+        size = np.where(own != 0.0, np.abs(own), 0.25)
+        inside = np.isfinite(low) & np.isfinite(high)
+        bottom = np.where(inside, low, np.maximum(low, own - 4 * size))
+        top = np.where(inside, high, np.minimum(high, own + 4 * size))
+        u = np.random.default_rng(seed).uniform(size=(starts, own.size))
+        geometric = np.clip(size * 4.0 ** (2 * u - 1), low, high)
+        draws = np.where((low >= 0.0) & ~inside, geometric, bottom + u * (top - bottom))
+        return [own, *draws]
+    points = [own]
+    for given in starts:
+        unknown = sorted(set(given) - set(problem.names))
+        if unknown:
+            raise ns.OptionError(
+                f"starts: expected names among {problem.names}, received {unknown}."
+            )
+        point = [number(given.get(n, v), n) for n, v in zip(problem.names, own, strict=True)]
+        points.append(np.clip(np.array(point), low, high))
+    return points

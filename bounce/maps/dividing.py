@@ -1,0 +1,461 @@
+"""The dividing surface: landings whose lift-off separates forward from reverse slip, H_F = 0.
+
+For a given normal speed it is a curve in the plane of landings (xdot, omega), made of arcs:
+
+- on *two-fold* arcs the ball rolls into the two-fold set H = L1 = L2 = 0 at lift-off. To one side
+  it leaves rolling just before lift-off to forward slip, to the other side to reverse slip;
+- on *slipping* arcs it slips up to lift-off, where H vanishes just then.
+
+Arcs end where the itinerary changes. The one where a two-fold arc meets a slipping arc, since the
+last rolling phase shrinks to nothing, is their junction: H = A = 0 at lift-off after slip.
+
+Biber, Champneys & Szalai (2022) construct the two-fold arc by integration backward from the
+two-fold set. Here landings are shot forward with the itinerary fixed, a smooth problem, and
+Newton's method meets the conditions at lift-off (the same curve, to rounding); this needs no
+formula for lift-off, so it also serves models whose normal motion depends on the tangential one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import nonsmooth as ns
+
+from ..contact.model import ContactModel
+from ..errors import ModelError
+from ..parameters import number
+from ..shot.single import State
+from .shooting import Newton, Shooting
+from .tracing import Arc, Tracer, landing_at, on_line
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DividingCurve:
+    """H_F = 0 in the plane of landings (xdot, omega) at one normal speed.
+
+    Attributes
+    ----------
+    model : ContactModel
+    ydot : float
+        Normal speed at touch-down.
+    arcs : tuple of Arc
+        The half that begins at rest with forward slip, outward, each where the one before ends.
+    reverse : tuple of Arc
+        The other half, on a slope or for a model that is not symmetric.
+    mirrored : bool
+        Whether the other half follows by the symmetry (xdot, omega) -> -(xdot, omega).
+    tol : float
+    """
+
+    model: ContactModel
+    ydot: float
+    arcs: tuple[Arc, ...]
+    reverse: tuple[Arc, ...]
+    mirrored: bool
+    tol: float
+
+    @property
+    def two_fold(self) -> Array:
+        """Landings that reach the two-fold, (n, 2) of (xdot, omega); arcs follow each other."""
+        return self._points("two-fold")
+
+    @property
+    def slipping(self) -> Array:
+        """Landings that slip up to lift-off with H = 0 there, (n, 2) of (xdot, omega)."""
+        return self._points("slipping")
+
+    @property
+    def junction(self) -> Array | None:
+        """The first landing (xdot, omega) shared by a two-fold and a slipping arc, or None."""
+        for first, second in zip(self.arcs, self.arcs[1:], strict=False):
+            if first.kind != second.kind:
+                return first.points[-1]
+        return None
+
+    @property
+    def complete(self) -> bool:
+        """Whether the curve was traced as far as asked; ``arcs[-1].end`` says why not."""
+        halves = [half for half in (self.arcs, self.reverse) if half]
+        return all(half[-1].end == "reach" for half in halves)
+
+    @property
+    def points(self) -> Array:
+        """The whole half that begins with forward slip, (n, 2)."""
+        return np.concatenate([arc.points for arc in self.arcs])
+
+    def _points(self, which: str) -> Array:
+        chosen = [arc.points for arc in self.arcs if arc.kind == which]
+        return np.concatenate(chosen) if chosen else np.empty((0, 2))
+
+    def omega(self, xdot: ArrayLike) -> Array:
+        """Spin on the curve at given speeds; solved for, not interpolated (some ms each).
+
+        Parameters
+        ----------
+        xdot : array_like (...)
+            Beyond the half that begins with forward slip, the mirrored half is used.
+
+        Returns
+        -------
+        ndarray (...)
+            Where the curve has several spins for a speed, the one first met from rest.
+
+        Raises
+        ------
+        nonsmooth.PointError
+            A speed that the curve does not reach.
+        """
+        speeds = np.asarray(xdot, dtype=float)
+        shooting = Shooting(self.model, self.ydot, tol=_integration(self.tol))
+        newton: dict[str, Newton] = {}
+        values = [self._omega(float(v), shooting, newton) for v in speeds.ravel()]
+        return np.array(values).reshape(speeds.shape)
+
+    def _omega(self, xdot: float, shooting: Shooting, newton: dict[str, Newton]) -> float:
+        for sign in (1.0, -1.0) if self.mirrored else (1.0,):
+            for arc in (*self.arcs, *self.reverse):
+                found = _bracket(arc.points[:, 0], sign * xdot)
+                if found is None:
+                    continue
+                k, weight = found
+                guess = (1 - weight) * arc.points[k] + weight * arc.points[k + 1]
+                if weight in (0.0, 1.0):
+                    return sign * float(guess[1])
+                word = arc.itinerary.replace(" ", "")
+                solver = newton.setdefault(word, Newton(abs(self.ydot)))
+                vertical = partial(on_line, shooting, word, np.array([1.0, 0.0]), sign * xdot)
+                root = solver.solve(vertical, guess)
+                if root is not None:
+                    return sign * float(root[1])
+        ends = np.concatenate([arc.points[:, 0] for arc in (*self.arcs, *self.reverse)])
+        low, high = ends.min(), ends.max()
+        both = " and its mirror image" if self.mirrored else ""
+        raise ns.PointError(
+            f"xdot: expected a speed that the curve reaches, in [{low:.6g}, {high:.6g}]{both}, "
+            f"received {xdot!r}. Give dividing_curve a larger reach."
+        )
+
+    def at_entry(self, time: float, itinerary: str = "+ s") -> State:
+        """Landing that begins to roll at a given time and rolls into the two-fold.
+
+        Parameters
+        ----------
+        time : float
+            After touch-down, before lift-off.
+        itinerary : {"+ s", "- s"}
+            Slip before.
+
+        Returns
+        -------
+        State
+
+        Raises
+        ------
+        nonsmooth.PointError
+            There is none.
+
+        Examples
+        --------
+        >>> import bounce
+        >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4, load="net")
+        >>> start = bounce.dividing_curve(turf).at_entry(1.5)
+        >>> f"{start.xdot:.12f}, {start.omega:.12f}"
+        '0.291276497193, 0.852376712353'
+        """
+        word = itinerary.replace(" ", "")
+        if word not in ("+s", "-s"):
+            raise ns.OptionError(f"itinerary: expected '+ s' or '- s', received {itinerary!r}.")
+        shooting = Shooting(self.model, self.ydot, tol=_integration(self.tol))
+        root = landing_at(shooting, word[0], time, np.zeros(2))
+        fault = "Newton's method finds none"
+        if root is not None:
+            fault = shooting.slip_then_roll(root, word[0], time)[1].fault
+        if root is None or fault:
+            raise ns.PointError(
+                f"time: expected one at which a ball that rolls into the two-fold can begin to roll, "
+                f"received {time!r}: {fault}."
+            )
+        return State(xdot=float(root[0]), ydot=self.ydot, omega=float(root[1]))
+
+    def __repr__(self) -> str:
+        arcs = ", ".join(f"{arc.itinerary!r} ({len(arc.points)})" for arc in self.arcs)
+        where = (
+            "none" if self.junction is None else f"({self.junction[0]:.6g}, {self.junction[1]:.6g})"
+        )
+        return f"DividingCurve(ydot={self.ydot:g}, arcs {arcs}, junction {where})"
+
+
+def dividing_curve(
+    model: ContactModel,
+    ydot: float = -1.0,
+    *,
+    reach: float = 3.0,
+    step: float = 0.05,
+    tol: float = 1e-12,
+) -> DividingCurve:
+    """Trace the curve H_F = 0 that divides forward from reverse slip at lift-off.
+
+    Parameters
+    ----------
+    model : ContactModel
+    ydot : float
+        Normal speed at touch-down, < 0.
+    reach : float, optional
+        Largest abs(xdot) traced, in units of abs(ydot).
+    step : float, optional
+        Distance of neighbouring points on bent arcs, in the same units.
+    tol : float, optional
+        Error of the points relative to abs(ydot).
+
+    Returns
+    -------
+    DividingCurve
+        The part that is connected to rest, xdot = omega = 0.
+
+    Raises
+    ------
+    nonsmooth.DegenerateError
+        A lift-off without a visible two-fold: the load ends with zero rate (Hertz without
+        gravity), friction is single-valued (a bristle), or no force acts along the ground.
+    LandingError, ModelError, nonsmooth.OptionError
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4, load="net")
+    >>> curve = bounce.dividing_curve(turf)
+    >>> [arc.itinerary for arc in curve.arcs]
+    ['+ s', '+']
+    >>> [f"{v:.12f}" for v in curve.junction]
+    ['0.444625790183', '1.596758407029']
+    >>> f"{curve.omega(2.0):.9f}"
+    '1.596825491'
+    """
+    if not isinstance(model, ContactModel):
+        raise ModelError(f"model: expected a ContactModel, received {model!r}.")
+    speed = number(ydot, "ydot", ns.OptionError)
+    numbers = dict(reach=reach, step=step, tol=tol)
+    checked = {k: number(v, k, ns.OptionError) for k, v in numbers.items()}
+    for name, value in {**checked, "-ydot": -speed}.items():
+        if value <= 0:
+            raise ns.OptionError(f"{name}: expected a positive number, received {value!r}.")
+    shooting = Shooting(model, speed, tol=_integration(tol))
+    _require_two_fold(shooting)
+    mirrored = _symmetric(shooting)
+    halves = [
+        tuple(Tracer(shooting, mode, mirrored, checked["reach"], checked["step"]).arcs())
+        for mode in ("+" if mirrored else "+-")
+    ]
+    return DividingCurve(model, speed, halves[0], (*halves, ())[1], mirrored, checked["tol"])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DividingSurface:
+    """H_F = 0 in the space of landings (xdot, ydot, omega), as curves at several normal speeds.
+
+    Attributes
+    ----------
+    curves : tuple of DividingCurve
+        In the order of ``ydot``.
+    """
+
+    curves: tuple[DividingCurve, ...]
+
+    @property
+    def ydot(self) -> Array:
+        """Normal speeds, (k,)."""
+        return np.array([curve.ydot for curve in self.curves])
+
+    @property
+    def two_fold(self) -> list[Array]:
+        """For each normal speed (n, 3) of (xdot, ydot, omega)."""
+        return [_with_ydot(curve.two_fold, curve.ydot) for curve in self.curves]
+
+    @property
+    def slipping(self) -> list[Array]:
+        """For each normal speed (n, 3) of (xdot, ydot, omega)."""
+        return [_with_ydot(curve.slipping, curve.ydot) for curve in self.curves]
+
+    @property
+    def junction(self) -> Array:
+        """Line where the parts meet, (k, 3); NaN where they do not."""
+        rows = [np.full(2, np.nan) if c.junction is None else c.junction for c in self.curves]
+        return np.column_stack([np.array(rows)[:, 0], self.ydot, np.array(rows)[:, 1]])
+
+    def __repr__(self) -> str:
+        return f"DividingSurface({len(self.curves)} curves, ydot = {self.ydot.tolist()})"
+
+
+def dividing_surface(
+    model: ContactModel,
+    ydot: ArrayLike,
+    *,
+    reach: float = 3.0,
+    step: float = 0.05,
+    tol: float = 1e-12,
+) -> DividingSurface:
+    """Trace the dividing surface at several normal speeds.
+
+    Without gravity a linear model's field is homogeneous of degree one and the surface is a cone.
+
+    Parameters
+    ----------
+    model : ContactModel
+    ydot : array_like (k,)
+        Normal speeds at touch-down, < 0.
+    reach, step, tol : float, optional
+        As in :func:`dividing_curve`.
+
+    Returns
+    -------
+    DividingSurface
+
+    Raises
+    ------
+    As :func:`dividing_curve`.
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> surface = bounce.dividing_surface(turf, [-0.5, -1.0])
+    >>> (surface.junction / surface.ydot[:, None]).round(9)
+    array([[-0.444..., 1. , -1.59...],
+           [-0.444..., 1. , -1.59...]])
+    """
+    speeds = np.atleast_1d(np.asarray(ydot, dtype=float))
+    if speeds.ndim != 1 or speeds.size == 0:
+        raise ns.OptionError(f"ydot: expected a list of speeds, received shape {speeds.shape}.")
+    return DividingSurface(
+        tuple(dividing_curve(model, v, reach=reach, step=step, tol=tol) for v in speeds.tolist())
+    )
+
+
+def critical_eta(
+    model: ContactModel,
+    *,
+    name: str = "eta",
+    bounds: tuple[float, float] = (0.05, 3.0),
+    ydot: float = -1.0,
+    xdot: float = 1e-4,
+) -> float:
+    """Smallest tangential frequency ratio at which a slow shot without spin lifts off in topspin slip.
+
+    A slow shot without spin soon rolls, with x = 0 and xdot > 0, and lifts off with H_F of the sign
+    of its tangential acceleration A there: negative (reverse slip) for a soft ground. The value
+    returned is the first zero of A at lift-off.
+
+    Parameters
+    ----------
+    model : ContactModel
+    name : str, optional
+        The parameter that is varied.
+    bounds : (float, float), optional
+        Where the zero is looked for.
+    ydot, xdot : float, optional
+        Landing; ``xdot`` is small, so that what depends on its square is lost in rounding.
+
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    nonsmooth.ConvergenceError
+        No change of sign within the bounds.
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> f"{bounce.critical_eta(turf):.6f}"
+    '1.19...'
+    """
+
+    from scipy.optimize import brentq  # slow to import
+
+    def pull(value: float) -> float:
+        shooting = Shooting(model.replace(**{name: value}), ydot)
+        k = 1.0 / model.values["inertia"]
+        rolling = xdot * k / (1 + k)  # slip ends at once: xdot - omega/k... is conserved
+        return shooting.shoot(np.array([rolling, -rolling]), "s").pull / rolling
+
+    grid = np.linspace(*bounds, 60)
+    values = [pull(v) for v in grid]
+    for k in range(len(grid) - 1):
+        if values[k] < 0 <= values[k + 1]:
+            return float(brentq(pull, grid[k], grid[k + 1], xtol=1e-13, rtol=1e-14))
+    raise ns.ConvergenceError(
+        f"{name}: expected a change to forward slip within {bounds}, received none: A at lift-off "
+        f"per speed is {values[0]:.4g} and {values[-1]:.4g} at the ends. Widen bounds.",
+        residual=min(map(abs, values)),
+        point=grid,
+    )
+
+
+def _bracket(values: Array, target: float) -> tuple[int, float] | None:
+    """First interval of a sequence that holds a value, and the weight of its right end."""
+    low, high = np.minimum(values[:-1], values[1:]), np.maximum(values[:-1], values[1:])
+    inside = np.flatnonzero((low <= target) & (target <= high) & (low < high))
+    if not inside.size:
+        return None
+    k = int(inside[0])
+    return k, float((target - values[k]) / (values[k + 1] - values[k]))
+
+
+def _with_ydot(points: Array, ydot: float) -> Array:
+    return np.column_stack([points[:, 0], np.full(len(points), ydot), points[:, 1]])
+
+
+def _integration(tol: float) -> float:
+    """Tolerance of the integration for points to ``tol``."""
+    return max(0.1 * tol, 1e-14)
+
+
+def _symmetric(shooting: Shooting) -> bool:
+    """Whether (x, xdot, omega) -> -(x, xdot, omega) maps forward slip to reverse slip."""
+    system, flip = shooting.system, np.ones(shooting.system.dimension)
+    flip[[0, 1, 4]] = -1.0
+    rng = np.random.default_rng(0)
+    above, below = system.field("+"), system.field("-")
+    for _ in range(5):
+        x = rng.uniform(-1, 1, system.dimension)
+        x[2] = -abs(x[2])
+        x[4] = abs(x[1]) + abs(x[4])
+        one = system.evaluate(above, x, shooting.model.values)[:, 0]
+        other = system.evaluate(below, flip * x, shooting.model.values)[:, 0]
+        if not np.allclose(one, flip * other, rtol=1e-12, atol=1e-12):
+            return False
+    return True
+
+
+def _require_two_fold(shooting: Shooting) -> None:
+    """Refuse models whose lift-off has no visible two-fold of dry friction."""
+    who = type(shooting.model).__name__
+    u = -0.3 * shooting.ydot * np.ones(2)
+    phase = shooting.first_phase(u)
+    above, below, *_ = shooting.numbers(phase(0.5 * (phase.t[0] + phase.t[-1])))
+    law = type(shooting.model.friction).__name__
+    if not below > above:
+        raise ns.DegenerateError(
+            f"{who}: expected dry friction, set-valued at H = 0, received {law}, which is a function "
+            "of the slip and of its own states. There is no rolling phase and no two-fold, so H_F = 0 "
+            "is a smooth level: find it with scipy from bounce.lift_off."
+        )
+    slip = shooting.slip(u)
+    rate = shooting.numbers(slip.x[-1])[6]
+    middle = shooting.numbers(slip(0.5 * (slip.t[0] + slip.t[-1])))[5]
+    duration = float(slip.t[-1] - slip.t[0])
+    if not abs(rate) * duration > 1e-3 * abs(middle):
+        raise ns.DegenerateError(
+            f"{who}: expected a load that falls through zero at lift-off at a nonzero rate, received "
+            f"rate {rate:.3g} (dLambda_N/dY = 0 there, as for Hertz's law without gravity). Then "
+            "L11 = L22, the two-fold at lift-off is visible-invisible, and no rolling ball reaches it: "
+            'there is no dividing curve of this kind. Gravity with load="net" restores it.'
+        )

@@ -1,0 +1,7 @@
+"""Pictures (matplotlib; loaded as ``bounce.plot`` on first use)."""
+
+from .outcomes import outcome_map
+from .residuals import residuals
+from .shot import STYLES, friction_cone
+
+__all__ = ["STYLES", "friction_cone", "outcome_map", "residuals"]

@@ -1,0 +1,264 @@
+"""Pictures of outcome maps (matplotlib; reached as ``bounce.plot.outcome_map``)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+import nonsmooth as ns
+
+from ..maps.dividing import DividingCurve
+from ..maps.outcomes import OutcomeMap
+
+style = ns.plot.style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+#: Regions of the paper's eight itineraries: warm where the ball leaves in forward slip, cold where
+#: in reverse (colours of the style and tints of them; neighbours differ in grey as well).
+COLOURS = {
+    "S+": "#F6C7A3",
+    "S+ R S+": style.VERMILLION,
+    "S- R S+": style.YELLOW,
+    "S- S+": "#A05A2C",
+    "S-": "#BCDDF5",
+    "S- R S-": style.BLUE,
+    "S+ R S-": style.SKY,
+    "S+ S-": "#0B3C5D",
+}
+#: For other itineraries, in the order in which they occur.
+MORE = (
+    style.PURPLE,
+    style.GREEN,
+    "#999999",
+    "#7A5195",
+    "#B7E4C7",
+    "#5F5F5F",
+    "#EBC4DB",
+    "#00573F",
+)
+
+#: Axes of landings in SI units as golfers read them: name, unit, and the unit in SI.
+_GOLF = {
+    "speed": ("landing speed", "m/s", 1.0),
+    "angle": ("angle of descent", "deg", math.pi / 180),
+    "spin": ("backspin", "rpm", math.pi / 30),
+}
+_LABELS = {
+    **{name: f"{what} ({unit})" for name, (what, unit, _) in _GOLF.items()},
+    "xdot": r"speed $\dot X_0$",
+    "ydot": r"normal speed $\dot Y_0$",
+    "omega": r"spin $\Omega_0$",
+    "x": r"$X_0$",
+    "y": r"$Y_0$",
+    "mu": r"friction $\mu$",
+    "eta": r"frequency ratio $\eta$",
+    "d1": r"$d_1$",
+    "d2": r"$d_2$",
+    "G": r"gravity $G$",
+}
+#: How many regions without room for their name are listed, the largest first.
+_LISTED = 16
+_QUANTITIES = ("itinerary", "slip", "omega", "spin_reversal", "lift_off_angle")
+
+
+def outcome_map(
+    outcomes: OutcomeMap,
+    quantity: str = "itinerary",
+    *,
+    curve: DividingCurve | None = None,
+    ax: Axes | None = None,
+) -> Figure:
+    """Draw a map of outcomes: regions by name, or a quantity at lift-off.
+
+    Parameters
+    ----------
+    outcomes : OutcomeMap
+    quantity : {"itinerary", "slip", "omega", "spin_reversal", "lift_off_angle"}
+        ``omega`` is the spin at lift-off.
+    curve : DividingCurve, optional
+        Drawn over a map of xdot and omega instead of the contour H_F = 0 of the map.
+    ax : matplotlib Axes, optional
+        Draw here instead of in a new figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    nonsmooth.OptionError
+        Another quantity, or a curve over other axes.
+
+    Examples
+    --------
+    >>> import numpy as np, bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> over = {"xdot": np.linspace(-2, 2, 30), "omega": np.linspace(-4, 4, 30)}
+    >>> figure = bounce.plot.outcome_map(bounce.outcome_map(turf, over))
+    >>> sorted(text.get_text() for text in figure.axes[0].texts)[:3]
+    ['S+', 'S+ R S+', 'S+ R S-']
+    """
+    if quantity not in _QUANTITIES:
+        raise ns.OptionError(f"quantity: expected one of {_QUANTITIES}, received {quantity!r}.")
+    if curve is not None and outcomes.names not in (("xdot", "omega"), ("omega", "xdot")):
+        raise ns.OptionError(
+            f"curve: expected a map over xdot and omega, received one over {outcomes.names}."
+        )
+    with style.settings():
+        figure, ax = style.axes_for(ax, (7.2, 5.6))
+        if quantity == "itinerary":
+            _regions(ax, outcomes)
+        else:
+            _field(figure, ax, outcomes, quantity)
+        if curve is not None:
+            _curve(ax, outcomes, curve)
+        else:
+            _contour(ax, outcomes)
+        for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
+            axis.set_label_text(_LABELS.get(name, name))
+        x, y = _axes(outcomes)
+        ax.set_xlim(*_ends(x))
+        ax.set_ylim(*_ends(y))
+        ax.set_title(_title(outcomes), fontsize=9, loc="left", color="0.3")
+    return figure
+
+
+def _regions(ax: Axes, outcomes: OutcomeMap) -> None:
+    from matplotlib.colors import ListedColormap
+    from matplotlib.patches import Patch
+
+    spare = iter(MORE * (1 + len(outcomes.regions) // len(MORE)))
+    colours = [COLOURS.get(name) or next(spare) for name in outcomes.regions]
+    palette = ListedColormap(["#FFFFFF", *colours])
+    limits: dict[str, Any] = dict(vmin=-1.5, vmax=len(colours) - 0.5)
+    ax.pcolormesh(
+        *_axes(outcomes), outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits
+    )
+    narrow: list[tuple[int, Patch]] = []
+    for code, (name, colour) in enumerate(zip(outcomes.regions, colours, strict=True)):
+        inside = outcomes.code == code
+        if not _named(ax, outcomes, inside, name, colour):
+            patch = Patch(facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name))
+            narrow.append((int(inside.sum()), patch))
+    if narrow:
+        handles = [patch for _, patch in sorted(narrow, key=lambda pair: -pair[0])[:_LISTED]]
+        if len(narrow) > _LISTED:
+            handles.append(Patch(alpha=0, label=f"and {len(narrow) - _LISTED} more"))
+        ax.legend(
+            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
+            frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
+        )  # fmt: skip
+
+
+def _short(name: str) -> str:
+    """The first phases of a long itinerary and its last."""
+    phases = name.split()
+    return name if len(phases) <= 8 else " ".join([*phases[:6], "..", phases[-1]])
+
+
+def _named(
+    ax: Axes, outcomes: OutcomeMap, inside: NDArray[np.bool_], name: str, colour: str
+) -> bool:
+    """Write a region's name where it is widest, if there is room for it."""
+    from scipy.ndimage import distance_transform_edt
+
+    room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
+    row, column = np.unravel_index(int(np.argmax(room)), room.shape)
+    if room.max() < max(0.03, 0.006 * len(name)) * min(inside.shape):
+        return False
+    x, y = _axes(outcomes)
+    place = (x[column], y[row])
+    text = "white" if _luminance(colour) < 0.2 else "black"
+    style.write(ax, place, name, color=text, zorder=6, fontsize=9, fontweight="bold")
+    return True
+
+
+def _field(figure: Figure, ax: Axes, outcomes: OutcomeMap, quantity: str) -> None:
+    from_lift_off = outcomes.lift_offs.omega if quantity == "omega" else None
+    values = from_lift_off if from_lift_off is not None else getattr(outcomes, quantity)
+    values = np.asarray(values, dtype=float)
+    values = np.where(outcomes.lift_offs.complete, values, np.nan)
+    options: dict[str, Any] = dict(cmap="viridis")
+    label = "angle above +x at lift-off (rad)"
+    if quantity in ("slip", "omega"):
+        bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
+        options = dict(cmap="PuOr_r", vmin=-bound, vmax=bound)
+        label = "slip at lift-off $H_F$" if quantity == "slip" else r"spin at lift-off $\Omega_F$"
+        label += " (m/s)" if _golf(outcomes) else ""
+    elif quantity == "spin_reversal":
+        options, label = dict(cmap="cividis", vmin=0, vmax=1), "spin reverses"
+    mesh = ax.pcolormesh(*_axes(outcomes), values, shading="nearest", rasterized=True, **options)
+    bar = figure.colorbar(mesh, ax=ax, label=label)
+    if quantity == "spin_reversal":
+        bar.set_ticks([0, 1], labels=["no", "yes"])
+
+
+def _contour(ax: Axes, outcomes: OutcomeMap) -> None:
+    """The border between forward and reverse slip, from the map's last phases."""
+    last = [{"+": 1.0, "-": -1.0}.get(name[-1], 0.0) for name in outcomes.regions]
+    sign = np.array([*last, np.nan])[outcomes.code]
+    if np.any(sign < 0) and np.any(sign > 0):
+        ax.contour(*_axes(outcomes), sign, levels=[0.0], colors="black", linewidths=1.6)
+
+
+def _curve(ax: Axes, outcomes: OutcomeMap, curve: DividingCurve) -> None:
+    from matplotlib.legend import Legend
+
+    order = [("xdot", "omega").index(name) for name in outcomes.names]
+    styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
+    lines: dict[str, Any] = {}
+    for arc in (*curve.arcs, *curve.reverse):
+        for sign in (1, -1) if curve.mirrored else (1,):
+            u, v = sign * arc.points[:, order].T
+            (line,) = ax.plot(u, v, color="black", linewidth=2.0, linestyle=styles[arc.kind])
+            lines[f"$H_F=0$, {arc.kind}"] = line
+    if curve.junction is not None:
+        for sign in (1, -1) if curve.mirrored else (1,):
+            point = sign * curve.junction[order]
+            ax.plot(*point, "o", color="white", markeredgecolor="black", markersize=6, zorder=8)
+    # An artist of its own: the axes' legend may hold the narrow regions.
+    ax.add_artist(
+        Legend(
+            ax, list(lines.values()), list(lines), loc="lower right", fontsize=8, framealpha=0.95
+        )
+    )
+
+
+def _title(outcomes: OutcomeMap) -> str:
+    values = {**outcomes.model.values, **outcomes.fixed}
+    unchanged = dict(x=0.0, y=0.0, G=0.0, slope=0.0, inertia=0.4)
+    shown = {n: v for n, v in values.items() if n not in outcomes.names and unchanged.get(n) != v}
+    parts = []
+    for name, value in shown.items():
+        _, unit, size = _GOLF.get(name, ("", "", 1.0))
+        parts.append(f"{name} = {value / size:g} {unit}".rstrip())
+    return f"{type(outcomes.model).__name__}: " + ", ".join(parts)
+
+
+def _golf(outcomes: OutcomeMap) -> bool:
+    """Whether the landings are in SI units."""
+    return bool({*outcomes.names, *outcomes.fixed} & set(_GOLF))
+
+
+def _axes(outcomes: OutcomeMap) -> list[NDArray[np.float64]]:
+    """Axes in the units of their labels."""
+    sizes = [_GOLF.get(name, ("", "", 1.0))[2] for name in outcomes.names]
+    return [values / size for values, size in zip(outcomes.axes, sizes, strict=True)]
+
+
+def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
+    low, high = float(values.min()), float(values.max())
+    return (low, high) if low < high else (low - 0.5, high + 0.5)
+
+
+def _luminance(colour: str) -> float:
+    """Relative luminance of WCAG 2.1."""
+    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
+    r, g, b = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
+    return 0.2126 * r + 0.7152 * g + 0.0722 * b

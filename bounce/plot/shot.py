@@ -1,0 +1,148 @@
+"""Pictures of one bounce: friction force against load, with the cone that bounds it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+import nonsmooth as ns
+
+from ..contact.equations import equations
+from ..shot.single import Shot
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+style = ns.plot.style
+
+#: Colours that differ in grey too, line styles and names of the phases.
+STYLES: dict[str, dict[str, Any]] = {
+    "+": dict(color=style.VERMILLION, linestyle="-", label="forward slip, $H>0$"),
+    "-": dict(color=style.BLUE, linestyle=(0, (5, 1.5)), label="reverse slip, $H<0$"),
+    "s": dict(color=style.BLACK, linestyle=(0, (1, 1)), label="rolling, $H=0$"),
+    "F": dict(color="#999999", linestyle="-.", label="no friction yet"),
+}
+_WIDTH = {"+": 2.0, "-": 2.0, "s": 2.6, "F": 1.6}
+_POINTS = 400
+
+
+def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
+    """Draw the friction force against the load, with the cone that bounds it.
+
+    Parameters
+    ----------
+    shot : Shot
+    ax : matplotlib Axes, optional
+        Draw here instead of in a new figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> shot = bounce.simulate(turf, xdot=0.3, ydot=-1.0, omega=0.1)
+    >>> bounce.plot.friction_cone(shot).axes[0].get_xlabel()
+    'friction force $\\\\Lambda_T$'
+    """
+    with style.settings():
+        figure, ax = style.axes_for(ax, (6.4, 5.2))
+        top = _cone(ax, shot)
+        _phases(ax, shot)
+        _markers(ax, shot, top)
+        ax.axhline(0.0, color="0.3", linewidth=0.8, zorder=1)
+        ax.set_xlabel(r"friction force $\Lambda_T$")
+        ax.set_ylabel(r"load $\Lambda_N$")
+        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+    return figure
+
+
+def _cone(ax: Axes, shot: Shot) -> float:
+    """Shade |Lambda_T| <= mu Lambda_N, with mu that of rest, and set the limits of the axes."""
+    forces = shot.forces(np.linspace(0.0, shot.time, _POINTS))
+    top = 1.15 * float(forces.load.max())
+    mu = _static_coefficient(shot)
+    ax.fill_betweenx(
+        [0.0, top], [0.0, -mu * top], [0.0, mu * top], color="0.92", zorder=0, linewidth=0
+    )
+    for side in (-1, 1):
+        ax.plot([0.0, side * mu * top], [0.0, top], color="0.45", linewidth=1.0, zorder=1)
+        ax.annotate(
+            rf"$\Lambda_T={'-' if side < 0 else ''}\mu\Lambda_N$",
+            (side * mu * top * 0.93, top * 0.93),
+            textcoords="offset points",
+            xytext=(side * 8, -3),
+            ha="left" if side > 0 else "right",
+            va="top",
+            color="0.3",
+        )
+    half = (1.45 * mu or 0.5) * top  # without friction the cone is a line
+    ax.set_xlim(-half, half)
+    ax.set_ylim(min(0.0, 1.1 * float(forces.load.min())) - 0.06 * top, top)
+    return top
+
+
+def _static_coefficient(shot: Shot) -> float:
+    import casadi as ca
+
+    model = shot.model
+    eq = equations(model.blueprint())
+    coefficient = ca.SX(model.friction_coefficient(eq.s, eq.q))
+    rest = ca.substitute(coefficient, eq.s.slip, 0)
+    x, p = shot(0.0), list(model.values.values())
+    return float(eq.function([rest])(x, p))
+
+
+def _phases(ax: Axes, shot: Shot) -> None:
+    """One line per phase, with an arrow in the direction of time."""
+    labelled: set[str] = set()
+    before: tuple[float, float] | None = None
+    for phase in shot.phases:
+        t = np.linspace(phase.t_start, phase.t_end, _POINTS)
+        # A transition belongs to the later phase; ask for this one's side of it.
+        t[-1] = np.nextafter(phase.t_end, phase.t_start)
+        forces = shot.forces(t)
+        first, last = ((float(forces.friction[k]), float(forces.load[k])) for k in (0, -1))
+        if before is not None:  # friction jumps where slip ends in rolling or in reverse slip
+            ax.plot(*zip(before, first, strict=True), color="0.6", linewidth=0.9, zorder=2)
+        before = last
+        look = dict(STYLES[phase.mode])
+        label = None if phase.mode in labelled else look.pop("label")
+        look.pop("label", None)
+        labelled.add(phase.mode)
+        ax.plot(
+            forces.friction,
+            forces.load,
+            label=label,
+            linewidth=_WIDTH[phase.mode],
+            zorder=3,
+            **look,
+        )
+        _arrow(ax, forces.friction, forces.load, STYLES[phase.mode]["color"])
+
+
+def _arrow(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:
+    """An arrow head at the middle of a curve's length, as it is seen on the axes."""
+    curve = np.column_stack([x, y])
+    scale = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
+    if np.linalg.norm(np.diff(curve, axis=0) / scale, axis=1).sum() >= 0.06:
+        style.arrowhead(ax, curve, 0.45, color, scale=scale, mutation_scale=16, zorder=4)
+
+
+def _markers(ax: Axes, shot: Shot, top: float) -> None:
+    """Touch-down, transitions and lift-off."""
+    start = shot.forces(0.0)
+    inner = np.array([phase.t_start for phase in shot.phases[1:]])
+    face: dict[str, Any] = dict(markerfacecolor="white", markeredgecolor="black")
+    common: dict[str, Any] = dict(linestyle="none", zorder=5, clip_on=False)
+    ax.plot(
+        start.friction, start.load, "o", color="black", markersize=7, label="touch-down", **common
+    )
+    if inner.size:
+        at = shot.forces(inner)
+        ax.plot(at.friction, at.load, "s", markersize=6, label="transition", **face, **common)
+    ax.plot(0.0, 0.0, "D", markersize=9, label="lift-off", **face, **common)

@@ -1,0 +1,221 @@
+"""Filippov's logic at a point of one or several surfaces: which motions can continue from here.
+
+A mode can continue if each of its guards that vanishes here becomes positive at once: its first
+nonzero Taylor coefficient is positive. For a side that is "the field leaves to this side", for
+sliding it is "both fields point at the surface". One such mode: the motion continues in it. More
+than one: the future is not unique. The coefficients that are zero by construction are dropped, so
+there is no push off the surface by an epsilon.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ...model import Array
+from .. import messages
+from ..facts import TANGENT, VANISHES
+from ..status import Status
+from . import complementarity
+from .modes import Expansion, Modes
+from .stepper import Stepper
+
+#: Number of leading coefficients of a guard that vanish by construction, by (kind, surface, side).
+Known = Mapping[tuple[str, int, int], int]
+
+#: Surfaces on which letters are tried one by one where the rates do not decide: 3 to that number.
+_TRIED = 4
+
+
+@dataclass(frozen=True)
+class Continuation:
+    """A mode that can continue, and the coefficients to drop from its guards in the first step.
+
+    ``unknowns`` are the multipliers of the surfaces that slide, where they are not eliminated.
+    """
+
+    mode: str
+    drops: dict[int, int]
+    strict: bool
+    unknowns: Array
+
+
+@dataclass(frozen=True)
+class Decision:
+    """Either one continuation or the reason why there is none."""
+
+    continuation: Continuation | None
+    status: Status = Status.REACHED_END
+    message: str = ""
+
+
+def decide(
+    stepper: Stepper,
+    x: Array,
+    mode: str,
+    active: Sequence[int],
+    known: Known,
+    layer: tuple[float, int] | None = None,
+) -> Decision:
+    """Choose the motion that continues from a point of the surfaces ``active``.
+
+    Parameters
+    ----------
+    stepper : Stepper
+    x : ndarray (N,)
+        Extended state, on the active surfaces.
+    mode : str
+        Letters of the surfaces that are not active; those of the active ones are a first guess.
+    active : sequence of int
+        Surfaces through the point and, numbered after all surfaces, contacts at rest there.
+    known : mapping
+        Coefficients known to vanish, besides the values of h at the active surfaces.
+    layer : (float, {-1, 1}), optional
+        With hidden dynamics and one active surface: where its multiplier comes from and which way
+        it moves through the layer lambda in [-1, 1].
+    """
+    if not active:
+        return Decision(Continuation(mode, {}, True, np.zeros(len(mode))))
+    first = stepper.system.surface_count  # of the contacts
+    contacts = [i - first for i in active if i >= first]
+    if len(active) == 1 and not contacts and is_two_fold(stepper.modes, mode, x, active[0]):
+        return Decision(None, Status.NON_UNIQUE, messages.two_fold(active[0]))
+    letters = _by_rates(stepper, x, mode, active)
+    if isinstance(letters, Decision):
+        return letters
+    found = [
+        c
+        for m in _spelled(mode, active, letters)
+        for c in _continuations(stepper, x, m, active, known)
+    ]
+    strict = [c for c in found if c.strict]
+    if layer is not None and stepper.system.hidden and len(active) == 1:
+        strict = _through_layer(strict, active[0], *layer)
+    if len(strict) == 1 or (not strict and len(found) == 1):
+        return Decision((strict or found)[0])
+    if len(strict) > 1:
+        return Decision(None, Status.NON_UNIQUE, messages.ambiguous([c.mode for c in strict]))
+    resting = [c for c in found if "s" in c.mode or "c" in c.mode]
+    if resting:
+        return Decision(resting[0])
+    if contacts:
+        names = [stepper.system.impacts[j] for j in contacts]
+        return Decision(None, Status.INCONSISTENT, messages.no_reaction(names))
+    if len(active) > 1:
+        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+    return Decision(None, Status.NON_UNIQUE, messages.degenerate())
+
+
+def _by_rates(
+    stepper: Stepper, x: Array, mode: str, active: Sequence[int]
+) -> dict[int, str] | Decision:
+    """Letters that are possible: one where the rates decide, else all."""
+    first = stepper.system.surface_count
+    undecided = {i: "+-s" if i < first else "oc" for i in active}
+    if len(active) < 2:
+        return undecided
+    problem = stepper.modes.rates(mode, x, active)
+    if problem is None:
+        return undecided if len(active) <= _TRIED else _too_many(active)
+    a, m, scales = problem
+    if complementarity.is_unique(m):
+        guess = np.array([{"+": 1.0, "-": -1.0, "o": -1.0}.get(mode[i], 0.0) for i in active])
+        lam = complementarity.solve(a, m, guess, [i >= first for i in active])
+    else:
+        if len(active) <= _TRIED - 1 or max(active) >= first:
+            return undecided if len(active) <= _TRIED else _too_many(active)
+        found = complementarity.all_solutions(a, m)
+        if found is None or len(found) > 1:
+            return _too_many(active)
+        lam = found[0] if found else None
+    if lam is None:
+        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+    rates = a + m @ lam
+    clear_rate = np.abs(rates) > VANISHES * (scales + np.abs(m).sum(axis=1))
+    room = np.where(np.array(active) < first, 1.0 - np.abs(lam), lam)
+    inside = room > VANISHES * (1.0 + scales / np.abs(np.diag(m)))
+    for k, i in enumerate(active):
+        if inside[k]:
+            undecided[i] = "s" if i < first else "c"
+        elif clear_rate[k]:
+            undecided[i] = "o" if i >= first else ("+" if lam[k] > 0.0 else "-")
+    if sum(len(letters) > 1 for letters in undecided.values()) > _TRIED:
+        return _too_many(active)
+    return undecided
+
+
+def _too_many(active: Sequence[int]) -> Decision:
+    return Decision(None, Status.NON_UNIQUE, messages.possibly_several(active))
+
+
+def _spelled(mode: str, active: Sequence[int], letters: dict[int, str]) -> Iterable[str]:
+    for choice in product(*(letters[i] for i in active)):
+        candidate = list(mode)
+        for i, letter in zip(active, choice, strict=True):
+            candidate[i] = letter
+        yield "".join(candidate)
+
+
+def _continuations(
+    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
+) -> Iterable[Continuation]:
+    for unknowns in stepper.modes.solutions(mode, x):
+        continuation = _continuation(stepper, x, unknowns, mode, active, known)
+        if continuation is not None:
+            yield continuation
+
+
+def _continuation(
+    stepper: Stepper, x: Array, unknowns: Array, mode: str, active: Sequence[int], known: Known
+) -> Continuation | None:
+    e = stepper.expand(mode, x, unknowns)
+    if not e.finite:
+        e = _finite_prefix(e)
+    drops, strict = {}, True
+    first = stepper.system.surface_count
+    for row, guard in enumerate(stepper.guards(mode)):
+        contact = guard.kind in ("impact", "release")
+        if guard.kind in ("stop", "reset") or guard.index + first * contact not in active:
+            continue
+        zeros = known.get((guard.kind, guard.index, guard.side), 0)
+        zeros = max(zeros, {"surface": 1, "impact": 2}.get(guard.kind, 0))
+        k, value = stepper.leading(e, row, zeros)
+        if value < 0.0:
+            return None
+        if value == 0.0:
+            strict = False
+        drops[row] = min(k, e.guards.shape[1] - 1) if value else e.guards.shape[1]
+    return Continuation(mode, drops, strict, unknowns)
+
+
+def _through_layer(
+    found: Sequence[Continuation], surface: int, origin: float, direction: int
+) -> list[Continuation]:
+    """First equilibrium of the layer problem that lambda meets on its way, if any (Jeffrey 2018)."""
+
+    def ahead(c: Continuation) -> float:
+        letter = c.mode[surface]
+        lam = float(c.unknowns[surface]) if letter == "s" else (1.0 if letter == "+" else -1.0)
+        return (lam - origin) * direction
+
+    return sorted((c for c in found if ahead(c) > 1e-5), key=ahead)[:1]
+
+
+def _finite_prefix(e: Expansion) -> Expansion:
+    """Zero the coefficients that are not finite: they decide nothing."""
+    states, guards = e.states.copy(), e.guards.copy()
+    for c in (states, guards):
+        c[~np.isfinite(c)] = 0.0
+    return replace(e, states=states, guards=guards, finite=False)
+
+
+def is_two_fold(modes: Modes, mode: str, x: Array, surface: int, tolerance: float = 0.0) -> bool:
+    """Whether both fields are tangent to a surface at a point, and the sliding field 0/0.
+
+    ``tolerance`` is on the angles between fields and surface; rounding is always allowed.
+    """
+    angles = modes.angles(mode, x, surface)
+    return angles is not None and bool(np.all(np.abs(angles) <= tolerance + TANGENT))

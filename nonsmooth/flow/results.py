@@ -1,0 +1,179 @@
+"""What many runs return: arrays of their ends, chunk by chunk and together."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Array
+from .facts import KINDS
+from .status import Status
+
+
+class Stopped(Exception):
+    """The work was told to stop before it was done."""
+
+
+@dataclass
+class Chunk:
+    """Results of some trajectories; itineraries as numbers into ``words``, which are sorted.
+
+    ``totals``: steps, events and trajectories handed over by the lanes.
+    """
+
+    x: Array
+    t: Array
+    status: NDArray[np.int8]
+    itinerary: NDArray[np.int32]
+    words: list[str]
+    kinds: NDArray[np.int32]
+    at_x: Array | None
+    at_t: Array | None
+    totals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(4, np.int64))
+
+    @classmethod
+    def empty(cls, count: int, n: int, at: bool) -> Chunk:
+        """Arrays without values for ``count`` trajectories of ``n`` states."""
+        return cls(
+            x=np.empty((count, n)),
+            t=np.empty(count),
+            status=np.empty(count, np.int8),
+            itinerary=np.empty(count, np.int32),
+            words=[],
+            kinds=np.empty((count, len(KINDS)), np.int32),
+            at_x=np.empty((count, n)) if at else None,
+            at_t=np.empty(count) if at else None,
+        )
+
+    def part(self, first: int, last: int) -> Chunk:
+        """Return the arrays of the trajectories first to last - 1, to be written in place."""
+        cut = slice(first, last)
+        return Chunk(
+            x=self.x[cut],
+            t=self.t[cut],
+            status=self.status[cut],
+            itinerary=self.itinerary[cut],
+            words=[],
+            kinds=self.kinds[cut],
+            at_x=None if self.at_x is None else self.at_x[cut],
+            at_t=None if self.at_t is None else self.at_t[cut],
+        )
+
+    def arrays(self) -> dict[str, NDArray[Any]]:
+        """Return the arrays with one row for each trajectory."""
+        names = ("x", "t", "status", "itinerary", "kinds", "at_x", "at_t")
+        return {name: a for name in names if (a := getattr(self, name)) is not None}
+
+    def rename(self, words: Mapping[int, str]) -> None:
+        """Number the itineraries in the order of their words, those in use only."""
+        self.words = sorted(set(words.values()))
+        number = {word: k for k, word in enumerate(self.words)}
+        table = np.zeros(max(words, default=0) + 1, np.int32)
+        for code, word in words.items():
+            table[code] = number[word]
+        self.itinerary[:] = table[self.itinerary]
+
+
+@dataclass(frozen=True, repr=False)
+class Ensemble:
+    """Results, each of the shape ``(...)`` of the broadcast starts and parameters.
+
+    Attributes
+    ----------
+    x : ndarray (..., n)
+        Last states.
+    t : ndarray (...)
+        Last times.
+    status : ndarray of int8 (...)
+        Values of :class:`Status`; compare with its members.
+    itineraries : tuple of str
+        The different itineraries that occur, sorted.
+    itinerary_code : ndarray of int32 (...)
+        Position in ``itineraries``.
+    events : dict of str to ndarray of int32 (...)
+        Number of events by kind: crossing, entry, exit, stop, reset, end.
+    event_x, event_t : ndarray (..., n), (...) or None
+        State and time of the event asked for with ``at_event``; NaN where it did not happen.
+    """
+
+    x: Array
+    t: Array
+    status: NDArray[np.int8]
+    itineraries: tuple[str, ...]
+    itinerary_code: NDArray[np.int32]
+    events: dict[str, NDArray[np.int32]]
+    event_x: Array | None = None
+    event_t: Array | None = None
+
+    @property
+    def itinerary(self) -> NDArray[np.object_]:
+        """Itineraries as strings; equal ones are the same object."""
+        return np.array([*self.itineraries, ""], dtype=object)[self.itinerary_code]
+
+    @property
+    def complete(self) -> NDArray[np.bool_]:
+        """Where the run did what was asked: reached its end or a stop."""
+        return (self.status == Status.REACHED_END) | (self.status == Status.STOPPED)
+
+    def __repr__(self) -> str:
+        found, number = np.unique(self.status, return_counts=True)
+        counts = ", ".join(f"{Status(int(s))} {k}" for s, k in zip(found, number, strict=True))
+        return (
+            f"Ensemble(shape {self.t.shape}, {self.x.shape[-1]} states, "
+            f"{len(self.itineraries)} itineraries; {counts})"
+        )
+
+
+class Collected:
+    """Arrays of all trajectories, filled as chunks arrive in any order.
+
+    Parameters
+    ----------
+    dimension : int
+        Number of states.
+    shape : tuple of int
+        Of the broadcast starts and parameters.
+    at : bool
+        Whether the state at an event is kept.
+    """
+
+    def __init__(self, dimension: int, shape: tuple[int, ...], at: bool):
+        self.shape = shape
+        self.all = Chunk.empty(math.prod(shape), dimension, at)
+        self._words: dict[str, int] = {}
+
+    def put(self, first: int, chunk: Chunk) -> None:
+        """Take a chunk that begins with trajectory ``first``; its arrays may be a part of these."""
+        whole = self.all.arrays()
+        for name, array in chunk.arrays().items():
+            if array.base is not whole[name]:
+                whole[name][first : first + len(array)] = array
+        numbers = [self._words.setdefault(w, len(self._words)) for w in chunk.words]
+        if numbers != list(range(len(numbers))):
+            codes = self.all.itinerary[first : first + len(chunk.t)]
+            codes[:] = np.array(numbers, np.int32)[codes]
+
+    def ensemble(self) -> Ensemble:
+        """Return the results, with the itineraries sorted."""
+        words, code, every = sorted(self._words), self.all.itinerary, self.all
+        if words != list(self._words):
+            order = np.empty(len(words), np.int32)
+            for k, word in enumerate(words):
+                order[self._words[word]] = k
+            code = order[code]
+        n, shape = every.x.shape[1], self.shape
+        return Ensemble(
+            x=every.x.reshape(*shape, n),
+            t=every.t.reshape(shape),
+            status=every.status.reshape(shape),
+            itineraries=tuple(words),
+            itinerary_code=code.reshape(shape),
+            events={kind: every.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
+            event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
+            event_t=None if every.at_t is None else every.at_t.reshape(shape),
+        )

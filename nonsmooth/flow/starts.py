@@ -1,0 +1,109 @@
+"""What many runs start from: states and parameters broadcast against each other."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..model import Array, FilippovSystem, PointError, explain
+
+
+class Starts:
+    """Starts and parameters, given out chunk by chunk.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    x0 : array_like (..., n)
+    parameters : mapping or None
+        Numbers, or arrays that broadcast with the starts.
+    t_start : float
+
+    Raises
+    ------
+    PointError, ParameterError
+    """
+
+    def __init__(
+        self,
+        system: FilippovSystem,
+        x0: ArrayLike,
+        parameters: Mapping[Any, ArrayLike] | None,
+        t_start: float,
+    ):
+        self.system, self.t_start = system, t_start
+        self.x0 = _numbers(x0, "x0")
+        if self.x0.ndim == 0 or self.x0.shape[-1] != system.dimension:
+            raise PointError(
+                explain(
+                    "x0",
+                    expected=f"shape (..., {system.dimension}) for the states {system.state_names}",
+                    received=f"shape {self.x0.shape}",
+                    advice="States are on the last axis.",
+                )
+            )
+        if parameters is not None and not isinstance(parameters, Mapping):
+            system.parameter_vector(parameters)  # refuses what is no mapping
+        arrays = {str(k): _numbers(v, f"parameter {k}") for k, v in (parameters or {}).items()}
+        sample = {k: _sample(v) for k, v in arrays.items()}
+        self.p = system.parameter_vector(sample)
+        self.varied = {system.parameter_names.index(k): v for k, v in arrays.items() if v.ndim > 0}
+        shapes = [self.x0.shape[:-1], *[v.shape for v in self.varied.values()]]
+        try:
+            self.shape = np.broadcast_shapes(*shapes)
+        except ValueError as error:
+            raise PointError(
+                f"x0 and parameters: expected shapes that broadcast, received {shapes}."
+            ) from error
+        self.count = math.prod(self.shape)
+
+    def digest(self) -> str:
+        """Return a hash of all numbers."""
+        code = hashlib.sha256(repr((self.shape, self.x0.shape)).encode())
+        code.update(np.ascontiguousarray(self.x0).tobytes())
+        code.update(self.p.tobytes())
+        for column, values in sorted(self.varied.items()):
+            code.update(repr((column, values.shape)).encode())
+            code.update(np.ascontiguousarray(values).tobytes())
+        return code.hexdigest()
+
+    def part(self, first: int, last: int) -> tuple[Array, Array]:
+        """Extended starts and parameters of the trajectories first to last - 1."""
+        n = self.system.dimension
+        x = _rows(self.x0, self.shape, first, last, n)
+        if self.system.time_dependent:
+            x = np.concatenate([x, np.full((last - first, 1), self.t_start)], axis=1)
+        if not self.varied:
+            return x, self.p
+        p = np.tile(self.p, (last - first, 1))
+        for column, values in self.varied.items():
+            p[:, column] = _rows(values[..., None], self.shape, first, last, 1)[:, 0]
+        return x, p
+
+
+def _rows(values: Array, shape: tuple[int, ...], first: int, last: int, n: int) -> Array:
+    """Rows first to last - 1 of values broadcast to ``(*shape, n)``, which is never made."""
+    if values.shape == (*shape, n):
+        return values.reshape(-1, n)[first:last]
+    where = np.unravel_index(np.arange(first, last), shape) if shape else ()
+    return np.broadcast_to(values, (*shape, n))[where]
+
+
+def _numbers(value: ArrayLike, what: str) -> Array:
+    try:
+        return np.asarray(value, dtype=float, order="C")
+    except (TypeError, ValueError) as error:
+        raise PointError(f"{what}: expected numbers, received {value!r}.") from error
+
+
+def _sample(values: Array) -> float:
+    """Any finite entry: names are checked with it, entries later, one by one."""
+    if values.ndim == 0:
+        return float(values)
+    finite = values[np.isfinite(values)]
+    return float(finite.flat[0]) if finite.size else 0.0

@@ -1,0 +1,53 @@
+"""Checks and margins that the questions of this floor share."""
+
+from __future__ import annotations
+
+import math
+
+from ..model import DefinitionError, FilippovSystem, explain, real
+
+#: A class that is closer than this to a change is not named.
+MARGIN = 1e-6
+
+
+def positive(value: float, name: str) -> float:
+    """Return a positive finite number or raise OptionError."""
+    return real(
+        value,
+        name,
+        expected="a positive finite number",
+        advice="Leave it out for the default.",
+        low=math.nextafter(0.0, 1.0),
+    )
+
+
+def require_autonomous(system: FilippovSystem, what: str) -> None:
+    """Refuse explicit time: what stays at one place does so for all time."""
+    if system.time_dependent:
+        raise DefinitionError(
+            explain(
+                what,
+                expected="a system without explicit time",
+                received=f"one that depends on {system.extended_states[-1]}",
+                advice="Make the time a state, or freeze it at a value.",
+            )
+        )
+
+
+def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
+    """Refuse a multiplier that enters nonlinearly: alpha would not be Filippov's."""
+    if system.nonlinear[surface]:
+        raise DefinitionError(
+            explain(
+                what,
+                expected=f"multiplier {surface} to enter the field linearly",
+                received="hidden dynamics",
+                advice="The sliding field is then not a convex combination of two fields; follow "
+                "it with simulate.",
+            )
+        )
+
+
+def relative_difference(u: float, v: float) -> float:
+    """|u - v| relative to |u| + |v|."""
+    return abs(u - v) / (abs(u) + abs(v))

@@ -1,0 +1,40 @@
+"""Numbers by name that a result hands out: a mapping that nobody can change."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from typing import TypeVar
+
+V = TypeVar("V")
+
+
+class ReadOnly(Mapping[str, V]):
+    """A mapping without assignment. Unlike ``types.MappingProxyType`` it can be pickled and copied.
+
+    Parameters
+    ----------
+    values : mapping
+        Copied.
+
+    Examples
+    --------
+    >>> import pickle
+    >>> values = ReadOnly({"L11": 1.0})
+    >>> values, pickle.loads(pickle.dumps(values)) == values == {"L11": 1.0}
+    ({'L11': 1.0}, True)
+    """
+
+    def __init__(self, values: Mapping[str, V]):
+        self._values = dict(values)
+
+    def __getitem__(self, name: str) -> V:
+        return self._values[name]
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._values)
+
+    def __len__(self) -> int:
+        return len(self._values)
+
+    def __repr__(self) -> str:
+        return repr(self._values)

@@ -1,0 +1,419 @@
+"""All modes of several surfaces as one program, with the multipliers as numbers or as series.
+
+On a surface that does not slide the multiplier is the number +1 or -1. On those that slide the
+multipliers keep G_i = grad h_i . f(x, lambda) at zero: coefficient k of lambda enters coefficient k of
+G linearly, with the matrix M = dG/dlambda at the start of the step, so the series of the multipliers
+follow order by order from one factorisation of M (also where lambda enters nonlinearly: hidden
+dynamics). Nothing here grows as the number of modes.
+
+Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), as the
+normal force of a contact, the unknown is nu_i = n_i lambda_i, so that sliding goes on smoothly through
+n_i = 0 (``cancel``).
+
+Source: Acary & Brogliato 2008, "Numerical methods for nonsmooth dynamical systems", for the
+complementarity of several surfaces; Jeffrey 2018 for hidden dynamics.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+import numpy as np
+
+from .cancel import cancel_common_factor
+from .economy import economise
+from .evaluators import Evaluator
+from .graph import depends_on, instructions
+from .identity import vanish_on
+from .jets import Expansion
+from .numbers import Numbers
+from .rules import Rule, lower
+from .switches import Guard
+from .system import FilippovSystem
+from .values import Array
+
+
+@dataclass(frozen=True)
+class Yardsticks:
+    """Numbers at the start of a step.
+
+    Attributes
+    ----------
+    layer : ndarray (m,)
+        G at the multipliers given.
+    slope : ndarray (m, m)
+        Its derivatives by the unknown of each surface (lambda_i, or nu_i).
+    factors : ndarray (m,)
+        n_i; 1 where there is none.
+    layer_gradient, surface_gradient, stop_gradient : ndarray (m, N), (m, N), (s, N)
+        Magnitudes of the state derivatives of G, of surfaces and gaps, of stops and resets.
+    """
+
+    layer: Array
+    slope: Array
+    factors: Array
+    layer_gradient: Array
+    surface_gradient: Array
+    stop_gradient: Array
+
+
+class Coupled:
+    """Series of states, surfaces, stops and multipliers of a system in any mode.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    watched : sequence of SX scalars, optional
+        Further functions, that follow the stops and resets.
+    """
+
+    def __init__(self, system: FilippovSystem, watched: Sequence[ca.SX] = ()):
+        self.system, d = system, system.definition
+        self._surfaces, self._watched = system.surface_count, len(watched)
+        #: Surfaces and impacts: the letters of a mode.
+        self.count = self._surfaces + len(system.impacts)
+        x = system.extended_states
+        lam = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in range(self._surfaces)])
+        field, factors, unknowns = _with_factors(system, lam)
+        self.scaled = tuple(not f.is_one() for f in factors)
+        #: Impacts whose reaction a surface's multiplier is multiplied with: friction at a contact.
+        self.carriers = tuple(
+            [j for j in range(len(system.impacts)) if ca.depends_on(f, d.reactions[j])]
+            for f in factors
+        )
+        self.continuous = tuple(self._is_continuous(i) for i in range(self._surfaces))
+        extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
+        self._moving = ca.vertcat(x, lam, d.reactions, *extra)
+        self._series: dict[str, tuple[Expansion, list[int]]] = {}
+        kept = ca.vertcat(d.surfaces, d.gap_rates)
+        self.layer = ca.densify(ca.jtimes(kept, x, field))
+        stops = ca.vertcat(d.guards, *watched)
+        stops = ca.densify(stops) if stops.numel() else ca.SX(0, 1)
+        heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
+        factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
+        self._outputs = [field, self.layer, heights, factor, stops]
+        every = ca.vertcat(*unknowns, d.reactions)
+        self.slope = ca.jacobian(self.layer, every)
+        #: Whether the unknown multipliers of a mode enter linearly together.
+        self.affine = bool(ca.is_linear(field, every))
+        #: Whether field, layer and guards are affine in states and multipliers together.
+        everything = ca.vertcat(field, self.layer, heights, stops)
+        self.linear = not any(self.scaled) and bool(ca.is_linear(everything, self._moving))
+        gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops)]
+        self._point = [self.layer, self.slope, factor, *gradients]
+        self._columns = ca.jacobian(field, every)
+        self._column_function: Evaluator | None = None
+
+    def _is_continuous(self, surface: int) -> bool:
+        """Whether the multiplier makes no difference on its surface: it is 0 there."""
+        d, x = self.system.definition, self.system.extended_states
+        column = ca.jacobian(d.field, d.multipliers[surface])
+        pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
+        if not all(ca.depends_on(piece, x) for piece in pieces):
+            return False
+        others = ca.vertcat(d.parameters, d.multipliers, d.reactions)
+        return vanish_on(pieces, self.system.surface_function(surface), x, others)
+
+    # shape -------------------------------------------------------------------------------------
+
+    def held(self, mode: str) -> Array:
+        """Multipliers that are known in a mode: +1 and -1; 0 for the others and open contacts."""
+        signs = np.array(self.system.parse_letters(mode), float)
+        signs[self._surfaces :] = 0.0
+        return signs
+
+    def sliding(self, mode: str) -> list[int]:
+        """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
+        signs = self.system.parse_letters(mode)
+        return [i for i, sign in enumerate(signs) if sign == 0 and not self._is_idle(i, signs)]
+
+    def _is_idle(self, i: int, signs: Sequence[int]) -> bool:
+        """Whether a multiplier makes no difference: on its surface, or at an open contact."""
+        if i >= self._surfaces:
+            return False
+        open_ones = [j for j in self.carriers[i] if signs[self._surfaces + j]]
+        return self.continuous[i] or bool(open_ones)
+
+    def guards(self, mode: str) -> tuple[Guard, ...]:
+        """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
+        result: list[Guard] = []
+        for i, sign in enumerate(self.system.parse_letters(mode)):
+            j = i - self._surfaces
+            if j >= 0:
+                kind, name = ("impact" if sign else "release"), self.system.impacts[j]
+                result.append(Guard(kind, j, sign, name))
+            elif sign:
+                result.append(Guard("surface", i, sign, f"h{i}"))
+            else:
+                result += [Guard("exit", i, side, f"lambda{i}") for side in (1, -1)]
+        items = [("stop", j, *s) for j, s in enumerate(self.system.stops)]
+        items += [("reset", j, *r) for j, r in enumerate(self.system.resets)]
+        result += [Guard(kind, j, direction, name) for kind, j, name, direction in items]
+        result += [Guard("zero", k, 0, f"f{k}") for k in range(self._watched)]
+        branches = len(self._stability(mode))
+        first = max(mode.find("s"), 0)
+        return (*result, *[Guard("branch", first, 0, "stability of sliding")] * branches)
+
+    def _stability(self, mode: str) -> list[ca.SX]:
+        """Functions that are positive while sliding is stable across its layer, for one or two
+        sliding surfaces whose slope changes; more are looked at step by step."""
+        s = self.sliding(mode)
+        slope = self.slope[s, s]
+        if not 1 <= len(s) <= 2 or max(s) >= self._surfaces or (len(s) == 1 and self.affine):
+            return []
+        if not ca.depends_on(slope, self._moving):
+            return []
+        return [-slope] if len(s) == 1 else [ca.det(slope), -ca.trace(slope)]
+
+    # numbers -----------------------------------------------------------------------------------
+
+    @cached_property
+    def _yardsticks(self) -> Evaluator:
+        p = self.system.parameter_symbols
+        outputs = [ca.densify(e) for e in self._point]
+        return Evaluator(ca.Function("point", [self._moving, p], outputs, {"cse": True}))
+
+    def yardsticks(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> Yardsticks:
+        """Evaluate at an extended state, with lambda where nothing slides (else 0) and nu (else 0)."""
+        values = self._yardsticks.copied(self._inputs(x, multipliers, unknowns), p)
+        layer, slope, factors, *gradients = values
+        return Yardsticks(
+            layer.ravel(), slope, factors.ravel(), *[np.abs(gradient) for gradient in gradients]
+        )
+
+    def columns(self, x: Array, multipliers: Array, p: Array) -> Array:
+        """Derivatives of the field by the unknowns (N, m), with the multipliers held."""
+        if self._column_function is None:
+            inputs = [self._moving, self.system.parameter_symbols]
+            function = ca.Function("columns", inputs, [ca.densify(self._columns)], {"cse": True})
+            self._column_function = Evaluator(function)
+        none = np.zeros(self.count)
+        return self._column_function.copied(self._inputs(x, multipliers, none), p)[0]
+
+    def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
+        scaled = np.array([*self.scaled, *[False] * (self.count - self._surfaces)], bool)
+        return np.concatenate([x, multipliers + np.where(scaled, 0.0, unknowns), unknowns[scaled]])
+
+    def solutions(self, mode: str, x: Array, p: Array, stable_only: bool = True) -> list[Array]:
+        """Multipliers (surfaces,) that keep the sliding surfaces of a mode.
+
+        Linear equations have one set; for others Newton's method starts from a grid (bilinear
+        equations of two multipliers have at most two sets).
+
+        Parameters
+        ----------
+        mode : str
+        x : ndarray (N,)
+        p : ndarray
+        stable_only : bool, optional
+            Only those that are stable across the layer (Jeffrey 2018).
+        """
+        sliding = self.sliding(mode)
+        unknowns = np.zeros(self.count)
+        if not sliding:
+            return [unknowns]
+        k = len(sliding)
+        starts = [np.zeros(k)]
+        if not self.affine:
+            grid = np.linspace(-0.95, 0.95, 21 if k == 1 else 5 if k < 4 else 1)
+            starts = list(np.stack(np.meshgrid(*[grid] * k), axis=-1).reshape(-1, k))
+        found: list[Array] = []
+        for start in starts:
+            unknowns[sliding] = start
+            lam = self.newton(mode, x, unknowns, p, 1 if self.affine else 30)
+            if lam is None or not self._is_solution(mode, x, lam, p, stable_only):
+                continue
+            if all(np.abs(lam - other).max() > 1e-7 for other in found):
+                found.append(lam)
+        return found
+
+    def _is_solution(
+        self, mode: str, x: Array, unknowns: Array, p: Array, stable_only: bool
+    ) -> bool:
+        sliding = self.sliding(mode)
+        marks = self.yardsticks(x, self.held(mode), unknowns, p)
+        slope = marks.slope[np.ix_(sliding, sliding)]
+        g = marks.layer[sliding]
+        small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
+        largest = np.abs(marks.factors[sliding]) * (1.0 + 1e-9)
+        if not self.affine and not (small and np.all(np.abs(unknowns[sliding]) <= largest)):
+            return False
+        if not np.all(np.isfinite(slope)):
+            return False
+        own = [k for k, i in enumerate(sliding) if i < self._surfaces]
+        stable = slope[np.ix_(own, own)] * np.sign(marks.factors)[np.array(sliding, int)[own]]
+        return not stable_only or not own or bool(np.linalg.eigvals(stable).real.max() < 0.0)
+
+    def newton(
+        self, mode: str, x: Array, unknowns: Array, p: Array, iterations: int
+    ) -> Array | None:
+        """Newton's method for the multipliers of a mode, from those given."""
+        signs, sliding = self.held(mode), self.sliding(mode)
+        result = unknowns.copy()
+        for _ in range(iterations):
+            marks = self.yardsticks(x, signs, result, p)
+            try:
+                step = np.linalg.solve(marks.slope[np.ix_(sliding, sliding)], marks.layer[sliding])
+            except np.linalg.LinAlgError:
+                return None
+            result[sliding] -= step
+            if not np.all(np.isfinite(step)):
+                return None
+            if np.abs(step).max(initial=0.0) <= 1e-16 * (1.0 + np.abs(result).max()):
+                break
+        return result
+
+    def values(
+        self, x: Array, multipliers: Array, unknowns: Array, p: Array
+    ) -> tuple[Array, Array, Array, Array, Array]:
+        """Field (N,), layer G (m,), surfaces (m,), factors (m,), stops and resets (s,) at a point."""
+        found = self._values.copied(self._inputs(x, multipliers, unknowns), p)
+        field, layer, h, factors, stops = (v.ravel() for v in found)
+        return field, layer, h, factors, stops
+
+    @cached_property
+    def _values(self) -> Evaluator:
+        p = self.system.parameter_symbols
+        outputs = [ca.densify(e) for e in self._outputs]
+        return Evaluator(ca.Function("values", [self._moving, p], outputs, {"cse": True}))
+
+    def _expansion(self, mode: str) -> tuple[Expansion, list[int]]:
+        """Return the expansion for a mode, and the rules that the unknowns enter."""
+        stability = self._stability(mode)
+        key = mode if stability else ""
+        if key not in self._series:
+            inputs = [self._moving, self.system.parameter_symbols]
+            outputs = [*self._outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
+            outputs = [ca.densify(o) for o in outputs]
+            nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
+            rules, place = lower(nodes, depends_on(nodes, [True, False]))
+            rows = [[place[j] for j in row] for row in rows]
+            late = _touched(rules, self.system.extended_dimension)
+            self._series[key] = Expansion(rules, rows, [], Numbers()), late
+        return self._series[key]
+
+    def jets(
+        self, mode: str, x: Array, unknowns: Array, slope: Array, p: Array, order: int
+    ) -> tuple[Array, Array, Array]:
+        """Taylor coefficients in a mode.
+
+        Parameters
+        ----------
+        mode : str
+        x : ndarray (N,)
+        unknowns : ndarray (m,)
+            lambda_i or nu_i of the surfaces that slide, at the start.
+        slope : ndarray (m, m)
+            dG/d(unknowns) there.
+        p : ndarray
+        order : int
+
+        Returns
+        -------
+        states : ndarray (N, order + 1)
+        guards : ndarray (g, order + 1)
+            In the order of ``guards``.
+        series : ndarray (m, order + 1)
+            Of the unknowns; zero where nothing slides.
+        """
+        expansion, late = self._expansion(mode)
+        expansion.restart([v or None for v in p.tolist()])
+        held = self.held(mode)
+        sliding = self.sliding(mode)
+        inverse = _inverse(slope[np.ix_(sliding, sliding)])
+        states = np.zeros((x.size, order + 1))
+        states[:, 0] = x
+        series = np.zeros((self.count, order + 1))
+        series[sliding, 0] = unknowns[sliding]
+        found: list[list[list[float]]] = []
+        for k in range(order + 1):
+            outputs = expansion.advance(k, self._now(states[:, k], held, series[:, k], k))
+            if k and sliding:
+                residual = np.array([outputs[1][i] or 0.0 for i in sliding])
+                series[sliding, k] = -inverse @ residual
+                now = self._now(states[:, k], held, series[:, k], k)
+                outputs = expansion.again(k, now, late)
+            numbers = [[v or 0.0 for v in row] for row in outputs]
+            found.append(numbers[1:])
+            if k < order:
+                states[:, k + 1] = np.array(numbers[0]) / (k + 1)
+        parts = [np.array([numbers[j] for numbers in found]).T for j in range(5)]
+        return states, self.rows(mode, series, *parts), series
+
+    def _now(self, states: Array, held: Array, unknowns: Array, k: int) -> list[float | None]:
+        """Coefficients k of the moving inputs: states, lambda and reactions, nu."""
+        values = self._inputs(states, held if k == 0 else np.zeros(self.count), unknowns)
+        return [v or None for v in values.tolist()]
+
+    def rows(
+        self,
+        mode: str,
+        series: Array,
+        layer: Array,
+        heights: Array,
+        factors: Array,
+        stops: Array,
+        stability: Array | None = None,
+    ) -> Array:
+        """Guards of a mode, from coefficients or values (rows) of what they are made of."""
+        rows: list[Array] = []
+        signs = self.system.parse_letters(mode)
+        for i, sign in enumerate(signs):
+            if sign:
+                rows.append(sign * heights[i])
+                continue
+            if i >= self._surfaces:
+                rows.append(series[i])
+                continue
+            if self._is_idle(i, signs):
+                rows += [-layer[i], layer[i]]
+                continue
+            turn = np.sign(next((v for v in np.ravel(factors[i]) if v), 1.0))
+            rows += [turn * (factors[i] - series[i]), turn * (factors[i] + series[i])]
+        rows += [*stops, *(() if stability is None else stability)]
+        return np.array(rows) if rows else np.zeros((0, *np.shape(series)[1:]))
+
+
+def _inverse(matrix: Array) -> Array:
+    """Inverse of a matrix; NaN where it has none."""
+    try:
+        return np.asarray(np.linalg.inv(matrix), float)
+    except np.linalg.LinAlgError:
+        return np.full_like(matrix, np.nan)
+
+
+def _touched(rules: Sequence[Rule], states: int) -> list[int]:
+    """Rules that the multipliers enter (inputs of the moving vector after the states)."""
+    touched = [False] * len(rules)
+    for _ in range(2):  # a sine and its cosine refer to each other
+        for j, rule in enumerate(rules):
+            own = rule.place[0] == 0 and rule.place[1] >= states
+            touched[j] = touched[j] or own or any(touched[a] for a in rule.args)
+    return [j for j, yes in enumerate(touched) if yes]
+
+
+def _with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX], list[ca.SX]]:
+    """Field in lambda, reactions and nu; factors n_i; and the unknown of each sliding surface."""
+    x, p, reactions = system.extended_states, system.parameter_symbols, system.definition.reactions
+    field = plain = system.field_with(lam, reactions)
+    factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
+    known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
+    columns = ca.jacobian(plain, lam)
+    for i in range(system.surface_count):
+        entries = ca.vertsplit(ca.densify(columns[:, i]))
+        if ca.depends_on(ca.vertcat(*entries), lam):
+            continue  # products of multipliers, or hidden dynamics
+        reduced, factor = cancel_common_factor(entries, variables, known)
+        if ca.depends_on(factor, variables):
+            nu = ca.SX.sym(f"nu{i}")
+            field = field + nu * ca.vertcat(*reduced)  # lambda_i is 0 while the surface slides
+            factors[i], unknowns[i] = factor, nu
+    return field, factors, unknowns
+
+
+def coupled_of(system: FilippovSystem) -> Coupled:
+    """Return the program of all modes of a system, built once."""
+    return system.cached("coupled", lambda: Coupled(system))

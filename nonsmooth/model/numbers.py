@@ -1,0 +1,91 @@
+"""The arithmetic of doubles in Python, in which nothing raises: what is not a number is NaN."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+
+import casadi as ca
+
+#: Operations of one argument, as CasADi names them.
+_UNARY: dict[str, Callable[[float], float]] = {
+    "assign": float,
+    "neg": lambda a: -a,
+    "twice": lambda a: a + a,
+    "sq": lambda a: a * a,
+    "inv": lambda a: 1.0 / a,
+    "sign": lambda a: float((a > 0) - (a < 0)) if a == a else math.nan,
+    "fabs": abs,
+    "not": lambda a: float(not a),
+    "floor": lambda a: float(math.floor(a)),
+    "ceil": lambda a: float(math.ceil(a)),
+    "erfinv": lambda a: float(ca.erfinv(a)),
+    **{
+        name: getattr(math, name)
+        for name in "sqrt exp expm1 log log1p sin cos tan asin acos atan sinh cosh tanh asinh acosh "
+        "atanh erf".split()
+    },
+}
+
+#: Operations of two arguments.
+_BINARY: dict[str, Callable[[float, float], float]] = {
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "pow": math.pow,
+    "constpow": math.pow,
+    "atan2": math.atan2,
+    "hypot": math.hypot,
+    "fmin": min,
+    "fmax": max,
+    "fmod": math.fmod,
+    "remainder": math.remainder,
+    "copysign": math.copysign,
+    "lt": lambda a, b: float(a < b),
+    "le": lambda a, b: float(a <= b),
+    "eq": lambda a, b: float(a == b),
+    "ne": lambda a, b: float(a != b),
+    "and": lambda a, b: float(bool(a and b)),
+    "or": lambda a, b: float(bool(a or b)),
+    "if_else_zero": lambda a, b: b if a else 0.0,
+}
+
+
+class Numbers:
+    """Doubles as coefficients of series (see ``jets.Arithmetic``).
+
+    Examples
+    --------
+    >>> Numbers().apply("sqrt", [2.25]), Numbers().divide(1.0, None), Numbers().apply("log", [-1.0])
+    (1.5, inf, nan)
+    """
+
+    def number(self, value: float) -> float | None:
+        """Return a constant, None for 0."""
+        return float(value) if value else None
+
+    def clean(self, a: float) -> float | None:
+        """Return None for 0."""
+        return None if a == 0.0 else a
+
+    def divide(self, a: float, b: float | None) -> float:
+        """Return a quotient; infinite where the divisor is zero."""
+        if b:
+            return a / b
+        return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a)
+
+    def apply(self, op: str, args: Sequence[float | None]) -> float:
+        """Return an operation of values, with 0 for None; NaN where it has no value."""
+        values = [0.0 if a is None else a for a in args]
+        try:
+            if len(values) == 1:
+                return _UNARY[op](values[0])
+            return _BINARY[op](values[0], values[1])
+        except OverflowError:
+            return math.inf
+        except ZeroDivisionError:
+            return self.divide(1.0 if op == "inv" else values[0], None)
+        except ValueError:
+            pole = {"log": 0.0, "log1p": -1.0}.get(op)
+            return -math.inf if values[0] == pole else math.nan

@@ -1,0 +1,1 @@
+"""Expressions printed as C: statements, programs of a system, modes blended for lanes."""

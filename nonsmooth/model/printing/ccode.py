@@ -1,0 +1,370 @@
+"""Expressions printed as C: one statement per instruction, value-numbered over a whole program.
+
+A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces,
+maps) in one graph, so that equal subexpressions are found once. What depends on parameters alone is
+moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
+is printed on a type ``T`` that is ``double`` or a vector of doubles. Which driver includes the
+text, and how it is compiled, is not known here.
+"""
+
+from __future__ import annotations
+
+import math
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from ..graph import Node, instructions
+
+#: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
+_ARITHMETIC = {
+    "assign": "{0}",
+    "add": "{0} + {1}",
+    "sub": "{0} - {1}",
+    "mul": "{0} * {1}",
+    "div": "{0} / {1}",
+    "neg": "-{0}",
+    "sq": "{0} * {0}",
+    "twice": "{0} + {0}",
+    "inv": "1.0 / {0}",
+}
+
+#: Functions of the C library, applied lane by lane; the rest of the smooth operations.
+_LIBRARY = {
+    name: name
+    for name in "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh "
+    "atan2 pow erf hypot expm1 log1p".split()
+} | {"constpow": "pow", "erfinv": "ns_erfinv"}
+
+#: Compilers take more than proportional time for long functions: statements of one that is not
+#: split, and of a part.
+_WHOLE, _PART = 5000, 250
+_NAME = re.compile(r"\b[vr]\d+\b")
+_DEFINED = re.compile(r"  const T ([vr]\d+) =")
+
+#: What only parameters may go through; always on doubles.
+_PARAMETERS_ONLY = {
+    "sign": "ns_sign({0})",
+    "fabs": "fabs({0})",
+    "fmin": "fmin({0}, {1})",
+    "fmax": "fmax({0}, {1})",
+    "floor": "floor({0})",
+    "ceil": "ceil({0})",
+    "fmod": "fmod({0}, {1})",
+    "remainder": "remainder({0}, {1})",
+    "copysign": "copysign({0}, {1})",
+    "lt": "(double)({0} < {1})",
+    "le": "(double)({0} <= {1})",
+    "eq": "(double)({0} == {1})",
+    "ne": "(double)({0} != {1})",
+    "not": "(double)(!{0})",
+    "and": "(double)({0} && {1})",
+    "or": "(double)({0} || {1})",
+    "if_else_zero": "({0} ? {1} : 0.0)",
+}
+
+
+@dataclass(frozen=True)
+class _Function:
+    name: str
+    arrays: tuple[str, ...]
+    first: int  # of its outputs among all outputs of the program
+
+
+class Program:
+    """C functions ``void name(const T *x, const T *q, [extra,] T *a, ...)`` of one system.
+
+    Parameters
+    ----------
+    states, parameters : SX
+        Symbol vectors: ``x`` and what ``q`` is prepared from.
+    extra : SX, optional
+        Further symbols that differ between lanes and steps: multipliers and masks.
+    extra_types : sequence of str, optional
+        ``"T"`` or ``"I"`` (a mask of all or no bits) for each.
+    """
+
+    def __init__(
+        self,
+        states: ca.SX,
+        parameters: ca.SX,
+        extra: ca.SX | None = None,
+        extra_types: Sequence[str] = (),
+    ):
+        self._inputs = [states, parameters, ca.SX(0, 1) if extra is None else extra]
+        self._types = tuple(extra_types)
+        self._functions: list[_Function] = []
+        self._outputs: list[ca.SX] = []
+
+    def add(self, name: str, **outputs: ca.SX) -> None:
+        """Add a function that stores each output, row by row, in the array of its name."""
+        self._functions.append(_Function(name, tuple(outputs), len(self._outputs)))
+        self._outputs += [ca.densify(ca.SX(e)).T for e in outputs.values()]
+
+    def text(self) -> str:
+        """Return the C text: ``NQ``, ``prepare`` and all functions."""
+        nodes, rows = instructions(self._inputs, self._outputs)
+        graph = _Graph(nodes, rows, self._types)
+        parts = [graph.prepare()]
+        for function in self._functions:
+            outputs = rows[function.first : function.first + len(function.arrays)]
+            parts.append(graph.function(function, outputs))
+        return "\n".join(parts)
+
+
+class _Graph:
+    """A value-numbered program: which nodes are constants, prepared, or computed each time."""
+
+    def __init__(self, nodes: Sequence[Node], rows: Sequence[Sequence[int]], types: Sequence[str]):
+        self.nodes, self.types = nodes, types
+        self.moving, self.constant = [], []
+        for node in nodes:
+            if node.op == "input":
+                self.moving.append(_place(node)[0] != 1)
+                self.constant.append(False)
+            else:
+                self.moving.append(any(self.moving[a] for a in node.args))
+                self.constant.append(node.op == "const")
+        self.prepared: dict[int, int] = {}
+        self._find_divisors()
+        self._find_sums(rows)
+        used = {j for row in rows for j in row}
+        for j, node in enumerate(nodes):
+            if self.moving[j]:
+                divisor = node.op == "div" and node.args[1] in self.divisors
+                used.update(node.args[:1] if divisor else node.args)
+        frontier = sorted(j for j in used if not self.moving[j] and not self.constant[j])
+        self.prepared = {j: k for k, j in enumerate(frontier)}
+        inverted = sorted(j for j in self.divisors if not self.moving[j] and not self.constant[j])
+        self.inverted = {j: len(frontier) + k for k, j in enumerate(inverted)}
+
+    def _find_divisors(self) -> None:
+        """Nodes whose reciprocal is taken once: a division costs as much as twenty products."""
+        count: dict[int, int] = {}
+        for j, node in enumerate(self.nodes):
+            if self.moving[j] and node.op == "div":
+                count[node.args[1]] = count.get(node.args[1], 0) + 1
+        self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
+
+    def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
+        """Terms of sums whose partial sums nobody else uses, those that are ready first first.
+
+        A convolution's oldest terms can then be added while its newest are still computed.
+        """
+        users = [0] * len(self.nodes)
+        for node in self.nodes:
+            for a in node.args:
+                users[a] += 1
+        for row in rows:
+            for j in row:
+                users[j] += 1
+        terms: dict[int, list[int]] = {}
+        for j, node in enumerate(self.nodes):
+            if node.op != "add" or not self.moving[j] or self._choice(node) is not None:
+                continue
+            terms[j] = []
+            for a in node.args:
+                terms[j] += terms.pop(a) if a in terms and users[a] == 1 else [a]
+        self.sums = {
+            j: sorted(t, key=lambda k: max(self.nodes[k].args, default=k))
+            for j, t in terms.items()
+            if len(t) > 2
+        }
+
+    def _sum(self, terms: Sequence[int]) -> str:
+        """Two chains of the early terms, then the two last."""
+        names = [self.name(k) for k in terms]
+        early, late = names[:-2], names[-2:]
+        chains = [early] if len(early) < 4 else [early[0::2], early[1::2]]
+        sums = ["(" * (len(c) - 1) + ") + ".join(c) for c in chains]
+        total = sums[0] if len(sums) == 1 else f"({sums[0]}) + ({sums[1]})"
+        for name in late:
+            total = f"({total}) + {name}"
+        return total
+
+    def _reciprocal(self, j: int) -> str:
+        if self.constant[j]:
+            value = _value(self.nodes[j])
+            return _literal(1.0 / value) if value else "INFINITY"
+        return f"q[{self.inverted[j]}]" if j in self.inverted else f"r{j}"
+
+    def name(self, j: int) -> str:
+        """C of a node's value."""
+        node = self.nodes[j]
+        if node.op == "const":
+            return _literal(_value(node))
+        if j in self.prepared:
+            return f"q[{self.prepared[j]}]"
+        if node.op == "input":
+            vector, position = _place(node)
+            return f"x[{position}]" if vector == 0 else f"e{position}"
+        return f"v{j}"
+
+    def prepare(self) -> str:
+        """C of the function from parameters to q."""
+        lines = []
+        for j in self._reachable([*self.prepared, *self.inverted], moving=False):
+            node = self.nodes[j]
+            if node.op == "const":
+                continue
+            if node.op == "input":
+                value = f"p[{_place(node)[1]}]"
+            else:
+                args = [
+                    _literal(_value(self.nodes[a])) if self.constant[a] else f"v{a}"
+                    for a in node.args
+                ]
+                value = _scalar(node.op, args)
+            lines.append(f"  const double v{j} = {value};")
+        lines += [f"  q[{k}] = v{j};" for j, k in self.prepared.items()]
+        lines += [f"  q[{k}] = 1.0 / v{j};" for j, k in self.inverted.items()]
+        return (
+            f"#define NQ {max(1, len(self.prepared) + len(self.inverted))}\n"
+            "static void prepare(const double *p, double *q) {\n  (void)p; (void)q;\n"
+            + "\n".join(lines)
+            + "\n}\n"
+        )
+
+    def function(self, function: _Function, outputs: Sequence[Sequence[int]]) -> str:
+        """C of one function."""
+        stores: dict[int, list[str]] = {}
+        for array, row in zip(function.arrays, outputs, strict=True):
+            for k, j in enumerate(row):
+                stores.setdefault(j, []).append(f"{array}[{k}]")
+        lines = []
+        reachable = self._reachable(list(stores), moving=True)
+        divisors = self.divisors & {
+            self.nodes[j].args[1] for j in reachable if self.nodes[j].op == "div"
+        }
+        for j in reachable:
+            if self.nodes[j].op not in ("input", "not"):
+                lines.append(f"  const T {self.name(j)} = {self._value(j)};")
+            if j in divisors:
+                lines.append(f"  const T r{j} = 1.0 / {self.name(j)};")
+            lines += [f"  {target} = {self.name(j)};" for target in stores.pop(j, [])]
+        for j, targets in stores.items():
+            value = f"BC({self.name(j)})" if self.constant[j] else self.name(j)
+            lines += [f"  {target} = {value};" for target in targets]
+        extra = "".join(f", const {t} e{k}" for k, t in enumerate(self.types))
+        arrays = "".join(f", T *restrict {a}" for a in function.arrays)
+        head = f"{function.name}(const T *restrict x, const T *restrict q{extra}{arrays})"
+        if len(lines) <= _WHOLE:
+            return _define(f"FUNCTION {head}", lines)
+        parts, size = _parts(lines)
+        given = ["x", "q", *(f"e{k}" for k in range(len(self.types))), *function.arrays, "w"]
+        text, calls = "", [f"  T w[{size}];"]
+        for k, part in enumerate(parts):
+            name = f"{function.name}_part{k}"
+            own = head.replace(function.name, name, 1).replace(")", ", T *restrict w)")
+            text += _define(f"static __attribute__((noinline)) void {own}", part)
+            calls.append(f"  {name}({', '.join(given)});")
+        return text + _define(f"FUNCTION {head}", calls)
+
+    def _reachable(self, roots: list[int], moving: bool) -> list[int]:
+        found: set[int] = set()
+        pending = [j for j in roots if self.moving[j] == moving]
+        while pending:
+            j = pending.pop()
+            if j not in found:
+                found.add(j)
+                pending += [a for a in self._arguments(j) if self.moving[a] == moving]
+        return sorted(found)
+
+    def _arguments(self, j: int) -> list[int]:
+        """Arguments of the statement that a node is printed as: a choice skips its halves."""
+        node = self.nodes[j]
+        if node.op == "add" and self.moving[j] and self._choice(node) is not None:
+            return [a for half in node.args for a in self.nodes[half].args]
+        return self.sums.get(j, list(node.args))
+
+    def _mask(self, j: int) -> tuple[str, bool]:
+        node = self.nodes[j]
+        if node.op == "not":
+            name, negated = self._mask(node.args[0])
+            return name, not negated
+        return self.name(j), False
+
+    def _value(self, j: int) -> str:
+        node = self.nodes[j]
+        if node.op == "if_else_zero":
+            mask, negated = self._mask(node.args[0])
+            chosen = self._broadcast(node.args[1])
+            pair = ("BC(0.0)", chosen) if negated else (chosen, "BC(0.0)")
+            return f"SELECT({mask}, {pair[0]}, {pair[1]})"
+        if node.op == "add" and (choice := self._choice(node)) is not None:
+            return choice
+        if j in self.sums:
+            return self._sum(self.sums[j])
+        if node.op == "div" and node.args[1] in self.divisors:
+            return f"{self.name(node.args[0])} * {self._reciprocal(node.args[1])}"
+        args = [self.name(a) for a in node.args]
+        if node.op in _ARITHMETIC:
+            return _ARITHMETIC[node.op].format(*args)
+        call = _LIBRARY[node.op].upper().replace("NS_", "") + "_"
+        return f"{call}({', '.join(self._broadcast(a) for a in node.args)})"
+
+    def _choice(self, node: Node) -> str | None:
+        """``if_else`` is written by CasADi as a sum of two halves of which one is zero."""
+        halves = [self.nodes[a] for a in node.args]
+        if any(half.op != "if_else_zero" for half in halves):
+            return None
+        (one, first), (two, second) = (self._mask(half.args[0]) for half in halves)
+        if one != two or first == second:
+            return None
+        values = [self._broadcast(half.args[1]) for half in halves]
+        if first:
+            values.reverse()
+        return f"SELECT({one}, {values[0]}, {values[1]})"
+
+    def _broadcast(self, j: int) -> str:
+        return f"BC({self.name(j)})" if self.constant[j] else self.name(j)
+
+
+def _define(head: str, lines: Sequence[str]) -> str:
+    return f"{head} {{\n  (void)x; (void)q;\n" + "\n".join(lines) + "\n}\n"
+
+
+def _parts(lines: Sequence[str]) -> tuple[list[list[str]], int]:
+    """Split a long function; what one part needs of another goes through an array w of that size."""
+    home = {m[1]: k // _PART for k, line in enumerate(lines) if (m := _DEFINED.match(line))}
+    shared: dict[str, int] = {}
+    for k, line in enumerate(lines):
+        for name in _NAME.findall(line):
+            if home[name] != k // _PART:
+                shared.setdefault(name, len(shared))
+    parts: list[list[str]] = [[] for _ in range(0, len(lines), _PART)]
+    for k, line in enumerate(lines):
+        here = lambda m, k=k: m[0] if home[m[0]] == k // _PART else f"w[{shared[m[0]]}]"
+        parts[k // _PART].append(_NAME.sub(here, line))
+        if (m := _DEFINED.match(line)) and m[1] in shared:
+            parts[k // _PART].append(f"  w[{shared[m[1]]}] = {m[1]};")
+    return parts, len(shared)
+
+
+def _place(node: Node) -> tuple[int, int]:
+    """Vector and position of an input."""
+    assert isinstance(node.payload, tuple)
+    return node.payload
+
+
+def _value(node: Node) -> float:
+    """Value of a constant."""
+    assert isinstance(node.payload, float)
+    return node.payload
+
+
+def _literal(value: float) -> str:
+    if not math.isfinite(value):
+        return "NAN" if math.isnan(value) else ("INFINITY" if value > 0 else "(-INFINITY)")
+    text = repr(float(value))
+    return f"({text})" if text.startswith("-") else text
+
+
+def _scalar(op: str, args: Sequence[str]) -> str:
+    if op in _ARITHMETIC:
+        return _ARITHMETIC[op].format(*args)
+    if op in _LIBRARY:
+        return f"{_LIBRARY[op]}({', '.join(args)})"
+    return _PARAMETERS_ONLY[op].format(*args)

@@ -1,0 +1,80 @@
+"""The functions of a system that a compiled driver calls, as two C programs.
+
+``modes_program``: every mode by itself, for one trajectory at a time.
+``lanes_program``: the modes of one surface blended, for several trajectories in step.
+"""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..jets import taylor
+from ..motion import motion
+from ..system import FilippovSystem
+from .blend import Blend, blended_jet
+from .ccode import Program
+
+
+def modes_program(system: FilippovSystem, order: int) -> str:
+    """C of ``jet_k``, ``guard_values_k`` for mode k, ``surface_values`` and ``reset_map_j``.
+
+    ``values_k`` are the field and the guards, for modes that are not affine.
+
+    Arrays are row by row: states (N, order+1), guards (m, order+1), gradients (m, N).
+    """
+    x, p = system.extended_states, system.parameter_symbols
+    program = Program(x, p)
+    for k, mode in enumerate(system.modes):
+        m = motion(system, mode)
+        states, guards = taylor(m.field, m.functions, x, p, order)
+        program.add(f"jet_{k}", c=states, g=guards)
+        program.add(f"guard_values_{k}", value=m.functions, gradient=_gradient(m.functions, x))
+        if not m.affine:
+            program.add(f"values_{k}", f=m.field, g=m.functions)
+    if system.surface_count:
+        h = _surfaces(system)
+        program.add("surface_values", h=h, gradient=_gradient(h, x))
+    for j in range(len(system.resets)):
+        program.add(f"reset_map_{j}", y=system.definition.maps[:, j])
+    return program.text()
+
+
+def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Blend]:
+    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, and the blended modes.
+
+    ``lie_values`` are L_F1 h and L_F2 h; each comes with its gradient, which measures rounding.
+    ``check_values`` are the rows of the field and the guards that are not affine, which a step is
+    checked with; ``checked`` of the blend says which.
+    """
+    x, p = system.extended_states, system.parameter_symbols
+    blend = blended_jet(system, order)
+    program = Program(x, p, blend.extra, ("I", "I", "T"))
+    program.add("jet", c=blend.states, g=blend.guards)
+    if system.surface_count:
+        h = _surfaces(system)
+        program.add("surface_values", h=h, gradient=_gradient(h, x))
+        values = ca.vertcat(system.lie_derivative("+"), system.lie_derivative("-"))
+        program.add("lie_values", value=values, gradient=_gradient(values, x))
+    stops = (
+        ca.densify(system.definition.guards) if system.definition.guards.numel() else ca.SX(0, 1)
+    )
+    program.add("stop_values", value=stops, gradient=_gradient(stops, x))
+    if blend.checked != ((), ()):
+        rows, slots = (list(part) for part in blend.checked)
+        program.add("check_values", f=blend.states[rows, 1], g=blend.guards[slots, 0])
+    return program.text(), blend
+
+
+def _surfaces(system: FilippovSystem) -> ca.SX:
+    return ca.vertcat(*[system.surface_function(i) for i in range(system.surface_count)])
+
+
+def _gradient(functions: ca.SX, x: ca.SX) -> ca.SX:
+    return ca.densify(ca.jacobian(functions, x)) if functions.numel() else ca.SX(0, x.numel())
+
+
+def is_flat(system: FilippovSystem) -> bool:
+    """Whether every surface is a plane: one Newton step then projects onto it exactly."""
+    if not system.surface_count:
+        return True
+    return bool(ca.is_linear(_surfaces(system), system.extended_states))

@@ -1,0 +1,92 @@
+"""Numbers for the symbols of a system: points and parameters, checked."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from .checks import real, real_array
+from .errors import ParameterError, PointError, explain
+from .reading import Parameters
+
+Array = NDArray[np.float64]
+
+
+def parameter_values(
+    names: Sequence[str], defaults: Mapping[str, float | None], parameters: Parameters | None
+) -> Array:
+    """Numbers for all parameters, defaults replaced by ``parameters`` (keys: symbols or names).
+
+    Raises
+    ------
+    ParameterError
+        An unknown name, a missing value or one that is not a finite number.
+    """
+    values, given = dict(defaults), dict[str, Any]()
+    if parameters is not None and not isinstance(parameters, Mapping):
+        raise ParameterError(
+            explain(
+                "parameters",
+                expected="a mapping from names or symbols to numbers",
+                received=f"{parameters!r} ({type(parameters).__name__})",
+                advice=f"The names are {list(names)}.",
+            )
+        )
+    for key, value in (parameters or {}).items():
+        name = key if isinstance(key, str) else str(key)
+        if name in given:
+            raise ParameterError(
+                f"parameters: expected one value for {name!r}, received {given[name]!r} and "
+                f"{value!r}, under its name and its symbol. Keep one of them."
+            )
+        given[name] = value
+        if name not in values:
+            raise ParameterError(
+                explain(
+                    "parameters",
+                    expected=f"names among {list(names)}",
+                    received=repr(name),
+                    advice="Declare it in the system's parameters=, or correct the name.",
+                )
+            )
+        values[name] = value
+    missing = [name for name, value in values.items() if value is None]
+    if missing:
+        raise ParameterError(
+            f"parameters: expected a value for {missing}, received none. They have no default: "
+            "pass parameters={name: value}."
+        )
+    return np.array([real(values[n], f"parameter {n!r}", error=ParameterError) for n in names])
+
+
+def state_values(names: Sequence[str], point: ArrayLike) -> Array:
+    """Numbers for all states.
+
+    Raises
+    ------
+    PointError
+        Wrong shape, not numbers, NaN or inf.
+    """
+    values = real_array(point, "point", f"{len(names)} numbers")
+    if values.shape != (len(names),):
+        raise PointError(
+            explain(
+                "point",
+                expected=f"shape ({len(names)},) for the states {tuple(names)}",
+                received=f"shape {values.shape}",
+                advice="Give one number for each state.",
+            )
+        )
+    if not np.all(np.isfinite(values)):
+        raise PointError(
+            explain(
+                "point",
+                expected="finite numbers",
+                received=str(values),
+                advice="NaN or inf often comes from an earlier division by zero.",
+            )
+        )
+    return values

@@ -1,0 +1,358 @@
+"""Atlas of the generic two-fold: every class and boundary with its portraits, and the class maps."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Patch, Polygon
+
+from ..model import Array, OptionError, explain
+from . import style
+from .two_fold_portrait import two_fold
+from .two_fold_space import two_fold_3d
+
+Numbers = tuple[tuple[int, int], tuple[float, float]]
+
+#: One two-fold of each class, and of each boundary that changes something.
+CASES: dict[str, Numbers] = {
+    "VV-C1": ((1, -1), (-2.0, -1.0)),
+    "VV-F": ((1, -1), (2.0, 1.0)),
+    "II-C": ((-1, 1), (-2.0, -1.0)),
+    "II-F": ((-1, 1), (-0.5, -0.5)),
+    "mix-0": ((1, 1), (0.0, 0.5)),
+    "mix-S": ((1, 1), (-1.5, 1.5)),
+    "mix-C": ((1, 1), (-3.0, -0.5)),
+    "mix-F": ((1, 1), (0.5, 3.0)),
+    "VV-C1 with Δ=0": ((1, -1), (-2.0, -0.5)),
+    "VV-C1|VV-F": ((1, -1), (2.0, 0.5)),
+    "II-F with Δ=0": ((-1, 1), (2.0, 0.5)),
+    "II-C|II-F": ((-1, 1), (-2.0, -0.5)),
+    "mix-0|mix-C": ((1, 1), (-1.5, 0.5)),
+    "mix-0|mix-F": ((1, 1), (-0.5, 1.5)),
+    "mix-S|mix-C": ((1, 1), (-2.0, 0.5)),
+    "mix-S|mix-F": ((1, 1), (-0.5, 2.0)),
+    "II-F with ν1=0": ((-1, 1), (0.0, -1.0)),
+    "mix-0 with ν2=0": ((1, 1), (0.5, 0.0)),
+}
+_SIGMA = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
+_TITLES = {
+    "VV": "visible (VV)",
+    "II": "invisible (II)",
+    "VI": "visible-invisible (VI)",
+    "IV": "invisible-visible (IV)",
+}
+#: Tint and hatch of each class; hatches tell them apart in grey.
+_FILLS = {
+    "VV-C1": ("#DCEBF5", ""),
+    "VV-F": ("#B7E0D0", ".."),
+    "II-C": ("#F0C9DF", "//"),
+    "II-F": ("#DCEBF5", ""),
+    "mix-0": ("#F4F4F4", ""),
+    "mix-S": ("#DCEBF5", ""),
+    "mix-C": ("#F0C9DF", "//"),
+    "mix-F": ("#B7E0D0", ".."),
+}
+_NAMES = {
+    "VV": {"VV-C1": (-1.8, -1.6), "VV-F": (1.9, 1.7)},
+    "II": {"II-C": (-2.15, -2.2), "II-F": (1.3, -1.4)},
+    "VI": {
+        "mix-0": (1.2, -1.0),
+        "mix-S": (-2.1, 2.1),
+        "mix-C": (-2.45, 0.13),
+        "mix-F": (-0.13, 2.6),
+    },
+}
+_REACH = 3.0
+_FLIGHTS = (3, 4, 5, 6, 8)  # n of the curves nu1 nu2 = cos^2(pi/n) that are drawn
+
+
+def two_fold_atlas(
+    cases: Sequence[str] | None = None, *, maps: bool = True, columns: int = 2
+) -> Figure:
+    """Draw two-folds of every class and boundary: sliding portrait, flow in space, class maps.
+
+    Parameters
+    ----------
+    cases : sequence of str, optional
+        Names among the keys of ``CASES``; all by default.
+    maps : bool, optional
+        Whether to draw the class maps of the three kinds at the bottom.
+    columns : int, optional
+        Two-folds side by side; each takes two panels.
+
+    Returns
+    -------
+    matplotlib Figure
+        Tall: save it as PDF or SVG, or name a few cases.
+
+    Raises
+    ------
+    OptionError
+        An unknown case.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> figure = ns.plot.two_fold_atlas(["II-C", "II-F"], maps=False)
+    >>> len(figure.axes)
+    4
+    """
+    chosen = list(CASES) if cases is None else list(cases)
+    unknown = [name for name in chosen if name not in CASES]
+    if unknown or not chosen or isinstance(cases, str):
+        raise OptionError(
+            explain(
+                "cases",
+                expected=f"names among {list(CASES)}",
+                received=repr(cases),
+                advice="Leave cases= out to draw all of them.",
+            )
+        )
+    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
+        raise OptionError(f"columns: expected a whole number >= 1, received {columns!r}.")
+    columns = min(columns, len(chosen))
+    rows = math.ceil(len(chosen) / columns)
+    with style.settings():
+        height = 3.4 * rows + 5.2 * maps + 0.8
+        figure = style.new_figure((7.6 * columns, height))
+        ratios = [3.4 * rows + 0.8, 5.2]
+        parts: Any = figure.subfigures(2, 1, height_ratios=ratios) if maps else [figure]
+        grid = parts[0].add_gridspec(rows, 2 * columns, width_ratios=[1.0, 1.35] * columns)
+        for k, name in enumerate(chosen):
+            row, column = divmod(k, columns)
+            flat = parts[0].add_subplot(grid[row, 2 * column])
+            space = parts[0].add_subplot(grid[row, 2 * column + 1])
+            two_fold(CASES[name], ax=flat, legend=False, orbits=6)
+            two_fold_3d(CASES[name], ax=space, legend=False, title="")
+        parts[0].legend(handles=_legend(), loc="outside upper center", ncols=3 * columns)
+        if maps:
+            for ax, kind in zip(parts[1].subplots(1, 3), ("VV", "II", "VI"), strict=True):
+                two_fold_map(kind, ax=ax)
+    return figure
+
+
+def two_fold_map(
+    kind: str,
+    *,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (4.8, 6.2),
+    legend: bool = True,
+) -> Figure:
+    """Draw the classes of one kind of two-fold over the (nu1, nu2) plane, with every boundary.
+
+    Parameters
+    ----------
+    kind : {"VV", "II", "VI", "IV"}
+        V for visible, I for invisible; the fold of F1 first.
+    ax : matplotlib Axes, optional
+    size : (float, float), optional
+        Inches, of a new figure.
+    legend : bool, optional
+
+    Returns
+    -------
+    matplotlib Figure
+
+    Raises
+    ------
+    OptionError
+        An unknown kind.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> ns.plot.two_fold_map("II").axes[0].get_xlabel()
+    '$\\\\nu_1$'
+    """
+    if kind not in _SIGMA:
+        raise OptionError(f"kind: expected one of {list(_SIGMA)}, received {kind!r}.")
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        _fill(axes, kind)
+        handles = _boundaries(axes, kind)
+        for name, place in _places(kind).items():
+            box = {
+                "boxstyle": "round,pad=0.15",
+                "facecolor": "white",
+                "edgecolor": "none",
+                "alpha": 0.85,
+            }
+            style.write(axes, place, name, fontsize=11, bbox=box, zorder=6)
+        for x, y in (([-_REACH, _REACH], [0, 0]), ([0, 0], [-_REACH, _REACH])):
+            axes.plot(x, y, color=style.GREY, linewidth=0.5, zorder=1)
+        axes.set(
+            xlim=(-_REACH, _REACH),
+            ylim=(-_REACH, _REACH),
+            xlabel=r"$\nu_1$",
+            ylabel=r"$\nu_2$",
+            title=_TITLES[kind],
+        )
+        axes.set_aspect("equal")
+        if legend:
+            axes.legend(handles=handles, loc="upper center", bbox_to_anchor=(0.5, -0.13))
+    return figure
+
+
+def _legend() -> list[Line2D | Patch]:
+    """What is common to all portraits."""
+    dashed = (0, (4, 2))
+    return [
+        Patch(facecolor=style.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
+        Patch(facecolor=style.TINT_REPELLING, label="$D_r$: repelling sliding"),
+        style.line(style.ABOVE, "fold of $F_1$, visible", 2.2, "-"),
+        style.line(style.ABOVE, "fold of $F_1$, invisible", 2.2, dashed),
+        style.line(style.BELOW, "fold of $F_2$, visible", 2.2, "-"),
+        style.line(style.BELOW, "fold of $F_2$, invisible", 2.2, dashed),
+        style.line(style.CANARD, "canard", 2.6, "-"),
+        style.line(style.FAUX_CANARD, "faux canard", 2.6, style.LONG_DASH),
+        style.line(style.BLACK, "pseudo-equilibria", 2.6, ":"),
+        Patch(
+            facecolor="white", edgecolor="#9A9A9A", hatch="////", label="all $D_a\\to s\\to D_r$"
+        ),
+        Patch(facecolor="white", edgecolor="#9A9A9A", hatch="...", label="all $D_r\\to s\\to D_a$"),
+        style.line(style.GREY, "diabolo", 1.3, style.DASH_DOT),
+        style.line(style.ABOVE, "orbits above, $F_1$", 1.2, "-"),
+        style.line(style.BELOW, "orbits below, $F_2$", 1.2, (0, (3.5, 1.3))),
+    ]
+
+
+def _places(kind: str) -> dict[str, tuple[float, float]]:
+    if kind == "IV":  # the other side up: (nu1, nu2) -> (nu2, nu1)
+        return {name: (b, a) for name, (a, b) in _NAMES["VI"].items()}
+    return _NAMES[kind]
+
+
+def areas(kind: str) -> list[tuple[str, Array]]:
+    """Classes of a kind and the polygons (m, 2) they fill in the map; later ones lie on top.
+
+    Examples
+    --------
+    >>> [label for label, _ in areas("II")]
+    ['II-F', 'II-C']
+    """
+    r = _REACH
+    box = np.array([[-r, -r], [r, -r], [r, r], [-r, r]])
+    if kind in ("VV", "II"):
+        side = 1 if kind == "VV" else -1
+        corner = np.vstack([_hyperbola(1.0, side), [[side * r, side * r]]])
+        return (
+            [("VV-C1", box), ("VV-F", corner)]
+            if kind == "VV"
+            else [("II-F", box), ("II-C", corner)]
+        )
+    curve = _hyperbola(-1.0, -1)[::-1]  # touches nu2 = nu1 + 2 at (-1, 1)
+    left, right = curve[curve[:, 0] <= -1.0], curve[curve[:, 0] >= -1.0]
+    found = {
+        "mix-0": box,
+        "mix-S": np.vstack([curve, [[-r, r]]]),
+        "mix-C": np.vstack([left, [[-1.0, 1.0], [-r, 2.0 - r]]]),
+        "mix-F": np.vstack([[[-1.0, 1.0]], right, [[r - 2.0, r]]]),
+    }
+    step = 1 if kind == "VI" else -1  # IV: the other side up, (nu1, nu2) -> (nu2, nu1)
+    return [(label, polygon[:, ::step]) for label, polygon in found.items()]
+
+
+def _fill(ax: Axes, kind: str) -> None:
+    """Tint each class."""
+    for label, polygon in areas(kind):
+        tint, hatch = _FILLS[label]
+        patch = Polygon(
+            polygon, facecolor=tint, edgecolor="#6A6A6A", hatch=hatch, linewidth=0, zorder=0
+        )
+        ax.add_patch(patch)
+
+
+def _hyperbola(product: float, branch: int) -> Array:
+    """Branch nu1 > 0 or nu1 < 0 of nu1 nu2 = product, within reach; (m, 2)."""
+    low = abs(product) / _REACH
+    x = branch * np.geomspace(max(low, 1e-3), _REACH, 200)
+    return np.column_stack([x, product / x])
+
+
+def _boundaries(ax: Axes, kind: str) -> list[Line2D]:
+    if kind in ("VV", "II"):
+        return _hyperbolas(ax, kind)
+    return _mixed_boundaries(ax, kind)
+
+
+def _hyperbolas(ax: Axes, kind: str) -> list[Line2D]:
+    decisive = 1 if kind == "VV" else -1
+    handles = [
+        _stroke(
+            ax,
+            _hyperbola(1.0, decisive),
+            style.BLACK,
+            2.2,
+            "-",
+            r"$\nu_1\nu_2=1$ ($\Delta=0$): pseudo-equilibria",
+        ),
+        _stroke(
+            ax,
+            _hyperbola(1.0, -decisive),
+            style.BLACK,
+            1.4,
+            (0, (5, 2)),
+            r"$\Delta=0$, same class; coincident fields",
+        ),
+    ]
+    if kind == "II":
+        for k, n in enumerate(_FLIGHTS):
+            curve = _hyperbola(math.cos(math.pi / n) ** 2, -1)
+            text = r"$\nu_1\nu_2=\cos^2(\pi/n)$: $n-1$ | $n$ flights"
+            handle = _stroke(ax, curve, style.BLUE, 0.9, "-", text)
+            handles += [handle] if k == 0 else []
+            at = curve[np.argmin(np.abs(curve[:, 0] - curve[:, 1] - (0.9 - 0.45 * k)))]
+            style.write(
+                ax, at, f"{n}", fontsize=7, color=style.BLUE, zorder=3, path_effects=style.halo(2.5)
+            )
+        for line in ([[0, -_REACH], [0, _REACH]], [[-_REACH, 0], [_REACH, 0]]):
+            handle = _stroke(
+                ax, np.array(line), style.VERMILLION, 1.2, ":", r"$\nu_i=0$: itinerary changes"
+            )
+        handles.append(handle)
+    return handles
+
+
+def _mixed_boundaries(ax: Axes, kind: str) -> list[Line2D]:
+    swap = -1 if kind == "IV" else 1  # (nu1, nu2) -> (nu2, nu1)
+    line = np.linspace(-_REACH, _REACH, 3)
+    jordan = np.column_stack([line, line + 2.0])[:, ::swap]
+    outside = np.column_stack([line, line - 2.0])[:, ::swap]
+    rank = _hyperbola(-1.0, -1 if kind == "VI" else 1)
+    harmless = _hyperbola(-1.0, 1 if kind == "VI" else -1)
+    itinerary = np.column_stack([line, 0 * line])[:, ::swap]
+    name = r"\nu_2-\nu_1" if kind == "VI" else r"\nu_1-\nu_2"
+    fold = 2 if kind == "VI" else 1
+    return [
+        _stroke(ax, jordan, style.BLACK, 2.2, "-", f"${name}=2$ (disc = 0)"),
+        _stroke(ax, rank, style.CANARD, 2.2, "-.", r"$\nu_1\nu_2=-1$ ($\Delta=0$)"),
+        _stroke(ax, outside, style.BLACK, 1.2, (0, (5, 2)), f"${name}=-2$, same class"),
+        _stroke(
+            ax,
+            harmless,
+            style.CANARD,
+            1.2,
+            (0, (5, 2)),
+            r"$\Delta=0$, same class; coincident fields",
+        ),
+        _stroke(ax, itinerary, style.VERMILLION, 1.2, ":", rf"$\nu_{fold}=0$: itinerary changes"),
+    ]
+
+
+def _stroke(ax: Axes, curve: Array, color: str, width: float, dashes: Any, text: str) -> Line2D:
+    (line,) = ax.plot(
+        *curve.T,
+        color=color,
+        linewidth=width,
+        linestyle=dashes,
+        label=text,
+        zorder=2,
+        gid="boundary",
+    )
+    return line

@@ -1,0 +1,47 @@
+"""``bounce fit`` finds parameters, and says which the data do not determine."""
+
+import json
+
+import numpy as np
+import pytest
+
+import bounce
+
+
+@pytest.fixture
+def measured(tmp_path):
+    law = bounce.laws.TiltedBounce(mu=0.25, restitution=0.4, tilt=0.2)
+    rng = np.random.default_rng(0)
+    u, v, w = rng.uniform(5, 25, 30), rng.uniform(5, 20, 30), rng.uniform(-5, 8, 30)
+    off = law.lift_off(u, -v, w)
+    radius = bounce.golf.GOLF.radius
+    columns = [u, -v, w / radius, off.xdot, off.ydot, off.omega / radius]
+    path = tmp_path / "data.csv"
+    head = "xdot [m/s],ydot [m/s],omega [rad/s],lift_off_xdot [m/s],lift_off_ydot [m/s],lift_off_omega [rad/s]"
+    np.savetxt(path, np.column_stack(columns), fmt="%.12g", delimiter=",", header=head, comments="")
+    return path
+
+
+def test_fit(command, tmp_path, measured):
+    picture = tmp_path / "residuals.png"
+    argv = ["fit", measured, "--turf", "natural", "--parameters", "mu,restitution,tilt"]
+    code, out, _ = command(*argv, "--json", "--residuals", picture)
+    report = json.loads(out)
+    assert report["inputs"]["starts"] == 16 and report["version"]
+    assert code == 0 and picture.exists()
+    assert report["values"] == pytest.approx(dict(mu=0.25, restitution=0.4, tilt=0.2), rel=1e-6)
+    assert "95 %" in command(*argv)[1]
+
+
+def test_parameters_that_are_not_determined(command, tmp_path):
+    rng = np.random.default_rng(15)
+    u, v, w = rng.uniform(15, 25, 4), -rng.uniform(10, 18, 4), rng.uniform(100, 300, 4)
+    columns = [u, v, w, u * 0.4 + rng.normal(size=4), -0.4 * v, -w]
+    path = tmp_path / "few.csv"
+    head = "xdot [m/s],ydot [m/s],omega [rad/s],lift_off_xdot [m/s],lift_off_ydot [m/s],lift_off_omega [rad/s]"
+    np.savetxt(path, np.column_stack(columns), fmt="%.17g", delimiter=",", header=head, comments="")
+    code, out, err = command("fit", path, "--parameters", "mu,restitution,tilt")
+    assert code == 3 and "(not determined by these data)" in out
+    assert err.startswith("bounce: caution: mu: not determined by these data")
+    code, out, _ = command("fit", path, "--parameters", "mu,restitution,tilt", "--json")
+    assert code == 3 and json.loads(out)["undetermined"] == ["mu"]

@@ -1,0 +1,140 @@
+"""The run-out agrees with closed forms: the Zeno sum of bounces, sliding into rolling, rolling to rest."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import bounce
+import nonsmooth as ns
+
+G = 9.80665
+R = bounce.golf.GOLF.radius
+DRIVE = bounce.Landing.polar(28.5, math.radians(37.3), 2094)
+
+
+@settings(max_examples=20)
+@given(r=st.floats(0.1, 0.8), u=st.floats(-20, 20), v=st.floats(0.5, 20))
+def test_zeno_sum(r, u, v):
+    """Rolling and constant restitution: hops of 2 u r^n v/g for n = 1, 2, ..., 2 u v r/(g (1-r)) in all."""
+    landing = bounce.Landing(u, -v, -u / R)
+    law = bounce.laws.RigidBounce(mu=0.4, restitution=r)
+    run = bounce.golf.play(law, landing, min_height=1e-14, rolling_friction=1e9)
+    assert run.bounced == pytest.approx(2 * u * v * r / (G * (1 - r)), abs=1e-6 * (1 + abs(u)))
+    assert run.bounces[-1].t == pytest.approx(2 * v * r / (G * (1 - r)), abs=1e-6)
+    assert run.first_height == pytest.approx((r * v) ** 2 / (2 * G))
+    heights = [b.hop.height for b in run.bounces if b.hop is not None]
+    assert heights[1:] == pytest.approx([h * r**2 for h in heights[:-1]])
+
+
+@given(v=st.floats(0.1, 5), rho=st.floats(0.02, 0.5))
+def test_rolling_to_rest(v, rho):
+    """x = v^2 (1 + k)/(2 rho g); a Stimpmeter's 1.83 m/s on rho = .131 rolls 1.83 m (6 feet)."""
+    run = bounce.golf.play(
+        bounce.laws.RigidBounce(mu=0.4, restitution=0.0),
+        bounce.Landing(v, -1e-3, -v / R),
+        rolling_friction=rho,
+    )
+    assert run.rolled == run.run_out == pytest.approx(v**2 * 1.4 / (2 * rho * G), rel=1e-12)
+    assert [g.mode for g in run.glides] == ["s"]
+
+
+def test_stimpmeter():
+    run = bounce.golf.play(
+        bounce.laws.RigidBounce(mu=0.4, restitution=0.0), bounce.Landing(1.83, -1e-3, -1.83 / R)
+    )
+    assert run.run_out / 0.3048 == pytest.approx(6.0, abs=0.02)
+
+
+@given(u=st.floats(-5, 5), spin=st.floats(-8, 8), slope=st.floats(-0.05, 0.05))
+def test_sliding_becomes_rolling(u, spin, slope):
+    """The law keeps the ball down, so it slides: 5/7 u - 2/7 R omega is what it rolls with on the level."""
+    law = bounce.laws.RigidBounce(mu=0.3, restitution=0.0)
+    run = bounce.golf.play(law, bounce.Landing(u, -1e-9, spin / R), slope=slope)
+    if run.glides and run.glides[0].mode in "+-":
+        slide = run.glides[0]
+        after = slide.xdot + slide.acceleration * slide.time
+        if slope == 0.0:
+            assert after == pytest.approx(5 / 7 * u - 2 / 7 * spin, abs=1e-7)
+        assert slide.time > 0.0
+    path = run.path()
+    assert np.all(np.diff(path[:, 0]) >= -1e-12)
+    assert path[-1, 1] == pytest.approx(run.run_out, abs=1e-12)
+    assert path[-1, 0] == pytest.approx(run.time, abs=1e-12)
+
+
+def test_backspin_runs_back():
+    run = bounce.golf.play(
+        bounce.laws.TiltedBounce(mu=0.4, restitution=0.2, tilt=math.radians(20)),
+        bounce.Landing.polar(20.0, math.radians(60), 9000),
+    )
+    assert run.run_out < 0.0
+
+
+@pytest.mark.filterwarnings("ignore::bounce.golf.ExtrapolationWarning")
+@pytest.mark.parametrize("name", bounce.laws.TURFS)
+def test_energy_decreases_from_bounce_to_bounce(name):
+    run = bounce.golf.play(bounce.laws.TURFS[name].law, DRIVE, air=bounce.golf.SMITS_SMITH)
+
+    def energy(s):
+        return s.xdot**2 + s.ydot**2 + 0.4 * (R * s.omega) ** 2
+
+    for b in run.bounces:
+        assert energy(b.rebound.lift_off) <= energy(b.rebound.landing) * (1 + 1e-12)
+    assert run.path()[:, 2].min() > -1e-9
+    assert 0.0 <= run.left_out < 1.0
+
+
+def test_known_run_of_a_drive():
+    """A public simulator with the same law, no drag and its own stop at 0.3 m/s gives 25 yards."""
+    run = bounce.golf.play(bounce.laws.TURFS["natural"].law, DRIVE)
+    assert run.run_out / 0.9144 == pytest.approx(25.0, abs=0.5)
+
+
+def test_contact_model_with_gravity_and_displacement():
+    scaling = bounce.Scaling.from_stiffness(bounce.golf.GOLF, 2e4)
+    turf = bounce.KelvinVoigt(mu=0.5, d1=0.2, d2=0.4, eta=0.7, G=scaling.gravity)
+    run = bounce.golf.play(turf, DRIVE, scaling=scaling)
+    first = run.bounces[0]
+    assert first.rebound.time > 0.0 and first.rebound.y < 0.0
+    assert run.bounces[1].x == pytest.approx(first.rebound.x + first.hop.range)
+    assert run.bounces[1].t == pytest.approx(first.rebound.time + first.hop.time)
+
+
+def test_slopes():
+    law = bounce.laws.RigidBounce(mu=0.4, restitution=0.0)
+    landing = bounce.Landing(1.0, -1e-3, -1.0 / R)
+    level, up = (bounce.golf.play(law, landing, slope=s).run_out for s in (0.0, 0.05))
+    down = bounce.golf.play(law, landing, slope=-0.05).run_out
+    assert up < level < down
+    steep = bounce.golf.play(law, landing, slope=0.2, rolling_friction=0.25)
+    assert len(steep.glides) == 1
+    with pytest.raises(bounce.golf.NoRestError, match="rolling ball stops"):
+        bounce.golf.play(law, landing, slope=0.2)
+    with pytest.raises(bounce.golf.NoRestError, match="friction stops the slip"):
+        bounce.golf.play(law, bounce.Landing(-5.0, -1e-3, -400.0), slope=1.0)
+
+
+@pytest.mark.parametrize(
+    ("options", "error", "message"),
+    [
+        (dict(rolling_friction=0.0), ns.OptionError, "rolling_friction"),
+        (dict(min_height=-1.0), ns.OptionError, "min_height"),
+        (dict(slope=3.0), ns.OptionError, "slope"),
+        (dict(max_bounces=3), bounce.golf.NoRestError, "within 3 bounces"),
+    ],
+)
+def test_messages(options, error, message):
+    with pytest.raises(error, match=message):
+        bounce.golf.play(bounce.laws.TURFS["artificial"].law, DRIVE, **options)
+
+
+def test_model_messages():
+    turf = bounce.KelvinVoigt(mu=0.5, d1=0.2, d2=0.4, eta=0.7)
+    scaling = bounce.Scaling.from_stiffness(bounce.golf.GOLF, 2e4)
+    with pytest.raises(ns.OptionError, match=r"slope: .*model\.replace"):
+        bounce.golf.play(turf, DRIVE, scaling=scaling, slope=0.1)
+    with pytest.raises(bounce.LandingError, match="does not approach"):
+        bounce.golf.play(bounce.laws.TURFS["natural"].law, bounce.Landing(1.0, 1.0, 0.0))

@@ -1,0 +1,88 @@
+"""Regions are named on the picture, differ in grey, and what cannot be drawn is refused."""
+
+import matplotlib.colors
+import numpy as np
+import pytest
+
+import bounce
+import nonsmooth as ns
+
+TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+PAPER = ("S+", "S+ S-", "S+ R S+", "S+ R S-", "S-", "S- S+", "S- R S+", "S- R S-")
+
+
+@pytest.fixture(scope="module")
+def outcomes():
+    over = dict(xdot=np.linspace(-2, 2, 60), omega=np.linspace(-4, 4, 80))
+    return bounce.outcome_map(TURF, over)
+
+
+def test_regions_are_named_on_the_picture(outcomes):
+    figure = bounce.plot.outcome_map(outcomes, curve=bounce.dividing_curve(TURF, step=0.2))
+    axes = figure.axes[0]
+    assert {t.get_text() for t in axes.texts} == set(PAPER)
+    assert axes.get_xlim() == (-2, 2) and axes.get_ylim() == (-4, 4)
+
+
+def test_narrow_regions_are_in_the_legend():
+    over = dict(eta=np.linspace(0.05, 3, 60), omega=np.linspace(-2, 3, 60))
+    m = bounce.outcome_map(TURF, over, fixed=dict(xdot=0.5))
+    axes = bounce.plot.outcome_map(m).axes[0]
+    legend = axes.get_legend()
+    assert legend is not None
+    names = [t.get_text() for t in axes.texts] + [t.get_text() for t in legend.get_texts()]
+    assert sorted(names) == sorted(m.regions)
+
+
+@pytest.mark.parametrize("quantity", ["slip", "spin_reversal", "lift_off_angle"])
+def test_quantities_are_drawn(outcomes, quantity):
+    assert len(bounce.plot.outcome_map(outcomes, quantity).axes) == 2
+
+
+def test_neighbouring_regions_differ_in_grey():
+    """For readers who see no colours at all."""
+    from bounce.plot.outcomes import COLOURS
+
+    def grey(name):
+        return float(np.dot(matplotlib.colors.to_rgb(COLOURS[name]), [0.299, 0.587, 0.114]))
+
+    pairs = [
+        ("S+", "S+ R S+"),
+        ("S+ R S+", "S- R S+"),
+        ("S- R S+", "S- S+"),
+        ("S-", "S- R S-"),
+        ("S- R S-", "S+ R S-"),
+        ("S+ R S-", "S+ S-"),
+        ("S- S+", "S-"),
+        ("S+ S-", "S+"),
+    ]
+    assert all(abs(grey(a) - grey(b)) > 0.15 for a, b in pairs)
+
+
+def test_pictures_refuse_what_they_cannot_draw(outcomes):
+    with pytest.raises(ns.OptionError, match="quantity: expected one of"):
+        bounce.plot.outcome_map(outcomes, "spin")
+    m = bounce.outcome_map(TURF, dict(mu=[0.1, 0.2], omega=[0.0, 1.0]), fixed=dict(xdot=1.0))
+    with pytest.raises(ns.OptionError, match="map over xdot and omega"):
+        bounce.plot.outcome_map(m, curve=bounce.dividing_curve(TURF, step=0.4, reach=0.6))
+
+
+@pytest.mark.filterwarnings("error")
+@pytest.mark.parametrize("quantity", ["itinerary", "slip"])
+def test_a_picture_of_a_map_without_lift_off(quantity):
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    over = {"xdot": [0.0, 1.0], "omega": [0.0, 1.0]}
+    figure = bounce.plot.outcome_map(bounce.outcome_map(turf, over, {"ydot": 1.0}), quantity)
+    figure.canvas.draw()
+
+
+def test_a_legend_of_dozens_of_regions_is_short():
+    stiff = bounce.KelvinVoigt(mu=0.3, d1=0.05, d2=0.1, eta=12)
+    axis = np.linspace(-1, 1, 60)
+    outcomes = bounce.outcome_map(stiff, {"xdot": axis, "omega": axis})
+    legend = bounce.plot.outcome_map(outcomes).axes[0].get_legend()
+    names = [text.get_text() for text in legend.get_texts()]
+    assert len(outcomes.regions) > 40
+    assert len(names) <= 17
+    assert names[-1].endswith("more")
+    assert max(map(len, names)) < 30

@@ -1,0 +1,208 @@
+"""Gaps that cannot close: impacts, rest after an accumulation, friction at the contact, release, each at
+its closed form."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, u, v, t, lam, r, q = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "lam", "r", "q"))
+G = 9.81
+
+engines = pytest.mark.parametrize("engine", ["reference"])
+
+
+def kinds(run):
+    return [e.kind for e in run.events]
+
+
+@engines
+@pytest.mark.parametrize("e", [0.3, 0.9])
+def test_a_ball_comes_to_rest_at_the_closed_form(e, engine):
+    ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=e))
+    run = ns.simulate(ball, [1.0, 0.0], 30.0, engine=engine)
+    first = (2 / G) ** 0.5
+    contact = next(event for event in run.events if event.kind == "contact")
+    assert run.itinerary == "o c" and run.status is ns.Status.REACHED_END
+    assert abs(contact.t - first * (1 + e) / (1 - e)) < 1e-11
+    assert np.all(run.x[-1] == 0.0) and abs(run.events[0].t - first) < 1e-12
+    before, after = run.events[0].x[1], run.events[0].x_after[1]
+    assert abs(after + e * before) < 1e-14
+
+
+@engines
+@pytest.mark.parametrize("restitution", [0.0, 0.5])
+def test_a_table_throws_the_ball_off_when_its_reaction_ends(restitution, engine):
+    """g = A omega^2 sin(omega t)."""
+    a, omega = 0.2, 8.0
+    gap = y - a * ca.sin(omega * t)
+    ball = ns.FilippovSystem(
+        [y, v], field=[v, -G], impacts=ns.Impact(gap, restitution=restitution), time=t
+    )
+    run = ns.simulate(ball, [1.0, 0.0], 5.0, engine=engine)
+    released = [event.t for event in run.events if event.kind == "release"]
+    phase = np.arcsin(G / (a * omega**2))
+    turns = np.round((omega * np.array(released) - phase) / (2 * np.pi))
+    assert len(released) == (5 if restitution else 6)
+    np.testing.assert_allclose(released, (phase + 2 * np.pi * turns) / omega, atol=1e-11)
+    heights = run(np.linspace(0.0, 5.0, 2001))[:, 0]
+    assert np.min(heights - a * np.sin(omega * np.linspace(0.0, 5.0, 2001))) > -1e-9
+
+
+@engines
+def test_a_start_at_rest_needs_no_accumulation(engine):
+    ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=0.9))
+    run = ns.simulate(ball, [0.0, 0.0], 1.0, engine=engine)
+    assert run.itinerary == "c" and kinds(run) == ["end"] and np.all(run.x == 0.0)
+
+
+@engines
+def test_a_start_that_presses_into_the_gap_is_an_impact_at_once(engine):
+    ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=0.5))
+    run = ns.simulate(ball, [0.0, -2.0], 0.05, engine=engine)
+    assert run.events[0].kind == "impact" and run.events[0].t == 0.0
+    assert abs(run.x[-1, 1] - (1.0 - 0.05 * G)) < 1e-13
+
+
+@engines
+def test_a_pulled_body_leaves(engine):
+    """The load turns round at t = 1: reaction 1 - t."""
+    body = ns.FilippovSystem([y, v], field=[v, t - 1], impacts=ns.Impact(y), time=t)
+    run = ns.simulate(body, [0.0, 0.0], 3.0, engine=engine)
+    assert run.itinerary == "c o" and kinds(run) == ["release", "end"]
+    assert abs(run.events[0].t - 1.0) < 1e-12
+    assert abs(run.x[-1, 0] - 2.0**3 / 6) < 1e-10
+
+
+@engines
+def test_a_start_behind_the_constraint_is_refused(engine):
+    ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, name="floor"))
+    run = ns.simulate(ball, [-0.1, 0.0], 1.0, engine=engine)
+    assert run.status is ns.Status.INCONSISTENT and "'floor' is negative" in run.message
+
+
+def block(mu, e=0.0):
+    """A point mass on the ground y = 0, with Coulomb friction at the contact."""
+    return ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, -mu * lam * r, r - G],
+        surface=u,
+        multipliers=lam,
+        impacts=ns.Impact(y, restitution=e, reaction=r),
+    )
+
+
+@engines
+def test_friction_lives_on_the_contact(engine):
+    """It slides to rest after u^2/(2 mu g), and sticks."""
+    run = ns.simulate(block(0.3), [0.0, 0.0, 2.0, 0.0], 3.0, engine=engine)
+    assert run.itinerary == "+c sc"
+    assert abs(run.events[0].t - 2.0 / (0.3 * G)) < 1e-12
+    np.testing.assert_allclose(run.x[-1], [2.0**2 / (2 * 0.3 * G), 0.0, 0.0, 0.0], atol=1e-12)
+
+
+@engines
+@pytest.mark.parametrize(("speed", "slips"), [(5.0, True), (0.5, False), (-5.0, True)])
+def test_an_oblique_impact_takes_friction_with_it(speed, slips, engine):
+    """Slip is reduced by mu (1 + e) |v|, or stopped within the impact."""
+    mu, e, fall = 0.3, 0.5, -2.0
+    run = ns.simulate(block(mu, e), [0.0, 0.0, speed, fall], 0.01, engine=engine)
+    after = run.events[0].x_after
+    stop = mu * (1 + e) * abs(fall)
+    expected = speed - np.sign(speed) * stop if slips else 0.0
+    np.testing.assert_allclose(after, [0.0, 0.0, expected, -e * fall], atol=1e-13)
+
+
+@engines
+def test_in_the_air_friction_does_nothing(engine):
+    run = ns.simulate(block(0.3, 0.5), [0.0, 1.0, 1.0, 0.0], 0.4, engine=engine)
+    assert run.itinerary == "+o" and run.x[-1, 2] == 1.0
+
+
+@engines
+def test_a_body_without_slip_falls_and_stays(engine):
+    """u = 0 all the time: the surface is never left, in the air nor on the ground."""
+    run = ns.simulate(block(0.3, 0.5), [0.0, 1.0, 0.0, 0.0], 5.0, engine=engine)
+    assert run.status is ns.Status.REACHED_END
+    np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-12)
+    assert run.itinerary.split()[-1][1] == "c"
+
+
+def bar(inertia, e=0.0):
+    """A bar of unit mass and half length 1 over two supports, at small angles."""
+    forces = [ca.SX.sym("r1"), ca.SX.sym("r2")]
+    impacts = [
+        ns.Impact(y - x, restitution=e, reaction=forces[0], name="left"),
+        ns.Impact(y + x, restitution=e, reaction=forces[1], name="right"),
+    ]
+    lift, turn = forces[0] + forces[1] - G, (forces[1] - forces[0]) / inertia
+    return ns.FilippovSystem([x, y, u, v], field=[u, v, turn, lift], impacts=impacts)
+
+
+@engines
+@pytest.mark.parametrize("inertia", [0.5, 2.0])
+def test_one_end_rests_while_the_other_strikes(inertia, engine):
+    """The end at rest is struck too if it would be pressed down (I < m l^2), else it lifts off."""
+    start = [0.3, 0.3, 0.0, 0.0]  # left end down, right end up
+    run = ns.simulate(bar(inertia), start, 2.0, engine=engine)
+    strike = next(event for event in run.events if event.kind == "impact")
+    rate = strike.x[3] + strike.x[2]  # of the right end, before
+    after = strike.x_after[3] - strike.x_after[2]  # of the left end
+    coupling = (1 - 1 / inertia) / (1 + 1 / inertia)
+    assert abs(strike.x_after[3] + strike.x_after[2]) < 1e-12 and rate < 0
+    assert abs(after - max(-coupling * rate, 0.0)) < 1e-11
+    assert np.all(
+        run(np.linspace(0, 2, 400))[:, 1] - abs(run(np.linspace(0, 2, 400))[:, 0]) > -1e-9
+    )
+
+
+@engines
+def test_both_ends_strike_at_once(engine):
+    run = ns.simulate(bar(1.5), [0.0, 1.0, 0.0, 0.0], 2.0, engine=engine)
+    assert run.itinerary == "oo cc" and np.all(np.abs(run.x[-1]) < 1e-12)
+
+
+@engines
+def test_an_oscillator_chatters_to_rest_at_its_wall_and_leaves_when_the_force_ends(engine):
+    """x'' = -x + A cos(omega t) before the wall x = s: it leaves where A cos(omega t) = s."""
+    force, omega, wall = 3.0, 0.3, 0.5
+    system = ns.FilippovSystem(
+        [x, v],
+        field=[v, -x - 0.1 * v + force * ca.cos(omega * t)],
+        impacts=ns.Impact(wall - x, restitution=0.6),
+        time=t,
+    )
+    run = ns.simulate(system, [0.0, 0.0], 45.0, engine=engine)
+    left = [event.t for event in run.events if event.kind == "release"]
+    assert len(left) == 2
+    expected = (np.arccos(wall / force) + 2 * np.pi * np.arange(2)) / omega
+    np.testing.assert_allclose(left, expected, atol=1e-10)
+    assert run(np.linspace(0, 45, 3000))[:, 0].max() < wall + 1e-9
+
+
+@engines
+def test_painleve_paradox_is_named(engine):
+    """Friction turns the reaction round: with slip +, r (1 - 2) pulls the contact into the ground."""
+    system = ns.FilippovSystem(
+        [x, y, u, v],
+        field=[u, v, -0.1 * lam * r, r * (1 - 2 * lam) - G],
+        surface=u,
+        multipliers=lam,
+        impacts=ns.Impact(y, reaction=r),
+    )
+    run = ns.simulate(system, [0.0, 0.0, 1.0, 0.0], 1.0, engine=engine)
+    assert run.status is ns.Status.INCONSISTENT
+
+
+def test_wrong_impacts_are_refused():
+    with pytest.raises(
+        ns.DefinitionError, match="restitution of 'impact': expected a number from 0"
+    ):
+        ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=1.5))
+    with pytest.raises(ns.DefinitionError, match="a function of positions"):
+        ns.FilippovSystem([y, v], field=[v, r - G], impacts=ns.Impact(v, reaction=r))
+    with pytest.raises(ns.DefinitionError, match="does not move"):
+        ns.FilippovSystem([y, v, x], field=[v, -G, r], impacts=ns.Impact(y, reaction=r))
+    with pytest.raises(ns.DefinitionError, match=r"impacts\[0\]: expected a Impact"):
+        ns.FilippovSystem([y, v], field=[v, -G], impacts=[ns.Stop(y)])

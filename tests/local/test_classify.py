@@ -1,0 +1,76 @@
+"""classify names what it is asked about in space, near boundaries of classes, and refuses the rest."""
+
+import casadi as ca
+import pytest
+
+import nonsmooth as ns
+from nonsmooth import textbook
+from nonsmooth.local import classify
+
+X, Y, Z = (ca.SX.sym(s) for s in "xyz")
+
+
+PLANE = ns.FilippovSystem([X, Y], surface=Y, above=[1, X], below=[1, 1])
+
+
+def test_classify_in_three_dimensions():
+    system = ns.FilippovSystem([X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1])
+    cases = [
+        ((0, 1, 1), "sliding", "attracting sliding"),
+        ((0, -1, 1), "crossing", "crossing up"),
+        ((0, 0, 1), "fold", "invisible"),
+        ((0, 1, 0), "fold", "invisible"),
+        ((0, 0, 0), "two-fold", "II-C"),
+        ((0, 1e-8, 1), "degenerate", "near L1 = 0"),
+    ]
+    for point, kind, label in cases:
+        found = classify(system, point)
+        assert (found.kind, found.label) == (kind, label), str(found)
+    whitney = ns.FilippovSystem([X, Y, Z], surface=X, above=[Y, Z, 1], below=[1, 0, 0])
+    assert classify(whitney, [0, 0, 0]).kind == "cusp"
+    assert classify(whitney, [0, 0, 1]).label == "visible"
+
+
+@pytest.mark.parametrize("label", textbook.TWO_FOLDS)
+def test_two_folds_are_named(label):
+    found = classify(textbook.two_fold(label).system, [0, 0, 0])
+    assert (found.kind, found.label) == ("two-fold", label)
+    assert found.distance > 0.05 and "L11" in found.evidence
+
+
+def test_two_folds_near_a_boundary_are_degenerate():
+    for eps in (0.0, 1e-12, 1e-8):
+        system = textbook.two_fold((1, -1), (2.0, 0.5 + eps)).system  # Delta = 2 eps
+        found = classify(system, [0, 0, 0])
+        assert found.kind == "degenerate" and found.nearest == "Delta=0"
+        assert found.distance == pytest.approx(2 * eps, abs=1e-15)
+
+
+def test_messages():
+    with pytest.raises(ns.PointError, match=r"expected a point of the surface.*nearest point"):
+        classify(PLANE, [1.0, 0.5])
+    with pytest.raises(ns.OptionError, match="margin"):
+        classify(PLANE, [0.0, 0.0], margin=-1.0)
+
+
+def test_time_and_hidden_dynamics():
+    t, lam = ca.SX.sym("t"), ca.SX.sym("lam")
+    moving = ns.FilippovSystem([X, Y], surface=Y, above=[ca.cos(t), -1], below=[1, 1], time=t)
+    assert classify(moving, [0.0, 0.0], t=1.0).label == "attracting sliding"
+    hidden = ns.FilippovSystem(
+        [X, Y], surface=Y, multipliers=lam, field=[1, -(lam**3)], hidden=True
+    )
+    with pytest.raises(ns.DefinitionError, match="hidden dynamics"):
+        classify(hidden, [0.0, 0.0])
+
+
+def test_both_fields_vanish():
+    system = ns.FilippovSystem([X, Y], surface=Y, above=[X, -Y], below=[-X, Y])
+    found = classify(system, [0.0, 0.0])
+    assert found.kind == "degenerate" and found.distance == 0.0
+
+
+def test_the_answer_reads():
+    text = str(classify(PLANE, [0.0, 0.0]))
+    assert text.startswith("fold: visible of F1 (above) at [0.0, 0.0] (")
+    assert "L11 = 1" in text

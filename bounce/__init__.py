@@ -37,13 +37,8 @@ from .contact.models import (
     Tsuji,
 )
 from .errors import EnergyWarning, LandingError, LiftOffError, ModelError, UnknownNameError
-from .maps.dividing import (
-    DividingCurve,
-    DividingSurface,
-    critical_eta,
-    dividing_curve,
-    dividing_surface,
-)
+from .maps.dividing import DividingCurve, critical_eta, dividing_curve
+from .maps.dividing_surface import DividingSurface, dividing_surface
 from .maps.lift_offs import lift_off
 from .maps.outcomes import OutcomeMap, outcome_map
 from .maps.results import BounceStatus, LiftOffs

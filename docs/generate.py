@@ -183,7 +183,7 @@ def api_pages() -> dict[str, str]:
         names = [n for n in ns.__all__ if _floor(ns, n) == floor]
         pages[f"api/{floor}.md"] = _page(f"nonsmooth: {floor}", about, "nonsmooth", names)
     pages["api/local.md"] += "\n" + _members("nonsmooth.local", returned_types())
-    for package in (ns.plot, ns.textbook, ns.two_folds, ns.plot.style):
+    for package in (ns.plot, ns.textbook, ns.two_folds, ns.continuation, ns.plot.style):
         short = package.__name__.rpartition(".")[2]
         path = "nonsmooth." + ("plot.style" if package is ns.plot.style else short)
         pages[f"api/{short}.md"] = _page(path, _words(package), path, _own(package))
@@ -205,6 +205,7 @@ def _overview() -> str:
     doors = {
         "nonsmooth": (ns, ns.__all__),
         "nonsmooth.two_folds": (ns.two_folds, ns.two_folds.__all__),
+        "nonsmooth.continuation": (ns.continuation, ns.continuation.__all__),
         "nonsmooth.local": (ns.local, returned_types()),
         "bounce": (bounce, bounce.__all__),
         "bounce.golf": (bounce.golf, bounce.golf.__all__),
@@ -219,7 +220,8 @@ def _overview() -> str:
         lists.append(f"## {path}\n\n" + table(("name", "what it is"), rows))
     intro = (
         "Both packages have one front door: their top level, with the verbs, the nouns and the "
-        "errors. The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`, and "
+        "errors. The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`, "
+        "curves of any equations are followed by `nonsmooth.continuation`, and "
         "the types that questions about a point return are in `nonsmooth.local`. What is before, between "
         "and after bounces is in `bounce.golf`, laws in closed form are in `bounce.laws`."
     )

@@ -20,8 +20,8 @@ is the sequence of modes. States are on the last axis, float64. Every run ends i
 never guesses where the future is not unique. Every error derives from NonsmoothError.
 
 Here are the verbs, the nouns and the errors. The algebra of two-folds, which needs no system, is in
-``two_folds``; the types that questions about a point return are in ``local``; pictures are in
-``plot`` and named systems with their closed-form answers in ``textbook``.
+``two_folds``; the types that questions about a point return are in ``local``; curves of any
+equations are followed by ``continuation``; pictures are in ``plot`` and named systems with their closed-form answers in ``textbook``.
 """
 
 from __future__ import annotations
@@ -78,7 +78,7 @@ from .model import (
     Stop,
     regularise,
 )
-from .orbit import Funnel, TraceError, funnel, trace_two_folds
+from .orbit import Funnel, TraceError, continuation, funnel, trace_two_folds
 
 if TYPE_CHECKING:
     from . import plot, textbook
@@ -111,6 +111,7 @@ __all__ = [
     "alpha",
     "boundary_equilibrium",
     "classify",
+    "continuation",
     "ensemble",
     "find_all",
     "find_boundary_equilibrium",

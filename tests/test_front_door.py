@@ -42,7 +42,7 @@ def test_dir_is_the_front_door_and_nothing_else():
 
 def test_modules_at_the_front_door_are_those_it_speaks_of():
     modules = {n for n in ns.__all__ if isinstance(getattr(ns, n), types.ModuleType)}
-    assert modules == {"local", "plot", "textbook", "two_folds"}
+    assert modules == {"continuation", "local", "plot", "textbook", "two_folds"}
     for name in modules:
         assert name in inspect.getdoc(ns)
 

@@ -18,7 +18,6 @@ formula for lift-off, so it also serves models whose normal motion depends on th
 from __future__ import annotations
 
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,8 +28,8 @@ from ..contact.model import ContactModel
 from ..errors import ModelError
 from ..parameters import number
 from ..shot.single import State
-from .shooting import Newton, Shooting
-from .tracing import Arc, Tracer, landing_at, on_line
+from .shooting import Shooting
+from .tracing import Arc, Landings, Tracer, landing_at
 
 Array = NDArray[np.float64]
 
@@ -113,11 +112,11 @@ class DividingCurve:
         """
         speeds = np.asarray(xdot, dtype=float)
         shooting = Shooting(self.model, self.ydot, tol=_integration(self.tol))
-        newton: dict[str, Newton] = {}
-        values = [self._omega(float(v), shooting, newton) for v in speeds.ravel()]
+        curves: dict[str, Landings] = {}
+        values = [self._omega(float(v), shooting, curves) for v in speeds.ravel()]
         return np.array(values).reshape(speeds.shape)
 
-    def _omega(self, xdot: float, shooting: Shooting, newton: dict[str, Newton]) -> float:
+    def _omega(self, xdot: float, shooting: Shooting, curves: dict[str, Landings]) -> float:
         for sign in (1.0, -1.0) if self.mirrored else (1.0,):
             for arc in (*self.arcs, *self.reverse):
                 found = _bracket(arc.points[:, 0], sign * xdot)
@@ -128,9 +127,9 @@ class DividingCurve:
                 if weight in (0.0, 1.0):
                     return sign * float(guess[1])
                 word = arc.itinerary.replace(" ", "")
-                solver = newton.setdefault(word, Newton(abs(self.ydot)))
-                vertical = partial(on_line, shooting, word, np.array([1.0, 0.0]), sign * xdot)
-                root = solver.solve(vertical, guess)
+                curve = curves.setdefault(word, Landings(shooting, word, tol=1e-15))
+                guess[0] = sign * xdot
+                root = curve.correct(guess, np.array([1.0, 0.0]), max_iterations=30)
                 if root is not None:
                     return sign * float(root[1])
         ends = np.concatenate([arc.points[:, 0] for arc in (*self.arcs, *self.reverse)])
@@ -255,88 +254,6 @@ def dividing_curve(
     return DividingCurve(model, speed, halves[0], (*halves, ())[1], mirrored, checked["tol"])
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class DividingSurface:
-    """H_F = 0 in the space of landings (xdot, ydot, omega), as curves at several normal speeds.
-
-    Attributes
-    ----------
-    curves : tuple of DividingCurve
-        In the order of ``ydot``.
-    """
-
-    curves: tuple[DividingCurve, ...]
-
-    @property
-    def ydot(self) -> Array:
-        """Normal speeds, (k,)."""
-        return np.array([curve.ydot for curve in self.curves])
-
-    @property
-    def two_fold(self) -> list[Array]:
-        """For each normal speed (n, 3) of (xdot, ydot, omega)."""
-        return [_with_ydot(curve.two_fold, curve.ydot) for curve in self.curves]
-
-    @property
-    def slipping(self) -> list[Array]:
-        """For each normal speed (n, 3) of (xdot, ydot, omega)."""
-        return [_with_ydot(curve.slipping, curve.ydot) for curve in self.curves]
-
-    @property
-    def junction(self) -> Array:
-        """Line where the parts meet, (k, 3); NaN where they do not."""
-        rows = [np.full(2, np.nan) if c.junction is None else c.junction for c in self.curves]
-        return np.column_stack([np.array(rows)[:, 0], self.ydot, np.array(rows)[:, 1]])
-
-    def __repr__(self) -> str:
-        return f"DividingSurface({len(self.curves)} curves, ydot = {self.ydot.tolist()})"
-
-
-def dividing_surface(
-    model: ContactModel,
-    ydot: ArrayLike,
-    *,
-    reach: float = 3.0,
-    step: float = 0.05,
-    tol: float = 1e-12,
-) -> DividingSurface:
-    """Trace the dividing surface at several normal speeds.
-
-    Without gravity a linear model's field is homogeneous of degree one and the surface is a cone.
-
-    Parameters
-    ----------
-    model : ContactModel
-    ydot : array_like (k,)
-        Normal speeds at touch-down, < 0.
-    reach, step, tol : float, optional
-        As in :func:`dividing_curve`.
-
-    Returns
-    -------
-    DividingSurface
-
-    Raises
-    ------
-    As :func:`dividing_curve`.
-
-    Examples
-    --------
-    >>> import bounce
-    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> surface = bounce.dividing_surface(turf, [-0.5, -1.0])
-    >>> (surface.junction / surface.ydot[:, None]).round(9)
-    array([[-0.444..., 1. , -1.59...],
-           [-0.444..., 1. , -1.59...]])
-    """
-    speeds = np.atleast_1d(np.asarray(ydot, dtype=float))
-    if speeds.ndim != 1 or speeds.size == 0:
-        raise ns.OptionError(f"ydot: expected a list of speeds, received shape {speeds.shape}.")
-    return DividingSurface(
-        tuple(dividing_curve(model, v, reach=reach, step=step, tol=tol) for v in speeds.tolist())
-    )
-
-
 def critical_eta(
     model: ContactModel,
     *,
@@ -407,10 +324,6 @@ def _bracket(values: Array, target: float) -> tuple[int, float] | None:
         return None
     k = int(inside[0])
     return k, float((target - values[k]) / (values[k + 1] - values[k]))
-
-
-def _with_ydot(points: Array, ydot: float) -> Array:
-    return np.column_stack([points[:, 0], np.full(len(points), ydot), points[:, 1]])
 
 
 def _integration(tol: float) -> float:

@@ -7,8 +7,6 @@ normal motion depends on the tangential one and lift-off comes at another time f
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -202,78 +200,3 @@ class Shooting:
             return "friction does not suffice to roll"
         above, below = self.numbers(run.x[-1])[3:5]
         return "" if above > 0 > below else "the two-fold at lift-off is not visible"
-
-
-@dataclass
-class Newton:
-    """Newton's method whose Jacobian is carried from one solve to the next (Broyden 1965).
-
-    scipy.optimize.root starts every solve with fresh differences; along a curve the Jacobian of the
-    last point is good, and a point costs two or three evaluations instead of seven.
-
-    Attributes
-    ----------
-    scale : float
-        Size of the unknowns.
-    tol : float
-        Accepted error, relative to ``scale``.
-    jacobian : ndarray (m, m) or None
-    evaluations : int
-    """
-
-    scale: float
-    tol: float = 1e-15
-    jacobian: Array | None = None
-    evaluations: int = 0
-
-    def solve(
-        self, f: Callable[[Array], Array], start: Array, iterations: int = 30
-    ) -> Array | None:
-        """Return a root near ``start`` to rounding, or None.
-
-        Examples
-        --------
-        >>> Newton(1.0).solve(lambda u: u**2 - 2.0, np.array([1.0])).tolist()
-        [1.414213562373095...]
-        """
-        carried = self.jacobian is not None
-        root = self._attempt(f, start, iterations)
-        if root is None and carried:
-            self.jacobian = None
-            root = self._attempt(f, start, iterations)
-        return root
-
-    def _attempt(self, f: Callable[[Array], Array], start: Array, iterations: int) -> Array | None:
-        u = np.array(start, dtype=float)
-        r = self._value(f, u)
-        if self.jacobian is None:
-            self.jacobian = self._differences(f, u, r)
-        last = np.inf
-        for _ in range(iterations):
-            if not (np.all(np.isfinite(r)) and np.all(np.isfinite(self.jacobian))):
-                return None
-            try:
-                step = -np.linalg.solve(self.jacobian, r)
-            except np.linalg.LinAlgError:
-                return None
-            size = float(np.linalg.norm(step)) / self.scale
-            u = u + step
-            # Steps shrink by a factor that itself shrinks: the next one is below size^2/last.
-            if size <= self.tol or (np.isfinite(last) and size * size <= self.tol * last):
-                return u
-            if size > 1e6:
-                return None
-            r = self._value(f, u)
-            self.jacobian = self.jacobian + np.outer(r, step) / float(step @ step)
-            last = size
-        return None
-
-    def _value(self, f: Callable[[Array], Array], u: Array) -> Array:
-        self.evaluations += 1
-        return f(u)
-
-    def _differences(self, f: Callable[[Array], Array], u: Array, r: Array) -> Array:
-        delta = 1e-6 * self.scale
-        return np.column_stack(
-            [(self._value(f, u + e) - r) / delta for e in delta * np.eye(len(u))]
-        )

@@ -4,6 +4,10 @@ Each step is the shortest one that solves the linearised equations (Gauss-Newton
 so the root found is close to the start. Equations are divided by the length of their gradient:
 residuals are distances, whatever the units of the equations. A step is halved until the residual
 falls. The iteration goes on to rounding and is accepted if the residual is below ``tol``.
+
+A good guess of as many equations as unknowns needs none of this: ``converge`` takes full steps and
+stops as soon as the next one would be below ``tol``. Where derivatives are dear, ``Secant`` carries
+the Jacobian from one evaluation to the next (Broyden 1965).
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from ..model import Array, ConvergenceError, OptionError, PointError
 from .checks import positive
 
 Equations = Callable[[Array], tuple[Array, Array]]
+Values = Callable[[Array], Array]
 
 _HALVINGS = 40
 
@@ -180,3 +185,111 @@ def _accept(
             point=x,
         )
     return Root(x, history[-1], len(steps), tuple(history), conditioning, linear)
+
+
+# good guesses ----------------------------------------------------------------------------------
+
+
+class Secant:
+    """Equations without derivatives: the Jacobian is carried along from differences (Broyden 1965).
+
+    Along a curve the Jacobian of the last point is good, and a point costs two or three evaluations
+    instead of those and as many more as there are unknowns.
+
+    Parameters
+    ----------
+    values : callable
+        x (n,) -> values (m,).
+    scale : float
+        Size of the unknowns.
+
+    Examples
+    --------
+    >>> converge(Secant(lambda u: u**2 - 2.0, 1.0), np.array([1.0])).tolist()
+    [1.414213562373095...]
+    """
+
+    def __init__(self, values: Values, scale: float):
+        self.values, self.scale = values, scale
+        self.jacobian: Array | None = None
+        self._last: tuple[Array, Array] | None = None
+
+    def forget(self) -> bool:
+        """Take fresh differences next time; whether there was anything to forget."""
+        had, self.jacobian, self._last = self.jacobian is not None, None, None
+        return had
+
+    def __call__(self, x: Array) -> tuple[Array, Array]:
+        """Values (m,) and the carried Jacobian (m, n) at x (n,)."""
+        r = self.values(x)
+        if self.jacobian is None:
+            delta = 1e-6 * self.scale
+            columns = [(self.values(x + e) - r) / delta for e in delta * np.eye(len(x))]
+            self.jacobian = np.column_stack(columns)
+        elif self._last is not None:
+            step, change = x - self._last[0], r - self._last[1]
+            square = float(step @ step)
+            if square > 0:
+                miss = change - self.jacobian @ step
+                self.jacobian = self.jacobian + np.outer(miss, step) / square
+        self._last = x, r
+        return r, self.jacobian
+
+
+def converge(
+    equations: Equations,
+    start: Array,
+    *,
+    tol: float = 1e-15,
+    scale: float = 1.0,
+    max_iterations: int = 30,
+) -> Array | None:
+    """Root of as many equations as unknowns from a good guess, or None.
+
+    Full steps; it ends with the step after which the next one would be below ``tol``: steps shrink
+    by a factor that itself shrinks, so the next one is below size^2/last.
+
+    Parameters
+    ----------
+    equations : callable
+        x (n,) -> values (n,), Jacobian (n, n); a :class:`Secant` is tried again with fresh
+        differences.
+    start : ndarray (n,)
+    tol : float, optional
+        Accepted error, relative to ``scale``.
+    scale : float, optional
+        Size of the unknowns.
+    max_iterations : int, optional
+
+    Examples
+    --------
+    >>> converge(lambda x: (x**2 - 9.0, np.diag(2 * x)), np.array([2.0])).tolist()
+    [3.0]
+    """
+    carried = isinstance(equations, Secant) and equations.jacobian is not None
+    root = _full_steps(equations, start, tol, scale, max_iterations)
+    if root is None and carried and isinstance(equations, Secant) and equations.forget():
+        root = _full_steps(equations, start, tol, scale, max_iterations)
+    return root
+
+
+def _full_steps(
+    equations: Equations, start: Array, tol: float, scale: float, most: int
+) -> Array | None:
+    x, last = np.array(start, dtype=float), np.inf
+    for _ in range(most):
+        values, jacobian = equations(x)
+        if not (np.isfinite(values).all() and np.isfinite(jacobian).all()):
+            return None
+        try:
+            step = -np.linalg.solve(jacobian, values)
+        except np.linalg.LinAlgError:
+            return None
+        size = float(np.linalg.norm(step)) / scale
+        x = x + step
+        if size <= tol or (np.isfinite(last) and size * size <= tol * last):
+            return x
+        if not size <= 1e6:
+            return None
+        last = size
+    return None

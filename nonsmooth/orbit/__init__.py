@@ -1,5 +1,6 @@
 """What needs both a place and a motion: canards, the set of futures, curves of two-folds."""
 
+from . import continuation
 from .canards import Path, Slider, paths_from
 from .futures import Departure, Funnel, funnel
 from .two_fold_curves import TraceError, trace_two_folds
@@ -10,6 +11,7 @@ __all__ = [
     "Path",
     "Slider",
     "TraceError",
+    "continuation",
     "funnel",
     "paths_from",
     "trace_two_folds",

@@ -107,6 +107,7 @@ def test_every_public_name_is_in_the_api():
         assert [n for n in wanted if f"::: {module.__name__}.{n}\n" not in pages] == []
     for path, names in (
         ("nonsmooth.two_folds", ns.two_folds.__all__),
+        ("nonsmooth.continuation", generate._own(ns.continuation)),
         ("nonsmooth.local", generate.returned_types()),
         ("nonsmooth.plot.style", ("settings", "arrowhead", "line", "marker")),
     ):

@@ -1,0 +1,233 @@
+"""Tracing one arc: predictor, corrector, step control, located zeros, and why it ends.
+
+The predictor is the polynomial in arclength through the last points. A step that fails, bends too
+much or leads to a point that is not on the curve is halved. A step in which a test changes its sign
+is searched for the zero. An interrupt ends the arc; what was computed is returned.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...model import Array
+from .curve import Curve, Point
+from .zeros import Zero, zeros_between
+
+#: Steps turn by no more than this, and grow where they turn by less than a third of it; rad.
+BEND = 0.3
+_ROWS = 6  # points of the predictor
+
+
+@dataclass(eq=False)
+class Arc:
+    """A piece of a curve.
+
+    Attributes
+    ----------
+    points : list of Point
+    zeros : list of Zero
+        Zeros of the tests, in their order along the arc.
+    end : str
+        ``"bound"``, ``"closed"``, ``"junction"``, ``"step too small"``, ``"points"`` (as many as
+        asked for), ``"interrupted"``, the name of the test that ended it, or what the curve said.
+    """
+
+    points: list[Point] = field(default_factory=list)
+    zeros: list[Zero] = field(default_factory=list)
+    end: str = ""
+
+    @property
+    def rows(self) -> list[Array]:
+        """The unknowns of the points."""
+        return [point.u for point in self.points]
+
+
+def trace(
+    curve: Curve,
+    rows: Sequence[Array],
+    tangent: Array,
+    *,
+    step: float,
+    first: float | None = None,
+    smallest: float = 1e-9,
+    most: int = 2000,
+    bounds: tuple[int, float, float] | None = None,
+    report: Callable[[Point], None] | None = None,
+) -> Arc:
+    """Follow a curve from the last of some points of it.
+
+    Parameters
+    ----------
+    curve : Curve
+    rows : sequence of ndarray (N,)
+        At least one point of the curve; earlier ones help the predictor.
+    tangent : ndarray (N,)
+        Which way to go, in scaled unknowns.
+    step : float
+        Largest step on bent pieces, in scaled unknowns; straight ones are taken in longer steps.
+    first : float, optional
+        The first step; by default a tenth of ``step``.
+    smallest : float, optional
+        An arc ends where steps would have to be shorter.
+    most : int, optional
+        Points of an arc.
+    bounds : (index, low, high), optional
+        Where one unknown stops the arc; it is solved for.
+    report : callable, optional
+        Called with every new point, e.g. to move a progress bar.
+
+    Returns
+    -------
+    Arc
+    """
+    arc = Arc()
+    tracing = _Tracing(curve, arc, step, smallest, bounds)
+    try:
+        tracing.begin(rows, tangent, step / 10 if first is None else first)
+        while not arc.end:
+            tracing.advance()
+            if report is not None and arc.points:
+                report(arc.points[-1])
+            if len(arc.points) >= most and not arc.end:
+                arc.end = "points"
+    except KeyboardInterrupt:
+        arc.end = "interrupted"
+    return arc
+
+
+class _Tracing:
+    """The state of one arc while it is traced."""
+
+    def __init__(
+        self,
+        curve: Curve,
+        arc: Arc,
+        step: float,
+        smallest: float,
+        bounds: tuple[int, float, float] | None,
+    ):
+        self.curve, self.arc, self.bounds = curve, arc, bounds
+        self.step, self.smallest, self.closing = step, smallest, False
+
+    def begin(self, rows: Sequence[Array], tangent: Array, first: float) -> None:
+        tangent = tangent / np.linalg.norm(tangent)
+        self.size = min(first, self.step)
+        for u in rows[:-1]:
+            self.arc.points.append(Point(np.asarray(u, float), tangent))
+        point = self.curve.point(np.asarray(rows[-1], float), tangent, tangent, 0.0)
+        if point is None:
+            self.arc.points.append(Point(np.asarray(rows[-1], float), tangent))
+            self.arc.end = "lost"
+            return
+        self.arc.points.append(point)
+        self.started = len(rows) - 1
+
+    def advance(self) -> None:
+        """Take one step, or halve it."""
+        curve, last = self.curve, self.arc.points[-1]
+        u, tangent = last.u, last.tangent
+        guess = ahead([p.u / curve.scale for p in self.arc.points[-_ROWS:]], self.size, tangent)
+        trial = curve.correct(guess * curve.scale, tangent)
+        chord = np.zeros(u.size) if trial is None else (trial - u) / curve.scale
+        bend = 0.0 if trial is None else angle(chord, tangent)
+        fault = "" if trial is None else curve.fault(trial)
+        new = None
+        if trial is not None and not fault and bend <= BEND:
+            length = float(np.linalg.norm(chord))
+            new = curve.point(trial, tangent, chord / length, last.arclength + length)
+        if new is not None and curve.exact:
+            bend = max(bend, angle(new.tangent, tangent))
+        if new is None or bend > BEND:
+            self._shorten(last, fault, bend, failed=trial is None)
+            return
+        self._accept(last, new)
+        if not self.closing and bend < BEND / 3:
+            straight = 10.0 if bend < 1e-6 else 4.0 if bend < 0.01 else 1.0
+            self.size = min(1.6 * self.size, straight * self.step)
+
+    def _shorten(self, last: Point, fault: str, bend: float, failed: bool) -> None:
+        """Halve a step that failed; end the arc where what ends it can be solved for."""
+        self.closing = self.closing or bool(fault) or (failed and not self.curve.exact)
+        if self.closing:
+            snapped = self.curve.snap(last.u, last.tangent, 2 * self.size)
+            if snapped is not None:
+                self.arc.points.append(Point(snapped, last.tangent))
+                self.arc.end = "junction"
+                return
+        if self.size < self.smallest:
+            self.arc.end = fault or ("lost" if failed else "step too small")
+        self.size *= 0.5
+
+    def _accept(self, last: Point, new: Point) -> None:
+        found = zeros_between(self.curve, last, new)
+        bound = self._bound(last, new)
+        if bound is not None:
+            new, self.arc.end = bound, "bound"
+            found = [zero for zero in found if zero.point.arclength <= new.arclength]
+        for zero in found:
+            self.arc.zeros.append(zero)
+            if self.curve.ends(zero.name):
+                self.arc.points.append(zero.point)
+                self.arc.end = zero.name
+                return
+        self.arc.points.append(new)
+        self.arc.end = self.arc.end or self.curve.out(new.u) or self._closed(last, new)
+
+    def _bound(self, last: Point, new: Point) -> Point | None:
+        """The point where the bounded unknown reaches its bound in this step."""
+        if self.bounds is None:
+            return None
+        k, low, high = self.bounds
+        if low <= new.u[k] <= high:
+            return None
+        limit = low if new.u[k] < low else high
+        weight = (limit - last.u[k]) / (new.u[k] - last.u[k])
+        guess = last.u + weight * (new.u - last.u)
+        guess[k] = limit
+        axis = np.zeros(guess.size)
+        axis[k] = 1.0
+        u = self.curve.correct(guess, axis)
+        if u is None:
+            return None
+        u[k] = limit
+        chord = (u - last.u) / self.curve.scale
+        length = float(np.linalg.norm(chord)) or 1.0
+        return self.curve.point(u, last.tangent, chord / length, last.arclength + length)
+
+    def _closed(self, last: Point, new: Point) -> str:
+        """Whether this step passes the start again."""
+        first = self.arc.points[self.started]
+        back, step = (first.u - last.u) / self.curve.scale, (new.u - last.u) / self.curve.scale
+        if len(self.arc.points) - self.started < 5 or first.tangent @ new.tangent < 0.5:
+            return ""
+        along = float(back @ step) / float(step @ step)
+        across = float(np.linalg.norm(back - along * step))
+        return "closed" if 0 < along <= 1 and across < 0.3 * float(np.linalg.norm(step)) else ""
+
+
+def ahead(rows: Sequence[Array], size: float, tangent: Array) -> Array:
+    """Guess for the point ``size`` ahead: the polynomial in arclength through the last points.
+
+    Examples
+    --------
+    >>> t = np.linspace(0, 1, 6)
+    >>> parabola = list(np.column_stack([t, 0 * t]))
+    >>> ahead(parabola, 0.2, np.array([1.0, 0.0])).round(12).tolist()
+    [1.2, 0.0]
+    """
+    last = np.array(rows)
+    if len(last) < 3:
+        return np.asarray(last[-1] + size * tangent)
+    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(last, axis=0), axis=1))])
+    nodes = s - s[-1]
+    weights = [np.prod([(size - b) / (a - b) for b in nodes if b != a]) for a in nodes]
+    return np.asarray(weights @ last)
+
+
+def angle(step: Array, direction: Array) -> float:
+    """Angle of a step with a direction of length 1; pi for none."""
+    length = float(np.linalg.norm(step))
+    return float(np.arccos(np.clip(step @ direction / length, -1, 1))) if length else np.pi

@@ -1,0 +1,181 @@
+"""What is continued: N - 1 smooth equations in N unknowns, and a point of the curve they define.
+
+Lengths and angles are measured in unknowns divided by their ``scale``. A guess is corrected in the
+hyperplane across a direction (pseudo-arclength; Keller 1977), so turning points are regular points.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ...local.newton import Secant, converge
+from ...model import Array, NonsmoothError
+
+
+@dataclass(frozen=True, eq=False)
+class Point:
+    """A point of a curve.
+
+    Attributes
+    ----------
+    u : ndarray (N,)
+        The unknowns.
+    tangent : ndarray (N,)
+        Direction of the curve in scaled unknowns, of length 1.
+    arclength : float
+        From the start of the arc, in scaled unknowns.
+    jacobian : ndarray (N - 1, N)
+        Of the equations by scaled unknowns; empty for a curve without derivatives.
+    tests : mapping of str to float
+        Functions whose zeros are looked for.
+    """
+
+    u: Array
+    tangent: Array
+    arclength: float = 0.0
+    jacobian: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    tests: Mapping[str, float] = field(default_factory=dict)
+
+
+class Curve:
+    """A curve in R^N; subclasses say by which equations, and what to watch along it.
+
+    Attributes
+    ----------
+    scale : ndarray (N,) or float
+        Sizes of the unknowns.
+    tol : float
+        Error of a point, in scaled unknowns.
+    exact : bool
+        Whether ``equations`` gives the derivative itself, not a :class:`~nonsmooth.continuation.Secant`
+        estimate of it; then tangents come from it, otherwise from the chord.
+    parameter : int or None
+        The unknown whose turning points are looked for, under the name ``"fold"``.
+    branching : bool
+        Whether branch points are looked for, under the name ``"branch point"``.
+
+    Examples
+    --------
+    The unit circle, from its rightmost point once round:
+
+    >>> import nonsmooth as ns
+    >>> class Circle(ns.continuation.Curve):
+    ...     parameter = 0
+    ...     def equations(self, u):
+    ...         return np.array([u @ u - 1]), 2 * u[None, :]
+    >>> arc = ns.continuation.trace(Circle(), [np.array([1.0, 0.0])], np.array([0.0, 1.0]), step=0.2)
+    >>> arc.end, [(zero.name, zero.point.u[0].round(12).tolist()) for zero in arc.zeros]
+    ('closed', [('fold', -1.0), ('fold', 1.0)])
+    """
+
+    scale: Array | float = 1.0
+    tol: float = 1e-13
+    exact: bool = True
+    parameter: int | None = None
+    branching: bool = False
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        """Values (N - 1,) and their Jacobian (N - 1, N)."""
+        raise NotImplementedError
+
+    def fault(self, u: Array) -> str:
+        """Why a zero of the equations is not a point of the curve; empty if it is one."""
+        return ""
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        """Functions whose zeros along the curve are located."""
+        return {}
+
+    def ends(self, name: str) -> bool:
+        """Whether the curve ends at a zero of this test."""
+        return False
+
+    def out(self, u: Array) -> str:
+        """Why the curve need not be followed beyond a point; empty if it is."""
+        return ""
+
+    def snap(self, u: Array, tangent: Array, reach: float) -> Array | None:
+        """The end of the curve ahead within ``reach``, solved for, where it is known what ends it."""
+        return None
+
+    # what follows from the equations ------------------------------------------------------------
+
+    def scaled(self, u: Array) -> tuple[Array, Array]:
+        """Values and Jacobian by scaled unknowns, from scaled unknowns."""
+        values, jacobian = self.equations(u * self.scale)
+        return values, jacobian * self.scale
+
+    def correct(self, guess: Array, across: Array, *, max_iterations: int = 10) -> Array | None:
+        """Point of the curve in the hyperplane through ``guess`` across a direction, or None.
+
+        Parameters
+        ----------
+        guess : ndarray (N,)
+        across : ndarray (N,)
+            In scaled unknowns; a unit vector keeps that unknown at its value in ``guess``.
+        max_iterations : int, optional
+        """
+        start = guess / self.scale
+        level = float(across @ start)
+
+        def bordered(v: Array) -> tuple[Array, Array]:
+            values, jacobian = self.scaled(v)
+            return np.append(values, across @ v - level), np.vstack([jacobian, across])
+
+        def attempt() -> Array | None:
+            return converge(bordered, start, tol=self.tol, max_iterations=max_iterations)
+
+        try:
+            found = attempt()
+            source = getattr(self, "secant", None)
+            if found is None and isinstance(source, Secant) and source.forget():
+                found = attempt()
+        except NonsmoothError:
+            return None
+        return None if found is None else found * self.scale
+
+    def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
+        """Describe a zero of the equations: tangent, along ``before``, and tests; None if it fails."""
+        if not self.exact:
+            plain = Point(u, chord, arclength)
+            return Point(u, chord, arclength, tests=dict(self.tests(plain)))
+        try:
+            _, jacobian = self.scaled(u / self.scale)
+            tangent, sign = along(jacobian, before)
+            tests: dict[str, float] = {}
+            if self.parameter is not None:
+                tests["fold"] = float(tangent[self.parameter])
+            if self.branching:
+                tests["branch point"] = sign
+            tests.update(self.tests(Point(u, tangent, arclength, jacobian)))
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return None
+        return Point(u, tangent, arclength, jacobian, tests)
+
+
+def along(jacobian: Array, before: Array) -> tuple[Array, float]:
+    """Null vector of a Jacobian that continues ``before``, and the bordered determinant.
+
+    The determinant is that of the Jacobian bordered by the tangent: it changes sign at a simple
+    branch point.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        At a branch point.
+
+    Examples
+    --------
+    >>> along(np.array([[0.0, 2.0]]), np.array([0.6, 0.8]))[0].tolist()
+    [1.0, 0.0]
+    """
+    bordered = np.vstack([jacobian, before])
+    target = np.zeros(before.size)
+    target[-1] = 1.0
+    tangent = np.linalg.solve(bordered, target)
+    length = float(np.linalg.norm(tangent))
+    sign, size = np.linalg.slogdet(bordered)
+    return np.asarray(tangent / length), float(sign) * float(np.exp(size)) * length

@@ -1,0 +1,147 @@
+"""Curves made of pieces: each with equations of its own, the next beginning where one ends."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...model import Array
+from .arc import Arc
+from .curve import Curve, Point
+
+
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """How a piece begins: its curve, points of it, and the way it goes in scaled unknowns."""
+
+    curve: Curve
+    rows: list[Array]
+    tangent: Array
+
+
+def pieces(
+    departure: Departure,
+    follow: Callable[[Departure], Arc],
+    following: Callable[[Departure, Arc], Departure | None],
+    *,
+    last: Callable[[Arc], bool],
+    apart: float = 1e-6,
+    most: int = 24,
+) -> Iterator[tuple[Departure, Arc]]:
+    """Trace piece after piece.
+
+    Parameters
+    ----------
+    departure : Departure
+        Of the first piece.
+    follow : callable
+        Traces one piece.
+    following : callable
+        How the next one begins, from the piece that ended; None if nothing follows.
+    last : callable
+        Whether the curve ends with a piece.
+    apart : float, optional
+        A piece that ends where an earlier one did closes the curve; distance in scaled unknowns.
+    most : int, optional
+        Number of pieces.
+
+    Yields
+    ------
+    Departure, Arc
+    """
+    ends: list[Array] = []
+    for _ in range(most):
+        arc = follow(departure)
+        yield departure, arc
+        end = arc.points[-1].u / departure.curve.scale
+        if last(arc) or any(np.linalg.norm(end - e) < apart for e in ends):
+            return
+        ends.append(end)
+        found = following(departure, arc)
+        if found is None:
+            return
+        departure = found
+
+
+def depart(
+    curve: Curve, u: Array, direction: Array, distance: float, forward: Array
+) -> Departure | None:
+    """Leave a point along a direction, unless that is the way back.
+
+    Parameters
+    ----------
+    curve : Curve
+    u : ndarray (N,)
+    direction : ndarray (N,)
+        In scaled unknowns.
+    distance : float
+    forward : ndarray (N,)
+        How the point was reached.
+    """
+    found = curve.correct(u + distance * direction * curve.scale, direction)
+    if found is None or curve.fault(found):
+        return None
+    step = (found - u) / curve.scale
+    tangent = step / np.linalg.norm(step)
+    return Departure(curve, [u, found], tangent) if tangent @ forward > -0.9 else None
+
+
+def directions(curve: Curve, u: Array) -> list[Array]:
+    """Both directions of the curve at a point, by its Jacobian; in scaled unknowns."""
+    _, jacobian = curve.scaled(u / curve.scale)
+    tangent = np.linalg.svd(jacobian)[2][-1]
+    return [tangent, -tangent]
+
+
+def other_direction(point: Point) -> Array:
+    """Across the curve in the plane of both branches that meet at a branch point.
+
+    The Jacobian has two null vectors there. The one across the tangent leads, corrected in the
+    hyperplane across it, to the other branch (Keller 1977).
+    """
+    null = np.linalg.svd(point.jacobian)[2][-2:]
+    inside = null @ point.tangent
+    across = inside[0] * null[1] - inside[1] * null[0]
+    return np.asarray(across / np.linalg.norm(across))
+
+
+def changes_around(
+    label: Callable[[float], str],
+    sign: Callable[[str], int],
+    start: float,
+    *,
+    count: int = 49,
+    leave_out: int = 3,
+    halvings: int = 12,
+) -> Iterator[tuple[float, str, str]]:
+    """Angles at which a label changes its sign on a small circle, the nearest to ``start`` first.
+
+    Parameters
+    ----------
+    label : callable
+        angle -> label.
+    sign : callable
+        label -> -1, 0 or 1.
+    start : float
+        The way ahead; the way back is left out.
+    count, leave_out, halvings : int, optional
+        Angles looked at, of them left out at either end, and bisections of an interval.
+
+    Yields
+    ------
+    angle, label before, label after
+    """
+    angles = start + np.linspace(-np.pi, np.pi, count)[leave_out : count - leave_out]
+    labels = [label(float(a)) for a in angles]
+    for k in sorted(range(len(labels) - 1), key=lambda k: abs(k - len(labels) // 2)):
+        (low, high), (a, b) = map(float, angles[k : k + 2]), labels[k : k + 2]
+        if sign(a) * sign(b) >= 0:
+            continue
+        middle = low
+        for _ in range(halvings):
+            middle = 0.5 * (low + high)
+            c = label(middle)
+            low, high, a, b = (middle, high, c, b) if sign(c) == sign(a) else (low, middle, a, c)
+        yield middle, a, b

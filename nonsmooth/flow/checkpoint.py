@@ -1,25 +1,35 @@
 """Finished chunks of an ensemble in a folder, so that an interrupted sweep goes on where it was.
 
 The folder holds ``problem.json`` (a hash of system, starts, parameters and options, and the size of
-a chunk) and one ``.npz`` file for each finished chunk. Files appear by an atomic rename.
+a chunk) and one ``.npz`` file for each finished chunk. Each is sealed with a hash of all that is in
+it and of what it belongs to. A chunk that is damaged, that was changed by hand or that comes from
+another problem or place counts as not finished and is computed again; a damaged ``problem.json``
+is refused. The seal finds accidents; it is no signature against one who knows how it is made.
 """
 
 from __future__ import annotations
 
+import hashlib
+import io
 import json
 import os
-import tempfile
 from pathlib import Path
-from zipfile import BadZipFile
+from typing import Any
+from zipfile import ZIP_STORED, ZipFile
 
 import numpy as np
+from numpy.typing import NDArray
 
-from ..model import OptionError
+from ..model import OptionError, explain
+from . import files
 from .results import Chunk
+from .status import Status
 
 #: Raised whenever the files or the numbers in them change, so that versions are not mixed.
-_FORMAT = 2
-_ARRAYS = ("x", "t", "status", "itinerary", "kinds", "at_x", "at_t", "totals")
+_FORMAT = 3
+
+#: Bytes: of problem.json, of the itineraries of a chunk, of a header of an array in a file.
+_HEAD, _WORDS, _HEADER = 1 << 12, 1 << 30, 1 << 10
 
 
 class Checkpoint:
@@ -37,61 +47,165 @@ class Checkpoint:
     Raises
     ------
     OptionError
-        The folder belongs to another problem or is no checkpoint.
+        The folder belongs to another problem, is no checkpoint, is damaged or cannot be written.
     """
 
     def __init__(self, path: str | os.PathLike[str], problem: str, chunk: int):
-        self.folder, self.chunk = Path(path), chunk
+        self.folder, self.problem, self.chunk = Path(path), problem, chunk
         head = self.folder / "problem.json"
-        if head.exists():
-            self.chunk = self._check(head, problem)
-            return
-        if self.folder.exists() and (not self.folder.is_dir() or any(self.folder.iterdir())):
-            raise OptionError(
-                f"checkpoint: expected a new folder or one written by ensemble, received "
-                f"{self.folder}, which holds something else. Choose another path."
-            )
-        self.folder.mkdir(parents=True, exist_ok=True)
-        content = {"format": _FORMAT, "problem": problem, "chunk": chunk}
-        self._write(head, json.dumps(content).encode())
-
-    def _check(self, head: Path, problem: str) -> int:
         try:
-            content = json.loads(head.read_text(encoding="utf-8"))
-            same = content["problem"] == problem and content["format"] == _FORMAT
-            chunk = int(content["chunk"])
-        except (ValueError, KeyError, TypeError):
-            same, chunk = False, 0
-        if not same:
+            if os.path.lexists(head):
+                self.chunk = self._check(head)
+                return
+            if os.path.lexists(self.folder) and self._holds_something():
+                raise OptionError(
+                    f"checkpoint: expected a new folder or one written by ensemble, received "
+                    f"{self.folder}, which holds something else. Choose another path."
+                )
+            self.folder.mkdir(parents=True, exist_ok=True)
+            files.replace(head, json.dumps(_sealed(self._head(chunk))).encode())
+        except (OSError, ValueError) as error:
+            if isinstance(error, OptionError):
+                raise
+            raise self._unusable(error) from error
+
+    def _head(self, chunk: int) -> dict[str, Any]:
+        return {"format": _FORMAT, "problem": self.problem, "chunk": chunk}
+
+    def _holds_something(self) -> bool:
+        if not self.folder.is_dir():
+            return True
+        return any(not p.name.startswith(files.PART) for p in self.folder.iterdir())
+
+    def _unusable(self, error: Exception) -> OptionError:
+        return OptionError(
+            explain(
+                "checkpoint",
+                expected="a folder that can be read and written",
+                received=f"{str(self.folder)!r} ({error})",
+                advice="Finished chunks in it are kept. Make room or choose another path.",
+            )
+        )
+
+    def _check(self, head: Path) -> int:
+        """Size of a chunk according to the folder, which must be this problem's."""
+        try:
+            content = json.loads(files.read(head, _HEAD) or b"")
+            own = {name: content[name] for name in ("format", "problem", "chunk")}
+            whole = content == _sealed(own) and type(own["chunk"]) is int and own["chunk"] > 0
+        except (ValueError, KeyError, TypeError, RecursionError):
+            own, whole = {}, False
+        if own.get("format", _FORMAT) == _FORMAT and not whole:
+            raise OptionError(
+                f"checkpoint: expected the file that ensemble wrote, received {head}, which is "
+                f"damaged or was changed. Choose another path, or delete {self.folder}."
+            )
+        if own != self._head(own["chunk"]):
             raise OptionError(
                 f"checkpoint: expected one of this problem, received {self.folder}, written for "
-                "another system, start, parameter or option. Choose another path, or delete it."
+                "another system, start, parameter or option, or by another version. Choose another "
+                "path, or delete it."
             )
-        return chunk
+        return own["chunk"]
 
-    def load(self, number: int) -> Chunk | None:
-        """Return a finished chunk, or None; a damaged file counts as not finished."""
-        try:
-            with np.load(self._file(number), allow_pickle=False) as data:
-                arrays = {k: data[k] if k in data else None for k in _ARRAYS}
-                words = json.loads(str(data["words"]))
-        except (OSError, ValueError, KeyError, EOFError, BadZipFile):
+    def load(self, number: int, like: Chunk) -> Chunk | None:
+        """Return a finished chunk, or None; a damaged file counts as not finished.
+
+        Parameters
+        ----------
+        number : int
+        like : Chunk
+            Has arrays as the chunk's must be; what is in them does not matter.
+        """
+        expected = _arrays(like)
+        most = sum(a.nbytes + 2 * _HEADER for a in expected.values()) + _WORDS
+        data = files.read(self._file(number), most)
+        if data is None:
             return None
-        return Chunk(words=words, **arrays)  # type: ignore[arg-type]
+        try:
+            arrays = _unpacked(data, expected)
+            words = json.loads(arrays.pop("words").tobytes())
+            seal = arrays.pop("seal").tobytes()
+            if seal != self._seal(number, words, arrays) or not _valid(words, arrays):
+                return None
+        except Exception:  # whatever a damaged file drives the readers of zip, NumPy and JSON to
+            return None
+        return Chunk(**{"at_x": None, "at_t": None, **arrays}, words=words)
 
     def save(self, number: int, chunk: Chunk) -> None:
-        """Write a finished chunk."""
-        arrays = {k: v for k in _ARRAYS if (v := getattr(chunk, k)) is not None}
-        handle, name = tempfile.mkstemp(dir=self.folder, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            np.savez(file, words=np.array(json.dumps(chunk.words)), **arrays)
-        os.replace(name, self._file(number))
+        """Write a finished chunk.
+
+        Raises
+        ------
+        OptionError
+            It cannot be written; those that were finished before are kept.
+        """
+        arrays, memory = _arrays(chunk), io.BytesIO()
+        words = np.frombuffer(json.dumps(chunk.words).encode(), np.uint8)
+        seal = np.frombuffer(self._seal(number, chunk.words, arrays), np.uint8)
+        np.savez(memory, words=words, seal=seal, **arrays)
+        try:
+            files.replace(self._file(number), memory.getvalue())
+        except OSError as error:
+            raise self._unusable(error) from error
 
     def _file(self, number: int) -> Path:
         return self.folder / f"chunk-{number:08d}.npz"
 
-    def _write(self, target: Path, data: bytes) -> None:
-        handle, name = tempfile.mkstemp(dir=self.folder, suffix=".part")
-        with os.fdopen(handle, "wb") as file:
-            file.write(data)
-        os.replace(name, target)
+    def _seal(self, number: int, words: list[str], arrays: dict[str, NDArray[Any]]) -> bytes:
+        place = [self.problem, self.chunk, number]
+        code = hashlib.sha256(json.dumps([_FORMAT, place, words]).encode())
+        for name, array in sorted(arrays.items()):
+            code.update(f"{name} {array.dtype.str} {array.shape}".encode())
+            code.update(np.ascontiguousarray(array).tobytes())
+        return code.digest()
+
+
+def _sealed(content: dict[str, Any]) -> dict[str, Any]:
+    text = json.dumps(content, sort_keys=True).encode()
+    return {**content, "seal": hashlib.sha256(text).hexdigest()}
+
+
+def _arrays(chunk: Chunk) -> dict[str, NDArray[Any]]:
+    return {**chunk.arrays(), "totals": chunk.totals}
+
+
+def _unpacked(data: bytes, expected: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+    """Arrays of a file; ValueError unless they have the types and shapes expected.
+
+    Nothing is made larger than the file: its parts are not compressed, and an array that says that it
+    is of another size than it has to be is not read.
+    """
+    arrays: dict[str, NDArray[Any]] = {}
+    with ZipFile(io.BytesIO(data)) as file:
+        parts = {part.filename: part for part in file.infolist()}
+        if set(parts) != {f"{name}.npy" for name in (*expected, "words", "seal")}:
+            raise ValueError("other arrays")
+        for name, part in parts.items():
+            if part.compress_type != ZIP_STORED or part.file_size > len(data):
+                raise ValueError("compressed")
+            raw = file.read(part)
+            stream = io.BytesIO(raw)
+            if np.lib.format.read_magic(stream) != (1, 0):
+                raise ValueError("another version")
+            found = np.lib.format.read_array_header_1_0(stream)
+            content, wanted = raw[stream.tell() :], expected.get(name.removesuffix(".npy"))
+            if wanted is None:
+                wanted = np.empty(len(content), np.uint8)
+            if found != (wanted.shape, False, wanted.dtype):
+                raise ValueError("another shape or type")
+            array = np.frombuffer(content, wanted.dtype).reshape(wanted.shape)
+            arrays[name.removesuffix(".npy")] = array
+    return arrays
+
+
+def _valid(words: list[str], arrays: dict[str, NDArray[Any]]) -> bool:
+    """Whether a chunk is one that a run could have had."""
+    code, known = arrays["itinerary"], [int(s) for s in Status]
+    return (
+        words == sorted(set(words))
+        and all(isinstance(w, str) for w in words)
+        and bool(np.all((code >= 0) & (code < len(words))))
+        and bool(np.isin(arrays["status"], known).all())
+        and bool(np.all(arrays["kinds"] >= 0))
+    )

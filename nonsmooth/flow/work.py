@@ -62,6 +62,7 @@ class Work:
     def __post_init__(self) -> None:
         _positive("chunk", self.chunk)
         _positive("threads", 1 if self.threads is None else self.threads)
+        _require_path(self.checkpoint)
         if self.executor is not None and not isinstance(self.executor, Executor):
             raise OptionError(
                 explain(
@@ -89,6 +90,18 @@ def _positive(name: str, value: int) -> None:
         raise OptionError(f"{name}: expected a positive integer, received {value!r}.")
 
 
+def _require_path(value: object) -> None:
+    if value is not None and not (isinstance(value, (str, os.PathLike)) and str(value)):
+        raise OptionError(
+            explain(
+                "checkpoint",
+                expected="the path of a folder",
+                received=f"{value!r} ({type(value).__name__})",
+                advice='For example checkpoint="sweep".',
+            )
+        )
+
+
 def run_all(
     job: Job, starts: Starts, results: Collected, work: Work, saved: Checkpoint | None
 ) -> None:
@@ -107,11 +120,13 @@ def run_all(
     bar = _bar(starts.count, work.progress)
     missing = []
     for number in range(math.ceil(starts.count / size)):
-        done = saved.load(number) if saved is not None else None
+        first = number * size
+        like = results.all.part(first, min(first + size, starts.count))
+        done = saved.load(number, like) if saved is not None else None
         if done is None:
             missing.append(number)
         else:
-            results.put(number * size, done)
+            results.put(first, done)
             bar.update(len(done.t))
     ends = ((k, k * size, min((k + 1) * size, starts.count)) for k in missing)
     pieces = ((k, *starts.part(a, b), results.all.part(a, b)) for k, a, b in ends)

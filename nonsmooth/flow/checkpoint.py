@@ -13,6 +13,7 @@ import hashlib
 import io
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 from zipfile import ZIP_STORED, ZipFile
@@ -130,7 +131,7 @@ class Checkpoint:
                 return None
         except Exception:  # whatever a damaged file drives the readers of zip, NumPy and JSON to
             return None
-        return Chunk(**{"at_x": None, "at_t": None, **arrays}, words=words)
+        return replace(like, **arrays, words=words)
 
     def save(self, number: int, chunk: Chunk) -> None:
         """Write a finished chunk.
@@ -143,7 +144,8 @@ class Checkpoint:
         arrays, memory = _arrays(chunk), io.BytesIO()
         words = np.frombuffer(json.dumps(chunk.words).encode(), np.uint8)
         seal = np.frombuffer(self._seal(number, chunk.words, arrays), np.uint8)
-        np.savez(memory, words=words, seal=seal, **arrays)
+        parts: dict[str, Any] = {**arrays, "words": words, "seal": seal}
+        np.savez(memory, **parts)
         try:
             files.replace(self._file(number), memory.getvalue())
         except OSError as error:

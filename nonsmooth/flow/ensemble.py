@@ -16,7 +16,7 @@ from .compiled.engine import engine_for
 from .facts import KINDS
 from .options import Options
 from .results import Collected, Ensemble
-from .select import use_compiled
+from .select import compiled_or_none, use_compiled
 from .starts import Starts
 from .work import Work, run_all
 
@@ -103,20 +103,24 @@ def ensemble(
         system.parse_mode(start_mode)
     starts = Starts(system, x0, parameters, t_start)
     at = _event_number(at_event)
-    compiled = use_compiled(engine, engine_for(system, options) is not None)
-    lanes = (
-        compiled
-        and supports_lanes(system)
-        and start_mode is None
-        and starts.count >= _FEW
-        and t_end > t_start
-    )
+    several = supports_lanes(system) and start_mode is None
+    several = several and starts.count >= _FEW and t_end > t_start
+    compiled = _compiled(system, options, engine, several)
+    lanes = compiled and several
     job = Job(system, options, at, compiled, lanes)
     work = Work() if work is None else work
     saved = work.checkpoint_of(lambda: _problem(system, starts, options, at, compiled))
     results = Collected(system.dimension, starts.shape, at is not None)
     run_all(job, starts, results, work, saved)
     return results.ensemble()
+
+
+def _compiled(system: FilippovSystem, options: Options, engine: str, lanes: bool) -> bool:
+    """Whether the compiled engine runs; it is compiled here, so that all chunks run the same one."""
+    fast = engine_for(system, options)
+    if not use_compiled(engine, fast is not None) or fast is None:
+        return False
+    return compiled_or_none(engine, fast, lambda: fast.lanes if lanes else fast.scalar) is not None
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -2,17 +2,25 @@
 
 from __future__ import annotations
 
-import warnings
-from functools import lru_cache
+from collections.abc import Callable
+from typing import TypeVar
+from weakref import WeakSet
 
 from ..model import OptionError, explain
-from .compiled.build import ADVICE, CompilerError, find_compiler
+from .compiled.compilers import ADVICE, CompilerError, find_compiler
+from .warn import CompilerWarning, warn_once
+
+__all__ = ["ENGINES", "CompilerWarning", "compiled_or_none", "use_compiled"]
 
 ENGINES = ("auto", "reference", "compiled")
 
 
-class CompilerWarning(UserWarning):
-    """The compiled engine is not used because there is no working compiler."""
+T = TypeVar("T")
+
+#: What could not be compiled; it is not tried again unless the compiled engine is asked for by name.
+_GIVEN_UP: WeakSet[object] = WeakSet()
+
+_SLOWLY = "The slow reference driver is used."
 
 
 def use_compiled(engine: str, supported: bool = True) -> bool:
@@ -44,15 +52,43 @@ def use_compiled(engine: str, supported: bool = True) -> bool:
                 "received 'compiled'. It has too many modes to compile."
             )
         return False
-    if find_compiler() is not None:
-        return True
+    try:
+        if find_compiler() is not None:
+            return True
+    except CompilerError as error:
+        if engine == "compiled":
+            raise
+        warn_once(f"{error} {_SLOWLY}")
+        return False
     if engine == "compiled":
         raise CompilerError(f"compiler: expected a C compiler, found none. {ADVICE}")
-    warn_once(f"No C compiler was found: the slow reference driver is used. {ADVICE}")
+    warn_once(f"No C compiler was found. {_SLOWLY} {ADVICE}")
     return False
 
 
-@lru_cache(maxsize=16)
-def warn_once(message: str) -> None:
-    """Warn, once in a process for each message."""
-    warnings.warn(message, CompilerWarning, stacklevel=4)
+def compiled_or_none(engine: str, of: object, work: Callable[[], T]) -> T | None:
+    """Return what work with the compiled engine returns, or None where it cannot be compiled.
+
+    Parameters
+    ----------
+    engine : {"auto", "compiled"}
+        ``"auto"`` warns where the compiler fails, once; ``"compiled"`` raises.
+    of : object
+        What is compiled; what failed once is not tried again by ``"auto"``.
+    work : callable
+
+    Raises
+    ------
+    CompilerError
+    """
+    if engine == "compiled":
+        return work()
+    if of in _GIVEN_UP:
+        return None
+    try:
+        return work()
+    except CompilerError as error:
+        _GIVEN_UP.add(of)
+        told = f"{error.brief} {_SLOWLY} {ADVICE}" if error.brief else f"{error} {_SLOWLY}"
+        warn_once(told)
+        return None

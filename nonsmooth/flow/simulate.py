@@ -12,7 +12,7 @@ from .compiled.convert import trajectory
 from .compiled.engine import engine_for, simulate_arrays
 from .options import Options
 from .reference.driver import Driver
-from .select import use_compiled
+from .select import compiled_or_none, use_compiled
 from .status import Status
 from .trajectory import Trajectory
 
@@ -117,8 +117,9 @@ def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: s
         first = Driver(system, x, p, replace(options, max_steps=steps)).run()
         if first.status is not Status.TOO_MANY_STEPS or options.max_steps <= steps:
             return first
-    if compiled:
-        arrays = simulate_arrays(system, x, p, options)
+    if compiled and available is not None:
+        run = lambda: simulate_arrays(system, x, p, options)
+        arrays = compiled_or_none(engine, available, run)
         if arrays is not None:
             return trajectory(system, p, options, arrays)
     return Driver(system, x, p, options).run()

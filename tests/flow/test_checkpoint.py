@@ -153,7 +153,6 @@ DAMAGE = {
     "empty": lambda path: path.write_bytes(b""),
     "text": lambda path: path.write_text("cut off"),
     **{f"cut at {p}": cut(p) for p in (0.1, 0.5, 0.9, 0.999)},
-    **{f"flipped at {p}": flipped(p) for p in (0.01, 0.1, 0.3, 0.5, 0.7, 0.9, 0.97, 0.99)},
     "one bit of a state": rewritten(scaled),
     "shape": put("x", np.zeros((3, 2))),
     "one state too many": put("x", np.zeros((2, 3))),
@@ -190,6 +189,14 @@ def test_a_damaged_chunk_is_computed_again(kind, folder, whole, saved):
     assert saved == [2]
 
 
+@pytest.mark.parametrize("place", np.linspace(0, 0.9999, 25).round(4))
+def test_a_single_bit_changes_nothing(place, folder, whole, saved):
+    """It is found, unless it is in what means nothing, such as the time in the zip file."""
+    flipped(place)(folder / LAST)
+    assert_same(sweep(folder), whole[1])
+    assert saved in ([], [2])
+
+
 def test_a_chunk_of_another_problem_is_computed_again(folder, whole, saved, tmp_path):
     other = tmp_path / "other"
     work = ns.Work(checkpoint=other, threads=1, chunk=CHUNK)
@@ -222,7 +229,7 @@ def edited(**changes):
 
 HEADS = {
     **{
-        f"chunk {c!r}": edited(chunk=c)
+        f"chunk {c!r}"[:20]: edited(chunk=c)
         for c in (0, -5, 3, 49, 10**9, 10**400, True, 4.0, "4", None, [4])
     },
     "empty": lambda path: path.write_text(""),

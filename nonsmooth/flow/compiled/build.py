@@ -1,125 +1,53 @@
-"""From C source to a loaded library: find a compiler, compile once, keep the result.
+"""From C source to a loaded library: compile once, keep the result, load it.
 
-The cache key hashes the source, the flags, the compiler's path and version, and the processor, so
-a change of any of them is another entry. Entries appear by an atomic rename: processes that build
-the same one at once do double work and no harm. An entry carries a hash of itself; one that does not
-match, or does not load, is built again.
+The key of an entry hashes the source, the flags, the compiler's path and version, and the processor,
+so a change of any of them is another entry. Entries appear by an atomic rename: processes that build
+the same one at once do double work and no harm. An entry that is damaged, or that does not load, is
+built again. A compiler that fails is told once and the next one is tried.
 """
 
 from __future__ import annotations
 
 import ctypes
 import hashlib
-import importlib.util
-import os
-import platform
 import shlex
-import shutil
 import subprocess
 import sys
 import tempfile
-from functools import lru_cache
 from pathlib import Path
 
-from ...model import NonsmoothError
-
-#: No -ffast-math: reassociation and assumed finiteness give wrong itineraries.
-FLAGS = (
-    "-O2 -march=native -std=gnu11 -fPIC -shared -fno-math-errno -fno-trapping-math "
-    "-ffp-contract=fast -w"
-).split()
-
-ADVICE = (
-    "Install one (gcc or clang from the system, or `pip install nonsmooth-dynamics[compiler]`), or "
-    "set CC."
+from .. import files
+from ..warn import warn_once
+from .compilers import (
+    ADVICE,
+    FLAGS,
+    Command,
+    CompilerError,
+    compilers,
+    find_compiler,
+    lane_width,
+    processor,
+    version,
 )
+from .store import cache_directory, is_intact, sealed, usable_folder
+
+__all__ = [
+    "CompilerError",
+    "build",
+    "cache_directory",
+    "compile_library",
+    "find_compiler",
+    "lane_width",
+    "library_key",
+]
+
+#: Seconds after which a compilation says that it is under way.
+_QUIET = 1.0
 
 
-class CompilerError(NonsmoothError, RuntimeError):
-    """No compiler was found, or it failed; the message holds the command and the file."""
-
-
-@lru_cache(maxsize=8)
-def _locate(cc: str, path: str) -> tuple[str, ...] | None:
-    if cc and shutil.which(shlex.split(cc)[0], path=path):
-        return tuple(shlex.split(cc))
-    for name in ("cc", "gcc", "clang"):
-        found = shutil.which(name, path=path)
-        if found:
-            return (found,)
-    if importlib.util.find_spec("ziglang") is not None:
-        return (sys.executable, "-m", "ziglang", "cc")
-    return None
-
-
-def find_compiler() -> tuple[str, ...] | None:
-    """Command of the C compiler: $CC, cc, gcc, clang, or the ziglang wheel; None without any."""
-    return _locate(os.environ.get("CC", ""), os.environ.get("PATH", ""))
-
-
-@lru_cache(maxsize=8)
-def _compiler_version(command: tuple[str, ...]) -> str:
-    """Identify a compiler without running it where its file says enough (running costs 10 ms)."""
-    path = shutil.which(command[0]) or command[0]
-    if len(command) > 1:
-        spec = importlib.util.find_spec("ziglang")
-        path = spec.origin if spec is not None and spec.origin else path
-    real = os.path.realpath(path)
-    try:
-        stat = os.stat(real)
-    except OSError:
-        return real
-    return f"{shlex.join(command)} {real} {stat.st_size} {stat.st_mtime_ns}"
-
-
-@lru_cache(maxsize=1)
-def _processor() -> str:
-    """What -march=native depends on."""
-    try:
-        lines = Path("/proc/cpuinfo").read_text(encoding="utf-8").split("\n\n")[0].splitlines()
-    except OSError:
-        return f"{platform.machine()} {platform.processor()} {platform.version()}"
-    keys = ("model name", "flags", "features", "cpu family", "model", "stepping")
-    return platform.machine() + "".join(
-        line for line in lines if line.split(":")[0].strip().lower() in keys
-    )
-
-
-def lane_width() -> int:
-    """Doubles in a vector register, and at least 4: wider vectors than the processor's are slow."""
-    return 8 if "avx512f" in _processor().split() else 4
-
-
-def cache_directory() -> Path:
-    """Folder of compiled engines: $NONSMOOTH_CACHE, or the user's cache folder."""
-    explicit = os.environ.get("NONSMOOTH_CACHE")
-    if explicit:
-        return Path(explicit)
-    if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "nonsmooth"
-
-
-def _writable_cache() -> Path:
-    folder = cache_directory()
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-        with tempfile.TemporaryFile(dir=folder):
-            return folder
-    except OSError:
-        return _private_folder()
-
-
-@lru_cache(maxsize=1)
-def _private_folder() -> Path:
-    return Path(tempfile.mkdtemp(prefix="nonsmooth-"))
-
-
-def library_key(source: str, command: tuple[str, ...]) -> str:
+def library_key(source: str, command: Command) -> str:
     """Content hash of a build."""
-    parts = (source, " ".join(FLAGS), _compiler_version(command), _processor(), sys.platform)
+    parts = (source, " ".join(FLAGS), version(command), processor(), sys.platform)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
@@ -129,59 +57,130 @@ def build(source: str) -> ctypes.CDLL:
     Raises
     ------
     CompilerError
+        There is no compiler, or none of them can compile it.
     """
-    command = find_compiler()
-    if command is None:
+    commands = compilers()
+    if not commands:
         raise CompilerError(f"compiler: expected a C compiler, found none. {ADVICE}")
-    folder = _writable_cache()
-    library = folder / f"{library_key(source, command)}.so"
-    for attempt in (1, 2):
-        if not _intact(library):
-            _compile(source, command, library)
+    failures: list[CompilerError] = []
+    for command in commands:
         try:
-            return ctypes.CDLL(str(library))
-        except OSError as error:
-            if attempt == 2:
-                raise CompilerError(
-                    f"library {library}: compiled but does not load ({error}). "
-                    "Is it built for another machine, or the folder mounted noexec? Set "
-                    "NONSMOOTH_CACHE to another folder."
-                ) from error
-            library.unlink(missing_ok=True)
-    raise AssertionError
+            library = _library(source, command, usable_folder())
+        except CompilerError as error:
+            failures.append(error)
+            continue
+        if failures:
+            warn_once(f"{failures[0].brief or failures[0]} {shlex.join(command)} is used instead.")
+        return library
+    raise failures[0]
 
 
-def _digest(data: bytes) -> bytes:
-    return b"nonsmooth" + hashlib.sha256(data).digest()
-
-
-def _intact(library: Path) -> bool:
-    """Whether a cache entry ends in the hash of what comes before (a linker ignores the tail)."""
+def _library(source: str, command: Command, folder: Path) -> ctypes.CDLL:
+    key = library_key(source, command)
+    library = folder / f"{key}.so"
+    if is_intact(library):
+        try:
+            return _loaded(library, key)
+        except OSError:
+            pass  # what it was built for is gone since: once more
+    compile_library(source, command, library)
     try:
-        data = library.read_bytes()
-    except OSError:
-        return False
-    return len(data) > 41 and data[-41:] == _digest(data[:-41])
+        return _loaded(library, key)
+    except OSError as error:
+        library.unlink(missing_ok=True)
+        raise CompilerError(
+            f"library {library}: compiled by {shlex.join(command)} but does not load ({error}). "
+            "Is it built for another machine, or the folder mounted noexec? Set NONSMOOTH_CACHE to "
+            "another folder.",
+            f"compiler: what {shlex.join(command)} makes does not load.",
+        ) from error
 
 
-def _compile(source: str, command: tuple[str, ...], library: Path) -> None:
+def _loaded(library: Path, key: str) -> ctypes.CDLL:
+    """Load a library; OSError if that fails or if it is not the one of this key."""
+    loaded = ctypes.CDLL(str(library))
+    try:
+        found = (ctypes.c_char * (len(key) + 1)).in_dll(loaded, "nonsmooth_key").value
+    except ValueError:
+        found = b""
+    if found != key.encode():
+        raise OSError("it is not the library of this source")
+    return loaded
+
+
+def compile_library(source: str, command: Command, library: Path) -> None:
+    """Put the library of a source into its place, which has its key as name.
+
+    Raises
+    ------
+    CompilerError
+        The compiler failed, or there is no room.
+    """
+    try:
+        _compile(source, command, library)
+    except OSError as error:
+        raise CompilerError(
+            f"cache: expected to write {library}, received {error}. Make room, or set "
+            "NONSMOOTH_CACHE to another folder."
+        ) from error
+
+
+def _compile(source: str, command: Command, library: Path) -> None:
     with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as work:
         text, output = Path(work) / "engine.c", Path(work) / "engine.so"
-        text.write_text(source, encoding="utf-8")
+        key = f'const char nonsmooth_key[] = "{library.stem}";\n'
+        text.write_text(f"{source}\n{key}", encoding="utf-8")
         call = [*command, *FLAGS, str(text), "-o", str(output), "-lm"]
-        try:
-            done = subprocess.run(call, capture_output=True, text=True, errors="replace")
-            failure = done.stderr if done.returncode else ""
-        except OSError as error:
-            failure = str(error)
-        if failure or not output.exists():
+        failure = _run(call)
+        if not failure and not output.is_file():
+            failure = "no error, but no library either"
+        if failure:
             kept = library.with_suffix(".c")
-            kept.write_text(source, encoding="utf-8")
+            files.replace(kept, source.encode())
             raise CompilerError(
                 f"compiler: expected a library from\n  {shlex.join(call)}\nreceived\n"
-                f"{failure.strip()[:2000]}\nThe source is kept in {kept}. {ADVICE}"
+                f"{failure[:2000]}\nThe source is kept in {kept}. {ADVICE}",
+                f"compiler: {shlex.join(command)} failed ({failure.splitlines()[0][:200]}).",
             )
-        with output.open("ab") as file:
-            data = output.read_bytes()
-            file.write(_digest(data))
-        os.replace(output, library)
+        files.replace(library, sealed(library.name, output.read_bytes()))
+
+
+def _run(call: list[str]) -> str:
+    """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
+    try:
+        process = subprocess.Popen(
+            call,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+            errors="replace",
+        )
+    except (OSError, ValueError) as error:
+        return str(error)
+    with process:
+        try:
+            errors = _finished(process)
+        except BaseException:
+            process.kill()
+            raise
+    if not process.returncode:
+        return ""
+    return errors.strip() or f"exit status {process.returncode} and no word about why"
+
+
+def _finished(process: subprocess.Popen[str]) -> str:
+    try:
+        return process.communicate(timeout=_QUIET)[1]
+    except subprocess.TimeoutExpired:
+        _say("nonsmooth: compiling the fast engine of this system (once; it is kept) ... ")
+        errors = process.communicate()[1]
+        _say("failed\n" if process.returncode else "done\n")
+        return errors
+
+
+def _say(text: str) -> None:
+    """Write to stderr, if there is one."""
+    if sys.stderr is not None:
+        sys.stderr.write(text)
+        sys.stderr.flush()

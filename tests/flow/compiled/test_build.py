@@ -10,6 +10,7 @@ import pytest
 
 import nonsmooth.flow.compiled.build as build_module
 from nonsmooth.flow.compiled.build import CompilerError, build, find_compiler
+from nonsmooth.flow.warn import CompilerWarning, warn_once
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -19,6 +20,7 @@ SOURCE = "int answer(void) { return 42; }\n"
 @pytest.fixture
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("NONSMOOTH_CACHE", str(tmp_path / "cache"))
+    warn_once.cache_clear()
     return tmp_path / "cache"
 
 
@@ -26,7 +28,7 @@ def test_compiled_once(cache, monkeypatch):
     assert build(SOURCE).answer() == 42
     entries = list(cache.iterdir())
     assert [e.suffix for e in entries] == [".so"]
-    monkeypatch.setattr(subprocess, "run", lambda *a, **k: pytest.fail("compiled again"))
+    monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: pytest.fail("compiled again"))
     assert build(SOURCE).answer() == 42
 
 
@@ -38,7 +40,7 @@ def test_key_depends_on_source_flags_compiler_and_processor(monkeypatch):
     monkeypatch.setattr(build_module, "FLAGS", ["-O0"])
     other = build_module.library_key(SOURCE, command)
     assert other != key
-    monkeypatch.setattr(build_module, "_processor", lambda: "another")
+    monkeypatch.setattr(build_module, "processor", lambda: "another")
     assert build_module.library_key(SOURCE, command) != other
 
 
@@ -46,9 +48,9 @@ def test_key_depends_on_source_flags_compiler_and_processor(monkeypatch):
 def test_damaged_entry_is_rebuilt(cache, damage):
     source = f"int answer(void) {{ return {len(damage or b'xyz')}; }}\n"
     library = cache / f"{build_module.library_key(source, find_compiler())}.so"
-    cache.mkdir()
+    cache.mkdir(mode=0o700)
     if damage is None:  # cut off in the middle, as by a full disk
-        build_module._compile(source, find_compiler(), library)
+        build_module.compile_library(source, find_compiler(), library)
         damage = library.read_bytes()[:-100]
         library.unlink()
     library.write_bytes(damage)
@@ -82,10 +84,12 @@ def test_named_compiler_is_preferred(cache, monkeypatch):
 
 
 def test_cache_folder_that_cannot_be_written(tmp_path, monkeypatch):
+    warn_once.cache_clear()
     blocked = tmp_path / "file"
     blocked.write_text("")
     monkeypatch.setenv("NONSMOOTH_CACHE", str(blocked))
-    assert isinstance(build(SOURCE), ctypes.CDLL)
+    with pytest.warns(CompilerWarning, match="cache: expected a folder"):
+        assert isinstance(build(SOURCE), ctypes.CDLL)
 
 
 HIDDEN = """

@@ -295,6 +295,8 @@ def test_an_executor_of_another_kind_is_refused():
 
 
 def test_quiet_without_a_terminal(system, starts, capfd):
+    ensemble(system, starts[:5], 1.0)  # a compilation that takes long says so
+    capfd.readouterr()
     ensemble(system, starts[:5], 1.0, work=Work(progress=True))
     out, err = capfd.readouterr()
     assert out == "" and err == ""

@@ -168,7 +168,7 @@ FLOORS = {
     "model": "What a nonsmooth system is: states, parameters, fields, surfaces, stops and resets.",
     "local": "What happens at a point of a surface, without time stepping.",
     "flow": "Moving through time.",
-    "orbit": "What needs both: sets of futures, curves of two-folds.",
+    "orbit": "What needs both: sets of futures, branches of solutions, curves of two-folds.",
 }
 
 

@@ -78,7 +78,18 @@ from .model import (
     Stop,
     regularise,
 )
-from .orbit import Funnel, TraceError, continuation, funnel, trace_two_folds
+from .orbit import (
+    Branch,
+    BranchEnd,
+    BranchEvent,
+    FarSide,
+    Funnel,
+    TraceError,
+    continuation,
+    continue_equilibrium,
+    funnel,
+    trace_two_folds,
+)
 
 if TYPE_CHECKING:
     from . import plot, textbook
@@ -86,11 +97,15 @@ if TYPE_CHECKING:
 __version__ = "0.1.0.dev0"
 
 __all__ = [
+    "Branch",
+    "BranchEnd",
+    "BranchEvent",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
     "Ensemble",
     "Event",
+    "FarSide",
     "FilippovSystem",
     "Funnel",
     "Impact",
@@ -112,6 +127,7 @@ __all__ = [
     "boundary_equilibrium",
     "classify",
     "continuation",
+    "continue_equilibrium",
     "ensemble",
     "find_all",
     "find_boundary_equilibrium",

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -71,7 +72,7 @@ class Curve:
     ('closed', [('fold', -1.0), ('fold', 1.0)])
     """
 
-    scale: Array | float = 1.0
+    scale: Any = 1.0
     tol: float = 1e-13
     exact: bool = True
     parameter: int | None = None

@@ -56,7 +56,8 @@ def pieces(
         arc = follow(departure)
         yield departure, arc
         end = arc.points[-1].u / departure.curve.scale
-        if last(arc) or any(np.linalg.norm(end - e) < apart for e in ends):
+        same = [e for e in ends if e.size == end.size]
+        if last(arc) or any(np.linalg.norm(end - e) < apart for e in same):
             return
         ends.append(end)
         found = following(departure, arc)

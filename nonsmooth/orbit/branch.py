@@ -1,0 +1,359 @@
+"""Branches of solutions as one parameter varies: what is returned, and how the pieces are joined.
+
+A branch is a chain of pieces, each continued by :mod:`nonsmooth.orbit.continuation` with equations
+of its own; it is followed from its start both ways.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from typing import Any
+
+import numpy as np
+
+from ..local.read_only import ReadOnly
+from ..model import Array, ConvergenceError, OptionError, PointError, explain, real
+from .continuation import Arc, Curve, Departure, Point, Zero, pieces, trace
+
+
+class BranchEnd(Enum):
+    """Why a branch ends."""
+
+    REACHED_BOUND = "bound"
+    CLOSED = "closed"
+    EVENT = "event"
+    PERIOD_DIVERGES = "period"
+    STEP_TOO_SMALL = "step too small"
+    TOO_MANY_POINTS = "points"
+    INTERRUPTED = "interrupted"
+
+    def __str__(self) -> str:
+        return self.name
+
+    @property
+    def advice(self) -> str:
+        """What it means, in a sentence."""
+        return _ADVICE[self]
+
+
+_ADVICE = {
+    BranchEnd.REACHED_BOUND: "The parameter reached its bound.",
+    BranchEnd.CLOSED: "The branch is a closed curve.",
+    BranchEnd.EVENT: "The branch ends at an event: nothing continues it, or through=False.",
+    BranchEnd.PERIOD_DIVERGES: "The period grows without bound: a homoclinic orbit is near.",
+    BranchEnd.STEP_TOO_SMALL: "Steps became too short: the solutions end here, or the equations do.",
+    BranchEnd.TOO_MANY_POINTS: "Raise max_points to go on.",
+    BranchEnd.INTERRUPTED: "Interrupted; what was computed is here.",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class FarSide:
+    """What is beyond an event.
+
+    Attributes
+    ----------
+    itinerary : str
+        Or the kind of solution; empty if nothing continues the branch.
+    verdict : str
+        In words.
+    numbers : mapping of str to float
+        What the verdict rests on.
+    """
+
+    itinerary: str = ""
+    verdict: str = ""
+    numbers: Mapping[str, float] = field(default_factory=lambda: ReadOnly({}))
+
+    def __str__(self) -> str:
+        parts = [part for part in (self.itinerary, self.verdict) if part]
+        return ": ".join(parts) if parts else "nothing changes"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class BranchEvent:
+    """A bifurcation on a branch.
+
+    Attributes
+    ----------
+    kind : str
+        ``"fold"``, ``"Hopf"``, ``"period doubling"``, ``"grazing-sliding"``, ...
+    parameter : float
+        Where the branch parameter is.
+    solution
+        What is continued, there: an equilibrium or a periodic orbit.
+    far_side : FarSide
+    coefficients : mapping of str to float
+        Of normal forms and conditions.
+    curve, point
+        The equations that were continued and the point on them, from which
+        ``continue_bifurcation`` and branch switching start.
+    """
+
+    kind: str
+    parameter: float
+    solution: Any
+    far_side: FarSide = field(default_factory=FarSide)
+    coefficients: Mapping[str, float] = field(default_factory=lambda: ReadOnly({}))
+    curve: Any = None
+    point: Point | None = None
+
+    @property
+    def orbit(self) -> Any:
+        """The solution, where it is a periodic orbit."""
+        return self.solution
+
+    def __repr__(self) -> str:
+        return f"BranchEvent({self.kind!r}, {self.parameter:.10g}, {self.far_side})"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Branch:
+    """Solutions as a parameter varies.
+
+    Attributes
+    ----------
+    parameter : str
+    values : ndarray (k,)
+        Of the parameter; a branch that turns back has values more than once.
+    solutions : tuple of k solutions
+        Equilibria or periodic orbits.
+    events : tuple of BranchEvent
+        In their order along the branch.
+    ends : tuple of two BranchEnd
+        Why it ends at its first and its last point.
+    """
+
+    parameter: str
+    values: Array
+    solutions: tuple[Any, ...]
+    events: tuple[BranchEvent, ...]
+    ends: tuple[BranchEnd, BranchEnd]
+    nodes: tuple[tuple[Any, Point], ...] = ()
+
+    @property
+    def orbits(self) -> tuple[Any, ...]:
+        """The solutions, where they are periodic orbits."""
+        return self.solutions
+
+    def __len__(self) -> int:
+        return len(self.values)
+
+    def at(self, value: float) -> list[Any]:
+        """Solutions at a value of the parameter, solved for; in their order along the branch.
+
+        Raises
+        ------
+        PointError
+            A value that the branch does not reach.
+
+        See Also
+        --------
+        __getitem__ : the only one, or the first.
+        """
+        wanted = real(value, "value", expected="a finite number", advice="Give one.")
+        found = []
+        for k in range(len(self) - 1):
+            (curve, a), (other, b) = self.nodes[k], self.nodes[k + 1]
+            va, vb = curve.value(a.u), other.value(b.u)
+            if curve is not other or not min(va, vb) <= wanted <= max(va, vb) or va == vb:
+                continue
+            if wanted == va and k and self.nodes[k - 1][0] is curve:
+                continue  # found as the end of the step before
+            guess = a.u + (wanted - va) / (vb - va) * (b.u - a.u)
+            found.append(curve.solution_at(guess, wanted))
+        if not found:
+            raise PointError(
+                explain(
+                    f"{self.parameter} = {wanted:.10g}",
+                    expected=f"a value that the branch reaches, in [{self.values.min():.10g}, "
+                    f"{self.values.max():.10g}]",
+                    received="one at which it has no solution",
+                    advice="Widen the bounds of the continuation.",
+                )
+            )
+        return found
+
+    def __getitem__(self, value: float) -> Any:
+        return self.at(value)[0]
+
+    def table(self) -> str:
+        """The events as lines of text."""
+        rows = [f"{self.parameter:>18}  event"]
+        rows += [f"{e.parameter:18.12g}  {e.kind}; {e.far_side}" for e in self.events]
+        return "\n".join(rows)
+
+    def __str__(self) -> str:
+        low, high = self.values.min(), self.values.max()
+        return (
+            f"Branch of {len(self)} points, {self.parameter} from {low:.10g} to {high:.10g}, "
+            f"ends {self.ends[0]} and {self.ends[1]}, {len(self.events)} events\n" + self.table()
+        )
+
+    def __repr__(self) -> str:
+        kinds = ", ".join(f"{e.kind} {e.parameter:.6g}" for e in self.events)
+        return f"Branch({self.parameter!r}, {len(self)} points; {kinds or 'no events'})"
+
+
+class BranchCurve(Curve):
+    """A curve of solutions with the parameter as last unknown; subclasses describe its points."""
+
+    parameter: int | None = -1
+    branching = True
+    scale: Array
+
+    def value(self, u: Array) -> float:
+        """The parameter at a point of the curve."""
+        return float(u[-1])
+
+    def describe(self, u: Array) -> Any:
+        """The solution at a point of the curve."""
+        raise NotImplementedError
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        """What a located zero is; None if it is nothing."""
+        raise NotImplementedError
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """How the branch goes on beyond an event that ends this curve."""
+        return None
+
+    def solution_at(self, guess: Array, value: float) -> Any:
+        """The solution near a guess at a value of the parameter."""
+        start, axis = np.array(guess), np.zeros(len(guess))
+        start[-1], axis[-1] = value, 1.0
+        u = self.correct(start, axis)
+        if u is None:
+            raise ConvergenceError(
+                explain(
+                    f"the branch at {value:.10g}",
+                    expected="a solution near its neighbours",
+                    received="no convergence",
+                    advice="Continue with a smaller step.",
+                )
+            )
+        u[-1] = value
+        return self.describe(u)
+
+
+def check_bounds(bounds: Sequence[float], value: float, name: str) -> tuple[float, float]:
+    """Check bounds of a parameter around its value.
+
+    Raises
+    ------
+    OptionError
+    """
+    try:
+        low, high = (float(b) for b in bounds)
+    except (TypeError, ValueError):
+        low, high = np.nan, np.nan
+    if not low <= value <= high or not np.isfinite(high - low) or low == high:
+        raise OptionError(
+            explain(
+                "bounds",
+                expected=f"two numbers around {name} = {value:.10g}",
+                received=repr(bounds),
+                advice="Give (low, high).",
+            )
+        )
+    return low, high
+
+
+def follow_branch(
+    curve: BranchCurve,
+    start: Array,
+    *,
+    name: str,
+    bounds: tuple[float, float],
+    step: float,
+    max_points: int,
+    through: bool,
+    report: Callable[[Point], None] | None = None,
+) -> Branch:
+    """Continue a solution both ways to the bounds of the parameter, through events if asked to."""
+    forward = np.zeros(start.size)
+    forward[-1] = 1.0
+    options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
+    halves: list[_Half] = []
+    for sign in (-1.0, 1.0):
+        if halves and halves[0].end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
+            halves.append(_Half(end=halves[0].end))
+            continue
+        halves.append(_half(curve, start, sign * forward, through, options))
+    return _joined(name, *halves)
+
+
+@dataclass
+class _Half:
+    """One way along a branch."""
+
+    nodes: list[tuple[BranchCurve, Point]] = field(default_factory=list)
+    events: list[BranchEvent] = field(default_factory=list)
+    end: BranchEnd = BranchEnd.EVENT
+
+
+def _half(
+    curve: BranchCurve, start: Array, tangent: Array, through: bool, options: Mapping[str, Any]
+) -> _Half:
+    half, (low, high) = _Half(), options["bounds"]
+    known: dict[int, BranchEvent | None] = {}  # by the identity of the zero, kept in its arc
+
+    def follow(departure: Departure) -> Arc:
+        arc = trace(
+            departure.curve,
+            departure.rows,
+            departure.tangent,
+            step=options["step"],
+            most=options["max_points"],
+            bounds=(len(departure.rows[-1]) - 1, low, high),
+            report=options["report"],
+        )
+        curve = departure.curve
+        assert isinstance(curve, BranchCurve)
+        known.update({id(zero): curve.event(zero) for zero in arc.zeros})
+        return arc
+
+    def following(departure: Departure, arc: Arc) -> Departure | None:
+        event = known[id(arc.zeros[-1])] if through and arc.zeros else None
+        if event is None or arc.zeros[-1].name != arc.end:
+            return None
+        assert isinstance(departure.curve, BranchCurve)
+        return departure.curve.onward(event, arc.zeros[-1])
+
+    whole = ("bound", "closed", "interrupted", "points")
+    first = Departure(curve, [start], tangent)
+    for departure, arc in pieces(
+        first, follow, following, last=lambda arc: arc.end in whole, apart=0.0
+    ):
+        at = departure.curve
+        assert isinstance(at, BranchCurve)
+        points = arc.points[1:] if half.nodes else arc.points  # pieces share their ends
+        half.nodes += [(at, point) for point in points]
+        found = [known[id(zero)] for zero in arc.zeros]
+        half.events += [event for event in found if event is not None]
+        half.end = _end_of(arc)
+    return half
+
+
+def _end_of(arc: Arc) -> BranchEnd:
+    if arc.end in ("lost", "step too small"):
+        return BranchEnd.STEP_TOO_SMALL
+    if arc.end == "period diverges":
+        return BranchEnd.PERIOD_DIVERGES
+    known = {end.value: end for end in BranchEnd}
+    return known.get(arc.end, BranchEnd.EVENT)
+
+
+def _joined(name: str, backward: _Half, forward: _Half) -> Branch:
+    nodes = [*reversed(backward.nodes), *forward.nodes[1 if backward.nodes else 0 :]]
+    events = [*reversed(backward.events), *forward.events]
+    return Branch(
+        parameter=name,
+        values=np.array([curve.value(point.u) for curve, point in nodes]),
+        solutions=tuple(curve.describe(point.u) for curve, point in nodes),
+        events=tuple(events),
+        ends=(backward.end, forward.end),
+        nodes=tuple(nodes),
+    )

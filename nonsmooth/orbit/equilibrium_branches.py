@@ -1,0 +1,326 @@
+"""Equilibria and pseudo-equilibria as a parameter varies, through the bifurcations that join them.
+
+An equilibrium of F_k solves F_k(x, p) = 0; where h = 0 on the branch it is a boundary equilibrium,
+beyond which a branch of pseudo-equilibria continues it: (1 - alpha) F1 + alpha F2 = 0 with h = 0,
+which begins with alpha = 0 (of F1) or 1 (of F2). On the other side of the parameter this is
+persistence, on the same side a nonsmooth fold (di Bernardo, Budd, Champneys & Kowalczyk 2008,
+ch. 5; Kuznetsov, Rinaldi & Gragnani 2003).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..local.boundary_equilibria import boundary_equilibrium_of
+from ..local.checks import positive, require_autonomous, require_linear
+from ..local.equilibria import Equilibrium, by_real_part, equilibrium_at, find_equilibrium
+from ..local.place import Place, place
+from ..local.pseudo_equilibria import (
+    find_pseudo_equilibrium,
+    pseudo_equilibrium_at,
+    sliding_matrix,
+)
+from ..local.read_only import ReadOnly
+from ..local.search import Found
+from ..local.sides import SIDES, Side, side_index
+from ..model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    explain,
+    require_system,
+    whole,
+)
+from .branch import Branch, BranchCurve, BranchEvent, FarSide, check_bounds, follow_branch
+from .continuation import Departure, Point, Zero, depart
+
+#: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.
+_START = 1e-4
+
+
+class _Equilibria(BranchCurve):
+    """What curves of equilibria and pseudo-equilibria share."""
+
+    def __init__(self, where: Place, index: int, scale: Array):
+        self.where, self.index, self.scale = where, index, scale
+        self.n = where.system.dimension
+
+    def place_at(self, u: Array) -> Place:
+        """The place with the parameter of a point."""
+        p = self.where.parameters.copy()
+        p[self.index] = u[-1]
+        return replace(self.where, parameters=p)
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        raise NotImplementedError
+
+    def hopf(self, u: Array) -> float:
+        """Product of the sums of pairs of eigenvalues: zero at a Hopf point or neutral saddle."""
+        values = self.eigenvalues(u)
+        k, l = np.triu_indices(values.size, 1)
+        return float(np.prod(values[k] + values[l]).real)
+
+    def described(self, zero: Zero, kind: str, **more: Any) -> BranchEvent:
+        u = zero.point.u
+        return BranchEvent(
+            kind, self.value(u), self.describe(u), curve=self, point=zero.point, **more
+        )
+
+    def smooth_event(self, zero: Zero, fold: str) -> BranchEvent | None:
+        """Fold, branch point or Hopf point."""
+        u = zero.point.u
+        if zero.name == "fold":
+            return self.described(zero, fold, far_side=FarSide("", "two branches meet and end"))
+        if zero.name == "branch point":
+            return self.described(zero, "branch point", far_side=FarSide("", "branches cross"))
+        values = self.eigenvalues(u)
+        k, l = np.triu_indices(values.size, 1)
+        nearest = int(np.argmin(np.abs(values[k] + values[l])))
+        frequency = float(abs(values[k[nearest]].imag))
+        if frequency == 0.0:
+            return None  # a neutral saddle
+        side = FarSide("", "a pair of eigenvalues crosses the imaginary axis")
+        numbers = ReadOnly({"frequency": frequency})
+        return self.described(zero, "Hopf", far_side=side, coefficients=numbers)
+
+    def boundary(self, zero: Zero, k: int) -> BranchEvent:
+        """The boundary equilibrium of F1 (k = 0) or F2 (k = 1) on this curve."""
+        x, here = zero.point.u[: self.n], self.place_at(zero.point.u)
+        numbers = here.finite_at(x)
+        found = boundary_equilibrium_of(
+            x, k, numbers.gradient, numbers.fields[1 - k], here.jacobians(x)[k]
+        )
+        verdict = {
+            "persistence": "persistence: one continues the other",
+            "nonsmooth fold": "nonsmooth fold: equilibrium and pseudo-equilibrium annihilate",
+        }.get(found.unfolding, "degenerate")
+        onward = "equilibrium" if isinstance(self, PseudoEquilibriumCurve) else "pseudo-equilibrium"
+        side = FarSide(onward, verdict, found.numbers)
+        event = self.described(zero, "boundary equilibrium", far_side=side)
+        return replace(event, solution=found)
+
+
+class EquilibriumCurve(_Equilibria):
+    """F_k(x, p) = 0 in the unknowns (x, p), for continuation."""
+
+    def __init__(self, where: Place, index: int, scale: Array, side: Side):
+        super().__init__(where, index, scale)
+        self.side, self.k = side, side_index(side)
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        here, x = self.place_at(u), u[: self.n]
+        by_parameter = here.parameter_derivatives(x)[1][self.k, :, self.index]
+        return here.at(x).fields[self.k], np.column_stack([here.jacobians(x)[self.k], by_parameter])
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        return by_real_part(self.place_at(u).jacobians(u[: self.n])[self.k])
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        numbers = self.place_at(point.u).at(point.u[: self.n])
+        found = {"boundary equilibrium": numbers.h}
+        if self.n > 1:
+            found["Hopf"] = self.hopf(point.u)
+        return found
+
+    def ends(self, name: str) -> bool:
+        return name == "boundary equilibrium"
+
+    def describe(self, u: Array) -> Equilibrium:
+        return equilibrium_at(self.place_at(u), Found(u[: self.n]), self.side)
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        if zero.name == "boundary equilibrium":
+            return self.boundary(zero, self.k)
+        return self.smooth_event(zero, "fold")
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """Pseudo-equilibria with 0 < alpha < 1."""
+        x, value = zero.point.u[: self.n], zero.point.u[-1]
+        scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
+        curve = PseudoEquilibriumCurve(self.where, self.index, scale)
+        return _leave(curve, np.concatenate([x, [float(self.k), value]]), 1.0 - 2.0 * self.k)
+
+
+class PseudoEquilibriumCurve(_Equilibria):
+    """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        n, here, x, a = self.n, self.place_at(u), u[: self.n], u[self.n]
+        at, (d1, d2) = here.at(x), here.jacobians(x)
+        dh, df = here.parameter_derivatives(x)
+        f1, f2 = at.fields
+        matrix = np.zeros((n + 1, n + 2))
+        matrix[:n, :n] = (1 - a) * d1 + a * d2
+        matrix[:n, n] = f2 - f1
+        matrix[:n, n + 1] = ((1 - a) * df[0] + a * df[1])[:, self.index]
+        matrix[n, :n], matrix[n, n + 1] = at.gradient, dh[self.index]
+        return np.append((1 - a) * f1 + a * f2, at.h), matrix
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        here, x = self.place_at(u), u[: self.n]
+        return by_real_part(sliding_matrix(here.at(x), here.jacobians(x))[0])
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        u = point.u
+        numbers = self.place_at(u).at(u[: self.n])
+        found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
+        found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
+        if self.n > 2 and found["two-fold"] != 0:
+            found["Hopf"] = self.hopf(u)
+        return found
+
+    def ends(self, name: str) -> bool:
+        return name.startswith("alpha")
+
+    def describe(self, u: Array) -> Any:
+        return pseudo_equilibrium_at(self.place_at(u), Found(u[: self.n]))
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        if zero.name.startswith("alpha"):
+            return self.boundary(zero, int(zero.name[-1]))
+        if zero.name == "two-fold":
+            numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
+            side = FarSide("", "sliding changes between attracting and repelling")
+            event = BranchEvent("two-fold", self.value(zero.point.u), numbers.x, side)
+            return replace(event, curve=self, point=zero.point)
+        return self.smooth_event(zero, "pseudo-saddle-node")
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """Equilibria of the field whose weight is one, on that field's own side."""
+        k, u = int(zero.name[-1]), zero.point.u
+        scale = np.append(self.scale[: self.n], self.scale[-1])
+        curve = EquilibriumCurve(self.where, self.index, scale, SIDES[k])
+        start = np.append(u[: self.n], u[-1])
+        gradient = curve.place_at(start).at(start[: self.n]).gradient
+        dh = curve.place_at(start).parameter_derivatives(start[: self.n])[0][self.index]
+        return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
+
+
+def _leave(curve: _Equilibria, u: Array, inward: float | Array) -> Departure | None:
+    """Leave a boundary equilibrium into the region where the new solutions are real.
+
+    ``inward`` is a gradient that must grow, or the sign with which alpha must.
+    """
+    _, jacobian = curve.scaled(u / curve.scale)
+    tangent = np.linalg.svd(jacobian)[2][-1]
+    if isinstance(inward, float):
+        growth = inward * tangent[curve.n]
+    else:
+        growth = float((inward * curve.scale) @ tangent)
+    direction = tangent if growth > 0 else -tangent
+    return depart(curve, u, direction, _START, direction)
+
+
+def continue_equilibrium(
+    system: FilippovSystem,
+    near: ArrayLike,
+    parameter: str,
+    *,
+    bounds: tuple[float, float],
+    side: Side | None = "+",
+    parameters: Parameters | None = None,
+    surface: int = 0,
+    mode: str | None = None,
+    step: float = 0.02,
+    max_points: int = 2000,
+    through: bool = True,
+) -> Branch:
+    """Follow an equilibrium or pseudo-equilibrium as a parameter varies.
+
+    Pseudo-arclength continuation both ways from the value in ``parameters``, round turning points,
+    with stability at each point.
+
+    Parameters
+    ----------
+    system, parameters, surface, mode
+        As in :func:`region`.
+    near : array_like (n,)
+        Start of the search for the first one.
+    parameter : str
+        Name of the parameter that varies.
+    bounds : (float, float)
+        Where the branch ends.
+    side : {"+", "-"} or None, optional
+        Of the field F1 or F2; None for a pseudo-equilibrium.
+    step : float, optional
+        Largest step where the branch bends, relative to the width of the bounds and to the size of
+        the states.
+    max_points : int, optional
+        Of each piece.
+    through : bool, optional
+        Whether to go on beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
+        that end there too.
+
+    Returns
+    -------
+    Branch
+        Its ``solutions`` are Equilibrium and PseudoEquilibrium. Events: ``"fold"``, ``"Hopf"``,
+        ``"branch point"``, ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` (persistence or
+        nonsmooth fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability).
+
+    Raises
+    ------
+    ConvergenceError, DefinitionError, OptionError, ParameterError, PointError
+
+    Examples
+    --------
+    A pseudo-saddle-node of the sliding flow x' = mu - x^2 on y = 0:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[mu - x**2, -1], below=[mu - x**2, 1],
+    ...                       parameters={mu: 1.0})
+    >>> branch = continue_equilibrium(s, [1.0, 0.0], "mu", bounds=(-1, 2), side=None)
+    >>> [(event.kind, abs(round(event.parameter, 12))) for event in branch.events]
+    [('pseudo-saddle-node', 0.0)]
+    >>> [found.kind for found in branch.at(1.0)]
+    ['pseudo-saddle', 'stable pseudo-node']
+    """
+    require_system(system)
+    require_autonomous(system, "continuation of equilibria")
+    positive(step, "step")
+    whole(max_points, "max_points", least=2)
+    if parameter not in system.parameter_names:
+        raise DefinitionError(
+            explain(
+                "parameter",
+                expected=f"a parameter among {list(system.parameter_names)}",
+                received=repr(parameter),
+                advice="Give its name.",
+            )
+        )
+    where, _ = place(system, near, parameters, 0.0, surface, mode)
+    index = system.parameter_names.index(parameter)
+    value = float(where.parameters[index])
+    low, high = check_bounds(bounds, value, parameter)
+    given: dict[str, Any] = dict(parameters=parameters, surface=surface, mode=mode)
+    curve: _Equilibria
+    if side is None:
+        require_linear(system, surface, "pseudo-equilibrium")
+        pseudo = find_pseudo_equilibrium(system, near, **given)
+        size = max(1.0, float(np.abs(pseudo.point).max()))
+        scale = np.append(np.full(system.dimension, size), [1.0, high - low])
+        curve = PseudoEquilibriumCurve(where, index, scale)
+        start = np.append(pseudo.point, [pseudo.alpha, value])
+    else:
+        found = find_equilibrium(system, near, side=side, **given)
+        size = max(1.0, float(np.abs(found.point).max()))
+        curve = EquilibriumCurve(
+            where, index, np.append(np.full(system.dimension, size), high - low), side
+        )
+        start = np.append(found.point, value)
+    return follow_branch(
+        curve,
+        start,
+        name=parameter,
+        bounds=(low, high),
+        step=step,
+        max_points=max_points,
+        through=through,
+    )

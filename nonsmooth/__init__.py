@@ -83,12 +83,18 @@ from .orbit import (
     BranchEnd,
     BranchEvent,
     FarSide,
+    FixedItinerary,
     Funnel,
+    Gradient,
+    Sensitivity,
     TraceError,
     continuation,
     continue_equilibrium,
     funnel,
+    gradient,
+    sensitivity,
     trace_two_folds,
+    vjp,
 )
 
 if TYPE_CHECKING:
@@ -107,7 +113,9 @@ __all__ = [
     "Event",
     "FarSide",
     "FilippovSystem",
+    "FixedItinerary",
     "Funnel",
+    "Gradient",
     "Impact",
     "NonsmoothError",
     "NotSmoothError",
@@ -117,6 +125,7 @@ __all__ = [
     "Region",
     "Reset",
     "Segment",
+    "Sensitivity",
     "Status",
     "Stop",
     "TraceError",
@@ -141,11 +150,13 @@ __all__ = [
     "fold_fold",
     "follow",
     "funnel",
+    "gradient",
     "intersection_range",
     "local",
     "plot",
     "region",
     "regularise",
+    "sensitivity",
     "simulate",
     "sliding_branches",
     "sliding_field",
@@ -153,6 +164,7 @@ __all__ = [
     "trace_two_folds",
     "two_fold",
     "two_folds",
+    "vjp",
 ]
 
 

@@ -168,6 +168,56 @@ class Coupled:
             return []
         return [-slope] if len(s) == 1 else [ca.det(slope), -ca.trace(slope)]
 
+    # expressions --------------------------------------------------------------------------------
+
+    @property
+    def field(self) -> ca.SX:
+        """The field in states, multipliers, reactions and nu."""
+        return self._outputs[0]
+
+    @property
+    def heights(self) -> ca.SX:
+        """Switching functions and gaps."""
+        return self._outputs[2]
+
+    @property
+    def factors(self) -> ca.SX:
+        """The factors n_i of surfaces and contacts; 1 where there is none."""
+        return self._outputs[3]
+
+    @property
+    def stops(self) -> ca.SX:
+        """Functions of stops and resets."""
+        return self._outputs[4]
+
+    @property
+    def multipliers(self) -> ca.SX:
+        """The symbols lambda_i of the surfaces."""
+        n = self.system.extended_dimension
+        return self._moving[n : n + self._surfaces]
+
+    def unknown(self, i: int) -> ca.SX:
+        """The symbol of the unknown of a surface or contact: lambda_i, a reaction, or nu_i."""
+        n = self.system.extended_dimension
+        scaled = i < self._surfaces and self.scaled[i]
+        return self._moving[n + self.count + sum(self.scaled[:i]) if scaled else n + i]
+
+    def symbols_of(self, which: Sequence[int]) -> ca.SX:
+        """The symbols of several unknowns (SX column)."""
+        return ca.vertcat(*[self.unknown(i) for i in which]) if which else ca.SX(0, 1)
+
+    def held_at(self, mode: str, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """Expressions with the multipliers that are known in a mode; unknowns stay symbols."""
+        n = self.system.extended_dimension
+        held = ca.SX([*self.held(mode), *[0.0] * sum(self.scaled)])
+        rest = self._moving[n:]
+        for i in self.sliding(mode):
+            own = self.unknown(i)
+            for k in range(rest.numel()):
+                if ca.is_equal(rest[k], own):
+                    held[k] = own
+        return [ca.substitute(e, rest, held) for e in expressions]
+
     # numbers -----------------------------------------------------------------------------------
 
     @cached_property

@@ -5,21 +5,31 @@ from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
 from .equilibrium_branches import continue_equilibrium
 from .futures import Departure, Funnel, funnel
+from .itinerary import Arrival, FixedItinerary
+from .sensitivity import Gradient, gradient, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds
+from .variation import Sensitivity
 
 __all__ = [
+    "Arrival",
     "Branch",
     "BranchEnd",
     "BranchEvent",
     "Departure",
     "FarSide",
+    "FixedItinerary",
     "Funnel",
+    "Gradient",
     "Path",
+    "Sensitivity",
     "Slider",
     "TraceError",
     "continuation",
     "continue_equilibrium",
     "funnel",
+    "gradient",
     "paths_from",
+    "sensitivity",
     "trace_two_folds",
+    "vjp",
 ]

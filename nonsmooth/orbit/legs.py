@@ -1,0 +1,288 @@
+"""Legs: stretches of one mode, each with the event that ends it; as words and with numbers.
+
+A run is a chain of legs. What happens at one instant is one event: a reset and the change of mode
+that it causes, an impact and the sliding that follows. Two guards that vanish at the same instant
+without one causing the other are a corner, where a derivative depends on which comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ..flow.facts import TIE
+from ..flow.fixed import flow_for
+from ..flow.trajectory import Event, Trajectory
+from ..model import Array, DegenerateError, FilippovSystem
+from ..model.variational import (
+    AtEvent,
+    EventMap,
+    VariationalField,
+    event_map,
+    variational_field,
+)
+
+#: Directions that differ by less than this are one: the gradients of events at one instant.
+_PARALLEL = 1e-7
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One mode and the event that ends it.
+
+    Attributes
+    ----------
+    mode : str
+    name : str
+        Of the guard that ends the leg; empty for a leg that ends at a time.
+    kind : str
+        Of the event: crossing, entry, exit, reset, impact, release, stop, end.
+    side : int
+        Of an exit.
+    letters : str
+        Sides of the friction at an impact.
+    further : tuple of Leg
+        Resets and impacts caused by the event, at the same instant.
+    """
+
+    mode: str
+    name: str = ""
+    kind: str = "end"
+    side: int = 0
+    letters: str = ""
+    further: tuple[Leg, ...] = ()
+
+    def field(self, system: FilippovSystem, chosen: tuple[int, ...] = ()) -> VariationalField:
+        """The variational field of the mode."""
+        return variational_field(system, self.mode, chosen)
+
+    def map(self, system: FilippovSystem) -> EventMap | None:
+        """The event's function and what it does to the state; None where a time ends the leg."""
+        if not self.name:
+            return None
+        return event_map(system, self.mode, self.name, self.side, self.letters)
+
+    def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
+        """Event function and state after the event, with derivatives; further resets included."""
+        own = self.map(system)
+        assert own is not None
+        at = own(y, p)
+        for leg in self.further:
+            then = leg.map(system)
+            assert then is not None
+            at = _composed(at, then(at.after, p))
+        return at
+
+    def __str__(self) -> str:
+        return f"{self.mode or 'o'} ({self.kind}{' ' + self.name if self.name else ''})"
+
+
+def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
+    """The map ``then`` after ``first``, at the event of ``first``."""
+    n = len(first.after)
+    slope = then.after_state[:, :n]
+    return replace(
+        first,
+        after=then.after,
+        after_state=slope @ first.after_state,
+        after_parameters=slope @ first.after_parameters + then.after_parameters,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """A leg with numbers: the flow of its mode from its start over its duration.
+
+    Attributes
+    ----------
+    end : ndarray (N + k,)
+        State at the end, before the event, with multipliers that are states.
+    by_start, by_parameters : ndarray (N + k, N), (N + k, q)
+        Derivatives of ``end``.
+    rate : ndarray (N + k,)
+        The field there.
+    """
+
+    end: Array
+    by_start: Array
+    by_parameters: Array
+    rate: Array
+
+
+def fly(
+    system: FilippovSystem,
+    leg: Leg,
+    x: Array,
+    duration: float,
+    p: Array,
+    chosen: tuple[int, ...] = (),
+) -> Flown:
+    """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives.
+
+    Raises
+    ------
+    ConvergenceError
+        The field is not finite on the way.
+    """
+    field = leg.field(system, chosen)
+    start = field.start(x, p)
+    whole = field.blocks.unpack(flow_for(field, start, p, duration))
+    n, end = field.blocks.starts, whole[:, 0]
+    rate = field.rate.copied(end, p)[0][:, 0]
+    return Flown(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], rate)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A leg of a run: where it starts and ends.
+
+    Attributes
+    ----------
+    leg : Leg
+    t, duration : float
+    start, end, after : ndarray (N,)
+        Extended states: at the start, before and after the event that ends it.
+    """
+
+    leg: Leg
+    t: float
+    duration: float
+    start: Array
+    end: Array
+    after: Array
+
+
+def stretches(run: Trajectory) -> list[Stretch]:
+    """Split a run into legs, one for each instant at which something happens.
+
+    Raises
+    ------
+    DegenerateError
+        Impacts that accumulate; two events at one instant of which neither causes the other.
+    """
+    system, p = run.system, np.array(list(run.parameters.values()), float)
+    p = system.parameter_vector(run.parameters)
+    t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
+    result: list[Stretch] = []
+    for group in _instants(run.events):
+        first, last = group[0], group[-1]
+        _require_countable(group)
+        leg = leg_of(system, first, p)
+        x_end = _extended(system, first.x, first.t)
+        further = [leg_of(system, e, p) for e in group[1:] if e.kind not in ("end", "stop")]
+        if further:
+            leg = replace(leg, further=_caused(system, leg, further, x_end, p, first.t))
+        after = _extended(system, last.x_after, last.t)
+        result.append(Stretch(leg, t, first.t - t, x, x_end, after))
+        t, x = last.t, after
+    return result
+
+
+def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
+    return np.append(x, t) if system.time_dependent else np.array(x)
+
+
+def _instants(events: Sequence[Event]) -> list[list[Event]]:
+    """Events that happen at one time together."""
+    groups: list[list[Event]] = []
+    for event in events:
+        if groups and abs(event.t - groups[-1][0].t) <= TIE * max(1.0, abs(event.t)):
+            if event.kind == "end":
+                continue  # the run ends at an event
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+    return groups
+
+
+def _require_countable(group: Sequence[Event]) -> None:
+    for event in group:
+        if event.kind == "contact":
+            raise DegenerateError(
+                f"event at t = {event.t:.10g}: expected finitely many impacts before a contact "
+                f"closes, received impacts on {event.name!r} that accumulate. Infinitely many legs "
+                "have no fixed itinerary: end the run before, or give a restitution of 0."
+            )
+
+
+def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
+    """The leg that an event of a run ends."""
+    if event.kind == "end":
+        return Leg(event.mode_before)
+    _require_one_surface(system, event)
+    side, letters = 0, ""
+    if event.name.startswith("lambda"):
+        i = int(event.name.removeprefix("lambda"))
+        side = {"+": 1, "-": -1}.get(event.mode_after[i], 0)
+    if event.kind == "impact":
+        letters = _letters(system, event, p)
+    return Leg(event.mode_before, event.name, event.kind, side, letters)
+
+
+def _require_one_surface(system: FilippovSystem, event: Event) -> None:
+    """Refuse an event at which the motion comes to two surfaces at once."""
+    if event.kind not in ("crossing", "entry", "exit"):
+        return
+    letters = zip(event.mode_before, event.mode_after, strict=False)
+    met = [f"h{i}" for i, (a, b) in enumerate(letters) if a != b and a in "+-"]
+    others = [name for name in met if name != event.name]
+    if others:
+        raise DegenerateError(corner(event.t, event.name, others[0]))
+
+
+def corner(t: float, one: str, other: str) -> str:
+    """Message for two guards that vanish at one instant."""
+    return (
+        f"event at t = {t:.10g}: expected one event, or events that follow from it, received {one!r} "
+        f"and {other!r} at the same instant (a corner). Its derivative depends on which of them comes "
+        "first: move the start or a parameter."
+    )
+
+
+def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
+    """The sides with which friction acted at an impact: those that give the state after it."""
+    from ..model import coupled_of
+
+    mode, m, coupled = event.mode_before, system.surface_count, coupled_of(system)
+    signs = system.parse_letters(mode)
+    struck = system.impacts.index(event.name)
+    taking = [struck, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
+    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
+    choices = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in carried]
+    misses: list[tuple[float, str]] = []
+    for choice in product(*choices):
+        letters = "".join(choice)
+        at = event_map(system, mode, event.name, 0, letters)
+        x = _extended(system, event.x, event.t)
+        y = variational_field(system, mode).initial(x, p)[:, 0]
+        after = _extended(system, event.x_after, event.t)
+        misses.append((float(np.abs(at(y, p).after - after).max()), letters))
+    return min(misses)[1]
+
+
+def _caused(
+    system: FilippovSystem, leg: Leg, further: Sequence[Leg], x: Array, p: Array, t: float
+) -> tuple[Leg, ...]:
+    """The resets among events that follow at once, each of which the ones before must cause."""
+    y = leg.field(system).initial(x, p)[:, 0]
+    kept: tuple[Leg, ...] = ()
+    for then in further:
+        at = replace(leg, further=kept).at_end(system, y, p)
+        start = then.field(system).initial(at.after, p)
+        other = then.at_end(system, start[:, 0], p)
+        n = len(at.after)
+        pulled = (other.gradient @ start[:, 1 : 1 + n]) @ at.after_state
+        if not _parallel(pulled, at.gradient):
+            raise DegenerateError(corner(t, leg.name, then.name))
+        if then.kind in ("reset", "impact"):
+            kept = (*kept, then)
+    return kept
+
+
+def _parallel(a: Array, b: Array) -> bool:
+    size = float(np.linalg.norm(b))
+    along = b * (a @ b) / size**2 if size else b
+    return bool(np.linalg.norm(a - along) <= _PARALLEL * max(float(np.linalg.norm(a)), 1e-300))

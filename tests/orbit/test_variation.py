@@ -1,0 +1,240 @@
+"""Derivatives of a run are exact through every kind of event, whichever way one computes them."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+import nonsmooth as ns
+
+CASES = {
+    case["id"]: case
+    for case in json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
+}
+
+
+def throw() -> ns.FilippovSystem:
+    """Case G1: friction that changes at x = 1, a wall at x = 2, a belt at v = -b."""
+    x, v, lam, place = (ca.SX.sym(s) for s in ("x", "v", "lam", "place"))
+    mu1, mu2, r, b = (ca.SX.sym(s) for s in ("mu1", "mu2", "r", "b"))
+    mu = (mu1 + mu2) / 2 + (mu2 - mu1) / 2 * place
+    return ns.FilippovSystem(
+        [x, v],
+        field=[v, -mu * lam],
+        multipliers=[lam, place],
+        surfaces=[v + b, x - 1],
+        parameters={mu1: 1.0, mu2: 1.5, r: 0.8, b: 0.3},
+        resets=ns.Reset(x - 2, [x, -r * v], 1),
+    )
+
+
+def test_gradients_through_crossing_impact_and_entry_are_the_closed_forms() -> None:
+    values = CASES["G1"]["values"]
+    run = ns.simulate(throw(), [0.0, 3.0], t_end=2.0, tol=1e-14)
+    s = ns.sensitivity(run)
+    expected = {k: float(v) for k, v in values["dx_T"].items()}
+    assert s.dx_dx0[0, 1] == pytest.approx(expected.pop("v0"), rel=1e-13)
+    for name, value in expected.items():
+        assert s.dx_dp[0, s.names.index(name)] == pytest.approx(value, rel=1e-13)
+    assert np.abs(s.dx_dx0[1]).max() < 1e-15
+    assert s.dx_dp[1].round(14).tolist() == [0, 0, 0, -1]
+    assert s.event_times == pytest.approx([float(t) for t in values["event_times"]], rel=1e-13)
+
+
+def differences(system, x0, t_end, names, **options):
+    """Central differences of order four of the end of a run."""
+    values = system.parameter_vector(None)
+    rows, weights = [], {1: 8 / 12, -1: -8 / 12, 2: -1 / 12, -2: 1 / 12}
+
+    def end(x, p):
+        given = dict(zip(system.parameter_names, p, strict=True))
+        return ns.simulate(system, x, t_end, parameters=given, tol=1e-14, **options).x[-1]
+
+    h = 2e-4
+    for k in range(len(x0)):
+        e = h * np.eye(len(x0))[k]
+        rows.append(sum(w * end(x0 + j * e, values) for j, w in weights.items()) / h)
+    for name in names:
+        e = h * np.eye(len(values))[system.parameter_names.index(name)]
+        rows.append(sum(w * end(x0, values + j * e) for j, w in weights.items()) / h)
+    return np.array(rows).T
+
+
+def check(system, x0, t_end, itinerary=None) -> ns.Sensitivity:
+    x0 = np.array(x0)
+    run = ns.simulate(system, x0, t_end, tol=1e-14)
+    if itinerary is not None:
+        assert run.itinerary == itinerary
+    s = ns.sensitivity(run)
+    found = np.hstack([s.dx_dx0, s.dx_dp])
+    expected = differences(system, x0, t_end, s.names)
+    assert np.abs(found - expected).max() < 2e-9 * (1 + np.abs(expected).max())
+    for row in np.eye(system.dimension):
+        by_start, by_parameters = ns.vjp(run, row)
+        pulled = np.concatenate([by_start, by_parameters])
+        assert np.abs(pulled - row @ found).max() <= 1e-12 * np.abs(found).max()
+    return s
+
+
+x, y, v, w, t, a, b, lam, other = (ca.SX.sym(s) for s in "x y v w t a b lam other".split())
+
+
+def test_a_surface_that_moves_with_the_time() -> None:
+    ramp = ns.FilippovSystem(
+        [x, y],
+        surface=y - 1 + a * t,
+        above=[1, x],
+        below=[y, -b],
+        time=t,
+        parameters={a: 0.5, b: 0.3},
+    )
+    check(ramp, [0.2, 0.1], 1.5)
+
+
+def test_a_reset_that_carries_the_state_through_a_surface() -> None:
+    # The jump and the change of mode that it causes are one event.
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y,
+        above=[1 + y, -1 - x],
+        below=[2 * y, 0.5 + a * x],
+        parameters={a: 0.4},
+        resets=ns.Reset(x - 1, [x - 1.5, -y - a], 1),
+    )
+    check(system, [0.1, 2.0], 2.4)
+
+
+def test_an_impact_and_friction_at_the_contact() -> None:
+    r = ca.SX.sym("r")
+    block = ns.FilippovSystem(
+        [x, y, v, w],
+        field=[v, w, -a * lam * r, r - 2.0],
+        surface=v,
+        multipliers=lam,
+        impacts=ns.Impact(y - 0.1 * x, restitution=b, reaction=r),
+        parameters={a: 0.2, b: 0.6},
+    )
+    s = check(block, [0.0, 0.5, 1.0, 0.0], 1.3)
+    assert len(s.event_times) >= 1
+
+
+def test_sliding_on_two_surfaces_one_after_the_other() -> None:
+    z = ca.SX.sym("z")
+    system = ns.FilippovSystem(
+        [x, y, z],
+        surfaces=[x, y],
+        multipliers=[lam, other],
+        field=[a - lam + 0.1 * y, 0.2 * z - other, 0.5 + lam * other - b * z],
+        parameters={a: 0.3, b: 0.4},
+    )
+    run = ns.simulate(system, [0.5, 0.9, 0.2], 2.0, tol=1e-14)
+    assert run.segments[-1].mode == "ss"
+    s = check(system, [0.5, 0.9, 0.2], 2.0)
+    assert np.linalg.matrix_rank(s.dx_dx0, tol=1e-10) == 1
+
+
+def test_sliding_of_hidden_dynamics() -> None:
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y,
+        multipliers=lam,
+        field=[1 + lam, a * x - 2 * lam + 0.3 * lam**2 * x],
+        parameters={a: 0.5},
+        hidden=True,
+    )
+    check(system, [0.1, 0.6], 1.5)
+
+
+def test_a_stop_moves_the_end() -> None:
+    system = ns.FilippovSystem([x, y], field=[y, -a], stops=ns.Stop(x, -1), parameters={a: 2.0})
+    run = ns.simulate(system, [1.0, 0.0], 9.0, tol=1e-14)  # x = x0 - t^2: v = -2 sqrt(a x0/2)
+    s = ns.sensitivity(run)
+    assert s.dx_dx0[1, 0] == pytest.approx(-1.0, rel=1e-13)
+    assert s.dx_dp[1, 0] == pytest.approx(-0.5, rel=1e-13)
+    assert np.abs(s.dx_dx0[0]).max() < 1e-15
+    assert s.dt_end_dx0[0] == pytest.approx(0.5, rel=1e-13)
+    assert ns.gradient(run, y).x0 == pytest.approx(s.dx_dx0[1], rel=1e-13)
+
+
+@settings(deadline=None, max_examples=4)
+@given(st.integers(0, 10**6))
+def test_adjoint_and_forward_agree_on_random_systems(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    states = [ca.SX.sym(f"x{i}") for i in range(2)]
+    fields = [
+        [ca.dot(ca.DM(row), ca.vertcat(*states)) + a * c for row, c in zip(m, u, strict=True)]
+        for m, u in ((rng.normal(size=(2, 2)), rng.normal(size=2)) for _ in range(2))
+    ]
+    system = ns.FilippovSystem(
+        states, surface=states[0], above=fields[0], below=fields[1], parameters={a: 1.0}
+    )
+    run = ns.simulate(system, rng.normal(size=2), 1.5)
+    if run.status is not ns.Status.REACHED_END:
+        return
+    s = ns.sensitivity(run)
+    found = np.hstack([s.dx_dx0, s.dx_dp])
+    row = rng.normal(size=2)
+    pulled = np.concatenate(ns.vjp(run, row))
+    assert np.abs(pulled - row @ found).max() <= 1e-12 * (1 + np.abs(found).max())
+    # A switching function times a number is the same system, and so are its derivatives.
+    scaled = ns.FilippovSystem(
+        states, surface=-1e3 * states[0], above=fields[1], below=fields[0], parameters={a: 1.0}
+    )
+    again = ns.sensitivity(ns.simulate(scaled, run.x[0], 1.5))
+    assert np.abs(again.dx_dx0 - s.dx_dx0).max() <= 1e-8 * (1 + np.abs(found).max())
+
+
+def test_a_run_back_in_time_has_the_inverse_derivative() -> None:
+    forward = ns.FilippovSystem([x, y], surface=y, above=[1 + y, -1], below=[y - 1, -2 - x])
+    back = ns.FilippovSystem([x, y], surface=y, above=[-1 - y, 1], below=[1 - y, 2 + x])
+    run = ns.simulate(forward, [0.2, 0.5], 1.0, tol=1e-14)
+    there = ns.sensitivity(run).dx_dx0
+    home = ns.sensitivity(ns.simulate(back, run.x[-1], 1.0, tol=1e-14)).dx_dx0
+    assert np.abs(home @ there - np.eye(2)).max() < 1e-12
+
+
+def test_the_clearance_is_the_distance_from_a_guard_that_is_missed() -> None:
+    system = ns.FilippovSystem([x, y], surface=2 * y, above=[1, 2 * x], below=[1, 1])
+    run = ns.simulate(system, [-1.0, 1.01], 2.0)  # y = x^2 + 0.01
+    s = ns.sensitivity(run)
+    assert s.clearance == pytest.approx(0.01, rel=1e-9)
+    assert "h0 > 0 at t = 1" in s.nearest
+
+
+def test_a_grazing_is_refused_by_name() -> None:
+    fall = ns.FilippovSystem([x, y], surface=y, above=[1, -3 * x**2], below=[1, -1])
+    run = ns.simulate(fall, [-1.0, 1.0], 1.5, tol=1e-12)  # y = -x^3: tangent at the surface
+    with pytest.raises(ns.DegenerateError, match="transversal"):
+        ns.sensitivity(run)
+
+
+def test_a_corner_is_refused() -> None:
+    both = ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[lam, other],
+        field=[1 + 0.1 * lam, 1 + 0.2 * other],
+    )
+    run = ns.simulate(both, [-0.9, -0.8], 3.0)
+    assert run.itinerary == "-- ++"
+    with pytest.raises(ns.DegenerateError, match="corner"):
+        ns.sensitivity(run)
+
+
+def test_bad_input_is_refused_in_words() -> None:
+    run = ns.simulate(throw(), [0.0, 3.0], t_end=2.0)
+    with pytest.raises(ns.ParameterError, match="mu3"):
+        ns.sensitivity(run, wrt="mu3")
+    with pytest.raises(ns.OptionError, match="Trajectory"):
+        ns.sensitivity("run")  # type: ignore[arg-type]
+    with pytest.raises(ns.PointError, match="2 numbers"):
+        ns.vjp(run, [1.0, 2.0, 3.0])
+    with pytest.raises(ns.DefinitionError):
+        ns.gradient(run, ca.SX.sym("stranger"))
+    assert ns.sensitivity(run, wrt="r").dx_dp.shape == (2, 1)

@@ -79,9 +79,11 @@ from .model import (
     regularise,
 )
 from .orbit import (
+    BifurcationCurve,
     Branch,
     BranchEnd,
     BranchEvent,
+    CodimensionTwo,
     FarSide,
     FixedItinerary,
     Funnel,
@@ -89,6 +91,7 @@ from .orbit import (
     Sensitivity,
     TraceError,
     continuation,
+    continue_bifurcation,
     continue_equilibrium,
     funnel,
     gradient,
@@ -103,9 +106,11 @@ if TYPE_CHECKING:
 __version__ = "0.1.0.dev0"
 
 __all__ = [
+    "BifurcationCurve",
     "Branch",
     "BranchEnd",
     "BranchEvent",
+    "CodimensionTwo",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
@@ -136,6 +141,7 @@ __all__ = [
     "boundary_equilibrium",
     "classify",
     "continuation",
+    "continue_bifurcation",
     "continue_equilibrium",
     "ensemble",
     "find_all",

@@ -1,6 +1,7 @@
 """What needs both a place and a motion: canards, the set of futures, curves of two-folds."""
 
 from . import continuation
+from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
 from .equilibrium_branches import continue_equilibrium
@@ -12,9 +13,11 @@ from .variation import Sensitivity
 
 __all__ = [
     "Arrival",
+    "BifurcationCurve",
     "Branch",
     "BranchEnd",
     "BranchEvent",
+    "CodimensionTwo",
     "Departure",
     "FarSide",
     "FixedItinerary",
@@ -25,6 +28,7 @@ __all__ = [
     "Slider",
     "TraceError",
     "continuation",
+    "continue_bifurcation",
     "continue_equilibrium",
     "funnel",
     "gradient",

@@ -14,7 +14,15 @@ from typing import Any
 import numpy as np
 
 from ..local.read_only import ReadOnly
-from ..model import Array, ConvergenceError, OptionError, PointError, explain, real
+from ..model import (
+    Array,
+    ConvergenceError,
+    FilippovSystem,
+    OptionError,
+    PointError,
+    explain,
+    real,
+)
 from .continuation import Arc, Curve, Departure, Point, Zero, pieces, trace
 
 
@@ -87,9 +95,9 @@ class BranchEvent:
     far_side : FarSide
     coefficients : mapping of str to float
         Of normal forms and conditions.
-    curve, point
-        The equations that were continued and the point on them, from which
-        ``continue_bifurcation`` and branch switching start.
+    curve, point, test
+        The equations that were continued, the point on them and the test that vanishes there, from
+        which ``continue_bifurcation`` and branch switching start.
     """
 
     kind: str
@@ -99,6 +107,7 @@ class BranchEvent:
     coefficients: Mapping[str, float] = field(default_factory=lambda: ReadOnly({}))
     curve: Any = None
     point: Point | None = None
+    test: str = ""
 
     @property
     def orbit(self) -> Any:
@@ -203,10 +212,36 @@ class BranchCurve(Curve):
     parameter: int | None = -1
     branching = True
     scale: Array
+    system: FilippovSystem
+    free: tuple[int, ...]
 
     def value(self, u: Array) -> float:
         """The parameter at a point of the curve."""
         return float(u[-1])
+
+    def parameters_at(self, u: Array) -> Array:
+        """All parameters of the system at a point of the curve."""
+        raise NotImplementedError
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        """The same equations with other free parameters, and the point there.
+
+        Parameters
+        ----------
+        u : ndarray
+        free : tuple of int
+        widths : ndarray
+            Scales of these parameters.
+        """
+        raise NotImplementedError
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        """Further functions whose zeros on a curve of events are of codimension two."""
+        return {}
+
+    def double_zero(self, u: Array) -> bool:
+        """Whether two eigenvalues vanish together at a point, not one beside an imaginary pair."""
+        return False
 
     def describe(self, u: Array) -> Any:
         """The solution at a point of the curve."""
@@ -307,7 +342,7 @@ def _half(
             departure.tangent,
             step=options["step"],
             most=options["max_points"],
-            bounds=(len(departure.rows[-1]) - 1, low, high),
+            bounds=[(len(departure.rows[-1]) - 1, low, high)],
             report=options["report"],
         )
         curve = departure.curve
@@ -333,11 +368,12 @@ def _half(
         half.nodes += [(at, point) for point in points]
         found = [known[id(zero)] for zero in arc.zeros]
         half.events += [event for event in found if event is not None]
-        half.end = _end_of(arc)
+        half.end = end_of(arc)
     return half
 
 
-def _end_of(arc: Arc) -> BranchEnd:
+def end_of(arc: Arc) -> BranchEnd:
+    """Name the end of an arc."""
     if arc.end in ("lost", "step too small"):
         return BranchEnd.STEP_TOO_SMALL
     if arc.end == "period diverges":

@@ -10,6 +10,7 @@ ch. 5; Kuznetsov, Rinaldi & Gragnani 2003).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import replace
 from typing import Any
 
@@ -47,18 +48,33 @@ _START = 1e-4
 class _Equilibria(BranchCurve):
     """What curves of equilibria and pseudo-equilibria share."""
 
-    def __init__(self, where: Place, index: int, scale: Array):
-        self.where, self.index, self.scale = where, index, scale
-        self.n = where.system.dimension
+    def __init__(self, where: Place, free: tuple[int, ...], scale: Array):
+        self.where, self.free, self.scale = where, free, scale
+        self.system, self.n = where.system, where.system.dimension
 
     def place_at(self, u: Array) -> Place:
-        """The place with the parameter of a point."""
+        """The place with the parameters of a point."""
+        return replace(self.where, parameters=self.parameters_at(u))
+
+    def parameters_at(self, u: Array) -> Array:
         p = self.where.parameters.copy()
-        p[self.index] = u[-1]
-        return replace(self.where, parameters=p)
+        p[list(self.free)] = u[-len(self.free) :]
+        return p
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        here, k = self.place_at(u), u.size - len(self.free)
+        curve = copy(self)
+        curve.where, curve.free = here, free
+        curve.scale = np.append(self.scale[:k], widths)
+        return curve, np.append(u[:k], here.parameters[list(free)])
 
     def eigenvalues(self, u: Array) -> NDArray[Any]:
         raise NotImplementedError
+
+    def double_zero(self, u: Array) -> bool:
+        sizes = np.sort(np.abs(self.eigenvalues(u)))
+        # a double zero is known to the square root of rounding
+        return bool(sizes[1] < 1e-4 * max(1.0, sizes[-1]))
 
     def hopf(self, u: Array) -> float:
         """Product of the sums of pairs of eigenvalues: zero at a Hopf point or neutral saddle."""
@@ -69,7 +85,13 @@ class _Equilibria(BranchCurve):
     def described(self, zero: Zero, kind: str, **more: Any) -> BranchEvent:
         u = zero.point.u
         return BranchEvent(
-            kind, self.value(u), self.describe(u), curve=self, point=zero.point, **more
+            kind,
+            self.value(u),
+            self.describe(u),
+            curve=self,
+            point=zero.point,
+            test=zero.name,
+            **more,
         )
 
     def smooth_event(self, zero: Zero, fold: str) -> BranchEvent | None:
@@ -105,17 +127,34 @@ class _Equilibria(BranchCurve):
         event = self.described(zero, "boundary equilibrium", far_side=side)
         return replace(event, solution=found)
 
+    def boundary_numbers(self, u: Array, k: int) -> Mapping[str, float]:
+        """What changes the class of a boundary equilibrium of F1 (k = 0) or F2 (k = 1)."""
+        x, here = u[: self.n], self.place_at(u)
+        numbers, a = here.finite_at(x), here.jacobians(x)[k]
+        other, sign = numbers.fields[1 - k], 1.0 - 2.0 * k
+        bordered = np.block([[a, other[:, None]], [numbers.gradient[None, :], np.zeros((1, 1))]])
+        values = by_real_part(a)
+        i, j = np.triu_indices(self.n, 1)
+        found = {
+            "the other field is tangent": sign * float(numbers.gradient @ other),
+            "persistence turns into nonsmooth fold": -sign * float(np.linalg.det(bordered)),
+            "fold": float(np.linalg.det(a)),
+        }
+        if self.n > 1:
+            found["Hopf"] = float(np.prod(values[i] + values[j]).real)
+        return found
+
 
 class EquilibriumCurve(_Equilibria):
     """F_k(x, p) = 0 in the unknowns (x, p), for continuation."""
 
-    def __init__(self, where: Place, index: int, scale: Array, side: Side):
-        super().__init__(where, index, scale)
+    def __init__(self, where: Place, free: tuple[int, ...], scale: Array, side: Side):
+        super().__init__(where, free, scale)
         self.side, self.k = side, side_index(side)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         here, x = self.place_at(u), u[: self.n]
-        by_parameter = here.parameter_derivatives(x)[1][self.k, :, self.index]
+        by_parameter = here.parameter_derivatives(x)[1][self.k][:, list(self.free)]
         return here.at(x).fields[self.k], np.column_stack([here.jacobians(x)[self.k], by_parameter])
 
     def eigenvalues(self, u: Array) -> NDArray[Any]:
@@ -127,6 +166,9 @@ class EquilibriumCurve(_Equilibria):
         if self.n > 1:
             found["Hopf"] = self.hopf(point.u)
         return found
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        return self.boundary_numbers(u, self.k) if name == "boundary equilibrium" else {}
 
     def ends(self, name: str) -> bool:
         return name == "boundary equilibrium"
@@ -143,7 +185,7 @@ class EquilibriumCurve(_Equilibria):
         """Pseudo-equilibria with 0 < alpha < 1."""
         x, value = zero.point.u[: self.n], zero.point.u[-1]
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
-        curve = PseudoEquilibriumCurve(self.where, self.index, scale)
+        curve = PseudoEquilibriumCurve(self.where, self.free, scale)
         return _leave(curve, np.concatenate([x, [float(self.k), value]]), 1.0 - 2.0 * self.k)
 
 
@@ -155,11 +197,11 @@ class PseudoEquilibriumCurve(_Equilibria):
         at, (d1, d2) = here.at(x), here.jacobians(x)
         dh, df = here.parameter_derivatives(x)
         f1, f2 = at.fields
-        matrix = np.zeros((n + 1, n + 2))
+        matrix, free = np.zeros((n + 1, u.size)), list(self.free)
         matrix[:n, :n] = (1 - a) * d1 + a * d2
         matrix[:n, n] = f2 - f1
-        matrix[:n, n + 1] = ((1 - a) * df[0] + a * df[1])[:, self.index]
-        matrix[n, :n], matrix[n, n + 1] = at.gradient, dh[self.index]
+        matrix[:n, n + 1 :] = ((1 - a) * df[0] + a * df[1])[:, free]
+        matrix[n, :n], matrix[n, n + 1 :] = at.gradient, dh[free]
         return np.append((1 - a) * f1 + a * f2, at.h), matrix
 
     def eigenvalues(self, u: Array) -> NDArray[Any]:
@@ -175,6 +217,9 @@ class PseudoEquilibriumCurve(_Equilibria):
             found["Hopf"] = self.hopf(u)
         return found
 
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        return self.boundary_numbers(u, int(name[-1])) if name.startswith("alpha") else {}
+
     def ends(self, name: str) -> bool:
         return name.startswith("alpha")
 
@@ -188,17 +233,17 @@ class PseudoEquilibriumCurve(_Equilibria):
             numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
             side = FarSide("", "sliding changes between attracting and repelling")
             event = BranchEvent("two-fold", self.value(zero.point.u), numbers.x, side)
-            return replace(event, curve=self, point=zero.point)
+            return replace(event, curve=self, point=zero.point, test=zero.name)
         return self.smooth_event(zero, "pseudo-saddle-node")
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Equilibria of the field whose weight is one, on that field's own side."""
         k, u = int(zero.name[-1]), zero.point.u
         scale = np.append(self.scale[: self.n], self.scale[-1])
-        curve = EquilibriumCurve(self.where, self.index, scale, SIDES[k])
+        curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
         start = np.append(u[: self.n], u[-1])
         gradient = curve.place_at(start).at(start[: self.n]).gradient
-        dh = curve.place_at(start).parameter_derivatives(start[: self.n])[0][self.index]
+        dh = curve.place_at(start).parameter_derivatives(start[: self.n])[0][list(self.free)]
         return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
 
 
@@ -306,13 +351,13 @@ def continue_equilibrium(
         pseudo = find_pseudo_equilibrium(system, near, **given)
         size = max(1.0, float(np.abs(pseudo.point).max()))
         scale = np.append(np.full(system.dimension, size), [1.0, high - low])
-        curve = PseudoEquilibriumCurve(where, index, scale)
+        curve = PseudoEquilibriumCurve(where, (index,), scale)
         start = np.append(pseudo.point, [pseudo.alpha, value])
     else:
         found = find_equilibrium(system, near, side=side, **given)
         size = max(1.0, float(np.abs(found.point).max()))
         curve = EquilibriumCurve(
-            where, index, np.append(np.full(system.dimension, size), high - low), side
+            where, (index,), np.append(np.full(system.dimension, size), high - low), side
         )
         start = np.append(found.point, value)
     return follow_branch(

@@ -54,7 +54,7 @@ def trace(
     first: float | None = None,
     smallest: float = 1e-9,
     most: int = 2000,
-    bounds: tuple[int, float, float] | None = None,
+    bounds: Sequence[tuple[int, float, float]] = (),
     report: Callable[[Point], None] | None = None,
 ) -> Arc:
     """Follow a curve from the last of some points of it.
@@ -74,8 +74,8 @@ def trace(
         An arc ends where steps would have to be shorter.
     most : int, optional
         Points of an arc.
-    bounds : (index, low, high), optional
-        Where one unknown stops the arc; it is solved for.
+    bounds : sequence of (index, low, high), optional
+        Where an unknown stops the arc; it is solved for.
     report : callable, optional
         Called with every new point, e.g. to move a progress bar.
 
@@ -107,7 +107,7 @@ class _Tracing:
         arc: Arc,
         step: float,
         smallest: float,
-        bounds: tuple[int, float, float] | None,
+        bounds: Sequence[tuple[int, float, float]],
     ):
         self.curve, self.arc, self.bounds = curve, arc, bounds
         self.step, self.smallest, self.closing = step, smallest, False
@@ -177,14 +177,15 @@ class _Tracing:
         self.arc.end = self.arc.end or self.curve.out(new.u) or self._closed(last, new)
 
     def _bound(self, last: Point, new: Point) -> Point | None:
-        """The point where the bounded unknown reaches its bound in this step."""
-        if self.bounds is None:
+        """The first point of this step where an unknown reaches its bound."""
+        weights: list[tuple[float, int, float]] = []
+        for k, low, high in self.bounds:
+            if not low <= new.u[k] <= high:
+                limit = low if new.u[k] < low else high
+                weights.append(((limit - last.u[k]) / (new.u[k] - last.u[k]), k, limit))
+        if not weights:
             return None
-        k, low, high = self.bounds
-        if low <= new.u[k] <= high:
-            return None
-        limit = low if new.u[k] < low else high
-        weight = (limit - last.u[k]) / (new.u[k] - last.u[k])
+        weight, k, limit = min(weights)
         guess = last.u + weight * (new.u - last.u)
         guess[k] = limit
         axis = np.zeros(guess.size)

@@ -45,7 +45,7 @@ class Pitchfork(Curve):
 
 def test_folds_are_passed_and_located():
     arc = trace(
-        Cubic(), [np.array([-2.0, -2.0])], np.array([1.0, 9.0]), step=0.2, bounds=(1, -3, 3)
+        Cubic(), [np.array([-2.0, -2.0])], np.array([1.0, 9.0]), step=0.2, bounds=[(1, -3, 3)]
     )
     folds = [zero.point.u for zero in arc.zeros if zero.name == "fold"]
     assert np.abs(np.array(folds) - [[-1, 2], [1, -2]]).max() < 1e-12
@@ -55,7 +55,7 @@ def test_folds_are_passed_and_located():
 
 def test_a_zero_of_a_test_is_found_and_a_pole_is_none():
     arc = trace(
-        Cubic(), [np.array([-2.0, -2.0])], np.array([1.0, 9.0]), step=0.2, bounds=(1, -3, 3)
+        Cubic(), [np.array([-2.0, -2.0])], np.array([1.0, 9.0]), step=0.2, bounds=[(1, -3, 3)]
     )
     found = [zero for zero in arc.zeros if zero.name in ("half", "pole")]
     assert [zero.name for zero in found] == ["half"]
@@ -74,9 +74,9 @@ def test_an_arc_ends_at_a_test_that_ends_it():
 @given(st.floats(1e-6, 1e6))
 def test_units_do_not_matter(factor):
     start, way = np.array([-2.0, -2.0]), np.array([1.0, 9.0])
-    plain = trace(Cubic(), [start], way, step=0.2, bounds=(1, -3, 3))
+    plain = trace(Cubic(), [start], way, step=0.2, bounds=[(1, -3, 3)])
     other = trace(
-        Cubic(factor), [factor * start], way, step=0.2, bounds=(1, -3 * factor, 3 * factor)
+        Cubic(factor), [factor * start], way, step=0.2, bounds=[(1, -3 * factor, 3 * factor)]
     )
     assert np.allclose(np.array(other.rows) / factor, plain.rows, rtol=0, atol=1e-9)
 
@@ -123,7 +123,7 @@ def test_steps_are_few_where_the_curve_is_straight():
         def equations(self, u):
             return np.array([u[0] - 2 * u[1]]), np.array([[1.0, -2.0]])
 
-    arc = trace(Line(), [np.zeros(2)], np.array([2.0, 1.0]), step=0.1, bounds=(0, -1, 10))
+    arc = trace(Line(), [np.zeros(2)], np.array([2.0, 1.0]), step=0.1, bounds=[(0, -1, 10)])
     assert len(arc.points) < 25
 
 

@@ -32,6 +32,7 @@ from . import local
 from .flow import (
     Ensemble,
     Event,
+    Section,
     Segment,
     Status,
     Trajectory,
@@ -64,6 +65,7 @@ from .local import (
     two_folds,
 )
 from .model import (
+    Clock,
     ConvergenceError,
     DefinitionError,
     DegenerateError,
@@ -110,6 +112,7 @@ __all__ = [
     "Branch",
     "BranchEnd",
     "BranchEvent",
+    "Clock",
     "CodimensionTwo",
     "ConvergenceError",
     "DefinitionError",
@@ -129,6 +132,7 @@ __all__ = [
     "PointError",
     "Region",
     "Reset",
+    "Section",
     "Segment",
     "Sensitivity",
     "Status",

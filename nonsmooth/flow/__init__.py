@@ -23,6 +23,7 @@ from .ensemble import ensemble
 from .follow import follow
 from .reference.polynomial import first_crossing, first_root
 from .results import Ensemble
+from .section import Section
 from .simulate import simulate
 from .status import Status
 from .trajectory import Event, Segment, Trajectory
@@ -31,6 +32,7 @@ from .work import Work
 __all__ = [
     "Ensemble",
     "Event",
+    "Section",
     "Segment",
     "Status",
     "Trajectory",

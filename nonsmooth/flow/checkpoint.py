@@ -27,7 +27,7 @@ from .results import Chunk
 from .status import Status
 
 #: Raised whenever the files or the numbers in them change, so that versions are not mixed.
-_FORMAT = 3
+_FORMAT = 4
 
 #: Bytes: of problem.json, of the itineraries of a chunk, of a header of an array in a file.
 _HEAD, _WORDS, _HEADER = 1 << 12, 1 << 30, 1 << 10

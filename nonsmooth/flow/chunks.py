@@ -16,7 +16,9 @@ from .facts import HAND_OVER, KINDS
 from .options import Options
 from .reference.driver import Driver
 from .results import Chunk, Stopped
+from .section import Times
 from .status import Status
+from .view import sampled
 
 #: The reference driver's functions are built and evaluated by one thread at a time.
 _REFERENCE = threading.Lock()
@@ -33,6 +35,10 @@ class Job:
     options : Options
     at : (kind, count) or None
         Event whose state is kept; the kind by its number.
+    times : Times or None
+        When runs are looked at.
+    room : int or None
+        Samples kept of each.
     compiled, lanes : bool
         Which engine runs.
     """
@@ -40,6 +46,8 @@ class Job:
     system: FilippovSystem | bytes
     options: Options
     at: tuple[int, int] | None
+    times: Times | None
+    room: int | None
     compiled: bool
     lanes: bool
 
@@ -70,17 +78,18 @@ def run_chunk(
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(len(x), bool)
     start = np.where(bad[:, None], np.nan, x) if bad.any() else x
     engine = engine_for(system, job.options) if job.compiled else None
+    times = None if job.times is None else job.times.of(p)
+    chunk = out or Chunk.empty(len(x), system.dimension, job.at is not None, job.room)
     if engine is None:
-        chunk = out or Chunk.empty(len(x), system.dimension, job.at is not None)
         _refuse(chunk, system, start, job.options)
     else:
-        chunk = engine.run_many(start, p, job.options, job.at, job.lanes, out, stop)
+        engine.run_many(start, p, job.options, job.at, job.lanes, chunk, stop, times)
     rest = np.flatnonzero(chunk.status == HAND_OVER)
     words = dict(enumerate(chunk.words))
     for i in rest.tolist():
         if stop():
             raise Stopped
-        words[len(words)] = _run_reference(chunk, system, i, start[i], p, len(words), job)
+        words[len(words)] = _run_reference(chunk, system, i, start[i], p, len(words), job, times)
     chunk.x[bad] = x[bad, : system.dimension]
     if engine is None or len(rest):
         used = np.bincount(chunk.itinerary).nonzero()[0].tolist()
@@ -95,14 +104,19 @@ def _refuse(chunk: Chunk, system: FilippovSystem, x: Array, options: Options) ->
     chunk.status[:] = np.where(bad, Status.NOT_FINITE, HAND_OVER)
     chunk.itinerary[:] = chunk.kinds[:] = 0
     chunk.kinds[bad, KINDS.index("end")] = 1
-    for array in (chunk.at_x, chunk.at_t):
-        if array is not None:
-            array[:] = np.nan
+    chunk.forget()
     chunk.words.append("")
 
 
 def _run_reference(
-    chunk: Chunk, system: FilippovSystem, i: int, x: Array, p: Array, code: int, job: Job
+    chunk: Chunk,
+    system: FilippovSystem,
+    i: int,
+    x: Array,
+    p: Array,
+    code: int,
+    job: Job,
+    times: Array | None,
 ) -> str:
     """Put the results of the reference driver into row i, which has the itinerary returned."""
     with _REFERENCE:
@@ -110,10 +124,17 @@ def _run_reference(
     chunk.x[i], chunk.t[i], chunk.status[i] = run.x[-1], run.t[-1], run.status
     chunk.itinerary[i] = code
     chunk.kinds[i] = 0
+    chunk.part(i, i + 1).forget()
     for event in run.events:
         kind = KINDS.index(event.kind)
         chunk.kinds[i, kind] += 1
         if job.at == (kind, chunk.kinds[i, kind]) and chunk.at_x is not None:
             assert chunk.at_t is not None
             chunk.at_x[i], chunk.at_t[i] = event.x, event.t
+    if chunk.sample_t is not None and chunk.sample_x is not None:
+        if times is not None:
+            row = times if times.ndim == 1 else times[i]
+            chunk.sample_t[i], chunk.sample_x[i] = sampled(run, row)
+        elif job.options.hits is not None:
+            job.options.hits.fill(run.events, chunk.sample_t[i], chunk.sample_x[i])
     return run.itinerary

@@ -18,6 +18,7 @@ from .options import Options
 from .results import Collected, Ensemble
 from .select import compiled_or_none, use_compiled
 from .starts import Starts
+from .view import read_view
 from .work import Work, run_all
 
 #: Fewer trajectories than this are not worth compiling the engine that runs several in step.
@@ -39,6 +40,8 @@ def ensemble(
     max_steps: int = 1_000_000,
     max_events: int = 100_000,
     at_event: tuple[str, int] | None = None,
+    t_eval: ArrayLike | None = None,
+    at: Any = None,
     work: Work | None = None,
     engine: str = "auto",
 ) -> Ensemble:
@@ -57,6 +60,10 @@ def ensemble(
         As in :func:`simulate`.
     at_event : (kind, k), optional
         Keep the state at the k-th event (from 1) of a kind, e.g. ``("crossing", 1)``.
+    t_eval : array_like (K,), optional
+        Keep the states at these times, sorted, in ``sample_t`` and ``sample_x``.
+    at : Section, str, number or expression, optional
+        Keep the states at a section; one at events needs a ``count``. See :class:`Section`.
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, checkpoint; see :class:`Work`.
     engine : {"auto", "reference", "compiled"}
@@ -90,6 +97,31 @@ def ensemble(
         start_mode=start_mode,
     )
     require_system(system)
+    work = _work(work)
+    if start_mode is not None:
+        system.parse_mode(start_mode)
+    starts = Starts(system, x0, parameters, t_start)
+    number = _event_number(at_event)
+    p = starts.p if at is None else starts.every_parameter()
+    view = read_view(system, t_eval, at, options, p)
+    options = view.options
+    if options.hits is not None and view.room is None:
+        raise OptionError(
+            "at: expected count= with a section at events in an ensemble, received none. It says how "
+            "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
+        )
+    several = supports_lanes(system) and start_mode is None and view.room is None
+    several = several and starts.count >= _FEW and t_end > t_start
+    compiled = _compiled(system, options, engine, several)
+    lanes = compiled and several
+    job = Job(system, options, number, view.times, view.room, compiled, lanes)
+    saved = work.checkpoint_of(lambda: _problem(system, starts, job))
+    results = Collected(system.dimension, starts.shape, number is not None, view.room)
+    run_all(job, starts, results, work, saved)
+    return results.ensemble()
+
+
+def _work(work: Any) -> Work:
     if work is not None and not isinstance(work, Work):
         raise OptionError(
             explain(
@@ -99,20 +131,7 @@ def ensemble(
                 advice="For example work=nonsmooth.Work(threads=2).",
             )
         )
-    if start_mode is not None:
-        system.parse_mode(start_mode)
-    starts = Starts(system, x0, parameters, t_start)
-    at = _event_number(at_event)
-    several = supports_lanes(system) and start_mode is None
-    several = several and starts.count >= _FEW and t_end > t_start
-    compiled = _compiled(system, options, engine, several)
-    lanes = compiled and several
-    job = Job(system, options, at, compiled, lanes)
-    work = Work() if work is None else work
-    saved = work.checkpoint_of(lambda: _problem(system, starts, options, at, compiled))
-    results = Collected(system.dimension, starts.shape, at is not None)
-    run_all(job, starts, results, work, saved)
-    return results.ensemble()
+    return work or Work()
 
 
 def _compiled(system: FilippovSystem, options: Options, engine: str, lanes: bool) -> bool:
@@ -142,14 +161,8 @@ def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:
     )
 
 
-def _problem(
-    system: FilippovSystem,
-    starts: Starts,
-    options: Options,
-    at: tuple[int, int] | None,
-    compiled: bool,
-) -> str:
+def _problem(system: FilippovSystem, starts: Starts, job: Job) -> str:
     code = hashlib.sha256(system.content_hash().encode())
-    code.update(repr((options, at, compiled)).encode())
+    code.update(repr((job.options, job.at, job.times, job.compiled)).encode())
     code.update(starts.digest().encode())
     return code.hexdigest()

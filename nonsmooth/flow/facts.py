@@ -110,6 +110,7 @@ REASONS = (
     "pressed",
     "two_sided",
     "multiple_zero",
+    "looked_at",
 )
 
 #: Not a status: the run goes on in the next call, after its arrays were emptied, or elsewhere.

@@ -103,6 +103,11 @@ def stopped(name: str, t: float) -> str:
     return f"{name!r} at t = {t:.10g}."
 
 
+def looked_at(count: int, t: float) -> str:
+    """The last hit of the section asked for."""
+    return f"Hit {count} of the section at t = {t:.10g}."
+
+
 def accumulation(events: int, limit: float) -> str:
     """Events accumulate."""
     return f"After {events} events; estimated limit t = {limit:.12g}."

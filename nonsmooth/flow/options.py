@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 from ..model import OptionError, explain, real, whole
 from .facts import SAFETY
+from .section import Hits
 
 
 @dataclass(frozen=True)
@@ -25,6 +26,8 @@ class Options:
     max_steps, max_events : int
     start_mode : str or None
         Continue in this mode from a start where more than one is possible.
+    hits : Hits or None
+        Events that are kept, the last of which may end the run.
 
     Raises
     ------
@@ -40,6 +43,7 @@ class Options:
     max_steps: int = 1_000_000
     max_events: int = 100_000
     start_mode: str | None = None
+    hits: Hits | None = None
 
     def __post_init__(self) -> None:
         for name in ("t_end", "t_start"):

@@ -34,11 +34,13 @@ class Chunk:
     kinds: NDArray[np.int32]
     at_x: Array | None
     at_t: Array | None
+    sample_t: Array | None = None
+    sample_x: Array | None = None
     totals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(4, np.int64))
 
     @classmethod
-    def empty(cls, count: int, n: int, at: bool) -> Chunk:
-        """Arrays without values for ``count`` trajectories of ``n`` states."""
+    def empty(cls, count: int, n: int, at: bool, room: int | None = None) -> Chunk:
+        """Arrays without values for ``count`` trajectories of ``n`` states, ``room`` samples each."""
         return cls(
             x=np.empty((count, n)),
             t=np.empty(count),
@@ -48,6 +50,8 @@ class Chunk:
             kinds=np.empty((count, len(KINDS)), np.int32),
             at_x=np.empty((count, n)) if at else None,
             at_t=np.empty(count) if at else None,
+            sample_t=None if room is None else np.empty((count, room)),
+            sample_x=None if room is None else np.empty((count, room, n)),
         )
 
     def part(self, first: int, last: int) -> Chunk:
@@ -62,11 +66,22 @@ class Chunk:
             kinds=self.kinds[cut],
             at_x=None if self.at_x is None else self.at_x[cut],
             at_t=None if self.at_t is None else self.at_t[cut],
+            sample_t=None if self.sample_t is None else self.sample_t[cut],
+            sample_x=None if self.sample_x is None else self.sample_x[cut],
         )
+
+    def forget(self) -> None:
+        """Empty the arrays of what may not happen."""
+        for array in (self.at_x, self.at_t, self.sample_t, self.sample_x):
+            if array is not None:
+                array[:] = np.nan
 
     def arrays(self) -> dict[str, NDArray[Any]]:
         """Return the arrays with one row for each trajectory."""
-        names = ("x", "t", "status", "itinerary", "kinds", "at_x", "at_t")
+        names = (
+            *("x", "t", "status", "itinerary", "kinds"),
+            *("at_x", "at_t", "sample_t", "sample_x"),
+        )
         return {name: a for name in names if (a := getattr(self, name)) is not None}
 
     def rename(self, words: Mapping[int, str]) -> None:
@@ -99,6 +114,8 @@ class Ensemble:
         Number of events by kind: crossing, entry, exit, stop, reset, end.
     event_x, event_t : ndarray (..., n), (...) or None
         State and time of the event asked for with ``at_event``; NaN where it did not happen.
+    sample_x, sample_t : ndarray (..., K, n), (..., K) or None
+        States and times asked for with ``t_eval`` or ``at``; NaN where they did not happen.
     """
 
     x: Array
@@ -109,6 +126,8 @@ class Ensemble:
     events: dict[str, NDArray[np.int32]]
     event_x: Array | None = None
     event_t: Array | None = None
+    sample_x: Array | None = None
+    sample_t: Array | None = None
 
     @property
     def itinerary(self) -> NDArray[np.object_]:
@@ -140,11 +159,13 @@ class Collected:
         Of the broadcast starts and parameters.
     at : bool
         Whether the state at an event is kept.
+    room : int or None
+        Samples kept of each trajectory.
     """
 
-    def __init__(self, dimension: int, shape: tuple[int, ...], at: bool):
+    def __init__(self, dimension: int, shape: tuple[int, ...], at: bool, room: int | None = None):
         self.shape = shape
-        self.all = Chunk.empty(math.prod(shape), dimension, at)
+        self.all = Chunk.empty(math.prod(shape), dimension, at, room)
         self._words: dict[str, int] = {}
 
     def put(self, first: int, chunk: Chunk) -> None:
@@ -176,4 +197,6 @@ class Collected:
             events={kind: every.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
             event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
             event_t=None if every.at_t is None else every.at_t.reshape(shape),
+            sample_x=None if every.sample_x is None else every.sample_x.reshape(*shape, -1, n),
+            sample_t=None if every.sample_t is None else every.sample_t.reshape(*shape, -1),
         )

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from typing import Any
 
+import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, Parameters, motion, require_system
@@ -12,9 +14,12 @@ from .compiled.convert import trajectory
 from .compiled.engine import engine_for, simulate_arrays
 from .options import Options
 from .reference.driver import Driver
+from .section import Section, Times
 from .select import compiled_or_none, use_compiled
+from .starts import require_start_mode
 from .status import Status
 from .trajectory import Trajectory
+from .view import read_view, sampled
 
 #: Steps that the reference driver takes before a run counts as long: at least so many, and more for
 #: a system whose jets have more instructions than _SMALL together, because compilers take longer.
@@ -35,6 +40,8 @@ def simulate(
     max_step: float = math.inf,
     max_steps: int = 1_000_000,
     max_events: int = 100_000,
+    t_eval: ArrayLike | None = None,
+    at: Any = None,
     engine: str = "auto",
 ) -> Trajectory:
     """Integrate a Filippov system through crossings, sliding, stops and resets.
@@ -58,6 +65,11 @@ def simulate(
         One letter per surface: which continuation to take where more than one is possible.
     max_step, max_steps, max_events : optional
         Limits.
+    t_eval : array_like (K,), optional
+        Keep the states at these times, sorted, in ``sample_t`` and ``sample_x`` of the result.
+    at : Section, str, number or expression, optional
+        Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
+        event, or after each period. See :class:`Section`.
     engine : {"auto", "reference", "compiled"}
         Which driver runs. ``"auto"`` takes the compiled engine for runs of more than 300 steps
         (more for large systems, which take long to compile), where there is a compiler; without
@@ -101,7 +113,25 @@ def simulate(
     )
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
-    return _run(system, x, p, options, engine)
+    require_start_mode(system, x, p, options)
+    view = read_view(system, t_eval, at, options, p)
+    options, times = view.options, view.times
+    if isinstance(at, Section) and at.count is not None and times is not None:
+        options = replace(options, t_end=float(times.of(p)[-1]))
+    return _looked_at(_run(system, x, p, options, engine), options, times, p)
+
+
+def _looked_at(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
+    """Give a run its samples."""
+    if times is not None:
+        t, x = sampled(run, times.of(p))
+        return replace(run, sample_t=t, sample_x=x)
+    if options.hits is None:
+        return run
+    kept = options.hits.select(run.events)
+    t, x = np.empty(len(kept)), np.empty((len(kept), run.x.shape[1]))
+    options.hits.fill(run.events, t, x)
+    return replace(run, sample_t=t, sample_x=x)
 
 
 def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: str) -> Trajectory:

@@ -10,7 +10,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, PointError, explain
+from ..model import Array, FilippovSystem, OptionError, PointError, Surfaces, explain
+from .facts import ON_SURFACE
+from .options import Options
+from .reference.modes import rounding_scale
 
 
 class Starts:
@@ -72,6 +75,10 @@ class Starts:
             code.update(np.ascontiguousarray(values).tobytes())
         return code.hexdigest()
 
+    def every_parameter(self) -> Array:
+        """Parameters (np,) or (m, np) of all trajectories."""
+        return self.part(0, self.count)[1]
+
     def part(self, first: int, last: int) -> tuple[Array, Array]:
         """Extended starts and parameters of the trajectories first to last - 1."""
         n = self.system.dimension
@@ -84,6 +91,33 @@ class Starts:
         for column, values in self.varied.items():
             p[:, column] = _rows(values[..., None], self.shape, first, last, 1)[:, 0]
         return x, p
+
+
+def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Options) -> None:
+    """Refuse a start mode with another side than the start (N,) has.
+
+    Raises
+    ------
+    OptionError
+    """
+    if options.start_mode is None or not system.surface_count:
+        return
+    letters = {1: "+", -1: "-", 0: "s"}
+    asked = system.parse_mode(options.start_mode)[: system.surface_count]
+    h, gradient = Surfaces(system).values(x, p)
+    scale = rounding_scale(np.abs(gradient), x, options.size)
+    sides = np.sign(np.where(np.abs(h) <= ON_SURFACE * scale, 0.0, h))[: system.surface_count]
+    wrong = [i for i, side in enumerate(sides) if side and side != asked[i]]
+    if wrong:
+        said = ", ".join(f"h{i} = {h[i]:.6g} ({letters[int(sides[i])]!r})" for i in wrong)
+        raise OptionError(
+            explain(
+                "start_mode",
+                expected=f"the sides of the start, where {said}",
+                received=repr(options.start_mode),
+                advice="Only on a surface, h = 0, is there a choice.",
+            )
+        )
 
 
 def _rows(values: Array, shape: tuple[int, ...], first: int, last: int, n: int) -> Array:

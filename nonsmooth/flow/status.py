@@ -33,7 +33,7 @@ class Status(IntEnum):
 
 ADVICE: dict[Status, str] = {
     Status.REACHED_END: "The run reached t_end.",
-    Status.STOPPED: "The run met a stopping surface.",
+    Status.STOPPED: "The run met a stopping surface or the last hit of its section.",
     Status.NON_UNIQUE: "The future is not unique from here; continue from the last state with "
     "start_mode= the mode you mean.",
     Status.ACCUMULATION: "Events accumulate in finite time (Zeno); continue from the limit with "

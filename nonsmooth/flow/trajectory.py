@@ -118,6 +118,8 @@ class Trajectory:
         Estimated limit of the event times when the status is ACCUMULATION.
     steps : Steps
         Accepted steps with their Taylor polynomials.
+    sample_t, sample_x : ndarray (K,), (K, n) or None
+        Times and states asked for with ``t_eval`` (NaN after an early end) or ``at``.
     """
 
     system: FilippovSystem
@@ -130,6 +132,8 @@ class Trajectory:
     message: str
     accumulation_time: float | None = None
     steps: Steps = field(default_factory=Steps)
+    sample_t: Array | None = None
+    sample_x: Array | None = None
 
     @property
     def itinerary(self) -> str:

@@ -1,6 +1,7 @@
 """WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
 
-from .checks import real, real_array, require_system, whole
+from .checks import is_real, real, real_array, require_system, whole
+from .clock import Clock
 from .coupled import Coupled, coupled_of
 from .definition import Impact, Reset, Stop, read_function
 from .errors import (
@@ -16,6 +17,7 @@ from .errors import (
 )
 from .evaluators import Evaluator, Resets, Surfaces, evaluator
 from .motion import Motion, followed, motion, watched_functions
+from .periods import periods, read_period
 from .reading import Parameters
 from .regularise import regularise
 from .switches import Guard
@@ -24,6 +26,7 @@ from .values import Array
 
 __all__ = [
     "Array",
+    "Clock",
     "ConvergenceError",
     "Coupled",
     "DefinitionError",
@@ -47,8 +50,11 @@ __all__ = [
     "evaluator",
     "explain",
     "followed",
+    "is_real",
     "motion",
+    "periods",
     "read_function",
+    "read_period",
     "real",
     "real_array",
     "regularise",

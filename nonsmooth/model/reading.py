@@ -15,6 +15,13 @@ Expression = Any  # a CasADi SX scalar, a number, or (for vectors) a sequence of
 Parameters = Mapping[Any, float | None]
 
 
+#: Advice where a function was given.
+_CALL = (
+    " Call it with the symbols and give what it returns, field=f(x, v). Inside, symbols have no truth "
+    "value: write casadi.if_else(x > 0, a, b) and use FilippovSystem.from_expression, not 'if'."
+)
+
+
 def listed(value: Any) -> list[Any]:
     """Return a sequence of what a user gave: one thing, a vector, a sequence, or None for nothing."""
     if value is None:
@@ -43,7 +50,7 @@ def scalar(value: Any, what: str) -> ca.SX:
     except (TypeError, ValueError, NotImplementedError) as error:
         raise DefinitionError(
             f"{what}: expected a CasADi SX expression or a number, received {value!r} "
-            f"({type(value).__name__})."
+            f"({type(value).__name__}).{_CALL if callable(value) else ''}"
         ) from error
     if result.shape != (1, 1):
         raise DefinitionError(f"{what}: expected a scalar, received shape {result.shape}.")
@@ -72,6 +79,10 @@ def column(values: Any, what: str, length: int) -> ca.SX:
         raise DefinitionError(
             f"{what}: expected {length} expressions, received none. Give above= and below= with "
             "surface=, or field= with multipliers= and surfaces=."
+        )
+    if callable(values):
+        raise DefinitionError(
+            f"{what}: expected {length} expressions, received the function {values!r}.{_CALL}"
         )
     items = listed(values)
     if len(items) != length:
@@ -153,5 +164,6 @@ def require_finite(expression: ca.SX, known: ca.SX, what: str) -> None:
         if f.instruction_id(k) == ca.OP_CONST and not math.isfinite(f.instruction_constant(k)):
             raise DefinitionError(
                 f"{what}: expected finite constants, received {f.instruction_constant(k)} in "
-                f"{expression}."
+                f"{expression}. Functions of Python's math turn a symbol into NaN: write casadi.sin(x), "
+                "not math.sin(x)."
             )

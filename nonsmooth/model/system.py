@@ -16,6 +16,7 @@ from numpy.typing import ArrayLike
 
 from .cache import Cache, Content
 from .checks import real
+from .clock import Clock, with_clocks
 from .definition import Definition, Impact, Reset, Stop, read_definition
 from .errors import DefinitionError, PointError, explain
 from .lift import LiftedSwitch, lift
@@ -54,6 +55,8 @@ class FilippovSystem:
     resets : sequence of Reset, optional
     impacts : sequence of Impact, optional
         Contacts that cannot be passed.
+    clocks : sequence of Clock, optional
+        What is periodic in time; each adds its phase to the states.
     hidden : bool, optional
         Allow multipliers that enter nonlinearly (hidden dynamics, Jeffrey 2018): sliding then
         follows a stable solution lambda of grad h . f(x, lambda) = 0.
@@ -92,24 +95,25 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        clocks: Sequence[Clock] | Clock = (),
         hidden: bool = False,
     ):
-        definition = read_definition(
-            states,
-            surface=surface,
-            above=above,
-            below=below,
-            field=field,
-            multipliers=multipliers,
-            surfaces=surfaces,
-            parameters=parameters,
-            time=time,
-            stops=stops,
-            resets=resets,
-            impacts=impacts,
-            hidden=hidden,
-        )
-        self._adopt(definition)
+        given = {
+            "states": states,
+            "surface": surface,
+            "above": above,
+            "below": below,
+            "field": field,
+            "multipliers": multipliers,
+            "surfaces": surfaces,
+            "parameters": parameters,
+            "time": time,
+            "stops": stops,
+            "resets": resets,
+            "impacts": impacts,
+            "hidden": hidden,
+        }
+        self._adopt(read_definition(**with_clocks(clocks, given)))
 
     # construction ------------------------------------------------------------------------------
 
@@ -127,6 +131,7 @@ class FilippovSystem:
         stops: Sequence[Stop] = (),
         resets: Sequence[Reset] | Reset = (),
         impacts: Sequence[Impact] | Impact = (),
+        clocks: Sequence[Clock] | Clock = (),
         hidden: bool = False,
     ) -> FilippovSystem:
         """Find sign, fabs, fmin, fmax and if_else in x' = ``rhs`` and make them surfaces.
@@ -138,7 +143,7 @@ class FilippovSystem:
 
         Parameters
         ----------
-        states, parameters, time, stops, resets, impacts
+        states, parameters, time, stops, resets, impacts, clocks
             As for the class. Stops, resets and gaps must be smooth.
         rhs : sequence of n expressions
             In states, parameters and time, with switches.
@@ -171,6 +176,9 @@ class FilippovSystem:
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
+        column(rhs, "rhs", len(listed(states)))  # refuses what is no field of the states
+        widened = with_clocks(clocks, {"states": states, "rhs": rhs, "resets": resets})
+        states, rhs, resets = widened["states"], widened["rhs"], widened["resets"]
         n = len(listed(states))
         frame = cls(states, field=[0] * n, parameters=parameters, time=time).definition
         entries = column(rhs, "rhs", n)
@@ -274,9 +282,21 @@ class FilippovSystem:
 
     def content_hash(self) -> str:
         """Hash of the definition: equal for equal expressions, names, stops and resets."""
-        state = {k: v for k, v in self.__getstate__().items() if k != "lifted"}
-        code = hashlib.sha256(str(sorted((k, repr(v)) for k, v in state.items())).encode())
-        return code.hexdigest()
+
+        def build() -> str:
+            parts = sorted((k, repr(v)) for k, v in self.definition.state().items())
+            return hashlib.sha256(str(parts).encode()).hexdigest()
+
+        return self.cached("content hash", build)
+
+    def __eq__(self, other: object) -> bool:
+        """Whether another system has the same definition; its symbols may be others."""
+        if self is other or not isinstance(other, FilippovSystem):
+            return self is other
+        return self.content_hash() == other.content_hash()
+
+    def __hash__(self) -> int:
+        return hash(self.content_hash())
 
     # symbolic ----------------------------------------------------------------------------------
 

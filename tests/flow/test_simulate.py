@@ -1,5 +1,6 @@
 """Long runs are compiled, short ones are not, and large systems have to be long to be worth it."""
 
+import re
 from importlib import import_module
 
 import casadi as ca
@@ -41,3 +42,15 @@ def test_which_engine_runs(n, steps, compiled, compiled_runs):
     run = ns.simulate(chain(n), np.full(2 * n, 0.2), 0.01 * steps, max_step=0.01, tol=1e-8)
     assert run.status is ns.Status.REACHED_END and len(run.t) > steps
     assert len(compiled_runs) == compiled
+
+
+@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize(("start", "mode"), [(1.0, "-"), (-1.0, "+"), (1.0, "s")])
+def test_a_start_mode_on_another_side_than_the_point_is_refused(engine, start, mode):
+    x = ca.SX.sym("x")
+    system = ns.FilippovSystem([x], surface=x, above=[-1], below=[3])
+    side = "+" if start > 0 else "-"
+    message = re.escape(f"h0 = {start:g} ({side!r}), received {mode!r}")
+    with pytest.raises(ns.OptionError, match=message):
+        ns.simulate(system, [start], t_end=1.0, start_mode=mode, engine=engine)
+    assert ns.simulate(system, [start], t_end=0.1, start_mode=side).status == 0

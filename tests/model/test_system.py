@@ -1,5 +1,6 @@
 """A system is defined once, in either form, and every inconsistent definition is refused in words."""
 
+import math
 import pickle
 
 import casadi as ca
@@ -66,6 +67,8 @@ def test_a_system_survives_pickling():
     copy = pickle.loads(pickle.dumps(system))
     assert repr(copy) == repr(system)
     assert copy.content_hash() == system.content_hash() != stick_slip().content_hash()
+    assert copy == system != stick_slip() and hash(copy) == hash(system)
+    assert system != "a system"
     runs = [ns.simulate(s, [0.0, 0.0], 20.0) for s in (system, copy)]
     assert runs[0].x.tolist() == runs[1].x.tolist()
 
@@ -91,6 +94,9 @@ WRONG = {
     "a second symbol of the same name": ({"above": [FOREIGN_X, v]}, "create each symbol once"),
     "a constant surface": ({"surface": 1.0}, "surface 0: expected a function of the states"),
     "a surface of parameters only": ({"surface": belt}, "surface 0: expected a function of the"),
+    "a function of Python's math": ({"above": [v, math.sin(x)]}, "write casadi.sin"),
+    "a function as a field": ({"above": lambda x, v: [v, x]}, "function .* Call it with the symb"),
+    "functions in a field": ({"above": [v, lambda x: x]}, "no truth value: write casadi.if_else"),
     "NaN in a field": ({"above": [v, np.nan]}, "expected finite constants, received nan"),
     "inf in a surface": ({"surface": v - ca.inf}, "expected finite constants"),
     "NaN as a default": ({"parameters": {belt: np.nan, friction: 1}}, "finite number"),

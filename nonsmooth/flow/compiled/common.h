@@ -17,7 +17,9 @@ typedef struct {
   int64_t max_steps, max_events;
   int32_t start_mode, at_kind;
   int64_t at_count;
-  int32_t dense, pad;
+  int32_t dense, hit_after;
+  /* Events that are hits: kinds as bits, for each kind of guard its indices as bits, side (or 0). */
+  int64_t hit_kinds, hit_guards[BRANCH_GUARD + 1], hit_side, hit_skip, hit_every, hit_count;
 } Options;
 
 /* Trajectories of a call: all of the arrays, or those listed in ``which``; where results go. */
@@ -31,6 +33,9 @@ typedef struct {
   int32_t *itinerary, *kinds;
   double *at_x, *at_t;
   int64_t *totals;
+  int64_t room, times_stride; /* samples of each trajectory; times are NULL where hits are kept */
+  const double *times;
+  double *sample_t, *sample_x;
 } Batch;
 
 /* Sizes of what Python and C share, compared when a library is loaded. */

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import ctypes
 import threading
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
-from ..facts import FULL, HAND_OVER, KINDS
+from ..facts import FULL, GUARDS, HAND_OVER, KINDS
 from ..options import Options
 from ..results import Chunk, Stopped
+from ..section import Hits
 from .build import CompilerError, build, lane_width
 from .codegen import lanes_source, scalar_source, supports_scalar
 
@@ -34,7 +36,10 @@ class _COptions(ctypes.Structure):
         *[(name, _I64) for name in ("max_steps", "max_events")],
         *[(name, _I32) for name in ("start_mode", "at_kind")],
         ("at_count", _I64),
-        *[(name, _I32) for name in ("dense", "pad")],
+        *[(name, _I32) for name in ("dense", "hit_after")],
+        ("hit_kinds", _I64),
+        ("hit_guards", _I64 * len(GUARDS)),
+        *[(name, _I64) for name in ("hit_side", "hit_skip", "hit_every", "hit_count")],
     ]
 
 
@@ -61,6 +66,8 @@ class _CBatch(ctypes.Structure):
         ("t0", _D),
         *[(name, _POINTER) for name in ("which", "x0", "p", "x", "t", "status", "itinerary")],
         *[(name, _POINTER) for name in ("kinds", "at_x", "at_t", "totals")],
+        *[(name, _I64) for name in ("room", "times_stride")],
+        *[(name, _POINTER) for name in ("times", "sample_t", "sample_x")],
     ]
 
 
@@ -245,6 +252,7 @@ class Engine:
         lanes: bool,
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
+        times: Array | None = None,
     ) -> Chunk:
         """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,).
 
@@ -258,6 +266,8 @@ class Engine:
             Contiguous arrays for the results, which are made unless given.
         stop : callable, optional
             Asked now and then whether to leave the work.
+        times : ndarray (K,) or (m, K), optional
+            Times at which the states are kept; not with lanes.
 
         Raises
         ------
@@ -265,42 +275,54 @@ class Engine:
         CompilerError
         """
         chunk = out or Chunk.empty(len(x), self.system.dimension, at is not None)
-        for array in (chunk.at_x, chunk.at_t):
-            if array is not None:  # what does not happen is not written
-                array[:] = np.nan
+        chunk.forget()
         x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
         c_options = _c_options(self.system, options, dense=False, at=at)
         library = self.lanes if lanes else self.scalar
         tree = library.tree_new()
         try:
-            self._call(library, None, x, p, c_options, options.t_start, tree, chunk, stop)
+            batch = partial(self._batch, x, p, options.t_start, chunk, times)
+            self._call(library, batch(None), c_options, tree, stop)
             rest = np.flatnonzero(chunk.status == HAND_OVER)
             if lanes and rest.size:
-                self._call(self.scalar, rest, x, p, c_options, options.t_start, tree, chunk, stop)
+                self._call(self.scalar, batch(rest), c_options, tree, stop)
             used = np.flatnonzero(np.bincount(chunk.itinerary))
             chunk.rename(_words(library, tree, self.system.modes, used.tolist()))
         finally:
             library.tree_free(tree)
         return chunk
 
+    def _batch(
+        self,
+        x: Array,
+        p: Array,
+        t_start: float,
+        chunk: Chunk,
+        times: Array | None,
+        which: NDArray[np.intp] | None,
+    ) -> _CBatch:
+        """What C reads and where it writes; all arrays live as long as the caller's."""
+        results = (chunk.x, chunk.t, chunk.status, chunk.itinerary, chunk.kinds)
+        kept = (chunk.at_x, chunk.at_t, chunk.totals)
+        sample_t = chunk.sample_t
+        return _CBatch(
+            len(x) if which is None else len(which),
+            p.shape[-1] if p.ndim > 1 else 0,
+            t_start,
+            *[_address(a) for a in (which, x, p, *results, *kept)],
+            0 if sample_t is None else sample_t.shape[1],
+            0 if times is None or times.ndim == 1 else times.shape[1],
+            *[_address(a) for a in (times, sample_t, chunk.sample_x)],
+        )
+
     def _call(
         self,
         library: ctypes.CDLL,
-        which: NDArray[np.intp] | None,
-        x: Array,
-        p: Array,
+        batch: _CBatch,
         options: _COptions,
-        t_start: float,
         tree: int,
-        chunk: Chunk,
         stop: Callable[[], bool],
     ) -> None:
-        count = len(x) if which is None else len(which)
-        stride = p.shape[-1] if p.ndim > 1 else 0
-        given = [_address(a) for a in (which, x, p)]
-        results = (chunk.x, chunk.t, chunk.status, chunk.itinerary, chunk.kinds)
-        kept = (chunk.at_x, chunk.at_t, chunk.totals)
-        batch = _CBatch(count, stride, t_start, *given, *[_address(a) for a in (*results, *kept)])
         memory = np.zeros(library.many_size() + 64, np.uint8)
         state = memory.ctypes.data + -memory.ctypes.data % 64
         call = (state, ctypes.byref(batch), ctypes.byref(options), tree, _BURST)
@@ -360,8 +382,31 @@ def _c_options(
         kind,
         count,
         int(dense),
-        0,
+        *_c_hits(system, o.hits),
     )
+
+
+def _c_hits(system: FilippovSystem, hits: Hits | None) -> tuple[Any, ...]:
+    """The last fields of the options: which events are hits, by their numbers."""
+    none = (_I64 * len(GUARDS))()
+    if hits is None:
+        return 0, 0, none, 0, 0, 1, 0
+    names = {
+        "surface": [f"h{i}" for i in range(system.surface_count)],
+        "stop": [name for name, _ in system.stops],
+        "reset": [name for name, _ in system.resets],
+    }
+    masks = [-1] * len(GUARDS)
+    if hits.names is not None:
+        masks = [_bits(n in hits.names for n in names.get(guard, ())) for guard in GUARDS]
+    side = 0 if hits.letter is None else (1 if hits.letter[1] == "+" else -1)
+    kinds = _bits(kind in hits.kinds for kind in KINDS)
+    numbers = (side, hits.skip, hits.every, hits.count or 0)
+    return int(hits.after), kinds, type(none)(*masks), *numbers
+
+
+def _bits(flags: Iterable[bool]) -> int:
+    return sum(1 << i for i, flag in enumerate(flags) if flag)
 
 
 def _words(

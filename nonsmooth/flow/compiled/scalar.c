@@ -36,6 +36,9 @@ typedef struct {
   double length, shortened; /* of the step before */
   int32_t length_mode;
   Output out;
+  int64_t hits, kept, room; /* of the section; samples kept, in row of the results */
+  const double *times;
+  double *sample_t, *sample_x;
   Tree *tree;
 } Run;
 
@@ -351,6 +354,33 @@ static void enter_segment(Run *r, int mode) {
   r->segment_steps = 0;
 }
 
+/* Samples: nonsmooth/flow/section.py */
+static void sample(Run *r, double t, const double *x) {
+  if (r->kept >= r->room) return;
+  r->sample_t[r->kept] = t;
+  memcpy(r->sample_x + r->kept++ * ND, x, ND * sizeof(double));
+}
+
+/* Samples at the times from the present one to less than that plus dt. */
+static void sample_step(Run *r, const Expansion *e, double dt) {
+  while (r->kept < r->room && r->times[r->kept] < r->t + dt) {
+    double x[N], ignored, s = r->times[r->kept] - r->t;
+    for (int i = 0; i < ND; i++) x[i] = horner(e->states[i], P, s, &ignored);
+    sample(r, r->times[r->kept], x);
+  }
+}
+
+static void count_hit(Run *r, int kind, const int *guard, const double *x) {
+  const Options *o = &r->o;
+  if (!(o->hit_kinds >> kind & 1) || !(o->hit_guards[guard[0]] >> guard[1] & 1)) return;
+  if (o->hit_side && guard[2] != o->hit_side) return;
+  r->hits++;
+  if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
+  sample(r, r->t, o->hit_after ? r->x : x);
+  if (o->hit_count && r->hits >= o->hit_skip + o->hit_every * o->hit_count)
+    finish(r, STOPPED, LOOKED_AT, (int)o->hit_count);
+}
+
 static void limit_of_events(Run *r);
 
 /* ``x`` is the state at the event, the present one unless the event changed it. */
@@ -371,6 +401,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     r->out.event_after[k] = r->mode;
     r->out.event_guard[k] = guard;
   }
+  if (r->o.hit_kinds) count_hit(r, kind, GUARD[before][guard], x);
   if (kind == END || kind == STOP) return;
   int at = r->history++ % HISTORY;
   r->interval[at] = r->t - r->last_event;
@@ -746,6 +777,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
     r->out.step_mode[k] = r->mode;
     memcpy(r->out.coefficients + k * N * (P + 1), e->states, sizeof e->states);
   }
+  if (r->times) sample_step(r, e, dt);
   memcpy(r->x, x, sizeof x);
   r->t += dt;
   r->step_count++;
@@ -866,7 +898,16 @@ typedef struct { int64_t next, begun; Run run; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
 
-static void keep(const Run *r, const Batch *b, int64_t i) {
+static void sample_into(Run *r, const Batch *b, int64_t i) {
+  r->room = b->room;
+  r->times = b->times ? b->times + i * b->times_stride : 0;
+  r->sample_t = b->sample_t + i * b->room;
+  r->sample_x = b->sample_x + i * b->room * ND;
+}
+
+static void keep(Run *r, const Batch *b, int64_t i) {
+  while (r->times && r->kept < r->room && r->times[r->kept] <= r->t && finite_all(r->x, ND))
+    sample(r, r->times[r->kept], r->x);
   memcpy(b->x + i * ND, r->x, ND * sizeof(double));
   b->t[i] = r->t;
   b->status[i] = (int8_t)r->status;
@@ -885,7 +926,10 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t b
   Run *r = &many->run;
   for (; many->next < b->count; many->next++) {
     int64_t i = b->which ? b->which[many->next] : many->next;
-    if (!many->begun) run_begin(r, o, &none, tree, b->x0 + i * N, b->p + i * b->p_stride, b->t0);
+    if (!many->begun) {
+      run_begin(r, o, &none, tree, b->x0 + i * N, b->p + i * b->p_stride, b->t0);
+      sample_into(r, b, i);
+    }
     many->begun = 1;
     if (go_on(r, &budget) == RUNNING) return 1;
     many->begun = 0;

@@ -61,6 +61,7 @@ class Driver:
         self._due_impact: Guard | None = None  # of a gap that is closing where the run stands
         self._sides: Sides = {}
         self._fired: set[int] = set()  # resets since the motion last moved
+        self._hits = 0  # of the section where the run is looked at
 
     # the loop ----------------------------------------------------------------------------------
 
@@ -468,6 +469,7 @@ class Driver:
         self.record.event(
             kind, self.t, x if x is not None else self.x, before, self.mode, name, self.x
         )
+        self._count_hit(kind, before, name)
         if kind in ("end", "stop"):
             return
         self.intervals.append(self.t - self._last_event)
@@ -480,6 +482,13 @@ class Driver:
             self._end(Status.ACCUMULATION, message)
         elif len(self.record.events) >= self.options.max_events:
             self._end(Status.TOO_MANY_EVENTS, messages.too_many("events", self.options.max_events))
+
+    def _count_hit(self, kind: str, before: str, name: str) -> None:
+        hits = self.options.hits
+        if hits is not None and hits.meets(kind, name, before):
+            self._hits += 1
+            if self._hits >= hits.last:
+                self._end(Status.STOPPED, messages.looked_at(hits.count or 0, self.t))
 
     def _close_segment(self, following: str) -> None:
         start, first = self._segment_start

@@ -1,0 +1,172 @@
+"""Reading ``t_eval=`` and ``at=``: which states of a run, or of many, are kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..model import (
+    Array,
+    FilippovSystem,
+    OptionError,
+    PointError,
+    explain,
+    periods,
+    read_period,
+    real_array,
+)
+from .options import Options
+from .section import KINDS_OF_SECTIONS, Hits, Section, Times
+from .trajectory import Trajectory
+
+
+@dataclass(frozen=True)
+class View:
+    """What of a run is looked at.
+
+    Attributes
+    ----------
+    options : Options
+        Those of the run, with the hits that are kept.
+    times : Times or None
+    room : int or None
+        States kept of each run; None where nothing is, or as many as there are.
+    """
+
+    options: Options
+    times: Times | None = None
+    room: int | None = None
+
+
+def read_view(
+    system: FilippovSystem, t_eval: ArrayLike | None, at: Any, options: Options, p: Array
+) -> View:
+    """Read what a user asked for, with the parameters (np,) or (m, np) of all runs.
+
+    Raises
+    ------
+    OptionError
+    """
+    if t_eval is not None and at is not None:
+        raise OptionError("t_eval, at: expected one of them, received both. Run twice.")
+    if t_eval is not None:
+        given = _given(t_eval, options.t_start, options.t_end)
+        return View(options, given, len(given.given))
+    if at is None:
+        return View(options)
+    section = at if isinstance(at, Section) else Section(at)
+    if isinstance(section.at, str):
+        hits = _hits(system, section)
+        return View(replace(options, hits=hits), None, hits.count)
+    times = _strobe(section, _period(system, section), options, p)
+    return View(options, times, times.count)
+
+
+def _period(system: FilippovSystem, section: Section) -> float | str:
+    period = read_period(system, section.at)
+    if period is None:
+        raise OptionError(
+            explain(
+                "at",
+                expected="a Section, a name, a kind of event, a period or an expression in "
+                "parameters",
+                received=f"{section.at!r} ({type(section.at).__name__})",
+                advice='For example at="h0", or at=nonsmooth.Section("h0", direction=1).',
+            )
+        )
+    if section.direction or section.after:
+        raise OptionError(
+            "at: expected direction= and after= with a surface, reset or impact only, received one "
+            "with a period. Times have no direction."
+        )
+    return period
+
+
+def _hits(system: FilippovSystem, section: Section) -> Hits:
+    """Events of a name, or of a kind where nothing has the name."""
+    name, letter = str(section.at), None
+    surfaces = [f"h{i}" for i in range(system.surface_count)]
+    items = {
+        "stop": [n for n, _ in system.stops],
+        "reset": [n for n, _ in system.resets],
+        "impact": list(system.impacts),
+    }
+    owners = tuple(kind for kind, names in items.items() if name in names)
+    kinds, names = (owners, (name,)) if owners else ((name,), None)
+    if name in surfaces and not owners:
+        kinds, names = KINDS_OF_SECTIONS, (name,)
+        if section.direction:
+            letter = surfaces.index(name), "+" if section.direction < 0 else "-"
+    elif section.direction:
+        raise OptionError(
+            f"direction: expected 0 for {name!r}, received {section.direction}. Only surfaces are "
+            "chosen by direction here; give a stop or a reset its own."
+        )
+    elif not owners and name not in KINDS_OF_SECTIONS:
+        known = [*surfaces, *items["stop"], *items["reset"], *items["impact"]]
+        raise OptionError(
+            explain(
+                "at",
+                expected=f"a name of {known} or a kind of {list(KINDS_OF_SECTIONS)}",
+                received=repr(name),
+                advice="A section that is none of them: give the system a stop or a reset there, "
+                "or ask nonsmooth.poincare.",
+            )
+        )
+    rest = section.every, section.skip, section.count, section.after
+    return Hits(kinds, names, letter, *rest)
+
+
+def _given(t_eval: ArrayLike, t_start: float, t_end: float) -> Times:
+    try:
+        times = real_array(t_eval, "t_eval")
+    except PointError as error:
+        raise OptionError(
+            f"t_eval: expected an array of times, received {t_eval!r}. For example "
+            "t_eval=numpy.linspace(t_start, t_end, 101)."
+        ) from error
+    wrong = None
+    if times.ndim != 1 or not times.size:
+        wrong = f"shape {times.shape}"
+    elif not np.all(np.isfinite(times)):
+        wrong = "some that are not finite"
+    elif np.any(np.diff(times) < 0.0):
+        wrong = "times that go back"
+    elif times[0] < t_start or times[-1] > t_end:
+        wrong = f"times from {times[0]} to {times[-1]}"
+    if wrong:
+        raise OptionError(
+            f"t_eval: expected times in a row (K,), sorted, from t_start = {t_start} to "
+            f"t_end = {t_end}, received {wrong}."
+        )
+    return Times(given=tuple(times.tolist()))
+
+
+def _strobe(section: Section, period: float | str, options: Options, p: Array) -> Times:
+    """Multiples of a period from t_start to t_end, as many as the shortest has."""
+    shortest = float(np.fmin.reduce(periods(period, p), axis=None, initial=math.inf))
+    fit = (options.t_end - options.t_start) / shortest * (1 + 4 * np.finfo(float).eps)
+    count = int((math.floor(fit) - section.skip) // section.every)
+    if section.count is not None:
+        count = min(count, section.count)
+    if count < 1:
+        raise OptionError(
+            f"at: expected a run of at least {section.skip + section.every} periods, received "
+            f"{fit:.6g} of the length {shortest:.6g}. Raise t_end, or lower skip and every."
+        )
+    return Times((), period, options.t_start, section.every, section.skip, count)
+
+
+def sampled(run: Trajectory, times: Array) -> tuple[Array, Array]:
+    """Return times (K,) and states (K, n) of a run; NaN beyond its end."""
+    t, x = np.full(times.shape, np.nan), np.full((times.size, run.x.shape[1]), np.nan)
+    last = float(run.t[-1])
+    within, ends = times < last, times == last
+    t[within | ends] = times[within | ends]
+    x[within] = run(times[within])
+    x[ends] = run.x[-1]
+    return t, x

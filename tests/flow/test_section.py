@@ -1,0 +1,170 @@
+"""Samples at sections, periods and given times are those of closed forms, in every engine."""
+
+import math
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, v, t, w, lam = (ca.SX.sym(s) for s in ("x", "v", "t", "w", "lam"))
+TWO_SPRINGS = ns.FilippovSystem([x, v], surface=x, above=[v, -x], below=[v, -4 * x])
+FALL = ns.FilippovSystem(
+    [x, v], field=[v, -2], resets=ns.Reset(x, [x, -v], direction=-1, name="floor")
+)
+FORCED = ns.FilippovSystem([x], field=[ca.cos(w * t)], parameters={w: 2.0}, time=t)
+ENGINES = ["reference", "compiled"]
+
+
+@pytest.fixture(params=["simulate", "ensemble"])
+def sample(request):
+    """One run by ``simulate`` or in an ensemble, where the others have other starts."""
+
+    def run(system, start, t_end, **options):
+        if request.param == "simulate":
+            found = ns.simulate(system, start, t_end, **options)
+            return found.sample_t, found.sample_x, found
+        starts = np.array([np.multiply(start, 1.1), start, np.full(len(start), np.nan)])
+        found = ns.ensemble(system, starts, t_end, work=ns.Work(threads=1), **options)
+        assert np.isnan(found.sample_x[2]).all() and np.isnan(found.sample_t[2]).all()
+        return found.sample_t[1], found.sample_x[1], found
+
+    return run
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_crossings_of_a_surface_in_one_direction(sample, engine):
+    # half a period of each spring: pi above, pi/2 below; speed is kept
+    at = ns.Section("h0", direction=1, count=3)
+    times, states, _ = sample(TWO_SPRINGS, [0.0, 1.0], 100.0, at=at, engine=engine)
+    assert np.allclose(times, 1.5 * math.pi * np.arange(1, 4), rtol=0, atol=1e-8)
+    assert np.allclose(states, [[0, 1]] * 3, rtol=0, atol=1e-8)
+    falling = ns.Section("h0", direction=-1, count=2)
+    times, states, _ = sample(TWO_SPRINGS, [0.0, 1.0], 100.0, at=falling, engine=engine)
+    assert np.allclose(times, math.pi * np.array([1, 2.5]), rtol=0, atol=1e-8)
+    assert np.allclose(states[:, 1], -1, rtol=0, atol=1e-8)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_every_third_hit_after_two_that_are_passed_over(sample, engine):
+    # from rest at the height 1 the ball lands at 1, 3, 5, ... with the speed 2
+    at = ns.Section("floor", every=3, skip=2, count=2, after=True)
+    times, states, run = sample(FALL, [1.0, 0.0], 100.0, at=at, engine=engine)
+    assert np.allclose(times, [9, 15], rtol=0, atol=1e-8)
+    assert np.allclose(states, [[0, 2], [0, 2]], rtol=0, atol=1e-8)
+    status = run.status if np.ndim(run.status) == 0 else run.status[1]
+    assert status == ns.Status.STOPPED
+    before = ns.Section("reset", count=1)
+    assert np.allclose(sample(FALL, [1.0, 0.0], 9.0, at=before, engine=engine)[1], [[0, -2]])
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_states_at_given_times_also_at_both_ends_and_after_a_jump(sample, engine):
+    given = [0.0, 0.5, 1.5, 2.0, 3.5]
+    times, states, _ = sample(FALL, [1.0, 0.0], 3.5, t_eval=given, engine=engine)
+    heights = [1.0, 0.75, 0.75, 1.0, 0.75]
+    assert np.array_equal(times, given)
+    assert np.allclose(states[:, 0], heights, rtol=0, atol=1e-9)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_times_after_the_end_of_a_run_are_nan(engine):
+    ends = ns.FilippovSystem([x], field=[1], stops=ns.Stop(x - 1))
+    run = ns.simulate(ends, [0.0], 3.0, t_eval=[0.5, 1.0, 1.5], engine=engine)
+    assert np.allclose(run.sample_x[:2, 0], [0.5, 1.0]) and np.isnan(run.sample_x[2, 0])
+    many = ns.ensemble(ends, [[0.0], [0.7]], 3.0, t_eval=[0.5, 1.0, 1.5], engine=engine)
+    assert np.array_equal(many.sample_x[0], run.sample_x, equal_nan=True)
+    assert np.isnan(many.sample_t[1]).tolist() == [True, True, True]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_period_may_depend_on_parameters(engine):
+    # x = sin(w t)/w is back at zero after each period, half way up a quarter later
+    values = np.array([2.0, 3.0, np.nan])
+    many = ns.ensemble(
+        FORCED, [[0.0]], 10.0, parameters={"w": values}, at=2 * ca.pi / w, engine=engine
+    )
+    assert many.sample_t.shape == (1, 3, 4) or many.sample_t.shape == (3, 4)
+    times = many.sample_t.reshape(3, 4)
+    assert np.allclose(times[0, :3], math.pi * np.array([1, 2, 3])) and np.isnan(times[0, 3])
+    assert np.allclose(times[1], 2 * math.pi / 3 * np.arange(1, 5))
+    assert np.nanmax(np.abs(many.sample_x)) < 1e-9 and np.isnan(times[2]).all()
+    run = ns.simulate(FORCED, [0.0], 10.0, at=ns.Section(math.pi / 4, every=4, skip=1, count=2))
+    assert np.allclose(run.sample_t, math.pi / 4 * np.array([5, 9])) and run.t[-1] < 7.1
+    assert np.allclose(run.sample_x, 0.5, rtol=0, atol=1e-9)
+
+
+def test_engines_and_chunks_agree_on_hits_of_random_runs():
+    dry = ns.FilippovSystem(
+        [x, v],
+        surface=v - 0.3,
+        multipliers=lam,
+        field=[v, ca.cos(1.3 * t) - x - 0.4 * lam],
+        time=t,
+        stops=ns.Stop(x - 3, name="wall"),
+    )
+    starts = np.random.default_rng(0).normal(size=(70, 2))
+    for at in (ns.Section("entry", count=4), ns.Section("h0", direction=-1, count=3)):
+        both = [ns.ensemble(dry, starts, 20.0, at=at, engine=engine) for engine in ENGINES]
+        assert np.array_equal(both[0].status, both[1].status)
+        assert both[0].itineraries == both[1].itineraries
+        assert np.allclose(both[0].sample_t, both[1].sample_t, atol=1e-8, equal_nan=True)
+        assert np.allclose(both[0].sample_x, both[1].sample_x, atol=1e-8, equal_nan=True)
+        small = ns.ensemble(dry, starts, 20.0, at=at, work=ns.Work(threads=2, chunk=7))
+        assert np.array_equal(small.sample_x, both[1].sample_x, equal_nan=True)
+
+
+def test_samples_survive_a_checkpoint_and_other_requests_are_another_problem(tmp_path):
+    work = ns.Work(checkpoint=tmp_path / "saved", chunk=2, threads=1)
+    starts = [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]
+    first = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
+    again = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
+    assert np.array_equal(first.sample_x, again.sample_x)
+    assert np.array_equal(pickle.loads(pickle.dumps(again)).sample_t, first.sample_t)
+    with pytest.raises(ns.OptionError, match="another system, start"):
+        ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.5], work=work)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"at": "h1"}, r"at: expected a name of \['h0'\] or a kind"),
+        ({"at": "end"}, "at: expected a name"),
+        ({"at": -1.0}, "period: expected a positive number, received -1.0"),
+        ({"at": x}, "an expression in parameters"),
+        ({"at": 50.0}, "at least 1 periods"),
+        ({"at": ns.Section("entry", direction=1)}, "Only surfaces are chosen by direction"),
+        ({"at": ns.Section(1.0, after=True)}, "Times have no direction"),
+        ({"at": "h0", "t_eval": [1.0]}, "expected one of them"),
+        ({"t_eval": [[1.0]]}, r"t_eval: expected times in a row .* received shape \(1, 1\)"),
+        ({"t_eval": [2.0, 1.0]}, "received times that go back"),
+        ({"t_eval": [0.0, 11.0]}, r"to t_end = 10.0, received times from 0.0 to 11.0"),
+        ({"t_eval": [math.nan]}, "some that are not finite"),
+        ({"t_eval": "all"}, "t_eval: expected an array of times, received 'all'"),
+    ],
+)
+def test_bad_requests_are_refused_by_name(options, message):
+    for run in (ns.simulate, ns.ensemble):
+        with pytest.raises(ns.OptionError, match=message):
+            run(TWO_SPRINGS, [0.0, 1.0], 10.0, **options)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"direction": 2}, "direction: expected -1"),
+        ({"every": 0}, "every: expected a positive whole number"),
+        ({"skip": -1}, "skip: expected a whole number >= 0"),
+        ({"count": 0.5}, "count: expected a positive whole number"),
+    ],
+)
+def test_bad_sections_are_refused(options, message):
+    with pytest.raises(ns.OptionError, match=message):
+        ns.Section("h0", **options)
+
+
+def test_an_ensemble_must_know_how_many_hits_to_keep():
+    with pytest.raises(ns.OptionError, match="expected count= with a section at events"):
+        ns.ensemble(TWO_SPRINGS, [0.0, 1.0], 10.0, at="h0")

@@ -41,6 +41,7 @@ from .flow import (
     first_crossing,
     first_root,
     follow,
+    load,
     simulate,
 )
 from .local import (
@@ -162,6 +163,7 @@ __all__ = [
     "funnel",
     "gradient",
     "intersection_range",
+    "load",
     "local",
     "plot",
     "region",

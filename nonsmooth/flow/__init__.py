@@ -23,6 +23,7 @@ from .ensemble import ensemble
 from .follow import follow
 from .reference.polynomial import first_crossing, first_root
 from .results import Ensemble
+from .saving import load
 from .section import Section
 from .simulate import simulate
 from .status import Status
@@ -41,5 +42,6 @@ __all__ = [
     "first_crossing",
     "first_root",
     "follow",
+    "load",
     "simulate",
 ]

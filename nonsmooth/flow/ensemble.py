@@ -116,7 +116,8 @@ def ensemble(
     lanes = compiled and several
     job = Job(system, options, number, view.times, view.room, compiled, lanes)
     saved = work.checkpoint_of(lambda: _problem(system, starts, job))
-    results = Collected(system.dimension, starts.shape, number is not None, view.room)
+    names, keeps = system.state_names, number is not None
+    results = Collected(system.dimension, starts.shape, keeps, view.room, names)
     run_all(job, starts, results, work, saved)
     return results.ensemble()
 

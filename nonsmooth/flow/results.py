@@ -11,7 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
+from . import tables
 from .facts import KINDS
+from .saving import Savable
 from .status import Status
 
 
@@ -95,7 +97,7 @@ class Chunk:
 
 
 @dataclass(frozen=True, repr=False)
-class Ensemble:
+class Ensemble(Savable):
     """Results, each of the shape ``(...)`` of the broadcast starts and parameters.
 
     Attributes
@@ -116,6 +118,7 @@ class Ensemble:
         State and time of the event asked for with ``at_event``; NaN where it did not happen.
     sample_x, sample_t : ndarray (..., K, n), (..., K) or None
         States and times asked for with ``t_eval`` or ``at``; NaN where they did not happen.
+    state_names : tuple of str
     """
 
     x: Array
@@ -128,6 +131,7 @@ class Ensemble:
     event_t: Array | None = None
     sample_x: Array | None = None
     sample_t: Array | None = None
+    state_names: tuple[str, ...] = ()
 
     @property
     def itinerary(self) -> NDArray[np.object_]:
@@ -138,6 +142,29 @@ class Ensemble:
     def complete(self) -> NDArray[np.bool_]:
         """Where the run did what was asked: reached its end or a stop."""
         return (self.status == Status.REACHED_END) | (self.status == Status.STOPPED)
+
+    def to_pandas(self) -> Any:
+        """Return a DataFrame with a row for each trajectory, in the order of the arrays.
+
+        Columns: ``t``, the states, status, itinerary, and the number of events of each kind
+        (``crossing_count``, ...). The index has the axes ``start_0``, ... if there are several.
+
+        Raises
+        ------
+        OptionError
+            pandas is not installed.
+        """
+        return tables.ensemble_table(self)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset of all arrays, with the axes ``start_0``, ..., ``sample`` and ``state``.
+
+        Raises
+        ------
+        OptionError
+            xarray is not installed.
+        """
+        return tables.ensemble_set(self)
 
     def __repr__(self) -> str:
         found, number = np.unique(self.status, return_counts=True)
@@ -161,10 +188,19 @@ class Collected:
         Whether the state at an event is kept.
     room : int or None
         Samples kept of each trajectory.
+    names : tuple of str
+        Of the states.
     """
 
-    def __init__(self, dimension: int, shape: tuple[int, ...], at: bool, room: int | None = None):
-        self.shape = shape
+    def __init__(
+        self,
+        dimension: int,
+        shape: tuple[int, ...],
+        at: bool,
+        room: int | None = None,
+        names: tuple[str, ...] = (),
+    ):
+        self.shape, self.names = shape, names
         self.all = Chunk.empty(math.prod(shape), dimension, at, room)
         self._words: dict[str, int] = {}
 
@@ -199,4 +235,5 @@ class Collected:
             event_t=None if every.at_t is None else every.at_t.reshape(shape),
             sample_x=None if every.sample_x is None else every.sample_x.reshape(*shape, -1, n),
             sample_t=None if every.sample_t is None else every.sample_t.reshape(*shape, -1),
+            state_names=self.names,
         )

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, PointError, real_array
+from . import tables
+from .saving import Savable, savable
 from .status import Status
 
 
+@savable
 @dataclass(frozen=True)
 class Event:
     """Something that happened at one instant.
@@ -45,6 +49,7 @@ class Event:
             object.__setattr__(self, "x_after", self.x)
 
 
+@savable
 @dataclass(frozen=True)
 class Segment:
     """A stretch of motion in one mode: steps ``first`` to ``last`` - 1."""
@@ -56,6 +61,7 @@ class Segment:
     last: int
 
 
+@savable
 @dataclass(frozen=True)
 class Steps:
     """Accepted steps with the Taylor polynomials of the states.
@@ -97,7 +103,7 @@ class Steps:
 
 
 @dataclass(frozen=True, repr=False)
-class Trajectory:
+class Trajectory(Savable):
     """A solution: call it with times to evaluate its dense output.
 
     Attributes
@@ -170,6 +176,32 @@ class Trajectory:
             return np.broadcast_to(self.x[-1], (*times.shape, n)).copy()
         forward = bool(self.t[-1] >= self.t[0])
         return self.steps.at(times.ravel(), n, forward).reshape(*times.shape, n)
+
+    def to_pandas(self, what: str = "points") -> Any:
+        """Return a DataFrame: steps and events in time, a row each event, or the samples.
+
+        Parameters
+        ----------
+        what : {"points", "events", "samples"}, optional
+            ``points`` and ``samples`` have the time as index and a column for each state; ``events``
+            has time, kind, name, modes, and the states before and after (``x_after``, ...).
+
+        Raises
+        ------
+        OptionError
+            pandas is not installed; the run has no samples.
+        """
+        return tables.trajectory_table(self, what)
+
+    def to_xarray(self) -> Any:
+        """Return a Dataset with ``x`` (t, state), and ``sample_x`` (sample, state) if there are any.
+
+        Raises
+        ------
+        OptionError
+            xarray is not installed.
+        """
+        return tables.trajectory_set(self)
 
     def __repr__(self) -> str:
         return (

@@ -16,6 +16,7 @@ from .errors import (
     explain,
 )
 from .evaluators import Evaluator, Resets, Surfaces, evaluator
+from .lift import LiftedSwitch
 from .motion import Motion, followed, motion, watched_functions
 from .periods import periods, read_period
 from .reading import Parameters
@@ -35,6 +36,7 @@ __all__ = [
     "FilippovSystem",
     "Guard",
     "Impact",
+    "LiftedSwitch",
     "Motion",
     "NonsmoothError",
     "NotSmoothError",

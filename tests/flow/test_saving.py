@@ -1,0 +1,137 @@
+"""Results survive files, pickles and copies to the last bit, and say the same as tables and data sets."""
+
+import copy
+import pickle
+import sys
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, v, a = (ca.SX.sym(s) for s in ("x", "v", "a"))
+BLOCK = ns.FilippovSystem.from_expression(
+    [x, v],
+    [v, -x - a * ca.sign(v - 0.3)],
+    parameters={a: 0.4},
+    stops=ns.Stop(x - 5, name="wall"),
+    resets=ns.Reset(x + 1, [x, -v], -1, "bumper"),
+)
+PLANE = ns.FilippovSystem([x, v], surface=v, above=[x, v - 1 + x], below=[-2, 1 + x])
+
+
+def run():
+    return ns.simulate(BLOCK, [0.0, -2.0], 12.0, t_eval=[0.0, 1.0, 12.0])
+
+
+def many():
+    starts = np.array([[0.0, -2.0], [0.5, 0.5], [np.nan, 0.0], [4.9, 1.0]]).reshape(2, 2, 2)
+    return ns.ensemble(BLOCK, starts, 6.0, at=ns.Section("entry", count=2))
+
+
+MADE = {"Trajectory": run, "Ensemble": many}
+
+
+def same(one, other):
+    """Whether two values are equal to the last bit, NaN included, through all their parts."""
+    assert type(one) is type(other)
+    if isinstance(one, np.ndarray):
+        return one.dtype == other.dtype and np.array_equal(
+            one, other, equal_nan=one.dtype.kind == "f"
+        )
+    if isinstance(one, (list, tuple)):
+        return len(one) == len(other) and all(map(same, one, other))
+    if isinstance(one, dict):
+        return list(one) == list(other) and all(map(same, one.values(), other.values()))
+    if hasattr(one, "__dataclass_fields__"):
+        return all(same(getattr(one, f), getattr(other, f)) for f in one.__dataclass_fields__)
+    return one == other
+
+
+@pytest.mark.parametrize("kind", MADE)
+def test_a_saved_result_is_the_same(kind, tmp_path):
+    result = MADE[kind]()
+    result.save(tmp_path / "result")  # the name is kept as it is
+    for again in (ns.load(tmp_path / "result"), type(result).load(str(tmp_path / "result"))):
+        assert type(again).__name__ == kind and same(again, result)
+
+
+@pytest.mark.parametrize("kind", MADE)
+@pytest.mark.parametrize("copied", [lambda r: pickle.loads(pickle.dumps(r)), copy.deepcopy])
+def test_a_copied_result_is_the_same(kind, copied):
+    assert same(copied(MADE[kind]()), MADE[kind]())
+
+
+def test_a_loaded_run_still_computes(tmp_path):
+    result = run()
+    result.save(tmp_path / "run.npz")
+    again = ns.load(tmp_path / "run.npz")
+    assert np.array_equal(again(np.linspace(0, 12, 50)), result(np.linspace(0, 12, 50)))
+    assert again.system == result.system and str(again.system.lifted[0]) == str(BLOCK.lifted[0])
+    assert np.array_equal(ns.simulate(again.system, [0.0, -2.0], 12.0).x, result.x)
+
+
+def test_files_that_are_none_are_refused(tmp_path):
+    (tmp_path / "text").write_text("no archive")
+    np.savez(tmp_path / "other.npz", x=np.zeros(3))
+    with open(tmp_path / "pickled", "wb") as file:
+        np.savez(file, tree=np.array([{}], dtype=object))
+    run().save(tmp_path / "cut")
+    (tmp_path / "cut").write_bytes((tmp_path / "cut").read_bytes()[:-200])
+    for name in ("missing", "text", "other.npz", "pickled", "cut"):
+        with pytest.raises(ns.OptionError, match=r"path: expected a file written by save"):
+            ns.load(tmp_path / name)
+    run().save(tmp_path / "run")
+    with pytest.raises(ns.OptionError, match="expected a saved Ensemble, received a Trajectory"):
+        ns.Ensemble.load(tmp_path / "run")
+    with pytest.raises(ns.OptionError, match="expected a file that can be written"):
+        run().save(tmp_path / "no folder" / "run")
+
+
+def test_a_run_as_tables():
+    pandas = pytest.importorskip("pandas")
+    result = run()
+    points, events = result.to_pandas(), result.to_pandas("events")
+    assert isinstance(points, pandas.DataFrame) and list(points) == ["x", "v"]
+    assert np.array_equal(points.to_numpy(), result.x) and points.index.name == "t"
+    assert points.attrs["a"] == 0.4 and points.attrs["status"] == "REACHED_END"
+    assert events.kind.tolist() == [e.kind for e in result.events]
+    bumps = events[events.name == "bumper"]
+    assert len(bumps) and np.array_equal(bumps.v_after, -bumps.v)
+    assert result.to_pandas("samples").loc[1.0].tolist() == result(1.0).tolist()
+    with pytest.raises(ns.OptionError, match="'points', 'events' or 'samples', received 'steps'"):
+        result.to_pandas("steps")
+    with pytest.raises(ns.OptionError, match="expected a run with samples"):
+        ns.simulate(BLOCK, [0.0, 0.0], 1.0).to_pandas("samples")
+
+
+def test_an_ensemble_as_a_table_and_as_a_data_set():
+    pytest.importorskip("pandas")
+    pytest.importorskip("xarray")
+    result = many()
+    table, data = result.to_pandas(), result.to_xarray()
+    assert table.loc[(1, 0), "status"] == "NOT_FINITE" and table.index.names == [
+        "start_0",
+        "start_1",
+    ]
+    assert table.itinerary.tolist() == result.itinerary.ravel().tolist()
+    assert np.array_equal(table[["x", "v"]].to_numpy(), result.x.reshape(4, 2), equal_nan=True)
+    assert table.entry_count.tolist() == result.events["entry"].ravel().tolist()
+    assert data.x.dims == ("start_0", "start_1", "state") and data.state.values.tolist() == [
+        "x",
+        "v",
+    ]
+    assert np.array_equal(data.sample_x, result.sample_x, equal_nan=True)
+    assert data.sample_x.sel(state="x").dims == ("start_0", "start_1", "sample")
+    trajectory = run().to_xarray()
+    assert np.array_equal(trajectory.x.sel(state="v"), run().x[:, 1])
+    assert trajectory.sample_t.values.tolist() == [0.0, 1.0, 12.0]
+
+
+@pytest.mark.parametrize("name", ["pandas", "xarray"])
+def test_libraries_that_are_not_there_are_asked_for(name, monkeypatch):
+    monkeypatch.setitem(sys.modules, name, None)
+    for make in MADE.values():
+        with pytest.raises(ns.OptionError, match=rf"to_{name}: expected {name} to be installed"):
+            getattr(make(), f"to_{name}")()

@@ -1,5 +1,6 @@
 """The shape of the project holds: floors without a client's words, no traces of a machine, every
-public name documented, no function longer than a screen."""
+public name documented, no function longer than a screen, no module than one idea, nothing private
+used elsewhere."""
 
 import ast
 import importlib
@@ -12,6 +13,14 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 LONGEST_FUNCTION = 60  # lines, from `def` to its last, the docstring not counted
+LONGEST_MODULE = 400  # lines
+
+# Modules that are longer, with their length: they may only become shorter.
+LONG_MODULES = {
+    "nonsmooth/flow/compiled/engine.py": 415,
+    "nonsmooth/flow/reference/driver.py": 506,
+    "nonsmooth/model/system.py": 560,
+}
 
 # Words of the client. The bouncing ball is also a classic of the general theory (impacts that
 # accumulate), so nonsmooth/textbook may say those two words, and no others.
@@ -119,3 +128,51 @@ def test_no_function_is_longer_than_a_screen():
                 if lines > LONGEST_FUNCTION:
                     long.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.name}: {lines}")
     assert not long, "\n".join(long)
+
+
+def test_no_module_is_longer_than_one_idea():
+    lengths = {
+        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").splitlines())
+        for path in sources("nonsmooth", "bounce")
+    }
+    long = {
+        name: lines
+        for name, lines in lengths.items()
+        if lines > LONG_MODULES.get(name, LONGEST_MODULE)
+    }
+    assert not long, long
+    short = [name for name in LONG_MODULES if lengths.get(name, 0) <= LONGEST_MODULE]
+    assert not short, f"no longer long, so no longer to be listed: {short}"
+
+
+def is_private(name):
+    return name.startswith("_") and not name.endswith("__")
+
+
+def private_uses(tree):
+    """Names with an underscore that a module imports, or takes from a module that it imported."""
+    modules = set()
+    for node in ast.walk(tree):
+        if isinstance(node, ast.Import):
+            modules |= {(a.asname or a.name).split(".")[0] for a in node.names}
+        if isinstance(node, ast.ImportFrom):
+            modules |= {a.asname or a.name for a in node.names if a.name.islower()}
+            parts = [*(node.module or "").split("."), *(a.name for a in node.names)]
+            yield from ((node.lineno, name) for name in parts if is_private(name))
+        if isinstance(node, ast.Attribute) and is_private(node.attr):
+            if isinstance(node.value, ast.Name) and node.value.id in modules - {"sys", "os"}:
+                yield node.lineno, f"{node.value.id}.{node.attr}"
+
+
+def test_nothing_private_is_used_in_another_module():
+    found = [
+        f"{path.relative_to(ROOT)}:{line}: {name}"
+        for path in sources("nonsmooth", "bounce", "papers", "benchmarks", "docs")
+        for line, name in private_uses(ast.parse(path.read_text(encoding="utf-8")))
+    ]
+    assert not found, "\n".join(found)
+
+
+def test_what_counts_as_private():
+    text = "from a import _b\nimport c\nc._d\nfrom . import e\ne._f, e.__doc__, self._g\nfrom ._h import i"
+    assert [name for _, name in private_uses(ast.parse(text))] == ["_b", "_h", "c._d", "e._f"]

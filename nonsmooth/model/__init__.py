@@ -3,7 +3,7 @@
 from .checks import is_real, real, real_array, require_system, whole
 from .clock import Clock
 from .coupled import Coupled, coupled_of
-from .definition import Impact, Reset, Stop, read_function
+from .definition import read_function
 from .errors import (
     ConvergenceError,
     DefinitionError,
@@ -16,7 +16,8 @@ from .errors import (
     explain,
 )
 from .evaluators import Evaluator, Resets, Surfaces, evaluator
-from .lift import LiftedSwitch
+from .events import Impact, Reset, Stop
+from .found_switches import LiftedSwitch
 from .motion import Motion, followed, motion, watched_functions
 from .periods import periods, read_period
 from .reading import Parameters

@@ -6,9 +6,8 @@ G linearly, with the matrix M = dG/dlambda at the start of the step, so the seri
 follow order by order from one factorisation of M (also where lambda enters nonlinearly: hidden
 dynamics). Nothing here grows as the number of modes.
 
-Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), as the
-normal force of a contact, the unknown is nu_i = n_i lambda_i, so that sliding goes on smoothly through
-n_i = 0 (``cancel``).
+Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), the
+unknown is nu_i = n_i lambda_i (``factors``).
 
 Source: Acary & Brogliato 2008, "Numerical methods for nonsmooth dynamical systems", for the
 complementarity of several surfaces; Jeffrey 2018 for hidden dynamics.
@@ -23,14 +22,14 @@ from functools import cached_property
 import casadi as ca
 import numpy as np
 
-from .cancel import cancel_common_factor
 from .economy import economise
 from .evaluators import Evaluator
+from .factors import with_factors
 from .graph import depends_on, instructions
 from .identity import vanish_on
 from .jets import Expansion
 from .numbers import Numbers
-from .rules import Rule, lower
+from .rules import lower, touched
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
@@ -77,7 +76,7 @@ class Coupled:
         self.count = self._surfaces + len(system.impacts)
         x = system.extended_states
         lam = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in range(self._surfaces)])
-        field, factors, unknowns = _with_factors(system, lam)
+        field, factors, unknowns = with_factors(system, lam)
         self.scaled = tuple(not f.is_one() for f in factors)
         #: Impacts whose reaction a surface's multiplier is multiplied with: friction at a contact.
         self.carriers = tuple(
@@ -341,7 +340,7 @@ class Coupled:
             nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
             rules, place = lower(nodes, depends_on(nodes, [True, False]))
             rows = [[place[j] for j in row] for row in rows]
-            late = _touched(rules, self.system.extended_dimension)
+            late = touched(rules, self.system.extended_dimension)
             self._series[key] = Expansion(rules, rows, [], Numbers()), late
         return self._series[key]
 
@@ -433,35 +432,6 @@ def _inverse(matrix: Array) -> Array:
         return np.asarray(np.linalg.inv(matrix), float)
     except np.linalg.LinAlgError:
         return np.full_like(matrix, np.nan)
-
-
-def _touched(rules: Sequence[Rule], states: int) -> list[int]:
-    """Rules that the multipliers enter (inputs of the moving vector after the states)."""
-    touched = [False] * len(rules)
-    for _ in range(2):  # a sine and its cosine refer to each other
-        for j, rule in enumerate(rules):
-            own = rule.place[0] == 0 and rule.place[1] >= states
-            touched[j] = touched[j] or own or any(touched[a] for a in rule.args)
-    return [j for j, yes in enumerate(touched) if yes]
-
-
-def _with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX], list[ca.SX]]:
-    """Field in lambda, reactions and nu; factors n_i; and the unknown of each sliding surface."""
-    x, p, reactions = system.extended_states, system.parameter_symbols, system.definition.reactions
-    field = plain = system.field_with(lam, reactions)
-    factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
-    known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
-    columns = ca.jacobian(plain, lam)
-    for i in range(system.surface_count):
-        entries = ca.vertsplit(ca.densify(columns[:, i]))
-        if ca.depends_on(ca.vertcat(*entries), lam):
-            continue  # products of multipliers, or hidden dynamics
-        reduced, factor = cancel_common_factor(entries, variables, known)
-        if ca.depends_on(factor, variables):
-            nu = ca.SX.sym(f"nu{i}")
-            field = field + nu * ca.vertcat(*reduced)  # lambda_i is 0 while the surface slides
-            factors[i], unknowns[i] = factor, nu
-    return field, factors, unknowns
 
 
 def coupled_of(system: FilippovSystem) -> Coupled:

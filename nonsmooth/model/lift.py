@@ -29,18 +29,17 @@ so, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are continu
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from itertools import product
 
 import casadi as ca
 
-from .cancel import Sum, normal_forms, simple_zeros
 from .errors import DefinitionError, NotSmoothError, explain
+from .found_switches import LiftedSwitch, Switches
 from .graph import NOT_SMOOTH, evaluate, instructions, operation
 
 #: A switch that depends on more switches than this is refused: 2^n copies of it would be needed.
 _MOST_NESTED = 6
-_ROUNDING = 16 * 2.220446049250313e-16
 
 _INFINITELY_MANY = (
     "It switches on infinitely many surfaces. Declare those that the motion can meet, each as "
@@ -61,36 +60,6 @@ _REFUSED: dict[str, str] = {
 
 
 @dataclass(frozen=True)
-class LiftedSwitch:
-    """A surface that was found in an expression.
-
-    Attributes
-    ----------
-    surface : str
-        Its name in events: ``h0``, ``h1``, ... in the order of the states that they depend on.
-    multiplier : str
-        Name of its multiplier.
-    function : str
-        The switching function.
-    origins : tuple of str
-        What it came from: ``sign``, ``fabs``, ``comparison``, ...
-    hidden : bool
-        Whether the multiplier was not affine in the expression as written, other than inside a
-        continuous switch, so that hidden dynamics would be another reading.
-    """
-
-    surface: str
-    multiplier: str
-    function: str
-    origins: tuple[str, ...]
-    hidden: bool = False
-
-    def __str__(self) -> str:
-        note = "; other readings on the surface: hidden dynamics" if self.hidden else ""
-        return f"{self.surface} = {self.function} ({', '.join(self.origins)}){note}"
-
-
-@dataclass(frozen=True)
 class Lifting:
     """A right-hand side with its switches replaced: field (n,), multipliers and surfaces (m,)."""
 
@@ -98,21 +67,6 @@ class Lifting:
     multipliers: ca.SX
     surfaces: ca.SX
     switches: tuple[LiftedSwitch, ...]
-
-
-@dataclass
-class _Switch:
-    """A surface under construction.
-
-    ``even`` is the multiplier inside continuous switches, where it makes no difference on h = 0; it
-    becomes ``lam`` at the end.
-    """
-
-    h: ca.SX
-    lam: ca.SX
-    even: ca.SX
-    origins: list[str] = field(default_factory=list)
-    hidden: bool = False
 
 
 @dataclass(frozen=True)
@@ -167,10 +121,8 @@ class _Lifter:
         self.inputs = [ca.vertcat(states, time), parameters]
         self.states, self.moving = states, self.inputs[0]
         self.nodes, self.rows = instructions(self.inputs, [rhs])
-        self.switches: list[_Switch] = []
+        self.switches = Switches(states, self.inputs)
         self.done = 0  # nodes evaluated: the number of the one under way
-        names = {str(s) for s in ca.vertsplit(ca.vertcat(*self.inputs))}
-        self.prefix = next(p for p in _prefixes() if not any(n.startswith(p) for n in names))
 
     def run(self) -> Lifting:
         values = evaluate(self.nodes, self)
@@ -178,18 +130,10 @@ class _Lifter:
         return self._finish(ca.vertcat(*entries))
 
     def _finish(self, f: ca.SX) -> Lifting:
-        kept = [s for s in self.switches if ca.depends_on(f, s.lam)]
-        kept.sort(key=lambda s: self._states_of(s.h))
-        report = tuple(
-            LiftedSwitch(f"h{i}", str(s.lam), str(s.h), tuple(sorted(s.origins)), s.hidden)
-            for i, s in enumerate(kept)
-        )
+        kept, told = self.switches.report(f)
         lam = ca.vertcat(*[s.lam for s in kept]) if kept else ca.SX(0, 1)
         h = ca.vertcat(*[s.h for s in kept]) if kept else ca.SX(0, 1)
-        return Lifting(f, lam, h, report)
-
-    def _states_of(self, h: ca.SX) -> tuple[int, ...]:
-        return tuple(i for i in range(self.states.numel()) if ca.depends_on(h, self.states[i]))
+        return Lifting(f, lam, h, told)
 
     # one node ----------------------------------------------------------------------------------
 
@@ -305,53 +249,20 @@ class _Lifter:
         raise _cannot(NOT_SMOOTH[op], "one of the states", operation(op, e), advice)
 
     def _sign(self, h: ca.SX, origin: str, of_zero: int = 0) -> _Value:
-        number, side = self._surface(h, origin)
+        number, side = self.switches.find(h, origin)
         if number is None:
             return _Value(ca.SX(side or of_zero))
         return _Value(side * self.switches[number].lam, frozenset([number]))
 
     def _choice(self, h: ca.SX, above: ca.SX, below: ca.SX, origin: str) -> _Value:
         """Return ``above`` where h > 0 and ``below`` where h < 0; they are equal on h = 0."""
-        number, side = self._surface(h, origin)
+        number, side = self.switches.find(h, origin)
         if number is None:
             return _Value(above if side >= 0 else below)
         lam = side * self.switches[number].even
         if ca.is_equal(above, -below, 20):
             return _Value(lam * above, frozenset([number]))
         return _Value((1 + lam) / 2 * above + (1 - lam) / 2 * below, frozenset([number]))
-
-    def _surface(self, h: ca.SX, origin: str) -> tuple[int | None, int]:
-        """Return the number of the surface h = 0 and the sign by which h differs from its function.
-
-        The number is None where h is a constant; then the sign is that of h.
-        """
-        h = simple_zeros(h, *self.inputs)
-        forms = self._forms([h, *(s.h for s in self.switches)])
-        if all(monomial == () for monomial in forms[0]):
-            c = forms[0].get((), 0.0)
-            return None, int(c > 0) - int(c < 0)
-        for i, form in enumerate(forms[1:]):
-            ratio = _ratio([forms[0], form])
-            if ratio:
-                if origin not in self.switches[i].origins:
-                    self.switches[i].origins.append(origin)
-                return i, 1 if ratio > 0 else -1
-        if not ca.depends_on(h, self.states):
-            raise DefinitionError(
-                explain(
-                    "a switch",
-                    expected="one that depends on the states",
-                    received=f"{origin} of {h}, which is known beforehand",
-                    advice="Make the clock a state with derivative 1, and switch on that.",
-                )
-            )
-        k = len(self.switches)
-        lam, even = ca.SX.sym(f"{self.prefix}{k}"), ca.SX.sym(f"{self.prefix}{k}_even")
-        self.switches.append(_Switch(h, lam, even, [origin]))
-        return k, 1
-
-    def _forms(self, expressions: list[ca.SX]) -> list[Sum]:
-        return [row[0] for row in normal_forms(self.inputs, expressions)[1]]
 
     # the result --------------------------------------------------------------------------------
 
@@ -385,10 +296,6 @@ class _Lifter:
         return "rhs"
 
 
-def _prefixes() -> Sequence[str]:
-    return ["lam" + "_" * k for k in range(100)]
-
-
 def _weighted(weights: list[ca.SX], values: list[ca.SX]) -> ca.SX:
     """Sum of weight times value; the weights add up to one, which shortens conditions."""
     ones = [w for w, v in zip(weights, values, strict=True) if v.is_one()]
@@ -397,16 +304,6 @@ def _weighted(weights: list[ca.SX], values: list[ca.SX]) -> ca.SX:
         return sum(ones, ca.SX(0)) if len(ones) <= len(zeros) else 1 - sum(zeros, ca.SX(0))
     terms = [w * v for w, v in zip(weights, values, strict=True)]
     return sum(terms[1:], terms[0])
-
-
-def _ratio(forms: Sequence[Sum]) -> float:
-    """Return c with forms[0] = c forms[1], or 0 if they are not proportional."""
-    first, second = forms
-    if first.keys() != second.keys():
-        return 0.0
-    ratios = [first[monomial] / second[monomial] for monomial in first]
-    c = ratios[0]
-    return c if all(abs(r - c) <= _ROUNDING * abs(c) for r in ratios) else 0.0
 
 
 def _cannot(op: str, received: str, e: ca.SX, advice: str) -> NotSmoothError:

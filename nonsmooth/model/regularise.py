@@ -31,8 +31,8 @@ from dataclasses import dataclass
 import casadi as ca
 
 from .checks import real, require_system
-from .definition import Reset, Stop
 from .errors import DefinitionError, OptionError, explain
+from .events import Reset, Stop
 from .reading import scalar
 from .system import FilippovSystem
 

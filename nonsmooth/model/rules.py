@@ -242,3 +242,13 @@ _EXPANSIONS: dict[str, Callable[..., int]] = {
     "atanh": lambda s, u: s._over("atanh", u, 1.0, -1.0),
     "atan2": _L._atan2,
 }
+
+
+def touched(rules: Sequence[Rule], states: int) -> list[int]:
+    """Return the rules that inputs of the moving vector enter that come after the states."""
+    entered = [False] * len(rules)
+    for _ in range(2):  # a sine and its cosine refer to each other
+        for j, rule in enumerate(rules):
+            own = rule.place[0] == 0 and rule.place[1] >= states
+            entered[j] = entered[j] or own or any(entered[a] for a in rule.args)
+    return [j for j, yes in enumerate(entered) if yes]

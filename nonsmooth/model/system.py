@@ -17,9 +17,12 @@ from numpy.typing import ArrayLike
 from .cache import Cache, Content
 from .checks import real
 from .clock import Clock, with_clocks
-from .definition import Definition, Impact, Reset, Stop, read_definition
+from .definition import read_definition
 from .errors import DefinitionError, PointError, explain
-from .lift import LiftedSwitch, lift
+from .events import Impact, Reset, Stop
+from .form import Definition
+from .found_switches import LiftedSwitch
+from .lift import lift
 from .reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from .values import Array, parameter_values, state_values
 

@@ -5,7 +5,8 @@ from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifur
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
 from .equilibrium_branches import continue_equilibrium
-from .futures import Departure, Funnel, funnel
+from .funnels import Departure, Funnel
+from .futures import funnel
 from .itinerary import Arrival, FixedItinerary
 from .sensitivity import Gradient, gradient, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds

@@ -14,7 +14,14 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, FilippovSystem, Parameters, coupled_of, require_system
+from ..model import (
+    Array,
+    FilippovSystem,
+    Parameters,
+    coupled_of,
+    require_system,
+    sliding_multipliers,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +94,7 @@ def sliding_branches(
     held = coupled.held(mode)
     x, p = system.extended_point(point, t), system.parameter_vector(parameters)
     sliding, branches = coupled.sliding(mode), []
-    for unknowns in coupled.solutions(mode, x, p, stable_only=False):
+    for unknowns in sliding_multipliers(coupled, mode, x, p, stable_only=False):
         marks = coupled.yardsticks(x, held, unknowns, p)
         multipliers = (unknowns / marks.factors)[sliding]
         if np.abs(multipliers).max(initial=0.0) > 1.0 + 1e-9:

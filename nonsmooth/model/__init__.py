@@ -20,6 +20,7 @@ from .events import Impact, Reset, Stop
 from .found_switches import LiftedSwitch
 from .motion import Motion, followed, motion, watched_functions
 from .periods import periods, read_period
+from .multipliers import newton_multipliers, sliding_multipliers
 from .reading import Parameters
 from .regularise import regularise
 from .switches import Guard
@@ -56,12 +57,14 @@ __all__ = [
     "is_real",
     "motion",
     "periods",
+    "newton_multipliers",
     "read_function",
     "read_period",
     "real",
     "real_array",
     "regularise",
     "require_system",
+    "sliding_multipliers",
     "watched_functions",
     "whole",
 ]

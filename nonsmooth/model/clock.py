@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from .definition import Reset
+from .events import Reset
 from .errors import DefinitionError, explain
 from .reading import Expression, column, listed, scalar
 

@@ -21,6 +21,7 @@ from .evaluators import Evaluator
 from .explicit import explicit, guard_named, solved
 from .jets import taylor
 from .motion import Motion
+from .multipliers import newton_multipliers, sliding_multipliers
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
@@ -209,10 +210,10 @@ class VariationalField:
         if near is not None:
             guess = np.zeros(coupled.count)
             guess[which] = near
-            found = coupled.newton(mode, x, guess, p, 30)
+            found = newton_multipliers(coupled, mode, x, guess, p, 30)
             if found is not None:
                 return np.asarray(found[which])
-        solutions = coupled.solutions(mode, x, p, stable_only=any(system.nonlinear))
+        solutions = sliding_multipliers(coupled, mode, x, p, stable_only=any(system.nonlinear))
         if len(solutions) != 1:
             raise DegenerateError(
                 f"mode {mode!r} at {x.tolist()}: expected one set of multipliers that keeps the "

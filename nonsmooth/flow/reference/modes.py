@@ -12,7 +12,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import Array, Coupled, Evaluator, FilippovSystem, Guard, Motion, coupled_of, motion
+from ...model import (
+    Array,
+    Coupled,
+    Evaluator,
+    FilippovSystem,
+    Guard,
+    Motion,
+    coupled_of,
+    motion,
+    newton_multipliers,
+    sliding_multipliers,
+)
 from ..facts import SAFETY
 from ..options import Options
 
@@ -358,13 +369,13 @@ class CoupledModes:
 
     def solutions(self, mode: str, x: Array, stable_only: bool = True) -> list[Array]:
         """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
-        return self.coupled.solutions(mode, x, self._p, stable_only)
+        return sliding_multipliers(self.coupled, mode, x, self._p, stable_only)
 
     def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
         """Correct multipliers that were advanced by a step."""
         if not self.coupled.sliding(mode):
             return unknowns
-        better = self.coupled.newton(mode, x, unknowns, self._p, 2)
+        better = newton_multipliers(self.coupled, mode, x, unknowns, self._p, 2)
         return unknowns if better is None else better
 
 

@@ -256,7 +256,11 @@ def _page(title: str, about: str, path: str, names: Iterable[str]) -> str:
 
 
 def _members(path: str, names: Iterable[str]) -> str:
-    return "\n".join(f"::: {path}.{name}\n" for name in names)
+    return "\n".join(f"::: {path}.{name}\n{_OPTIONS.get(name, '')}" for name in names)
+
+
+#: The class that a reader sees has the methods of what it is built on.
+_OPTIONS = {"FilippovSystem": "    options:\n      inherited_members: true\n"}
 
 
 def _floor(package: ModuleType, name: str) -> str:

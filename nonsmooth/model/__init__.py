@@ -19,8 +19,8 @@ from .evaluators import Evaluator, Resets, Surfaces, evaluator
 from .events import Impact, Reset, Stop
 from .found_switches import LiftedSwitch
 from .motion import Motion, followed, motion, watched_functions
+from .multipliers import sliding_multipliers
 from .periods import periods, read_period
-from .multipliers import newton_multipliers, sliding_multipliers
 from .reading import Parameters
 from .regularise import regularise
 from .switches import Guard
@@ -57,7 +57,6 @@ __all__ = [
     "is_real",
     "motion",
     "periods",
-    "newton_multipliers",
     "read_function",
     "read_period",
     "real",

@@ -8,8 +8,8 @@ from typing import Any
 
 import casadi as ca
 
-from .events import Reset
 from .errors import DefinitionError, explain
+from .events import Reset
 from .reading import Expression, column, listed, scalar
 
 

@@ -117,7 +117,7 @@ def explicit(system: FilippovSystem, mode: str) -> Motion:
     A mass that rests on a table, and one that flies:
 
     >>> y, v = ca.SX.sym("y"), ca.SX.sym("v")
-    >>> from .definition import Impact
+    >>> from .events import Impact
     >>> system = FilippovSystem([y, v], field=[v, -9.81], impacts=Impact(y))
     >>> explicit(system, "c").field, explicit(system, "o").field
     (SX([v, 0]), SX([v, -9.81]))

@@ -12,18 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import (
-    Array,
-    Coupled,
-    Evaluator,
-    FilippovSystem,
-    Guard,
-    Motion,
-    coupled_of,
-    motion,
-    newton_multipliers,
-    sliding_multipliers,
-)
+from ...model import Array, Coupled, Evaluator, FilippovSystem, Guard, Motion, coupled_of, motion
+from ...model.multipliers import newton_multipliers, sliding_multipliers
 from ..facts import SAFETY
 from ..options import Options
 

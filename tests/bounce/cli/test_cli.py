@@ -111,8 +111,9 @@ OVER = ["--over", "xdot=-2:2:5", "--over", "omega=-4:4:5", "--output"]
 )
 def test_errors_are_one_line_with_a_code(command, argv, code, message):
     got, out, err = command(*argv)
+    told = [line for line in err.strip().splitlines() if not line.startswith("nonsmooth: compil")]
     assert got == code and out == ""
-    assert message in err and len(err.strip().splitlines()) == 1
+    assert message in err and len(told) == 1  # a compilation that takes long says so
 
 
 def test_help(command):
@@ -147,7 +148,8 @@ def test_version(command):
 def test_as_a_process():
     argv = [sys.executable, "-m", "bounce.cli", *SHOT, "--turf", "artificial"]
     done = subprocess.run(argv, capture_output=True, text=True, timeout=120, check=False)
-    assert done.returncode == 0 and done.stdout.startswith("lift-off") and done.stderr == ""
+    assert done.returncode == 0 and done.stdout.startswith("lift-off"), done.stderr
+    assert "Error" not in done.stderr and "Warning" not in done.stderr
     wrong = subprocess.run(
         [*argv, "--set", "mu=-1"], capture_output=True, text=True, timeout=120, check=False
     )

@@ -119,7 +119,8 @@ def test_without_another_compiler_the_reference_driver_runs_with_one_warning(stu
         capture_output=True,
         text=True,
     )
-    assert done.returncode == 0 and done.stderr == "", done.stderr
+    told = [k for k in done.stderr.splitlines() if not k.startswith("nonsmooth: compiling")]
+    assert done.returncode == 0 and told == [], done.stderr
     assert stub[1] in done.stdout
 
 

@@ -1,0 +1,207 @@
+"""What can be read off a system's definition: sizes, names, the letters of modes, expressions."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from .errors import DefinitionError, explain
+from .form import Definition
+from .found_switches import LiftedSwitch
+from .reading import Expression, listed, scalar
+
+
+class Structure:
+    """A definition that answers questions about itself; ``FilippovSystem`` computes with it."""
+
+    #: What ``from_expression`` found, one for each surface; empty for other systems.
+    lifted: tuple[LiftedSwitch, ...] = ()
+
+    def _adopt(self, definition: Definition) -> None:
+        self.definition = definition
+        self.stops, self.resets = definition.stops, definition.resets
+        self.impacts = definition.impacts
+        self.hidden = definition.hidden
+        field, multipliers = definition.field, listed(definition.multipliers)
+        self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
+        names = definition.names
+        self.state_names = tuple(names["states"])
+        self.parameter_names = tuple(names["parameters"])
+        self._extended_states = definition.extended_states
+
+    def __repr__(self) -> str:
+        parts = [
+            f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
+        ]
+        names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
+        parts.append(f"{self.surface_count} surface{'s' * (self.surface_count != 1)}{names}")
+        if self.parameter_names:
+            parts.append(f"parameters: {', '.join(self.parameter_names)}")
+        if self.time_dependent:
+            parts.append(f"time {self.definition.time}")
+        parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
+        parts += [f"impact {n!r}" for n in self.impacts]
+        return f"FilippovSystem({'; '.join(parts)})"
+
+    # shape -------------------------------------------------------------------------------------
+
+    @property
+    def dimension(self) -> int:
+        """Number n of states."""
+        return int(self.definition.states.numel())
+
+    @property
+    def surface_count(self) -> int:
+        """Number of switching surfaces."""
+        return int(self.definition.surfaces.numel())
+
+    @property
+    def coupled(self) -> bool:
+        """Whether multipliers are not eliminated: several surfaces, one that enters nonlinearly, or
+        reactions."""
+        return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
+
+    @property
+    def time_dependent(self) -> bool:
+        """Whether the system depends on time explicitly."""
+        return bool(self.definition.time.numel())
+
+    @property
+    def extended_dimension(self) -> int:
+        """Number of states, plus one if the system depends on time."""
+        return int(self.definition.states.numel() + self.definition.time.numel())
+
+    @property
+    def extended_states(self) -> ca.SX:
+        """The states, followed by the time where the system depends on it (SX column)."""
+        return self._extended_states
+
+    @property
+    def parameter_symbols(self) -> ca.SX:
+        """The parameters as an SX column, in the order of ``parameter_names``."""
+        return self.definition.parameters
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The modes of one letter per surface in which at most one surface slides."""
+        result = [""]
+        for _ in range(self.surface_count):
+            result = [m + c for m in result for c in "+-s" if not (c == "s" and "s" in m)]
+        return tuple(result)
+
+    def parse_mode(self, mode: str) -> tuple[int, ...]:
+        """Turn the letters of the surfaces into signs: ``+`` 1, ``-`` -1, ``s`` 0.
+
+        Raises
+        ------
+        DefinitionError
+            A wrong number of letters or another letter.
+        """
+        return self.parse_letters(mode)[: self.surface_count]
+
+    def parse_letters(self, mode: str) -> tuple[int, ...]:
+        """Turn the letters of surfaces and impacts into signs: ``+`` 1, ``-`` -1, ``s`` 0, ``o`` 1
+        and ``c`` 0. Letters of the impacts may be missing: open.
+
+        Raises
+        ------
+        DefinitionError
+            A wrong number of letters or another letter.
+        """
+        letters = {"+": 1, "-": -1, "s": 0, "o": 1, "c": 0}
+        m, c = self.surface_count, len(self.impacts)
+        whole = mode + "o" * c if isinstance(mode, str) and len(mode) == m else mode
+        fits = isinstance(whole, str) and len(whole) == m + c
+        if not fits or set(whole[:m]) - set("+-s") or set(whole[m:]) - set("oc"):
+            contacts = f", and {c}, each of o c, one per impact" if c else ""
+            raise DefinitionError(
+                explain(
+                    "mode",
+                    expected=f"{m} letter(s), each of + - s, one per surface{contacts}",
+                    received=repr(mode),
+                    advice="'+' is h > 0, '-' is h < 0, 's' is sliding"
+                    + ("; 'o' is an open contact, 'c' a closed one." if c else "."),
+                )
+            )
+        return tuple(letters[letter] for letter in whole)
+
+    def surface_index(self, surface: int) -> int:
+        """Check the number of a surface.
+
+        Raises
+        ------
+        DefinitionError
+        """
+        if isinstance(surface, bool) or not isinstance(surface, (int, np.integer)):
+            raise DefinitionError(f"surface: expected an index (int), received {surface!r}.")
+        if not 0 <= surface < self.surface_count:
+            raise DefinitionError(
+                f"surface: expected an index below {self.surface_count}, received {surface}."
+            )
+        return int(surface)
+
+    # expressions -----------------------------------------------------------------------------
+
+    def surface_function(self, surface: int = 0) -> ca.SX:
+        """Return the switching function h of a surface (SX scalar)."""
+        return self.definition.surfaces[self.surface_index(surface)]
+
+    def field(self, mode: str) -> ca.SX:
+        """Right-hand side of a mode without sliding, time row included (SX, extended dimension).
+
+        Parameters
+        ----------
+        mode : str
+            One letter, ``+`` or ``-``, for each surface.
+        """
+        signs = self.parse_mode(mode)
+        if 0 in signs:
+            raise DefinitionError(f"field: expected a mode of + and -, received {mode!r}.")
+        return self.field_with(ca.DM(list(signs)))
+
+    def field_with(self, multipliers: Any, reactions: Any = None) -> ca.SX:
+        """Right-hand side for given multipliers (values or expressions), time row included.
+
+        Reactions of impacts are zero unless given.
+        """
+        d, f = self.definition, self.definition.field
+        if self.surface_count:
+            f = ca.substitute(f, d.multipliers, multipliers)
+        if self.impacts:
+            f = ca.substitute(f, d.reactions, 0 if reactions is None else reactions)
+        return ca.vertcat(f, ca.SX.ones(d.time.numel(), 1))
+
+    def gradient(self, expression: Expression) -> ca.SX:
+        """Derivatives of a scalar with respect to the states, then time if it depends on it.
+
+        Returns
+        -------
+        SX row (1, extended dimension)
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+        >>> ns.FilippovSystem([x, v], surface=v, above=[v, -x - 1], below=[v, 1 - x]).gradient(x * v)
+        SX([[v, x]])
+        """
+        return ca.densify(ca.jacobian(scalar(expression, "expression"), self.extended_states))
+
+    def parameter_gradient(self, expression: Expression) -> ca.SX:
+        """Derivatives of a scalar with respect to the parameters, in the order of their names.
+
+        Returns
+        -------
+        SX row (1, number of parameters)
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, a, b = ca.SX.sym("x"), ca.SX.sym("a"), ca.SX.sym("b")
+        >>> system = ns.FilippovSystem([x], field=[a * x], parameters=[a, b])
+        >>> system.parameter_gradient(a * x + b)
+        SX([[x, 1]])
+        """
+        return ca.densify(ca.jacobian(scalar(expression, "expression"), self.parameter_symbols))

@@ -76,8 +76,12 @@ class Leg:
             at = _composed(at, then(at.after, p))
         return at
 
-    def __str__(self) -> str:
-        return f"{self.mode or 'o'} ({self.kind}{' ' + self.name if self.name else ''})"
+
+
+def leg_name(leg: Leg) -> str:
+    """A leg in words: its mode, and what ends it."""
+    end = f", ended by {leg.name}" if leg.name else ""
+    return f"({leg.mode or 'o'}{end})"
 
 
 def _composed(first: AtEvent, then: AtEvent) -> AtEvent:

@@ -1,0 +1,238 @@
+"""The boundary value problem of a periodic orbit with a fixed itinerary.
+
+Unknowns are the start x_i (extended by the time where the system depends on it) and the duration T_i of
+every leg. With the flow phi of the leg's mode, its event e_i and reset g_i,
+
+    g_i(phi_i(x_i, T_i; p)) - x_(i+1) = 0,     e_i(phi_i(x_i, T_i; p)) = 0,     i = 1 .. N,
+
+and the last leg leads back to the first: R g_N - d - x_1 = 0, where R is a symmetry (half orbits) and
+d advances the time of a forced system. The Jacobian holds plain variational matrices; saltation appears
+by itself when the durations are eliminated.
+
+Nothing here asks whether the guards agree: a solution may be virtual, and branches pass through such
+points smoothly. Source: Dercole & Kuznetsov 2005 (SlideCont), Thota & Dankowicz 2008 (TC-HAT), with Taylor
+legs in place of collocation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from ..model import Array, FilippovSystem
+from ..model.variational import AtEvent, Forcing, surface_map
+from .legs import Flown, Leg, fly
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The equations at some unknowns.
+
+    Attributes
+    ----------
+    residual : ndarray (m,)
+    jacobian : ndarray (m, m)
+        By the unknowns.
+    by_parameters : ndarray (m, q)
+        By the chosen parameters.
+    flown : tuple of Flown
+        The legs.
+    events : tuple of AtEvent
+        At their ends; for a leg without an event the identity and the phase condition.
+    starts : ndarray (N, n)
+    durations : ndarray (N,)
+    """
+
+    residual: Array
+    jacobian: Array
+    by_parameters: Array
+    flown: tuple[Flown, ...]
+    events: tuple[AtEvent, ...]
+    starts: Array
+    durations: Array
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryProblem:
+    """A periodic orbit's equations: legs, symmetry, forcing, phase.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+    legs : tuple of Leg
+    symmetry : ndarray (n, n) or None
+        R, on the states without the time.
+    periods : float
+        Forcing periods by which the legs advance the time; a whole number, or a half of one with a
+        symmetry.
+    forcing : Forcing or None
+        The forcing period as a function of the parameters.
+    phase : ndarray (N,) or None
+        For a leg without an event: the row of the phase condition ``phase . (x_1 - reference)``.
+    reference : ndarray (N,) or None
+    """
+
+    system: FilippovSystem
+    legs: tuple[Leg, ...]
+    symmetry: Array | None = None
+    periods: float = 0.0
+    forcing: Forcing | None = None
+    phase: Array | None = None
+    reference: Array | None = None
+    _kept: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        sliding = [
+            i
+            for i in range(self.system.surface_count)
+            if all(leg.mode[i] == "s" for leg in self.legs)
+        ]
+        object.__setattr__(self, "_kept", tuple(sliding))
+
+    @property
+    def dimension(self) -> int:
+        """States of a leg's start, the time included."""
+        return self.system.extended_dimension
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.legs) * (self.dimension + 1)
+
+    def pack(self, starts: Array, durations: Array) -> Array:
+        """Unknowns from starts (N, n) and durations (N,)."""
+        return np.concatenate([np.ravel(starts), np.ravel(durations)])
+
+    def split(self, u: Array) -> tuple[Array, Array]:
+        """Starts (N, n) and durations (N,) of unknowns."""
+        count = len(self.legs) * self.dimension
+        return u[:count].reshape(len(self.legs), self.dimension), u[count : self.size]
+
+    @cached_property
+    def wrap(self) -> Array:
+        """R on the extended states."""
+        whole = np.eye(self.dimension)
+        if self.symmetry is not None:
+            n = self.system.dimension
+            whole[:n, :n] = self.symmetry
+        return whole
+
+    def advance(self, p: Array) -> tuple[float, Array]:
+        """Time by which the legs advance, and its derivatives by all parameters."""
+        if self.forcing is None:
+            return 0.0, np.zeros(p.size)
+        value, slope = self.forcing(p)
+        return self.periods * value, self.periods * slope
+
+    def evaluate(self, u: Array, p: Array, chosen: tuple[int, ...] = ()) -> Evaluation:
+        """Residual, Jacobian by the unknowns, and derivatives by chosen parameters.
+
+        Parameters
+        ----------
+        u : ndarray (m,)
+        p : ndarray
+            All parameters.
+        chosen : tuple of int
+            Parameters by which one differentiates.
+
+        Raises
+        ------
+        ConvergenceError, DegenerateError
+            A leg cannot be flown.
+        """
+        starts, durations = self.split(u)
+        count, n = len(self.legs), self.dimension
+        residual, jacobian = np.zeros(self.size), np.zeros((self.size, self.size))
+        by_parameters = np.zeros((self.size, len(chosen)))
+        flown, events, columns = list[Flown](), list[AtEvent](), list(chosen)
+        for i, leg in enumerate(self.legs):
+            part = fly(self.system, leg, starts[i], float(durations[i]), p, chosen)
+            at = self._at_end(leg, part, starts[i], p)
+            own = slice(i * n, (i + 1) * n)
+            time, last = count * n + i, i + 1 == count
+            following = slice(0, n) if last else slice((i + 1) * n, (i + 2) * n)
+            by_end, after = at.after_state, at.after
+            by_p = by_end @ part.by_parameters + at.after_parameters[:, columns]
+            if last:
+                by_end, after, by_p = self.wrap @ by_end, self.wrap @ after, self.wrap @ by_p
+            residual[own] = after - starts[0 if last else i + 1]
+            jacobian[own, own] += by_end @ part.by_start
+            jacobian[own, following] -= np.eye(n)
+            jacobian[own, time] = by_end @ part.rate
+            by_parameters[own] = by_p
+            if last:
+                self._advance(residual, by_parameters, own, p, columns)
+            if leg.name:
+                residual[time] = at.value
+                jacobian[time, own] = at.gradient @ part.by_start
+                jacobian[time, time] = at.gradient @ part.rate
+                by_parameters[time] = at.gradient @ part.by_parameters + at.by_parameters[columns]
+            else:
+                assert self.phase is not None and self.reference is not None
+                residual[time] = self.phase @ (starts[i] - self.reference)
+                jacobian[time, own] = self.phase
+            flown.append(part)
+            events.append(at)
+        if self._kept:
+            self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
+        return Evaluation(
+            residual, jacobian, by_parameters, tuple(flown), tuple(events), starts, durations
+        )
+
+    def _at_end(self, leg: Leg, part: Flown, start: Array, p: Array) -> AtEvent:
+        if leg.name:
+            return leg.at_end(self.system, part.end, p)
+        n, size = self.dimension, len(part.end)
+        assert self.phase is not None
+        gradient = np.zeros(size)
+        gradient[:n] = self.phase @ self.wrap
+        identity = np.eye(n, size)
+        return AtEvent(
+            part.end[:n], identity, np.zeros((n, p.size)), 0.0, gradient, np.zeros(p.size)
+        )
+
+    def _advance(
+        self, residual: Array, by_parameters: Array, own: slice, p: Array, columns: Sequence[int]
+    ) -> None:
+        if self.forcing is None:
+            return
+        value, slope = self.advance(p)
+        residual[own.stop - 1] -= value
+        by_parameters[own.stop - 1] -= slope[list(columns)]
+
+    def _keep(
+        self,
+        residual: Array,
+        jacobian: Array,
+        by_parameters: Array,
+        start: Array,
+        p: Array,
+        columns: Sequence[int],
+    ) -> None:
+        """An orbit that slides all the time keeps h whatever it is: demand h(x_1) = 0 in place of
+        the closing row that h says most about."""
+        n = self.dimension
+        first = (len(self.legs) - 1) * n
+        taken: list[int] = []
+        for surface in self._kept:
+            at = surface_map(self.system, surface)(start, p)
+            free = [k for k in range(self.system.dimension) if k not in taken]
+            k = max(free, key=lambda k: abs(float(at.gradient[k])))
+            taken.append(k)
+            residual[first + k] = at.value
+            jacobian[first + k] = 0.0
+            jacobian[first + k, :n] = at.gradient
+            by_parameters[first + k] = at.by_parameters[list(columns)]
+
+    def scales(self, u: Array) -> Array:
+        """Sizes of the unknowns: states by their range over the legs, times by the duration."""
+        starts, durations = self.split(u)
+        span = float(np.abs(durations).sum()) or 1.0
+        size = np.abs(starts).max(axis=0)
+        if self.system.time_dependent:
+            size[-1] = span
+        size = np.where(size > 1e-6 * max(size.max(), 1e-300), size, max(size.max(), 1e-300))
+        return self.pack(np.tile(size, (len(self.legs), 1)), np.full(len(self.legs), span))

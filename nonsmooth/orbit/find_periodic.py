@@ -1,0 +1,453 @@
+"""The verb ``periodic_orbit``: from a guess to a periodic orbit, or to the reason why there is none."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..flow.simulate import simulate
+from ..flow.status import Status
+from ..flow.trajectory import Trajectory
+from ..local.newton import converge
+from ..model import (
+    Array,
+    ConvergenceError,
+    DegenerateError,
+    FilippovSystem,
+    NonsmoothError,
+    OptionError,
+    Parameters,
+    explain,
+    real_array,
+    require_system,
+)
+from ..model.variational import Forcing, frequencies
+from .boundary import BoundaryProblem, Evaluation
+from .itinerary import FixedItinerary, leg_between, read_word
+from .legs import Leg, leg_name
+from .periodic import PeriodicOrbit, faults_of, named
+from .recurrence import CLOSE, Recurrence, recurrence, refused
+
+#: Newton's method ends when the next step would be below this, relative to the orbit.
+_TOLERANCE = 1e-10
+
+_MOST_EVENTS = 2000
+
+Itinerary = str | Sequence[str] | Sequence[tuple[str, str]]
+
+
+def periodic_orbit(
+    system: FilippovSystem,
+    guess: Trajectory | PeriodicOrbit | ArrayLike,
+    *,
+    itinerary: Itinerary | None = None,
+    period: Any = None,
+    symmetry: ArrayLike | str | None = None,
+    parameters: Parameters | None = None,
+    t_start: float = 0.0,
+    virtual: bool = False,
+    max_iterations: int = 20,
+) -> PeriodicOrbit:
+    """Find a periodic orbit, stable or not, with all digits, its multipliers and its margins.
+
+    The itinerary is read off the guess and kept; the boundary value problem of its legs is solved by
+    Newton's method with exact derivatives; then the guards are asked whether the orbit is real.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    guess : Trajectory, state (n,) or PeriodicOrbit
+        A run whose end is near the orbit; a state near it, from which the system is simulated; an
+        orbit at other parameters, whose itinerary is kept.
+    itinerary : str or sequence, optional
+        Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
+        ends it; with a state as the guess.
+    period : expression in parameters or float, optional
+        The period of the forcing, if the system depends on time. Found by itself where the time only
+        enters sines and cosines of one frequency. The orbit may take several.
+    symmetry : "odd" or array_like (n, n), optional
+        R, if R x solves the equations when x does (half a forcing period later, if there is one): the
+        orbit is looked for as a half, which R maps to the other half. ``"odd"`` is R = -1.
+    parameters : mapping, optional
+        Values that replace those of the guess, or defaults.
+    t_start : float, optional
+        Time of a state.
+    virtual : bool, optional
+        Accept an orbit that no motion takes because guards disagree.
+    max_iterations : int, optional
+
+    Returns
+    -------
+    PeriodicOrbit
+
+    Raises
+    ------
+    ConvergenceError
+        The guess does not close, Newton's method fails, or the orbit is virtual (then it is the
+        attribute ``orbit`` of the error).
+    DegenerateError
+        The orbit grazes, or passes a two-fold or a corner.
+    OptionError, ParameterError, PointError
+
+    Notes
+    -----
+    Unknowns are starts and durations of the legs (multiple shooting by Taylor series; no mesh).
+    Multipliers: products of variational and saltation matrices, Leine & Nijmeijer 2004, ch. 7.
+
+    Examples
+    --------
+    A relay with hysteresis, whose orbit has the period 4 artanh(1/2):
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    >>> relay = ns.FilippovSystem([x, u], field=[2 * u - x, 0], resets=[
+    ...     ns.Reset(x - 1, [x, -u], 1, "up"), ns.Reset(x + 1, [x, -u], -1, "down")])
+    >>> run = ns.simulate(relay, [0.0, 1.0], t_end=5.0)
+    >>> orbit = ns.periodic_orbit(relay, run)
+    >>> f"{orbit.period:.13f}", f"{4 * np.arctanh(0.5):.13f}", orbit.stability
+    ('2.1972245773362', '2.1972245773362', 'neutral to first order, 1 multiplier on the unit circle')
+    """
+    require_system(system)
+    mirror = _mirror(system, symmetry)
+    start = _start(system, guess, itinerary, period, mirror, parameters, t_start)
+    solver = _Solver(start.problem, start.p)
+    u, at = solver.solve(start.unknowns, max_iterations)
+    faults = tuple(faults_of(start.problem, at, start.p))
+    orbit = PeriodicOrbit(
+        system, named(system, start.p), start.problem, u, at, solver.iterations, faults
+    )
+    _require_simple(orbit)
+    if faults and not virtual:
+        raise _virtual(orbit)
+    return orbit
+
+
+@dataclass(frozen=True, eq=False)
+class _Start:
+    problem: BoundaryProblem
+    unknowns: Array
+    p: Array
+
+
+def _mirror(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array | None:
+    n = system.dimension
+    if symmetry is None:
+        return None
+    if isinstance(symmetry, str):
+        if symmetry != "odd":
+            raise OptionError(
+                f"symmetry: expected 'odd' or a matrix ({n}, {n}), received {symmetry!r}."
+            )
+        return -np.eye(n)
+    matrix = real_array(symmetry, "symmetry")
+    if matrix.shape != (n, n) or np.abs(matrix @ matrix - np.eye(n)).max() > 1e-9:
+        raise OptionError(
+            explain(
+                "symmetry",
+                expected=f"'odd' or a matrix ({n}, {n}) whose square is 1",
+                received=f"shape {matrix.shape}",
+                advice="R maps half of the orbit to the other half.",
+            )
+        )
+    return matrix
+
+
+def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
+    """The period of the forcing as a function of the parameters; None for autonomous systems."""
+    if not system.time_dependent:
+        return None
+    if period is None:
+        found = frequencies(system)
+        if len(found) != 1:
+            raise OptionError(
+                explain(
+                    "period",
+                    expected="the period of the forcing, as a number or an expression in parameters",
+                    received=f"none, with {len(found)} frequencies {found} in sines and cosines",
+                    advice="Give period=2*pi/w.",
+                )
+            )
+        return Forcing(system, 2.0 * math.pi / found[0])
+    return Forcing(system, period)
+
+
+def _start(
+    system: FilippovSystem,
+    guess: Any,
+    itinerary: Itinerary | None,
+    period: Any,
+    mirror: Array | None,
+    parameters: Parameters | None,
+    t_start: float,
+) -> _Start:
+    if isinstance(guess, PeriodicOrbit):
+        return _from_orbit(system, guess, parameters)
+    if isinstance(guess, Trajectory):
+        given = {**guess.parameters, **_by_name(parameters)}
+        p = system.parameter_vector(given)
+        forcing = _forcing(system, period)
+        span = forcing(p)[0] if forcing else None
+        found = recurrence(guess, symmetry=mirror, period=span, first=False)
+        if found is None or found.distance > CLOSE:
+            raise refused(guess, found)
+        return _from_recurrence(system, found, forcing, mirror, p)
+    p = system.parameter_vector(parameters)
+    forcing = _forcing(system, period)
+    x = system.extended_point(real_array(guess, "guess"), t_start)
+    if itinerary is not None:
+        return _from_word(system, x, itinerary, forcing, mirror, p)
+    hint = forcing(p)[0] if forcing else None if period is None else float(period)
+    found = _simulated(system, x, mirror, hint, forcing is not None, p)
+    return _from_recurrence(system, found, forcing, mirror, p)
+
+
+def _by_name(parameters: Parameters | None) -> dict[str, float]:
+    return {str(k): v for k, v in (parameters or {}).items()}
+
+
+def _from_orbit(
+    system: FilippovSystem, orbit: PeriodicOrbit, parameters: Parameters | None
+) -> _Start:
+    p = system.parameter_vector({**orbit.parameters, **_by_name(parameters)})
+    return _Start(orbit.problem, orbit.unknowns, p)
+
+
+def _from_recurrence(
+    system: FilippovSystem,
+    found: Recurrence,
+    forcing: Forcing | None,
+    mirror: Array | None,
+    p: Array,
+) -> _Start:
+    starts = np.array([part.start for part in found.parts])
+    durations = np.array([part.duration for part in found.parts])
+    if forcing is not None:  # the clock within one period keeps its size that of the orbit's
+        span = forcing(p)[0]
+        starts[:, -1] -= span * math.floor(starts[0, -1] / span)
+    legs = tuple(part.leg for part in found.parts)
+    return _problem(system, legs, starts, durations, found.periods, forcing, mirror, p)
+
+
+def _problem(
+    system: FilippovSystem,
+    legs: tuple[Leg, ...],
+    starts: Array,
+    durations: Array,
+    periods: float,
+    forcing: Forcing | None,
+    mirror: Array | None,
+    p: Array,
+) -> _Start:
+    phase = reference = None
+    if not legs[-1].name:
+        reference = starts[0]
+        phase = np.zeros(system.extended_dimension)
+        if system.time_dependent:
+            phase[-1] = 1.0
+        else:
+            field = legs[0].field(system)
+            rate = field.rate.copied(field.initial(starts[0], p)[:, 0], p)[0]
+            phase = rate[: system.extended_dimension, 0] / float(np.linalg.norm(rate))
+    problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
+    return _Start(problem, problem.pack(starts, durations), p)
+
+
+def _from_word(
+    system: FilippovSystem,
+    x: Array,
+    itinerary: Itinerary,
+    forcing: Forcing | None,
+    mirror: Array | None,
+    p: Array,
+) -> _Start:
+    """Follow the legs of an itinerary, each to its event."""
+    pairs = [(e, "") if isinstance(e, str) else e for e in itinerary] if not isinstance(
+        itinerary, str
+    ) else [(mode, "") for mode in read_word(system, itinerary)]
+    modes = [mode for mode, _ in pairs]
+    n, t = system.dimension, float(x[-1]) if system.time_dependent else 0.0
+    begin, state = t, x[:n]
+    legs, starts, durations = list[Leg](), list[Array](), list[float]()
+    values = named(system, p)
+    for k, (mode, name) in enumerate(pairs):
+        following = modes[(k + 1) % len(modes)]
+        if mirror is not None and k + 1 == len(modes):
+            following = following.translate(str.maketrans("+-", "-+"))
+        leg = leg_between(system, mode, following, name)
+        run = FixedItinerary(system, [mode], leg.name, values).leg(mode, t, state, leg.name)
+        starts.append(system.extended_point(state, t))
+        durations.append(float(run.t[-1]) - t)
+        t = float(run.t[-1])
+        y = leg.field(system).initial(system.extended_point(run.x[-1], t), p)[:, 0]
+        state = leg.at_end(system, y, p).after[:n]
+        legs.append(leg)
+    periods = 0.0
+    if forcing is not None:
+        count = (t - begin) / forcing(p)[0]
+        periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
+    return _problem(
+        system, tuple(legs), np.array(starts), np.array(durations), periods, forcing, mirror, p
+    )
+
+
+def _simulated(
+    system: FilippovSystem,
+    x: Array,
+    mirror: Array | None,
+    hint: float | None,
+    forced: bool,
+    p: Array,
+) -> Recurrence:
+    """Simulate from a state, longer and longer, until the run comes back."""
+    n, values = system.dimension, named(system, p)
+    t = float(x[-1]) if system.time_dependent else 0.0
+    unit = hint if hint else _natural_time(system, x, p)
+    period = hint if forced else None
+    best: Recurrence | None = None
+    run: Trajectory | None = None
+    for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
+        run = simulate(
+            system, x[:n], t + span * unit, t_start=t, parameters=values, tol=1e-12,
+            max_events=_MOST_EVENTS,
+        )  # fmt: skip
+        for first in (True, False):
+            found = recurrence(run, symmetry=mirror, period=period, first=first)
+            if found is not None and (best is None or found.distance < 0.3 * best.distance):
+                best = found
+        if (best is not None and best.distance < 0.02) or run.status is not Status.REACHED_END:
+            break
+    assert run is not None
+    if best is None or best.distance > CLOSE:
+        raise refused(run, best)
+    return best
+
+
+def _natural_time(system: FilippovSystem, x: Array, p: Array) -> float:
+    """The time in which the state changes by its size."""
+    mode = system.modes[0] + "o" * len(system.impacts)
+    field = Leg(mode).field(system)
+    rate = field.rate.copied(field.initial(x, p)[:, 0], p)[0][: system.dimension, 0]
+    size, speed = float(np.linalg.norm(x[: system.dimension])), float(np.linalg.norm(rate))
+    return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0
+
+
+class _Solver:
+    """Newton's method on the equations of an orbit, with what it knows where it fails."""
+
+    def __init__(self, problem: BoundaryProblem, p: Array):
+        self.problem, self.p = problem, p
+        self.iterations = 0
+        self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
+
+    def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
+        """The orbit, to rounding.
+
+        Raises
+        ------
+        ConvergenceError
+        """
+        scales = self.problem.scales(u)
+
+        def equations(v: Array) -> tuple[Array, Array]:
+            self.last = v * scales, None
+            at = self.problem.evaluate(v * scales, self.p)
+            self.last = v * scales, at
+            self.iterations += 1
+            return at.residual, at.jacobian * scales
+
+        reason = ""
+        try:
+            root = converge(equations, u / scales, tol=_TOLERANCE, max_iterations=max_iterations)
+        except (ConvergenceError, DegenerateError) as error:
+            root, reason = None, str(error)
+        if root is None:
+            raise self._failure(reason)
+        return self._polished(root * scales)
+
+    def _polished(self, u: Array) -> tuple[Array, Evaluation]:
+        """Two more steps at most, as long as they shrink: to rounding."""
+        at = self.problem.evaluate(u, self.p)
+        for _ in range(2):
+            step = -np.linalg.solve(at.jacobian, at.residual)
+            new = u + step
+            if np.abs(step).max() <= 1e-15 * np.abs(u).max():
+                break
+            there = self.problem.evaluate(new, self.p)
+            self.iterations += 1
+            if not np.abs(there.residual).max() < np.abs(at.residual).max():
+                break
+            u, at = new, there
+        return u, at
+
+    def _failure(self, reason: str) -> ConvergenceError:
+        u, at = self.last
+        _, durations = self.problem.split(u)
+        legs = self.problem.legs
+        size = float(np.abs(at.residual).max()) if at is not None else math.nan
+        backward = [
+            f"leg {i + 1} {leg_name(leg)} has the duration {d:.3g}"
+            for i, (leg, d) in enumerate(zip(legs, durations, strict=True))
+            if not d > 0.0
+        ]
+        if not backward and at is not None:
+            try:
+                backward = faults_of(self.problem, at, self.p)
+            except NonsmoothError:
+                backward = []
+        told = f" {reason}" if reason else ""
+        where = f" At the last iterate {backward[0]}." if backward else ""
+        words = " ".join(leg.mode or "o" for leg in legs)
+        return ConvergenceError(
+            f"periodic orbit: expected Newton's method to converge with the itinerary {words!r}, "
+            f"received none after {self.iterations} steps, residual {size:.2g}.{told}{where} Simulate "
+            "longer, start closer to the orbit, or try the itinerary of a run from there.",
+            residual=size,
+            point=u,
+        )
+
+
+def _require_simple(orbit: PeriodicOrbit) -> None:
+    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
+    system, p = orbit.system, orbit.parameter_vector
+    for i, leg in enumerate(orbit.problem.legs):
+        if leg.kind != "exit" or system.coupled:
+            continue
+        other = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}[leg.name]
+        end = orbit.evaluation.flown[i].end
+        at = Leg(leg.mode, other, "exit").at_end(system, end, p)
+        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
+        if abs(at.value) <= 1e-9 * size:
+            raise DegenerateError(
+                f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
+                f"{leg_name(leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
+                f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
+            )
+    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
+
+
+class VirtualOrbitError(ConvergenceError):
+    """An orbit of the equations that no motion takes.
+
+    Attributes
+    ----------
+    orbit : PeriodicOrbit
+    """
+
+    def __init__(self, message: str, orbit: PeriodicOrbit):
+        super().__init__(message, residual=orbit.residual, point=orbit.unknowns)
+        self.orbit = orbit
+
+
+def _virtual(orbit: PeriodicOrbit) -> VirtualOrbitError:
+    more = f" (and {len(orbit.faults) - 1} more)" if len(orbit.faults) > 1 else ""
+    return VirtualOrbitError(
+        f"periodic orbit: expected one that a motion takes, received a virtual one: "
+        f"{orbit.faults[0]}{more}. Try the itinerary of a simulation from there, or say virtual=True "
+        "if it is meant; it is the attribute `orbit` of this error.",
+        orbit,
+    )

@@ -1,0 +1,157 @@
+"""Floquet multipliers of a periodic orbit from the derivatives of its legs.
+
+The return map is condensed: perturbations are kept on the surfaces of the events, where the direction
+of the flow is left out, and in the subspaces that entries to sliding leave. What remains are the
+multipliers that are not structural; a multiplier 1 of the flow (or of the time) and a 0 for each
+dimension lost are exact. The full matrix gives them with rounding, which estimates the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import Array
+from .boundary import BoundaryProblem, Evaluation
+from .legs import leg_name
+from .saltation import saltation
+
+#: A direction that a leg shrinks to this part of the others is lost.
+_LOST = 1e-12
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers of the map of the legs, and how they follow.
+
+    Attributes
+    ----------
+    values : ndarray (N - 1 or N,)
+        The nontrivial ones and the structural zeros, largest first; of the whole period.
+    of_map : ndarray
+        Those of the legs' map alone, the half map of a symmetric orbit.
+    zeros : int
+        How many are structurally zero.
+    reduced : ndarray (r, r)
+        The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
+    matrix : ndarray (N, N)
+        The full derivative of the legs' map.
+    error : float
+        Distance of the structural multipliers of ``matrix`` from 1 and 0.
+    """
+
+    values: NDArray[np.complex128]
+    of_map: NDArray[np.complex128]
+    zeros: int
+    reduced: Array
+    matrix: Array
+    error: float
+
+
+def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multipliers:
+    """Multipliers of a periodic orbit.
+
+    Parameters
+    ----------
+    problem : BoundaryProblem
+    at : Evaluation
+        At the orbit.
+    p : ndarray
+
+    Raises
+    ------
+    DegenerateError
+        An event that is grazed.
+    """
+    n = problem.dimension
+    reduced = _condensed(problem, at)
+    nontrivial = np.linalg.eigvals(reduced) if reduced.size else np.zeros(0)
+    zeros = n - 1 - nontrivial.size
+    matrix = monodromy(problem, at, p)
+    whole = np.linalg.eigvals(matrix)
+    one = int(np.argmin(np.abs(whole - 1.0)))
+    rest = np.sort(np.abs(np.delete(whole, one)))
+    error = max(float(np.abs(whole[one] - 1.0)), *rest[:zeros].tolist(), 0.0)
+    of_map = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
+    power = 2 if problem.symmetry is not None else 1
+    return Multipliers(_sorted(of_map**power), of_map, zeros, reduced, matrix, error)
+
+
+def _sorted(values: Array) -> NDArray[np.complex128]:
+    order = np.lexsort((values.imag, -np.abs(values).round(14)))
+    return np.asarray(values[order], complex)
+
+
+def _condensed(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """The return map on perturbations across the flow, in the smallest subspace that they pass."""
+    count, n = len(problem.legs), problem.dimension
+    maps = []
+    for i in range(count):
+        flown, event = at.flown[i], at.events[i]
+        speed = float(event.gradient @ flown.rate)
+        across = flown.by_start - np.outer(flown.rate, event.gradient @ flown.by_start) / speed
+        step = event.after_state @ across
+        maps.append(problem.wrap @ step if i + 1 == count else step)
+    bases: list[Array] = [np.eye(n)] * count
+    basis = np.eye(n)
+    for _ in range(2):
+        for i in range(count):
+            basis = _range(maps[i] @ basis)
+            bases[(i + 1) % count] = basis
+    first = min(range(count), key=lambda i: bases[i].shape[1])
+    product = np.eye(bases[first].shape[1])
+    for k in range(count):
+        i = (first + k) % count
+        product = bases[(i + 1) % count].T @ maps[i] @ bases[i] @ product
+    return product
+
+
+def _range(matrix: Array) -> Array:
+    """Orthonormal basis of the range of a matrix."""
+    if not matrix.shape[1]:
+        return matrix
+    u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
+    return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), 1e-300)])
+
+
+def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+    """Product of state-transition and saltation matrices over the legs, (N, N)."""
+    count, n = len(problem.legs), problem.dimension
+    product = np.eye(n)
+    for i, leg in enumerate(problem.legs):
+        flown, event, last = at.flown[i], at.events[i], i + 1 == count
+        if leg.name:
+            following = problem.legs[(i + 1) % count].field(problem.system)
+            start = following.initial(at.starts[(i + 1) % count], p)[:, 0]
+            after = following.rate.copied(start, p)[0][:n, 0]
+            if last:
+                after = np.linalg.solve(problem.wrap, after)
+            jump = saltation(event, flown.rate, after, f"leg {i + 1} {leg_name(leg)}").matrix
+        else:
+            jump = event.after_state
+        product = jump @ flown.by_start @ product
+        if last:
+            product = problem.wrap @ product
+    return np.asarray(product)
+
+
+def stability(values: NDArray[np.complex128], error: float) -> str:
+    """Stability in words, from the multipliers that are not the 1 of the flow.
+
+    Examples
+    --------
+    >>> stability(np.array([0.5, 0.0]), 0.0), stability(np.array([0.0]), 0.0)
+    ('asymptotically stable', 'superstable')
+    >>> stability(np.array([-1.3, 0.2]), 0.0)
+    'unstable, 1 multiplier outside the unit circle'
+    """
+    sizes, margin = np.abs(values), max(1e-9, 10.0 * error)
+    outside = int(np.sum(sizes > 1.0 + margin))
+    if outside:
+        return f"unstable, {outside} multiplier{'s' * (outside > 1)} outside the unit circle"
+    if np.any(sizes > 1.0 - margin):
+        on = int(np.sum(sizes > 1.0 - margin))
+        return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
+    return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"

@@ -1,0 +1,184 @@
+"""Reading an itinerary off a run: the legs between two passages of nearly the same state.
+
+Distances are measured by how far each state moves in the run; in a forced system the time between the
+passages must be a whole number of periods, and half numbers count with a symmetry.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..flow.trajectory import Trajectory
+from ..model import Array, ConvergenceError
+from .legs import Stretch, stretches
+
+#: A run that comes back to within this part of its size may be near a periodic orbit.
+CLOSE = 0.25
+
+
+@dataclass(frozen=True, eq=False)
+class Recurrence:
+    """A stretch of a run that nearly closes.
+
+    Attributes
+    ----------
+    parts : tuple of Stretch
+    periods : float
+        Forcing periods, 0 without forcing.
+    distance : float
+        Of its ends, relative to the size of the run.
+    """
+
+    parts: tuple[Stretch, ...]
+    periods: float
+    distance: float
+
+
+def recurrence(
+    run: Trajectory,
+    *,
+    symmetry: Array | None,
+    period: float | None,
+    first: bool,
+) -> Recurrence | None:
+    """The legs of a run that nearly close, None if it has none.
+
+    Parameters
+    ----------
+    run : Trajectory
+    symmetry : ndarray (n, n) or None
+    period : float or None
+        Of the forcing.
+    first : bool
+        Take the first recurrence of the run, not the last.
+    """
+    parts = [part for part in stretches(run) if part.duration > 0.0]
+    closed = [k for k, part in enumerate(parts) if part.leg.name and part.leg.kind != "stop"]
+    # legs between two events: start k is after the event that ends part k - 1
+    starts = [k + 1 for k in closed if k + 1 < len(parts)]
+    if len(starts) < 2:
+        return _without_events(run, parts, symmetry, period, first)
+    scale = _scales(run)
+    anchor = starts[0] if first else starts[-1]
+    found: list[Recurrence] = []
+    for other in starts:
+        a, b = (anchor, other) if first else (other, anchor)
+        if a >= b:
+            continue
+        if symmetry is None and _key(parts, a) != _key(parts, b):
+            continue
+        distance, periods = _distance(run, parts[a], parts[b], scale, symmetry, period)
+        found.append(Recurrence(tuple(parts[a:b]), periods, distance))
+    return _shortest(found)
+
+
+def _shortest(found: Sequence[Recurrence]) -> Recurrence | None:
+    """The shortest of those that close about as well as the best."""
+    if not found:
+        return None
+    best = min(r.distance for r in found)
+    good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]
+    return min(good, key=lambda r: len(r.parts))
+
+
+def _key(parts: Sequence[Stretch], k: int) -> tuple[str, str]:
+    return parts[k].leg.mode, parts[k - 1].leg.name
+
+
+def _scales(run: Trajectory) -> Array:
+    span = np.asarray(np.ptp(run.x[len(run.x) // 2 :], axis=0))
+    return np.where(span > 1e-12 * max(float(span.max()), 1e-300), span, max(span.max(), 1e-300))
+
+
+def _distance(
+    run: Trajectory,
+    a: Stretch,
+    b: Stretch,
+    scale: Array,
+    symmetry: Array | None,
+    period: float | None,
+) -> tuple[float, float]:
+    """Relative distance of two starts, and the forcing periods between them."""
+    n = run.system.dimension
+    there = b.start[:n] if symmetry is None else symmetry @ b.start[:n]
+    distance = float(np.abs((there - a.start[:n]) / scale).max())
+    if period is None:
+        return distance, 0.0
+    count = (b.t - a.t) / period
+    whole = round(count) if symmetry is None else round(count - 0.5) + 0.5
+    if whole <= 0:
+        return np.inf, 0.0
+    return max(distance, 2.0 * abs(count - whole)), float(whole)
+
+
+def _without_events(
+    run: Trajectory,
+    parts: Sequence[Stretch],
+    symmetry: Array | None,
+    period: float | None,
+    first: bool,
+) -> Recurrence | None:
+    """A recurrence within one leg: after whole periods, or on a plane across the flow."""
+    if not parts:
+        return None
+    part = parts[0] if first else parts[-1]
+    start, end = part.t, part.t + part.duration
+    n, scale = run.system.dimension, _scales(run)
+    anchor = start if first else end
+    found = []
+    for t in _returns(run, start, end, anchor, symmetry, period):
+        low, high = sorted((anchor, t))
+        there = run(high) if symmetry is None else symmetry @ run(high)
+        distance = float(np.abs((there - run(low)) / scale).max())
+        x = np.append(run(low), low) if run.system.time_dependent else run(low)
+        periods = (high - low) / period if period else 0.0
+        leg = type(part.leg)(part.leg.mode)
+        cut = Stretch(leg, low, high - low, x, x, x)
+        found.append(Recurrence((cut,), round(2 * periods) / 2, distance))
+    del n
+    best = min((r.distance for r in found), default=np.inf)
+    good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]
+    return min(good, key=lambda r: r.parts[0].duration) if good else None
+
+
+def _returns(
+    run: Trajectory,
+    start: float,
+    end: float,
+    anchor: float,
+    symmetry: Array | None,
+    period: float | None,
+) -> list[float]:
+    """Times at which the run may be back at the state it has at ``anchor``."""
+    if period is not None:
+        shift = 0.0 if symmetry is None else 0.5
+        count = int((end - start) / period + 1e-9)
+        steps = [(k + 1 - shift) * period for k in range(count)]
+        sign = 1.0 if anchor == start else -1.0
+        return [anchor + sign * s for s in steps]
+    times = np.linspace(start, end, 4001)
+    states = run(times) if symmetry is None else run(times) @ symmetry.T
+    x = run(anchor)
+    i = int(np.argmin(np.abs(times - anchor)))
+    rate = (run(times[min(i + 1, 4000)]) - run(times[max(i - 1, 0)])) / 2.0
+    height = (states - x) @ rate
+    crossings = np.flatnonzero((height[:-1] < 0.0) & (height[1:] >= 0.0))
+    away = [k for k in crossings if abs(times[k] - anchor) > 3 * (times[1] - times[0])]
+    weights = [height[k] / (height[k] - height[k + 1]) for k in away]
+    return [float(times[k] + w * (times[1] - times[0])) for k, w in zip(away, weights, strict=True)]
+
+
+def refused(run: Trajectory, found: Recurrence | None) -> ConvergenceError:
+    """The error for a run in which no orbit closes."""
+    came = "it has no two passages of one event" if found is None else (
+        f"the best one closes to {found.distance:.2g} of its size, after "
+        f"{len(found.parts)} legs"
+    )
+    return ConvergenceError(
+        f"guess: expected a run that comes back near to where it was, received none: {came}. The "
+        f"itinerary does not close. The run ended with {run.status} at t = {run.t[-1]:.6g}. Simulate "
+        "longer, closer to the orbit, or give itinerary= or a symmetry."
+    )

@@ -5,9 +5,11 @@ from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifur
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
 from .equilibrium_branches import continue_equilibrium
+from .find_periodic import VirtualOrbitError, periodic_orbit
 from .funnels import Departure, Funnel
-from .futures import funnel
+from .futures import Departure, Funnel, funnel
 from .itinerary import Arrival, FixedItinerary
+from .periodic import PeriodicOrbit
 from .sensitivity import Gradient, gradient, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds
 from .variation import Sensitivity
@@ -25,15 +27,18 @@ __all__ = [
     "Funnel",
     "Gradient",
     "Path",
+    "PeriodicOrbit",
     "Sensitivity",
     "Slider",
     "TraceError",
+    "VirtualOrbitError",
     "continuation",
     "continue_bifurcation",
     "continue_equilibrium",
     "funnel",
     "gradient",
     "paths_from",
+    "periodic_orbit",
     "sensitivity",
     "trace_two_folds",
     "vjp",

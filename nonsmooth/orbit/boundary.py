@@ -73,6 +73,8 @@ class BoundaryProblem:
     phase : ndarray (N,) or None
         For a leg without an event: the row of the phase condition ``phase . (x_1 - reference)``.
     reference : ndarray (N,) or None
+    kept : tuple of int
+        Surfaces on which every leg slides.
     """
 
     system: FilippovSystem
@@ -82,7 +84,7 @@ class BoundaryProblem:
     forcing: Forcing | None = None
     phase: Array | None = None
     reference: Array | None = None
-    _kept: tuple[int, ...] = field(init=False)
+    kept: tuple[int, ...] = field(init=False)
 
     def __post_init__(self) -> None:
         sliding = [
@@ -90,7 +92,7 @@ class BoundaryProblem:
             for i in range(self.system.surface_count)
             if all(leg.mode[i] == "s" for leg in self.legs)
         ]
-        object.__setattr__(self, "_kept", tuple(sliding))
+        object.__setattr__(self, "kept", tuple(sliding))
 
     @property
     def dimension(self) -> int:
@@ -176,7 +178,7 @@ class BoundaryProblem:
                 jacobian[time, own] = self.phase
             flown.append(part)
             events.append(at)
-        if self._kept:
+        if self.kept:
             self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
         return Evaluation(
             residual, jacobian, by_parameters, tuple(flown), tuple(events), starts, durations
@@ -217,7 +219,7 @@ class BoundaryProblem:
         n = self.dimension
         first = (len(self.legs) - 1) * n
         taken: list[int] = []
-        for surface in self._kept:
+        for surface in self.kept:
             at = surface_map(self.system, surface)(start, p)
             free = [k for k in range(self.system.dimension) if k not in taken]
             k = max(free, key=lambda k: abs(float(at.gradient[k])))

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike
 from ..flow.simulate import simulate
 from ..flow.status import Status
 from ..flow.trajectory import Trajectory
-from ..local.newton import converge
+from ..local.newton import Equations, converge, solve
 from ..model import (
     Array,
     ConvergenceError,
@@ -28,8 +28,9 @@ from ..model import (
 )
 from ..model.variational import Forcing, frequencies
 from .boundary import BoundaryProblem, Evaluation
-from .itinerary import FixedItinerary, leg_between, read_word
-from .legs import Leg, leg_name
+from .guards import march
+from .itinerary import leg_between, read_word
+from .legs import Leg, fly, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 from .recurrence import CLOSE, Recurrence, recurrence, refused
 
@@ -37,6 +38,9 @@ from .recurrence import CLOSE, Recurrence, recurrence, refused
 _TOLERANCE = 1e-10
 
 _MOST_EVENTS = 2000
+
+#: A leg of a given itinerary is followed so many times the time in which the state changes.
+_LONGEST = 200.0
 
 Itinerary = str | Sequence[str] | Sequence[tuple[str, str]]
 
@@ -206,7 +210,7 @@ def _start(
     return _from_recurrence(system, found, forcing, mirror, p)
 
 
-def _by_name(parameters: Parameters | None) -> dict[str, float]:
+def _by_name(parameters: Parameters | None) -> dict[str, Any]:
     return {str(k): v for k, v in (parameters or {}).items()}
 
 
@@ -266,29 +270,37 @@ def _from_word(
     p: Array,
 ) -> _Start:
     """Follow the legs of an itinerary, each to its event."""
-    pairs = [(e, "") if isinstance(e, str) else e for e in itinerary] if not isinstance(
-        itinerary, str
-    ) else [(mode, "") for mode in read_word(system, itinerary)]
+    pairs = (
+        [(e, "") if isinstance(e, str) else e for e in itinerary]
+        if not isinstance(itinerary, str)
+        else [(mode, "") for mode in read_word(system, itinerary)]
+    )
     modes = [mode for mode, _ in pairs]
     n, t = system.dimension, float(x[-1]) if system.time_dependent else 0.0
-    begin, state = t, x[:n]
+    t_first, state = t, x[:n]
     legs, starts, durations = list[Leg](), list[Array](), list[float]()
-    values = named(system, p)
     for k, (mode, name) in enumerate(pairs):
         following = modes[(k + 1) % len(modes)]
         if mirror is not None and k + 1 == len(modes):
             following = following.translate(str.maketrans("+-", "-+"))
         leg = leg_between(system, mode, following, name)
-        run = FixedItinerary(system, [mode], leg.name, values).leg(mode, t, state, leg.name)
-        starts.append(system.extended_point(state, t))
-        durations.append(float(run.t[-1]) - t)
-        t = float(run.t[-1])
-        y = leg.field(system).initial(system.extended_point(run.x[-1], t), p)[:, 0]
-        state = leg.at_end(system, y, p).after[:n]
+        begin = system.extended_point(state, t)
+        duration = march(system, leg, begin, p, _LONGEST * _natural_time(system, begin, p))
+        if duration is None:
+            raise ConvergenceError(
+                f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
+                f"from {state.tolist()} at t = {t:.6g}. Start closer to the orbit, or change the "
+                "itinerary."
+            )
+        starts.append(begin)
+        durations.append(duration)
+        t += duration
+        end = fly(system, leg, begin, duration, p).end
+        state = leg.at_end(system, end, p).after[:n]
         legs.append(leg)
     periods = 0.0
     if forcing is not None:
-        count = (t - begin) / forcing(p)[0]
+        count = (t - t_first) / forcing(p)[0]
         periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
     return _problem(
         system, tuple(legs), np.array(starts), np.array(durations), periods, forcing, mirror, p
@@ -361,13 +373,33 @@ class _Solver:
             return at.residual, at.jacobian * scales
 
         reason = ""
+        root: Array | None
         try:
             root = converge(equations, u / scales, tol=_TOLERANCE, max_iterations=max_iterations)
         except (ConvergenceError, DegenerateError) as error:
             root, reason = None, str(error)
         if root is None:
+            root = self._damped(equations, u / scales, 2 * max_iterations)
+        if root is None:
             raise self._failure(reason)
         return self._polished(root * scales)
+
+    def _damped(self, equations: Equations, v: Array, max_iterations: int) -> Array | None:
+        """Newton's method with halved steps, from farther away."""
+
+        def guarded(w: Array) -> tuple[Array, Array]:
+            try:
+                return equations(w)
+            except (ConvergenceError, DegenerateError):
+                return np.full(w.size, np.nan), np.full((w.size, w.size), np.nan)
+
+        try:
+            found = solve(
+                guarded, v, tol=1e-7, max_iterations=max_iterations, what="periodic orbit"
+            )
+        except NonsmoothError:
+            return None
+        return found.x
 
     def _polished(self, u: Array) -> tuple[Array, Evaluation]:
         """Two more steps at most, as long as they shrink: to rounding."""
@@ -383,6 +415,17 @@ class _Solver:
                 break
             u, at = new, there
         return u, at
+
+    def _largest(self, at: Evaluation) -> str:
+        """The leg whose equations are least satisfied, in words."""
+        count, n = len(self.problem.legs), self.problem.dimension
+        sizes = np.abs(at.residual[: count * n]).reshape(count, n).max(axis=1)
+        ends = np.abs(at.residual[count * n :])
+        i = int(np.argmax(np.maximum(sizes, ends)))
+        what = "does not end on its event" if ends[i] > sizes[i] else "does not meet the next one"
+        return (
+            f"leg {i + 1} {leg_name(self.problem.legs[i])} {what} (by {max(sizes[i], ends[i]):.2g})"
+        )
 
     def _failure(self, reason: str) -> ConvergenceError:
         u, at = self.last
@@ -400,6 +443,8 @@ class _Solver:
             except NonsmoothError:
                 backward = []
         told = f" {reason}" if reason else ""
+        if at is not None and not backward:
+            backward = [self._largest(at)]
         where = f" At the last iterate {backward[0]}." if backward else ""
         words = " ".join(leg.mode or "o" for leg in legs)
         return ConvergenceError(

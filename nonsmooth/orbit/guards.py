@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..flow.fixed import steps_for
+from ..flow.reference.polynomial import first_crossing
 from ..model import Array, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .legs import Leg
@@ -191,11 +192,40 @@ def _following_fault(
     for k, guard in enumerate(field.motion.guards):
         if guard.kind in ("stop", "reset", "zero", "branch"):
             continue
-        scale = np.abs(slopes[k]) @ np.abs(states[:, :4])
-        scale[0] += 1e-3 * float(np.linalg.norm(slopes[k]))
+        length = float(np.linalg.norm(slopes[k]))
+        scale = length * np.abs(states[:, :4]).max(axis=0)
+        scale[0] += 1e-3 * length
         for value, size in zip(rows[k, :4], scale, strict=False):
             if abs(value) > _NEGATIVE * size:
                 if value < 0.0:
                     return f"where mode {following!r} begins after it, {described(guard)} fails"
                 break
     return ""
+
+
+def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) -> float | None:
+    """Time until the event of a leg, whatever other guards say; None if it does not come.
+
+    A zero where the leg starts is not counted.
+    """
+    field = guarded_field(system, leg.mode)
+    guards = field.motion.guards
+    row = next(
+        k
+        for k, g in enumerate(guards)
+        if g.name == leg.name and (g.kind != "exit" or leg.side in (0, g.side))
+    )
+    direction = guards[row].side if guards[row].kind in ("stop", "reset") else -1
+    y = variational_field(system, leg.mode).initial(x, p)[:, 0]
+    t = 0.0
+    for h, _, end in steps_for(field, y, p, t_max):
+        c = field.jets.outputs[1][row].copy()
+        if t == 0.0:
+            scale = float(np.linalg.norm(field.gradients(y, p)[0][row])) * float(np.abs(y).max())
+            drop = int(np.argmax(np.abs(c) > 1e-9 * scale))
+            c = c[drop:]
+        found = first_crossing(c.tolist(), h, direction)
+        if found is not None and t + found > 0.0:
+            return t + found
+        t, y = t + h, end
+    return None

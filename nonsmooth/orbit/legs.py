@@ -77,7 +77,6 @@ class Leg:
         return at
 
 
-
 def leg_name(leg: Leg) -> str:
     """A leg in words: its mode, and what ends it."""
     end = f", ended by {leg.name}" if leg.name else ""

@@ -9,16 +9,18 @@ dimension lost are exact. The full matrix gives them with rounding, which estima
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
+from ..model.variational import surface_map
 from .boundary import BoundaryProblem, Evaluation
 from .legs import leg_name
 from .saltation import saltation
 
-#: A direction that a leg shrinks to this part of the others is lost.
+#: A direction of which a leg leaves no more than this part is lost.
 _LOST = 1e-12
 
 
@@ -66,7 +68,7 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
         An event that is grazed.
     """
     n = problem.dimension
-    reduced = _condensed(problem, at)
+    reduced = _condensed(problem, at, p)
     nontrivial = np.linalg.eigvals(reduced) if reduced.size else np.zeros(0)
     zeros = n - 1 - nontrivial.size
     matrix = monodromy(problem, at, p)
@@ -79,12 +81,12 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
     return Multipliers(_sorted(of_map**power), of_map, zeros, reduced, matrix, error)
 
 
-def _sorted(values: Array) -> NDArray[np.complex128]:
+def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
     order = np.lexsort((values.imag, -np.abs(values).round(14)))
     return np.asarray(values[order], complex)
 
 
-def _condensed(problem: BoundaryProblem, at: Evaluation) -> Array:
+def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
     count, n = len(problem.legs), problem.dimension
     maps = []
@@ -94,32 +96,41 @@ def _condensed(problem: BoundaryProblem, at: Evaluation) -> Array:
         across = flown.by_start - np.outer(flown.rate, event.gradient @ flown.by_start) / speed
         step = event.after_state @ across
         maps.append(problem.wrap @ step if i + 1 == count else step)
+    basis = _kept(problem, at, p)
     bases: list[Array] = [np.eye(n)] * count
-    basis = np.eye(n)
     for _ in range(2):
         for i in range(count):
-            basis = _range(maps[i] @ basis)
+            size = float(np.linalg.norm(at.flown[i].by_start @ basis)) if basis.size else 0.0
+            basis = _range(maps[i] @ basis, size)
             bases[(i + 1) % count] = basis
     first = min(range(count), key=lambda i: bases[i].shape[1])
-    product = np.eye(bases[first].shape[1])
+    product: Array = np.eye(bases[first].shape[1])
     for k in range(count):
         i = (first + k) % count
-        product = bases[(i + 1) % count].T @ maps[i] @ bases[i] @ product
+        product = np.asarray(bases[(i + 1) % count].T @ maps[i] @ bases[i] @ product, float)
     return product
 
 
-def _range(matrix: Array) -> Array:
-    """Orthonormal basis of the range of a matrix."""
+def _kept(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+    """Directions that remain on the surfaces on which the orbit slides all the time."""
+    if not problem.kept:
+        return np.eye(problem.dimension)
+    rows = [surface_map(problem.system, i)(at.starts[0], p).gradient for i in problem.kept]
+    return np.asarray(np.linalg.svd(np.array(rows))[2][len(rows) :].T)
+
+
+def _range(matrix: Array, size: float) -> Array:
+    """Orthonormal basis of the range of a matrix, without what is lost beside ``size``."""
     if not matrix.shape[1]:
         return matrix
     u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
-    return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), 1e-300)])
+    return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
 
 
 def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
     count, n = len(problem.legs), problem.dimension
-    product = np.eye(n)
+    product: Array = np.eye(n)
     for i, leg in enumerate(problem.legs):
         flown, event, last = at.flown[i], at.events[i], i + 1 == count
         if leg.name:
@@ -131,10 +142,10 @@ def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
             jump = saltation(event, flown.rate, after, f"leg {i + 1} {leg_name(leg)}").matrix
         else:
             jump = event.after_state
-        product = jump @ flown.by_start @ product
+        product = np.asarray(jump @ flown.by_start @ product, float)
         if last:
-            product = problem.wrap @ product
-    return np.asarray(product)
+            product = np.asarray(problem.wrap @ product, float)
+    return product
 
 
 def stability(values: NDArray[np.complex128], error: float) -> str:

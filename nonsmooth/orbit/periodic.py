@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
@@ -10,8 +9,10 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from ..flow.fixed import flow_for
 from ..flow.trajectory import Trajectory
-from ..model import Array, FilippovSystem, ParameterError
+from ..model import Array, FilippovSystem, ParameterError, Surfaces
+from ..model.variational import variational_field
 from .boundary import BoundaryProblem, Evaluation
 from .guards import change_fault, described, watch
 from .legs import leg_name
@@ -234,10 +235,8 @@ class PeriodicOrbit:
             raise ParameterError(
                 f"parameter: expected a name among {list(names)}, received {parameter!r}."
             )
-        at = self.problem.evaluate(
-            self.unknowns, self.parameter_vector, (names.index(parameter),)
-        )
-        change = -np.linalg.solve(at.jacobian, at.by_parameters[:, 0])
+        at = self.problem.evaluate(self.unknowns, self.parameter_vector, (names.index(parameter),))
+        change = np.asarray(-np.linalg.solve(at.jacobian, at.by_parameters[:, 0]), float)
         starts, durations = self.problem.split(change)
         n = self.system.dimension
         period = float(durations.sum()) * (2 if self.symmetric else 1)
@@ -266,9 +265,7 @@ class PeriodicOrbit:
         return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return (
-            f"PeriodicOrbit(period {self.period:.10g}, {len(self.legs)} legs, {self.stability})"
-        )
+        return f"PeriodicOrbit(period {self.period:.10g}, {len(self.legs)} legs, {self.stability})"
 
 
 _MIRRORED = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}
@@ -282,10 +279,6 @@ def _number(m: complex) -> str:
 
 def mirrored_mode(orbit: PeriodicOrbit, mode: str, x: Array, duration: float) -> str:
     """The mode of a leg's mirror image."""
-    from ..flow.fixed import flow_for
-    from ..model import Surfaces
-    from ..model.variational import variational_field
-
     system, p = orbit.system, orbit.parameter_vector
     field = variational_field(system, mode)
     middle = flow_for(field, field.start(x, p), p, 0.5 * duration)[: system.extended_dimension]
@@ -350,4 +343,3 @@ def named(system: FilippovSystem, values: Array) -> dict[str, float]:
 
 
 __all__ = ["Margin", "OrbitDerivative", "OrbitLeg", "PeriodicOrbit", "faults_of", "named"]
-_Parameters = Mapping[str, float]

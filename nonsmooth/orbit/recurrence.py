@@ -173,9 +173,13 @@ def _returns(
 
 def refused(run: Trajectory, found: Recurrence | None) -> ConvergenceError:
     """The error for a run in which no orbit closes."""
-    came = "it has no two passages of one event" if found is None else (
-        f"the best one closes to {found.distance:.2g} of its size, after "
-        f"{len(found.parts)} legs"
+    came = (
+        "it has no two passages of one event"
+        if found is None
+        else (
+            f"the best one closes to {found.distance:.2g} of its size, after "
+            f"{len(found.parts)} legs"
+        )
     )
     return ConvergenceError(
         f"guess: expected a run that comes back near to where it was, received none: {came}. The "

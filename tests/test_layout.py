@@ -19,7 +19,6 @@ LONGEST_MODULE = 400  # lines
 LONG_MODULES = {
     "nonsmooth/flow/compiled/engine.py": 460,
     "nonsmooth/flow/reference/driver.py": 515,
-    "nonsmooth/model/variational.py": 440,
 }
 
 # Words of the client. The bouncing ball is also a classic of the general theory (impacts that

@@ -7,7 +7,7 @@ from .canards import Path, Slider, paths_from
 from .equilibrium_branches import continue_equilibrium
 from .find_periodic import VirtualOrbitError, periodic_orbit
 from .funnels import Departure, Funnel
-from .futures import Departure, Funnel, funnel
+from .futures import funnel
 from .itinerary import Arrival, FixedItinerary
 from .periodic import PeriodicOrbit
 from .sensitivity import Gradient, gradient, sensitivity, vjp

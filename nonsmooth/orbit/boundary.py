@@ -23,7 +23,8 @@ from functools import cached_property
 import numpy as np
 
 from ..model import Array, FilippovSystem
-from ..model.variational import AtEvent, Forcing, surface_map
+from ..model.event_maps import AtEvent, surface_map
+from ..model.forcing import Forcing
 from .legs import Flown, Leg, fly
 
 

@@ -26,8 +26,8 @@ from ..model import (
     explain,
     require_system,
 )
+from ..model.event_maps import event_map, function_map
 from ..model.explicit import explicit
-from ..model.variational import event_map, function_map
 from .guards import change_fault, watch
 from .legs import Flown, Leg, fly
 from .saltation import saltation

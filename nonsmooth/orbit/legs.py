@@ -17,13 +17,8 @@ from ..flow.facts import TIE
 from ..flow.fixed import flow_for
 from ..flow.trajectory import Event, Trajectory
 from ..model import Array, DegenerateError, FilippovSystem
-from ..model.variational import (
-    AtEvent,
-    EventMap,
-    VariationalField,
-    event_map,
-    variational_field,
-)
+from ..model.event_maps import AtEvent, EventMap, event_map
+from ..model.variational import VariationalField, variational_field
 
 #: Directions that differ by less than this are one: the gradients of events at one instant.
 _PARALLEL = 1e-7

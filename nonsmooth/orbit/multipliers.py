@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
-from ..model.variational import surface_map
+from ..model.event_maps import surface_map
 from .boundary import BoundaryProblem, Evaluation
 from .legs import leg_name
 from .saltation import saltation
@@ -138,7 +138,7 @@ def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
             start = following.initial(at.starts[(i + 1) % count], p)[:, 0]
             after = following.rate.copied(start, p)[0][:n, 0]
             if last:
-                after = np.linalg.solve(problem.wrap, after)
+                after = np.asarray(np.linalg.solve(problem.wrap, after), float)
             jump = saltation(event, flown.rate, after, f"leg {i + 1} {leg_name(leg)}").matrix
         else:
             jump = event.after_state

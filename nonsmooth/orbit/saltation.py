@@ -22,7 +22,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..model import Array, DegenerateError
-from ..model.variational import AtEvent
+from ..model.event_maps import AtEvent
 
 #: An orbit that meets a surface at an angle below this grazes it.
 GRAZING = 1e-8

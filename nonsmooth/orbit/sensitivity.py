@@ -19,7 +19,7 @@ from ..model import (
     read_function,
     real_array,
 )
-from ..model.variational import function_map
+from ..model.event_maps import function_map
 from .variation import Passage, Sensitivity, along, passages
 
 

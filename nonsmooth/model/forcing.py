@@ -1,0 +1,68 @@
+"""The period of a forced system, as a function of its parameters."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+
+from .evaluators import Evaluator
+from .system import FilippovSystem
+from .values import Array
+
+
+class Forcing:
+    """The period of a forced system as a function of its parameters.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    period : SX or float
+
+    Attributes
+    ----------
+    expression : SX
+    """
+
+    def __init__(self, system: FilippovSystem, period: ca.SX | float):
+        self.expression = ca.SX(period)
+        p = system.parameter_symbols
+        outputs = [ca.densify(e) for e in (self.expression, ca.jacobian(self.expression, p))]
+        self._function = Evaluator(ca.Function("period", [ca.SX(0, 1), p], outputs))
+
+    def __call__(self, p: Array) -> tuple[float, Array]:
+        """The period, and its derivatives by all parameters."""
+        value, slope = self._function.copied(np.zeros(0), p)
+        return float(value[0, 0]), slope[0]
+
+
+def frequencies(system: FilippovSystem) -> list[ca.SX]:
+    """Rates of the arguments of sines and cosines that are linear in the time, without repetition.
+
+    Examples
+    --------
+    >>> x, t, w = (ca.SX.sym(s) for s in "xtw")
+    >>> forced = FilippovSystem([x], field=[ca.cos(w * t + 1) - x], time=t, parameters={w: 2.0})
+    >>> frequencies(forced)
+    [SX(w)]
+    """
+    if not system.time_dependent:
+        return []
+    d = system.definition
+    expressions = [d.field, d.surfaces, d.guards, d.maps, d.gaps]
+    found: list[ca.SX] = []
+    seen: set[int] = set()
+    stack = [e for block in expressions for e in ca.vertsplit(ca.densify(ca.vec(block)))]
+    while stack:
+        node = stack.pop()
+        if node.element_hash() in seen:
+            continue
+        seen.add(node.element_hash())
+        if node.is_leaf():
+            continue
+        if node.op() in (ca.OP_SIN, ca.OP_COS):
+            rate = ca.simplify(ca.jacobian(node.dep(0), d.time))
+            if not rate.is_zero() and not ca.depends_on(rate, system.extended_states):
+                if not any(ca.is_equal(rate, other, 10) for other in found):
+                    found.append(rate)
+        stack += [node.dep(k) for k in range(node.n_dep())]
+    return found

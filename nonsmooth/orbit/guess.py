@@ -1,0 +1,257 @@
+"""From a guess to the equations of a periodic orbit and a start for Newton's method."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ..flow.simulate import simulate
+from ..flow.status import Status
+from ..flow.trajectory import Trajectory
+from ..model import (
+    Array,
+    ConvergenceError,
+    FilippovSystem,
+    OptionError,
+    Parameters,
+    explain,
+    real_array,
+)
+from ..model.forcing import Forcing, frequencies
+from .boundary import BoundaryProblem
+from .guards import march
+from .itinerary import leg_between, read_word
+from .legs import Leg, fly, leg_name
+from .periodic import PeriodicOrbit, named
+from .recurrence import CLOSE, Recurrence, recurrence, refused
+
+_MOST_EVENTS = 2000
+
+#: A leg of a given itinerary is followed so many times the time in which the state changes.
+_LONGEST = 200.0
+
+Itinerary = str | Sequence[str] | Sequence[tuple[str, str]]
+
+
+@dataclass(frozen=True, eq=False)
+class Start:
+    """Equations of an orbit, unknowns near it, and all parameters."""
+
+    problem: BoundaryProblem
+    unknowns: Array
+    p: Array
+
+
+def mirror_of(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array | None:
+    n = system.dimension
+    if symmetry is None:
+        return None
+    if isinstance(symmetry, str):
+        if symmetry != "odd":
+            raise OptionError(
+                f"symmetry: expected 'odd' or a matrix ({n}, {n}), received {symmetry!r}."
+            )
+        return -np.eye(n)
+    matrix = real_array(symmetry, "symmetry")
+    if matrix.shape != (n, n) or np.abs(matrix @ matrix - np.eye(n)).max() > 1e-9:
+        raise OptionError(
+            explain(
+                "symmetry",
+                expected=f"'odd' or a matrix ({n}, {n}) whose square is 1",
+                received=f"shape {matrix.shape}",
+                advice="R maps half of the orbit to the other half.",
+            )
+        )
+    return matrix
+
+
+def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
+    """The period of the forcing as a function of the parameters; None for autonomous systems."""
+    if not system.time_dependent:
+        return None
+    if period is None:
+        found = frequencies(system)
+        if len(found) != 1:
+            raise OptionError(
+                explain(
+                    "period",
+                    expected="the period of the forcing, as a number or an expression in parameters",
+                    received=f"none, with {len(found)} frequencies {found} in sines and cosines",
+                    advice="Give period=2*pi/w.",
+                )
+            )
+        return Forcing(system, 2.0 * math.pi / found[0])
+    return Forcing(system, period)
+
+
+def start_of(
+    system: FilippovSystem,
+    guess: Any,
+    itinerary: Itinerary | None,
+    period: Any,
+    mirror: Array | None,
+    parameters: Parameters | None,
+    t_start: float,
+) -> Start:
+    if isinstance(guess, PeriodicOrbit):
+        return _from_orbit(system, guess, parameters)
+    if isinstance(guess, Trajectory):
+        given = {**guess.parameters, **_by_name(parameters)}
+        p = system.parameter_vector(given)
+        forcing = _forcing(system, period)
+        span = forcing(p)[0] if forcing else None
+        found = recurrence(guess, symmetry=mirror, period=span, first=False)
+        if found is None or found.distance > CLOSE:
+            raise refused(guess, found)
+        return _from_recurrence(system, found, forcing, mirror, p)
+    p = system.parameter_vector(parameters)
+    forcing = _forcing(system, period)
+    x = system.extended_point(real_array(guess, "guess"), t_start)
+    if itinerary is not None:
+        return _from_word(system, x, itinerary, forcing, mirror, p)
+    hint = forcing(p)[0] if forcing else None if period is None else float(period)
+    found = _simulated(system, x, mirror, hint, forcing is not None, p)
+    return _from_recurrence(system, found, forcing, mirror, p)
+
+
+def _by_name(parameters: Parameters | None) -> dict[str, Any]:
+    return {str(k): v for k, v in (parameters or {}).items()}
+
+
+def _from_orbit(
+    system: FilippovSystem, orbit: PeriodicOrbit, parameters: Parameters | None
+) -> Start:
+    p = system.parameter_vector({**orbit.parameters, **_by_name(parameters)})
+    return Start(orbit.problem, orbit.unknowns, p)
+
+
+def _from_recurrence(
+    system: FilippovSystem,
+    found: Recurrence,
+    forcing: Forcing | None,
+    mirror: Array | None,
+    p: Array,
+) -> Start:
+    starts = np.array([part.start for part in found.parts])
+    durations = np.array([part.duration for part in found.parts])
+    if forcing is not None:  # the clock within one period keeps its size that of the orbit's
+        span = forcing(p)[0]
+        starts[:, -1] -= span * math.floor(starts[0, -1] / span)
+    legs = tuple(part.leg for part in found.parts)
+    return _problem(system, legs, starts, durations, found.periods, forcing, mirror, p)
+
+
+def _problem(
+    system: FilippovSystem,
+    legs: tuple[Leg, ...],
+    starts: Array,
+    durations: Array,
+    periods: float,
+    forcing: Forcing | None,
+    mirror: Array | None,
+    p: Array,
+) -> Start:
+    phase = reference = None
+    if not legs[-1].name:
+        reference = starts[0]
+        phase = np.zeros(system.extended_dimension)
+        if system.time_dependent:
+            phase[-1] = 1.0
+        else:
+            field = legs[0].field(system)
+            rate = field.rate.copied(field.initial(starts[0], p)[:, 0], p)[0]
+            phase = rate[: system.extended_dimension, 0] / float(np.linalg.norm(rate))
+    problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
+    return Start(problem, problem.pack(starts, durations), p)
+
+
+def _from_word(
+    system: FilippovSystem,
+    x: Array,
+    itinerary: Itinerary,
+    forcing: Forcing | None,
+    mirror: Array | None,
+    p: Array,
+) -> Start:
+    """Follow the legs of an itinerary, each to its event."""
+    pairs = (
+        [(e, "") if isinstance(e, str) else e for e in itinerary]
+        if not isinstance(itinerary, str)
+        else [(mode, "") for mode in read_word(system, itinerary)]
+    )
+    modes = [mode for mode, _ in pairs]
+    n, t = system.dimension, float(x[-1]) if system.time_dependent else 0.0
+    t_first, state = t, x[:n]
+    legs, starts, durations = list[Leg](), list[Array](), list[float]()
+    for k, (mode, name) in enumerate(pairs):
+        following = modes[(k + 1) % len(modes)]
+        if mirror is not None and k + 1 == len(modes):
+            following = following.translate(str.maketrans("+-", "-+"))
+        leg = leg_between(system, mode, following, name)
+        begin = system.extended_point(state, t)
+        duration = march(system, leg, begin, p, _LONGEST * _natural_time(system, begin, p))
+        if duration is None:
+            raise ConvergenceError(
+                f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
+                f"from {state.tolist()} at t = {t:.6g}. Start closer to the orbit, or change the "
+                "itinerary."
+            )
+        starts.append(begin)
+        durations.append(duration)
+        t += duration
+        end = fly(system, leg, begin, duration, p).end
+        state = leg.at_end(system, end, p).after[:n]
+        legs.append(leg)
+    periods = 0.0
+    if forcing is not None:
+        count = (t - t_first) / forcing(p)[0]
+        periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
+    return _problem(
+        system, tuple(legs), np.array(starts), np.array(durations), periods, forcing, mirror, p
+    )
+
+
+def _simulated(
+    system: FilippovSystem,
+    x: Array,
+    mirror: Array | None,
+    hint: float | None,
+    forced: bool,
+    p: Array,
+) -> Recurrence:
+    """Simulate from a state, longer and longer, until the run comes back."""
+    n, values = system.dimension, named(system, p)
+    t = float(x[-1]) if system.time_dependent else 0.0
+    unit = hint if hint else _natural_time(system, x, p)
+    period = hint if forced else None
+    best: Recurrence | None = None
+    run: Trajectory | None = None
+    for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
+        run = simulate(
+            system, x[:n], t + span * unit, t_start=t, parameters=values, tol=1e-12,
+            max_events=_MOST_EVENTS,
+        )  # fmt: skip
+        for first in (True, False):
+            found = recurrence(run, symmetry=mirror, period=period, first=first)
+            if found is not None and (best is None or found.distance < 0.3 * best.distance):
+                best = found
+        if (best is not None and best.distance < 0.02) or run.status is not Status.REACHED_END:
+            break
+    assert run is not None
+    if best is None or best.distance > CLOSE:
+        raise refused(run, best)
+    return best
+
+
+def _natural_time(system: FilippovSystem, x: Array, p: Array) -> float:
+    """The time in which the state changes by its size."""
+    mode = system.modes[0] + "o" * len(system.impacts)
+    field = Leg(mode).field(system)
+    rate = field.rate.copied(field.initial(x, p)[:, 0], p)[0][: system.dimension, 0]
+    size, speed = float(np.linalg.norm(x[: system.dimension])), float(np.linalg.norm(rate))
+    return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

@@ -83,7 +83,7 @@ def decide(
     contacts = [i - first for i in active if i >= first]
     if len(active) == 1 and not contacts and is_two_fold(stepper.modes, mode, x, active[0]):
         return Decision(None, Status.NON_UNIQUE, messages.two_fold(active[0]))
-    letters = _by_rates(stepper, x, mode, active)
+    letters = _by_rates(stepper, x, mode, active, known)
     if isinstance(letters, Decision):
         return letters
     found = [
@@ -110,10 +110,15 @@ def decide(
 
 
 def _by_rates(
-    stepper: Stepper, x: Array, mode: str, active: Sequence[int]
+    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
 ) -> dict[int, str] | Decision:
-    """Letters that are possible: one where the rates decide, else all."""
+    """Letters that are possible: one where the rates decide, else all.
+
+    A surface or contact that is being left has a multiplier at its bound, to the tolerance of the run:
+    its rates decide nothing.
+    """
     first = stepper.system.surface_count
+    leaving = {j + first * (kind in ("impact", "release")) for kind, j, _ in known}
     undecided = {i: "+-s" if i < first else "oc" for i in active}
     if len(active) < 2:
         return undecided
@@ -138,6 +143,8 @@ def _by_rates(
     room = np.where(np.array(active) < first, 1.0 - np.abs(lam), lam)
     inside = room > VANISHES * (1.0 + scales / np.abs(np.diag(m)))
     for k, i in enumerate(active):
+        if i in leaving:
+            continue
         if inside[k]:
             undecided[i] = "s" if i < first else "c"
         elif clear_rate[k]:

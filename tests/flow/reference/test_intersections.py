@@ -130,3 +130,19 @@ def test_no_motion_along_an_intersection_has_no_range():
     )
     with pytest.raises(ns.PointError, match="leaves the intersection"):
         ns.intersection_range(system, [0.0, 0.0], of=x)
+
+
+@pytest.mark.parametrize("tol", [1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-10, 1e-13])
+def test_an_intersection_is_left_at_any_tolerance(tol):
+    """(1.2 sin z + 0.15 cos z)/1.06 = lambda reaches 1: one surface is left, the other holds. To the
+    tolerance of the run the multiplier may still be below 1 there."""
+    system = ns.FilippovSystem(
+        [x, y, z],
+        field=[-lam + 0.3 * kap + 1.2 * ca.sin(z), -kap - 0.2 * lam + ca.cos(z) / 2, 1],
+        multipliers=[lam, kap],
+        surfaces=[x, y],
+    )
+    run = ns.simulate(system, [0.0, 0.0, 0.0], 1.5, tol=tol)
+    assert run.itinerary == "ss +s" and run.status is ns.Status.REACHED_END
+    left = np.arcsin(1.06 / np.hypot(1.2, 0.15)) - np.arctan2(0.15, 1.2)
+    assert abs(run.events[0].t - left) <= 10 * tol

@@ -8,13 +8,16 @@ from .boundary_equilibria import (
     find_boundary_equilibrium,
 )
 from .branches import SlidingBranch, sliding_branches
-from .classify import LocalObject, classify
+from .classify import classify
 from .equilibria import Equilibrium, find_equilibrium
 from .find_two_fold import find_two_fold, two_fold
 from .fold_folds import FoldFold, fold_fold
 from .folds import Fold, find_fold, fold
 from .intersection import intersection_range
-from .pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
+from .intersections import Continuation, Intersection, intersection
+from .local_object import LocalObject
+from .pseudo_equilibria import find_pseudo_equilibrium
+from .pseudo_equilibrium import PseudoEquilibrium
 from .regions import Region, alpha, region, sliding_field
 from .search import find_all
 from .two_fold import TwoFold
@@ -22,9 +25,11 @@ from .two_fold import TwoFold
 __all__ = [
     "BoundaryBifurcation",
     "BoundaryEquilibrium",
+    "Continuation",
     "Equilibrium",
     "Fold",
     "FoldFold",
+    "Intersection",
     "LocalObject",
     "PseudoEquilibrium",
     "Region",
@@ -41,6 +46,7 @@ __all__ = [
     "find_two_fold",
     "fold",
     "fold_fold",
+    "intersection",
     "intersection_range",
     "region",
     "sliding_branches",

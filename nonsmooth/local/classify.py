@@ -8,8 +8,6 @@ distances are dimensionless and unchanged when h or a field is multiplied by a p
 
 from __future__ import annotations
 
-from collections.abc import Mapping
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,66 +16,22 @@ from numpy.typing import ArrayLike, NDArray
 from ..model import Array, DegenerateError, FilippovSystem, Parameters, PointError, explain
 from .boundary_equilibria import boundary_equilibrium_of
 from .checks import MARGIN, positive, require_linear
+from .classify_intersection import classify_intersection, meeting_at
 from .equilibria import equilibrium_distance, kind_of
 from .find_two_fold import independence, two_fold
 from .fold_folds import fold_fold_of
 from .folds import Fold, bend, fold
+from .local_object import LocalObject, spectrum
 from .numbers import Numbers
 from .place import Place, place
 from .pseudo_equilibria import pseudo_equilibrium_at, sliding_expansion, sliding_matrix
 from .read_only import ReadOnly
 from .regions import region_of
 from .search import Found
-from .sides import FIELDS, SIDES
+from .sides import SIDES
 from .two_folds import classify_two_fold
 
 Margins = dict[str, float]
-
-
-@dataclass(frozen=True, eq=False)
-class LocalObject:
-    """What a point is.
-
-    Attributes
-    ----------
-    kind : str
-        ``"crossing"``, ``"sliding"``, ``"fold"``, ``"cusp"``, ``"fold-fold"`` (plane),
-        ``"two-fold"``, ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"`` or
-        ``"degenerate"``.
-    label : str
-        Its class: ``"crossing up"``, ``"attracting sliding"``, ``"visible"``, ``"II2"``,
-        ``"VV-C1"``, ``"stable focus"``, ``"pseudo-saddle"``, ``"BF3"``, ...
-    side : {"+", "-", ""}
-        The field to which a fold, cusp, equilibrium or boundary equilibrium belongs.
-    point : ndarray (n,)
-    distance : float
-        To the nearest degenerate case; below the margin the kind is ``"degenerate"``.
-    nearest : str
-        Which condition that is, e.g. ``"L1 = 0"``.
-    margins : mapping
-        Distance from each condition that was looked at.
-    evidence : mapping
-        Numbers: h, L1, L2, and what decided the class.
-    detail : object
-        The Fold, TwoFold, FoldFold, BoundaryEquilibrium or PseudoEquilibrium, if there is one.
-    """
-
-    kind: str
-    label: str
-    side: str
-    point: Array
-    distance: float
-    nearest: str
-    margins: Mapping[str, float]
-    evidence: Mapping[str, float]
-    detail: Any = None
-
-    def __str__(self) -> str:
-        field = f" of {FIELDS[self.side]}" if self.side else ""
-        name = self.label if self.label == self.kind else f"{self.kind}: {self.label}"
-        numbers = ", ".join(f"{k} = {v:.6g}" for k, v in self.evidence.items())
-        away = f"{self.distance:.3g} from {self.nearest}" if self.nearest else "nothing is near"
-        return f"{name}{field} at {self.point.tolist()} ({away}). {numbers}"
 
 
 def classify(
@@ -96,7 +50,8 @@ def classify(
     Parameters
     ----------
     system, point, parameters, t, surface, mode
-        As in :func:`region`.
+        As in :func:`region`. A point on several surfaces is looked at as their intersection, unless
+        ``mode`` chooses sides; a mode with several ``s`` says which surfaces meet.
     tol : float, optional
         An equation holds if its dimensionless distance is at most this.
     margin : float, optional
@@ -129,6 +84,9 @@ def classify(
     degenerate - near L1 = 0
     """
     positive(tol, "tol"), positive(margin, "margin")
+    meeting = meeting_at(system, point, parameters, t, mode, tol)
+    if meeting is not None:
+        return classify_intersection(meeting, tol, margin)
     where, x = place(system, point, parameters, t, surface, mode)
     require_linear(system, surface, "classify")
     numbers = where.finite_at(x)
@@ -215,7 +173,7 @@ class _Question:
         kind, hyperbolic = kind_of(eigenvalues, scale)
         self.margins["an eigenvalue without real part"] = hyperbolic
         self._gaps(eigenvalues, scale, kind)
-        self.evidence.update(_spectrum(eigenvalues))
+        self.evidence.update(spectrum(eigenvalues))
         name = kind if status == "real" else f"virtual {kind}"
         return self.answer("equilibrium", name, SIDES[k])
 
@@ -259,7 +217,7 @@ class _Question:
             numbers.x, k, numbers.gradient, numbers.fields[1 - k], self.derivatives[k], 1e-300
         )
         self.margins.update(found.margins)
-        self.evidence.update(found.numbers, **_spectrum(found.eigenvalues))
+        self.evidence.update(found.numbers, **spectrum(found.eigenvalues))
         return self.answer("boundary equilibrium", found.label, SIDES[k], found)
 
     def _fold_fold(self) -> LocalObject:
@@ -356,7 +314,7 @@ class _Question:
     def _pseudo_equilibrium(self) -> LocalObject:
         numbers = self.numbers
         found = pseudo_equilibrium_at(self.where, Found(numbers.x, residual=numbers.distance))
-        self.evidence.update(_spectrum(found.eigenvalues))
+        self.evidence.update(spectrum(found.eigenvalues))
         if found.eigenvalues.size == 0:
             return self.answer("pseudo-equilibrium", found.kind, "", found)
         scale = float(max(np.linalg.norm(d, 2) for d in self.derivatives)) or 1.0
@@ -374,13 +332,3 @@ class _Question:
             abs(second) * (1 + float(np.linalg.norm(numbers.x))) / scale
         )
         return self.answer("pseudo-equilibrium", "pseudo-saddle-node", "", found)
-
-
-def _spectrum(eigenvalues: NDArray[Any]) -> dict[str, float]:
-    """Eigenvalues as numbers: real parts, and imaginary parts where they are not zero."""
-    values: dict[str, float] = {}
-    for i, v in enumerate(eigenvalues, 1):
-        values[f"Re lambda{i}"] = float(v.real)
-        if v.imag:
-            values[f"Im lambda{i}"] = float(v.imag)
-    return values

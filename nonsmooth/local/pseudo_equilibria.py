@@ -3,70 +3,26 @@
 There h = 0 and (1 - alpha) F1 + alpha F2 = 0 with 0 < alpha < 1, so F1 and F2 point in opposite
 directions. Stability along the surface is that of the n - 1 eigenvalues of Dg on the tangent space;
 across the surface it is that of the sliding region (Filippov 1988, sec. 17-19; Kuznetsov, Rinaldi &
-Gragnani 2003).
+Gragnani 2003). On k surfaces that meet f(x, lambda) = 0 with one multiplier each
+(``intersection_equilibria``).
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import Any
+from dataclasses import replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters, PointError, explain
+from ..model import Array, FilippovSystem, Parameters, PointError, explain, require_system
 from .checks import require_autonomous, require_linear
 from .equilibria import by_real_part, kind_of
+from .intersection_equilibria import find_on_intersection, sliding_in
 from .numbers import Numbers
 from .place import TOLERANCE, Place, place
+from .pseudo_equilibrium import PseudoEquilibrium, pseudo_kind
 from .regions import Region, region_of
 from .search import Found, search
-
-
-@dataclass(frozen=True, eq=False)
-class PseudoEquilibrium:
-    """A zero of the sliding field.
-
-    Attributes
-    ----------
-    point : ndarray (n,)
-    alpha : float
-        Weight of F2; in (0, 1) for a real one.
-    status : {"real", "virtual"}
-        Virtual if alpha is outside (0, 1): the fields are parallel there, not opposite.
-    region : Region
-    kind : str
-        ``"stable pseudo-node"``, ``"unstable pseudo-node"``, ``"pseudo-saddle"``, with complex
-        eigenvalues ``"stable pseudo-focus"``, ...; ``"pseudo-saddle-node"`` or ``"degenerate"``
-        where the sliding flow decides nothing.
-    eigenvalues : ndarray (n - 1,)
-        Of the sliding field on the tangent space of the surface, by real part.
-    stable : bool
-        Attracting from the surface and along it.
-    margin : float
-        Smallest of: alpha, 1 - alpha, the real parts relative to the largest modulus of DF_i.
-    distance, residual : float
-    iterations : int
-    """
-
-    point: Array
-    alpha: float
-    status: str
-    region: Region
-    kind: str
-    eigenvalues: NDArray[Any]
-    stable: bool
-    margin: float
-    distance: float
-    residual: float
-    iterations: int
-
-    def __str__(self) -> str:
-        values = ", ".join(f"{v:.6g}" for v in self.eigenvalues) or "none"
-        return (
-            f"{self.status} {self.kind} at {self.point.tolist()} in {self.region}, "
-            f"alpha = {self.alpha:.6g}, eigenvalues along the surface {values}."
-        )
 
 
 def find_pseudo_equilibrium(
@@ -84,7 +40,8 @@ def find_pseudo_equilibrium(
     Parameters
     ----------
     system, parameters, surface, mode
-        As in :func:`region`; the point need not be on the surface.
+        As in :func:`region`; the point need not be on the surface. A ``mode`` with several ``s``, such
+        as ``"ss+"``, looks on the intersection of those surfaces.
     near : array_like (n,)
     tol : float, optional
         Accepted residual (a distance), relative to 1 + |x|.
@@ -112,8 +69,22 @@ def find_pseudo_equilibrium(
     ...     [x, y], surface=x + y, above=[y - x, 3 * y - 10], below=[y - x, 3 * y + 10])
     >>> print(find_pseudo_equilibrium(relay, [0.5, -0.4]).kind)
     stable pseudo-node
+
+    Two genes that switch each other off, and a third that both switch on:
+
+    >>> a, b, z = ca.SX.sym("a"), ca.SX.sym("b"), ca.SX.sym("z")
+    >>> genes = ns.FilippovSystem(
+    ...     [x, y, z], field=[-a - x, -b - y, a + b + 1 - z], multipliers=[a, b], surfaces=[x, y])
+    >>> found = find_pseudo_equilibrium(genes, [0.1, 0.1, 0.5], mode="ss")
+    >>> found.kind, found.point.round(12).tolist(), found.eigenvalues.round(12).tolist()
+    ('stable pseudo-node', [0.0, 0.0, 1.0], [-1.0])
     """
+    require_system(system)
     require_autonomous(system, "pseudo-equilibrium")
+    if mode is not None and sliding_in(system, mode) > 1:
+        return find_on_intersection(
+            system, near, mode, parameters, tol=tol, max_iterations=max_iterations
+        )
     where, x = place(system, near, parameters, 0.0, surface, mode)
     require_linear(system, surface, "pseudo-equilibrium")
     numbers = where.finite_at(x)
@@ -168,23 +139,16 @@ def pseudo_equilibrium_at(where: Place, found: Found) -> PseudoEquilibrium:
         alpha=alpha,
         status="real" if real else "virtual",
         region=region,
-        kind=_pseudo_kind(kind, region),
+        kind=pseudo_kind(kind, region),
         eigenvalues=eigenvalues,
         stable=region is Region.ATTRACTING and kind.startswith("stable"),
         margin=min(abs(alpha), abs(1 - alpha), margin),
         distance=found.distance,
         residual=found.residual,
         iterations=found.iterations,
+        mode=where.mode,
+        multipliers=np.array([1.0 - 2.0 * alpha]),
     )
-
-
-def _pseudo_kind(kind: str, region: Region) -> str:
-    """Kind of the sliding flow and stability across the surface, together."""
-    if kind == "degenerate":
-        return "pseudo-saddle-node"
-    stability, _, shape = kind.partition(" ")
-    across = {Region.ATTRACTING: "stable", Region.REPELLING: "unstable"}.get(region, stability)
-    return f"{stability} pseudo-{shape}" if stability == across else "pseudo-saddle"
 
 
 # along the surface -----------------------------------------------------------------------------

@@ -29,6 +29,7 @@ class Region(Enum):
     TANGENT_ABOVE = "tangency of the field above"  # L1 = 0
     TANGENT_BELOW = "tangency of the field below"  # L2 = 0
     TWO_FOLD = "tangency of both fields"  # L1 = L2 = 0
+    MIXED = "sliding that neither attracts nor repels"  # on several surfaces only
 
     def __str__(self) -> str:
         return self.value

@@ -1,5 +1,6 @@
 """WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
 
+from . import complementarity
 from .checks import is_real, real, real_array, require_system, whole
 from .clock import Clock
 from .coupled import Coupled, coupled_of
@@ -18,6 +19,7 @@ from .errors import (
 from .evaluators import Evaluator, Resets, Surfaces, evaluator
 from .events import Impact, Reset, Stop
 from .found_switches import LiftedSwitch
+from .layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .motion import Motion, followed, motion, watched_functions
 from .multipliers import sliding_multipliers
 from .periods import periods, read_period
@@ -38,7 +40,10 @@ __all__ = [
     "FilippovSystem",
     "Guard",
     "Impact",
+    "Layer",
+    "LayerNumbers",
     "LiftedSwitch",
+    "Loop",
     "Motion",
     "NonsmoothError",
     "NotSmoothError",
@@ -50,11 +55,14 @@ __all__ = [
     "Resets",
     "Stop",
     "Surfaces",
+    "complementarity",
     "coupled_of",
     "evaluator",
     "explain",
     "followed",
     "is_real",
+    "layer_of",
+    "loop_at",
     "motion",
     "periods",
     "read_function",

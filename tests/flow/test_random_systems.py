@@ -14,7 +14,9 @@ from .independent.integrator import Path, Run
 
 T_END = 4.0
 SIZES = [Size(n, m) for n in (2, 3, 4, 5) for m in (1, 2, 3)]
-TOLERANCES = dict(zip(SIZES, [1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13] * 2, strict=False))
+TOLERANCES = dict(
+    zip(SIZES, [1e-6, 1e-7, 1e-8, 1e-9, 1e-10, 1e-11, 1e-12, 1e-13] * 2, strict=False)
+)
 ENGINES = ("reference", "scalar", "lanes")
 
 #: Systems of each size, and in the short version.
@@ -92,7 +94,9 @@ def compare(found: Sample, engine: str) -> None:
     assert decided >= 0.9 * len(results)
 
 
-@pytest.mark.parametrize("size", [Size(2, 1), Size(3, 2), Size(4, 1), Size(3, 3), Size(5, 2)], ids=str)
+@pytest.mark.parametrize(
+    "size", [Size(2, 1), Size(3, 2), Size(4, 1), Size(3, 3), Size(5, 2)], ids=str
+)
 def test_a_few_random_systems_agree_with_an_independent_integrator(size):
     compare(sample(size, FEW), "reference")
 

@@ -12,7 +12,18 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import Array, Coupled, Evaluator, FilippovSystem, Guard, Motion, coupled_of, motion
+from ...model import (
+    Array,
+    Coupled,
+    Evaluator,
+    FilippovSystem,
+    Guard,
+    Motion,
+    coupled_of,
+    layer_of,
+    loop_at,
+    motion,
+)
 from ...model.multipliers import newton_multipliers, sliding_multipliers
 from ..facts import SAFETY
 from ..options import Options
@@ -91,6 +102,10 @@ class Modes(Protocol):
 
     def solutions(self, mode: str, x: Array, stable_only: bool = True) -> list[Array]:
         """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
+        ...
+
+    def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
+        """Whether orbits of the plane run round the point where two surfaces meet, and towards it."""
         ...
 
     def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
@@ -210,6 +225,10 @@ class SeparateModes:
     def solutions(self, mode: str, x: Array, stable_only: bool = True) -> list[Array]:
         """Multipliers are eliminated."""
         return [np.zeros(len(mode))]
+
+    def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
+        """There is one surface."""
+        return False
 
     def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
         """Multipliers are eliminated."""
@@ -361,6 +380,14 @@ class CoupledModes:
         """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
         return sliding_multipliers(self.coupled, mode, x, self._p, stable_only)
 
+    def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
+        """Whether orbits of the plane run round the point where two surfaces meet, and towards it."""
+        if self._system.extended_dimension != 2 or max(surfaces) >= self._system.surface_count:
+            return False
+        held = self.coupled.held(mode)[: self._system.surface_count]
+        loop = loop_at(layer_of(self._system), x, surfaces, held, self._p)
+        return loop is not None and loop.attracts is True
+
     def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
         """Correct multipliers that were advanced by a step."""
         if not self.coupled.sliding(mode):
@@ -379,21 +406,3 @@ def _inverse(matrix: Array) -> Array:
         return np.asarray(np.linalg.inv(matrix), float)
     except np.linalg.LinAlgError:
         return np.full_like(matrix, np.nan)
-
-
-def no_unknowns(system: FilippovSystem) -> Array:
-    """Multipliers of a system of which nothing slides."""
-    return np.zeros(system.surface_count)
-
-
-__all__: Sequence[str] = [
-    "CoupledModes",
-    "Expansion",
-    "Modes",
-    "SeparateModes",
-    "modes_of",
-    "no_unknowns",
-    "powers",
-    "rounding_scale",
-    "tolerances",
-]

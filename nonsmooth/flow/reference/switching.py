@@ -15,11 +15,10 @@ from itertools import product
 
 import numpy as np
 
-from ...model import Array
+from ...model import Array, complementarity
 from .. import messages
 from ..facts import TANGENT, VANISHES
 from ..status import Status
-from . import complementarity
 from .modes import Expansion, Modes
 from .stepper import Stepper
 
@@ -104,9 +103,20 @@ def decide(
     if contacts:
         names = [stepper.system.impacts[j] for j in contacts]
         return Decision(None, Status.INCONSISTENT, messages.no_reaction(names))
+    if len(active) == 2 and stepper.modes.spirals_in(mode, x, active):
+        return _held_there(stepper, x, mode, active)
     if len(active) > 1:
         return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
     return Decision(None, Status.NON_UNIQUE, messages.degenerate())
+
+
+def _held_there(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) -> Decision:
+    """Stay where two surfaces meet though no layer attracts: all orbits spiral in, so none leaves."""
+    letters = "".join("s" if i in active else letter for i, letter in enumerate(mode))
+    found = stepper.modes.solutions(letters, x, stable_only=False)
+    if len(found) != 1:
+        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+    return Decision(Continuation(letters, {}, True, found[0]))
 
 
 def _by_rates(

@@ -188,7 +188,10 @@ class Run:
             elif lowest[k] < 0.0 or np.isfinite(self.high[s]):
                 self._narrow(s, h[k], y[k], lowest[k], g1[k])
             else:
-                self.x[s] = project(self.many.part(active[[k]]), y[[k]], self.mode[[s]])[0]
+                one = self.many.part(active[[k]])
+                self.x[s] = project(one, y[[k]], self.mode[[s]])[0]
+                if growth(Flow(one, self.mode[[s]]), self.x[[s]], t[[k]] + h[k]) >= 0.0:
+                    self.paths[s].trouble = "sliding that stops attracting: a two-fold was passed"
                 self.t[s] = self.t[s] + h[k]
                 self.h[s] = min(h[k] * _change(error[k]), 0.03 * self.t_end)
                 self.fresh[s] = False
@@ -208,7 +211,9 @@ class Run:
         if abs(value) < 1e-17 or width < 1e-17:
             return self._event(s, h, y, g)
         if self.low[s] == 0.0:
-            g0 = Flow(self.many.part(np.array([s])), self.mode[[s]]).guards(self.x[[s]], self.t[[s]])
+            g0 = Flow(self.many.part(np.array([s])), self.mode[[s]]).guards(
+                self.x[[s]], self.t[[s]]
+            )
             self.low_value[s] = float(g0.min())
         a, b = self.low_value[s], self.high_value[s]
         part = np.longdouble(a) / (a - b) if a > b else 0.5
@@ -267,18 +272,25 @@ def continuations(
             if i not in fixed
         ]
         least = min(room, default=1.0)
-        slides = np.flatnonzero(candidate == 0)
-        matrix = slope[0][np.ix_(slides, slides)].astype(float)
-        growth = np.linalg.eigvals(matrix).real.max() if slides.size else -1.0
-        if least > -_TINY and growth < _TINY:
-            near |= bool(least < _TINY or growth > -_TINY)
+        rate = growth(Flow(one, candidate[None]), x, t)
+        if least > -_TINY and rate < _TINY:
+            near |= bool(least < _TINY or rate > -_TINY)
             found.append(candidate)
     return found, near
 
 
+def growth(flow: Flow, x: np.ndarray, t: np.ndarray) -> float:
+    """Growth across the layer of the surfaces on which one system slides; negative if it attracts."""
+    slides = np.flatnonzero(flow.mode[0] == 0)
+    matrix = flow.layer(x, t)[1][0][np.ix_(slides, slides)].astype(float)
+    return float(np.linalg.eigvals(matrix).real.max()) if slides.size else -1.0
+
+
 def _change(error: float) -> float:
     """Factor of the next step size."""
-    return float(np.clip(0.85 * (_TOLERANCE / max(error, 1e-30)) ** (1 / (2 * _ORDER - 1)), 0.2, 2.5))
+    return float(
+        np.clip(0.85 * (_TOLERANCE / max(error, 1e-30)) ** (1 / (2 * _ORDER - 1)), 0.2, 2.5)
+    )
 
 
 def _dips(

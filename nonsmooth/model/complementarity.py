@@ -13,13 +13,16 @@ Source: Cottle, Pang & Stone 1992, "The linear complementarity problem", ch. 3 (
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Sequence
 from itertools import combinations, product
 
 import numpy as np
 
-from ...model import Array
-from ..facts import VANISHES
+from .values import Array
+
+#: What is below this, relative to its terms, is rounding.
+_ROUNDING = 64 * sys.float_info.epsilon
 
 #: Minors of all subsets are computed up to this size, and all 3^k solutions up to the other.
 _MINORS, _ENUMERATED = 8, 6
@@ -100,25 +103,55 @@ def _wanted(lam: Array, rates: Array, letters: Array, low: Array, high: Array) -
 def is_unique(m: Array) -> bool:
     """Whether -M is shown to be a P-matrix, so that there is one solution for every a.
 
-    Shown for a matrix that scaling makes symmetric and definite (friction at contacts), for one whose
-    symmetric part is definite, for one with a dominant diagonal, and by its minors if it is small.
+    Shown for a matrix that attracts (``attracts``), and by its minors if it is small.
 
     Examples
     --------
     >>> is_unique(-np.eye(3)), is_unique(np.array([[-1.0, 3.0], [-3.0, -1.0]])), is_unique(np.eye(1))
     (True, True, False)
     """
+    a = _scaled(m)
+    return a is not None and (_is_stable(a) or (len(a) <= _MINORS and _has_positive_minors(a)))
+
+
+def attracts(m: Array) -> bool:
+    """Whether the intersection of the surfaces is shown to attract where all of them can slide.
+
+    With V = sum_i d_i |h_i| (1 - lambda_i sgn h_i), lambda the sliding multipliers, V' = mu^T D M mu < 0
+    for all mu = sgn h - lambda if D M has a definite symmetric part: the intersection is reached in
+    finite time. There is such a positive diagonal D for one or two surfaces if -M is a P-matrix, and for
+    any number if a scaling makes M symmetric and definite, if its symmetric part is definite, or if its
+    diagonal dominates (Kaszkurewicz & Bhaya 2000, "Matrix diagonal stability in systems and computation",
+    ch. 2). False says that none of this was found, not that the intersection repels.
+
+    Examples
+    --------
+    >>> attracts(np.array([[-1.0, 3.0], [-3.0, -1.0]])), attracts(np.array([[0.0, 1.0], [-1.0, 0.0]]))
+    (True, False)
+    """
+    a = _scaled(m)
+    return a is not None and (_is_stable(a) or (len(a) <= 2 and _has_positive_minors(a)))
+
+
+def _scaled(m: Array) -> Array | None:
+    """Return -M with unit diagonal, which leaves P-matrices what they are; None where it cannot be one."""
     if not np.all(np.isfinite(m)) or np.any(np.diag(m) >= 0.0):
-        return False
+        return None
     scale = np.sqrt(-np.diag(m))
-    a = -m / np.outer(scale, scale)  # unit diagonal; P-matrices stay what they are
+    return np.asarray(-m / np.outer(scale, scale), float)
+
+
+def _is_stable(a: Array) -> bool:
+    """Whether a positive diagonal D with D A + A^T D definite is found."""
     if _is_definite(_symmetrised(a)) or _is_definite((a + a.T) / 2):
         return True
     off = np.abs(a - np.eye(len(a))).sum(axis=1)
-    if np.all(off < 1.0 - VANISHES):
-        return True
-    return len(a) <= _MINORS and all(
-        np.linalg.det(a[np.ix_(s, s)]) > VANISHES
+    return bool(np.all(off < 1.0 - _ROUNDING))
+
+
+def _has_positive_minors(a: Array) -> bool:
+    return all(
+        np.linalg.det(a[np.ix_(s, s)]) > _ROUNDING
         for size in range(2, len(a) + 1)
         for s in combinations(range(len(a)), size)
     )
@@ -127,7 +160,7 @@ def is_unique(m: Array) -> bool:
 def _is_definite(a: Array | None) -> bool:
     if a is None:
         return False
-    return bool(np.linalg.eigvalsh(a)[0] > VANISHES * len(a))
+    return bool(np.linalg.eigvalsh(a)[0] > _ROUNDING * len(a))
 
 
 def _symmetrised(a: Array) -> Array | None:
@@ -155,10 +188,10 @@ def all_solutions(a: Array, m: Array) -> list[Array] | None:
     if len(a) > _ENUMERATED:
         return None
     found: list[Array] = []
-    slack = VANISHES * (np.abs(a) + np.abs(m).sum(axis=1))
+    slack = _ROUNDING * (np.abs(a) + np.abs(m).sum(axis=1))
     for letters in product((0.0, 1.0, -1.0), repeat=len(a)):
         lam = _held(a, m, np.array(letters), np.full(len(a), -1.0))
-        if lam is None or np.abs(lam).max(initial=0.0) > 1.0 + VANISHES:
+        if lam is None or np.abs(lam).max(initial=0.0) > 1.0 + _ROUNDING:
             continue
         rates = a + m @ lam
         if np.any(np.array(letters) * rates < -slack):

@@ -25,9 +25,11 @@ TWO_FOLDS = {
 RESULTS = {
     "BoundaryBifurcation",
     "BoundaryEquilibrium",
+    "Continuation",
     "Equilibrium",
     "Fold",
     "FoldFold",
+    "Intersection",
     "LocalObject",
     "PseudoEquilibrium",
     "SlidingBranch",

@@ -63,7 +63,11 @@ def simulate(
         Set them apart.
     start_mode : str, optional
         One letter per surface: which continuation to take where more than one is possible.
-    max_step, max_steps, max_events : optional
+    max_step : float, optional
+        Longest step. A step is accepted only where field and guards agree with its polynomials at its
+        end and inside; a pulse that is thinner than the spacing of these points, a hundredth of the
+        time that a step may bridge, can still be missed. A ``max_step`` of its width excludes that.
+    max_steps, max_events : optional
         Limits.
     t_eval : array_like (K,), optional
         Keep the states at these times, sorted, in ``sample_t`` and ``sample_x`` of the result.

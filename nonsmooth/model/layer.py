@@ -141,13 +141,16 @@ def loop_at(
         s = np.array(q, float)
         d = df * s[:, None] * s[None, :]
         accel = d @ (f * s)
-        first = -1.0 / u
-        second = -(d[near, near] * first + 0.5 * accel[near] * first**2) / u
-        factor = v * first
-        grown = (v * second + d[far, near] * first + 0.5 * accel[far] * first**2) / factor
-        bend += grown * ratio  # relative change per unit of the first radius
-        size += abs(grown) * ratio
-        ratio *= factor
+        with np.errstate(over="ignore", invalid="ignore"):
+            first = -1.0 / u
+            second = -(d[near, near] * first + 0.5 * accel[near] * first**2) / u
+            factor = v * first
+            grown = (v * second + d[far, near] * first + 0.5 * accel[far] * first**2) / factor
+            bend += grown * ratio  # relative change per unit of the first radius
+            size += abs(grown) * ratio
+            ratio *= factor
+    if not np.isfinite(ratio * size):
+        return None
     exact = bool(abs(ratio - 1.0) <= 1e-12)
     return Loop(float(ratio), float(bend) if abs(bend) > 1e-12 * size else 0.0, exact)
 

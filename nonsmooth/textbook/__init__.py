@@ -27,7 +27,7 @@ from .planar import (
     spiral_oscillator,
 )
 from .problem import Problem, Reference
-from .several_surfaces import ambiguous_exit, hidden_dynamics, two_relay_spiral
+from .several_surfaces import ambiguous_exit, glass_loop, hidden_dynamics, two_relay_spiral
 from .two_folds import TWO_FOLDS, two_fold
 
 __all__ = [
@@ -39,6 +39,7 @@ __all__ = [
     "bouncing_ball",
     "by_name",
     "dry_friction",
+    "glass_loop",
     "harvested_prey_predator",
     "hidden_dynamics",
     "impact_oscillator",
@@ -64,6 +65,7 @@ _FUNCTIONS: tuple[Callable[[], Problem], ...] = (
     scalar_sliding,
     scalar_repelling,
     two_relay_spiral,
+    glass_loop,
     bouncing_ball,
     harvested_prey_predator,
     welander_box,

@@ -53,6 +53,66 @@ def two_relay_spiral() -> Problem:
     )
 
 
+def glass_loop() -> Problem:
+    """Two genes, one switched on and one off by the other: a loop that spirals into its thresholds.
+
+    x' = [y > 1/2] - x, y' = [x < 1/2] - y, a Glass network. Orbits are straight in each quadrant of the
+    thresholds; at distance r/2 from the intersection a quarter turn takes log(1 + r) and leads to
+    r/(1 + r). From (3/4, 3/4) the k-th crossing is at log(k + 1/2), and |x - 1/2| + |y - 1/2| falls as
+    exp(-t): the intersection attracts though no layer does, and no orbit leaves it.
+
+    Returns
+    -------
+    Problem
+
+    Notes
+    -----
+    Source: Glass & Pasternack 1978, J. Math. Biology 6, 207-223, for the loops; closed form of this one
+    derived for this library.
+
+    Examples
+    --------
+    >>> import nonsmooth as ns
+    >>> glass = glass_loop()
+    >>> found = ns.classify(glass.system, [0.5, 0.5])
+    >>> found.kind, found.label
+    ('pseudo-equilibrium', 'stable pseudo-focus')
+    >>> stays = ns.simulate(glass.system, [0.5, 0.5], 10.0)
+    >>> stays.itinerary, stays.x[-1].tolist()
+    ('ss', [0.5, 0.5])
+    """
+    x, y, a, b = (ca.SX.sym(s) for s in ("x", "y", "a", "b"))
+    system = FilippovSystem(
+        [x, y],
+        surfaces=[x - 0.5, y - 0.5],
+        multipliers=[a, b],
+        field=[(1 + b) / 2 - x, (1 - a) / 2 - y],
+    )
+    return problem(
+        "glass_loop",
+        system,
+        (0.75, 0.75),
+        3.0,
+        (
+            stated(
+                "crossing times 1 to 4",
+                "times of the first four crossings: log(3/2), log(5/2), log(7/2), log(9/2)",
+                ".40546510810816438198",
+                ".91629073187415506518",
+                "1.25276296849536799569",
+                "1.50407739677627407337",
+            ),
+            stated(
+                "distance at crossing 4",
+                "abs(x - 1/2) + abs(y - 1/2) there: 1/9",
+                ".11111111111111111111",
+            ),
+        ),
+        title="A negative loop of two genes",
+        source="Glass & Pasternack 1978; closed form",
+    )
+
+
 def ambiguous_exit() -> Problem:
     """Sliding on the intersection of two surfaces whose exit Filippov's set leaves open.
 

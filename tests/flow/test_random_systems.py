@@ -2,7 +2,7 @@
 those of an integrator that shares no code with them, and errors are below a hundred times the tolerance."""
 
 from dataclasses import dataclass
-from functools import lru_cache
+from functools import cache, lru_cache
 
 import numpy as np
 import pytest
@@ -43,7 +43,7 @@ def sample(size: Size, count: int) -> Sample:
     return Sample(size, drawn, Run(Many(drawn), T_END).run())
 
 
-@lru_cache(maxsize=None)
+@cache
 def of_size(size: Size) -> ns.FilippovSystem:
     return system(size)
 

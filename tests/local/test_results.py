@@ -9,7 +9,7 @@ import pytest
 
 import nonsmooth as ns
 
-x, y, z, mu, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "mu", "lam"))
+x, y, z, mu, lam, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "mu", "lam", "a", "b"))
 SPACE = ns.FilippovSystem(
     [x, y, z],
     surface=x,
@@ -24,6 +24,7 @@ FOCUS = ns.FilippovSystem(
 HIDDEN = ns.FilippovSystem(
     [x, y], field=[(lam - 0.5) * (lam + 0.2), 1 - lam], multipliers=lam, surface=x, hidden=True
 )
+MEETING = ns.FilippovSystem([x, y], field=[-a - x, -b], multipliers=[a, b], surfaces=[x, y])
 RESULTS = {
     "TwoFold": lambda: ns.find_two_fold(SPACE, [0.0, 0.1, -0.1]),
     "Fold": lambda: ns.find_fold(PLANE, [0.8, 0.1]),
@@ -38,6 +39,8 @@ RESULTS = {
     ),
     "LocalObject": lambda: ns.classify(SPACE, [0.0, 0.0, 0.0]),
     "SlidingBranch": lambda: ns.sliding_branches(HIDDEN, [0.0, 0.0])[0],
+    "Intersection": lambda: ns.intersection(MEETING, [0.0, 0.0]),
+    "Continuation": lambda: ns.intersection(MEETING, [0.0, 0.0]).continuations[0],
     "Region": lambda: ns.region(PLANE, [0.5, 0.0]),
 }
 

@@ -333,6 +333,18 @@ def limit(problem, reference):
     return run.accumulation_time
 
 
+@check("glass_loop", "crossing times 1 to 4")
+def gene_switches(problem, reference):
+    run = run_of("glass_loop")
+    assert run.itinerary.startswith("++ +- -- -+ ++")
+    return [e.t for e in run.events[:4]]
+
+
+@check("glass_loop", "distance at crossing 4")
+def gene_distance(problem, reference):
+    return np.abs(run_of("glass_loop").events[3].x - 0.5).sum()
+
+
 @check("ambiguous_exit", "exit time, bilinear")
 def bilinear_exit(problem, reference):
     run = run_of("ambiguous_exit")

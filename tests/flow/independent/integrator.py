@@ -181,7 +181,7 @@ class Run:
         dips = _dips(flow, x, t, g0, y, h, g1, self.fresh[active])
         lowest = g1.min(axis=1).astype(float)
         for k, s in enumerate(active):
-            if not np.all(np.isfinite(y[k])) or error[k] > _TOLERANCE and h[k] > 1e-6:
+            if not np.all(np.isfinite(y[k])) or (error[k] > _TOLERANCE and h[k] > 1e-6):
                 self.h[s] = h[k] * (0.2 if not np.isfinite(error[k]) else _change(error[k]))
             elif dips[k] and h[k] > 1e-5 and np.isinf(self.high[s]):
                 self.h[s] = h[k] / 2

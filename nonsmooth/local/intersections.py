@@ -31,6 +31,7 @@ from ..model import (
     layer_of,
     loop_at,
     require_system,
+    sliding_multipliers,
 )
 from .checks import positive
 from .place import TOLERANCE
@@ -293,7 +294,7 @@ class Meeting:
     def _solved(self, letters: Array) -> Iterable[tuple[str, Array]]:
         mode = self._mode(letters)
         coupled = coupled_of(self.system)
-        for unknowns in coupled.solutions(mode, self.x, self.p, stable_only=False):
+        for unknowns in sliding_multipliers(coupled, mode, self.x, self.p, stable_only=False):
             lam = self._with(letters)
             held = coupled.held(mode)
             factors = coupled.yardsticks(self.x, held, unknowns, self.p).factors

@@ -12,18 +12,8 @@ from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import (
-    Array,
-    Coupled,
-    Evaluator,
-    FilippovSystem,
-    Guard,
-    Motion,
-    coupled_of,
-    layer_of,
-    loop_at,
-    motion,
-)
+from ...model import Array, Coupled, Evaluator, FilippovSystem, Guard, Motion, coupled_of, motion
+from ...model.layer import spirals_in
 from ...model.multipliers import newton_multipliers, sliding_multipliers
 from ..facts import SAFETY
 from ..options import Options
@@ -382,11 +372,7 @@ class CoupledModes:
 
     def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
         """Whether orbits of the plane run round the point where two surfaces meet, and towards it."""
-        if self._system.extended_dimension != 2 or max(surfaces) >= self._system.surface_count:
-            return False
-        held = self.coupled.held(mode)[: self._system.surface_count]
-        loop = loop_at(layer_of(self._system), x, surfaces, held, self._p)
-        return loop is not None and loop.attracts is True
+        return spirals_in(self._system, x, self.coupled.held(mode), self._p, surfaces)
 
     def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
         """Correct multipliers that were advanced by a step."""

@@ -108,7 +108,19 @@ from .orbit import (
 )
 
 if TYPE_CHECKING:
-    from . import plot, textbook
+    from . import plot, proofs, textbook
+    from .proofs import Census, Enclosure, MissingError, Proof, UnprovenError, certify, prove_all
+
+#: Names that come from the floor of proofs, loaded when asked for.
+_OF_PROOFS = (
+    "Census",
+    "Enclosure",
+    "MissingError",
+    "Proof",
+    "UnprovenError",
+    "certify",
+    "prove_all",
+)
 
 __version__ = "0.1.0.dev0"
 
@@ -117,11 +129,13 @@ __all__ = [
     "Branch",
     "BranchEnd",
     "BranchEvent",
+    "Census",
     "Clock",
     "CodimensionTwo",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
+    "Enclosure",
     "Ensemble",
     "Event",
     "FarSide",
@@ -130,12 +144,14 @@ __all__ = [
     "Funnel",
     "Gradient",
     "Impact",
+    "MissingError",
     "NonsmoothError",
     "NotSmoothError",
     "OptionError",
     "ParameterError",
     "PeriodicOrbit",
     "PointError",
+    "Proof",
     "Region",
     "Reset",
     "Section",
@@ -146,10 +162,12 @@ __all__ = [
     "TraceError",
     "Trajectory",
     "TwoFold",
+    "UnprovenError",
     "VirtualOrbitError",
     "Work",
     "alpha",
     "boundary_equilibrium",
+    "certify",
     "classify",
     "continuation",
     "continue_bifurcation",
@@ -174,6 +192,8 @@ __all__ = [
     "local",
     "periodic_orbit",
     "plot",
+    "proofs",
+    "prove_all",
     "region",
     "regularise",
     "sensitivity",
@@ -189,11 +209,13 @@ __all__ = [
 
 
 def __getattr__(name: str) -> object:
-    """Load pictures and textbook only when they are asked for (matplotlib is slow to import)."""
-    if name in ("plot", "textbook"):
-        import importlib
+    """Load pictures, textbook and proofs only when they are asked for (matplotlib is slow to import)."""
+    import importlib
 
+    if name in ("plot", "proofs", "textbook"):
         return importlib.import_module(f".{name}", __name__)
+    if name in _OF_PROOFS:
+        return getattr(importlib.import_module(".proofs", __name__), name)
     raise AttributeError(f"module 'nonsmooth' has no attribute {name!r}")
 
 

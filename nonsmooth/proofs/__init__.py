@@ -1,0 +1,37 @@
+"""PROOFS about special points and orbits, in interval arithmetic of any precision.
+
+A theorem here rests on the user's expressions as they are stored: gradients and Hessians are taken
+of the stored instructions (``tape``), constants are exact, and every number is an enclosure
+(``arithmetic``, by python-flint, the extra ``nonsmooth-dynamics[proofs]``). What cannot be enclosed
+is refused, never guessed. Nothing else imports this floor.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+from .census import Census, Undecided
+from .enclosure import Enclosure
+from .proof import MissingError, Proof, UnprovenError
+
+try:
+    from .certify import certify
+    from .everything import prove_all
+except MissingError as error:  # the names are there, and say what is missing when they are called
+    _reason = str(error)
+
+    def _refuse(*args: Any, **options: Any) -> Any:
+        raise MissingError(_reason)
+
+    certify = prove_all = _refuse
+
+__all__ = [
+    "Census",
+    "Enclosure",
+    "MissingError",
+    "Proof",
+    "Undecided",
+    "UnprovenError",
+    "certify",
+    "prove_all",
+]

@@ -1,0 +1,436 @@
+"""Theorems about one special point: existence, uniqueness, class; over boxes of parameters too."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+
+from ..local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
+from ..local.search import unknowns
+from ..model import FilippovSystem, OptionError, explain, real, whole
+from .arithmetic import Numbers, exact, precision, radius
+from .decimals import enclosure, inner
+from .described import Described, enclosed
+from .equations import Equations, plane
+from .flint import arb
+from .krawczyk import Zero, prove_zero
+from .proof import Proof, hulls, intervals, listed, paragraph
+from .questions import QUESTIONS, Question, Verdict
+from .record import record_of
+
+_READ = {
+    "stored": "Constants are the doubles stored in the expressions.",
+    "written": "Constants are the decimals that the stored doubles are written as.",
+}
+
+
+def certify(
+    found: TwoFold | Fold | Equilibrium | PseudoEquilibrium,
+    *,
+    system: FilippovSystem | None = None,
+    width: float = 1e-12,
+    parameters: Mapping[Any, Any] | None = None,
+    hold: Sequence[str] = (),
+    numbers: Numbers = "stored",
+    max_bits: int = 2048,
+    max_pieces: int = 64,
+) -> Proof:
+    """Prove that a special point exists, is the only one in a named box, and what it is.
+
+    Krawczyk's operator in interval arithmetic of any precision; derivatives are those of the
+    expressions as they are stored. Nothing rests on rounding.
+
+    Parameters
+    ----------
+    found : TwoFold, Fold, Equilibrium or PseudoEquilibrium
+        As a search returns it. In systems with more states than equations the theorem is about the
+        point on the plane through it, across the set of such points (or of held states).
+    system : FilippovSystem, optional
+        Needed for points that do not know theirs: all but two-folds.
+    width : float, optional
+        Largest radius of the enclosures, where the parameters are points.
+    parameters : mapping, optional
+        Values, as numbers or strings, or pairs (low, high): the theorem is then for all of them.
+        The others have the value they had in the search, or their default.
+    hold : sequence of str, optional
+        States that keep their value.
+    numbers : {"stored", "written"}
+        Whether the constant 0.1 is the double nearest to one tenth, or one tenth.
+    max_bits : int, optional
+        Where to give up raising the precision.
+    max_pieces : int, optional
+        How often intervals of parameters may be divided.
+
+    Returns
+    -------
+    Proof
+        ``proven`` is False where something stayed undecided; the statement says what.
+
+    Raises
+    ------
+    MissingError
+        python-flint is not installed.
+    NotSmoothError
+        An operation that jumps or has a kink.
+    OptionError, ParameterError, DefinitionError
+
+    Notes
+    -----
+    Krawczyk 1969; Neumaier, Interval Methods for Systems of Equations, 1990, ch. 5; the classes are
+    those of ``nonsmooth.two_folds``. Arithmetic: Arb (Johansson 2017).
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, z = (ca.SX.sym(s) for s in "xyz")
+    >>> s = ns.FilippovSystem([x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1 + 0.1 * y])
+    >>> proof = ns.certify(ns.find_two_fold(s, near=[0.0, 0.1, -0.1]), width=1e-30)
+    >>> proof.proven, proof.label, str(proof.point["y"]), str(proof.values["eigenvalue_low"])
+    (True, 'II-C', '0', '-2.618033988749894848204586834365... +- ...')
+    """
+    subject = _subject(found, system, hold, numbers, parameters)
+    limit = real(width, "width", low=5e-324, expected="a positive number")
+    whole(max_bits, "max_bits", least=64)
+    whole(max_pieces, "max_pieces")
+    if numbers not in _READ:
+        raise OptionError(
+            explain(
+                "numbers",
+                expected="'stored' or 'written'",
+                received=repr(numbers),
+                advice="See certify.",
+            )
+        )
+    pieces = _divided(subject, limit, max_bits, max_pieces)
+    return pieces[0] if len(pieces) == 1 else _together(subject, pieces)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """A question, where it is asked, and for which parameters.
+
+    Attributes
+    ----------
+    question : Question
+    start : list of float
+        Values of the unknowns to start from.
+    unknowns : list of (int, int)
+        Vector and position among the inputs.
+    names : list of str
+    values : list of Fraction
+        Extended states, for those that are held.
+    normals, through : planes across sets of such points.
+    parameters : list of (Fraction, Fraction)
+    numbers : {"stored", "written"}
+    """
+
+    question: Question
+    start: list[float]
+    unknowns: list[tuple[int, int]]
+    names: list[str]
+    values: list[Fraction]
+    normals: list[list[Fraction]]
+    through: list[Fraction]
+    parameters: list[tuple[Fraction, Fraction]]
+    numbers: Numbers
+
+    @property
+    def parameter_names(self) -> tuple[str, ...]:
+        return self.question.described.system.parameter_names
+
+    def equations(self) -> Equations:
+        """The square system with enclosures of what is held."""
+        tape = self.question.described.tape
+        inputs = [tape.symbol(*place) for place in self.unknowns if place[0] == 0]
+        nodes = [*self.question.nodes, *plane(tape, inputs, self.normals, self.through)]
+        held = [enclosed([(v, v) for v in self.values]), enclosed(self.parameters)]
+        held.append([arb(0)] * len(self.question.further))
+        return Equations(tape, nodes, self.unknowns, self.names, held, self.numbers)
+
+
+def _subject(
+    found: Any,
+    system: FilippovSystem | None,
+    hold: Sequence[str],
+    numbers: Numbers,
+    parameters: Mapping[Any, Any] | None,
+) -> Subject:
+    kinds = {TwoFold: "two-fold", Fold: "fold", Equilibrium: "equilibrium"}
+    kind = {**kinds, PseudoEquilibrium: "pseudo-equilibrium"}.get(type(found))
+    if kind is None:
+        raise OptionError(
+            explain(
+                "certify",
+                expected="a TwoFold, Fold, Equilibrium or PseudoEquilibrium",
+                received=f"{found!r} ({type(found).__name__})",
+                advice="Find one first, for example with find_two_fold(system, near=...).",
+            )
+        )
+    surface, mode, given = 0, None, dict(parameters or {})
+    if isinstance(found, TwoFold):
+        system, surface = found.system, found.surface
+        where = found.chart.where
+        mode = where.mode if system.surface_count > 1 else None
+        names = {k if isinstance(k, str) else str(k) for k in given}
+        given |= {k: v for k, v in found.parameters.items() if k not in names}
+    if system is None:
+        raise OptionError(
+            explain(
+                "system",
+                expected="the system that the point belongs to",
+                received="none",
+                advice="Write certify(found, system=system); only two-folds know theirs.",
+            )
+        )
+    described = Described(system, surface, mode)
+    question = QUESTIONS[kind](described, numbers, getattr(found, "side", "+"))
+    point = [float(v) for v in found.point]
+    point += [float(getattr(found, "t", 0.0))] if system.time_dependent else []
+    free = unknowns(system, hold, 1, kind)
+    extra = [1 - 2 * found.alpha] if isinstance(found, PseudoEquilibrium) else []
+    normals = _across(question, point, free, described.parameters(given, numbers), numbers)
+    return Subject(
+        question,
+        [point[i] for i in free] + extra,
+        [(0, i) for i in free] + [(2, k) for k in range(len(extra))],
+        [system.state_names[i] for i in free] + [name for name, *_ in question.further],
+        [exact(v, numbers) for v in point],
+        normals,
+        [exact(point[i], numbers) for i in free],
+        described.parameters(given, numbers),
+        numbers,
+    )
+
+
+def _across(
+    question: Question,
+    point: list[float],
+    free: list[int],
+    parameters: Sequence[tuple[Fraction, Fraction]],
+    numbers: Numbers,
+) -> list[list[Fraction]]:
+    """Normals of the plane across the set of zeros; none if the zeros are isolated points."""
+    unknown = len(free) + len(question.further)
+    missing = unknown - len(question.nodes)
+    if missing < 0:
+        raise OptionError(
+            explain(
+                "hold",
+                expected=f"at least {len(question.nodes) - len(question.further)} free states",
+                received=f"{len(free)}",
+                advice="Hold fewer states.",
+            )
+        )
+    if missing == 0:
+        return []
+    described = question.described
+    held = [
+        [arb(v) for v in point],
+        [a.mid() for a in enclosed(parameters)],
+        [arb(0)] * len(question.further),
+    ]
+    inputs = [(0, i) for i in free]
+    flat = Equations(described.tape, question.nodes, inputs, [""] * len(free), held, numbers)
+    _, jacobian = flat.with_jacobian([held[0][i] for i in free])
+    rows = np.array([[float(v.mid()) for v in row] for row in jacobian.tolist()])
+    normals = np.linalg.svd(rows)[2][len(question.nodes) :]
+    return [[Fraction(float(v)) for v in row] for row in normals]
+
+
+# Pieces of the parameters --------------------------------------------------------------------------
+
+
+def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> list[Proof]:
+    """Proofs over pieces of the parameters' intervals, halved where one proof does not do."""
+    todo, done, failed = [subject], list[Proof](), 0
+    while todo:
+        one = todo.pop()
+        proof, start = _one(one, width, max_bits)
+        wide = [k for k, (a, b) in enumerate(one.parameters) if a < b]
+        if (
+            proof.proven
+            or not wide
+            or len(todo) + len(done) + 2 > max_pieces
+            or failed > max_pieces
+        ):
+            done.append(proof)
+            continue
+        failed += 1
+        sizes = [(b - a) / (1 + abs(a + b)) for a, b in one.parameters]
+        k = max(wide, key=lambda j: sizes[j])
+        low, high = one.parameters[k]
+        for part in (((low + high) / 2, high), (low, (low + high) / 2)):
+            ends = [part if j == k else v for j, v in enumerate(one.parameters)]
+            todo.append(replace(one, parameters=ends, start=start))
+    return done
+
+
+def _one(subject: Subject, width: float, max_bits: int) -> tuple[Proof, list[float]]:
+    """A proof for one piece, with as many bits as its width and class need."""
+    bits = 64
+    while 2.0 ** (16 - bits) > width and bits < max_bits:
+        bits *= 2
+    start: list[arb] = [arb(v) for v in subject.start]
+    best: tuple[Zero, Verdict, Equations] | None = None
+    last = float("inf")
+    while True:
+        with precision(bits):
+            equations = subject.equations()
+            zero = prove_zero(equations, start)
+            if zero is not None:
+                verdict = subject.question.verdict(equations.inputs(zero.point))
+                best, start = (zero, verdict, equations), [v.mid() for v in zero.point]
+                size = max(map(radius, zero.point))
+                stuck = size > 0 and size > 0.5 * last  # wide parameters: more digits do not help
+                last = size
+                if (verdict.label and size <= width) or stuck:
+                    break
+            if 2 * bits > max_bits or (zero is None and _wide(subject) and bits > 64):
+                break
+        bits *= 2
+    with precision(bits):
+        proof = _proof(subject, best, bits)
+    return proof, [float(v) for v in start]
+
+
+def prove_subject(subject: Subject, zero: Zero, width: float, max_bits: int = 1024) -> Proof | None:
+    """A proof for a zero that is known to exist; None where it cannot be told to be that one."""
+    start = [float(v.mid()) for v in zero.point]
+    proof, end = _one(replace(subject, start=start), width, max_bits)
+    same = all(b.contains(arb(v)) for b, v in zip(zero.box, end, strict=True))
+    return proof if proof.exists and same else None
+
+
+def _wide(subject: Subject) -> bool:
+    return any(a < b for a, b in subject.parameters)
+
+
+def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits: int) -> Proof:
+    kind, names = subject.question.kind, subject.parameter_names
+    ranges = [enclosure(v) for v in enclosed(subject.parameters)]
+    parameters = dict(zip(names, ranges, strict=True))
+    condition = f"For {intervals(parameters)}: " if parameters else ""
+    if best is None:
+        statement = paragraph(
+            f"{condition}No proof of a {kind} near "
+            + ", ".join(f"{k} = {v:.8g}" for k, v in zip(subject.names, subject.start, strict=True))
+            + f" with up to {bits} bits.",
+            "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
+            "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
+            "parameters are too wide.",
+        )
+        return Proof(kind, False, False, "", statement, {}, {}, {}, parameters, bits)
+    zero, verdict, equations = best
+    point = dict(zip(subject.names, map(enclosure, zero.point), strict=True))
+    box = {
+        name: inner(b, k) for name, b, k in zip(subject.names, zero.box, zero.image, strict=True)
+    }
+    values = {k: enclosure(v) for k, v in verdict.values.items() if v.is_finite()}
+    statement = _statement(subject, verdict, condition, point, box, values)
+    record = record_of(subject, equations, zero, verdict, bits)
+    return Proof(
+        kind,
+        bool(verdict.label),
+        True,
+        verdict.label,
+        statement,
+        point,
+        box,
+        values,
+        parameters,
+        bits,
+        record,
+    )
+
+
+def _statement(
+    subject: Subject,
+    verdict: Verdict,
+    condition: str,
+    point: Mapping[str, Any],
+    box: Mapping[str, Any],
+    values: Mapping[str, Any],
+) -> str:
+    kind = subject.question.kind
+    where = _where(subject)
+    article = "an" if verdict.title[0] in "aeiou" else "a"
+    shown = {k: v for k, v in values.items() if not (k[0] == "L" and k[1:].isdigit())}
+    classed = f", class {verdict.label}" if kind == "two-fold" and verdict.label else ""
+    if verdict.label.startswith("boundary Delta") or verdict.label.startswith("boundary disc"):
+        classed = f", exactly on the {verdict.label}"
+    head = "Theorem" if verdict.label else "Theorem on existence, with the class undecided"
+    return paragraph(
+        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{where}.",
+        f"It is {article} {verdict.title}{classed}, at {listed(point)}.",
+        f"{listed(shown)}." if shown else "",
+        *verdict.lines,
+        f"Not decided: {verdict.why}." if verdict.why and not verdict.label else "",
+        _READ[subject.numbers],
+    )
+
+
+def _where(subject: Subject) -> str:
+    """What is held, and the plane."""
+    described = subject.question.described
+    free = {i for vector, i in subject.unknowns if vector == 0}
+    names = [*described.system.state_names, "t"]
+    held = [
+        f"{names[i]} = {enclosure(enclosed([(v, v)])[0])}"
+        for i, v in enumerate(subject.values)
+        if i not in free
+    ]
+    text = f" with {', '.join(held)}" if held else ""
+    if subject.normals:
+        text += (
+            f" on the plane through the given point across the set of such points (of codimension "
+            f"{len(subject.normals)})"
+        )
+    return text
+
+
+def _together(subject: Subject, pieces: list[Proof]) -> Proof:
+    """One statement of all pieces."""
+    kind, names = subject.question.kind, subject.parameter_names
+    whole_range = [enclosure(v) for v in enclosed(subject.parameters)]
+    parameters = dict(zip(names, whole_range, strict=True))
+    proven = all(p.proven for p in pieces)
+    exists = all(p.exists for p in pieces)
+    labels = list(dict.fromkeys(p.label for p in pieces if p.proven))
+    head = "Theorem" if proven else "Theorem in part"
+    groups = []
+    for label in labels:
+        count = sum(p.label == label and p.proven for p in pieces)
+        groups.append(f"{label} on {count} of {len(pieces)} pieces")
+    missing = [p for p in pieces if not p.proven]
+    lines = [f"On {intervals(p.parameters)}: {p.statement.splitlines()[0]}" for p in missing[:3]]
+    size = "on each the box of its piece contains exactly one"
+    statement = paragraph(
+        f"{head}. For {intervals(parameters)}, divided into {len(pieces)} pieces, {size} {kind}: "
+        f"{'; '.join(groups) or 'none proven'}.",
+        f"Over all pieces {intervals(hulls([p.point for p in pieces if p.exists]))}.",
+        f"Undecided on {len(missing)} pieces." if missing else "",
+        *lines,
+        _READ[subject.numbers],
+    )
+    points = [p.point for p in pieces if p.exists]
+    values = [p.values for p in pieces if p.exists]
+    label = labels[0] if proven and len(labels) == 1 else ""
+    bits = max(p.bits for p in pieces)
+    return Proof(
+        kind,
+        proven,
+        exists,
+        label,
+        statement,
+        hulls(points),
+        {},
+        hulls(values),
+        parameters,
+        bits,
+        {},
+        tuple(pieces),
+    )

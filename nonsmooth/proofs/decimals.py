@@ -1,0 +1,34 @@
+"""From intervals to decimals, rounded outward or inward."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+
+from .arithmetic import ends
+from .enclosure import Enclosure, places_of, rounded
+from .flint import arb
+
+
+def enclosure(a: arb) -> Enclosure:
+    """Write a finite enclosure as decimals, rounded outward."""
+    low, high = ends(a)
+    if low == high and len(str(low.denominator)) <= 40:  # a binary fraction is a finite decimal
+        text = rounded(low, low.denominator.bit_length() - 1, 0)
+        return Enclosure(text, text)
+    width = high - low if high > low else abs(low) / 2**200
+    places = places_of(width) + 2
+    return Enclosure(rounded(low, places, -1), rounded(high, places, 1))
+
+
+def inner(box: arb, core: arb) -> Enclosure:
+    """Decimals inside a box and around what it surely holds, as short as they can be.
+
+    What holds in the box holds in what is written, where existence in ``core`` is proven.
+    """
+    (low, high), (first, last) = ends(box), ends(core)
+    places = max(0, places_of(high - low))
+    while True:
+        a, b = rounded(low, places, 1), rounded(high, places, -1)
+        if low <= Fraction(a) <= first and last <= Fraction(b) <= high:
+            return Enclosure(a, b)
+        places += 1

@@ -1,0 +1,261 @@
+"""Every special point in a box: a complete list, or the places that stay undecided."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any, Literal
+
+import numpy as np
+
+from ..local.sides import Side
+from ..model import FilippovSystem, OptionError, explain, real, require_system, whole
+from .arithmetic import Numbers, enclose, exact, precision
+from .batch import Floats, of_fractions
+from .census import Census, Undecided
+from .certify import Subject, prove_subject
+from .described import Described
+from .enclosure import Enclosure
+from .flint import arb
+from .proof import Proof, paragraph
+from .questions import QUESTIONS, Question
+from .subdivide import Search, clusters
+
+Kind = Literal["two-fold", "fold", "equilibrium", "pseudo-equilibrium"]
+
+
+def prove_all(
+    system: FilippovSystem,
+    box: Sequence[Any],
+    kind: Kind = "two-fold",
+    *,
+    side: Side = "+",
+    surface: int = 0,
+    mode: str | None = None,
+    parameters: Mapping[Any, Any] | None = None,
+    t: float = 0.0,
+    numbers: Numbers = "stored",
+    width: float = 1e-12,
+    max_boxes: int = 200_000,
+) -> Census:
+    """Find every special point in a box, with proof that there are no others.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    box : sequence of n pairs (low, high)
+        For each state its range; a number holds a state at that value. As many states must be left
+        free as there are equations: 3 for two-folds, 2 for folds, all for points of rest.
+    kind : {"two-fold", "fold", "equilibrium", "pseudo-equilibrium"}, optional
+        Equilibria are those of one field on its own side, pseudo-equilibria those that slide.
+    side : {"+", "-"}, optional
+        For folds and equilibria the field F1 or F2.
+    surface, mode
+        As in :func:`nonsmooth.region`.
+    parameters : mapping, optional
+        Values, or pairs (low, high): the list is then complete for each of them.
+    t : float, optional
+        Time of two-folds and folds, where the system depends on it.
+    numbers, width
+        As in :func:`certify`.
+    max_boxes : int, optional
+        How many pieces of the box may be looked at.
+
+    Returns
+    -------
+    Census
+        Ctrl-C ends the search and returns what was proven so far.
+
+    Raises
+    ------
+    MissingError, OptionError, ParameterError, DefinitionError, NotSmoothError
+
+    Notes
+    -----
+    Subdivision with interval extensions and Krawczyk's operator; see Kearfott 1996, Rigorous Global
+    Search. Zeros that are not simple (double ones, curves) stay undecided, and are named.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, z = (ca.SX.sym(s) for s in "xyz")
+    >>> s = ns.FilippovSystem([x, y, z], surface=x, above=[y**2 - z, 1, 1], below=[y + z, 1, -1])
+    >>> everything = ns.prove_all(s, [(-1, 1), (-2, 2), (-2, 2)])
+    >>> everything.complete, [p.label for p in everything.zeros]
+    (True, [...])
+    """
+    require_system(system)
+    if kind not in QUESTIONS:
+        raise OptionError(
+            explain("kind", expected=f"one of {list(QUESTIONS)}", received=repr(kind), advice="")
+        )
+    limit = real(width, "width", low=5e-324, expected="a positive number")
+    most = whole(max_boxes, "max_boxes")
+    question = QUESTIONS[kind](Described(system, surface, mode), numbers, side)
+    ranges = _read_box(system, box, numbers)
+    ranges += [exact(t, numbers, "t")] if system.time_dependent else []
+    subject = _subject(question, ranges, parameters, numbers)
+    bounds = [v for v in ranges if isinstance(v, tuple)]
+    bounds += [(low, high) for _, low, high in question.further]
+    with precision(128):
+        around = [of_fractions(*pair) for pair in bounds]
+        low = np.array([float(v.low) for v in around])
+        high = np.array([float(v.high) for v in around])
+        search = Search(subject.equations(), low, high, max_boxes=most)
+        search.run()
+    return _census(subject, search, bounds, limit)
+
+
+def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> list[Any]:
+    """Ranges of the states, or values of those that are held, as fractions."""
+    names = system.state_names
+    expected = f"{len(names)} ranges (low, high) or numbers, for {', '.join(names)}"
+    try:
+        given = list(box)
+    except TypeError:
+        given = []
+    if len(given) != len(names):
+        raise OptionError(
+            explain("box", expected=expected, received=repr(box), advice="In the states' order.")
+        )
+    result: list[Any] = []
+    for name, value in zip(names, given, strict=True):
+        what = f"box of {name!r}"
+        if isinstance(value, (tuple, list, np.ndarray)):
+            ends = [exact(v, numbers, what) for v in value]
+            if len(ends) != 2 or not ends[0] < ends[1]:
+                raise OptionError(
+                    explain(
+                        what,
+                        expected="(low, high) with low < high, both finite",
+                        received=repr(value),
+                        advice="A number instead of a pair holds the state.",
+                    )
+                )
+            result.append((ends[0], ends[1]))
+        else:
+            result.append(exact(value, numbers, what))
+    return result
+
+
+def _subject(
+    question: Question, ranges: list[Any], parameters: Mapping[Any, Any] | None, numbers: Numbers
+) -> Subject:
+    system = question.described.system
+    free = [i for i, v in enumerate(ranges) if isinstance(v, tuple)]
+    unknown = len(free) + len(question.further)
+    if unknown != len(question.nodes):
+        raise OptionError(
+            explain(
+                "box",
+                expected=f"{len(question.nodes) - len(question.further)} free states for a "
+                f"{question.kind}, which has so many equations",
+                received=f"{len(free)}",
+                advice="Otherwise they are no isolated points but a set of dimension "
+                f"{unknown - len(question.nodes)}: hold states by giving a number for their range."
+                if unknown > len(question.nodes)
+                else "Give more states a range.",
+            )
+        )
+    values = [v[0] if isinstance(v, tuple) else v for v in ranges]
+    return Subject(
+        question,
+        [0.0] * unknown,
+        [(0, i) for i in free] + [(2, k) for k in range(len(question.further))],
+        [system.state_names[i] for i in free] + [name for name, *_ in question.further],
+        values,
+        [],
+        [Fraction(0)] * len(free),
+        question.described.parameters(parameters, numbers),
+        numbers,
+    )
+
+
+def _census(
+    subject: Subject, search: Search, bounds: list[tuple[Fraction, Fraction]], width: float
+) -> Census:
+    zeros, edge, left = [], [], []
+    for found in search.zeros:
+        where = _place(found.point, bounds)
+        counts = subject.question.counts(search.equations.inputs(found.point))
+        if where == "outside" or counts is False:
+            continue
+        proof = prove_subject(subject, found, width)
+        if proof is None or counts is None:
+            why = "a zero on the surface or at the end of sliding: its status is undecided"
+            left.append(Undecided(proof.point if proof else {}, why))
+        elif where == "edge":
+            edge.append(proof)
+        else:
+            zeros.append(proof)
+    for low, high in clusters(search.undecided, search.size):
+        box = {
+            name: Enclosure(repr(float(a)), repr(float(b)))
+            for name, a, b in zip(subject.names, low, high, strict=True)
+        }
+        left.append(Undecided(box, _reason(low, high, search)))
+    complete = not left and not edge
+    statement = _words(subject, search, bounds, zeros, edge, left, complete)
+    kind = subject.question.kind
+    return Census(kind, complete, tuple(zeros), tuple(edge), tuple(left), search.boxes, statement)
+
+
+def _place(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) -> str:
+    """Whether a point is in the closed box: "inside", "outside" or "edge"."""
+    result = "inside"
+    with precision(256):
+        for v, (a, b) in zip(point, bounds, strict=True):
+            low, high = enclose(a), enclose(b)
+            if v < low or v > high:
+                return "outside"
+            if not (v >= low and v <= high):
+                result = "edge"
+    return result
+
+
+def _reason(low: Floats, high: Floats, search: Search) -> str:
+    share = float(np.max((high - low) / search.size))
+    if search.stopped in ("interrupted",) or search.stopped.endswith("pieces"):
+        return f"not looked at any closer ({search.stopped})"
+    if share > 0.02:
+        return (
+            "zeros that are not isolated (a curve or a surface of them), or expressions that are "
+            "not defined there"
+        )
+    return (
+        "a zero that is not simple (a double one, or several closer than can be told apart), or a "
+        "branch point of an expression"
+    )
+
+
+def _words(
+    subject: Subject,
+    search: Search,
+    bounds: Sequence[tuple[Fraction, Fraction]],
+    zeros: list[Proof],
+    edge: list[Proof],
+    left: list[Undecided],
+    complete: bool,
+) -> str:
+    kind = subject.question.kind
+    ranges = ", ".join(
+        f"{name} in [{float(a):g}, {float(b):g}]"
+        for name, (a, b) in zip(subject.names, bounds, strict=True)
+    )
+    count = {0: f"no {kind}", 1: f"exactly one {kind}"}.get(
+        len(zeros), f"exactly {len(zeros)} points of kind {kind}"
+    )
+    if not complete:
+        count = f"at least {len(zeros)} of kind {kind}; the list is not proven complete"
+    lines = [
+        f"{p.label or 'class undecided'}: {', '.join(f'{k} = {v}' for k, v in p.point.items())}."
+        for p in zeros[:20]
+    ]
+    lines += [f"On the edge: {', '.join(f'{k} = {v}' for k, v in p.point.items())}." for p in edge]
+    lines += [f"Undecided: {u}." for u in left[:10]]
+    head = "Theorem" if complete else "Theorem in part"
+    return paragraph(
+        f"{head}. The box {ranges} holds {count}.",
+        *lines,
+        f"{search.boxes} pieces of the box were looked at.",
+    )

@@ -1,0 +1,144 @@
+"""Lists of all special points are complete: closed forms, Newton's method finds no other."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, z = (ca.SX.sym(s) for s in "xyz")
+BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
+
+
+def flat(above, below, surface=z):
+    """Fields whose third components are L1 and L2 on z = 0."""
+    return ns.FilippovSystem([x, y, z], surface=surface, above=[1, 1, above], below=[1, -1, below])
+
+
+def chebyshev(n, u):
+    a, b = 1, u
+    for _ in range(n - 1):
+        a, b = b, 2 * u * b - a
+    return b
+
+
+@pytest.mark.parametrize(
+    ("first", "second", "count"),
+    [
+        (x**2 + y**2 - 1, x - y, 2),
+        (x**2 + y**2 - 1, x**2 - y**2, 4),
+        (x**2 + y**2 - 1, (x - 3) ** 2 + y**2 - 1, 0),
+        (chebyshev(4, x), chebyshev(5, y), 20),
+        (x**2 + y**2 - 1, x - 1 + 1e-9, 2),
+        (x**2 + y**2 - 1, x - 1 - 1e-9, 0),
+        (ca.sin(4 * x), ca.cos(3 * y) * ca.exp(x), 6),
+    ],
+)
+def test_the_count_is_that_of_the_closed_form(first, second, count):
+    everything = ns.prove_all(flat(first, second), BOX)
+    assert everything.complete and len(everything.zeros) == count
+    assert all(p.exists for p in everything.zeros)
+
+
+def test_double_zeros_curves_and_edges_are_named():
+    double = ns.prove_all(flat(x**2 + y**2 - 1, x - 1), BOX)
+    assert not double.complete and "not simple" in double.undecided[0].why
+    assert len(double.undecided) == 1
+    circle = x**2 + y**2 - 1
+    curve = ns.prove_all(flat(circle, circle * (2 + x)), BOX, max_boxes=5000)
+    assert not curve.complete and curve.undecided and "not proven complete" in str(curve)
+    third = 0.25 + x - ca.sqrt(ca.SX(2)) / 2  # zero at an irrational number, the box ends near it
+    edge = float(np.sqrt(0.5)) - 0.25
+    on = ns.prove_all(flat(third, y), [(-1.0, edge), *BOX[1:]])
+    assert len(on.zeros) + len(on.edge) <= 1
+    exact = ns.prove_all(flat(x - 1.5, y), BOX)
+    assert exact.complete and len(exact.zeros) == 1
+
+
+def test_branch_points_are_not_passed_over():
+    everything = ns.prove_all(flat(ca.sqrt(x) - 0.5, y), BOX)
+    assert not everything.complete
+    assert len(everything.zeros) == 1 and "0.25" in str(everything)
+    assert ns.prove_all(flat(ca.sqrt(x) - 0.5, y), [(0.1, 1), *BOX[1:]]).complete
+
+
+def test_planar_points():
+    s = ns.FilippovSystem(
+        [x, y], surface=y, above=[1, x * (x**2 - 0.5)], below=[1 - x**2, y + x - 0.25]
+    )
+    box = [(-1.5, 1.5), (-1, 1)]
+    folds = ns.prove_all(s, box, "fold", side="+")
+    assert folds.complete and [p.label for p in folds.zeros].count("visible") == 2
+    assert len(folds.zeros) == 3
+    below = ns.prove_all(s, box, "equilibrium", side="-")  # (1, -0.75) below; (-1, 1.25) outside
+    assert below.complete and len(below.zeros) == 1
+    s = ns.FilippovSystem([x, y], surface=y, above=[x**2 - 0.25, -1], below=[x**2 - 0.25, 1])
+    rest = ns.prove_all(s, box, "pseudo-equilibrium")
+    assert rest.complete and len(rest.zeros) == 2
+    assert sorted(p.label for p in rest.zeros) == [
+        "real stable pseudo-node",
+        "real unstable pseudo-node",
+    ]
+
+
+def compare_with_newton(seed, systems, starts):
+    """Random systems: every zero that Newton's method finds is proven, each proven one is found."""
+    rng = np.random.default_rng(seed)
+    monomials = [1, x, y, z, x**2, y**2, x * y, x**3, y**3, x * y**2]
+    for k in range(systems):
+        f, g = (
+            sum(float(c) * m for c, m in zip(rng.normal(size=len(monomials)), monomials, strict=True))
+            for _ in "fg"
+        )
+        if k % 3 == 1:
+            f = f + ca.sin(2 * x * y)
+        if k % 3 == 2:
+            g = g + ca.exp(0.5 * x) - ca.cos(y)
+        system = flat(f, g, surface=z + 0.1 * x * y if k % 2 else z)
+        everything = ns.prove_all(system, BOX)
+        assert everything.complete, everything
+        points = rng.uniform(*np.array(BOX).T, size=(starts, 3))
+        tangent = lambda p, s=system: ns.find_two_fold(s, p)
+        with np.errstate(over="ignore", invalid="ignore"):  # starts that run away
+            found = [f.point for f in ns.find_all(tangent, points)]
+        inside = [p for p in found if all(a <= v <= b for v, (a, b) in zip(p, BOX, strict=True))]
+        proven = np.array([[v.middle for v in p.point.values()] for p in everything.zeros])
+        proven = proven.reshape(-1, 3)
+        for p in inside:
+            assert np.min(np.linalg.norm(proven - p, axis=1), initial=np.inf) < 1e-8, (k, p)
+        for i, p in enumerate(proven):
+            assert np.min(np.linalg.norm(np.delete(proven, i, 0) - p, axis=1), initial=1) > 1e-9
+    return systems
+
+
+def test_newton_finds_nothing_that_is_not_proven():
+    assert compare_with_newton(seed=3, systems=4, starts=15)
+
+
+@pytest.mark.slow
+def test_newton_finds_nothing_in_500_random_systems():
+    assert compare_with_newton(seed=4, systems=500, starts=300)
+
+
+def test_intervals_of_parameters():
+    p = ca.SX.sym("p")
+    system = ns.FilippovSystem(
+        [x, y, z], surface=z, above=[1, 1, x**2 - p], below=[1, -1, y - x], parameters={p: 0.5}
+    )
+    some = ns.prove_all(system, BOX, parameters={"p": (0.4, 0.6)})
+    assert some.complete and len(some.zeros) == 2
+    none = ns.prove_all(system, BOX, parameters={"p": (-0.6, -0.4)})
+    assert none.complete and not none.zeros
+    assert not ns.prove_all(system, BOX, parameters={"p": (-0.1, 0.1)}).complete
+
+
+def test_what_is_given_wrongly_is_refused():
+    s = flat(x, y)
+    for box in ([(-1, 1)] * 2, 3, [(-1, 1), (1, -1), (0, 1)], [(-1, np.inf), (0, 1), (0, 1)]):
+        with pytest.raises(ns.OptionError, match="box"):
+            ns.prove_all(s, box)
+    with pytest.raises(ns.OptionError, match="dimension 1"):
+        ns.prove_all(s, BOX, "fold")
+    with pytest.raises(ns.OptionError, match="kind"):
+        ns.prove_all(s, BOX, "cusp")
+    assert ns.prove_all(s, [(-1, 1), 0.25, (-1, 1)], "fold").complete

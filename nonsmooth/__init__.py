@@ -108,7 +108,7 @@ from .orbit import (
 )
 
 if TYPE_CHECKING:
-    from . import plot, proofs, textbook
+    from . import plot, textbook
     from .proofs import Census, Enclosure, MissingError, Proof, UnprovenError, certify, prove_all
 
 #: Names that come from the floor of proofs, loaded when asked for.
@@ -192,7 +192,6 @@ __all__ = [
     "local",
     "periodic_orbit",
     "plot",
-    "proofs",
     "prove_all",
     "region",
     "regularise",

@@ -3,24 +3,21 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
-from fractions import Fraction
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-
 from ..local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
-from ..local.search import unknowns
 from ..model import FilippovSystem, OptionError, explain, real, whole
-from .arithmetic import Numbers, exact, precision, radius
+from .arithmetic import Numbers, precision, radius
 from .decimals import enclosure, inner
-from .described import Described, enclosed
-from .equations import Equations, plane
+from .described import enclosed
+from .equations import Equations
 from .flint import arb
 from .krawczyk import Zero, prove_zero
 from .proof import Proof, hulls, intervals, listed, paragraph
-from .questions import QUESTIONS, Question, Verdict
+from .questions import Verdict
 from .record import record_of
+from .subject import Subject, subject_of
 
 _READ = {
     "stored": "Constants are the doubles stored in the expressions.",
@@ -92,7 +89,7 @@ def certify(
     >>> proof.proven, proof.label, str(proof.point["y"]), str(proof.values["eigenvalue_low"])
     (True, 'II-C', '0', '-2.618033988749894848204586834365... +- ...')
     """
-    subject = _subject(found, system, hold, numbers, parameters)
+    subject = subject_of(found, system, hold, numbers, parameters)
     limit = real(width, "width", low=5e-324, expected="a positive number")
     whole(max_bits, "max_bits", least=64)
     whole(max_pieces, "max_pieces")
@@ -107,138 +104,6 @@ def certify(
         )
     pieces = _divided(subject, limit, max_bits, max_pieces)
     return pieces[0] if len(pieces) == 1 else _together(subject, pieces)
-
-
-@dataclass(frozen=True)
-class Subject:
-    """A question, where it is asked, and for which parameters.
-
-    Attributes
-    ----------
-    question : Question
-    start : list of float
-        Values of the unknowns to start from.
-    unknowns : list of (int, int)
-        Vector and position among the inputs.
-    names : list of str
-    values : list of Fraction
-        Extended states, for those that are held.
-    normals, through : planes across sets of such points.
-    parameters : list of (Fraction, Fraction)
-    numbers : {"stored", "written"}
-    """
-
-    question: Question
-    start: list[float]
-    unknowns: list[tuple[int, int]]
-    names: list[str]
-    values: list[Fraction]
-    normals: list[list[Fraction]]
-    through: list[Fraction]
-    parameters: list[tuple[Fraction, Fraction]]
-    numbers: Numbers
-
-    @property
-    def parameter_names(self) -> tuple[str, ...]:
-        return self.question.described.system.parameter_names
-
-    def equations(self) -> Equations:
-        """The square system with enclosures of what is held."""
-        tape = self.question.described.tape
-        inputs = [tape.symbol(*place) for place in self.unknowns if place[0] == 0]
-        nodes = [*self.question.nodes, *plane(tape, inputs, self.normals, self.through)]
-        held = [enclosed([(v, v) for v in self.values]), enclosed(self.parameters)]
-        held.append([arb(0)] * len(self.question.further))
-        return Equations(tape, nodes, self.unknowns, self.names, held, self.numbers)
-
-
-def _subject(
-    found: Any,
-    system: FilippovSystem | None,
-    hold: Sequence[str],
-    numbers: Numbers,
-    parameters: Mapping[Any, Any] | None,
-) -> Subject:
-    kinds = {TwoFold: "two-fold", Fold: "fold", Equilibrium: "equilibrium"}
-    kind = {**kinds, PseudoEquilibrium: "pseudo-equilibrium"}.get(type(found))
-    if kind is None:
-        raise OptionError(
-            explain(
-                "certify",
-                expected="a TwoFold, Fold, Equilibrium or PseudoEquilibrium",
-                received=f"{found!r} ({type(found).__name__})",
-                advice="Find one first, for example with find_two_fold(system, near=...).",
-            )
-        )
-    surface, mode, given = 0, None, dict(parameters or {})
-    if isinstance(found, TwoFold):
-        system, surface = found.system, found.surface
-        where = found.chart.where
-        mode = where.mode if system.surface_count > 1 else None
-        names = {k if isinstance(k, str) else str(k) for k in given}
-        given |= {k: v for k, v in found.parameters.items() if k not in names}
-    if system is None:
-        raise OptionError(
-            explain(
-                "system",
-                expected="the system that the point belongs to",
-                received="none",
-                advice="Write certify(found, system=system); only two-folds know theirs.",
-            )
-        )
-    described = Described(system, surface, mode)
-    question = QUESTIONS[kind](described, numbers, getattr(found, "side", "+"))
-    point = [float(v) for v in found.point]
-    point += [float(getattr(found, "t", 0.0))] if system.time_dependent else []
-    free = unknowns(system, hold, 1, kind)
-    extra = [1 - 2 * found.alpha] if isinstance(found, PseudoEquilibrium) else []
-    normals = _across(question, point, free, described.parameters(given, numbers), numbers)
-    return Subject(
-        question,
-        [point[i] for i in free] + extra,
-        [(0, i) for i in free] + [(2, k) for k in range(len(extra))],
-        [system.state_names[i] for i in free] + [name for name, *_ in question.further],
-        [exact(v, numbers) for v in point],
-        normals,
-        [exact(point[i], numbers) for i in free],
-        described.parameters(given, numbers),
-        numbers,
-    )
-
-
-def _across(
-    question: Question,
-    point: list[float],
-    free: list[int],
-    parameters: Sequence[tuple[Fraction, Fraction]],
-    numbers: Numbers,
-) -> list[list[Fraction]]:
-    """Normals of the plane across the set of zeros; none if the zeros are isolated points."""
-    unknown = len(free) + len(question.further)
-    missing = unknown - len(question.nodes)
-    if missing < 0:
-        raise OptionError(
-            explain(
-                "hold",
-                expected=f"at least {len(question.nodes) - len(question.further)} free states",
-                received=f"{len(free)}",
-                advice="Hold fewer states.",
-            )
-        )
-    if missing == 0:
-        return []
-    described = question.described
-    held = [
-        [arb(v) for v in point],
-        [a.mid() for a in enclosed(parameters)],
-        [arb(0)] * len(question.further),
-    ]
-    inputs = [(0, i) for i in free]
-    flat = Equations(described.tape, question.nodes, inputs, [""] * len(free), held, numbers)
-    _, jacobian = flat.with_jacobian([held[0][i] for i in free])
-    rows = np.array([[float(v.mid()) for v in row] for row in jacobian.tolist()])
-    normals = np.linalg.svd(rows)[2][len(question.nodes) :]
-    return [[Fraction(float(v)) for v in row] for row in normals]
 
 
 # Pieces of the parameters --------------------------------------------------------------------------

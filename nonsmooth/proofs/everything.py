@@ -13,13 +13,14 @@ from ..model import FilippovSystem, OptionError, explain, real, require_system, 
 from .arithmetic import Numbers, enclose, exact, precision
 from .batch import Floats, of_fractions
 from .census import Census, Undecided
-from .certify import Subject, prove_subject
+from .certify import prove_subject
 from .described import Described
 from .enclosure import Enclosure
 from .flint import arb
 from .proof import Proof, paragraph
 from .questions import QUESTIONS, Question
 from .subdivide import Search, clusters
+from .subject import Subject
 
 Kind = Literal["two-fold", "fold", "equilibrium", "pseudo-equilibrium"]
 

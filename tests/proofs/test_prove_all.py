@@ -87,7 +87,10 @@ def compare_with_newton(seed, systems, starts):
     monomials = [1, x, y, z, x**2, y**2, x * y, x**3, y**3, x * y**2]
     for k in range(systems):
         f, g = (
-            sum(float(c) * m for c, m in zip(rng.normal(size=len(monomials)), monomials, strict=True))
+            sum(
+                float(c) * m
+                for c, m in zip(rng.normal(size=len(monomials)), monomials, strict=True)
+            )
             for _ in "fg"
         )
         if k % 3 == 1:

@@ -85,7 +85,7 @@ def error_table() -> str:
     rows = []
     for module in (ns, bounce, bounce.golf):
         for name in module.__all__:
-            thing = vars(module).get(name)
+            thing = getattr(module, name)
             if not (inspect.isclass(thing) and issubclass(thing, (ns.NonsmoothError, Warning))):
                 continue
             builtin = next(c for c in thing.__mro__ if c.__module__ == "builtins").__name__
@@ -169,6 +169,7 @@ FLOORS = {
     "local": "What happens at a point of a surface, without time stepping.",
     "flow": "Moving through time.",
     "orbit": "What needs both: sets of futures, branches of solutions, curves of two-folds.",
+    "proofs": "Theorems in interval arithmetic, by the extra `proofs` (python-flint).",
 }
 
 

@@ -141,6 +141,8 @@ def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: 
 def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any]:
     """Results of a search from many starts, each once; starts that lead nowhere are left out.
 
+    The list is not proven complete: :func:`nonsmooth.prove_all` proves that there are no others.
+
     Parameters
     ----------
     search : callable

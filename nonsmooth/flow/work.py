@@ -9,11 +9,11 @@ from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
 
 from ..model import Array, OptionError, explain
 from .checkpoint import Checkpoint
 from .chunks import Job, run_chunk, shipped
+from .progress import progress_bar
 from .results import Chunk, Collected
 from .starts import Starts
 
@@ -117,7 +117,7 @@ def run_all(
     saved : Checkpoint or None
     """
     size = work.chunk if saved is None else saved.chunk
-    bar = _bar(starts.count, work.progress)
+    bar = progress_bar(starts.count, work.progress)
     missing = []
     for number in range(math.ceil(starts.count / size)):
         first = number * size
@@ -209,20 +209,3 @@ def _processors() -> int:
         return len(os.sched_getaffinity(0))
     except AttributeError:
         return os.cpu_count() or 1
-
-
-class _NoBar:
-    def update(self, count: int) -> None:
-        """Do nothing."""
-
-    def close(self) -> None:
-        """Do nothing."""
-
-
-def _bar(total: int, progress: bool) -> Any:
-    """A bar on a terminal, for work of more than a second; nothing elsewhere."""
-    if not progress:
-        return _NoBar()
-    from tqdm import tqdm  # here: it is not needed to import the library
-
-    return tqdm(total=total, disable=None, delay=1.0, unit="run", unit_scale=True)

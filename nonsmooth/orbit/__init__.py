@@ -10,6 +10,10 @@ from .funnels import Departure, Funnel
 from .futures import funnel
 from .itinerary import Arrival, FixedItinerary
 from .periodic import PeriodicOrbit
+from .lyapunov import (
+    LyapunovSpectrum,
+    lyapunov_spectrum,
+)
 from .sensitivity import Gradient, gradient, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds
 from .variation import Sensitivity
@@ -26,6 +30,7 @@ __all__ = [
     "FixedItinerary",
     "Funnel",
     "Gradient",
+    "LyapunovSpectrum",
     "Path",
     "PeriodicOrbit",
     "Sensitivity",
@@ -37,6 +42,7 @@ __all__ = [
     "continue_equilibrium",
     "funnel",
     "gradient",
+    "lyapunov_spectrum",
     "paths_from",
     "periodic_orbit",
     "sensitivity",

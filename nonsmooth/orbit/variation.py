@@ -82,7 +82,7 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     for k, part in enumerate(parts):
         flown = _flown(run, part, p, chosen)
         following = parts[k + 1] if k + 1 < len(parts) else None
-        result.append(Passage(part, flown, _event(run, part, flown, following, p)))
+        result.append(Passage(part, flown, saltation_after(run, part, flown, following, p)))
     return result
 
 
@@ -94,9 +94,16 @@ def _flown(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) ->
         return collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
 
 
-def _event(
+def saltation_after(
     run: Trajectory, part: Stretch, flown: Flown, following: Stretch | None, p: Array
 ) -> Saltation | None:
+    """What the event that ends a leg does to neighbours; None where a time ends it.
+
+    Raises
+    ------
+    DegenerateError
+        The run grazes there.
+    """
     if not part.leg.name:
         return None
     system, n = run.system, run.system.extended_dimension

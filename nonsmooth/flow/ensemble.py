@@ -18,7 +18,7 @@ from .options import Options
 from .results import Collected, Ensemble
 from .select import compiled_or_none, use_compiled
 from .starts import Starts
-from .view import read_view
+from .view import read_view, sectioned
 from .work import Work, run_all
 
 #: Fewer trajectories than this are not worth compiling the engine that runs several in step.
@@ -100,6 +100,7 @@ def ensemble(
     work = _work(work)
     if start_mode is not None:
         system.parse_mode(start_mode)
+    system, at = sectioned(system, at)
     starts = Starts(system, x0, parameters, t_start)
     number = _event_number(at_event)
     p = starts.p if at is None else starts.every_parameter()

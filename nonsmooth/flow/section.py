@@ -11,12 +11,14 @@ import numpy as np
 
 from ..model import Array, OptionError, periods, whole
 from .facts import KINDS
+from .saving import savable
 from .trajectory import Event
 
 #: Kinds of events that a section can be at: all but the end.
 KINDS_OF_SECTIONS = KINDS[:-1]
 
 
+@savable
 @dataclass(frozen=True)
 class Section:
     """Where a run is looked at, for Poincare maps, stroboscopic pictures and bifurcation diagrams.
@@ -26,10 +28,12 @@ class Section:
     at : str, number or expression
         A name: of a surface (``"h0"``, ``"h1"``, ...), a stop, a reset or an impact, or else a kind
         of event (``"crossing"``, ``"entry"``, ``"exit"``, ``"reset"``, ...). A number, or an
-        expression in parameters, is a period: the run is looked at after each, from ``t_start``.
+        expression in parameters, is a period: the run is looked at after each, from ``t_start``. An
+        expression in states is a section of its own: the system gets a reset named ``"section"``
+        where it is zero, which changes nothing.
     direction : {-1, 0, 1}, optional
-        Of a surface: only where h falls, either way, only where it rises. Stops and resets have
-        directions of their own.
+        Of a surface or expression: only where it falls, either way, only where it rises. Stops and
+        resets have directions of their own.
     every : int, optional
         Keep each ``every``-th hit.
     skip : int, optional
@@ -39,6 +43,10 @@ class Section:
         ensembles, where the periods differ.
     after : bool, optional
         The state after a reset or an impact instead of the one before.
+
+    Notes
+    -----
+    What happens at the start itself, to rounding, is no hit: a map from a section leads back to it.
 
     Raises
     ------
@@ -86,6 +94,8 @@ class Hits:
         Only where this surface has this letter before.
     every, skip, count, after
         As in :class:`Section`.
+    begin : float
+        What happens up to this time is no hit.
     """
 
     kinds: tuple[str, ...]
@@ -95,21 +105,26 @@ class Hits:
     skip: int
     count: int | None
     after: bool
+    begin: float
 
     @property
     def last(self) -> float:
         """Number of the hit that ends a run."""
         return math.inf if self.count is None else self.skip + self.every * self.count
 
-    def meets(self, kind: str, name: str, before: str) -> bool:
+    def meets(self, t: float, kind: str, name: str, before: str) -> bool:
         """Whether an event is a hit."""
-        if kind not in self.kinds or (self.names is not None and name not in self.names):
+        if (
+            t <= self.begin
+            or kind not in self.kinds
+            or (self.names is not None and name not in self.names)
+        ):
             return False
         return self.letter is None or before[self.letter[0]] == self.letter[1]
 
     def select(self, events: Sequence[Event]) -> list[Event]:
         """Return the hits that are kept."""
-        hits = [e for e in events if self.meets(e.kind, e.name, e.mode_before)]
+        hits = [e for e in events if self.meets(e.t, e.kind, e.name, e.mode_before)]
         kept = hits[self.skip + self.every - 1 :: self.every]
         return kept if self.count is None else kept[: self.count]
 

@@ -19,7 +19,7 @@ from .select import compiled_or_none, use_compiled
 from .starts import require_start_mode
 from .status import Status
 from .trajectory import Trajectory
-from .view import read_view, sampled
+from .view import read_view, sampled, sectioned
 
 #: Steps that the reference driver takes before a run counts as long: at least so many, and more for
 #: a system whose jets have more instructions than _SMALL together, because compilers take longer.
@@ -115,6 +115,7 @@ def simulate(
         max_events=max_events,
         start_mode=start_mode,
     )
+    system, at = sectioned(system, at)
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
     require_start_mode(system, x, p, options)

@@ -10,15 +10,20 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import (
+    SECTION,
     Array,
     FilippovSystem,
     OptionError,
     PointError,
     explain,
+    is_function,
+    is_real,
     periods,
     read_period,
     real_array,
+    with_section,
 )
+from .facts import AT_END
 from .options import Options
 from .section import KINDS_OF_SECTIONS, Hits, Section, Times
 from .trajectory import Trajectory
@@ -60,10 +65,26 @@ def read_view(
         return View(options)
     section = at if isinstance(at, Section) else Section(at)
     if isinstance(section.at, str):
-        hits = _hits(system, section)
+        hits = _hits(system, section, options.t_start)
         return View(replace(options, hits=hits), None, hits.count)
     times = _strobe(section, _period(system, section), options, p)
     return View(options, times, times.count)
+
+
+def sectioned(system: FilippovSystem, at: Any) -> tuple[FilippovSystem, Any]:
+    """Give the system the section ``at`` if it is a function of the states, and call it by its name.
+
+    Raises
+    ------
+    DefinitionError, NotSmoothError, OptionError
+    """
+    section = at if isinstance(at, Section) else None if at is None else Section(at)
+    if section is None or isinstance(section.at, str) or is_real(section.at):
+        return system, at
+    if not is_function(section.at) or read_period(system, section.at) is not None:
+        return system, at
+    wider = with_section(system, section.at, section.direction)
+    return wider, replace(section, at=SECTION, direction=0)
 
 
 def _period(system: FilippovSystem, section: Section) -> float | str:
@@ -72,8 +93,7 @@ def _period(system: FilippovSystem, section: Section) -> float | str:
         raise OptionError(
             explain(
                 "at",
-                expected="a Section, a name, a kind of event, a period or an expression in "
-                "parameters",
+                expected="a Section, a name, a kind of event, a period or an expression",
                 received=f"{section.at!r} ({type(section.at).__name__})",
                 advice='For example at="h0", or at=nonsmooth.Section("h0", direction=1).',
             )
@@ -86,7 +106,7 @@ def _period(system: FilippovSystem, section: Section) -> float | str:
     return period
 
 
-def _hits(system: FilippovSystem, section: Section) -> Hits:
+def _hits(system: FilippovSystem, section: Section, t_start: float) -> Hits:
     """Events of a name, or of a kind where nothing has the name."""
     name, letter = str(section.at), None
     surfaces = [f"h{i}" for i in range(system.surface_count)]
@@ -113,12 +133,11 @@ def _hits(system: FilippovSystem, section: Section) -> Hits:
                 "at",
                 expected=f"a name of {known} or a kind of {list(KINDS_OF_SECTIONS)}",
                 received=repr(name),
-                advice="A section that is none of them: give the system a stop or a reset there, "
-                "or ask nonsmooth.poincare.",
+                advice="A section that is none of them is an expression in states, at=x - 1.",
             )
         )
     rest = section.every, section.skip, section.count, section.after
-    return Hits(kinds, names, letter, *rest)
+    return Hits(kinds, names, letter, *rest, begin=t_start + AT_END * max(1.0, abs(t_start)))
 
 
 def _given(t_eval: ArrayLike, t_start: float, t_end: float) -> Times:

@@ -23,8 +23,10 @@ from .layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .motion import Motion, followed, motion, watched_functions
 from .multipliers import sliding_multipliers
 from .periods import periods, read_period
+from .periods import is_function, periods, read_period
 from .reading import Parameters
 from .regularise import regularise
+from .sections import SECTION, with_section
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
@@ -53,6 +55,7 @@ __all__ = [
     "PointError",
     "Reset",
     "Resets",
+    "SECTION",
     "Stop",
     "Surfaces",
     "complementarity",
@@ -60,6 +63,7 @@ __all__ = [
     "evaluator",
     "explain",
     "followed",
+    "is_function",
     "is_real",
     "layer_of",
     "loop_at",
@@ -74,4 +78,5 @@ __all__ = [
     "sliding_multipliers",
     "watched_functions",
     "whole",
+    "with_section",
 ]

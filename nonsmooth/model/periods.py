@@ -13,6 +13,11 @@ from .system import FilippovSystem
 from .values import Array
 
 
+def is_function(value: Any) -> bool:
+    """Whether a value is one scalar expression."""
+    return isinstance(value, ca.SX) and bool(value.is_scalar())
+
+
 def read_period(system: FilippovSystem, value: Any) -> float | str | None:
     """Read a number, or an expression in parameters as a serialised function; None if it is neither.
 
@@ -23,7 +28,7 @@ def read_period(system: FilippovSystem, value: Any) -> float | str | None:
     """
     if is_real(value):
         return float(periods(float(value), np.zeros(0)))
-    if not (isinstance(value, ca.SX) and value.is_scalar()):
+    if not is_function(value):
         return None
     try:
         return str(ca.Function("period", [system.parameter_symbols], [value]).serialize())

@@ -14,6 +14,10 @@ from .lyapunov import (
     LyapunovSpectrum,
     lyapunov_spectrum,
 )
+from .poincare import (
+    PoincareOrbit,
+    poincare,
+)
 from .sensitivity import Gradient, gradient, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds
 from .variation import Sensitivity
@@ -33,6 +37,7 @@ __all__ = [
     "LyapunovSpectrum",
     "Path",
     "PeriodicOrbit",
+    "PoincareOrbit",
     "Sensitivity",
     "Slider",
     "TraceError",
@@ -45,6 +50,7 @@ __all__ = [
     "lyapunov_spectrum",
     "paths_from",
     "periodic_orbit",
+    "poincare",
     "sensitivity",
     "trace_two_folds",
     "vjp",

@@ -48,6 +48,17 @@ def test_crossings_of_a_surface_in_one_direction(sample, engine):
 
 
 @pytest.mark.parametrize("engine", ENGINES)
+def test_an_expression_in_states_is_a_section_and_its_start_is_no_hit(sample, engine):
+    # on the circle x**2 + v**2 = 1 above, the ellipse 4 x**2 + v**2 = 1 below: v = 0 at x = -1/2
+    at = ns.Section(v, direction=1, count=3)
+    times, states, _ = sample(TWO_SPRINGS, [-0.5, 0.0], 100.0, at=at, engine=engine)
+    assert np.allclose(times, 1.5 * math.pi * np.arange(1, 4), rtol=0, atol=1e-8)
+    assert np.allclose(states, [[-0.5, 0.0]] * 3, rtol=0, atol=1e-8)
+    with pytest.raises(ns.DefinitionError, match=r"section: expected the states .* received also"):
+        sample(TWO_SPRINGS, [-0.5, 0.0], 1.0, at=ns.Section(v - w, count=1))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
 def test_every_third_hit_after_two_that_are_passed_over(sample, engine):
     # from rest at the height 1 the ball lands at 1, 3, 5, ... with the speed 2
     at = ns.Section("floor", every=3, skip=2, count=2, after=True)
@@ -133,7 +144,7 @@ def test_samples_survive_a_checkpoint_and_other_requests_are_another_problem(tmp
         ({"at": "h1"}, r"at: expected a name of \['h0'\] or a kind"),
         ({"at": "end"}, "at: expected a name"),
         ({"at": -1.0}, "period: expected a positive number, received -1.0"),
-        ({"at": x}, "an expression in parameters"),
+        ({"at": [x]}, "a period or an expression"),
         ({"at": 50.0}, "at least 1 periods"),
         ({"at": ns.Section("entry", direction=1)}, "Only surfaces are chosen by direction"),
         ({"at": ns.Section(1.0, after=True)}, "Times have no direction"),

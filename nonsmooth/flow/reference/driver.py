@@ -485,7 +485,7 @@ class Driver:
 
     def _count_hit(self, kind: str, before: str, name: str) -> None:
         hits = self.options.hits
-        if hits is not None and hits.meets(kind, name, before):
+        if hits is not None and hits.meets(self.t, kind, name, before):
             self._hits += 1
             if self._hits >= hits.last:
                 self._end(Status.STOPPED, messages.looked_at(hits.count or 0, self.t))

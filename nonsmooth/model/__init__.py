@@ -22,7 +22,6 @@ from .found_switches import LiftedSwitch
 from .layer import Layer, LayerNumbers, Loop, layer_of, loop_at
 from .motion import Motion, followed, motion, watched_functions
 from .multipliers import sliding_multipliers
-from .periods import periods, read_period
 from .periods import is_function, periods, read_period
 from .reading import Parameters
 from .regularise import regularise
@@ -32,6 +31,7 @@ from .system import FilippovSystem
 from .values import Array
 
 __all__ = [
+    "SECTION",
     "Array",
     "Clock",
     "ConvergenceError",
@@ -55,7 +55,6 @@ __all__ = [
     "PointError",
     "Reset",
     "Resets",
-    "SECTION",
     "Stop",
     "Surfaces",
     "complementarity",

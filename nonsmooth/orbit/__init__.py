@@ -9,11 +9,11 @@ from .find_periodic import VirtualOrbitError, periodic_orbit
 from .funnels import Departure, Funnel
 from .futures import funnel
 from .itinerary import Arrival, FixedItinerary
-from .periodic import PeriodicOrbit
 from .lyapunov import (
     LyapunovSpectrum,
     lyapunov_spectrum,
 )
+from .periodic import PeriodicOrbit
 from .poincare import (
     PoincareOrbit,
     poincare,

@@ -7,7 +7,8 @@ normal motion depends on the tangential one and lift-off comes at another time f
 
 from __future__ import annotations
 
-from itertools import pairwise
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import NamedTuple
 
 import casadi as ca
@@ -22,9 +23,6 @@ from ..errors import LiftOffError
 from ..shot.touch_down import approach
 
 Array = NDArray[np.float64]
-
-#: An Euler step of this length leaves a power law's zero; its error is below rounding.
-_INSTANT = 1e-13
 
 
 class Arrival(NamedTuple):
@@ -70,6 +68,7 @@ class Shooting:
         self.equations, self.system = equations(self.blueprint), contact_system(self.blueprint)
         self._values = list(model.values.values())
         self._function = self.system.function("bounce shooting", self._expressions)
+        self._itineraries: dict[str, ns.FixedItinerary] = {}
 
     def _expressions(self) -> list[ca.SX]:
         lie = [self.system.lie_derivative(modes) for modes in ("+", "-", "++", "--")]
@@ -98,16 +97,13 @@ class Shooting:
         t, x = self.land(u)
         wrong = {"+": x[1] + x[4] < 0, "-": x[1] + x[4] > 0}.get(word[0], False)
         fault = "the slip at touch-down has the other sign" if wrong else ""
-        for mode, following in pairwise(word):
-            names = ("L_F1 h", "L_F2 h") if mode == "s" else ("h0",)
-            run = self._follow(mode, t, x, (*names, "lift-off"))
-            t, x = float(run.t[-1]), run.x[-1]
-            fault = fault or self._change_fault(mode, following, run.events[-1].name, x)
-        return self._last(word[-1], t, x, fault)
+        with self._lift_off():
+            found = self._itinerary(word).arrive(x, t)
+        return self._arrival(found.x, found.t, found.entry, fault or found.fault, word[-1])
 
     def slip(self, u: Array) -> ns.Trajectory:
         """Forward slip from touch-down to lift-off."""
-        return self._follow("+", *self.land(u), ("lift-off",))
+        return self._follow("+", *self.land(u), "lift-off")
 
     def first_phase(self, u: Array) -> ns.Trajectory:
         """Forward slip from touch-down to its end: H = 0 or lift-off."""
@@ -122,81 +118,46 @@ class Shooting:
         ]
         what = "lifts off" if early and early[0].name == "lift-off" else "has H = 0"
         fault = f"the ball {what} at t = {early[0].t:.6g}, while slipping" if early else ""
-        return float(slip.x[-1][1] + slip.x[-1][4]), self._last("s", entry, slip.x[-1], fault)
+        roll = self._follow("s", entry, slip.x[-1], "lift-off")
+        fault = fault or self._itinerary("s").inside(roll, "rolling")
+        arrival = self._arrival(roll.x[-1], float(roll.t[-1]), entry, fault, "s")
+        return float(slip.x[-1][1] + slip.x[-1][4]), arrival
 
-    def _last(self, mode: str, t: float, x: Array, fault: str) -> Arrival:
-        run = self._follow(mode, t, x, ("lift-off",))
-        end = run.x[-1]
-        fault = fault or (self._roll_fault(run) if mode == "s" else self._slip_fault(run, mode))
-        slip, pull = float(end[1] + end[4]), float(self.numbers(end)[2])
-        return Arrival(end, float(run.t[-1]), t, slip, pull, fault)
+    def _arrival(self, x: Array, t: float, entry: float, fault: str, mode: str) -> Arrival:
+        """Describe a lift-off; one from rolling must be at a visible two-fold."""
+        pull, above, below = self.numbers(x)[2:5]
+        if mode == "s" and not above > 0 > below:
+            fault = fault or "the two-fold at lift-off is not visible"
+        return Arrival(x, t, entry, float(x[1] + x[4]), float(pull), fault)
+
+    def _itinerary(self, word: str) -> ns.FixedItinerary:
+        if word not in self._itineraries:
+            self._itineraries[word] = ns.FixedItinerary(
+                self.system,
+                word,
+                until="lift-off",
+                parameters=self.model.values,
+                tol=self.tol,
+                t_max=self.t_max,
+            )
+        return self._itineraries[word]
 
     def _follow(
-        self, mode: str, t: float, x: Array, until: tuple[str, ...], t_end: float | None = None
+        self,
+        mode: str,
+        t: float,
+        x: Array,
+        until: str | tuple[str, ...],
+        t_end: float | None = None,
     ) -> ns.Trajectory:
-        run = self._run(mode, t, x, until, t_end)
-        if run.status is ns.Status.NOT_FINITE and len(run.t) == 1 and x[2] == 0.0:
-            # A power law at y = 0 has no Taylor series there.
-            # There the load is zero, so the field is that of every mode.
-            field = self.system.evaluate(self.system.field("+"), x, self.model.values)[:, 0]
-            run = self._run(mode, t, x + _INSTANT * field, until, t_end)
-        wanted = ns.Status.STOPPED if t_end is None else ns.Status.REACHED_END
-        if run.status is not wanted:
-            doing = "rolling" if mode == "s" else "slipping"
-            raise LiftOffError(
-                f"lift-off: expected after {doing} from xdot = {x[1]:.6g}, omega = {x[4]:.6g}, "
-                f"received {run.status}: {run.message}",
-                run,
-            )
-        return run
+        with self._lift_off():
+            return self._itinerary(mode).leg(mode, t, x, until, t_end)
 
-    def _run(
-        self, mode: str, t: float, x: Array, until: tuple[str, ...], t_end: float | None
-    ) -> ns.Trajectory:
-        return ns.follow(
-            self.system,
-            x,
-            t + self.t_max if t_end is None else t_end,
-            mode=mode,
-            until=until,
-            t_start=t,
-            parameters=self.model.values,
-            tol=self.tol,
-        )
-
-    # whether a ball really moves so -------------------------------------------------------------
-
-    def _change_fault(self, mode: str, following: str, name: str, x: Array) -> str:
-        """A phase must end as the itinerary says: by entry, crossing, or exit to that side."""
-        above, below = self.numbers(x)[:2]
-        if name == "lift-off":
-            return f"lift-off in a phase {mode!r} that is not the last"
-        if mode == "s":
-            wanted = "L_F1 h" if following == "+" else "L_F2 h"
-            return "" if name == wanted else "rolling ends to the other side"
-        if following == "s":
-            return "" if above <= 0 <= below else "the ball cannot roll where slip ends"
-        crosses = above < 0 and below < 0 if following == "-" else above > 0 and below > 0
-        return "" if crosses else "the slip cannot change sign where it vanishes"
-
-    def _slip_fault(self, run: ns.Trajectory, mode: str) -> str:
-        """H must keep its sign strictly between the ends, which may be zeros."""
-        start, end = float(run.t[0]), float(run.t[-1])
-        near = 1e-7 * (end - start)
-        early = any(e.name == "h0" and start + near < e.t < end - near for e in run.events)
-        middle = run(0.5 * (start + end))
-        if early or (1 if mode == "+" else -1) * (middle[1] + middle[4]) <= 0.0:
-            return "H changes sign while slipping"
-        return ""
-
-    def _roll_fault(self, run: ns.Trajectory) -> str:
-        """Rolling needs L1 < 0 < L2 until both vanish at a visible two-fold."""
-        start, end = float(run.t[0]), float(run.t[-1])
-        near = 1e-5 * (end - start)
-        names = ("L_F1 h", "L_F2 h")
-        early = any(e.name in names and start + near < e.t < end - near for e in run.events)
-        first, middle = self.numbers(run.x[0]), self.numbers(run(0.5 * (start + end)))
-        if early or not (first[0] <= 0 <= first[1] and middle[0] <= 0 <= middle[1]):
-            return "friction does not suffice to roll"
-        above, below = self.numbers(run.x[-1])[3:5]
-        return "" if above > 0 > below else "the two-fold at lift-off is not visible"
+    @contextmanager
+    def _lift_off(self) -> Iterator[None]:
+        """Say of a phase that does not end that there is no lift-off."""
+        try:
+            yield
+        except ns.ConvergenceError as error:
+            run = error.point if isinstance(error.point, ns.Trajectory) else None
+            raise LiftOffError(f"lift-off: {error}", run) from error

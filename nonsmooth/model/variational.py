@@ -285,6 +285,11 @@ class GuardedField:
         return Evaluator(self.motion.jet_function(ORDER))
 
     @cached_property
+    def starts(self) -> Evaluator:
+        """(y, p) -> the first coefficients of states and guards, to order 3."""
+        return Evaluator(self.motion.jet_function(3))
+
+    @cached_property
     def gradients(self) -> Evaluator:
         """(y, p) -> gradients of the guards (g, N + k)."""
         return Evaluator(self.motion.gradient_function())

@@ -187,7 +187,7 @@ def _following_fault(
     """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
     field = guarded_field(system, following)
     y = variational_field(system, following).initial(after, p)[:, 0]
-    states, rows = field.jets.copied(y, p)
+    states, rows = field.starts.copied(y, p)
     slopes = field.gradients.copied(y, p)[0]
     for k, guard in enumerate(field.motion.guards):
         if guard.kind in ("stop", "reset", "zero", "branch"):

@@ -28,13 +28,18 @@ from ..model import (
 )
 from ..model.event_maps import event_map, function_map
 from ..model.explicit import explicit
-from .guards import change_fault, watch
+from ..model.variational import guarded_field, variational_field
+from .guards import change_fault, described
 from .legs import Flown, Leg, fly
 from .saltation import saltation
 
 #: An Euler step of this length leaves a power law's zero, where a field has no Taylor series; its
 #: error is below rounding.
 _INSTANT = 1e-13
+
+#: Parts of a leg's duration beside its ends in which a zero of a guard is that of the end's event. Both
+#: exits of sliding vanish at a two-fold, which is met with rounding.
+_NEAR = {"surface": 1e-7, "exit": 1e-5, "impact": 1e-7, "release": 1e-7}
 
 
 @dataclass(frozen=True, eq=False)
@@ -209,22 +214,20 @@ class FixedItinerary:
             last, entry = k + 1 == len(self.modes), t
             leg = None if last else leg_between(system, mode, self.modes[k + 1])
             run = self.leg(mode, t, x, self.until if leg is None else self._ends(leg))
-            name = run.events[-1].name
+            name, what = run.events[-1].name, f"leg {k + 1} ({mode})"
             if leg is not None and name != leg.name:
-                fault = fault or f"leg {k + 1} ({mode}) ends by {name!r}, not by {leg.name!r}"
-            duration = float(run.t[-1]) - t
+                fault = fault or f"{what} ends by {name!r}, not by {leg.name!r}"
+            fault = fault or self.inside(run, what)
             begin = system.extended_point(x, t)
+            durations.append(float(run.t[-1]) - t)
             t, x = float(run.t[-1]), run.x[-1]
-            if not fault:
-                fault = self._fault(k, mode, begin, duration, p)
             if not fault and leg is not None:
                 at = system.extended_point(x, t)
                 y = leg.field(system).initial(at, p)[:, 0]
                 fault = change_fault(system, leg, self.modes[k + 1], y, at, p)
-                fault = f"leg {k + 1} ({mode}): {fault}" if fault else ""
+                fault = f"{what}: {fault}" if fault else ""
             legs.append(leg or Leg(mode))
             starts.append(begin)
-            durations.append(duration)
         return Arrival(x, t, entry, fault, tuple(legs), tuple(starts), tuple(durations))
 
     def _ends(self, leg: Leg) -> tuple[object, ...]:
@@ -235,13 +238,39 @@ class FixedItinerary:
         end = isinstance(self.until, str) and (self.until not in names or self.until in own)
         return own if end else (*own, self.until)
 
-    def _fault(self, k: int, mode: str, x: Array, duration: float, p: Array) -> str:
-        """Guards of a mode that are negative inside a leg."""
-        if duration <= 0.0:
-            return f"leg {k + 1} ({mode}) has the duration {duration:.3g}"
-        faults = watch(self.system, mode, x, duration, p).faults
-        faults = [f for f in faults if not f.startswith(("stop", "reset"))]
-        return f"leg {k + 1} ({mode}): {faults[0]}" if faults else ""
+    def inside(self, run: Trajectory, what: str) -> str:
+        """A guard of its mode that a leg violates; empty if there is none.
+
+        Zeros near the ends are those of the events there.
+
+        Parameters
+        ----------
+        run : Trajectory
+            Of one mode, as :meth:`leg` returns it.
+        what : str
+            Named in the message.
+        """
+        system, mode = self.system, run.segments[0].mode
+        start, end = float(run.t[0]), float(run.t[-1])
+        if end <= start:
+            return f"{what} has the duration {end - start:.3g}"
+        of_mode = explicit(system, mode)
+        kinds = {g.name: g for g in of_mode.guards if g.kind in _NEAR}
+        for event in run.events:
+            guard = kinds.get(event.name)
+            if guard is None or event.kind == "end":
+                continue
+            near = _NEAR[guard.kind] * (end - start)
+            if start + near < event.t < end - near:
+                return f"{what}: {described(guard)} fails at t = {event.t:.6g}"
+        middle = system.extended_point(run(0.5 * (start + end)), 0.5 * (start + end))
+        p = system.parameter_vector(self.parameters)
+        y = variational_field(system, mode).initial(middle, p)[:, 0]
+        values = guarded_field(system, mode).starts(y, p)[1][:, 0]
+        for guard, value in zip(of_mode.guards, values, strict=True):
+            if guard.kind in _NEAR and value <= 0.0:
+                return f"{what}: {described(guard)} fails"
+        return ""
 
     def leg(
         self, mode: str, t: float, x: Array, until: object, t_end: float | None = None

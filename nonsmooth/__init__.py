@@ -83,6 +83,7 @@ from .model import (
     regularise,
 )
 from .orbit import (
+    Basins,
     BifurcationCurve,
     Branch,
     BranchEnd,
@@ -98,6 +99,7 @@ from .orbit import (
     Sensitivity,
     TraceError,
     VirtualOrbitError,
+    basins,
     continuation,
     continue_bifurcation,
     continue_equilibrium,
@@ -129,6 +131,7 @@ _OF_PROOFS = (
 __version__ = "0.1.0.dev0"
 
 __all__ = [
+    "Basins",
     "BifurcationCurve",
     "Branch",
     "BranchEnd",
@@ -172,6 +175,7 @@ __all__ = [
     "VirtualOrbitError",
     "Work",
     "alpha",
+    "basins",
     "boundary_equilibrium",
     "certify",
     "classify",

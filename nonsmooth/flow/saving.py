@@ -159,7 +159,7 @@ class _Writer:
         if isinstance(value, Mapping):
             return {"mapping": [[self.tree(k), self.tree(v)] for k, v in value.items()]}
         name = type(value).__name__
-        if _FIELDS.get(name) is type(value):
+        if name in _FIELDS and dataclasses.is_dataclass(value):
             fields = dataclasses.fields(value)
             return {
                 "of": name,

@@ -1,6 +1,10 @@
 """What needs both a place and a motion: canards, the set of futures, curves of two-folds."""
 
 from . import continuation
+from .basins import (
+    Basins,
+    basins,
+)
 from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
@@ -24,6 +28,7 @@ from .variation import Sensitivity
 
 __all__ = [
     "Arrival",
+    "Basins",
     "BifurcationCurve",
     "Branch",
     "BranchEnd",
@@ -42,6 +47,7 @@ __all__ = [
     "Slider",
     "TraceError",
     "VirtualOrbitError",
+    "basins",
     "continuation",
     "continue_bifurcation",
     "continue_equilibrium",

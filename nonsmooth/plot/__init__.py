@@ -1,10 +1,13 @@
-"""Pictures (matplotlib): two-folds, trajectories, phase portraits. Imported only on use.
+"""Pictures (matplotlib): two-folds, trajectories, phase portraits, basins. Imported only on use.
 
 Every function returns a matplotlib Figure and leaves matplotlib's global settings alone. What they
 share of colours, dashes and arrows is in ``style``, for pictures of one's own.
 """
 
 from . import style
+from .basin_map import (
+    basins,
+)
 from .phase_portrait import phase_portrait
 from .sliding_portrait import sliding_portrait
 from .trajectory import trajectory
@@ -13,6 +16,7 @@ from .two_fold_portrait import two_fold
 from .two_fold_space import two_fold_3d
 
 __all__ = [
+    "basins",
     "phase_portrait",
     "sliding_portrait",
     "style",

@@ -1,0 +1,130 @@
+"""Basins of attraction as a map, with the attractors on it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.colors import ListedColormap, to_rgb
+from matplotlib.figure import Figure
+from matplotlib.patches import Patch
+
+from ..model import OptionError
+from ..orbit import Basins
+from . import style
+
+#: Of attractors, in turn: told apart also without colour, light enough for dark marks.
+_COLORS = ("#9ecae1", "#fdd0a2", "#a1d99b", "#dadaeb", "#fee391", "#fbb4b9", "#ccebc5", "#bcbddc")
+_OTHERS = {0: "#ffffff", -1: "#252525", -2: "#737373", -3: "#bdbdbd", -4: "#969696"}
+
+
+def basins(
+    found: Basins,
+    *,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (6.4, 5.0),
+    legend: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw which attractor each start of a grid of two axes goes to.
+
+    Attractors are marked where they are in the plane of the grid's axes; the other states of the
+    starts, if there are any, have the grid's values.
+
+    Parameters
+    ----------
+    found : Basins
+        Of a grid given as a mapping in which two states vary.
+    ax : matplotlib Axes, optional
+        A new figure is made without it.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    OptionError
+        A grid that is none of two axes.
+
+    Examples
+    --------
+    >>> import casadi as ca, numpy as np, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> well = ns.FilippovSystem(
+    ...     [x, v], surface=x, above=[v, 1 - x - 0.3 * v], below=[v, -1 - x - 0.3 * v])
+    >>> axis = np.linspace(-3, 3, 8)
+    >>> found = ns.basins(well, {"x": axis, "v": axis}, t_end=100.0)
+    >>> figure = ns.plot.basins(found)
+    """
+    if not isinstance(found, Basins) or len(found.axes) != 2:
+        raise OptionError(
+            "found: expected Basins of a grid with two axes, received "
+            f"{found!r}. Give the grid as a mapping: two states with axes, numbers for the others."
+        )
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        _fill(axes, found)
+        first, second = (found.state_names.index(name) for name in found.axes)
+        for attractor in found.attractors:
+            points = attractor.points
+            axes.plot(
+                points[:, first],
+                points[:, second],
+                linestyle="",
+                marker="o",
+                markersize=5.0 if len(points) < 8 else 2.0,
+                color=style.BLACK,
+                markeredgewidth=0.0,
+                zorder=3,
+            )
+        across, up = found.axes
+        axes.set_xlabel(across)
+        axes.set_ylabel(up)
+        if title:
+            axes.set_title(title)
+        if legend:
+            _legend(axes, found)
+    return figure
+
+
+def _fill(axes: Axes, found: Basins) -> None:
+    """Cells around the starts, in the colours of their labels."""
+    present = np.unique(found.labels)
+    index = np.searchsorted(present, found.labels)
+    colors = ListedColormap([to_rgb(_color(int(label))) for label in present])
+    x, y = (_edges(axis) for axis in found.axes.values())
+    axes.pcolormesh(x, y, index.T, cmap=colors, vmin=-0.5, vmax=len(present) - 0.5, rasterized=True)
+    axes.set_xlim(x[0], x[-1])
+    axes.set_ylim(y[0], y[-1])
+
+
+def _edges(axis: Any) -> Any:
+    """Bounds of cells around values."""
+    if len(axis) < 2:
+        return np.array([axis[0] - 0.5, axis[0] + 0.5])
+    middle = (axis[1:] + axis[:-1]) / 2
+    return np.concatenate([[2 * axis[0] - middle[0]], middle, [2 * axis[-1] - middle[-1]]])
+
+
+def _color(label: int) -> str:
+    return _COLORS[(label - 1) % len(_COLORS)] if label > 0 else _OTHERS[label]
+
+
+def _legend(axes: Axes, found: Basins) -> None:
+    parts = found.fractions
+    order = [k for k in parts if k > 0][:8] + [k for k in parts if k <= 0]
+    handles = [
+        Patch(
+            facecolor=_color(k),
+            edgecolor=style.GREY,
+            label=f"{found.name(k)}: {100 * parts[k]:.1f} %",
+        )
+        for k in order
+    ]
+    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)

@@ -243,6 +243,7 @@ def converge(
     tol: float = 1e-15,
     scale: float = 1.0,
     max_iterations: int = 30,
+    linear: Callable[[Array, Array], Array] | None = None,
 ) -> Array | None:
     """Root of as many equations as unknowns from a good guess, or None.
 
@@ -260,6 +261,8 @@ def converge(
     scale : float, optional
         Size of the unknowns.
     max_iterations : int, optional
+    linear : callable, optional
+        Solves the linear equations of a step, where their structure is known.
 
     Examples
     --------
@@ -267,14 +270,19 @@ def converge(
     [3.0]
     """
     carried = isinstance(equations, Secant) and equations.jacobian is not None
-    root = _full_steps(equations, start, tol, scale, max_iterations)
+    root = _full_steps(equations, start, tol, scale, max_iterations, linear)
     if root is None and carried and isinstance(equations, Secant) and equations.forget():
-        root = _full_steps(equations, start, tol, scale, max_iterations)
+        root = _full_steps(equations, start, tol, scale, max_iterations, linear)
     return root
 
 
 def _full_steps(
-    equations: Equations, start: Array, tol: float, scale: float, most: int
+    equations: Equations,
+    start: Array,
+    tol: float,
+    scale: float,
+    most: int,
+    linear: Callable[[Array, Array], Array] | None,
 ) -> Array | None:
     x, last = np.array(start, dtype=float), np.inf
     for _ in range(most):
@@ -282,7 +290,7 @@ def _full_steps(
         if not (np.isfinite(values).all() and np.isfinite(jacobian).all()):
             return None
         try:
-            step = -np.linalg.solve(jacobian, values)
+            step = -(np.linalg.solve if linear is None else linear)(jacobian, values)
         except np.linalg.LinAlgError:
             return None
         size = float(np.linalg.norm(step)) / scale

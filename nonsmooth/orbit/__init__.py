@@ -8,6 +8,7 @@ from .basins import (
 from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
+from .connections import Connection, find_homoclinic
 from .equilibrium_branches import continue_equilibrium
 from .find_periodic import VirtualOrbitError, periodic_orbit
 from .funnels import Departure, Funnel
@@ -34,6 +35,7 @@ __all__ = [
     "BranchEnd",
     "BranchEvent",
     "CodimensionTwo",
+    "Connection",
     "Departure",
     "FarSide",
     "FixedItinerary",
@@ -51,6 +53,7 @@ __all__ = [
     "continuation",
     "continue_bifurcation",
     "continue_equilibrium",
+    "find_homoclinic",
     "funnel",
     "gradient",
     "lyapunov_spectrum",

@@ -27,6 +27,9 @@ from ..model.event_maps import AtEvent, surface_map
 from ..model.forcing import Forcing
 from .legs import Flown, Leg, fly
 
+#: Up to so many unknowns a dense solution is faster than elimination in Python.
+_DENSE = 60
+
 
 @dataclass(frozen=True, eq=False)
 class Evaluation:
@@ -229,6 +232,43 @@ class BoundaryProblem:
             jacobian[first + k] = 0.0
             jacobian[first + k, :n] = at.gradient
             by_parameters[first + k] = at.by_parameters[list(columns)]
+
+    def solve(self, jacobian: Array, right: Array) -> Array:
+        """Solve equations with the Jacobian of this problem, by elimination from leg to leg.
+
+        Durations are eliminated first, then the starts of all legs but the first: n^3 operations for
+        each leg (few legs are solved as a dense system). The columns may be scaled.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+        """
+        count, n = len(self.legs), self.dimension
+        if self.size <= _DENSE or self.kept or not all(leg.name for leg in self.legs):
+            return np.asarray(np.linalg.solve(jacobian, right), float)
+        steps, shifts, slopes, times = [], [], [], []
+        for i in range(count):
+            own, time = slice(i * n, (i + 1) * n), count * n + i
+            following = slice(0, n) if i + 1 == count else slice((i + 1) * n, (i + 2) * n)
+            slope = jacobian[time, own] / jacobian[time, time]
+            level = right[time] / jacobian[time, time]
+            ahead = -np.diag(jacobian[own, following])  # a diagonal block, but for one leg
+            steps.append(
+                (jacobian[own, own] - np.outer(jacobian[own, time], slope)) / ahead[:, None]
+            )
+            shifts.append((jacobian[own, time] * level - right[own]) / ahead)
+            slopes.append(slope)
+            times.append(level)
+        whole, shift = np.eye(n), np.zeros(n)
+        for step, more in zip(steps, shifts, strict=True):
+            whole, shift = step @ whole, step @ shift + more
+        x = np.linalg.solve(np.eye(n) - whole, shift)
+        result = np.zeros(self.size)
+        for i in range(count):
+            result[i * n : (i + 1) * n] = x
+            result[count * n + i] = times[i] - slopes[i] @ x
+            x = steps[i] @ x + shifts[i]
+        return result
 
     def scales(self, u: Array) -> Array:
         """Sizes of the unknowns: states by their range over the legs, times by the duration."""

@@ -141,7 +141,13 @@ class _Solver:
         reason = ""
         root: Array | None
         try:
-            root = converge(equations, u / scales, tol=_TOLERANCE, max_iterations=max_iterations)
+            root = converge(
+                equations,
+                u / scales,
+                tol=_TOLERANCE,
+                max_iterations=max_iterations,
+                linear=self.problem.solve,
+            )
         except (ConvergenceError, DegenerateError) as error:
             root, reason = None, str(error)
         if root is None:
@@ -171,7 +177,7 @@ class _Solver:
         """Two more steps at most, as long as they shrink: to rounding."""
         at = self.problem.evaluate(u, self.p)
         for _ in range(2):
-            step = -np.linalg.solve(at.jacobian, at.residual)
+            step = -self.problem.solve(at.jacobian, at.residual)
             new = u + step
             if np.abs(step).max() <= 1e-15 * np.abs(u).max():
                 break

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..flow.fixed import steps_for
-from ..flow.reference.polynomial import first_crossing
+from ..flow.reference.polynomial import first_crossing, keeps_sign
 from ..model import Array, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .legs import Leg
@@ -82,7 +82,9 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     t, margin = 0.0, _ENDS * duration
     for h, states, end in steps_for(field, y, p, duration):
         rows = field.jets.outputs[1].copy()
-        points = [(s, k) for k in range(len(guards)) for s in _extrema(rows[k], h)]
+        slopes = rows[:, 1:] * np.arange(1, rows.shape[1])
+        turning = np.flatnonzero(~keeps_sign(slopes, h)) if len(guards) else ()
+        points = [(s, int(k)) for k in turning for s in _extrema(rows[k], h)]
         if t + h < duration - margin:
             points += [(h, k) for k in range(len(guards))]
         for s, k in points:

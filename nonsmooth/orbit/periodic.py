@@ -236,7 +236,7 @@ class PeriodicOrbit:
                 f"parameter: expected a name among {list(names)}, received {parameter!r}."
             )
         at = self.problem.evaluate(self.unknowns, self.parameter_vector, (names.index(parameter),))
-        change = np.asarray(-np.linalg.solve(at.jacobian, at.by_parameters[:, 0]), float)
+        change = -self.problem.solve(at.jacobian, at.by_parameters[:, 0])
         starts, durations = self.problem.split(change)
         n = self.system.dimension
         period = float(durations.sum()) * (2 if self.symmetric else 1)

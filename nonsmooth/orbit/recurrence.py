@@ -63,15 +63,16 @@ def recurrence(
         return _without_events(run, parts, symmetry, period, first)
     scale = _scales(run)
     anchor = starts[0] if first else starts[-1]
-    found: list[Recurrence] = []
-    for other in starts:
-        a, b = (anchor, other) if first else (other, anchor)
-        if a >= b:
-            continue
-        if symmetry is None and _key(parts, a) != _key(parts, b):
-            continue
-        distance, periods = _distance(run, parts[a], parts[b], scale, symmetry, period)
-        found.append(Recurrence(tuple(parts[a:b]), periods, distance))
+    others = [k for k in starts if (k > anchor if first else k < anchor)]
+    if symmetry is None:
+        others = [k for k in others if _key(parts, k) == _key(parts, anchor)]
+    if not others:
+        return None
+    distances, periods = _distances(run, parts, anchor, others, scale, symmetry, period)
+    found = [
+        Recurrence(tuple(parts[min(anchor, k) : max(anchor, k)]), count, distance)
+        for k, distance, count in zip(others, distances, periods, strict=True)
+    ]
     return _shortest(found)
 
 
@@ -93,25 +94,29 @@ def _scales(run: Trajectory) -> Array:
     return np.where(span > 1e-12 * max(float(span.max()), 1e-300), span, max(span.max(), 1e-300))
 
 
-def _distance(
+def _distances(
     run: Trajectory,
-    a: Stretch,
-    b: Stretch,
+    parts: Sequence[Stretch],
+    anchor: int,
+    others: Sequence[int],
     scale: Array,
     symmetry: Array | None,
     period: float | None,
-) -> tuple[float, float]:
-    """Relative distance of two starts, and the forcing periods between them."""
-    n = run.system.dimension
-    there = b.start[:n] if symmetry is None else symmetry @ b.start[:n]
-    distance = float(np.abs((there - a.start[:n]) / scale).max())
+) -> tuple[list[float], list[float]]:
+    """Relative distances of the starts of parts, and the forcing periods between them."""
+    n, sign = run.system.dimension, 1.0 if others[0] > anchor else -1.0
+    states = np.array([parts[k].start[:n] for k in others])
+    if symmetry is not None:  # its square is 1: either end may be mirrored
+        states = states @ symmetry.T
+    apart = np.abs((states - parts[anchor].start[:n]) / scale).max(axis=1)
     if period is None:
-        return distance, 0.0
-    count = (b.t - a.t) / period
-    whole = round(count) if symmetry is None else round(count - 0.5) + 0.5
-    if whole <= 0:
-        return np.inf, 0.0
-    return max(distance, 2.0 * abs(count - whole)), float(whole)
+        return apart.tolist(), [0.0] * len(others)
+    times = np.array([parts[k].t for k in others])
+    count = sign * (times - parts[anchor].t) / period
+    shift = 0.0 if symmetry is None else 0.5
+    whole = np.round(count - shift) + shift
+    apart = np.maximum(apart, 2.0 * np.abs(count - whole))
+    return np.where(whole > 0.0, apart, np.inf).tolist(), whole.tolist()
 
 
 def _without_events(

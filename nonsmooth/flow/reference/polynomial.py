@@ -34,6 +34,22 @@ def _to_bernstein(degree: int) -> NDArray[np.float64]:
     )
 
 
+def keeps_sign(coefficients: NDArray[np.float64], h: float) -> NDArray[np.bool_]:
+    """Whether polynomials (rows, in powers of t) surely have no zero for t between 0 and h.
+
+    By their Bernstein coefficients, between whose least and largest all values lie; where that does
+    not decide, the answer is False.
+
+    Examples
+    --------
+    >>> keeps_sign(np.array([[1.0, -0.5], [1.0, -2.0]]), 1.0).tolist()
+    [True, False]
+    """
+    degree = coefficients.shape[1] - 1
+    b = (coefficients * h ** np.arange(degree + 1)) @ _to_bernstein(degree).T
+    return np.asarray((b > 0.0).all(axis=1) | (b < 0.0).all(axis=1))
+
+
 def first_root(coefficients: Sequence[float], h: float) -> float | None:
     """First t in (0, h] at which a polynomial that is positive at 0 stops being positive.
 

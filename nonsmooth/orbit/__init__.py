@@ -23,7 +23,7 @@ from .poincare import (
     PoincareOrbit,
     poincare,
 )
-from .sensitivity import Gradient, gradient, sensitivity, vjp
+from .sensitivity import Gradient, gradient, saltation_matrix, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds
 from .variation import Sensitivity
 
@@ -60,6 +60,7 @@ __all__ = [
     "paths_from",
     "periodic_orbit",
     "poincare",
+    "saltation_matrix",
     "sensitivity",
     "trace_two_folds",
     "vjp",

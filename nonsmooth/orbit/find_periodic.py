@@ -27,6 +27,9 @@ from .periodic import PeriodicOrbit, faults_of, named
 #: Newton's method ends when the next step would be below this, relative to the orbit.
 _TOLERANCE = 1e-10
 
+#: No leg may grow to so many times the guess of the whole orbit.
+_LONGEST = 10.0
+
 
 def periodic_orbit(
     system: FilippovSystem,
@@ -130,9 +133,17 @@ class _Solver:
         ConvergenceError
         """
         scales = self.problem.scales(u)
+        longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
 
         def equations(v: Array) -> tuple[Array, Array]:
             self.last = v * scales, None
+            durations = self.problem.split(v * scales)[1]
+            if not np.abs(durations).max() <= longest:
+                i = int(np.argmax(np.abs(durations)))
+                raise ConvergenceError(
+                    f"Leg {i + 1} {leg_name(self.problem.legs[i])} grew to the duration "
+                    f"{durations[i]:.3g}."
+                )
             at = self.problem.evaluate(v * scales, self.p)
             self.last = v * scales, at
             self.iterations += 1

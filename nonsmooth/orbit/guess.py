@@ -17,8 +17,10 @@ from ..model import (
     Array,
     ConvergenceError,
     FilippovSystem,
+    NonsmoothError,
     OptionError,
     Parameters,
+    Surfaces,
     explain,
     real_array,
 )
@@ -34,6 +36,12 @@ _MOST_EVENTS = 2000
 
 #: A leg of a given itinerary is followed so many times the time in which the state changes.
 _LONGEST = 200.0
+
+#: A run that comes back as near as this, relative to its size, is not simulated further.
+_GOOD = 0.02
+
+#: A state that may be one after a reset is left by this part of that time.
+_LATER = 0.05
 
 Itinerary = str | Sequence[str] | Sequence[tuple[str, str]]
 
@@ -224,23 +232,26 @@ def _simulated(
     forced: bool,
     p: Array,
 ) -> Recurrence:
-    """Simulate from a state, longer and longer, until the run comes back."""
-    n, values = system.dimension, named(system, p)
-    t = float(x[-1]) if system.time_dependent else 0.0
-    unit = hint if hint else _natural_time(system, x, p)
-    period = hint if forced else None
+    """Simulate from a state, longer and longer, until the run comes back.
+
+    Where there are resets the state may be meant as that after one, which is due again at once when a
+    run begins there; so a state a little later is tried as well.
+    """
+    natural = _natural_time(system, x, p)
+    starts = [x]
+    if system.resets:
+        try:
+            later = fly(system, Leg(_letters(system, x, p)), x, _LATER * natural, p).end
+            starts = [later[: x.size], x]
+        except NonsmoothError:
+            pass
     best: Recurrence | None = None
     run: Trajectory | None = None
-    for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
-        run = simulate(
-            system, x[:n], t + span * unit, t_start=t, parameters=values, tol=1e-12,
-            max_events=_MOST_EVENTS,
-        )  # fmt: skip
-        for first in (True, False):
-            found = recurrence(run, symmetry=mirror, period=period, first=first)
-            if found is not None and (best is None or found.distance < 0.3 * best.distance):
-                best = found
-        if (best is not None and best.distance < 0.02) or run.status is not Status.REACHED_END:
+    for start in starts:
+        run, found = _comes_back(system, start, mirror, hint or natural, hint, forced, p)
+        if found is not None and (best is None or found.distance < best.distance):
+            best = found
+        if best is not None and best.distance < _GOOD:
             break
     assert run is not None
     if best is None or best.distance > CLOSE:
@@ -248,10 +259,46 @@ def _simulated(
     return best
 
 
+def _comes_back(
+    system: FilippovSystem,
+    x: Array,
+    mirror: Array | None,
+    unit: float,
+    hint: float | None,
+    forced: bool,
+    p: Array,
+) -> tuple[Trajectory, Recurrence | None]:
+    n, values = system.dimension, named(system, p)
+    t = float(x[-1]) if system.time_dependent else 0.0
+    best: Recurrence | None = None
+    for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
+        run = simulate(
+            system,
+            x[:n],
+            t + span * unit,
+            t_start=t,
+            parameters=values,
+            tol=1e-12,
+            max_events=_MOST_EVENTS,
+        )
+        for first in (True, False):
+            found = recurrence(run, symmetry=mirror, period=hint if forced else None, first=first)
+            if found is not None and (best is None or found.distance < 0.3 * best.distance):
+                best = found
+        if (best is not None and best.distance < _GOOD) or run.status is not Status.REACHED_END:
+            break
+    return run, best
+
+
+def _letters(system: FilippovSystem, x: Array, p: Array) -> str:
+    """The mode of a state that is on no surface."""
+    h = Surfaces(system).values(x, p)[0][: system.surface_count]
+    return "".join("+" if v > 0 else "-" for v in h) + "o" * len(system.impacts)
+
+
 def _natural_time(system: FilippovSystem, x: Array, p: Array) -> float:
     """The time in which the state changes by its size."""
-    mode = system.modes[0] + "o" * len(system.impacts)
-    field = Leg(mode).field(system)
+    field = Leg(_letters(system, x, p)).field(system)
     rate = field.rate.copied(field.initial(x, p)[:, 0], p)[0][: system.dimension, 0]
     size, speed = float(np.linalg.norm(x[: system.dimension])), float(np.linalg.norm(rate))
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

@@ -316,24 +316,23 @@ def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
 
 def _margins(orbit: PeriodicOrbit) -> list[Margin]:
     problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
-    size = float(np.abs(at.starts[:, : orbit.system.dimension]).max()) or 1.0
+    size = problem.scales(orbit.unknowns)[: problem.dimension]  # units of the states do not matter
     result: list[Margin] = []
     for i, leg in enumerate(problem.legs):
         duration = float(at.durations[i])
         verb = "slides" if "s" in leg.mode else "lasts"
         if leg.name:
             result.append(Margin(i, f"{verb} for", duration, duration / orbit.period))
-            flown, event = at.flown[i], at.events[i]
-            speed = float(event.gradient @ flown.rate)
-            length = float(np.linalg.norm(event.gradient) * np.linalg.norm(flown.rate)) or 1.0
-            result.append(
-                Margin(i, f"meets {leg.name} at the angle", speed / length, speed / length)
-            )
+            gradient, rate = at.events[i].gradient[: size.size], at.flown[i].rate[: size.size]
+            length = float(np.linalg.norm(gradient * size) * np.linalg.norm(rate / size)) or 1.0
+            angle = float(at.events[i].gradient @ at.flown[i].rate) / length
+            result.append(Margin(i, f"meets {leg.name} at the angle", angle, angle))
         if duration <= 0.0:
             continue
         for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
             what = f"keeps {described(near.guard)} at its nearest by"
-            result.append(Margin(i, what, near.distance, near.distance / size))
+            relative = near.distance / float(np.abs(size[: orbit.system.dimension]).max())
+            result.append(Margin(i, what, near.distance, relative))
     return result
 
 

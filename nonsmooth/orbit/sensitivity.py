@@ -1,4 +1,4 @@
-"""The verbs ``sensitivity``, ``gradient`` and ``vjp``: derivatives of a run."""
+"""The verbs ``sensitivity``, ``gradient``, ``vjp`` and ``saltation_matrix``: derivatives of a run."""
 
 from __future__ import annotations
 
@@ -12,14 +12,20 @@ from numpy.typing import ArrayLike
 from ..flow.trajectory import Trajectory
 from ..model import (
     Array,
+    FilippovSystem,
     OptionError,
     ParameterError,
+    Parameters,
     PointError,
     explain,
     read_function,
     real_array,
+    require_system,
 )
 from ..model.event_maps import function_map
+from .itinerary import leg_between
+from .legs import Leg
+from .saltation import saltation
 from .variation import Passage, Sensitivity, along, passages
 
 
@@ -186,6 +192,69 @@ def vjp(
     whole[:n] = row
     back, by_parameters = _pulled(parts, whole, chosen, stopped=_stopped(parts[-1]))
     return back[:n], by_parameters
+
+
+def saltation_matrix(
+    system: FilippovSystem,
+    before: str,
+    after: str,
+    point: ArrayLike,
+    *,
+    event: str = "",
+    t: float = 0.0,
+    parameters: Parameters | None = None,
+) -> Array:
+    """The saltation matrix of one event: how perturbations of an orbit pass it.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    before, after : str
+        Modes.
+    point : array_like (n,)
+        Where the event happens, before a reset.
+    event : str, optional
+        Name of the event (``"h0"``, a reset, an impact), where the letters of the modes do not tell it.
+    t : float, optional
+        Time, where the system depends on it.
+    parameters : mapping, optional
+
+    Returns
+    -------
+    ndarray (n, n)
+
+    Raises
+    ------
+    DegenerateError
+        The orbit grazes the surface.
+    OptionError
+        The modes do not tell the event.
+    DefinitionError, ParameterError, PointError
+
+    Notes
+    -----
+    S = g_x + (f+ - g_x f-) e_x/(e_x f-), time included (Leine & Nijmeijer 2004, ch. 7).
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
+    >>> ns.saltation_matrix(system, "+", "-", [0.0, 0.0])
+    array([[ 1. , -1. ],
+           [ 0. ,  0.5]])
+    """
+    require_system(system)
+    p, x = system.parameter_vector(parameters), system.extended_point(point, t)
+    leg = leg_between(system, before, after, event)
+    field, following = leg.field(system), Leg(after).field(system)
+    y = field.initial(x, p)
+    at = leg.at_end(system, y[:, 0], p)
+    start = following.initial(at.after, p)[:, 0]
+    rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
+    size, n = system.extended_dimension, system.dimension
+    matrix = saltation(at, rates[0], rates[1][:size], f"{leg.name!r} at {x[:n].tolist()}").matrix
+    return np.asarray((matrix @ y[:, 1 : 1 + size])[:n, :n])
 
 
 def _stopped(last: Passage) -> bool:

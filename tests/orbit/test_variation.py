@@ -227,6 +227,26 @@ def test_a_corner_is_refused() -> None:
         ns.sensitivity(run)
 
 
+def test_saltation_matrices_are_those_of_exact_fractions() -> None:
+    def exact(rows) -> np.ndarray:
+        return np.array([[eval(v) for v in row] for row in rows])  # fractions such as "-1/2"
+
+    values, at = CASES["S1"]["values"], [0.0, 0.0]
+    crossing = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
+    assert np.array_equal(ns.saltation_matrix(crossing, "+", "-", at), exact(values["crossing"]))
+    entry = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, 2])
+    assert np.array_equal(ns.saltation_matrix(entry, "+", "s", at), exact(values["entry"]))
+    moving = ns.FilippovSystem([x, y], surface=y + 3 * t, above=[1, -5], below=[3, -4], time=t)
+    found = ns.saltation_matrix(moving, "+", "-", at)
+    assert np.array_equal(found, exact(values["time_dependent"]))
+    after = [x + y / 4, -y / 2]
+    jump = ns.FilippovSystem(
+        [x, y], surface=x - y, above=[1, 2], below=[1, -2], resets=ns.Reset(y, after, -1, "jump")
+    )
+    found = ns.saltation_matrix(jump, "-", "+", at, event="jump")
+    assert np.array_equal(found, exact(values["reset"]))
+
+
 def test_bad_input_is_refused_in_words() -> None:
     run = ns.simulate(throw(), [0.0, 3.0], t_end=2.0)
     with pytest.raises(ns.ParameterError, match="mu3"):

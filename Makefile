@@ -24,7 +24,7 @@ test: .venv/.test ## the tests, without the slow ones
 	@$(PYTEST) -m "not slow" $(PYTEST_ARGS)
 
 check: lint ## everything that must hold before a release: lint, then all tests
-	@$(PYTEST) $(PYTEST_ARGS)
+	@HYPOTHESIS_PROFILE=$${HYPOTHESIS_PROFILE:-whole} $(PYTEST) $(PYTEST_ARGS)
 
 bench: .venv/.bench ## measured speeds, beside the peers
 	@$(BIN)/python -m benchmarks

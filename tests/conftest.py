@@ -1,7 +1,9 @@
 """What every test runs under: no display, and property tests that repeat.
 
 The default hypothesis profile draws the same examples every time, so a clone passes or fails like
-any other; `HYPOTHESIS_PROFILE=explore` draws new ones, and many more, to look for a counterexample.
+any other: 30 of each property, or as many as hypothesis finds good (100) with
+`HYPOTHESIS_PROFILE=whole`, which `make check` and CI take. `HYPOTHESIS_PROFILE=explore` draws new
+ones, and many more, to look for a counterexample.
 """
 
 import os
@@ -10,6 +12,7 @@ from hypothesis import settings
 
 os.environ["MPLBACKEND"] = "Agg"
 
-settings.register_profile("ci", derandomize=True, deadline=None)
+settings.register_profile("quick", derandomize=True, deadline=None, max_examples=30)
+settings.register_profile("whole", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, max_examples=2000, print_blob=True)
-settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "ci"))
+settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))

@@ -40,7 +40,8 @@ def test_circle():
     assert np.max(late) < 1e-9 and late[0] == 0.0
 
 
-def test_sphere():
+@pytest.mark.parametrize("long", [LONG / 10, pytest.param(LONG, marks=pytest.mark.slow)])
+def test_sphere(long):
     """Rotation about a tilted axis on the unit sphere, pulled in and out with unequal strength."""
     x = ca.SX.sym("x", 3)
     axis = np.array([2.0, -1.0, 2.0]) / 3.0
@@ -52,11 +53,11 @@ def test_sphere():
         below=ca.vertsplit(spin + x * (1.5 + x[1])),
     )
     start = np.array([0.6, 0.0, 0.8])
-    run = ns.simulate(system, start, LONG, tol=1e-12)
+    run = ns.simulate(system, start, long, tol=1e-12)
     assert run.itinerary == "s" and run.status is ns.Status.REACHED_END
     assert np.max(np.abs(np.sum(run.x**2, axis=1) - 1)) < 1e-12
     along = axis * (axis @ start)
-    t = np.linspace(0.0, LONG, 1001)[:, None]
+    t = np.linspace(0.0, long, 1001)[:, None]
     exact = along + np.cos(t) * (start - along) + np.sin(t) * np.cross(axis, start)
     assert np.max(np.abs(run(t[:, 0]) - exact)) < 1e-9
 

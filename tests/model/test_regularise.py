@@ -36,7 +36,13 @@ def order(found, widths):
     return np.log(found[-2] / found[-1]) / np.log(widths[-2] / widths[-1])
 
 
-@pytest.mark.parametrize("transition", SMOOTHERS)
+@pytest.mark.parametrize(
+    "transition",
+    [
+        s if s in ("tanh", "algebraic") else pytest.param(s, marks=pytest.mark.slow)
+        for s in SMOOTHERS
+    ],
+)
 @pytest.mark.parametrize(
     ("system", "start", "t_end"),
     [(CROSSING, [0.0, -0.5], 2.0), (SLIDING, [0.0, 0.2], 1.0)],

@@ -1,5 +1,7 @@
 """The portraits of a two-fold draw exact orbits, name every part, and leave matplotlib as it was."""
 
+from functools import cache
+
 import casadi as ca
 import matplotlib
 import numpy as np
@@ -36,6 +38,12 @@ BOUNDARIES = {
 ALL = {**CLASSES, **BOUNDARIES}
 
 
+@cache
+def shared(draw, sigma, nu) -> Figure:
+    """A portrait that several tests look at and leave as it is."""
+    return draw((sigma, nu))
+
+
 def lines(figure: Figure, gid: str) -> list[np.ndarray]:
     return [
         np.column_stack(line.get_data())
@@ -51,7 +59,7 @@ def words(figure: Figure) -> set[str]:
 @pytest.mark.parametrize("sigma, nu", ALL.values(), ids=ALL)
 def test_drawn_orbits_satisfy_the_reduced_equation_in_the_direction_of_time(sigma, nu):
     flow = ReducedFlow(sigma, nu)
-    drawn = lines(ns.plot.two_fold((sigma, nu)), "orbit")
+    drawn = lines(shared(ns.plot.two_fold, sigma, nu), "orbit")
     assert len(drawn) >= 4
     for curve in drawn:
         assert np.all(curve >= 0) or np.all(curve <= 0)  # each stays in Da or in Dr
@@ -71,7 +79,7 @@ def test_drawn_orbits_are_exact(label):
     sigma, nu = CLASSES[label]
     flow = ReducedFlow(sigma, nu)
     low, high = flow.eigenvalues
-    for curve in lines(ns.plot.two_fold((sigma, nu)), "orbit"):
+    for curve in lines(shared(ns.plot.two_fold, sigma, nu), "orbit"):
         # u = u0 e^(low r), v = v0 e^(high r): this combination does not change along an orbit
         u, v = np.abs(np.linalg.solve(flow.eigenvectors, curve.T))
         away = (u > 1e-6) & (v > 1e-6)
@@ -81,7 +89,7 @@ def test_drawn_orbits_are_exact(label):
 @pytest.mark.parametrize("sigma, nu", ALL.values(), ids=ALL)
 def test_eigenlines_have_the_slope_of_the_theory(sigma, nu):
     flow = ReducedFlow(sigma, nu)
-    drawn = lines(ns.plot.two_fold((sigma, nu)), "eigenline")
+    drawn = lines(shared(ns.plot.two_fold, sigma, nu), "eigenline")
     assert len(drawn) == len(eigenlines(flow))
     for (value, _), line in zip(eigenlines(flow), drawn, strict=True):
         (a, b), (c, d) = line
@@ -92,7 +100,7 @@ def test_eigenlines_have_the_slope_of_the_theory(sigma, nu):
 @pytest.mark.parametrize("draw", [ns.plot.two_fold, ns.plot.two_fold_3d])
 @pytest.mark.parametrize("sigma, nu", ALL.values(), ids=ALL)
 def test_every_part_is_named(draw, sigma, nu):
-    figure = draw((sigma, nu))
+    figure = shared(draw, sigma, nu)
     ax = figure.axes[0]
     assert {"$D_a$", "$D_r$", "$C_1$", "$C_2$"} <= words(figure)
     assert len(lines(figure, "fold")) == 2
@@ -114,7 +122,9 @@ def test_axes_are_labelled():
 @pytest.mark.parametrize("sigma, nu", ALL.values(), ids=ALL)
 def test_visible_folds_are_solid_and_invisible_ones_dashed(sigma, nu):
     folds = [
-        line for line in ns.plot.two_fold((sigma, nu)).axes[0].lines if line.get_gid() == "fold"
+        line
+        for line in shared(ns.plot.two_fold, sigma, nu).axes[0].lines
+        if line.get_gid() == "fold"
     ]
     for line, visible in zip(folds, (sigma[0] == 1, sigma[1] == -1), strict=True):
         assert (line.get_linestyle() == "-") == visible

@@ -91,7 +91,9 @@ def test_bisection_by_simulation_finds_the_same_spin(curve):
         assert abs(low - spin) < 1e-8
 
 
-@pytest.mark.parametrize("eta", [0.5, 1.0, 1.3, 2.0])
+@pytest.mark.parametrize(
+    "eta", [0.5, 2.0, *(pytest.param(eta, marks=pytest.mark.slow) for eta in (1.0, 1.3))]
+)
 def test_forward_slip_on_one_side_and_reverse_slip_on_the_other(eta):
     """Also where the curve goes on through itineraries such as + - s, + s + and - +."""
     model = TURF.replace(eta=eta)
@@ -143,7 +145,15 @@ MODELS = [
 ]
 
 
-@pytest.mark.parametrize("model", MODELS, ids=lambda m: type(m).__name__)
+#: Dear ones, of which the rest has one of each kind: a damper, a power law, an own law.
+DEAR = (bounce.KuwabaraKono, Coupled, bounce.Maxwell)
+
+
+@pytest.mark.parametrize(
+    "model",
+    [pytest.param(m, marks=pytest.mark.slow) if type(m) in DEAR else m for m in MODELS],
+    ids=lambda m: type(m).__name__,
+)
 def test_other_contact_models_have_it_too(model):
     curve = bounce.dividing_curve(model, step=0.3, reach=1.0)
     assert curve.junction is not None

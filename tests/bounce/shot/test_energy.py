@@ -54,7 +54,7 @@ def test_adhesion_that_is_let_go_where_it_ends():
     assert shot.lift_off.ydot == pytest.approx(np.sqrt(1 - 0.05**2 - 2 * 0.05 * 0.05), abs=1e-9)
 
 
-@pytest.mark.parametrize("tol", [1e-6, 1e-10])
+@pytest.mark.parametrize("tol", [1e-6, pytest.param(1e-10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "model",
     [

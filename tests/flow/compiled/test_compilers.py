@@ -109,7 +109,13 @@ print(text)
 
 
 @pytest.mark.parametrize(
-    "stub", ["developer tools", "writes no library", "no program"], indirect=True
+    "stub",
+    [
+        "writes no library",
+        pytest.param("developer tools", marks=pytest.mark.slow),
+        pytest.param("no program", marks=pytest.mark.slow),
+    ],
+    indirect=True,
 )
 def test_without_another_compiler_the_reference_driver_runs_with_one_warning(stub):
     path = os.pathsep.join(p for p in sys.path if p)

@@ -113,7 +113,7 @@ numbers = st.floats(-4, 4).filter(lambda v: abs(v) > 1e-6)
 signs = st.sampled_from([VV, II, VI, IV])
 
 
-@settings(max_examples=25)
+@settings(max_examples=8)
 @given(signs, numbers, numbers)
 def test_rings_at_random(sigma, n1, n2):
     c = classify_two_fold(sigma, (n1, n2))

@@ -25,6 +25,7 @@ from .multipliers import sliding_multipliers
 from .periods import is_function, periods, read_period
 from .reading import Parameters
 from .regularise import regularise
+from .reversal import reversed_system
 from .sections import SECTION, with_section
 from .switches import Guard
 from .system import FilippovSystem
@@ -74,6 +75,7 @@ __all__ = [
     "real_array",
     "regularise",
     "require_system",
+    "reversed_system",
     "sliding_multipliers",
     "watched_functions",
     "whole",

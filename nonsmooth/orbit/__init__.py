@@ -18,6 +18,10 @@ from .lyapunov import (
     LyapunovSpectrum,
     lyapunov_spectrum,
 )
+from .manifold import (
+    Manifold,
+    manifold,
+)
 from .periodic import PeriodicOrbit
 from .poincare import (
     PoincareOrbit,
@@ -42,6 +46,7 @@ __all__ = [
     "Funnel",
     "Gradient",
     "LyapunovSpectrum",
+    "Manifold",
     "Path",
     "PeriodicOrbit",
     "PoincareOrbit",
@@ -57,6 +62,7 @@ __all__ = [
     "funnel",
     "gradient",
     "lyapunov_spectrum",
+    "manifold",
     "paths_from",
     "periodic_orbit",
     "poincare",

@@ -8,6 +8,9 @@ from . import style
 from .basin_map import (
     basins,
 )
+from .manifold_picture import (
+    manifold,
+)
 from .phase_portrait import phase_portrait
 from .sliding_portrait import sliding_portrait
 from .trajectory import trajectory
@@ -17,6 +20,7 @@ from .two_fold_space import two_fold_3d
 
 __all__ = [
     "basins",
+    "manifold",
     "phase_portrait",
     "sliding_portrait",
     "style",

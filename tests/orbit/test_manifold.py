@@ -1,0 +1,141 @@
+"""Manifolds are those of closed forms: separatrices through switches, thresholds, surfaces."""
+
+import json
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+CASES = {
+    case["id"]: case
+    for case in json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
+}
+x, y, z, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "t", "lam"))
+
+
+def test_smooth_saddle_and_its_curves_through_a_switch():
+    """x' = x, y' = -y + x**2 on both sides of y = 1/2: W^u is y = x**2/3, W^s is x = 0."""
+    field = [x, -y + x**2]
+    system = ns.FilippovSystem([x, y], surface=y - 0.5, above=field, below=[field[0] + 0, field[1]])
+    saddle = ns.find_equilibrium(system, [0.1, 0.1], side="-")
+    out = ns.manifold(system, saddle, stable=False, length=4.0)
+    assert out.dimension == 1 and len(out.arcs) == 2
+    for arc in out.arcs:
+        assert np.allclose(arc.points[:, 1], arc.points[:, 0] ** 2 / 3, rtol=0, atol=1e-9)
+        steps = np.linalg.norm(np.diff(arc.points, axis=0), axis=1)
+        assert arc.end == "length" and steps[:-1] == pytest.approx(0.04, rel=0.03)
+    back = ns.manifold(system, saddle, length=2.0)
+    for arc in back.arcs:
+        assert np.abs(arc.points[:, 0]).max() < 1e-9 and np.all(np.diff(arc.t) < 0)
+        assert abs(arc.points[-1, 1]) == pytest.approx(2.0, abs=1e-3)
+    assert {arc.itinerary for arc in back.arcs} == {"-", "- +"}
+
+
+def test_thresholds_of_the_double_well_are_on_the_orbits_through_its_fold():
+    """B2: the orbits that come to the visible-visible two-fold divide the basins."""
+    well = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
+    found = ns.manifold(well, ns.fold_fold(well, [0.0, 0.0]), length=30.0, spacing=0.001, tol=1e-13)
+    thresholds = []
+    for arc in found.arcs:
+        p, w = arc.points[:, 0], arc.points[:, 1]
+        for k in np.flatnonzero((w[:-1] * w[1:] < 0) & (p[:-1] > 0)):
+            # close to v = 0 the curve is a parabola in v
+            near = slice(k - 3, k + 5)
+            thresholds.append(np.polyval(np.polyfit(w[near], p[near], 4), 0.0))
+    truth = [float(value) for value in CASES["B2"]["values"]["thresholds"]]
+    assert sorted(thresholds)[:3] == pytest.approx(truth, abs=1e-9)
+
+
+def test_the_homoclinic_orbit_leaves_by_the_fold_and_ends_at_the_pseudo_saddle():
+    """H1: at the homoclinic parameter the stable manifold begins at the visible fold."""
+    values = {k: float(s) for k, s in CASES["H1"]["values"].items()}
+    rho, c = float(CASES["H1"]["parameters"]["rho"]), values["c_homoclinic"]
+    system = ns.FilippovSystem(
+        [x, y], surface=y, above=[rho * x - (y - 1), x + rho * (y - 1)], below=[c, 1]
+    )
+    saddle = ns.find_pseudo_equilibrium(system, [values["x_pseudo_saddle"] + 0.01, 0.0])
+    above = ns.manifold(system, saddle, length=12.0, spacing=1e-3, tol=1e-13).arcs[0]
+    apart = np.linalg.norm(above.points - [values["x_fold"], 0.0], axis=1)
+    near = int(np.argmin(apart))
+    assert above.t[near] == pytest.approx(-values["flight"], abs=2e-3)
+    # between the points beside the fold the orbit is a parabola that touches y = 0 there
+    part = above.points[near - 3 : near + 4]
+    touch = np.polynomial.Polynomial.fit(part[:, 0] - values["x_fold"], part[:, 1], 4)
+    assert abs(touch(0.0)) < 1e-10 and abs(touch.deriv()(0.0)) < 1e-7
+    slide = ns.manifold(system, saddle, stable=False, length=1.0)
+    assert [arc.itinerary.split()[0] for arc in slide.arcs] == ["s", "s"]
+    assert np.abs(slide.arcs[0].points[:20, 1]).max() < 1e-12
+
+
+def test_a_surface_of_a_saddle_in_space():
+    """x' = -x, y' = -3 y, z' = z + x**2: the stable manifold is z = -x**2/3."""
+    switched = ns.FilippovSystem(
+        [x, y, z],
+        surface=x - 0.4,
+        above=[-x, -3 * y, z + x**2],
+        below=[-x, -3 * y + 0 * x, z + x**2],
+    )
+    saddle = ns.find_equilibrium(switched, [0.1, 0.1, 0.1], side="-")
+    found = ns.manifold(switched, saddle, length=0.8, spacing=0.1, max_orbits=120)
+    assert found.dimension == 2 and 16 <= len(found.arcs) <= 120
+    points = found.points
+    assert np.allclose(points[:, 2], -(points[:, 0] ** 2) / 3, rtol=0, atol=1e-9)
+    corners = points[found.triangles]
+    area = np.linalg.norm(
+        np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1
+    ).sum()
+    assert area > 1.6 and len(found.triangles) > 200
+    flat = corners[:, :, :2]
+    assert (np.linalg.norm(flat.mean(axis=1), axis=1) < 0.1).any()
+
+
+def test_the_surface_that_ends_on_a_sliding_curve():
+    """Sliding on z = 0 has a saddle at 0 with W^s: x = 0; fields (x, -y, -+1) keep x = 0."""
+    system = ns.FilippovSystem([x, y, z], surface=z, above=[x, -y, -1], below=[x, -y, 1])
+    saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.0])
+    assert saddle.kind == "pseudo-saddle"
+    found = ns.manifold(system, saddle, length=0.8, spacing=0.2)
+    assert found.dimension == 2 and np.abs(found.points[:, 0]).max() < 1e-9
+    assert found.points[:, 2].max() > 0.5 and found.points[:, 2].min() < -0.5
+    assert {arc.itinerary for arc in found.arcs} == {"+", "-"}
+    out = ns.manifold(system, saddle, stable=False, length=1.0)
+    assert out.dimension == 1 and np.abs(out.arcs[0].points[:, 1:]).max() < 1e-9
+
+
+def test_backward_a_manifold_ends_where_sliding_begins():
+    """The stable manifold of the saddle above meets y = -1, where both fields lead away."""
+    system = ns.FilippovSystem([x, y], surface=y + 1, above=[x, -y], below=[0.3, -1.0 + 0 * y])
+    saddle = ns.find_equilibrium(system, [0.1, 0.1], side="+")
+    ends = {arc.end for arc in ns.manifold(system, saddle, length=3.0).arcs}
+    assert ends == {"length", "sliding"}
+
+
+def test_manifolds_are_saved(tmp_path):
+    plain = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
+    found = ns.manifold(plain, ns.find_equilibrium(plain, [0.1, 0.1]), length=1.0)
+    found.save(tmp_path / "manifold")
+    again = ns.load(tmp_path / "manifold")
+    assert repr(again) == repr(found) and repr(again.arcs) == repr(found.arcs)
+    assert np.array_equal(again.arcs[1].points, found.arcs[1].points)
+
+
+def test_what_has_no_manifold_is_refused():
+    node = ns.FilippovSystem([x, y], surface=x - 2, above=[-x, -y], below=[-x, -2 * y])
+    found = ns.find_equilibrium(node, [0.1, 0.1], side="-")
+    with pytest.raises(ns.DegenerateError, match="expected a point with unstable directions"):
+        ns.manifold(node, found, stable=False, length=1.0)
+    virtual = ns.find_equilibrium(node, [0.1, 0.1], side="+")
+    with pytest.raises(ns.DegenerateError, match="received a virtual one"):
+        ns.manifold(node, virtual, length=1.0)
+    with pytest.raises(ns.OptionError, match="of: expected an Equilibrium"):
+        ns.manifold(node, [0.0, 0.0], length=1.0)
+    with pytest.raises(ns.OptionError, match="length: expected a positive number"):
+        ns.manifold(node, found, length=-1.0)
+    kicked = ns.FilippovSystem(
+        [x, y], surface=x - 2, above=[x, -y], below=[x, -2 * y], resets=ns.Reset(y - 1, [x, 0], 1)
+    )
+    with pytest.raises(ns.DefinitionError, match="system: expected one without resets"):
+        ns.manifold(kicked, ns.find_equilibrium(kicked, [0.1, 0.1], side="-"), length=1.0)

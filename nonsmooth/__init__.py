@@ -120,16 +120,28 @@ from .orbit import (
 
 if TYPE_CHECKING:
     from . import plot, textbook
-    from .proofs import Census, Enclosure, MissingError, Proof, UnprovenError, certify, prove_all
+    from .proofs import (
+        Census,
+        Enclosure,
+        MissingError,
+        OrbitProof,
+        Proof,
+        UnprovenError,
+        certify,
+        certify_orbit,
+        prove_all,
+    )
 
 #: Names that come from the floor of proofs, loaded when asked for.
 _OF_PROOFS = (
     "Census",
     "Enclosure",
     "MissingError",
+    "OrbitProof",
     "Proof",
     "UnprovenError",
     "certify",
+    "certify_orbit",
     "prove_all",
 )
 
@@ -163,6 +175,7 @@ __all__ = [
     "NonsmoothError",
     "NotSmoothError",
     "OptionError",
+    "OrbitProof",
     "ParameterError",
     "PeriodicOrbit",
     "PoincareOrbit",
@@ -185,6 +198,7 @@ __all__ = [
     "basins",
     "boundary_equilibrium",
     "certify",
+    "certify_orbit",
     "classify",
     "continuation",
     "continue_bifurcation",

@@ -53,3 +53,11 @@ def test_bounce(tmp_path, monkeypatch):
     above = spins[np.flatnonzero(np.diff(signs) > 0)[-1], column]
     assert above == pytest.approx(curve.omega(speeds[0, column]), abs=8 / 999)
     assert (tmp_path / "cone.png").stat().st_size > 10_000
+
+
+def test_proof(tmp_path, monkeypatch, capsys):
+    names = run("proof", tmp_path, monkeypatch)
+    assert names["proof"].label == "II-C" and names["proof"].values["nu1"].low == "-2"
+    assert names["everything"].zeros[0].label == "II-C"
+    printed = capsys.readouterr().out
+    assert "exactly one two-fold" in printed and "itinerary + -" in printed

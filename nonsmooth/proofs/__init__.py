@@ -12,26 +12,31 @@ from typing import Any
 
 from .census import Census, Undecided
 from .enclosure import Enclosure
+from .orbit_proof import OrbitProof, ProvenEvent
 from .proof import MissingError, Proof, UnprovenError
 
 try:
     from .certify import certify
     from .everything import prove_all
+    from .orbits import certify_orbit
 except MissingError as error:  # the names are there, and say what is missing when they are called
     _reason = str(error)
 
     def _refuse(*args: Any, **options: Any) -> Any:
         raise MissingError(_reason)
 
-    certify = prove_all = _refuse
+    certify = certify_orbit = prove_all = _refuse
 
 __all__ = [
     "Census",
     "Enclosure",
     "MissingError",
+    "OrbitProof",
     "Proof",
+    "ProvenEvent",
     "Undecided",
     "UnprovenError",
     "certify",
+    "certify_orbit",
     "prove_all",
 ]

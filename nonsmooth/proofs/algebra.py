@@ -1,6 +1,6 @@
 """Expressions as polynomials with rational coefficients: what is equal here is equal.
 
-Instructions that are not polynomial (a sine, a quotient) stand for themselves as atoms. Common
+Instructions that are not polynomial (a sine, an inverse) stand for themselves as atoms. Common
 factors are found by the exact greatest common divisor over the rationals.
 """
 
@@ -14,7 +14,7 @@ from .arithmetic import Numbers, exact
 from .flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx
 from .tape import Tape
 
-_POLYNOMIAL = {"const", "add", "sub", "mul", "neg", "sq", "twice", "power"}
+_POLYNOMIAL = {"const", "add", "sub", "mul", "div", "neg", "sq", "twice", "power"}
 
 
 class Algebra:
@@ -32,6 +32,10 @@ class Algebra:
         self.tape = tape
         chosen = tape.ancestors(roots)
         self.atoms = [k for k in chosen if not self._is_polynomial(k)]
+        # A quotient is a product with the inverse of its denominator, which is an atom.
+        below = {k: tape.nodes[k].args[1] for k in chosen if tape.nodes[k].op == "div"}
+        self._inverse = {k: tape.node("inv", b) for k, b in below.items()}
+        self.atoms += sorted(set(self._inverse.values()) - set(self.atoms))
         names = [f"a{k}" for k in self.atoms] or ["a"]
         self.ring = fmpq_mpoly_ctx.get(names, "lex")
         self._value: dict[int, Any] = dict(zip(self.atoms, self.ring.gens(), strict=False))
@@ -39,7 +43,9 @@ class Algebra:
             if k not in self._value:
                 node = tape.nodes[k]
                 args = [self._value[a] for a in node.args]
-                if node.op == "const":
+                if node.op == "div":
+                    self._value[k] = args[0] * self._value[self._inverse[k]]
+                elif node.op == "const":
                     self._value[k] = self.constant(exact(node.payload, numbers))
                 else:
                     self._value[k] = self._combine(node.op, args, node.payload)
@@ -115,8 +121,9 @@ class Difference:
         polynomials = [algebra[k] for k in self.differences]
         divisor = common_divisor(polynomials)
         self.identical = divisor is None
-        if divisor is None:
-            divisor = algebra.constant(Fraction(1))
-        self.direction = [algebra.node(p / divisor) for p in polynomials]
-        self.factor = algebra.node(divisor)
+        if divisor is None or divisor.is_constant():
+            self.factor, self.direction = tape.constant(1.0), self.differences
+        else:  # written out only where something is cancelled
+            self.factor = algebra.node(divisor)
+            self.direction = [algebra.node(p / divisor) for p in polynomials]
         self.transverse = tape.dot(gradient, self.direction)

@@ -1,0 +1,402 @@
+"""Validated steps along one orbit, or along all orbits from a box.
+
+A step: an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
+remainder, and the set of states as middle + frame r with an orthogonal frame (Lohner 1987). Guards
+are proven positive, or to have one simple zero; there the time is eliminated by the derivative of the
+return map, (1 - f grad g/(grad g . f)) D. Modes follow from proven signs.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from .arithmetic import hull, radius, sign
+from .equations import column, entries
+from .flint import arb, arb_mat, ctx
+from .krawczyk import identity
+from .modes import Mode, Modes, Watch
+from .proof import UnprovenError
+from .roots import Polynomial, UnsureError, first_zero
+from .series import horner
+
+
+@dataclass(frozen=True)
+class Met:
+    """An event in enclosures."""
+
+    watch: Watch
+    kind: str
+    t: arb
+    x: list[arb]
+    before: str
+    after: str
+
+
+@dataclass
+class _Step:
+    """What one step is made of."""
+
+    h: float
+    natural: float  # the step without limits
+    tube: list[arb]
+    hull: list[arb]
+    c: list[list[arb]]  # of the hull
+    top: list[list[arb]]  # of the tube
+    guards: list[list[arb]]
+    guard_tops: list[list[arb]]
+
+
+class Follower:
+    """A set of states that moves.
+
+    Parameters
+    ----------
+    modes : Modes
+    x : sequence of arb
+        Extended states at the start.
+    p : sequence of arb
+        Parameters.
+    order : int
+    """
+
+    def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
+        self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)
+        self._adopt(list(x))
+        self.t, self.steps, self.events, self.smallest = arb(0), 0, list[Met](), 0.0
+        self.mode, zeros = self._first_mode(list(x))
+        self.zeros: dict[int, int] = {}
+        self.signs: dict[int, int] = {}
+        self._watch_afresh(zeros)
+
+    # the set -------------------------------------------------------------------------------------
+
+    def _adopt(self, x: list[arb]) -> None:
+        self.middle, self.frame = [v.mid() for v in x], identity(self.n)
+        self.r = column([v - m for v, m in zip(x, self.middle, strict=True)])
+
+    def hull(self) -> list[arb]:
+        """A box around the set."""
+        move = entries(self.frame * self.r)
+        return [m + v for m, v in zip(self.middle, move, strict=True)]
+
+    def _moved(self, image: list[arb], derivative: arb_mat) -> None:
+        """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
+        product = derivative * self.frame
+        wide = any(radius(v) > 0 for v in entries(self.r))
+        frame = _orthogonal(product) if wide else identity(self.n)
+        inverse = frame.inv()
+        self.middle = [v.mid() for v in image]
+        miss = column([v - m for v, m in zip(image, self.middle, strict=True)])
+        self.r = inverse * miss + (inverse * product) * self.r
+        self.frame = frame
+
+    # modes and guards ----------------------------------------------------------------------------
+
+    def _first_mode(self, x: list[arb]) -> tuple[str, int]:
+        h, l1, l2 = self.modes.surface(x, self.p)
+        if sign(h):
+            return "+" if h > 0 else "-", 0
+        if h.is_zero():
+            found = _beyond(l1, l2)
+            if found:
+                return found
+        raise UnprovenError(
+            f"start: h in {h.str(5)}, L1 in {l1.str(5)}, L2 in {l2.str(5)}: where it goes is undecided"
+        )
+
+    @property
+    def now(self) -> Mode:
+        """The mode that it is in."""
+        return self.modes[self.mode]
+
+    def _watch_afresh(self, surface_zeros: int) -> None:
+        """Signs of stops and resets at the start, or after a jump."""
+        x = self.hull()
+        self.zeros, values = {}, self.now.watched(x, self.p)
+        coefficients = None
+        for k, watch in enumerate(self.now.watches):
+            if watch.kind == "surface":
+                self.zeros[k] = surface_zeros
+            if watch.kind not in ("stop", "reset"):
+                continue
+            self.signs[k - self._first()] = sign(values[k])
+            if values[k].is_zero():
+                if coefficients is None:
+                    c = self.now.series(x, self.p, 8)
+                    coefficients = self.now.watched_series(c, self.p)
+                self._from_zero(k, coefficients[k])
+            elif not sign(values[k]):
+                raise UnprovenError(f"{watch.name}: its sign is undecided at the start")
+
+    def _from_zero(self, k: int, c: Sequence[arb]) -> None:
+        """Sign just after a zero, by the first coefficient that is not zero."""
+        order = next((j for j, v in enumerate(c) if not v.is_zero()), 0)
+        if not order or not sign(c[order]):
+            raise UnprovenError(f"{self.now.watches[k].name}: its sign after a zero is undecided")
+        self.zeros[k], self.signs[k - self._first()] = order, sign(c[order])
+
+    def _first(self) -> int:
+        """Number of the first stop or reset among the mode's watches."""
+        return sum(w.kind in ("surface", "exit") for w in self.now.watches)
+
+    # steps ---------------------------------------------------------------------------------------
+
+    def step(self, t_end: arb) -> Met | None:
+        """One step, to an event if one comes first; the event or None."""
+        left = math.nextafter(float((t_end - self.t).upper()), math.inf)
+        limit = left
+        for _ in range(40):
+            made = self._prepare(limit, t_end)
+            try:
+                hit = self._first_event(made)
+            except UnsureError as unsure:
+                if unsure.since < 0.02 * min(made.natural, left):
+                    raise UnprovenError(
+                        f"the sign of a guard is undecided at t = {float(self.t.mid()) + unsure.since:.9g} "
+                        "(a tangency, or the set is too wide)"
+                    ) from None
+                limit = unsure.since
+                continue
+            return self._advance(made, hit, t_end)
+        raise UnprovenError(f"no step at t = {float(self.t.mid()):.9g}")
+
+    def _prepare(self, limit: float, t_end: arb) -> _Step:
+        """A step size with an a-priori enclosure and a small remainder."""
+        mode, x, count = self.now, self.hull(), self.order + 2
+        c = mode.series(x, self.p, count)
+        size = max(max(abs(float(v[self.order].mid())) for v in c), 1e-300)
+        wide = max(radius(v) for v in x)
+        tolerance = max(2.0 ** (2 - ctx.prec), 1e-3 * wide)
+        natural = min((tolerance / size) ** (1 / self.order), 1e6)
+        h = min(natural, limit)
+        for _ in range(60):
+            tube = self._tube(x, h)
+            if tube is not None:
+                top = mode.series(tube, self.p, count)
+                rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (self.order + 1)
+                if rest <= 8 * tolerance:
+                    break
+                ratio = (8 * tolerance / rest) ** (1 / (self.order + 1)) if rest < 1e300 else 0.0
+                h *= min(0.9, max(0.3, 0.9 * ratio))
+            else:
+                h /= 2
+        else:
+            raise UnprovenError(
+                f"no enclosure of the motion from t = {float(self.t.mid()):.9g} (the field is not "
+                "defined there, or the set is too wide)"
+            )
+        if min(h, natural) < self.smallest:
+            raise UnprovenError(
+                f"steps become too small at t = {float(self.t.mid()):.9g} (a singularity is near)"
+            )
+        guards = mode.watched_series(c, self.p)
+        return _Step(h, natural, tube, x, c, top, guards, mode.watched_series(top, self.p))
+
+    def _tube(self, x: list[arb], h: float) -> list[arb] | None:
+        """B with x + [0, h] F(B) inside B: every orbit from x exists on [0, h] and stays in B."""
+        t, b = hull(arb(0), arb(h)), x
+        for _ in range(12):
+            f = self.now.field(b, self.p)
+            new = [v + t * w for v, w in zip(x, f, strict=True)]
+            if not all(v.is_finite() for v in new):
+                return None
+            if all(u.contains(v) for u, v in zip(b, new, strict=True)):
+                return b
+            b = [v + arb(0, 0.1 * radius(v) + 1e-300) for v in new]
+        return None
+
+    def _first_event(self, made: _Step) -> tuple[int, arb] | None:
+        """The guard that comes first, proven, and its time."""
+        hits, unsure = [], float("inf")
+        for k, watch in enumerate(self.now.watches):
+            f = self._polynomial(made, k, watch)
+            try:
+                t = first_zero(f, made.h)
+            except UnsureError as error:
+                unsure = min(unsure, error.since)
+                continue
+            if t is not None:
+                hits.append((t, k))
+        hits.sort(key=lambda hit: float(hit[0].upper()))
+        first = hits[0] if hits else None
+        if first is not None and float(first[0].upper()) < unsure:
+            late = [name for t, name in hits[1:] if not first[0] < t]
+            if late:
+                names = [self.now.watches[k].name for k in (first[1], *late)]
+                raise UnprovenError(
+                    f"which comes first is undecided: {', '.join(names)} at t = "
+                    f"{float((self.t + first[0]).mid()):.9g}"
+                )
+            return first[1], first[0]
+        if unsure < float("inf"):
+            raise UnsureError(unsure)
+        return None
+
+    def _polynomial(self, made: _Step, k: int, watch: Watch) -> Polynomial:
+        c, top = made.guards[k][:-1], made.guard_tops[k][-1]
+        if watch.kind in ("stop", "reset") and self.signs[k - self._first()] < 0:
+            c, top = [-v for v in c], -top
+        return Polynomial(c, top, self.zeros.get(k, 0))
+
+    def _advance(self, made: _Step, hit: tuple[int, arb] | None, t_end: arb) -> Met | None:
+        mode = self.now
+        time = arb(made.h) if hit is None else hit[1]
+        if hit is None and (t_end - self.t) <= made.h:
+            time = t_end - self.t  # the end itself, also where it is no double
+        c = mode.series(self.middle, self.p, self.order + 2)
+        derivative = self._derivative(made, time)
+        if hit is None:
+            image = _at(c, made.top, time)
+        else:
+            own = self._own_time(c, made, hit)
+            image = _at(c, made.top, own)
+            derivative = self._return_map(made, hit[0], time, derivative)
+        self._moved(image, derivative)
+        self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
+        return None if hit is None else self._serve(mode.watches[hit[0]], hit[0])
+
+    def _derivative(self, made: _Step, time: arb) -> arb_mat:
+        """Derivatives of the flow to times in ``time``, for all states of the set."""
+        mode = self.now
+        if mode.affine:
+            return (mode.jacobian(made.hull, self.p) * time).exp()
+        jacobian = mode.jacobian(made.tube, self.p)
+        bound = max(
+            sum(float(abs(v).upper()) for v in row) * (1 + 1e-12) for row in jacobian.tolist()
+        )
+        grow = radius_of_growth(bound, made.h)
+        around = arb_mat([[arb(int(i == j), grow) for j in range(self.n)] for i in range(self.n)])
+        low = mode.variation(made.c, self.p, identity(self.n))
+        top = mode.variation(made.top, self.p, around)
+        return horner([*low[:-1], top[-1]], time)
+
+    def _own_time(self, c: list[list[arb]], made: _Step, hit: tuple[int, arb]) -> arb:
+        """The event's time of the middle alone, narrower than that of the whole set."""
+        k, time = hit
+        g = self.now.watched_series(c, self.p)[k]
+        f = Polynomial(g[:-1], made.guard_tops[k][-1])
+        for _ in range(60):
+            m = time.mid()
+            slope = f.slope(time)
+            if slope.contains(0) or not slope.is_finite():
+                break
+            new = (m - f.value(m) / slope).intersection(time)
+            if not new.is_finite() or radius(new) > 0.9 * radius(time):
+                break
+            time = new
+        return time
+
+    def _return_map(self, made: _Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
+        """(1 - f grad g/(grad g . f)) D where the event is met."""
+        x = _at(made.c, made.top, time)
+        f, g = self.now.field(x, self.p), self.now.slope(k, x, self.p)
+        rate = sum((a * b for a, b in zip(f, g, strict=True)), arb(0))
+        if rate.contains(0) or not rate.is_finite():
+            return derivative if radius(time) == 0 else _not_transversal(self)
+        n = self.n
+        across = arb_mat([[int(i == j) - f[i] * g[j] / rate for j in range(n)] for i in range(n)])
+        return across * derivative
+
+    # events --------------------------------------------------------------------------------------
+
+    def _serve(self, watch: Watch, k: int) -> Met | None:
+        before, x = self.mode, self.hull()
+        if watch.kind in ("stop", "reset"):
+            return self._end(watch, k, x)
+        _, l1, l2 = self.modes.surface(x, self.p)
+        if watch.kind == "exit":
+            self.mode, zeros, kind = ("+" if watch.direction > 0 else "-"), 2, "exit"
+            other = l2 if watch.direction > 0 else -l1
+            if not other > 0:
+                raise UnprovenError(
+                    f"exit at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so the "
+                    "other field's sign is undecided (a two-fold?)"
+                )
+        else:
+            found = _beyond(l1, l2)
+            if found is None:
+                raise UnprovenError(
+                    f"surface at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so what "
+                    "follows is undecided"
+                )
+            self.mode, zeros = found
+            kind = "entry" if self.mode == "s" else "crossing"
+        self.zeros = {j: zeros for j, w in enumerate(self.now.watches) if w.kind == "surface"}
+        met = Met(watch, kind, self.t, x, before, self.mode)
+        self.events.append(met)
+        return met
+
+    def _end(self, watch: Watch, k: int, x: list[arb]) -> Met | None:
+        """A stop or a reset was met; it counts if its direction does."""
+        place = k - self._first()
+        falling = self.signs[place] > 0
+        self.signs[place] = -self.signs[place]
+        if watch.direction * (-1 if falling else 1) < 0:
+            self.zeros[k] = 1
+            return None
+        before = self.mode
+        met = Met(watch, watch.kind, self.t, x, before, before)
+        if watch.kind == "reset":
+            met = self._jump(watch, met)
+        self.events.append(met)
+        return met
+
+    def _jump(self, watch: Watch, met: Met) -> Met:
+        """After a reset: a new state, whose side and signs must be decided anew."""
+        new = self.modes.jump(watch, met.x, self.p)
+        own = self.modes.kept(watch, watch)
+        self._adopt(new)
+        h, *_ = self.modes.surface(new, self.p)
+        if not sign(h):
+            raise UnprovenError(
+                f"{watch.name} at t = {self.t.str(8)}: the side after it is undecided"
+            )
+        self.mode = "+" if h > 0 else "-"
+        self.zeros = {}
+        c = self.now.watched_series(self.now.series(new, self.p, 3), self.p)
+        for k, w in enumerate(self.now.watches):
+            if w.kind not in ("stop", "reset"):
+                continue
+            at_zero = w is watch and own
+            value = c[k][1 if at_zero else 0]
+            if not sign(value):
+                raise UnprovenError(f"{w.name}: its sign after {watch.name} is undecided")
+            self.signs[k - self._first()] = sign(value)
+            if at_zero:
+                self.zeros[k] = 1
+        return Met(watch, "reset", met.t, new, met.before, self.mode)
+
+
+def _beyond(l1: arb, l2: arb) -> tuple[str, int] | None:
+    """The mode beyond a point of the surface, and how many coefficients of h are zero in it."""
+    if l1 < 0 and l2 > 0:
+        return "s", 0
+    if l1 > 0 and l2 > 0:
+        return "+", 1
+    return ("-", 1) if l1 < 0 and l2 < 0 else None
+
+
+def _not_transversal(follower: Follower) -> arb_mat:
+    raise UnprovenError(f"an event at t = {follower.t.str(8)} is not proven to be transversal")
+
+
+def _at(c: Sequence[Sequence[arb]], top: Sequence[Sequence[arb]], time: arb) -> list[arb]:
+    """States at a time from coefficients 0..K and the remainder."""
+    return [horner([*a[:-1], b[-1]], time) for a, b in zip(c, top, strict=True)]
+
+
+def radius_of_growth(bound: float, h: float) -> float:
+    """exp(bound h) - 1, rounded upward."""
+    return float(((arb(bound) * arb(h)).expm1()).upper()) * (1 + 1e-12)
+
+
+def _orthogonal(matrix: arb_mat) -> arb_mat:
+    """An orthogonal factor of the midpoints as exact doubles, longest column first."""
+    a = np.array([[float(v.mid()) for v in row] for row in matrix.tolist()])
+    order = np.argsort(-np.linalg.norm(a, axis=0))
+    q = np.linalg.qr(a[:, order])[0]
+    return arb_mat([[arb(float(v)) for v in row] for row in q.tolist()])

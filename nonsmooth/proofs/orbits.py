@@ -1,0 +1,184 @@
+"""Theorems about one orbit: its itinerary, its events and its end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from ..model import FilippovSystem, OptionError, PointError, explain, require_system, whole
+from .arithmetic import Numbers, exact, precision
+from .decimals import enclosure
+from .described import enclosed
+from .flint import arb, ctx
+from .follow import Follower, Met
+from .modes import Modes
+from .orbit_proof import OrbitProof, ProvenEvent
+from .proof import UnprovenError
+
+
+def certify_orbit(
+    system: FilippovSystem,
+    x0: Sequence[Any],
+    t_end: Any,
+    *,
+    parameters: Mapping[Any, Any] | None = None,
+    t0: Any = 0,
+    numbers: Numbers = "stored",
+    bits: int = 64,
+    max_bits: int = 256,
+    max_steps: int = 2000,
+) -> OrbitProof:
+    """Prove which modes an orbit goes through, when its events are, and where it ends.
+
+    Taylor series with proven remainders, guards by proven signs, events by interval Newton. Where
+    something stays undecided (a tangency, a two-fold, two events at once, a start set too wide) the
+    result says where and why, and holds what was proven up to there.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        With one surface; stops and resets are served, impacts are not.
+    x0 : sequence of n numbers, strings or pairs (low, high)
+        The start; pairs make a box, and the theorem is for all orbits from it.
+    t_end : number or string
+        Duration after ``t0``.
+    parameters : mapping, optional
+        Values, or pairs (low, high).
+    t0 : number or string, optional
+        Time at the start, where the system depends on it.
+    numbers : {"stored", "written"}
+        As in :func:`certify`.
+    bits, max_bits : int, optional
+        Precision to start with, and to give up at.
+    max_steps : int, optional
+
+    Returns
+    -------
+    OrbitProof
+
+    Raises
+    ------
+    MissingError, DefinitionError, PointError, ParameterError, OptionError, NotSmoothError
+
+    Notes
+    -----
+    Moore 1966; Lohner 1987; Zgliczynski 2002; return maps as in CAPD (Kapela et al. 2021).
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
+    >>> orbit = ns.certify_orbit(s, [0, 0], t_end=3)
+    >>> orbit.proven, orbit.itinerary, str(orbit.events[0].t)
+    (True, '- s -', '0.523598775598298873... +- ...')
+    """
+    require_system(system)
+    duration = exact(t_end, numbers, "t_end")
+    if duration <= 0:
+        raise OptionError(
+            explain("t_end", expected="a positive time", received=repr(t_end), advice="")
+        )
+    whole(bits, "bits", least=32)
+    whole(max_bits, "max_bits", least=32)
+    whole(max_steps, "max_steps")
+    modes = Modes(system, numbers)
+    start = _read_start(system, x0, numbers)
+    if system.time_dependent:
+        t = exact(t0, numbers, "t0")
+        start.append((t, t))
+    ranges = modes.described.parameters(parameters, numbers)
+    points = all(a == b for a, b in (*start, *ranges))
+    while True:
+        with precision(bits):
+            x, p, end = enclosed(start), enclosed(ranges), enclosed([(duration, duration)])[0]
+            result = _run(modes, x, p, end, max_steps)
+        if result.proven or not points or 2 * bits > max_bits:
+            return result
+        bits *= 2
+
+
+def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> list[Any]:
+    try:
+        given = list(x0)
+    except TypeError:
+        given = []
+    if len(given) != system.dimension:
+        raise PointError(
+            explain(
+                "x0",
+                expected=f"{system.dimension} numbers or pairs, for {', '.join(system.state_names)}",
+                received=repr(x0),
+                advice="A pair (low, high) makes a box.",
+            )
+        )
+    result = []
+    for name, value in zip(system.state_names, given, strict=True):
+        ends = list(value) if isinstance(value, (tuple, list)) else [value, value]
+        fractions = [exact(v, numbers, f"start of {name!r}") for v in ends]
+        if len(fractions) != 2 or fractions[0] > fractions[1]:
+            raise PointError(
+                explain(
+                    f"start of {name!r}",
+                    expected="a number or (low, high)",
+                    received=repr(value),
+                    advice="",
+                )
+            )
+        result.append((fractions[0], fractions[1]))
+    return result
+
+
+def _run(modes: Modes, x: list[arb], p: list[arb], t_end: arb, max_steps: int) -> OrbitProof:
+    """Follow until the end, a stop, or something undecided."""
+    follower, why, status = None, "", ""
+    try:
+        follower = Follower(modes, x, p, order=max(12, int(ctx.prec * 0.3)))
+        follower.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
+        itinerary = [follower.mode]
+        while not status:
+            if follower.steps >= max_steps:
+                raise UnprovenError(f"more than {max_steps} steps")
+            met = follower.step(t_end)
+            if met is not None and met.kind == "stop":
+                status = met.watch.name
+            elif met is not None:
+                itinerary.append(met.after)
+            elif not (t_end - follower.t) > 0:
+                status = "end"
+    except UnprovenError as error:
+        why = str(error)
+    except KeyboardInterrupt:
+        why = "interrupted"
+    return _result(modes, follower, x, p, status, why)
+
+
+def _result(
+    modes: Modes, follower: Follower | None, x: list[arb], p: list[arb], status: str, why: str
+) -> OrbitProof:
+    system = modes.system
+    names = (*system.state_names, *(("t",) if system.time_dependent else ()))
+    named = lambda values: dict(zip(names, map(enclosure, values), strict=True))
+    events = tuple(_event(e, named) for e in follower.events) if follower else ()
+    itinerary = [follower.events[0].before if events else follower.mode] if follower else []
+    itinerary += [e.after for e in (follower.events if follower else []) if e.kind != "stop"]
+    return OrbitProof(
+        proven=bool(status),
+        status=status or "undecided",
+        why=why,
+        itinerary=" ".join(itinerary),
+        events=events,
+        start=named(x),
+        parameters=dict(zip(system.parameter_names, map(enclosure, p), strict=True)),
+        t=enclosure(follower.t) if follower else enclosure(arb(0)),
+        end=named(follower.hull() if follower else x),
+        steps=follower.steps if follower else 0,
+        bits=int(ctx.prec),
+        numbers=modes.numbers,
+    )
+
+
+def _event(met: Met, named: Any) -> ProvenEvent:
+    return ProvenEvent(
+        met.kind, met.watch.name, enclosure(met.t), named(met.x), met.before, met.after
+    )

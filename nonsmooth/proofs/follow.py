@@ -12,8 +12,6 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numpy as np
-
 from .arithmetic import hull, radius, sign
 from .equations import column, entries
 from .flint import arb, arb_mat, ctx
@@ -22,6 +20,7 @@ from .modes import Mode, Modes, Watch
 from .proof import UnprovenError
 from .roots import Polynomial, UnsureError, first_zero
 from .series import horner
+from .steps import Step, at, growth, orthogonal
 
 
 @dataclass(frozen=True)
@@ -34,20 +33,6 @@ class Met:
     x: list[arb]
     before: str
     after: str
-
-
-@dataclass
-class _Step:
-    """What one step is made of."""
-
-    h: float
-    natural: float  # the step without limits
-    tube: list[arb]
-    hull: list[arb]
-    c: list[list[arb]]  # of the hull
-    top: list[list[arb]]  # of the tube
-    guards: list[list[arb]]
-    guard_tops: list[list[arb]]
 
 
 class Follower:
@@ -87,7 +72,7 @@ class Follower:
         """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
         product = derivative * self.frame
         wide = any(radius(v) > 0 for v in entries(self.r))
-        frame = _orthogonal(product) if wide else identity(self.n)
+        frame = orthogonal(product) if wide else identity(self.n)
         inverse = frame.inv()
         self.middle = [v.mid() for v in image]
         miss = column([v - m for v, m in zip(image, self.middle, strict=True)])
@@ -164,7 +149,7 @@ class Follower:
             return self._advance(made, hit, t_end)
         raise UnprovenError(f"no step at t = {float(self.t.mid()):.9g}")
 
-    def _prepare(self, limit: float, t_end: arb) -> _Step:
+    def _prepare(self, limit: float, t_end: arb) -> Step:
         """A step size with an a-priori enclosure and a small remainder."""
         mode, x, count = self.now, self.hull(), self.order + 2
         c = mode.series(x, self.p, count)
@@ -194,7 +179,7 @@ class Follower:
                 f"steps become too small at t = {float(self.t.mid()):.9g} (a singularity is near)"
             )
         guards = mode.watched_series(c, self.p)
-        return _Step(h, natural, tube, x, c, top, guards, mode.watched_series(top, self.p))
+        return Step(h, natural, tube, x, c, top, guards, mode.watched_series(top, self.p))
 
     def _tube(self, x: list[arb], h: float) -> list[arb] | None:
         """B with x + [0, h] F(B) inside B: every orbit from x exists on [0, h] and stays in B."""
@@ -209,7 +194,7 @@ class Follower:
             b = [v + arb(0, 0.1 * radius(v) + 1e-300) for v in new]
         return None
 
-    def _first_event(self, made: _Step) -> tuple[int, arb] | None:
+    def _first_event(self, made: Step) -> tuple[int, arb] | None:
         """The guard that comes first, proven, and its time."""
         hits, unsure = [], float("inf")
         for k, watch in enumerate(self.now.watches):
@@ -236,13 +221,13 @@ class Follower:
             raise UnsureError(unsure)
         return None
 
-    def _polynomial(self, made: _Step, k: int, watch: Watch) -> Polynomial:
+    def _polynomial(self, made: Step, k: int, watch: Watch) -> Polynomial:
         c, top = made.guards[k][:-1], made.guard_tops[k][-1]
         if watch.kind in ("stop", "reset") and self.signs[k - self._first()] < 0:
             c, top = [-v for v in c], -top
         return Polynomial(c, top, self.zeros.get(k, 0))
 
-    def _advance(self, made: _Step, hit: tuple[int, arb] | None, t_end: arb) -> Met | None:
+    def _advance(self, made: Step, hit: tuple[int, arb] | None, t_end: arb) -> Met | None:
         mode = self.now
         time = arb(made.h) if hit is None else hit[1]
         if hit is None and (t_end - self.t) <= made.h:
@@ -250,16 +235,16 @@ class Follower:
         c = mode.series(self.middle, self.p, self.order + 2)
         derivative = self._derivative(made, time)
         if hit is None:
-            image = _at(c, made.top, time)
+            image = at(c, made.top, time)
         else:
             own = self._own_time(c, made, hit)
-            image = _at(c, made.top, own)
+            image = at(c, made.top, own)
             derivative = self._return_map(made, hit[0], time, derivative)
         self._moved(image, derivative)
         self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
         return None if hit is None else self._serve(mode.watches[hit[0]], hit[0])
 
-    def _derivative(self, made: _Step, time: arb) -> arb_mat:
+    def _derivative(self, made: Step, time: arb) -> arb_mat:
         """Derivatives of the flow to times in ``time``, for all states of the set."""
         mode = self.now
         if mode.affine:
@@ -268,13 +253,13 @@ class Follower:
         bound = max(
             sum(float(abs(v).upper()) for v in row) * (1 + 1e-12) for row in jacobian.tolist()
         )
-        grow = radius_of_growth(bound, made.h)
+        grow = growth(bound, made.h)
         around = arb_mat([[arb(int(i == j), grow) for j in range(self.n)] for i in range(self.n)])
         low = mode.variation(made.c, self.p, identity(self.n))
         top = mode.variation(made.top, self.p, around)
         return horner([*low[:-1], top[-1]], time)
 
-    def _own_time(self, c: list[list[arb]], made: _Step, hit: tuple[int, arb]) -> arb:
+    def _own_time(self, c: list[list[arb]], made: Step, hit: tuple[int, arb]) -> arb:
         """The event's time of the middle alone, narrower than that of the whole set."""
         k, time = hit
         g = self.now.watched_series(c, self.p)[k]
@@ -290,9 +275,9 @@ class Follower:
             time = new
         return time
 
-    def _return_map(self, made: _Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
+    def _return_map(self, made: Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
         """(1 - f grad g/(grad g . f)) D where the event is met."""
-        x = _at(made.c, made.top, time)
+        x = at(made.c, made.top, time)
         f, g = self.now.field(x, self.p), self.now.slope(k, x, self.p)
         rate = sum((a * b for a, b in zip(f, g, strict=True)), arb(0))
         if rate.contains(0) or not rate.is_finite():
@@ -382,21 +367,3 @@ def _beyond(l1: arb, l2: arb) -> tuple[str, int] | None:
 
 def _not_transversal(follower: Follower) -> arb_mat:
     raise UnprovenError(f"an event at t = {follower.t.str(8)} is not proven to be transversal")
-
-
-def _at(c: Sequence[Sequence[arb]], top: Sequence[Sequence[arb]], time: arb) -> list[arb]:
-    """States at a time from coefficients 0..K and the remainder."""
-    return [horner([*a[:-1], b[-1]], time) for a, b in zip(c, top, strict=True)]
-
-
-def radius_of_growth(bound: float, h: float) -> float:
-    """exp(bound h) - 1, rounded upward."""
-    return float(((arb(bound) * arb(h)).expm1()).upper()) * (1 + 1e-12)
-
-
-def _orthogonal(matrix: arb_mat) -> arb_mat:
-    """An orthogonal factor of the midpoints as exact doubles, longest column first."""
-    a = np.array([[float(v.mid()) for v in row] for row in matrix.tolist()])
-    order = np.argsort(-np.linalg.norm(a, axis=0))
-    q = np.linalg.qr(a[:, order])[0]
-    return arb_mat([[arb(float(v)) for v in row] for row in q.tolist()])

@@ -118,7 +118,9 @@ def test_a_graze_a_two_fold_and_a_wide_box_are_not_proven():
 
 def test_the_field_may_not_be_defined_all_the_way():
     s = ns.FilippovSystem([x], surface=x + 9, above=[-ca.sqrt(x)], below=[1])
-    orbit = ns.certify_orbit(s, [1], t_end=3, max_steps=15, max_bits=64)  # (1 - t/2)^2 ends at t = 2
+    orbit = ns.certify_orbit(
+        s, [1], t_end=3, max_steps=15, max_bits=64
+    )  # (1 - t/2)^2 ends at t = 2
     assert not orbit.proven and float(orbit.t.high) <= 2
     blow = ns.FilippovSystem([x], surface=x + 9, above=[x**2], below=[1])
     orbit = ns.certify_orbit(blow, [1], t_end=1.5, max_steps=15, max_bits=64)

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..model import Array, FilippovSystem
 from .compiled.engine import engine_for
+from .compiled.tape import tape_for
 from .facts import HAND_OVER, KINDS
 from .options import Options
 from .reference.driver import Driver
@@ -22,6 +23,9 @@ from .view import sampled
 
 #: The reference driver's functions are built and evaluated by one thread at a time.
 _REFERENCE = threading.Lock()
+
+
+ENGINES = ("reference", "tape", "scalar", "lanes")
 
 
 @dataclass(frozen=True)
@@ -39,8 +43,9 @@ class Job:
         When runs are looked at.
     room : int or None
         Samples kept of each.
-    compiled, lanes : bool
-        Which engine runs.
+    engine : str
+        One of ``ENGINES``: the reference driver, the interpreter, or a program generated for the
+        system that runs one trajectory at a time or several in step.
     """
 
     system: FilippovSystem | bytes
@@ -48,8 +53,7 @@ class Job:
     at: tuple[int, int] | None
     times: Times | None
     room: int | None
-    compiled: bool
-    lanes: bool
+    engine: str
 
 
 def shipped(job: Job) -> Job:
@@ -77,13 +81,12 @@ def run_chunk(
     system = _unpickled(job.system) if isinstance(job.system, bytes) else job.system
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(len(x), bool)
     start = np.where(bad[:, None], np.nan, x) if bad.any() else x
-    engine = engine_for(system, job.options) if job.compiled else None
     times = None if job.times is None else job.times.of(p)
     chunk = out or Chunk.empty(len(x), system.dimension, job.at is not None, job.room)
-    if engine is None:
+    if job.engine == "reference":
         _refuse(chunk, system, start, job.options)
     else:
-        engine.run_many(start, p, job.options, job.at, job.lanes, chunk, stop, times)
+        _run_compiled(job, system, start, p, chunk, stop, times)
     rest = np.flatnonzero(chunk.status == HAND_OVER)
     words = dict(enumerate(chunk.words))
     for i in rest.tolist():
@@ -91,10 +94,30 @@ def run_chunk(
             raise Stopped
         words[len(words)] = _run_reference(chunk, system, i, start[i], p, len(words), job, times)
     chunk.x[bad] = x[bad, : system.dimension]
-    if engine is None or len(rest):
+    if job.engine == "reference" or len(rest):
         used = np.bincount(chunk.itinerary).nonzero()[0].tolist()
         chunk.rename({code: words[code] for code in used})
     return chunk
+
+
+def _run_compiled(
+    job: Job,
+    system: FilippovSystem,
+    x: Array,
+    p: Array,
+    out: Chunk,
+    stop: Callable[[], bool],
+    times: Array | None,
+) -> None:
+    if job.engine == "tape":
+        tape = tape_for(system, job.options)
+        assert tape is not None
+        tape.run_many(x, p, job.options, job.at, out, stop, times)
+    else:
+        generated = engine_for(system, job.options)
+        assert generated is not None
+        lanes = job.engine == "lanes"
+        generated.run_many(x, p, job.options, job.at, lanes, out, stop, times)
 
 
 def _refuse(chunk: Chunk, system: FilippovSystem, x: Array, options: Options) -> None:

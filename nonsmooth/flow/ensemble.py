@@ -13,6 +13,7 @@ from ..model import FilippovSystem, OptionError, explain, require_system
 from .chunks import Job
 from .compiled.codegen import supports_lanes
 from .compiled.engine import engine_for
+from .compiled.tape import library, tape_for
 from .facts import KINDS
 from .options import Options
 from .results import Collected, Ensemble
@@ -111,11 +112,10 @@ def ensemble(
             "at: expected count= with a section at events in an ensemble, received none. It says how "
             "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
         )
-    several = supports_lanes(system) and start_mode is None and view.room is None
-    several = several and starts.count >= _FEW and t_end > t_start
-    compiled = _compiled(system, options, engine, several)
-    lanes = compiled and several
-    job = Job(system, options, number, view.times, view.room, compiled, lanes)
+    lanes = supports_lanes(system) and start_mode is None and view.room is None
+    several = lanes and t_end > t_start
+    chosen = _engine(system, options, engine, starts.count, several)
+    job = Job(system, options, number, view.times, view.room, chosen)
     saved = work.checkpoint_of(lambda: _problem(system, starts, job))
     names, keeps = system.state_names, number is not None
     results = Collected(system.dimension, starts.shape, keeps, view.room, names)
@@ -136,12 +136,23 @@ def _work(work: Any) -> Work:
     return work or Work()
 
 
-def _compiled(system: FilippovSystem, options: Options, engine: str, lanes: bool) -> bool:
-    """Whether the compiled engine runs; it is compiled here, so that all chunks run the same one."""
-    fast = engine_for(system, options)
-    if not use_compiled(engine, fast is not None) or fast is None:
-        return False
-    return compiled_or_none(engine, fast, lambda: fast.lanes if lanes else fast.scalar) is not None
+def _engine(
+    system: FilippovSystem, options: Options, engine: str, count: int, lanes: bool
+) -> str:
+    """Which of ``chunks.ENGINES`` runs; few trajectories are not worth generating a program.
+
+    It is compiled here, so that all chunks run the same one.
+    """
+    fast, tape = engine_for(system, options), tape_for(system, options)
+    if not use_compiled(engine, fast is not None or tape is not None):
+        return "reference"
+    few = count < _FEW
+    if tape is not None and (fast is None or (few and engine == "auto")):
+        return "tape" if compiled_or_none(engine, library, library) is not None else "reference"
+    assert fast is not None
+    lanes = lanes and not few
+    found = compiled_or_none(engine, fast, lambda: fast.lanes if lanes else fast.scalar)
+    return "reference" if found is None else ("lanes" if lanes else "scalar")
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -111,6 +111,11 @@ REASONS = (
     "two_sided",
     "multiple_zero",
     "looked_at",
+    "behind",
+    "no_impulse",
+    "no_reaction",
+    "no_stable_motion",
+    "possibly_several",
 )
 
 #: Not a status: the run goes on in the next call, after its arrays were emptied, or elsewhere.

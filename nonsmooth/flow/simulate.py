@@ -9,9 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters, motion, require_system
+from ..model import Array, FilippovSystem, Parameters, require_system
+from .compiled.arrays import Run
 from .compiled.convert import trajectory
-from .compiled.engine import engine_for, simulate_arrays
+from .compiled.engine import engine_for
+from .compiled.tape import library, tape_for
+from .facts import HAND_OVER
 from .options import Options
 from .reference.driver import Driver
 from .section import Section, Times
@@ -21,9 +24,8 @@ from .status import Status
 from .trajectory import Trajectory
 from .view import read_view, sampled, sectioned
 
-#: Steps that the reference driver takes before a run counts as long: at least so many, and more for
-#: a system whose jets have more instructions than _SMALL together, because compilers take longer.
-_SHORT, _SMALL, _STEPS_PER_INSTRUCTION = 300, 10_000, 0.05
+#: Steps of the interpreter after which a run counts as long: a program is generated for it.
+_LONG = 20_000
 
 
 def simulate(
@@ -75,9 +77,9 @@ def simulate(
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
     engine : {"auto", "reference", "compiled"}
-        Which driver runs. ``"auto"`` takes the compiled engine for runs of more than 300 steps
-        (more for large systems, which take long to compile), where there is a compiler; without
-        one it says so, once.
+        Which driver runs. ``"auto"`` takes the interpreter in C, which is compiled once on a machine
+        and serves every system at once, and for runs of more than 20,000 steps a program generated for
+        the system; without a compiler it says so, once, and takes the reference driver in Python.
 
     Returns
     -------
@@ -140,27 +142,29 @@ def _looked_at(run: Trajectory, options: Options, times: Times | None, p: Array)
 
 
 def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: str) -> Trajectory:
-    """Choose the engine: short runs are done before a compiler would have started.
+    """Choose the engine: the interpreter is there at once, a long run is worth a compiler.
 
     The choice depends on the problem alone, never on what happens to be cached, so that the same
     call gives the same bits.
     """
-    available = engine_for(system, options)
-    compiled = use_compiled(engine, available is not None)
-    if compiled and available is not None and engine == "auto":
-        steps = min(_short(system, available.order), options.max_steps)
-        first = Driver(system, x, p, replace(options, max_steps=steps)).run()
-        if first.status is not Status.TOO_MANY_STEPS or options.max_steps <= steps:
-            return first
-    if compiled and available is not None:
-        run = lambda: simulate_arrays(system, x, p, options)
-        arrays = compiled_or_none(engine, available, run)
-        if arrays is not None:
-            return trajectory(system, p, options, arrays)
-    return Driver(system, x, p, options).run()
+    generated, tape = engine_for(system, options), tape_for(system, options)
+    if not use_compiled(engine, generated is not None or tape is not None):
+        return Driver(system, x, p, options).run()
+    if tape is not None and (generated is None or engine == "auto"):
+        steps = options.max_steps if generated is None else min(_LONG, options.max_steps)
+        first = replace(options, max_steps=steps)
+        run = compiled_or_none(engine, library, lambda: tape.run(x, p, first))
+        if run is None or run.status != Status.TOO_MANY_STEPS or steps == options.max_steps:
+            return _converted(system, x, p, options, run)
+    fast = generated
+    run = compiled_or_none(engine, fast, lambda: fast.run(x, p, options)) if fast else None
+    return _converted(system, x, p, options, run)
 
 
-def _short(system: FilippovSystem, order: int) -> int:
-    """Steps that take the reference driver about as long as a compiler takes."""
-    one = motion(system, system.modes[0]).jet_function(order).n_instructions()
-    return _SHORT + int(_STEPS_PER_INSTRUCTION * max(0, one * len(system.modes) - _SMALL))
+def _converted(
+    system: FilippovSystem, x: Array, p: Array, options: Options, run: Run | None
+) -> Trajectory:
+    """Return the trajectory of a compiled run; the reference driver repeats what is rare."""
+    if run is None or run.status == HAND_OVER:
+        return Driver(system, x, p, options).run()
+    return trajectory(system, p, options, run)

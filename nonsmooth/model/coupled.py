@@ -85,25 +85,25 @@ class Coupled:
         )
         self.continuous = tuple(self._is_continuous(i) for i in range(self._surfaces))
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
-        self._moving = ca.vertcat(x, lam, d.reactions, *extra)
-        self._series: dict[str, tuple[Expansion, list[int]]] = {}
+        self.moving = ca.vertcat(x, lam, d.reactions, *extra)
+        self._series: dict[tuple[int, ...], tuple[Expansion, list[int]]] = {}
         kept = ca.vertcat(d.surfaces, d.gap_rates)
         self.layer = ca.densify(ca.jtimes(kept, x, field))
         stops = ca.vertcat(d.guards, *watched)
         stops = ca.densify(stops) if stops.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
         factor = ca.vertcat(*factors, *[ca.SX(1)] * len(system.impacts))
-        self._outputs = [field, self.layer, heights, factor, stops]
+        self.outputs = [field, self.layer, heights, factor, stops]
         every = ca.vertcat(*unknowns, d.reactions)
         self.slope = ca.jacobian(self.layer, every)
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
         #: Whether field, layer and guards are affine in states and multipliers together.
         everything = ca.vertcat(field, self.layer, heights, stops)
-        self.linear = not any(self.scaled) and bool(ca.is_linear(everything, self._moving))
-        gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops)]
-        self._point = [self.layer, self.slope, factor, *gradients]
-        self._columns = ca.jacobian(field, every)
+        self.linear = not any(self.scaled) and bool(ca.is_linear(everything, self.moving))
+        #: Of layer, of surfaces and gaps, and of stops and resets, by the states.
+        self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops)]
+        self.columns_of_field = ca.jacobian(field, every)
         self._column_function: Evaluator | None = None
 
     def _is_continuous(self, surface: int) -> bool:
@@ -153,53 +153,55 @@ class Coupled:
         result += [Guard(kind, j, direction, name) for kind, j, name, direction in items]
         result += [Guard("zero", k, 0, f"f{k}") for k in range(self._watched)]
         branches = len(self._stability(mode))
-        first = max(mode.find("s"), 0)
+        first = next((i for i in self.sliding(mode) if i < self._surfaces), 0)
         return (*result, *[Guard("branch", first, 0, "stability of sliding")] * branches)
 
     def _stability(self, mode: str) -> list[ca.SX]:
-        """Functions that are positive while sliding is stable across its layer, for one or two
-        sliding surfaces whose slope changes; more are looked at step by step."""
+        """Functions that pass zero where sliding loses its stability across the layer.
+
+        The slope of one multiplier, determinant and trace of that of two; of more, or with contacts,
+        its diagonal, each of which has to keep its sign. None where the slope does not change.
+        """
         s = self.sliding(mode)
-        slope = self.slope[s, s]
-        if not 1 <= len(s) <= 2 or max(s) >= self._surfaces or (len(s) == 1 and self.affine):
-            return []
-        if not ca.depends_on(slope, self._moving):
-            return []
-        return [-slope] if len(s) == 1 else [ca.det(slope), -ca.trace(slope)]
+        slope = ca.densify(self.slope[s, s])
+        if len(s) == 2 and max(s) < self._surfaces:
+            return [ca.det(slope), ca.trace(slope)] if ca.depends_on(slope, self.moving) else []
+        diagonal = [slope[k, k] for k in range(len(s))]
+        return [e for e in diagonal if ca.depends_on(e, self.moving)]
 
     # expressions --------------------------------------------------------------------------------
 
     @property
     def field(self) -> ca.SX:
         """The field in states, multipliers, reactions and nu."""
-        return self._outputs[0]
+        return self.outputs[0]
 
     @property
     def heights(self) -> ca.SX:
         """Switching functions and gaps."""
-        return self._outputs[2]
+        return self.outputs[2]
 
     @property
     def factors(self) -> ca.SX:
         """The factors n_i of surfaces and contacts; 1 where there is none."""
-        return self._outputs[3]
+        return self.outputs[3]
 
     @property
     def stops(self) -> ca.SX:
         """Functions of stops and resets."""
-        return self._outputs[4]
+        return self.outputs[4]
 
     @property
     def multipliers(self) -> ca.SX:
         """The symbols lambda_i of the surfaces."""
         n = self.system.extended_dimension
-        return self._moving[n : n + self._surfaces]
+        return self.moving[n : n + self._surfaces]
 
     def unknown(self, i: int) -> ca.SX:
         """The symbol of the unknown of a surface or contact: lambda_i, a reaction, or nu_i."""
         n = self.system.extended_dimension
         scaled = i < self._surfaces and self.scaled[i]
-        return self._moving[n + self.count + sum(self.scaled[:i]) if scaled else n + i]
+        return self.moving[n + self.count + sum(self.scaled[:i]) if scaled else n + i]
 
     def symbols_of(self, which: Sequence[int]) -> ca.SX:
         """The symbols of several unknowns (SX column)."""
@@ -209,7 +211,7 @@ class Coupled:
         """Expressions with the multipliers that are known in a mode; unknowns stay symbols."""
         n = self.system.extended_dimension
         held = ca.SX([*self.held(mode), *[0.0] * sum(self.scaled)])
-        rest = self._moving[n:]
+        rest = self.moving[n:]
         for i in self.sliding(mode):
             own = self.unknown(i)
             for k in range(rest.numel()):
@@ -222,8 +224,9 @@ class Coupled:
     @cached_property
     def _yardsticks(self) -> Evaluator:
         p = self.system.parameter_symbols
-        outputs = [ca.densify(e) for e in self._point]
-        return Evaluator(ca.Function("point", [self._moving, p], outputs, {"cse": True}))
+        point = [self.layer, self.slope, self.factors, *self.gradients]
+        outputs = [ca.densify(e) for e in point]
+        return Evaluator(ca.Function("point", [self.moving, p], outputs, {"cse": True}))
 
     def yardsticks(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> Yardsticks:
         """Evaluate at an extended state, with lambda where nothing slides (else 0) and nu (else 0)."""
@@ -236,8 +239,8 @@ class Coupled:
     def columns(self, x: Array, multipliers: Array, p: Array) -> Array:
         """Derivatives of the field by the unknowns (N, m), with the multipliers held."""
         if self._column_function is None:
-            inputs = [self._moving, self.system.parameter_symbols]
-            function = ca.Function("columns", inputs, [ca.densify(self._columns)], {"cse": True})
+            inputs = [self.moving, self.system.parameter_symbols]
+            function = ca.Function("columns", inputs, [ca.densify(self.columns_of_field)], {"cse": True})
             self._column_function = Evaluator(function)
         none = np.zeros(self.count)
         return self._column_function.copied(self._inputs(x, multipliers, none), p)[0]
@@ -257,16 +260,16 @@ class Coupled:
     @cached_property
     def _values(self) -> Evaluator:
         p = self.system.parameter_symbols
-        outputs = [ca.densify(e) for e in self._outputs]
-        return Evaluator(ca.Function("values", [self._moving, p], outputs, {"cse": True}))
+        outputs = [ca.densify(e) for e in self.outputs]
+        return Evaluator(ca.Function("values", [self.moving, p], outputs, {"cse": True}))
 
     def _expansion(self, mode: str) -> tuple[Expansion, list[int]]:
         """Return the expansion for a mode, and the rules that the unknowns enter."""
         stability = self._stability(mode)
-        key = mode if stability else ""
+        key = tuple(self.sliding(mode)) if stability else ()
         if key not in self._series:
-            inputs = [self._moving, self.system.parameter_symbols]
-            outputs = [*self._outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
+            inputs = [self.moving, self.system.parameter_symbols]
+            outputs = [*self.outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
             outputs = [ca.densify(o) for o in outputs]
             nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
             rules, place = lower(nodes, depends_on(nodes, [True, False]))
@@ -351,9 +354,9 @@ class Coupled:
             if self._is_idle(i, signs):
                 rows += [-layer[i], layer[i]]
                 continue
-            turn = np.sign(next((v for v in np.ravel(factors[i]) if v), 1.0))
+            turn = _sign(factors[i])
             rows += [turn * (factors[i] - series[i]), turn * (factors[i] + series[i])]
-        rows += [*stops, *(() if stability is None else stability)]
+        rows += [*stops, *[_sign(row) * row for row in (() if stability is None else stability)]]
         return np.array(rows) if rows else np.zeros((0, *np.shape(series)[1:]))
 
 
@@ -363,6 +366,11 @@ def _inverse(matrix: Array) -> Array:
         return np.asarray(np.linalg.inv(matrix), float)
     except np.linalg.LinAlgError:
         return np.full_like(matrix, np.nan)
+
+
+def _sign(row: Array) -> float:
+    """Sign of a series just after its start."""
+    return float(np.sign(next((v for v in np.ravel(row) if v), 1.0)))
 
 
 def coupled_of(system: FilippovSystem) -> Coupled:

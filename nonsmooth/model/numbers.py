@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 import casadi as ca
 
 #: Operations of one argument, as CasADi names them.
-_UNARY: dict[str, Callable[[float], float]] = {
+UNARY: dict[str, Callable[[float], float]] = {
     "assign": float,
     "neg": lambda a: -a,
     "twice": lambda a: a + a,
@@ -28,7 +28,7 @@ _UNARY: dict[str, Callable[[float], float]] = {
 }
 
 #: Operations of two arguments.
-_BINARY: dict[str, Callable[[float, float], float]] = {
+BINARY: dict[str, Callable[[float, float], float]] = {
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
@@ -80,8 +80,8 @@ class Numbers:
         values = [0.0 if a is None else a for a in args]
         try:
             if len(values) == 1:
-                return _UNARY[op](values[0])
-            return _BINARY[op](values[0], values[1])
+                return UNARY[op](values[0])
+            return BINARY[op](values[0], values[1])
         except OverflowError:
             return math.inf
         except ZeroDivisionError:

@@ -1,6 +1,16 @@
-"""The compiled engine: the reference driver's algorithm in C, generated and built per system."""
+"""The compiled engines: the interpreter of any system, and programs generated for one."""
 
+from .arrays import Run
 from .build import CompilerError, find_compiler
-from .engine import Engine, Run, engine_for, simulate_arrays
+from .engine import Engine, engine_for
+from .tape import TapeEngine, tape_for
 
-__all__ = ["CompilerError", "Engine", "Run", "engine_for", "find_compiler", "simulate_arrays"]
+__all__ = [
+    "CompilerError",
+    "Engine",
+    "Run",
+    "TapeEngine",
+    "engine_for",
+    "find_compiler",
+    "tape_for",
+]

@@ -31,7 +31,8 @@ _SCALAR_FUNCTIONS = (
 
 
 @lru_cache(maxsize=8)
-def _driver(name: str) -> str:
+def driver_text(name: str) -> str:
+    """Return one of the files in C beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
@@ -59,13 +60,13 @@ def scalar_source(system: FilippovSystem, order: int) -> str:
         [
             facts_header(),
             _sizes(system, order),
-            _driver("common.h"),
+            driver_text("common.h"),
             _SCALAR_TYPE,
             calls,
             modes_program(system, order),
             _mode_tables(system),
             _dispatch(system),
-            _driver("scalar.c"),
+            driver_text("scalar.c"),
         ]
     )
 
@@ -92,10 +93,10 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
             facts_header(),
             _sizes(system, order),
             defines,
-            _driver("common.h"),
-            _driver("vector.h"),
+            driver_text("common.h"),
+            driver_text("vector.h"),
             program,
-            _driver("lanes.c"),
+            driver_text("lanes.c"),
         ]
     )
 

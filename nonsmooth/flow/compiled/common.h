@@ -18,8 +18,9 @@ typedef struct {
   int32_t start_mode, at_kind;
   int64_t at_count;
   int32_t dense, hit_after;
-  /* Events that are hits: kinds as bits, for each kind of guard its indices as bits, side (or 0). */
-  int64_t hit_kinds, hit_guards[BRANCH_GUARD + 1], hit_side, hit_skip, hit_every, hit_count;
+  /* Events that are hits: kinds as bits; whether each guard is named, by kind and index; side (or 0). */
+  int64_t hit_kinds, hit_width, hit_side, hit_skip, hit_every, hit_count;
+  const int8_t *hit_named;
 } Options;
 
 /* Trajectories of a call: all of the arrays, or those listed in ``which``; where results go. */

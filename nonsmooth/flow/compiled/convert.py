@@ -6,13 +6,13 @@ import math
 
 import numpy as np
 
-from ...model import Array, FilippovSystem, motion
+from ...model import Array, FilippovSystem
 from .. import messages
 from ..facts import KINDS, REASONS
 from ..options import Options
 from ..status import ADVICE, Status
 from ..trajectory import Event, Segment, Steps, Trajectory
-from .engine import Run
+from .arrays import Run
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
@@ -31,9 +31,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     -------
     Trajectory
     """
-    status, modes = Status(run.status), system.modes
+    status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
-    events = _events(system, run)
+    events = _events(run)
     if status is not Status.STOPPED:
         letters = modes[run.mode]
         events.append(Event("end", float(run.t[-1]), run.x[-1], letters, letters, str(status)))
@@ -43,7 +43,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         t=run.t,
         x=run.x,
         events=events,
-        segments=_segments(system, run),
+        segments=_segments(run),
         status=status,
         message=f"{_message(system, options, run)} {ADVICE[status]}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
@@ -51,27 +51,35 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     )
 
 
-def _events(system: FilippovSystem, run: Run) -> list[Event]:
-    modes, found = system.modes, []
+def _events(run: Run) -> list[Event]:
+    modes, found = run.letters, []
     for k, kind in enumerate(run.event_kinds):
         before, after = modes[run.event_before[k]], modes[run.event_after[k]]
-        name = motion(system, before).guards[run.event_guards[k]].name
+        row = int(run.event_guards[k])
+        name = run.guards(before)[row].name if row >= 0 else _closed(run, before, after)
         t = float(run.event_t[k])
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
         found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1]))
     return found
 
 
-def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
+def _closed(run: Run, before: str, after: str) -> str:
+    """Names of the contacts that close together where impacts accumulate."""
+    closed = [g for g in run.guards(after) if g.kind == "release"]
+    opened = {g.name for g in run.guards(before) if g.kind == "release"}
+    return " and ".join(g.name for g in closed if g.name not in opened)
+
+
+def _segments(run: Run) -> list[Segment]:
     """Stretches of steps in one mode; a run without a step has its one mode."""
     t_last = float(run.t[-1])
     if not len(run.modes):
-        return [Segment(system.modes[run.mode], t_last, t_last, 0, 0)]
+        return [Segment(run.letters[run.mode], t_last, t_last, 0, 0)]
     changes = np.flatnonzero(np.diff(run.modes)) + 1
     bounds = [0, *changes.tolist(), len(run.modes)]
     ends = [*(float(run.starts[k]) for k in changes), t_last]
     return [
-        Segment(system.modes[run.modes[a]], float(run.starts[a]), end, a, b)
+        Segment(run.letters[run.modes[a]], float(run.starts[a]), end, a, b)
         for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
     ]
 
@@ -100,14 +108,14 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
 
 
 def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
-    modes, t = system.modes, float(run.t[-1])
+    modes, t = run.letters, float(run.t[-1])
     reason = REASONS[run.reason]
     if reason == "two_fold":
         return messages.two_fold(run.where)
     if reason == "slid_to_two_fold":
         return messages.slid_to_two_fold(run.where)
     if reason == "ambiguous":
-        return messages.ambiguous([m for k, m in enumerate(modes) if run.where >> k & 1])
+        return messages.ambiguous(run.several)
     if reason == "wrong_start":
         return messages.wrong_start(str(options.start_mode), modes[run.where])
     if reason == "field":
@@ -118,6 +126,23 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.multiple_zero(run.where)
     if reason == "two_sided":
         return messages.two_sided(system.resets[run.where][0])
+    contacts = _contacts(system, run)
+    if reason == "behind":
+        return messages.behind(system.impacts[run.where], t)
+    if reason == "no_impulse":
+        return messages.no_impulse(system.impacts[run.where], t)
+    if reason == "no_reaction":
+        return messages.no_reaction(contacts)
+    if reason == "no_stable_motion":
+        return messages.no_stable_motion(run.active)
+    if reason == "possibly_several":
+        return messages.possibly_several(run.active)
     if reason == "reset_map":
         return messages.reset_not_finite(system.resets[run.where][0], t)
     return messages.surface_not_finite() if reason == "surface" else messages.degenerate()
+
+
+def _contacts(system: FilippovSystem, run: Run) -> list[str]:
+    """Names of the contacts at the last point that was decided."""
+    first = system.surface_count
+    return [system.impacts[i - first] for i in run.active if i >= first]

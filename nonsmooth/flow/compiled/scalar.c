@@ -372,7 +372,7 @@ static void sample_step(Run *r, const Expansion *e, double dt) {
 
 static void count_hit(Run *r, int kind, const int *guard, const double *x) {
   const Options *o = &r->o;
-  if (!(o->hit_kinds >> kind & 1) || !(o->hit_guards[guard[0]] >> guard[1] & 1)) return;
+  if (!(o->hit_kinds >> kind & 1) || !o->hit_named[guard[0] * o->hit_width + guard[1]]) return;
   if ((o->hit_side && guard[2] != o->hit_side) || r->t <= r->begun + AT_END * larger(1, fabs(r->begun))) return;
   r->hits++;
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;

@@ -184,8 +184,9 @@ class Driver:
         if guard.kind == "surface" and not self._is_on(i):
             return self._end(Status.NON_UNIQUE, messages.multiple_zero(i))
         known: dict[tuple[str, int, int], int] = {}
-        if guard.kind == "exit":
+        if guard.kind in ("exit", "branch"):
             self._watch_two_fold()
+        if guard.kind == "exit":
             known = {("exit", i, guard.side): 1, ("surface", i, guard.side): 2}
         layer = (float(guard.side), -guard.side) if guard.kind == "surface" else None
         self._continue(active, known, before, guard.name, layer)

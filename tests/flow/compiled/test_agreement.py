@@ -11,7 +11,7 @@ from hypothesis import strategies as st
 import nonsmooth.flow.compiled.build as build_module
 import nonsmooth.flow.compiled.engine as engine_module
 import nonsmooth.textbook as textbook
-from nonsmooth.flow.compiled import engine_for, find_compiler, simulate_arrays
+from nonsmooth.flow.compiled import engine_for, find_compiler, tape_for
 from nonsmooth.flow.compiled.codegen import lanes_source, scalar_source, supports_lanes
 from nonsmooth.flow.facts import HAND_OVER, KINDS
 from nonsmooth.flow.options import Options
@@ -26,13 +26,29 @@ def reference(system, x, p, options):
     return Driver(system, x.copy(), p, options).run()
 
 
+def simulate_arrays(system, x, p, options, engine=engine_for):
+    """Run a compiled engine; None where the reference driver must repeat the run."""
+    compiled = engine(system, options)
+    run = compiled.run(x, p, options) if compiled is not None else None
+    return None if run is None or run.status == HAND_OVER else run
+
+
 def agree(system, start, options, parameters=None, tolerance=1e-12):
     """Assert that engines agree; returns the status."""
     x, p = system.extended_point(start, options.t_start), system.parameter_vector(parameters)
     expected = reference(system, x, p, options)
-    run = simulate_arrays(system, x, p, options)
-    if run is None:
-        return None
+    for engine in (engine_for, tape_for):
+        run = simulate_arrays(system, x, p, options, engine)
+        if run is None:
+            return None
+        same_run(run, expected, tolerance)
+    if supports_lanes(system):
+        scale = 1.0 + np.abs(expected.x).max() + np.abs(expected.t).max()
+        lanes_agree(system, x, p, options, expected, tolerance * scale)
+    return expected.status
+
+
+def same_run(run, expected, tolerance):
     assert run.status == expected.status, expected.message
     assert run.itinerary == expected.itinerary
     kinds = [e.kind for e in expected.events if e.kind != "end"]
@@ -48,9 +64,6 @@ def agree(system, start, options, parameters=None, tolerance=1e-12):
         np.testing.assert_allclose(run.event_x, states, rtol=0, atol=tolerance * scale)
     times = [e.t for e in expected.events if e.kind != "end"]
     np.testing.assert_allclose(run.event_t, times, rtol=0, atol=tolerance * scale)
-    if supports_lanes(system):
-        lanes_agree(system, x, p, options, expected, tolerance * scale)
-    return expected.status
 
 
 def lanes_agree(system, x, p, options, expected, tolerance):

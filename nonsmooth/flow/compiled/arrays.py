@@ -1,0 +1,322 @@
+"""What Python and the drivers in C share: structures of options and batches, arrays of a dense run."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, FilippovSystem, Guard
+from ..facts import GUARDS, KINDS
+from ..options import Options
+from ..results import Chunk
+from ..section import Hits
+from .build import CompilerError
+
+#: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
+BURST = 4096
+
+#: Room of the first and of the largest arrays of a dense run, in steps.
+FIRST_STEPS, MOST_STEPS = 64, 16384
+
+_D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
+_POINTER = ctypes.c_void_p
+
+
+class OptionsStructure(ctypes.Structure):
+    """``Options`` of common.h."""
+
+    _fields_ = [
+        *[(name, _D) for name in ("t_end", "rtol", "atol", "max_step")],
+        *[(name, _I64) for name in ("max_steps", "max_events")],
+        *[(name, _I32) for name in ("start_mode", "at_kind")],
+        ("at_count", _I64),
+        *[(name, _I32) for name in ("dense", "hit_after")],
+        *[(name, _I64) for name in ("hit_kinds", "hit_width", "hit_side", "hit_skip", "hit_every")],
+        ("hit_count", _I64),
+        ("hit_named", _POINTER),
+    ]
+    kept: NDArray[Any]  # what hit_named points to
+
+
+class BatchStructure(ctypes.Structure):
+    """``Batch`` of common.h."""
+
+    _fields_ = [
+        ("count", _I64),
+        ("p_stride", _I64),
+        ("t0", _D),
+        *[(name, _POINTER) for name in ("which", "x0", "p", "x", "t", "status", "itinerary")],
+        *[(name, _POINTER) for name in ("kinds", "at_x", "at_t", "totals")],
+        *[(name, _I64) for name in ("room", "times_stride")],
+        *[(name, _POINTER) for name in ("times", "sample_t", "sample_x")],
+    ]
+
+
+_OUTPUT_ARRAYS = {
+    "start": (float, "step"),
+    "coefficients": (float, "step"),
+    "point_t": (float, "point"),
+    "point_x": (float, "point"),
+    "event_t": (float, "event"),
+    "event_x": (float, "event"),
+    "event_after_x": (float, "event"),
+    "step_mode": (np.int32, "step"),
+    "event_kind": (np.int32, "event"),
+    "event_before": (np.int32, "event"),
+    "event_after": (np.int32, "event"),
+    "event_guard": (np.int32, "event"),
+}
+
+
+class Output:
+    """Arrays of a dense run with room for some steps.
+
+    Parameters
+    ----------
+    n : int
+        Extended dimension.
+    order, steps : int
+    """
+
+    class Structure(ctypes.Structure):
+        """``Output`` of the drivers."""
+
+        _fields_ = [
+            *[(name, _I64) for name in ("steps", "points", "events")],
+            *[(name, _I64) for name in ("step_room", "point_room", "event_room")],
+            *[(name, _POINTER) for name in _OUTPUT_ARRAYS],
+        ]
+
+    def __init__(self, n: int, order: int, steps: int):
+        self.steps = steps
+        rooms = {"step": steps, "point": 3 * steps, "event": 2 * steps}
+        shapes: dict[str, tuple[int, ...]] = {
+            "coefficients": (n, order + 1),
+            "point_x": (n,),
+            "event_x": (n,),
+            "event_after_x": (n,),
+        }
+        self.arrays: dict[str, NDArray[Any]] = {
+            name: np.empty((rooms[room], *shapes.get(name, ())), dtype)
+            for name, (dtype, room) in _OUTPUT_ARRAYS.items()
+        }
+        addresses = [a.ctypes.data for a in self.arrays.values()]
+        self.pointer = ctypes.byref(self.Structure(0, 0, 0, *rooms.values(), *addresses))
+
+    def filled(self, counts: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
+        """Return the parts that were written: steps, points and events."""
+        sizes = dict(zip(("step", "point", "event"), counts.tolist(), strict=True))
+        return {name: a[: sizes[_OUTPUT_ARRAYS[name][1]]] for name, a in self.arrays.items()}
+
+
+@dataclass
+class Run:
+    """One dense run as arrays.
+
+    Attributes
+    ----------
+    status : int
+        A Status, or HAND_OVER: the reference driver must repeat the run.
+    reason, where : int
+        Why, for the message (see ``facts.REASONS``): a surface, a stop.
+    mode : int
+        Last mode.
+    limit : float
+        Accumulation time or NaN.
+    itinerary : str
+    letters : sequence of str
+        Modes by number.
+    guards : callable
+        From a mode to its guards.
+    active : list of int
+        Surfaces and contacts at the last point that was decided.
+    several : list of str
+        Modes that could continue there, where more than one could.
+    t, x : ndarray (m,), (m, n)
+        Points: start, steps and events; a reset appears twice.
+    starts, coefficients, modes : ndarray (s,), (s, N, P+1), (s,)
+        Steps: start times, Taylor coefficients, numbers of modes.
+    event_kinds, event_t, event_x, event_after_x : ndarray (e,) or (e, n)
+    event_before, event_after, event_guards : ndarray (e,)
+        Events: kind (position in ``facts.KINDS``), modes before and after, row of the guard in
+        ``guards(mode_before)`` or -1. The final "end" is not among them.
+    """
+
+    status: int
+    reason: int
+    where: int
+    mode: int
+    limit: float
+    itinerary: str
+    letters: Sequence[str]
+    guards: Callable[[str], Sequence[Guard]]
+    active: list[int]
+    several: list[str]
+    t: Array
+    x: Array
+    starts: Array
+    coefficients: Array
+    modes: NDArray[np.int32]
+    event_kinds: NDArray[np.int32]
+    event_t: Array
+    event_x: Array
+    event_after_x: Array
+    event_before: NDArray[np.int32]
+    event_after: NDArray[np.int32]
+    event_guards: NDArray[np.int32]
+
+    @classmethod
+    def joined(
+        cls,
+        parts: Sequence[dict[str, NDArray[Any]]],
+        n: int,
+        numbers: Array,
+        counts: NDArray[np.int64],
+        itinerary: str,
+        letters: Sequence[str],
+        guards: Callable[[str], Sequence[Guard]],
+        active: list[int],
+        several: list[str],
+    ) -> Run:
+        """Put the parts of a run together, and what the driver says of its end."""
+        join = np.concatenate if len(parts) > 1 else lambda pieces: pieces[0]
+        whole = {name: join([part[name] for part in parts]) for name in _OUTPUT_ARRAYS}
+        return cls(
+            status=int(counts[0]),
+            reason=int(counts[1]),
+            where=int(counts[2]),
+            mode=int(counts[3]),
+            limit=float(numbers[1]),
+            itinerary=itinerary,
+            letters=letters,
+            guards=guards,
+            active=active,
+            several=several,
+            t=whole["point_t"],
+            x=whole["point_x"][:, :n],
+            starts=whole["start"],
+            coefficients=whole["coefficients"],
+            modes=whole["step_mode"],
+            event_kinds=whole["event_kind"],
+            event_t=whole["event_t"],
+            event_x=whole["event_x"][:, :n],
+            event_after_x=whole["event_after_x"][:, :n],
+            event_before=whole["event_before"],
+            event_after=whole["event_after"],
+            event_guards=whole["event_guard"],
+        )
+
+
+def require_size(size: Any, structure: type[ctypes.Structure]) -> None:
+    """Refuse a library whose structure is not laid out as ours.
+
+    Raises
+    ------
+    CompilerError
+    """
+    size.restype = _I64
+    if size() != ctypes.sizeof(structure):
+        raise CompilerError(
+            f"{structure.__name__}: expected {ctypes.sizeof(structure)} bytes, received {size()} "
+            "from the compiled library. Its compiler lays out structures in another way."
+        )
+
+
+def address(a: NDArray[Any] | None) -> int | None:
+    """Return where an array begins."""
+    return None if a is None else a.ctypes.data
+
+
+def options_of(
+    system: FilippovSystem,
+    o: Options,
+    dense: bool,
+    at: tuple[int, int] | None = None,
+    start_mode: int = -1,
+) -> OptionsStructure:
+    """Options as C reads them; the start's mode by its number."""
+    kind, count = at or (-1, 0)
+    limit = 2**62
+    made = OptionsStructure(
+        o.t_end,
+        o.rtol,
+        o.atol,
+        o.max_step,
+        int(min(o.max_steps, limit)),
+        int(min(o.max_events, limit)),
+        start_mode,
+        kind,
+        count,
+        int(dense),
+    )
+    made.kept = _named(system, o.hits)
+    made.hit_named, made.hit_width, made.hit_every = address(made.kept), made.kept.shape[1], 1
+    if o.hits is not None:
+        made.hit_after, made.hit_skip, made.hit_every = int(o.hits.after), o.hits.skip, o.hits.every
+        made.hit_kinds = sum(1 << i for i, kind in enumerate(KINDS) if kind in o.hits.kinds)
+        made.hit_count = o.hits.count or 0
+        made.hit_side = 0 if o.hits.letter is None else (1 if o.hits.letter[1] == "+" else -1)
+    return made
+
+
+def _named(system: FilippovSystem, hits: Hits | None) -> NDArray[np.int8]:
+    """Whether the guards of each kind have a name that is looked for."""
+    names = {
+        "surface": [f"h{i}" for i in range(system.surface_count)],
+        "stop": [name for name, _ in system.stops],
+        "reset": [name for name, _ in system.resets],
+        "impact": system.impacts,
+        "release": system.impacts,
+    }
+    width = max(1, *map(len, names.values()))
+    named = np.zeros((len(GUARDS), width), np.int8)
+    for row, kind in zip(named, GUARDS, strict=True):
+        if hits is None or hits.names is None:
+            row[:] = 1
+        else:
+            own = names.get(kind, ())
+            row[: len(own)] = [name in hits.names for name in own]
+    return named
+
+
+def batch_of(
+    x: Array,
+    p: Array,
+    t_start: float,
+    chunk: Chunk,
+    times: Array | None,
+    which: NDArray[np.intp] | None,
+) -> BatchStructure:
+    """What C reads and where it writes; all arrays live as long as the caller's."""
+    count = len(x) if which is None else len(which)
+    stride = p.shape[-1] if p.ndim > 1 else 0
+    results = (chunk.x, chunk.t, chunk.status, chunk.itinerary, chunk.kinds)
+    kept = (chunk.at_x, chunk.at_t, chunk.totals)
+    arrays = [address(a) for a in (which, x, p, *results, *kept)]
+    room = 0 if chunk.sample_t is None else chunk.sample_t.shape[1]
+    times_stride = 0 if times is None or times.ndim == 1 else times.shape[1]
+    samples = [address(a) for a in (times, chunk.sample_t, chunk.sample_x)]
+    return BatchStructure(count, stride, t_start, *arrays, room, times_stride, *samples)
+
+
+def words_of(
+    parent: NDArray[np.int32],
+    mode: NDArray[np.int32],
+    modes: Sequence[str],
+    nodes: Sequence[int],
+) -> Mapping[int, str]:
+    """Itineraries of some nodes of a tree of modes, as strings."""
+    above, last = parent.tolist(), mode.tolist()
+    words = {}
+    for node in nodes:
+        letters, k = [], node
+        while k > 0:
+            letters.append(modes[last[k]] or "o")
+            k = above[k]
+        words[node] = " ".join(reversed(letters))
+    return words

@@ -1,0 +1,174 @@
+/* Programs as lists of instructions, and the interpreter that runs them: no system is compiled.
+ *
+ * The lists are written by nonsmooth/model/printing/tape.py; the operations and the Taylor rules have the
+ * numbers of its enumerations. What does not move (constants, parameters) is computed once a run.
+ */
+
+/* Values of a graph: node j is op[j] of nodes a[j] and b[j]; inputs have a vector and a position there. */
+typedef struct {
+  int32_t size, still_count, moving_count, output_count;
+  const int32_t *op, *a, *b, *still, *moving, *output;
+  const double *constant;
+} Values;
+
+/* Power series by rules (nonsmooth/model/rules.py), order by order. ``late`` are those that multipliers
+ * enter, which follow from the equations of the same order. */
+typedef struct {
+  int32_t size, still_count, moving_count, late_count, output_count, pad;
+  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *late, *output;
+  const double *first, *second;
+} Series;
+
+static double operate(int op, double x, double y) {
+  switch (op) {
+    case OP_assign: return x;
+    case OP_neg: return -x;
+    case OP_twice: return x + x;
+    case OP_sq: return x * x;
+    case OP_inv: return 1.0 / x;
+    case OP_sign: return x == x ? ns_sign(x) : NAN;
+    case OP_fabs: return fabs(x);
+    case OP_not: return !x;
+    case OP_floor: return floor(x);
+    case OP_ceil: return ceil(x);
+    case OP_erfinv: return ns_erfinv(x);
+    case OP_sqrt: return sqrt(x);
+    case OP_exp: return exp(x);
+    case OP_expm1: return expm1(x);
+    case OP_log: return log(x);
+    case OP_log1p: return log1p(x);
+    case OP_sin: return sin(x);
+    case OP_cos: return cos(x);
+    case OP_tan: return tan(x);
+    case OP_asin: return asin(x);
+    case OP_acos: return acos(x);
+    case OP_atan: return atan(x);
+    case OP_sinh: return sinh(x);
+    case OP_cosh: return cosh(x);
+    case OP_tanh: return tanh(x);
+    case OP_asinh: return asinh(x);
+    case OP_acosh: return acosh(x);
+    case OP_atanh: return atanh(x);
+    case OP_erf: return erf(x);
+    case OP_add: return x + y;
+    case OP_sub: return x - y;
+    case OP_mul: return x * y;
+    case OP_div: return x / y;
+    case OP_pow: case OP_constpow: return pow(x, y);
+    case OP_atan2: return atan2(x, y);
+    case OP_hypot: return hypot(x, y);
+    case OP_fmin: return fmin(x, y);
+    case OP_fmax: return fmax(x, y);
+    case OP_fmod: return fmod(x, y);
+    case OP_remainder: return remainder(x, y);
+    case OP_copysign: return copysign(x, y);
+    case OP_lt: return x < y;
+    case OP_le: return x <= y;
+    case OP_eq: return x == y;
+    case OP_ne: return x != y;
+    case OP_and: return x && y;
+    case OP_or: return x || y;
+    case OP_if_else_zero: return x ? y : 0;
+  }
+  return NAN;
+}
+
+static void values_nodes(const Values *t, const int32_t *which, int32_t count, const double *x, const double *p,
+                         double *w) {
+  for (int32_t k = 0; k < count; k++) {
+    int32_t j = which[k], a = t->a[j], b = t->b[j];
+    switch (t->op[j]) { /* the frequent ones at once */
+      case OP_const: w[j] = t->constant[j]; break;
+      case OP_input: w[j] = a ? p[b] : x[b]; break;
+      case OP_add: w[j] = w[a] + w[b]; break;
+      case OP_sub: w[j] = w[a] - w[b]; break;
+      case OP_mul: w[j] = w[a] * w[b]; break;
+      case OP_neg: w[j] = -w[a]; break;
+      default: w[j] = operate(t->op[j], w[a], w[b]);
+    }
+  }
+}
+static void values_prepare(const Values *t, const double *p, double *w) {
+  values_nodes(t, t->still, t->still_count, p, p, w);
+}
+static void values_run(const Values *t, const double *x, const double *p, double *w) {
+  values_nodes(t, t->moving, t->moving_count, x, p, w);
+}
+
+/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in two chains. */
+static inline double convolve(const double *u, const double *v, int k, int first, int last) {
+  double even = 0, odd = 0;
+  int i = first;
+  for (; i < last; i += 2) { even += u[i] * v[k - i]; odd += u[i + 1] * v[k - i - 1]; }
+  return i == last ? (even + u[i] * v[k - i]) + odd : even + odd;
+}
+static inline double weigh(const double *u, const double *v, int k, int first, int last) {
+  double even = 0, odd = 0;
+  int i = first;
+  for (; i < last; i += 2) { even += i * (u[i] * v[k - i]); odd += (i + 1) * (u[i + 1] * v[k - i - 1]); }
+  return i == last ? (even + i * (u[i] * v[k - i])) + odd : even + odd;
+}
+
+/* A coefficient that is zero stays so, whatever it is divided by: a square root of zero at rest. */
+static inline double over(double a, double b) { return a == 0 ? 0 : a / b; }
+
+static double power_coefficient(const double *u, const double *w, double exponent, int k) {
+  double sum = 0;
+  for (int j = 0; j < k; j++) sum += (exponent * (k - j) - j) * (u[k - j] * w[j]);
+  return over(sum, u[0]) * (1.0 / k);
+}
+
+/* Coefficient k of some rules; coefficient i of rule j is s[j * stride + i], of input x[i] x[k]. */
+static void series_rules(const Series *t, const int32_t *which, int32_t count, int k, int stride, const double *x,
+                         double *s) {
+  for (int32_t l = 0; l < count; l++) {
+    int32_t j = which[l];
+    const double *u = s + (int64_t)t->a[j] * stride, *v = s + (int64_t)t->b[j] * stride;
+    double *w = s + (int64_t)j * stride;
+    switch (t->rule[j]) {
+      case RULE_input: w[k] = x[t->b[j]]; break;
+      case RULE_add: w[k] = u[k] + v[k]; break;
+      case RULE_sub: w[k] = u[k] - v[k]; break;
+      case RULE_neg: w[k] = -u[k]; break;
+      case RULE_twice: w[k] = u[k] + u[k]; break;
+      case RULE_scale: w[k] = u[k] * v[0]; break;
+      case RULE_over: w[k] = over(u[k], v[0]); break;
+      case RULE_mul: w[k] = convolve(u, v, k, 0, k); break;
+      case RULE_sq: {
+        double half = 2 * convolve(u, u, k, 0, (k + 1) / 2 - 1);
+        w[k] = k % 2 ? half : half + u[k / 2] * u[k / 2];
+        break;
+      }
+      case RULE_div: w[k] = over(u[k] - convolve(w, v, k, 0, k - 1), v[0]); break;
+      case RULE_sqrt: w[k] = k ? over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]) : sqrt(u[0]); break;
+      case RULE_power: w[k] = k ? power_coefficient(u, w, v[0], k) : pow(u[0], v[0]); break;
+      case RULE_affine: w[k] = (k ? 0 : t->first[j]) + t->second[j] * u[k]; break;
+      case RULE_integral:
+        w[k] = k ? t->first[j] / k * weigh(u, v, k, 1, k) : operate(t->op[j], u[0], 0);
+        break;
+      case RULE_quotient:
+        w[k] = k ? over(t->first[j] * k * u[k] - weigh(w, v, k, 1, k - 1), v[0]) * (1.0 / k)
+                 : operate(t->op[j], u[0], 0);
+        break;
+      case RULE_atan2: {
+        const double *r = s + (int64_t)t->c[j] * stride;
+        if (k == 0) { w[0] = atan2(u[0], v[0]); break; }
+        double top = weigh(u, v, k, 1, k) - weigh(v, u, k, 1, k) - weigh(w, r, k, 1, k - 1);
+        w[k] = over(top, r[0]) * (1.0 / k);
+        break;
+      }
+      default: w[k] = NAN;
+    }
+  }
+}
+
+/* What does not move: constants, parameters and operations of them; later coefficients stay zero. */
+static void series_prepare(const Series *t, int stride, const double *p, double *s) {
+  for (int32_t l = 0; l < t->still_count; l++) {
+    int32_t j = t->still[l];
+    double *w = s + (int64_t)j * stride, u = s[(int64_t)t->a[j] * stride], v = s[(int64_t)t->b[j] * stride];
+    if (t->rule[j] == RULE_constant) w[0] = t->first[j];
+    else if (t->rule[j] == RULE_input) w[0] = p[t->b[j]];
+    else w[0] = operate(t->op[j], u, v);
+  }
+}

@@ -1,0 +1,306 @@
+"""The interpreter from Python: any system at once, with a library that is compiled once per machine."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import fields
+from functools import lru_cache
+from importlib import resources
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, Coupled, FilippovSystem, coupled_of
+from ...model.printing.tape import OPERATIONS, TAPE_RULES, Entries, Series, Tape, Values, tape_of
+from ..facts import FULL, RUNNING
+from ..options import Options
+from ..results import Chunk, Stopped
+from .arrays import (
+    BURST,
+    FIRST_STEPS,
+    MOST_STEPS,
+    BatchStructure,
+    OptionsStructure,
+    Output,
+    Run,
+    address,
+    batch_of,
+    options_of,
+    require_size,
+    words_of,
+)
+from .build import build
+from .codegen import driver_text, facts_header
+
+#: Largest order of the series, for arrays on the stack.
+_MOST_ORDER = 48
+
+_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+
+
+class _Values(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("size", "still_count", "moving_count", "output_count")],
+        *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "output", "constant")],
+    ]
+
+
+class _Series(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("size", "still_count", "moving_count", "late_count")],
+        *[(name, _I32) for name in ("output_count", "pad")],
+        *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "late")],
+        *[(name, _POINTER) for name in ("output", "first", "second")],
+    ]
+
+
+class _Entries(ctypes.Structure):
+    _fields_ = [("count", _I32), ("pad", _I32), ("row", _POINTER), ("column", _POINTER)]
+
+
+_VALUES = ("point", "surfaces", "maps", "restitution", "columns")
+_ENTRIES = tuple(field.name for field in fields(Tape) if field.type == "Entries")
+_TABLES = ("stop_direction", "reset_direction", "continuous", "scaled", "carries", "component")
+
+
+class _System(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("n", "dimension", "timed", "m", "c", "parameters")],
+        *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
+        ("series", _Series),
+        *[(name, _Values) for name in _VALUES],
+        *[(name, _Entries) for name in _ENTRIES],
+        *[(name, _POINTER) for name in (*_TABLES, "slope_output", "slope_moves")],
+        *[(name, _I32) for name in ("linear", "pad")],
+    ]
+
+
+@lru_cache(maxsize=1)
+def library() -> ctypes.CDLL:
+    """Return the interpreter, compiled when it is first asked for on a machine.
+
+    Raises
+    ------
+    CompilerError
+    """
+    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
+    head = "".join(
+        f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
+        for prefix, names in enumerations
+    )
+    sizes = f"#define P {_MOST_ORDER}\n#define MODES 1000000\n#define M 1\n#define NG 1\n"
+    texts = [driver_text(name) for name in ("common.h", "tape.h", "linear.h", "tape.c")]
+    made = build("".join([facts_header(), sizes, head, *texts]))
+    require_size(made.options_size, OptionsStructure)
+    require_size(made.batch_size, BatchStructure)
+    require_size(made.system_size, _System)
+    require_size(made.output_size, Output.Structure)
+    made.table_new.restype = made.run_new.restype = _POINTER
+    made.table_new.argtypes = [_I32]
+    for name in ("table_modes", "table_size", "table_free", "run_free"):
+        getattr(made, name).argtypes = [_POINTER]
+    made.table_read.argtypes = [_POINTER] * 4
+    made.run_new.argtypes = [_POINTER] * 2
+    made.run_begin.argtypes = [*[_POINTER] * 6, _D]
+    made.run_continue.argtypes = [_POINTER, _I64]
+    made.run_read.argtypes = [_POINTER] * 5
+    made.run_resume.argtypes = [_POINTER] * 2
+    made.run_many.argtypes = [*[_POINTER] * 5, _I64]
+    return made
+
+
+def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
+    """Return the interpreter with a system at the options' tolerance, or None where it has none: its
+    multipliers must enter linearly."""
+    order = options.order
+    if any(system.nonlinear) or order >= _MOST_ORDER or not coupled_of(system).affine:
+        return None
+    return system.cached(("tape", order), lambda: TapeEngine(system, order))
+
+
+class TapeEngine:
+    """The interpreter with one system at one order.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    order : int
+    """
+
+    def __init__(self, system: FilippovSystem, order: int):
+        self.system, self.order = system, order
+        self.coupled = coupled_of(system)
+        tape = system.cached("tape", lambda: tape_of(self.coupled))
+        self._kept: list[NDArray[Any]] = []  # arrays that C points to
+        self._c = self._structure(self.coupled, tape)
+
+    def _structure(self, coupled: Coupled, tape: Tape) -> _System:
+        system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
+        made = _System(
+            n=system.extended_dimension,
+            dimension=system.dimension,
+            timed=int(system.time_dependent),
+            m=m,
+            c=c,
+            parameters=len(system.parameter_names),
+            stops=len(system.stops),
+            resets=len(system.resets),
+            order=self.order,
+            slope_outputs=tape.slope_outputs,
+            series=self._series(tape.series),
+            linear=int(coupled.linear),
+        )
+        for name in _VALUES:
+            setattr(made, name, self._values(getattr(tape, name)))
+        for name in _ENTRIES:
+            setattr(made, name, self._entries(getattr(tape, name)))
+        carries = np.zeros((m, c))
+        for i, carried in enumerate(coupled.carriers):
+            carries[i, carried] = 1
+        tables: dict[str, Any] = {
+            "stop_direction": [direction for _, direction in system.stops],
+            "reset_direction": [direction for _, direction in system.resets],
+            "continuous": coupled.continuous,
+            "scaled": coupled.scaled,
+            "carries": carries.ravel(),
+            "component": tape.component,
+            "slope_output": tape.slope_output,
+            "slope_moves": tape.slope_moves,
+        }
+        for name, values in tables.items():
+            setattr(made, name, self._at(np.array([*values, 0], np.int32)))
+        return made
+
+    def _at(self, array: NDArray[Any]) -> int:
+        self._kept.append(array)
+        return array.ctypes.data
+
+    def _values(self, v: Values) -> _Values:
+        arrays = (v.op, v.a, v.b, v.still, v.moving, v.outputs, v.constant)
+        sizes = (len(v.op), len(v.still), len(v.moving), len(v.outputs))
+        return _Values(*sizes, *map(self._at, arrays))
+
+    def _series(self, s: Series) -> _Series:
+        sizes = (len(s.rule), len(s.still), len(s.moving), len(s.late), len(s.outputs), 0)
+        arrays = (s.rule, s.a, s.b, s.c, s.op, s.still, s.moving, s.late, s.outputs)
+        return _Series(*sizes, *map(self._at, (*arrays, s.first, s.second)))
+
+    def _entries(self, e: Entries) -> _Entries:
+        return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
+
+    # one trajectory ----------------------------------------------------------------------------
+
+    def run(self, x: Array, p: Array, options: Options) -> Run:
+        """Run one trajectory from an extended start, dense output kept."""
+        n = self.system.extended_dimension
+        output = Output(n, self.order, FIRST_STEPS)
+        x, p = np.array(x, float), np.append(np.array(p, float), 0.0)
+        start = self._start_mode(options)
+        parts: list[dict[str, NDArray[Any]]] = []
+        with self._table() as table, self._state(table) as state:
+            c_options = ctypes.byref(options_of(self.system, options, dense=True))
+            given = (address(x), address(p), address(start))
+            library().run_begin(state, c_options, output.pointer, *given, options.t_start)
+            while True:
+                status = RUNNING
+                while status == RUNNING:  # Python hears Ctrl-C between the calls
+                    status = library().run_continue(state, BURST)
+                numbers, counts, active, several = self._read(state)
+                parts.append(output.filled(counts[7:10]))
+                if status != FULL:
+                    break
+                output = Output(n, self.order, min(4 * output.steps, MOST_STEPS))
+                library().run_resume(state, output.pointer)
+            modes, words = self._words(table, [int(counts[4])])
+        return Run.joined(
+            parts,
+            self.system.dimension,
+            numbers=numbers,
+            counts=counts,
+            itinerary=words[int(counts[4])],
+            letters=modes,
+            guards=self.coupled.guards,
+            active=active,
+            several=[modes[k] for k in several],
+        )
+
+    def _start_mode(self, options: Options) -> NDArray[np.int8] | None:
+        if options.start_mode is None:
+            return None
+        return np.array([*self.system.parse_letters(options.start_mode), 0], np.int8)
+
+    @contextmanager
+    def _table(self) -> Iterator[int]:
+        table = library().table_new(self.system.surface_count + len(self.system.impacts))
+        try:
+            yield table
+        finally:
+            library().table_free(table)
+
+    @contextmanager
+    def _state(self, table: int) -> Iterator[int]:
+        state = library().run_new(ctypes.byref(self._c), table)
+        if not state:
+            raise MemoryError("the compiled engine: no memory for a run of this system")
+        try:
+            yield state
+        finally:
+            library().run_free(state)
+
+    def _read(self, state: int) -> tuple[Array, NDArray[np.int64], list[int], list[int]]:
+        numbers, counts = np.empty(3), np.empty(12, np.int64)
+        width = self.system.surface_count + len(self.system.impacts)
+        active, several = np.empty(width + 1, np.int32), np.empty(16, np.int32)
+        arrays = (numbers, counts, active, several)
+        library().run_read(state, *[address(a) for a in arrays])
+        return numbers, counts, active[: counts[10]].tolist(), several[: counts[11]].tolist()
+
+    def _words(self, table: int, nodes: list[int]) -> tuple[list[str], dict[int, str]]:
+        """Modes that were met, and itineraries of some nodes of their tree."""
+        made, width = library(), self.system.surface_count + len(self.system.impacts)
+        size, count = made.table_size(table), made.table_modes(table)
+        parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+        letters = np.empty((count, max(width, 1)), np.int8)
+        made.table_read(table, address(parent), address(mode), address(letters))
+        modes = [self._spelled(row) for row in letters[:, :width].tolist()]
+        return modes, words_of(parent, mode, modes, nodes)
+
+    def _spelled(self, signs: list[int]) -> str:
+        m = self.system.surface_count
+        surfaces = ("s+-"[sign] for sign in signs[:m])
+        return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
+
+    # many trajectories -------------------------------------------------------------------------
+
+    def run_many(
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+        out: Chunk | None = None,
+        stop: Callable[[], bool] = lambda: False,
+        times: Array | None = None,
+    ) -> Chunk:
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,).
+
+        As ``Engine.run_many``, which is faster where many trajectories share a system.
+        """
+        chunk = out or Chunk.empty(len(x), self.system.dimension, at is not None)
+        chunk.forget()
+        x = np.ascontiguousarray(x, float)
+        p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)
+        batch = batch_of(x, p, options.t_start, chunk, times, None)
+        start, done = self._start_mode(options), np.zeros(1, np.int64)
+        c_options = options_of(self.system, options, dense=False, at=at)
+        with self._table() as table, self._state(table) as state:
+            call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
+            while library().run_many(*call, address(start), BURST):
+                if stop():
+                    raise Stopped
+            used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
+            chunk.rename(self._words(table, used)[1])
+        return chunk

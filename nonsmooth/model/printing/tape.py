@@ -1,0 +1,276 @@
+"""A system as lists of instructions, which the interpreter in C runs at once: nothing is compiled.
+
+``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Tape`` all that a driver needs of
+a system, in any mode (``model.coupled``). Generation is linear in the graph.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import cast
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..coupled import Coupled
+from ..economy import economise
+from ..graph import depends_on, instructions
+from ..numbers import BINARY, UNARY
+from ..rules import RULES, Rule, lower, touched
+from ..values import Array
+
+Integers = NDArray[np.int32]
+
+#: Operations and rules by number, as in the C enumerations. ``scale`` and ``over`` are products with and
+#: quotients by what does not move.
+OPERATIONS = ("const", "input", *UNARY, *BINARY)
+TAPE_RULES = (*RULES, "scale", "over")
+
+
+@dataclass(frozen=True)
+class Values:
+    """Nodes of a graph.
+
+    Attributes
+    ----------
+    op, a, b : ndarray of int32
+        Operation and its arguments; vector and position of an input.
+    constant : ndarray
+        Values of constants.
+    still, moving : ndarray of int32
+        Nodes that are evaluated once for given parameters, and at every point; each in order.
+    outputs : ndarray of int32
+        Nodes of the outputs.
+    """
+
+    op: Integers
+    a: Integers
+    b: Integers
+    constant: Array
+    still: Integers
+    moving: Integers
+    outputs: Integers
+
+
+@dataclass(frozen=True)
+class Series:
+    """Rules of power series.
+
+    Attributes
+    ----------
+    rule, a, b, c, op : ndarray of int32
+        Rule, its arguments (vector and position of an input in a and b), its operation.
+    first, second : ndarray
+        Its numbers.
+    still, moving, late : ndarray of int32
+        Rules that are known once the parameters are, those advanced order by order, and those of them
+        that multipliers enter.
+    outputs : ndarray of int32
+    """
+
+    rule: Integers
+    a: Integers
+    b: Integers
+    c: Integers
+    op: Integers
+    first: Array
+    second: Array
+    still: Integers
+    moving: Integers
+    late: Integers
+    outputs: Integers
+
+
+@dataclass(frozen=True)
+class Entries:
+    """Places of the nonzero entries of a matrix."""
+
+    row: Integers
+    column: Integers
+
+
+@dataclass(frozen=True)
+class Tape:
+    """What the driver in C reads of a system; see ``System`` in ``flow/compiled/tape.c``."""
+
+    series: Series
+    point: Values
+    surfaces: Values
+    maps: Values
+    restitution: Values
+    columns: Values
+    slope: Entries
+    layer_gradient: Entries
+    height_gradient: Entries
+    stop_gradient: Entries
+    surface_gradient: Entries
+    column: Entries
+    component: Integers
+    slope_output: Integers
+    slope_moves: Integers
+    slope_outputs: int
+
+
+def tape_of(coupled: Coupled) -> Tape:
+    """Write a system as a tape.
+
+    Parameters
+    ----------
+    coupled : Coupled
+        With multipliers that enter linearly.
+    """
+    system, d = coupled.system, coupled.system.definition
+    x, p = system.extended_states, system.parameter_symbols
+    slope, gradients = _sparse(coupled.slope), [_sparse(g) for g in coupled.gradients]
+    matrices = [slope, *gradients]
+    kept = ca.vertcat(d.surfaces, d.gaps, d.gap_rates)
+    surface_gradient = _sparse(ca.jacobian(kept, x)) if kept.numel() else _sparse(ca.SX(0, 1))
+    column = _sparse(coupled.columns_of_field)
+    output, moves, slopes = _moving_slopes(coupled)
+    point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
+    return Tape(
+        series=series_of([coupled.moving, p], [*coupled.outputs, slopes], x.numel()),
+        point=values_of([coupled.moving, p], point),
+        surfaces=values_of([x, p], [kept, surface_gradient[0]]),
+        maps=values_of([x, p], [d.maps]),
+        restitution=values_of([x, p], [d.restitutions]),
+        columns=values_of([coupled.moving, p], [column[0]]),
+        slope=slope[1],
+        layer_gradient=gradients[0][1],
+        height_gradient=gradients[1][1],
+        stop_gradient=gradients[2][1],
+        surface_gradient=surface_gradient[1],
+        column=column[1],
+        component=_components(surface_gradient[1], kept.numel()),
+        slope_output=output,
+        slope_moves=moves,
+        slope_outputs=slopes.numel(),
+    )
+
+
+def values_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Values:
+    """Write expressions in two vectors of symbols, of which the first moves."""
+    nodes, rows = instructions(inputs, outputs)
+    moving = depends_on(nodes, [True, False])
+    number = {op: k for k, op in enumerate(OPERATIONS)}
+    op, constant = [number[node.op] for node in nodes], np.zeros(len(nodes))
+    args = np.zeros((len(nodes), 2), np.int32)
+    for j, node in enumerate(nodes):
+        if node.op == "const":
+            constant[j] = cast("float", node.payload)
+        elif node.op == "input":
+            args[j] = node.place
+        else:
+            args[j, : len(node.args)] = node.args
+    return Values(
+        op=_integers(op),
+        a=_integers(args[:, 0]),
+        b=_integers(args[:, 1]),
+        constant=constant,
+        still=_where(moving, False),
+        moving=_where(moving, True),
+        outputs=_integers([j for row in rows for j in row]),
+    )
+
+
+def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], states: int) -> Series:
+    """Write the Taylor rules of expressions in two vectors, of which the first moves.
+
+    Parameters
+    ----------
+    states : int
+        So many of its entries are states; the others are multipliers.
+    """
+    outputs = [ca.densify(o) for o in outputs]
+    nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
+    rules, place = lower(nodes, depends_on(nodes, [True, False]))
+    still = [_is_still(rule) for rule in rules]
+    operations = {op: k for k, op in enumerate(OPERATIONS)}
+    args, first, second, names = np.zeros((len(rules), 3), np.int32), [], [], []
+    for j, rule in enumerate(rules):
+        name, own = _specialised(rule, still)
+        names.append(TAPE_RULES.index(name))
+        args[j, : len(own)] = own
+        numbers = (*rule.numbers, 0.0, 0.0)
+        first.append(numbers[0])
+        second.append(numbers[1])
+    late = touched(rules, states)
+    return Series(
+        rule=_integers(names),
+        a=_integers(args[:, 0]),
+        b=_integers(args[:, 1]),
+        c=_integers(args[:, 2]),
+        op=_integers([operations[rule.operation] if rule.operation else 0 for rule in rules]),
+        first=np.array(first),
+        second=np.array(second),
+        still=_where(still, True),
+        moving=_where(still, False),
+        late=_integers([j for j in late if not still[j]]),
+        outputs=_integers([place[j] for row in rows for j in row]),
+    )
+
+
+def _is_still(rule: Rule) -> bool:
+    return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.place[0] == 1)
+
+
+def _specialised(rule: Rule, still: Sequence[bool]) -> tuple[str, tuple[int, ...]]:
+    """Name and arguments of a rule: products with what is still need no convolution."""
+    if rule.rule == "input":
+        return rule.rule, rule.place
+    if rule.rule == "mul" and still[rule.args[1]]:
+        return "scale", rule.args
+    if rule.rule == "mul" and still[rule.args[0]]:
+        return "scale", (rule.args[1], rule.args[0])
+    if rule.rule == "div" and still[rule.args[1]]:
+        return "over", rule.args
+    return rule.rule, rule.args
+
+
+def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
+    """Nonzero entries of a matrix as a column, and their places."""
+    rows, columns = matrix.sparsity().row(), matrix.sparsity().get_col()
+    nonzeros = ca.vertcat(*matrix.nonzeros()) if rows else ca.SX(0, 1)
+    return nonzeros, Entries(_integers(rows), _integers(columns))
+
+
+def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:
+    """Series that the stability of sliding is read from: the slope's entries, if any moves; their
+    numbers or -1 for each place, and which of them move."""
+    size = coupled.count
+    output, moves = np.full((size, size), -1), np.zeros((size, size), int)
+    own: list[ca.SX] = []
+    sparsity = coupled.slope.sparsity()
+    for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
+        output[i, j] = len(own)
+        own.append(coupled.slope[i, j])
+        moves[i, j] = bool(ca.depends_on(own[-1], coupled.moving))
+    if not moves.any():
+        return _integers(np.full(size * size, -1)), _integers(np.zeros(size * size)), ca.SX(0, 1)
+    return _integers(output.ravel()), _integers(moves.ravel()), ca.vertcat(*own)
+
+
+def _components(gradient: Entries, rows: int) -> Integers:
+    """Number of the group of each row: rows of different groups have no column in common."""
+    group = list(range(rows))
+
+    def root(i: int) -> int:
+        while group[i] != i:
+            group[i] = group[group[i]]
+            i = group[i]
+        return i
+
+    first: dict[int, int] = {}
+    for i, j in zip(gradient.row.tolist(), gradient.column.tolist(), strict=True):
+        group[root(i)] = root(first.setdefault(j, i))
+    return _integers([root(i) for i in range(rows)])
+
+
+def _where(flags: Sequence[bool], wanted: bool) -> Integers:
+    return _integers([j for j, flag in enumerate(flags) if flag == wanted])
+
+
+def _integers(values: Sequence[int] | NDArray[np.generic]) -> Integers:
+    return np.ascontiguousarray(values, dtype=np.int32)

@@ -136,9 +136,7 @@ def _work(work: Any) -> Work:
     return work or Work()
 
 
-def _engine(
-    system: FilippovSystem, options: Options, engine: str, count: int, lanes: bool
-) -> str:
+def _engine(system: FilippovSystem, options: Options, engine: str, count: int, lanes: bool) -> str:
     """Which of ``chunks.ENGINES`` runs; few trajectories are not worth generating a program.
 
     It is compiled here, so that all chunks run the same one.
@@ -176,6 +174,6 @@ def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:
 
 def _problem(system: FilippovSystem, starts: Starts, job: Job) -> str:
     code = hashlib.sha256(system.content_hash().encode())
-    code.update(repr((job.options, job.at, job.times, job.compiled)).encode())
+    code.update(repr((job.options, job.at, job.times, job.engine)).encode())
     code.update(starts.digest().encode())
     return code.hexdigest()

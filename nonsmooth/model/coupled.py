@@ -21,6 +21,7 @@ from functools import cached_property
 
 import casadi as ca
 import numpy as np
+from numpy.typing import NDArray
 
 from .economy import economise
 from .evaluators import Evaluator
@@ -152,22 +153,38 @@ class Coupled:
         items += [("reset", j, *r) for j, r in enumerate(self.system.resets)]
         result += [Guard(kind, j, direction, name) for kind, j, name, direction in items]
         result += [Guard("zero", k, 0, f"f{k}") for k in range(self._watched)]
-        branches = len(self._stability(mode))
-        first = next((i for i in self.sliding(mode) if i < self._surfaces), 0)
+        sliding = self.sliding(mode)
+        first = next((i for i in sliding if i < self._surfaces), 0)
+        branches = len(self._changing(sliding))
         return (*result, *[Guard("branch", first, 0, "stability of sliding")] * branches)
 
-    def _stability(self, mode: str) -> list[ca.SX]:
+    @cached_property
+    def slope_moves(self) -> NDArray[np.bool_]:
+        """Which derivatives of the layer's rates by the unknowns change along a motion (m, m)."""
+        moves = np.zeros((self.count, self.count), bool)
+        sparsity = self.slope.sparsity()
+        for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
+            moves[i, j] = ca.depends_on(self.slope[i, j], self.moving)
+        return moves
+
+    def _changing(self, sliding: Sequence[int]) -> list[int]:
+        """Unknowns that the stability of sliding is read from: two surfaces together, else each
+        alone; none where the slope does not change."""
+        if len(sliding) == 2 and max(sliding) < self._surfaces:
+            return list(sliding) if self.slope_moves[np.ix_(sliding, sliding)].any() else []
+        return [i for i in sliding if self.slope_moves[i, i]]
+
+    def _stability(self, sliding: Sequence[int]) -> list[ca.SX]:
         """Functions that pass zero where sliding loses its stability across the layer.
 
         The slope of one multiplier, determinant and trace of that of two; of more, or with contacts,
-        its diagonal, each of which has to keep its sign. None where the slope does not change.
+        its diagonal, each of which has to keep its sign.
         """
-        s = self.sliding(mode)
-        slope = ca.densify(self.slope[s, s])
-        if len(s) == 2 and max(s) < self._surfaces:
-            return [ca.det(slope), ca.trace(slope)] if ca.depends_on(slope, self.moving) else []
-        diagonal = [slope[k, k] for k in range(len(s))]
-        return [e for e in diagonal if ca.depends_on(e, self.moving)]
+        changing = self._changing(sliding)
+        if len(sliding) == 2 and len(changing) == 2 and max(sliding) < self._surfaces:
+            slope = ca.densify(self.slope[changing, changing])
+            return [ca.det(slope), ca.trace(slope)]
+        return [self.slope[i, i] for i in changing]
 
     # expressions --------------------------------------------------------------------------------
 
@@ -240,7 +257,9 @@ class Coupled:
         """Derivatives of the field by the unknowns (N, m), with the multipliers held."""
         if self._column_function is None:
             inputs = [self.moving, self.system.parameter_symbols]
-            function = ca.Function("columns", inputs, [ca.densify(self.columns_of_field)], {"cse": True})
+            function = ca.Function(
+                "columns", inputs, [ca.densify(self.columns_of_field)], {"cse": True}
+            )
             self._column_function = Evaluator(function)
         none = np.zeros(self.count)
         return self._column_function.copied(self._inputs(x, multipliers, none), p)[0]
@@ -265,7 +284,7 @@ class Coupled:
 
     def _expansion(self, mode: str) -> tuple[Expansion, list[int]]:
         """Return the expansion for a mode, and the rules that the unknowns enter."""
-        stability = self._stability(mode)
+        stability = self._stability(self.sliding(mode))
         key = tuple(self.sliding(mode)) if stability else ()
         if key not in self._series:
             inputs = [self.moving, self.system.parameter_symbols]

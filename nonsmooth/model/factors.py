@@ -36,12 +36,15 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
     columns = ca.jacobian(plain, lam)
     for i in range(system.surface_count):
-        entries = ca.vertsplit(ca.densify(columns[:, i]))
-        if ca.depends_on(ca.vertcat(*entries), lam):
-            continue  # products of multipliers, or hidden dynamics
+        rows, entries = columns[:, i].sparsity().row(), columns[:, i].nonzeros()
+        column = ca.vertcat(*entries)
+        if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
+            continue  # products of multipliers, or hidden dynamics; a constant
         reduced, factor = cancel_common_factor(entries, variables, known)
         if ca.depends_on(factor, variables):
             nu = ca.SX.sym(f"nu{i}")
-            field = field + nu * ca.vertcat(*reduced)  # lambda_i is 0 while the surface slides
+            field = ca.SX(field)
+            for row, entry in zip(rows, reduced, strict=True):
+                field[row] += nu * entry  # lambda_i is 0 while the surface slides
             factors[i], unknowns[i] = factor, nu
     return field, factors, unknowns

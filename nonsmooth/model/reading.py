@@ -137,7 +137,8 @@ def require_known(
     """Refuse symbols other than ``known``, whose names are listed in the message."""
     present = ca.symvar(expression)
     listed = ca.vertsplit(known)
-    foreign = [s for s in present if not any(ca.is_equal(s, k) for k in listed)]
+    own = {k.element_hash() for k in listed}
+    foreign = [s for s in present if s.element_hash() not in own]
     if foreign:
         names = {str(k) for k in listed}
         clash = [str(s) for s in foreign if str(s) in names]

@@ -1,4 +1,4 @@
-"""Long runs are compiled, short ones are not, and large systems have to be long to be worth it."""
+"""The interpreter runs at once; a long run is worth a program of its own."""
 
 import re
 from importlib import import_module
@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.compiled import Engine, TapeEngine, find_compiler
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -25,23 +25,33 @@ def chain(n):
 
 
 @pytest.fixture
-def compiled_runs(monkeypatch):
-    module = import_module("nonsmooth.flow.simulate")  # the package's name is the function
-    runs, original = [], module.simulate_arrays
+def engines(monkeypatch):
+    """Which engines have run."""
+    ran = []
+    for kind in (Engine, TapeEngine):
 
-    def watched(*arguments):
-        runs.append(arguments)
-        return original(*arguments)
+        def watched(self, *arguments, original=kind.run):
+            ran.append(type(self).__name__)
+            return original(self, *arguments)
 
-    monkeypatch.setattr(module, "simulate_arrays", watched)
-    return runs
+        monkeypatch.setattr(kind, "run", watched)
+    return ran
 
 
-@pytest.mark.parametrize(("n", "steps", "compiled"), [(2, 200, 0), (2, 500, 1), (8, 500, 0)])
-def test_which_engine_runs(n, steps, compiled, compiled_runs):
-    run = ns.simulate(chain(n), np.full(2 * n, 0.2), 0.01 * steps, max_step=0.01, tol=1e-8)
-    assert run.status is ns.Status.REACHED_END and len(run.t) > steps
-    assert len(compiled_runs) == compiled
+@pytest.mark.parametrize(
+    ("long", "expected"), [(20_000, ["TapeEngine"]), (100, ["TapeEngine", "Engine"])]
+)
+def test_which_engine_runs(long, expected, engines, monkeypatch):
+    monkeypatch.setattr(import_module("nonsmooth.flow.simulate"), "_LONG", long)
+    run = ns.simulate(chain(2), np.full(4, 0.2), 2.0, max_step=0.01, tol=1e-8)
+    assert run.status is ns.Status.REACHED_END and len(run.t) > 200
+    assert engines == expected
+
+
+def test_limits_of_steps_are_those_of_the_whole_run(engines, monkeypatch):
+    monkeypatch.setattr(import_module("nonsmooth.flow.simulate"), "_LONG", 20)
+    run = ns.simulate(chain(2), np.full(4, 0.2), 2.0, max_step=0.01, tol=1e-8, max_steps=50)
+    assert run.status is ns.Status.TOO_MANY_STEPS and len(run.steps.starts) == 50
 
 
 @pytest.mark.parametrize("engine", ["reference", "compiled"])

@@ -34,6 +34,7 @@ from .codegen import lanes_source, scalar_source, supports_scalar
 
 _I64, _D, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
+
 class Engine:
     """The compiled libraries of one system at one order, each built when first needed.
 

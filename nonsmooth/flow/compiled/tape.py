@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields
+from dataclasses import fields, replace
 from functools import lru_cache
-from importlib import resources
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, coupled_of
+from ...model import Array, Coupled, FilippovSystem, Guard, coupled_of
 from ...model.printing.tape import OPERATIONS, TAPE_RULES, Entries, Series, Tape, Values, tape_of
 from ..facts import FULL, RUNNING
 from ..options import Options
@@ -181,15 +180,23 @@ class TapeEngine:
     def _values(self, v: Values) -> _Values:
         arrays = (v.op, v.a, v.b, v.still, v.moving, v.outputs, v.constant)
         sizes = (len(v.op), len(v.still), len(v.moving), len(v.outputs))
-        return _Values(*sizes, *map(self._at, arrays))
+        return _Values(*sizes, *[self._at(a) for a in arrays])
 
     def _series(self, s: Series) -> _Series:
         sizes = (len(s.rule), len(s.still), len(s.moving), len(s.late), len(s.outputs), 0)
         arrays = (s.rule, s.a, s.b, s.c, s.op, s.still, s.moving, s.late, s.outputs)
-        return _Series(*sizes, *map(self._at, (*arrays, s.first, s.second)))
+        return _Series(*sizes, *[self._at(a) for a in (*arrays, s.first, s.second)])
 
     def _entries(self, e: Entries) -> _Entries:
         return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
+
+    def guards(self, mode: str) -> tuple[Guard, ...]:
+        """Guards of a mode, with the names that the reference driver gives them."""
+        found = self.coupled.guards(mode)
+        if self.system.coupled:
+            return found
+        names = {1: "L_F1 h", -1: "L_F2 h"}
+        return tuple(replace(g, name=names[g.side]) if g.kind == "exit" else g for g in found)
 
     # one trajectory ----------------------------------------------------------------------------
 
@@ -222,7 +229,7 @@ class TapeEngine:
             counts=counts,
             itinerary=words[int(counts[4])],
             letters=modes,
-            guards=self.coupled.guards,
+            guards=self.guards,
             active=active,
             several=[modes[k] for k in several],
         )
@@ -258,7 +265,7 @@ class TapeEngine:
         library().run_read(state, *[address(a) for a in arrays])
         return numbers, counts, active[: counts[10]].tolist(), several[: counts[11]].tolist()
 
-    def _words(self, table: int, nodes: list[int]) -> tuple[list[str], dict[int, str]]:
+    def _words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""
         made, width = library(), self.system.surface_count + len(self.system.impacts)
         size, count = made.table_size(table), made.table_modes(table)

@@ -239,17 +239,13 @@ def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
 def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:
     """Series that the stability of sliding is read from: the slope's entries, if any moves; their
     numbers or -1 for each place, and which of them move."""
-    size = coupled.count
-    output, moves = np.full((size, size), -1), np.zeros((size, size), int)
-    own: list[ca.SX] = []
-    sparsity = coupled.slope.sparsity()
-    for i, j in zip(sparsity.row(), sparsity.get_col(), strict=True):
-        output[i, j] = len(own)
-        own.append(coupled.slope[i, j])
-        moves[i, j] = bool(ca.depends_on(own[-1], coupled.moving))
+    output, moves = np.full((coupled.count, coupled.count), -1), coupled.slope_moves
     if not moves.any():
-        return _integers(np.full(size * size, -1)), _integers(np.zeros(size * size)), ca.SX(0, 1)
-    return _integers(output.ravel()), _integers(moves.ravel()), ca.vertcat(*own)
+        return _integers(output.ravel()), _integers(moves.ravel()), ca.SX(0, 1)
+    sparsity = coupled.slope.sparsity()
+    output[sparsity.row(), sparsity.get_col()] = range(sparsity.nnz())
+    own = ca.vertcat(*coupled.slope.nonzeros())
+    return _integers(output.ravel()), _integers(moves.ravel()), own
 
 
 def _components(gradient: Entries, rows: int) -> Integers:

@@ -1,0 +1,97 @@
+"""What a run notes as it goes: points, events, segments, how it ended; accumulation of events."""
+
+from __future__ import annotations
+
+from ...model import Array, FilippovSystem
+from .. import messages
+from ..options import Options
+from ..status import Status
+from ..trajectory import Segment, Trajectory
+from .accumulation import remaining_time
+from .record import Record
+
+
+class Bookkeeping:
+    """State of one run, and what is known of its past.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    x : ndarray (N,)
+        Extended start.
+    p : ndarray
+    options : Options
+    """
+
+    def __init__(self, system: FilippovSystem, x: Array, p: Array, options: Options):
+        self.system, self.p, self.options = system, p, options
+        self.t, self.x, self.mode = options.t_start, x, ""
+        self.record = Record(system, p)
+        self.intervals: list[float] = []
+        self.patterns: list[str] = []
+        self.ended: tuple[Status, str] | None = None
+        self.limit: float | None = None
+        self._segment_start = (self.t, 0)
+        self._last_event = self.t
+        self._hits = 0  # of the section where the run is looked at
+
+    def come_to_rest(self, left: float) -> bool:
+        """Whether the run goes on after events that accumulate in the time left."""
+        return False
+
+    def note(self) -> None:
+        """Note the state."""
+        self.record.point(self.t, self.x)
+
+    def event(self, kind: str, before: str, name: str, x: Array | None = None) -> None:
+        """Note an event at the state ``x``, the present one unless the event changed it."""
+        self.record.event(
+            kind, self.t, x if x is not None else self.x, before, self.mode, name, self.x
+        )
+        self._count_hit(kind, before, name)
+        if kind in ("end", "stop"):
+            return
+        self.intervals.append(self.t - self._last_event)
+        self.patterns.append(f"{kind} {before} {self.mode} {name}")
+        self._last_event = self.t
+        left = remaining_time(self.intervals, self.patterns, self.t - self.options.t_start)
+        if left is not None and not (self.ended is None and self.come_to_rest(left)):
+            self.limit = self.t + left
+            message = messages.accumulation(len(self.record.events), self.limit)
+            self.end(Status.ACCUMULATION, message)
+        elif len(self.record.events) >= self.options.max_events:
+            self.end(Status.TOO_MANY_EVENTS, messages.too_many("events", self.options.max_events))
+
+    def _count_hit(self, kind: str, before: str, name: str) -> None:
+        hits = self.options.hits
+        if hits is not None and hits.meets(self.t, kind, name, before):
+            self._hits += 1
+            if self._hits >= hits.last:
+                self.end(Status.STOPPED, messages.looked_at(hits.count or 0, self.t))
+
+    def close_segment(self, following: str) -> None:
+        """End the stretch of steps in a mode, where another follows."""
+        start, first = self._segment_start
+        count = len(self.record.starts)
+        if following == self.mode:
+            return
+        if count > first:
+            self.record.segments.append(Segment(self.mode, start, self.t, first, count))
+        self._segment_start = (self.t, count)
+
+    def end(self, status: Status, message: str) -> None:
+        """End the run, if it has not ended."""
+        if self.ended is None:
+            self.ended = (status, message)
+
+    def trajectory(self) -> Trajectory:
+        """Return the run."""
+        assert self.ended is not None
+        status, message = self.ended
+        start, first = self._segment_start
+        count = len(self.record.starts)
+        if count > first or not self.record.segments:
+            self.record.segments.append(Segment(self.mode, start, self.t, first, count))
+        if status is not Status.STOPPED:
+            self.event("end", self.mode, str(status))
+        return self.record.trajectory(status, message, self.limit)

@@ -1,0 +1,253 @@
+"""The interpreter does what the reference driver does, for any number of surfaces and impacts."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.flow.compiled import find_compiler, tape_for
+from nonsmooth.flow.compiled.convert import trajectory
+from nonsmooth.flow.facts import HAND_OVER
+from nonsmooth.flow.options import Options
+from nonsmooth.flow.reference.driver import Driver
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+x, y, u, v, t, r, lam = (ca.SX.sym(name) for name in ("x", "y", "u", "v", "t", "r", "lam"))
+
+
+def both(system, start, t_end, tol=1e-10, **options):
+    """Run the reference driver and the interpreter."""
+    options = Options(t_end=t_end, rtol=tol, atol=tol, **options)
+    point, p = system.extended_point(start, options.t_start), system.parameter_vector()
+    expected = Driver(system, point.copy(), p, options).run()
+    run = tape_for(system, options).run(point, p, options)
+    assert run.status != HAND_OVER
+    return expected, trajectory(system, p, options, run)
+
+
+def agree(system, start, t_end, tol=1e-10, **options):
+    """Assert that statuses, messages, events and states agree; return the run."""
+    expected, run = both(system, start, t_end, tol, **options)
+    assert (run.status, run.itinerary) == (expected.status, expected.itinerary)
+    described = lambda run: [(e.kind, e.mode_before, e.mode_after, e.name) for e in run.events]
+    assert described(run) == described(expected)
+    scale = 1.0 + np.abs(expected.x).max()
+    np.testing.assert_allclose(run.x[-1], expected.x[-1], rtol=0, atol=1e-12 * scale + 20 * tol)
+    for one, other in zip(run.events, expected.events, strict=True):
+        assert one.t == pytest.approx(other.t, abs=1e-9 + 20 * tol)
+    return run
+
+
+def random_system(rng):
+    """States, surfaces, resets and stops at random; some surfaces curved, some forces not linear."""
+    n, m = int(rng.integers(1, 6)), int(rng.integers(0, 4))
+    states = [ca.SX.sym(f"x{i}") for i in range(n)]
+    multipliers = [ca.SX.sym(f"lambda{i}") for i in range(m)]
+    line = lambda: float(rng.normal()) + sum(float(rng.normal()) * s for s in states)
+    bend = lambda a, b: [0.3 * ca.sin(a), 0.2 * a * b, 0.3 * ca.tanh(a), ca.exp(-a * a)]
+    field = []
+    for i in range(n):
+        force = 0.7 * line() + bend(line(), line())[rng.integers(4)] - 0.1 * states[i] ** 3
+        for j in range(m):
+            own = i % m == j
+            weight = abs(rng.normal()) + 0.2 if own else 0.3 * rng.normal()
+            curved = 1 + 0.3 * ca.sin(line()) if rng.random() < 0.3 else 1
+            force -= float(weight) * curved * multipliers[j]
+        field.append(force)
+    surfaces = [line() + 0.2 * states[0] ** 2 * int(rng.random() < 0.3) for _ in range(m)]
+    more = {}
+    if rng.random() < 0.3:
+        more["stops"] = [ns.Stop(line() - 4, int(rng.integers(-1, 2)))]
+    if rng.random() < 0.3:
+        more["resets"] = [ns.Reset(line() - 1, [-0.5 * s for s in states], direction=-1)]
+    return ns.FilippovSystem(
+        states, field=field, surfaces=surfaces, multipliers=multipliers, **more
+    )
+
+
+@pytest.mark.parametrize(
+    "count", [8, pytest.param(400, marks=pytest.mark.slow)], ids=["few", "many"]
+)
+def test_random_systems(count):
+    rng = np.random.default_rng(count)
+    for _ in range(count):
+        system = random_system(rng)
+        start, tol = rng.normal(size=system.dimension), float(10.0 ** -rng.integers(6, 13))
+        agree(system, start, 6.0, tol, max_steps=3000, max_events=300)
+
+
+def blocks(count):
+    """Blocks on a belt, coupled by springs, each with its own friction."""
+    q, w, mu = (ca.SX.sym(name, count) for name in ("q", "w", "mu"))
+    pull = [
+        sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < count) - 0.3 * q[i]
+        for i in range(count)
+    ]
+    force = [pull[i] - (1 + 0.07 * i) * mu[i] for i in range(count)]
+    return ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(w)],
+        field=[*ca.vertsplit(w), *force],
+        surfaces=[w[i] - 0.1 for i in range(count)],
+        multipliers=ca.vertsplit(mu),
+    )
+
+
+@pytest.mark.parametrize("count", [2, 7])
+def test_blocks_with_friction(count):
+    start = [*(0.5 * np.cos(1.7 * np.arange(count))), *np.zeros(count)]
+    assert len(agree(blocks(count), start, 15.0).events) > count
+
+
+def test_a_hundred_blocks_keep_their_energy_balance():
+    """Energy changes by the work of friction, which is -mu_i lambda_i w_i: quadrature of the run."""
+    count = 100
+    system, rng = blocks(count), np.random.default_rng(1)
+    start = [*(0.5 * rng.normal(size=count)), *np.zeros(count)]
+    run = ns.simulate(system, start, 30.0)
+    assert run.status is ns.Status.REACHED_END and len(run.events) > 100
+    q, w = run.x[:, :count], run.x[:, count:]
+    energy = (w**2).sum(1) / 2 + 0.15 * (q**2).sum(1) + (np.diff(q, axis=1) ** 2).sum(1) / 2
+    work = 0.0
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    for segment in run.segments:
+        sticks = np.array([letter == "s" for letter in segment.mode])
+        signs = np.array([{"+": 1.0, "-": -1.0, "s": 0.0}[c] for c in segment.mode])
+        for k in range(segment.first, segment.last):
+            a = run.steps.starts[k]
+            b = run.steps.starts[k + 1] if k + 1 < len(run.steps.starts) else run.t[-1]
+            states = run(a + (b - a) * (nodes + 1) / 2)
+            at = states[:, :count]
+            pull = -0.3 * at
+            pull[:, :-1] += at[:, 1:] - at[:, :-1]
+            pull[:, 1:] += at[:, :-1] - at[:, 1:]
+            friction = np.where(sticks, -pull, -signs * (1 + 0.07 * np.arange(count)))
+            work += (b - a) / 2 * weights @ (friction * states[:, count:]).sum(1)
+    assert energy[-1] - energy[0] == pytest.approx(work, abs=1e-8 * energy[0])
+
+
+TABLE = ns.FilippovSystem(
+    [y, v], field=[v, -9.81], impacts=ns.Impact(y - 0.2 * ca.sin(8 * t), restitution=0.5), time=t
+)
+BLOCK = ns.FilippovSystem(
+    [x, y, u, v],
+    field=[u, v, -0.3 * lam * r, r - 9.81],
+    surface=u,
+    multipliers=lam,
+    impacts=ns.Impact(y, restitution=0.6, reaction=r),
+)
+STACK = ns.FilippovSystem(
+    [x, u, y, v],
+    field=[u, -9.81, v, -9.81],
+    impacts=[ns.Impact(x, 0.5, name="floor"), ns.Impact(y - x - 1, 0.5, name="stack")],
+)
+WALLS = ns.FilippovSystem(
+    [x, u],
+    field=[u, -0.1 * u + ca.cos(t)],
+    time=t,
+    impacts=[ns.Impact(x + 0.3, 0.8, name="left"), ns.Impact(0.3 - x, 0.8, name="right")],
+)
+
+
+@pytest.mark.parametrize(
+    ("system", "start", "t_end"),
+    [
+        (TABLE, [1.0, 0.0], 5.0),
+        (BLOCK, [0.0, 1.0, 2.0, 0.0], 3.0),
+        (BLOCK, [0.0, 0.0, 2.0, 0.0], 3.0),
+        (STACK, [1.0, 0.0, 3.0, 0.0], 3.0),
+        (WALLS, [0.0, 0.0], 12.0),
+    ],
+    ids=["table", "thrown block", "sliding block", "stack", "walls"],
+)
+def test_impacts(system, start, t_end):
+    agree(system, start, t_end)
+
+
+def test_refusals_have_the_same_words():
+    for start, status in (([-1.0, 0.0], "INCONSISTENT"), ([1.0, np.inf], "NOT_FINITE")):
+        if np.all(np.isfinite(start)):
+            expected, run = both(TABLE, start, 1.0)
+            assert (str(run.status), run.message) == (status, expected.message)
+
+
+def test_where_more_modes_hold_they_are_named():
+    """Repelling sliding on one of two surfaces: both sides and sliding can continue."""
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    system = ns.FilippovSystem(
+        [x, y], field=[a, 1 - 2 * b], surfaces=[x, y - 9], multipliers=[a, b]
+    )
+    expected, run = both(system, [0.0, 0.0], 1.0)
+    assert run.status is ns.Status.NON_UNIQUE and run.message == expected.message
+
+
+def test_ensembles_are_the_runs_one_by_one():
+    starts = np.array([[0.5, 0.0], [1.0, 0.5], [np.nan, 0.0], [-1.0, 0.0]])
+    many = ns.ensemble(TABLE, starts, 3.0, t_eval=[0.5, 1.0], at_event=("impact", 2))
+    for k in (0, 1):
+        run = ns.simulate(TABLE, starts[k], 3.0)
+        np.testing.assert_array_equal(many.x[k], run.x[-1])
+        np.testing.assert_allclose(many.sample_x[k], run([0.5, 1.0]), rtol=0, atol=1e-13)
+        second = [e for e in run.events if e.kind == "impact"][1]
+        np.testing.assert_array_equal(many.event_x[k], second.x)
+        assert many.itinerary[k] == run.itinerary
+    assert [str(ns.Status(s)) for s in many.status[2:]] == ["NOT_FINITE", "INCONSISTENT"]
+
+
+def test_a_section_at_an_impact():
+    at = ns.Section("impact", count=3)
+    run = ns.simulate(TABLE, [1.0, 0.0], 5.0, at=at)
+    many = ns.ensemble(TABLE, [[1.0, 0.0]] * 3, 5.0, at=at)
+    hits = [e for e in run.events if e.kind == "impact"]
+    assert len(hits) == 3 and run.status is ns.Status.STOPPED
+    np.testing.assert_array_equal(many.sample_t[1], [e.t for e in hits])
+    np.testing.assert_array_equal(many.sample_x[2], [e.x for e in hits])
+
+
+OPERATIONS = {
+    "arithmetic": lambda a, b: (a + b) * (a - b) / (2 + b * b) - 3 * a,
+    "powers": lambda a, b: a**2 + (1 + a**2) ** -1.5 + (2 + a) ** b + a**7,
+    "roots": lambda a, b: ca.sqrt(2 + a) + ca.hypot(a, 1 + b),
+    "exponentials": lambda a, b: ca.exp(a) + ca.log(3 + b) + ca.expm1(b) + ca.log1p(a),
+    "circles": lambda a, b: ca.sin(a) + ca.cos(b) + ca.tan(a) + ca.atan2(1 + a, 2 + b),
+    "inverse": lambda a, b: ca.asin(a / 3) + ca.acos(b / 3) + ca.atan(a),
+    "hyperbolic": lambda a, b: ca.sinh(a) + ca.cosh(b) + ca.tanh(a * b),
+    "inverse hyperbolic": lambda a, b: ca.asinh(a) + ca.acosh(3 + b) + ca.atanh(a / 3),
+    "error": lambda a, b: ca.erf(a) + ca.erfinv(b / 3),
+    "parameters": lambda a, b: a * ca.fmax(P, 0.2) + ca.fabs(P) * b + ca.floor(P) + ca.sign(P),
+}
+P = ca.SX.sym("p")
+
+
+@pytest.mark.parametrize("name", OPERATIONS)
+def test_every_operation(name):
+    """As a field, as a curved surface with sliding, and as a stop."""
+    f = OPERATIONS[name](x, y)
+    system = ns.FilippovSystem(
+        [x, y, u],
+        field=[0.3 * ca.cos(u), -0.2 * x, 0.1 * f - (0.4 + x * x) * lam],
+        surfaces=[u - 0.05 * f],
+        multipliers=[lam],
+        stops=[ns.Stop(f - 50)],
+        parameters={P: -0.7},
+    )
+    run = agree(system, [0.2, 0.4, 1.0], 6.0)
+    assert "s" in run.itinerary
+
+
+def test_interruption_is_heard(monkeypatch):
+    """Between bursts of steps; the burst is shortened here, so that no clock is needed."""
+    import nonsmooth.flow.compiled.tape as module
+
+    calls, original = [], module.library().run_continue
+
+    def interrupted(state, budget):
+        calls.append(budget)
+        if len(calls) > 2:
+            raise KeyboardInterrupt
+        return original(state, budget)
+
+    monkeypatch.setattr(module, "BURST", 5)
+    monkeypatch.setattr(module.library(), "run_continue", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        ns.simulate(WALLS, [0.0, 0.0], 50.0)

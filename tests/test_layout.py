@@ -16,8 +16,7 @@ LONGEST_FUNCTION = 60  # lines, from `def` to its last, the docstring not counte
 LONGEST_MODULE = 400  # lines
 
 # Modules that are longer, with their length: they may only become shorter.
-LONG_MODULES = {
-}
+LONG_MODULES = {}
 
 # Words of the client. The bouncing ball is also a classic of the general theory (impacts that
 # accumulate), so nonsmooth/textbook may say those two words, and no others.

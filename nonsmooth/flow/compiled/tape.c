@@ -888,11 +888,21 @@ static int rates(Run *r, const int8_t *letter) {
   return 1;
 }
 
+/* Of a guard that ended the mode before so many coefficients vanish. */
+typedef struct { int kind, index, side, zeros; } Known;
+
+/* What is being left has a multiplier at its bound, to the tolerance of the run: its rates decide nothing. */
+static int is_left(const Run *r, int which, const Known *known, int count) {
+  for (int i = 0; i < count; i++)
+    if (known[i].index + (known[i].kind == IMPACT_GUARD || known[i].kind == RELEASE_GUARD ? r->m : 0) == which) return 1;
+  return 0;
+}
+
 static void many_may_hold(Run *r) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); }
 
 /* Letters that are possible at the active surfaces, as bits of +1 (1), -1 (2) and sliding (4), for contacts
  * open (1) and closed (4): one where the rates decide, else all. 0 if the run ends. */
-static int by_rates(Run *r, const int8_t *letter, int8_t *possible) {
+static int by_rates(Run *r, const int8_t *letter, const Known *known, int known_count, int8_t *possible) {
   int k = r->active_count, contacts = 0, open = 0;
   for (int i = 0; i < k; i++) {
     contacts |= r->active[i] >= r->m;
@@ -922,6 +932,7 @@ static int by_rates(Run *r, const int8_t *letter, int8_t *possible) {
     for (int j = 0; j < k; j++)
       if (m[i * k + j] != 0) { rate += m[i * k + j] * r->lam[j]; sum += fabs(m[i * k + j]); }
     double room = contact[i] ? lam : 1 - fabs(lam);
+    if (is_left(r, r->active[i], known, known_count)) { open++; continue; }
     if (room > VANISHES * (1 + scale[i] / fabs(m[i * k + i]))) possible[i] = 4;
     else if (fabs(rate) > VANISHES * (scale[i] + sum)) possible[i] = contact[i] || lam > 0 ? 1 : 2;
     open += (possible[i] & (possible[i] - 1)) != 0;
@@ -952,10 +963,7 @@ static int is_stable(Run *r, const Layout *l) {
   return shown(a, k, r->work, r->pending) == 2 ? 1 : -1;
 }
 
-/* Whether the motion can continue in a mode: its guards that vanish here become positive. ``zeros`` says of
- * a guard that ended the mode before how many of its coefficients vanish. */
-typedef struct { int kind, index, side, zeros; } Known;
-
+/* Whether the motion can continue in a mode: its guards that vanish here become positive. */
 static int continuation(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
   Expansion *e = &r->trial;
   lay_out(r, letter, &e->l);
@@ -1006,6 +1014,7 @@ static int rests(const Run *r, const int8_t *letter) {
 /* What is to be said of a point without a motion. */
 static int no_motion(Run *r, int contacts) {
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
+  else if (r->active_count == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
   else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
   else finish(r, NON_UNIQUE, DEGENERATE, 0);
   return 0;
@@ -1023,7 +1032,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);
     return 0;
   }
-  if (!by_rates(r, letter, possible)) return 0;
+  if (!by_rates(r, letter, known, known_count, possible)) return 0;
   for (int i = 0; i < k; i++) total *= bits(possible[i]);
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {

@@ -133,7 +133,6 @@ def test_no_motion_along_an_intersection_has_no_range():
         ns.intersection_range(system, [0.0, 0.0], of=x)
 
 
-
 @pytest.mark.parametrize("tol", [1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-10, 1e-13])
 def test_an_intersection_is_left_at_any_tolerance(tol):
     """(1.2 sin z + 0.15 cos z)/1.06 = lambda reaches 1: one surface is left, the other holds. To the
@@ -149,6 +148,7 @@ def test_an_intersection_is_left_at_any_tolerance(tol):
     left = np.arcsin(1.06 / np.hypot(1.2, 0.15)) - np.arctan2(0.15, 1.2)
     assert abs(run.events[0].t - left) <= 10 * tol
 
+
 @pytest.mark.parametrize("engine", ["reference", "compiled"])
 def test_sliding_into_a_two_fold_of_one_of_two_surfaces(engine):
     """The other surface is far away: t* = -(1, 1) M^-1 z0 as with one surface, then no future."""
@@ -163,4 +163,3 @@ def test_sliding_into_a_two_fold_of_one_of_two_surfaces(engine):
     assert run.status is ns.Status.NON_UNIQUE and run.itinerary == "s-"
     m = np.array([[-1.0, 1.0], [1.0, -2.0]])
     assert run.t[-1] == pytest.approx(-np.ones(2) @ np.linalg.solve(m, start), abs=1e-9)
-

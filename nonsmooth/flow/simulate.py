@@ -152,8 +152,7 @@ def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: s
         return Driver(system, x, p, options).run()
     if tape is not None and (generated is None or engine == "auto"):
         steps = options.max_steps if generated is None else min(_LONG, options.max_steps)
-        first = replace(options, max_steps=steps)
-        run = compiled_or_none(engine, library, lambda: tape.run(x, p, first))
+        run = compiled_or_none(engine, library, lambda: tape.run(x, p, options, steps))
         if run is None or run.status != Status.TOO_MANY_STEPS or steps == options.max_steps:
             return _converted(system, x, p, options, run)
     fast = generated

@@ -133,6 +133,7 @@ class TapeEngine:
         self.system, self.order = system, order
         self.coupled = coupled_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
+        self.guards = lru_cache(maxsize=4096)(self._guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
 
@@ -190,7 +191,7 @@ class TapeEngine:
     def _entries(self, e: Entries) -> _Entries:
         return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
 
-    def guards(self, mode: str) -> tuple[Guard, ...]:
+    def _guards(self, mode: str) -> tuple[Guard, ...]:
         """Guards of a mode, with the names that the reference driver gives them."""
         found = self.coupled.guards(mode)
         if self.system.coupled:
@@ -200,15 +201,22 @@ class TapeEngine:
 
     # one trajectory ----------------------------------------------------------------------------
 
-    def run(self, x: Array, p: Array, options: Options) -> Run:
-        """Run one trajectory from an extended start, dense output kept."""
+    def run(self, x: Array, p: Array, options: Options, max_steps: int | None = None) -> Run:
+        """Run one trajectory from an extended start, dense output kept.
+
+        ``max_steps`` is a limit besides that of the options.
+        """
         n = self.system.extended_dimension
         output = Output(n, self.order, FIRST_STEPS)
         x, p = np.array(x, float), np.append(np.array(p, float), 0.0)
         start = self._start_mode(options)
         parts: list[dict[str, NDArray[Any]]] = []
         with self._table() as table, self._state(table) as state:
-            c_options = ctypes.byref(options_of(self.system, options, dense=True))
+            limits = options_of(self.system, options, dense=True)
+            limits.max_steps = min(
+                limits.max_steps, limits.max_steps if max_steps is None else max_steps
+            )
+            c_options = ctypes.byref(limits)
             given = (address(x), address(p), address(start))
             library().run_begin(state, c_options, output.pointer, *given, options.t_start)
             while True:

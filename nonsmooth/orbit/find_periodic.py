@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -21,11 +22,14 @@ from ..model import (
 )
 from .boundary import BoundaryProblem, Evaluation
 from .guess import Itinerary, mirror_of, start_of
-from .legs import Leg, leg_name
+from .legs import Leg, fly, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 
 #: Newton's method ends when the next step would be below this, relative to the orbit.
 _TOLERANCE = 1e-10
+
+#: Starts of legs that are as near as this, relative to the orbit, are one.
+_SAME = 1e-7
 
 #: No leg may grow to so many times the guess of the whole orbit.
 _LONGEST = 10.0
@@ -107,14 +111,51 @@ def periodic_orbit(
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     solver = _Solver(start.problem, start.p)
     u, at = solver.solve(start.unknowns, max_iterations)
-    faults = tuple(faults_of(start.problem, at, start.p))
-    orbit = PeriodicOrbit(
-        system, named(system, start.p), start.problem, u, at, solver.iterations, faults
-    )
+    problem, once = _primitive(start.problem, u, start.p)
+    if problem is not start.problem:
+        u, at = _Solver(problem, start.p).solve(once, max_iterations)
+    faults = tuple(faults_of(problem, at, start.p))
+    orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
     _require_simple(orbit)
     if faults and not virtual:
         raise _virtual(orbit)
     return orbit
+
+
+def _primitive(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
+    """The orbit once, where the legs go round it several times."""
+    starts, durations = problem.split(u)
+    count, n = len(problem.legs), problem.system.dimension
+    if problem.symmetry is not None:
+        return problem, u
+    if not problem.legs[-1].name:
+        return _primitive_leg(problem, starts[0], float(durations[0]), p)
+    size = problem.scales(u)[:n]
+    for k in range(1, count // 2 + 1):
+        if count % k or problem.legs != problem.legs[:k] * (count // k):
+            continue
+        apart = np.abs((np.roll(starts, -k, axis=0) - starts)[:, :n] / size).max()
+        if apart < _SAME:
+            periods = problem.periods * k / count
+            once = replace(problem, legs=problem.legs[:k], periods=float(round(periods)))
+            return once, once.pack(starts[:k], durations[:k])
+    return problem, u
+
+
+def _primitive_leg(
+    problem: BoundaryProblem, x: Array, duration: float, p: Array
+) -> tuple[BoundaryProblem, Array]:
+    """The same for a forced orbit without an event."""
+    count, n = round(problem.periods), problem.system.dimension
+    size = np.abs(x[:n]).max() or 1.0
+    for k in range(1, count // 2 + 1):
+        if count % k:
+            continue
+        there = fly(problem.system, problem.legs[0], x, duration * k / count, p).end
+        if np.abs(there[:n] - x[:n]).max() < _SAME * size:
+            once = replace(problem, periods=float(k))
+            return once, once.pack(x, np.array([duration * k / count]))
+    return problem, problem.pack(x, np.array([duration]))
 
 
 class _Solver:

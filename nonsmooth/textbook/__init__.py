@@ -18,6 +18,13 @@ from ..model import OptionError, explain
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
 from .impacts import bouncing_ball, impact_oscillator, kelvin_voigt_bounce
 from .models import harvested_prey_predator, state_dependent_jump, welander_box
+from .periodic import (
+    belt_oscillator,
+    buck_converter,
+    forced_dry_friction,
+    multi_sliding_relay,
+    simplest_walker,
+)
 from .planar import (
     piecewise_cycle,
     planar_relay,
@@ -36,20 +43,25 @@ __all__ = [
     "Problem",
     "Reference",
     "ambiguous_exit",
+    "belt_oscillator",
     "bouncing_ball",
+    "buck_converter",
     "by_name",
     "dry_friction",
+    "forced_dry_friction",
     "glass_loop",
     "harvested_prey_predator",
     "hidden_dynamics",
     "impact_oscillator",
     "kelvin_voigt_bounce",
     "leine_stick_slip",
+    "multi_sliding_relay",
     "piecewise_cycle",
     "planar_relay",
     "pseudo_hopf",
     "scalar_repelling",
     "scalar_sliding",
+    "simplest_walker",
     "spiral_oscillator",
     "state_dependent_jump",
     "stick_slip_exponential",
@@ -79,6 +91,11 @@ _FUNCTIONS: tuple[Callable[[], Problem], ...] = (
     kelvin_voigt_bounce,
     piecewise_cycle,
     two_fold,
+    multi_sliding_relay,
+    forced_dry_friction,
+    belt_oscillator,
+    simplest_walker,
+    buck_converter,
 )
 
 #: Every problem by name, in the order of the catalogue.

@@ -21,16 +21,7 @@ def symbols(names: str) -> list[ca.SX]:
 
 
 def relay() -> ns.FilippovSystem:
-    x1, x2, x3, w = symbols("x1 x2 x3 w")
-    linear = [x2 - (0.1 * w + 1) * x1, x3 - (0.1 * w + w**2) * x1, -(w**2) * x1]
-    drive = [1, -2, 1]
-    return ns.FilippovSystem(
-        [x1, x2, x3],
-        surface=x1,
-        above=[a - b for a, b in zip(linear, drive, strict=True)],
-        below=[a + b for a, b in zip(linear, drive, strict=True)],
-        parameters={w: 25.0},
-    )
+    return ns.textbook.multi_sliding_relay().system
 
 
 def stick_slip() -> ns.FilippovSystem:
@@ -121,40 +112,12 @@ def excited_oscillator() -> ns.FilippovSystem:
 
 
 def forced_friction() -> ns.FilippovSystem:
-    x, v, t, f, F, W = symbols("x v t f F W")
-    return ns.FilippovSystem(
-        [x, v],
-        surface=v,
-        above=[v, F * ca.cos(W * t) - x - f],
-        below=[v, F * ca.cos(W * t) - x + f],
-        parameters={f: 0.2, F: 1, W: 0.6},
-        time=t,
-    )
+    return ns.textbook.forced_dry_friction().system
 
 
 def friction_oscillator() -> ns.FilippovSystem:
-    u, v, t, nu, F, a0, a1, a2 = symbols("u v t nu F a0 a1 a2")
-
-    def c(z: ca.SX, side: int) -> ca.SX:
-        return a0 * side - a1 * z + a2 * z**3
-
-    return ns.FilippovSystem(
-        [u, v],
-        surface=1 - v,
-        above=[v, -u + c(1 - v, 1) + F * ca.cos(nu * t)],
-        below=[v, -u + c(1 - v, -1) + F * ca.cos(nu * t)],
-        parameters={nu: float(CASES["K1"]["nu_grazing"]), F: 0.1, a0: 1.5, a1: 1.5, a2: 0.45},
-        time=t,
-    )
+    return ns.textbook.belt_oscillator().system
 
 
 def walker() -> ns.FilippovSystem:
-    a, b, p, q, gamma = symbols("th thd ph phd gamma")
-    swing = ca.sin(a - gamma) + b**2 * ca.sin(p) - ca.cos(a - gamma) * ca.sin(p)
-    after = [-a, ca.cos(2 * a) * b, -2 * a, ca.cos(2 * a) * (1 - ca.cos(2 * a)) * b]
-    return ns.FilippovSystem(
-        [a, b, p, q],
-        field=[b, ca.sin(a - gamma), q, swing],
-        parameters={gamma: 0.009},
-        resets=ns.Reset(p - 2 * a, after, 1),
-    )
+    return ns.textbook.simplest_walker().system

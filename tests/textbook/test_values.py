@@ -560,6 +560,72 @@ def two_fold_number(problem, reference):
     ]
 
 
+# periodic orbits by their boundary value problem ---------------------------------------------------
+
+
+@functools.cache
+def orbit_of(name, at=()):
+    problem = build(name)
+    start, values = problem.start_at(dict(at))
+    if name == "belt_oscillator":
+        return ns.periodic_orbit(problem.system, start)
+    if name == "simplest_walker":
+        return ns.periodic_orbit(problem.system, start, itinerary=[("", "heelstrike")])
+    if name == "buck_converter" and at:  # near its period doubling a run takes long to settle
+        return ns.periodic_orbit(problem.system, orbit_of(name), parameters=values)
+    odd = "odd" if name in ("multi_sliding_relay", "forced_dry_friction") else None
+    return ns.periodic_orbit(problem.system, run_of(name, at), symmetry=odd)
+
+
+def orbit_for(problem, reference):
+    return orbit_of(problem.name, tuple(reference.at.items()))
+
+
+@check("multi_sliding_relay", "period")
+@check("simplest_walker", "long step", "short step")
+def period_of_orbit(problem, reference):
+    return orbit_for(problem, reference).period
+
+
+@check("multi_sliding_relay", "multiplier")
+@check("simplest_walker", "multiplier of short steps")
+def nontrivial_multiplier(problem, reference):
+    return orbit_for(problem, reference).multipliers[1].real
+
+
+@check("forced_dry_friction", "multiplier")
+def multiplier_that_is_not_zero(problem, reference):
+    return orbit_for(problem, reference).multipliers[0].real
+
+
+@check("forced_dry_friction", "multiplier (re, im)")
+@check("simplest_walker", "multiplier (re, im)")
+@check("buck_converter", "multiplier (re, im)")
+def complex_multiplier(problem, reference):
+    (value,) = [m for m in orbit_for(problem, reference).multipliers if m.imag > 0]
+    return value.real, value.imag
+
+
+@check("buck_converter", "multiplier at the period doubling")
+def doubling(problem, reference):
+    return orbit_for(problem, reference).multipliers[1].real
+
+
+@check("belt_oscillator", "multipliers")
+def both_multipliers(problem, reference):
+    return orbit_for(problem, reference).multipliers.real
+
+
+@check("forced_dry_friction", "turning point")
+def turning_point(problem, reference):
+    return max(leg.start[0] for leg in orbit_for(problem, reference).legs)
+
+
+@check("forced_dry_friction", "stick time")
+def stick(problem, reference):
+    return next(leg.duration for leg in orbit_for(problem, reference).legs if leg.mode == "s")
+
+
 ALL = [(name, r) for name, make in textbook.PROBLEMS.items() for r in make().references]
 
 

@@ -80,6 +80,7 @@ from .model import (
     PointError,
     Reset,
     Stop,
+    call,
     regularise,
 )
 from .orbit import (
@@ -197,6 +198,7 @@ __all__ = [
     "alpha",
     "basins",
     "boundary_equilibrium",
+    "call",
     "certify",
     "certify_orbit",
     "classify",

@@ -197,7 +197,7 @@ class Batch:
 
     def _velocities(self, blueprint: ContactModel, rows: Rows) -> Array:
         """Rates of the states of some rows without friction."""
-        field = touch_down_function(blueprint)(self.states[rows].T, self._columns(rows))[2]
+        field = ns.call(touch_down_function(blueprint), self.states[rows].T, self._columns(rows))[2]
         return np.array(field).T
 
     def _columns(self, rows: Rows) -> Array:

@@ -78,7 +78,7 @@ class Shooting:
 
     def numbers(self, x: Array) -> Array:
         """L1, L2, A, L11, L22, the load and its rate at a state; (7,)."""
-        return np.array([float(v) for v in self._function(x, self._values)])
+        return np.array([v.item() for v in ns.call(self._function, x, self._values)])
 
     def land(self, u: Array) -> tuple[float, Array]:
         """Time and state at which contact begins, from u = (xdot, omega) at touch-down."""

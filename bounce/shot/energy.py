@@ -10,6 +10,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+import nonsmooth as ns
+
 from ..contact.equations import energy_function
 from ..contact.model import ContactModel
 
@@ -38,7 +40,7 @@ def gains(
     ndarray of bool (m,)
     """
     function = energy_function(blueprint)
-    before, after = (np.array(function(x, p)[1])[0] for x in (landing, lift_off))
+    before, after = (ns.call(function, x, p)[1][0] for x in (landing, lift_off))
     change: NDArray[np.bool_] = after - before > _TOLERANCES * tol * np.abs(before)
     return change
 

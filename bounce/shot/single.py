@@ -181,8 +181,7 @@ class Shot:
         states = self(times)
         states = states.reshape(-1, states.shape[-1]).T
         values = np.array(list(self.model.values.values()))[:, None]
-        results = function.call([states, np.repeat(values, states.shape[1], axis=1)])
-        return [np.array(r).reshape(times.shape) for r in results]
+        return [r.reshape(times.shape) for r in ns.call(function, states, values)]
 
     def __repr__(self) -> str:
         end = self.lift_off

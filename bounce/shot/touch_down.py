@@ -70,7 +70,7 @@ def rise(blueprint: ContactModel, x: Array, p: Array) -> Rise:
     Rise
     """
     function = touch_down_function(blueprint)
-    load, _, field, change = (np.array(v) for v in function(x, p))
+    load, _, field, change = ns.call(function, x, p)
     never = _AHEAD.size + 1
     first = np.where(load[0] > 0, 0, never)
     zero = load[0] == 0  # at touch-down, and not negative before it is positive
@@ -78,7 +78,7 @@ def rise(blueprint: ContactModel, x: Array, p: Array) -> Rise:
         waiting = np.flatnonzero(first == never)
         if not waiting.size:
             break
-        now = np.array(function(x[:, waiting] + ahead * field[:, waiting], p[:, waiting])[0])[0]
+        now = ns.call(function, x[:, waiting] + ahead * field[:, waiting], p[:, waiting])[0][0]
         zero[waiting[now < 0]] = False
         first[waiting[now > 0]] = k
     rough = ~np.all(np.isfinite(change), axis=0)
@@ -122,7 +122,7 @@ def onto_zero_load(blueprint: ContactModel, x: Array, p: Array) -> Array:
     ndarray (n, m)
     """
     for _ in range(3):
-        load, rate, field, _ = (np.array(v) for v in touch_down_function(blueprint)(x, p))
+        load, rate, field, _ = ns.call(touch_down_function(blueprint), x, p)
         x = x - load / rate * field
     return x
 
@@ -182,7 +182,7 @@ def approach(
 
 def _finite_load(blueprint: ContactModel, x: Array, p: Array) -> float:
     """The load at touch-down; forces that are not finite are refused."""
-    load, _, field, _ = (np.array(v).ravel() for v in touch_down_function(blueprint)(x, p))
+    load, _, field, _ = (v.ravel() for v in ns.call(touch_down_function(blueprint), x, p))
     if not (np.isfinite(load[0]) and np.all(np.isfinite(field))):
         raise LandingError(
             f"load: expected finite forces at touch-down, received a load of {load[0]} and rates of "

@@ -20,6 +20,7 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
+    call,
     evaluator,
     explain,
     motion,
@@ -112,7 +113,7 @@ class Place:
         if not count:
             vectors = np.zeros((0, 2, size))
             return ManyNumbers(x, np.zeros(0), x, vectors, np.zeros((0, 2)), vectors)
-        outputs = [np.array(v, dtype=float) for v in function.call([x.T, self.parameters])]
+        outputs = call(function, x.T, self.parameters)
         h, l1, l2 = (v[0] for v in outputs[:3])
         g, g1, g2 = (v.reshape(count, size) for v in outputs[3:6])
         fields = np.stack([f.T for f in outputs[6:]], axis=1)
@@ -126,8 +127,8 @@ class Place:
             h = system.surface_function(self.surface)
             return [h, system.gradient(h)]
 
-        h, gradient = system.function(("h", self.surface), build).call([x.T, self.parameters])
-        return np.array(h, dtype=float)[0], np.array(gradient, dtype=float).reshape(x.shape)
+        h, gradient = call(system.function(("h", self.surface), build), x.T, self.parameters)
+        return h[0], gradient.reshape(x.shape)
 
     # derivatives -------------------------------------------------------------------------------
 
@@ -171,7 +172,7 @@ class Place:
         Coefficient k of h is its Lie derivative L^k h over k!.
         """
         jet = motion(self.system, self.side(letter)).jet_function(order)
-        states, guards = (np.array(v, dtype=float) for v in jet(x, self.parameters))
+        states, guards = call(jet, x, self.parameters)
         # the guard of a side is h there, and positive
         return states, (1.0 if letter == "+" else -1.0) * guards[self.surface]
 
@@ -239,7 +240,7 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     def build() -> Sequence[Any]:
         return [system.surface_function(i) for i in range(system.surface_count)]
 
-    values = [float(v) for v in system.function(("local", "surfaces"), build).call([x, p])]
+    values = [v.item() for v in call(system.function(("local", "surfaces"), build), x, p)]
     for i, value in enumerate(values):
         if i != surface and value == 0:
             raise PointError(

@@ -7,7 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters, PointError, explain, motion
+from ..model import Array, FilippovSystem, Parameters, PointError, call, explain, motion
 from .checks import positive
 from .numbers import Numbers
 from .place import TOLERANCE, on_surface, place
@@ -228,7 +228,7 @@ def sliding_field(
         )
     build = motion(system, where.mode)
     function = system.function(("sliding field", where.mode), lambda: [build.field])
-    value = np.array(function(x, where.parameters), dtype=float).ravel()
+    value = call(function, x, where.parameters)[0].ravel()
     if found is Region.TWO_FOLD:
         middle = numbers.fields.mean(axis=0)
         # at, or within rounding of, the point itself the quotient may be 0/0 or noise

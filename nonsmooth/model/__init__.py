@@ -1,6 +1,7 @@
 """WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
 
 from . import complementarity
+from .calls import call
 from .checks import is_real, real, real_array, require_system, whole
 from .clock import Clock
 from .coupled import Coupled, coupled_of
@@ -58,6 +59,7 @@ __all__ = [
     "Resets",
     "Stop",
     "Surfaces",
+    "call",
     "complementarity",
     "coupled_of",
     "evaluator",

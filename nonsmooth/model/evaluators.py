@@ -104,12 +104,12 @@ class Resets:
 
     def __init__(self, system: FilippovSystem):
         self.system = system
-        self.function = system.function("resets", lambda: [system.definition.maps])
+        self.evaluator = Evaluator(system.function("resets", lambda: [system.definition.maps]))
 
     def apply(self, index: int, x: Array, p: Array) -> Array:
         """Return the state after reset ``index``; the time is kept."""
         after = x.copy()
-        after[: self.system.dimension] = np.array(self.function(x, p))[:, index]
+        after[: self.system.dimension] = self.evaluator.copied(x, p)[0][:, index]
         return after
 
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from .cache import Cache, Content
+from .calls import call
 from .checks import real
 from .clock import Clock, with_clocks
 from .definition import read_definition
@@ -359,7 +360,7 @@ class FilippovSystem(Structure):
         3.0
         """
         values, p = self.extended_point(point, t), self.parameter_vector(parameters)
-        return np.array(self._function_of(matrix(expression))(values, p))
+        return call(self._function_of(matrix(expression)), values, p)[0]
 
     def _function_of(self, expression: ca.SX) -> ca.Function:
         """Return the function of an expression, the same for the same expression object."""

@@ -12,7 +12,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ..flow import Event, Segment, Trajectory
-from ..model import Array, DefinitionError, FilippovSystem, OptionError, explain, whole
+from ..model import Array, DefinitionError, FilippovSystem, OptionError, call, explain, whole
 from . import style
 
 #: Marker of each kind of event; shape tells them apart without colour.
@@ -314,9 +314,9 @@ def draw_surfaces(
     function = system.function(
         ("plot surfaces",), lambda: [system.surface_function(i) for i in range(count)]
     )
-    values = function.call([points, parameters]) if count else []
+    values = call(function, points, parameters) if count else []
     for value in values:
-        h = np.array(value, dtype=float).reshape(x.shape)
+        h = value.reshape(x.shape)
         if np.nanmin(h) < 0 < np.nanmax(h):
             ax.contour(
                 x,

@@ -5,15 +5,16 @@ import multiprocessing
 import os
 import pickle
 import signal
-import subprocess
 import sys
-import time
+import threading
+import types
 
 import casadi as ca
 import numpy as np
 import pytest
 
-from nonsmooth.flow import Status, simulate
+from nonsmooth.flow import Status, chunks, simulate
+from nonsmooth.flow import work as work_module
 from nonsmooth.flow.checkpoint import Checkpoint
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.ensemble import ensemble
@@ -302,39 +303,49 @@ def test_quiet_without_a_terminal(system, starts, capfd):
     assert out == "" and err == ""
 
 
-ENDLESS = """
-import sys, casadi as ca, numpy as np
-from nonsmooth.flow.ensemble import ensemble
-from nonsmooth.flow.work import Work
-from nonsmooth.model import FilippovSystem
-x, v = ca.SX.sym("x"), ca.SX.sym("v")
-system = FilippovSystem([x, v], surface=v - 9, above=[v, -x - 1], below=[v, -x])
-starts = np.random.default_rng(0).normal(size=(400, 2))
-ensemble(system, starts[:100], 1.0, work=Work(chunk=50, threads=1))
-print("ready", flush=True)
-ensemble(system, starts, 1e8, max_steps=10**12, work=Work(chunk=50, threads=int(sys.argv[1])))
-"""
+LONG = {"t_end": 1e8, "max_steps": 10**7}  # minutes, if nothing ends it
+
+
+@pytest.fixture
+def endless():
+    """A system without events, compiled."""
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    system = FilippovSystem([x, v], surface=v - 9, above=[v, -x - 1], below=[v, -x])
+    starts = np.random.default_rng(0).normal(size=(400, 2))
+    ensemble(system, starts[:100], 1.0, work=Work(chunk=50, threads=1))
+    return system, starts
+
+
+def press():
+    """Press Ctrl-C, from whatever thread."""
+    signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
+    return False
 
 
 @needs_compiler
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-@pytest.mark.parametrize("threads", ["1", "2"])
-def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(threads):
-    path = os.pathsep.join(p for p in sys.path if p)
-    with subprocess.Popen(
-        [sys.executable, "-c", ENDLESS, threads],
-        stdout=subprocess.PIPE,
-        stderr=subprocess.PIPE,
-        env=os.environ | {"PYTHONPATH": path},
-    ) as process:
-        try:
-            assert process.stdout.readline() == b"ready\n"
-            time.sleep(0.5)
-            process.send_signal(signal.SIGINT)
-            _, error = process.communicate(timeout=20)
-        finally:
-            process.kill()
-    assert b"KeyboardInterrupt" in error and process.returncode != 0
+def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(endless, monkeypatch):
+    monkeypatch.setattr(chunks.run_chunk, "__defaults__", (None, press))  # asked between bursts
+    with pytest.raises(KeyboardInterrupt):
+        ensemble(*endless, **LONG, work=Work(chunk=50, threads=1))
+
+
+@needs_compiler
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_interrupt_from_the_keyboard_is_heard_inside_the_chunks_of_threads(endless, monkeypatch):
+    class Pressed(threading.Event):
+        pressed = False
+
+        def is_set(self):
+            if not Pressed.pressed:
+                Pressed.pressed = True
+                press()
+            return super().is_set()
+
+    monkeypatch.setattr(work_module, "threading", types.SimpleNamespace(Event=Pressed))
+    with pytest.raises(KeyboardInterrupt):
+        ensemble(*endless, **LONG, work=Work(chunk=50, threads=2))
+    assert Pressed.pressed
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ has to be located: Taylor steps to rounding, and no more. This is the one place 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import Protocol
 
 import numpy as np
@@ -76,8 +76,10 @@ def steps_for(
     for _ in range(_MOST_STEPS):
         if left == 0.0:
             return
-        c = field.jets(z, p)[0]
+        c, *watched = field.jets(z, p)
         h = _length(c, field.groups, abs(duration), tol)
+        for rows in watched:  # a guard may vary where the states rest
+            h = min(h, _length(rows, np.arange(len(rows))[:, None], abs(duration), tol))
         if not (h > 1e-14 * abs(duration) and np.all(np.isfinite(c))):
             break
         # two equal steps rather than a long one and the rest of it
@@ -99,7 +101,7 @@ def steps_for(
 _DEGREES = np.arange(64)
 
 
-def _length(c: Array, groups: Sequence[NDArray[np.intp]], duration: float, tol: float) -> float:
+def _length(c: Array, groups: Iterable[NDArray[np.intp]], duration: float, tol: float) -> float:
     """Step for which the last two terms stay below ``tol`` times the size of their group."""
     last, order, h = np.abs(c[:, [0, 1, -2, -1]]), c.shape[1] - 1, math.inf
     for group in groups:

@@ -244,6 +244,7 @@ def converge(
     scale: float = 1.0,
     max_iterations: int = 30,
     linear: Callable[[Array, Array], Array] | None = None,
+    noise: float = 1e-11,
 ) -> Array | None:
     """Root of as many equations as unknowns from a good guess, or None.
 
@@ -263,6 +264,8 @@ def converge(
     max_iterations : int, optional
     linear : callable, optional
         Solves the linear equations of a step, where their structure is known.
+    noise : float, optional
+        Steps below this, relative to ``scale``, that shrink no more are taken to be rounding.
 
     Examples
     --------
@@ -270,9 +273,9 @@ def converge(
     [3.0]
     """
     carried = isinstance(equations, Secant) and equations.jacobian is not None
-    root = _full_steps(equations, start, tol, scale, max_iterations, linear)
+    root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
     if root is None and carried and isinstance(equations, Secant) and equations.forget():
-        root = _full_steps(equations, start, tol, scale, max_iterations, linear)
+        root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
     return root
 
 
@@ -283,6 +286,7 @@ def _full_steps(
     scale: float,
     most: int,
     linear: Callable[[Array, Array], Array] | None,
+    noise: float,
 ) -> Array | None:
     x, last = np.array(start, dtype=float), np.inf
     for _ in range(most):
@@ -297,6 +301,8 @@ def _full_steps(
         x = x + step
         if size <= tol or (np.isfinite(last) and size * size <= tol * last):
             return x
+        if size <= noise and size >= 0.25 * last:
+            return x  # rounding of the equations is above tol
         if not size <= 1e6:
             return None
         last = size

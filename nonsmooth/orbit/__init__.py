@@ -22,6 +22,7 @@ from .manifold import (
     Manifold,
     manifold,
 )
+from .orbit_branches import continue_orbit
 from .periodic import PeriodicOrbit
 from .poincare import (
     PoincareOrbit,
@@ -58,6 +59,7 @@ __all__ = [
     "continuation",
     "continue_bifurcation",
     "continue_equilibrium",
+    "continue_orbit",
     "find_homoclinic",
     "funnel",
     "gradient",

@@ -17,7 +17,8 @@ import numpy as np
 
 from ..local.checks import positive
 from ..model import Array, ConvergenceError, DefinitionError, OptionError, explain, whole
-from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
+from .branch import BranchEnd, BranchEvent
+from .branch_curves import BranchCurve, check_bounds, end_of
 from .continuation import Arc, Curve, Point, Secant, Zero, directions, trace
 
 _NAMES = {
@@ -116,6 +117,9 @@ class EventCurve(Curve):
             left, _, right = np.linalg.svd(self._square(start))
             self.border = left[:, -1], right[-1]
         self.unit = abs(self.test(start + 1e-3 * base.scale * self._probe())) or 1.0
+        # what vanishes with the event, as at the twin of it in a symmetric orbit
+        tests = self.base.tests(Point(start, np.zeros(len(start))))
+        self.twins = {k for k, v in tests.items() if abs(v) <= 1e-8 and k != name}
         self.secant = Secant(lambda v: np.array([self.test(v * self.scale) / self.unit]), 1.0)
 
     def _probe(self) -> Array:
@@ -149,7 +153,8 @@ class EventCurve(Curve):
     def tests(self, point: Point) -> Mapping[str, float]:
         """Other events that happen at the same time, and what degenerates."""
         u = point.u
-        found = {k: v for k, v in self.base.tests(point).items() if k != self.name}
+        omitted = {self.name, *self.twins}
+        found = {k: v for k, v in self.base.tests(point).items() if k not in omitted}
         if self.name == "fold":
             found["cusp"] = self._quadratic(u)
         else:
@@ -301,10 +306,10 @@ def _on_curve(curve: EventCurve, start: Array, across: Array, kind: str) -> Arra
 
 
 def _special(curve: EventCurve, zero: Zero, k: int) -> CodimensionTwo:
-    pair = frozenset({curve.name, zero.name})
-    kind = _NAMES.get(pair, zero.name)
-    if kind == zero.name and zero.name in curve.base.tests(zero.point):
-        kind = f"{curve.name} with {zero.name}"
+    own, other = (curve.base.named(name, zero.point.u) for name in (curve.name, zero.name))
+    kind = _NAMES.get(frozenset({own, other}), other)
+    if kind == other and zero.name in curve.base.tests(zero.point):
+        kind = f"{own} with {other}"
     if kind == "fold-Hopf" and curve.base.double_zero(zero.point.u):
         kind = "Bogdanov-Takens"
     try:

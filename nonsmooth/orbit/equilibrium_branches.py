@@ -38,7 +38,8 @@ from ..model import (
     require_system,
     whole,
 )
-from .branch import Branch, BranchCurve, BranchEvent, FarSide, check_bounds, follow_branch
+from .branch import Branch, BranchEvent, FarSide
+from .branch_curves import BranchCurve, check_bounds, follow_branch
 from .continuation import Departure, Point, Zero, depart
 
 #: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.

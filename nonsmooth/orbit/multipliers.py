@@ -86,16 +86,30 @@ def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
     return np.asarray(values[order], complex)
 
 
-def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
-    """The return map on perturbations across the flow, in the smallest subspace that they pass."""
-    count, n = len(problem.legs), problem.dimension
-    maps = []
+def leg_maps(problem: BoundaryProblem, at: Evaluation) -> list[Array]:
+    """Derivatives of the maps from the start of each leg to that of the next, across the flow."""
+    count, maps = len(problem.legs), list[Array]()
     for i in range(count):
         flown, event = at.flown[i], at.events[i]
         speed = float(event.gradient @ flown.rate)
         across = flown.by_start - np.outer(flown.rate, event.gradient @ flown.by_start) / speed
         step = event.after_state @ across
         maps.append(problem.wrap @ step if i + 1 == count else step)
+    return maps
+
+
+def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Derivative of the legs' map across the flow, (N, N); 0 in place of the 1 of the flow."""
+    product = np.eye(problem.dimension)
+    for step in leg_maps(problem, at):
+        product = step @ product
+    return product
+
+
+def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+    """The return map on perturbations across the flow, in the smallest subspace that they pass."""
+    count, n = len(problem.legs), problem.dimension
+    maps = leg_maps(problem, at)
     basis = _kept(problem, at, p)
     bases: list[Array] = [np.eye(n)] * count
     for _ in range(2):

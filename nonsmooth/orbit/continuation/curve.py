@@ -127,7 +127,11 @@ class Curve:
             return np.append(values, across @ v - level), np.vstack([jacobian, across])
 
         def attempt() -> Array | None:
-            return converge(bordered, start, tol=self.tol, max_iterations=max_iterations)
+            # exact derivatives converge quadratically: near a branch point rounding is magnified
+            noise = 1e-8 if self.exact else 1e-11
+            return converge(
+                bordered, start, tol=self.tol, max_iterations=max_iterations, noise=noise
+            )
 
         try:
             found = attempt()

@@ -23,34 +23,64 @@ class Zero:
     point : Point
     slope : float
         Derivative of the test by arclength, from the ends of the step.
+    together : tuple of str
+        Tests that vanish at the same point, this one included.
     """
 
     name: str
     point: Point
     slope: float
+    together: tuple[str, ...] = ()
 
 
 def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
-    """Zeros in the step from a to b, in their order; a test that jumps or has a pole has none."""
+    """Zeros in the step from a to b, in their order; a test that jumps or has a pole has none.
+
+    Where the equations are singular at the zero of a test that ends the curve it cannot be located
+    along the curve; then it is taken to be at the last point before it.
+    """
     names = [k for k in a.tests if k in b.tests and a.tests[k] * b.tests[k] < 0]
-    found = [_zero(curve, a, b, name) for name in names]
-    return sorted(
-        (zero for zero in found if zero is not None), key=lambda zero: zero.point.arclength
-    )
-
-
-def _zero(curve: Curve, a: Point, b: Point, name: str) -> Zero | None:
     segment = _Segment(curve, a, b)
-    low, high = a.tests[name], b.tests[name]
-    slope = (high - low) / (b.arclength - a.arclength)
+    found = [_zero(segment, name) for name in names]
+    zeros = [zero for zero in found if zero is not None]
+    lost = [n for n, zero in zip(names, found, strict=True) if zero is None and curve.ends(n)]
+    lost = [n for n in lost if not segment.jumps(n)]
+    if lost:
+        end = segment.before(lost)
+        zeros = [z for z in zeros if curve.ends(z.name)]
+        zeros += [Zero(name, end, segment.slope(name)) for name in lost]
+    near = 1e-6 * (b.arclength - a.arclength)
+    zeros = [
+        replace(
+            z,
+            together=tuple(
+                o.name
+                for o in zeros
+                if abs(o.point.arclength - z.point.arclength) <= near
+                or (lost and curve.ends(o.name) and curve.ends(z.name))
+            ),
+        )
+        for z in zeros
+    ]
+    return sorted(zeros, key=lambda zero: zero.point.arclength)
+
+
+def _zero(segment: _Segment, name: str) -> Zero | None:
     if name == "branch point":
-        point = segment.interpolated(name)
-    else:
-        weight = segment.root(name)
-        point = None if weight is None else segment.at(weight)
-        if point is not None and not abs(point.tests[name]) <= 1e-5 * max(abs(low), abs(high)):
-            return None
-    return None if point is None else Zero(name, point, slope)
+        return _interpolated(segment, name)
+    weight = segment.root(name)
+    point = None if weight is None else segment.at(weight)
+    if weight is None and name == "fold":  # beside a branch point
+        return _interpolated(segment, name)
+    size = max(abs(segment.a.tests[name]), abs(segment.b.tests[name]))
+    if point is None or not abs(point.tests[name]) <= 1e-5 * size:
+        return None
+    return Zero(name, point, segment.slope(name))
+
+
+def _interpolated(segment: _Segment, name: str) -> Zero | None:
+    point = segment.interpolated(name)
+    return None if point is None else Zero(name, point, segment.slope(name))
 
 
 class _Segment:
@@ -61,6 +91,25 @@ class _Segment:
         self.chord = (b.u - a.u) / curve.scale
         self.length = float(np.linalg.norm(self.chord))
         self.known: dict[float, Point | None] = {0.0: a, 1.0: b}
+
+    def slope(self, name: str) -> float:
+        """Mean slope of a test over the step."""
+        return (self.b.tests[name] - self.a.tests[name]) / (self.b.arclength - self.a.arclength)
+
+    def jumps(self, name: str) -> bool:
+        """Whether a test changes its sign without passing small values, where it was followed."""
+        values = [p.tests[name] for p in self.known.values() if p is not None and name in p.tests]
+        ends = min(abs(self.a.tests[name]), abs(self.b.tests[name]))
+        return len(values) > 20 and min(map(abs, values)) > 0.1 * ends
+
+    def before(self, names: list[str]) -> Point:
+        """The last point known before any of some tests changes its sign."""
+        good = [
+            (weight, p)
+            for weight, p in self.known.items()
+            if p is not None and all(p.tests.get(n, 0.0) * self.a.tests[n] > 0 for n in names)
+        ]
+        return max(good, key=lambda entry: entry[0])[1]
 
     def at(self, weight: float) -> Point | None:
         """The point of the curve across the chord at a fraction of it."""
@@ -112,11 +161,14 @@ class _Segment:
         middle, width = low / (low - high), 0.5
         point: Point | None = None
         for _ in range(3):
-            nodes = middle + width * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
-            points = [p for w in nodes if (p := self.at(float(w))) is not None]
-            if len(points) < _NODES or any(name not in p.tests for p in points):
+            wanted = middle + width * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
+            pairs = [(w, p) for w in wanted.tolist() if (p := self.at(w)) is not None]
+            pairs = [(w, p) for w, p in pairs if name in p.tests]
+            if len(pairs) < _NODES - 2:
                 return point
-            tests = np.polynomial.Polynomial.fit(nodes, [p.tests[name] for p in points], _NODES - 1)
+            nodes, points = np.array([w for w, _ in pairs]), [p for _, p in pairs]
+            degree = len(pairs) - 1
+            tests = np.polynomial.Polynomial.fit(nodes, [p.tests[name] for p in points], degree)
             roots = tests.roots()
             real = roots.real[np.abs(roots.imag) < 1e-6]
             if not real.size:
@@ -124,7 +176,7 @@ class _Segment:
             middle = float(real[np.argmin(np.abs(real - middle))])
             rows = np.array([p.u for p in points])
             u = np.array(
-                [np.polynomial.Polynomial.fit(nodes, row, _NODES - 1)(middle) for row in rows.T]
+                [np.polynomial.Polynomial.fit(nodes, row, degree)(middle) for row in rows.T]
             )
             near = points[int(np.argmin(np.abs(nodes - middle)))]
             s = self.a.arclength + middle * (self.b.arclength - self.a.arclength)

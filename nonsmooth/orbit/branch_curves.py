@@ -1,0 +1,228 @@
+"""Following a branch of solutions both ways from its start, piece after piece.
+
+Each piece is continued by :mod:`nonsmooth.continuation` with equations of its own; where one ends at
+an event the next one begins in the solutions on the other side.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..model import Array, ConvergenceError, FilippovSystem, OptionError, explain
+from .branch import Branch, BranchEnd, BranchEvent
+from .continuation import Arc, Curve, Departure, Point, Zero, pieces, trace
+
+
+class BranchCurve(Curve):
+    """A curve of solutions with the parameter as last unknown; subclasses describe its points."""
+
+    parameter: int | None = -1
+    branching = True
+    scale: Array
+    system: FilippovSystem
+    free: tuple[int, ...]
+
+    def value(self, u: Array) -> float:
+        """The parameter at a point of the curve."""
+        return float(u[-1])
+
+    def parameters_at(self, u: Array) -> Array:
+        """All parameters of the system at a point of the curve."""
+        raise NotImplementedError
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        """The same equations with other free parameters, and the point there.
+
+        Parameters
+        ----------
+        u : ndarray
+        free : tuple of int
+        widths : ndarray
+            Scales of these parameters.
+        """
+        raise NotImplementedError
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        """Further functions whose zeros on a curve of events are of codimension two."""
+        return {}
+
+    def named(self, test: str, u: Array) -> str:
+        """The bifurcation at a zero of a test."""
+        return test
+
+    def double_zero(self, u: Array) -> bool:
+        """Whether two eigenvalues vanish together at a point, not one beside an imaginary pair."""
+        return False
+
+    def describe(self, u: Array) -> Any:
+        """The solution at a point of the curve."""
+        raise NotImplementedError
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        """What a located zero is; None if it is nothing."""
+        raise NotImplementedError
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """How the branch goes on beyond an event that ends this curve."""
+        return None
+
+    def solution_at(self, guess: Array, value: float) -> Any:
+        """The solution near a guess at a value of the parameter."""
+        start, axis = np.array(guess), np.zeros(len(guess))
+        start[-1], axis[-1] = value, 1.0
+        u = self.correct(start, axis)
+        if u is None:
+            raise ConvergenceError(
+                explain(
+                    f"the branch at {value:.10g}",
+                    expected="a solution near its neighbours",
+                    received="no convergence",
+                    advice="Continue with a smaller step.",
+                )
+            )
+        u[-1] = value
+        return self.describe(u)
+
+
+def check_bounds(bounds: Sequence[float], value: float, name: str) -> tuple[float, float]:
+    """Check bounds of a parameter around its value.
+
+    Raises
+    ------
+    OptionError
+    """
+    try:
+        low, high = (float(b) for b in bounds)
+    except (TypeError, ValueError):
+        low, high = np.nan, np.nan
+    if not low <= value <= high or not np.isfinite(high - low) or low == high:
+        raise OptionError(
+            explain(
+                "bounds",
+                expected=f"two numbers around {name} = {value:.10g}",
+                received=repr(bounds),
+                advice="Give (low, high).",
+            )
+        )
+    return low, high
+
+
+def follow_branch(
+    curve: BranchCurve,
+    start: Array,
+    *,
+    name: str,
+    bounds: tuple[float, float],
+    step: float,
+    max_points: int,
+    through: bool,
+    report: Callable[[Point], None] | None = None,
+) -> Branch:
+    """Continue a solution both ways to the bounds of the parameter, through events if asked to."""
+    forward = np.zeros(start.size)
+    forward[-1] = 1.0
+    options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
+    halves: list[_Half] = []
+    for sign in (-1.0, 1.0):
+        if halves and halves[0].end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
+            halves.append(_Half(end=halves[0].end))
+            continue
+        halves.append(_half(curve, start, sign * forward, through, options))
+    return _joined(name, *halves)
+
+
+@dataclass
+class _Half:
+    """One way along a branch."""
+
+    nodes: list[tuple[BranchCurve, Point]] = field(default_factory=list)
+    events: list[BranchEvent] = field(default_factory=list)
+    end: BranchEnd = BranchEnd.EVENT
+
+
+def _half(
+    curve: BranchCurve, start: Array, tangent: Array, through: bool, options: Mapping[str, Any]
+) -> _Half:
+    half, (low, high) = _Half(), options["bounds"]
+    known: dict[int, BranchEvent | None] = {}  # by the identity of the zero, kept in its arc
+
+    def follow(departure: Departure) -> Arc:
+        arc = trace(
+            departure.curve,
+            departure.rows,
+            departure.tangent,
+            step=options["step"],
+            most=options["max_points"],
+            bounds=[(len(departure.rows[-1]) - 1, low, high)],
+            report=options["report"],
+        )
+        curve = departure.curve
+        assert isinstance(curve, BranchCurve)
+        _drop_turning(arc)
+        known.update({id(zero): curve.event(zero) for zero in arc.zeros})
+        return arc
+
+    def following(departure: Departure, arc: Arc) -> Departure | None:
+        event = known[id(arc.zeros[-1])] if through and arc.zeros else None
+        if event is None or arc.zeros[-1].name != arc.end:
+            return None
+        assert isinstance(departure.curve, BranchCurve)
+        return departure.curve.onward(event, arc.zeros[-1])
+
+    whole = ("bound", "closed", "interrupted", "points")
+    first = Departure(curve, [start], tangent)
+    for departure, arc in pieces(
+        first, follow, following, last=lambda arc: arc.end in whole, apart=0.0
+    ):
+        at = departure.curve
+        assert isinstance(at, BranchCurve)
+        points = arc.points[1:] if half.nodes else arc.points  # pieces share their ends
+        half.nodes += [(at, point) for point in points]
+        found = [known[id(zero)] for zero in arc.zeros]
+        half.events += [event for event in found if event is not None]
+        half.end = end_of(arc)
+    return half
+
+
+def _drop_turning(arc: Arc) -> None:
+    """Forget a turning or branch point that only mirrors the event at which an arc ends.
+
+    Where a new leg grows like a square root the branch is tangent to a constant parameter, and where
+    it grows like a cube root the equations are singular.
+    """
+    if not arc.zeros or arc.zeros[-1].name != arc.end:
+        return
+    end = arc.zeros[-1].point.arclength
+    near = 1e-6 * max(1.0, end)
+    arc.zeros[:] = [
+        zero
+        for zero in arc.zeros
+        if zero.name not in ("fold", "branch point") or end - zero.point.arclength > near
+    ]
+
+
+def end_of(arc: Arc) -> BranchEnd:
+    """Name the end of an arc."""
+    if arc.end in ("lost", "step too small"):
+        return BranchEnd.STEP_TOO_SMALL
+    if arc.end == "period diverges":
+        return BranchEnd.PERIOD_DIVERGES
+    known = {end.value: end for end in BranchEnd}
+    return known.get(arc.end, BranchEnd.EVENT)
+
+
+def _joined(name: str, backward: _Half, forward: _Half) -> Branch:
+    nodes = [*reversed(backward.nodes), *forward.nodes[1 if backward.nodes else 0 :]]
+    events = [*reversed(backward.events), *forward.events]
+    return Branch(
+        parameter=name,
+        values=np.array([curve.value(point.u) for curve, point in nodes]),
+        solutions=tuple(curve.describe(point.u) for curve, point in nodes),
+        events=tuple(events),
+        ends=(backward.end, forward.end),
+        nodes=tuple(nodes),
+    )

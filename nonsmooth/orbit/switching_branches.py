@@ -1,0 +1,107 @@
+"""From a period doubling, pitchfork or branch point to the branch that crosses there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..model import Array, ConvergenceError, DefinitionError, explain
+from .branch import BranchEvent
+from .continuation import other_direction
+from .edits import mirrored
+from .multipliers import leg_maps
+from .orbit_branches import OrbitCurve
+
+#: Distances from the event at which the new branch is looked for, relative to the orbit.
+_AWAY = (1e-3, 1e-2, 3e-2)
+
+
+def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, Array]:
+    """The branch that crosses at an event: its curve, and a point near the event.
+
+    Raises
+    ------
+    DefinitionError, ConvergenceError
+    """
+    if event.kind not in ("period doubling", "pitchfork", "branch point"):
+        raise DefinitionError(
+            explain(
+                "orbit",
+                expected="a period doubling, pitchfork or branch point to switch branches at",
+                received=repr(event),
+                advice="Continue event.orbit, or continue_bifurcation the event.",
+            )
+        )
+    base: OrbitCurve = event.curve
+    assert event.point is not None
+    curve, u = base.freed(event.point.u, free, np.ones(1))
+    assert isinstance(curve, OrbitCurve)
+    if event.kind == "branch point":
+        way = other_direction(event.point)
+    else:
+        curve, u, way = _twice(curve, u)
+    for away in _AWAY:
+        found = curve.correct(u + away * way * curve.scale, way)
+        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
+            return curve, found
+    raise ConvergenceError(
+        explain(
+            event.kind,
+            expected="an orbit on the branch that crosses",
+            received="no convergence near it",
+            advice="Perhaps the crossing branch is vertical or the event is degenerate.",
+        )
+    )
+
+
+def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
+    """Twice the legs, and the direction in which the orbit parts from its first round."""
+    problem = curve.problem
+    starts, durations = problem.split(u)
+    at, p = curve.evaluation(u), curve.parameters_at(u)
+    changes, times = _alternating(curve, u)
+    n = problem.dimension
+    shift = np.zeros(n)
+    if problem.forcing is not None:
+        shift[-1] = problem.advance(p)[0]
+    back = np.linalg.inv(problem.wrap)
+    second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
+    turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
+    legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
+    double = replace(
+        problem, legs=legs, symmetry=None, periods=2 * problem.periods, phase=None, reference=None
+    )
+    if problem.phase is not None:
+        raise DefinitionError(
+            "period doubling of an orbit without events: expected an orbit with at least one event, "
+            "received none. Add a section, e.g. a surface where both fields are equal."
+        )
+    unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
+    way = np.append(
+        double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times])),
+        np.zeros(len(curve.free)),
+    )
+    new = curve.with_problem(double, unknowns)
+    way = way / new.scale
+    del at
+    return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
+
+
+def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
+    """Changes of starts and durations in the direction that the legs' map turns round."""
+    problem, at = curve.problem, curve.evaluation(u)
+    maps = leg_maps(problem, at)
+    whole = np.eye(problem.dimension)
+    for step in maps:
+        whole = step @ whole
+    values, vectors = np.linalg.eig(whole)
+    d = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
+    changes, times = [], []
+    for step, flown, event in zip(maps, at.flown, at.events, strict=True):
+        changes.append(d)
+        times.append(
+            -float(event.gradient @ flown.by_start @ d) / float(event.gradient @ flown.rate)
+        )
+        d = step @ d
+    return np.array(changes), np.array(times)

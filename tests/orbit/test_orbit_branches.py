@@ -1,0 +1,188 @@
+"""Branches of periodic orbits: every bifurcation is at its reference value, from both sides, and the
+orbits beyond it are those that a search finds there."""
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from tests.orbit.periodic_cases import (
+    CASES,
+    excited_oscillator,
+    forced_friction,
+    friction_oscillator,
+    grazing_circle,
+    relay,
+    scalar_relay,
+    table,
+    walker,
+    welander,
+)
+
+
+def number(case, name):
+    return float(CASES[case][name])
+
+
+def kinds(branch):
+    return [event.kind for event in branch.events]
+
+
+@pytest.fixture(scope="module")
+def forced():
+    """x' = A cos t - k sgn x from crossing orbits through sliding ones to rest."""
+    system = scalar_relay()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    return ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0))
+
+
+def test_crossing_sliding_and_adding_sliding_of_a_forced_relay(forced):
+    assert kinds(forced) == ["adding-sliding", "crossing-sliding"]
+    adding, crossing = forced.events
+    assert abs(crossing.parameter - number("F1", "A_crossing_sliding")) < 1e-12
+    assert abs(adding.parameter - number("F2", "ADDING_SLIDING_A")) < 1e-12
+    assert [len(orbit.legs) for orbit in (crossing.orbit, adding.orbit)] == [2, 1]
+    assert crossing.far_side.itinerary.split() == ["-", "s", "+", "s"]
+    assert forced.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+
+
+def test_orbits_beyond_an_event_have_the_reference_values(forced):
+    sliding = forced[1.5]
+    flights = [leg.duration for leg in sliding.legs if leg.mode != "s"]
+    slides = [leg.duration for leg in sliding.legs if leg.mode == "s"]
+    assert np.abs(np.array(flights) - number("F2", "flight")).max() < 1e-12
+    assert np.abs(np.array(slides) - number("F2", "slide")).max() < 1e-12
+    assert not sliding.is_virtual and sliding.stability == "superstable"
+    assert abs(forced[2.5].multipliers[0] - number("F1", "multiplier")) < 1e-12
+
+
+def test_the_branch_can_stop_at_the_event():
+    system = scalar_relay()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), through=False)
+    assert branch.ends == (ns.BranchEnd.EVENT, ns.BranchEnd.REACHED_BOUND)
+    assert abs(branch.values[0] - number("F1", "A_crossing_sliding")) < 1e-12
+
+
+@pytest.mark.parametrize("inside", [True, False])
+def test_grazing_sliding_of_a_circle_from_either_side(inside):
+    """A_i = 0 in the plane: from a stable orbit always persistence."""
+    system = grazing_circle()
+    d = 0.9 if inside else 1.1
+    start = [0.0, 0.5] if inside else [0.9, 0.0]
+    orbit = ns.periodic_orbit(system, ns.simulate(system, start, 40, parameters={"d": d}))
+    branch = ns.continue_orbit(orbit, "d", bounds=(0.85, 1.15))
+    (event,) = branch.events
+    assert event.kind == "grazing-sliding"
+    assert abs(event.parameter - number("F5", "d_grazing_sliding")) < 1e-12
+    assert event.far_side.verdict == "persistence"
+    assert abs(event.coefficients["det(I - A_i)"] - 1) < 1e-9
+    assert abs(event.coefficients["radius of A_o"] - number("F5", "multiplier_before")) < 1e-12
+    assert abs(branch[0.9].period - number("F5", "period")) < 1e-11
+    assert abs(branch[1.1].period - number("F5", "period_before")) < 1e-11
+
+
+def test_fold_and_period_doubling_of_a_ball_on_a_table():
+    orbit = ns.periodic_orbit(table(), [0.26, 3.1], t_start=0.64, itinerary=[("", "reset")])
+    branch = ns.continue_orbit(orbit, "A", bounds=(0.3, 1.2))
+    assert kinds(branch) in (["fold", "period doubling"], ["period doubling", "fold"])
+    found = {event.kind: event.parameter for event in branch.events}
+    assert abs(found["fold"] - number("I1", "A_fold")) < 1e-12
+    assert abs(found["period doubling"] - number("I1", "A_period_doubling")) < 1e-12
+
+
+def test_neimark_sacker():
+    orbit = ns.periodic_orbit(
+        excited_oscillator(), [-0.1, -1.1], t_start=1.3, itinerary=[("", "reset")]
+    )
+    (event,) = ns.continue_orbit(orbit, "d", bounds=(0.02, 0.06)).events
+    assert event.kind == "Neimark-Sacker"
+    assert abs(event.parameter - number("I4", "d_NS")) < 1e-12
+    pair = CASES["I4"]["multipliers"][0]
+    wanted = np.arctan2(abs(float(pair["im"])), float(pair["re"]))
+    assert abs(event.coefficients["angle"] - wanted) < 1e-11
+
+
+def test_grazing_sliding_that_leads_to_chaos():
+    """Kowalczyk & di Bernardo 2005: the derivatives with and without contact, and what follows."""
+    nu = number("K1", "nu_grazing")
+    orbit = ns.periodic_orbit(friction_oscillator(), [2.19, -0.42], parameters={"nu": nu + 1e-3})
+    branch = ns.continue_orbit(orbit, "nu", bounds=(nu - 1e-4, nu + 1.1e-3))
+    (event,) = branch.events
+    assert event.kind == "grazing-sliding" and abs(event.parameter - nu) < 1e-12
+    outer = [float(v) for v in CASES["K2"]["A_out_eigenvalues"]]
+    inner = [float(v) for v in CASES["K2"]["A_in_eigenvalues"]]
+    numbers = event.coefficients
+    assert abs(numbers["det(I + A_o)"] - np.prod(1 + np.array(outer))) < 1e-9
+    assert abs(numbers["det(I + A_i)"] - np.prod(1 + np.array(inner))) < 1e-9
+    assert "unstable orbit of twice the period" in event.far_side.verdict
+    assert "chaos" in event.far_side.verdict
+
+
+def test_the_walker_doubles_its_step_and_the_new_gait_is_found():
+    """Garcia, Chatterjee, Ruina & Coleman 1998: period two from about 0.015 on."""
+    system, state = walker(), [0.2003, -0.1998, 0.4006, -0.0158]
+    orbit = ns.periodic_orbit(system, state, itinerary=[("", "reset")])
+    (event,) = ns.continue_orbit(orbit, "gamma", bounds=(0.008, 0.018)).events
+    assert event.kind == "period doubling" and abs(event.parameter - 0.0151) < 5e-5
+    double = ns.continue_orbit(event, "gamma", bounds=(0.0149, 0.0165))
+    orbit = double[0.016]
+    assert len(orbit.legs) == 2 and "asymptotically stable" in orbit.stability
+    steps = [leg.duration for leg in orbit.legs]
+    assert abs(steps[0] - steps[1]) > 1e-2
+    again = ns.periodic_orbit(
+        system, orbit.start, itinerary=[("", "reset")] * 2, parameters={"gamma": 0.016}
+    )
+    assert abs(again.period - orbit.period) < 1e-11
+
+
+def test_crossing_sliding_of_dry_friction_by_its_symmetry_and_without_it():
+    system = forced_friction()
+    run = ns.simulate(system, [1.5, 0.0], 100.0)
+    half = ns.periodic_orbit(system, run, symmetry="odd")
+    (event,) = ns.continue_orbit(half, "f", bounds=(0.15, 0.6)).events
+    assert event.kind == "crossing-sliding"
+    whole = ns.periodic_orbit(system, run)
+    (twin,) = ns.continue_orbit(whole, "f", bounds=(0.15, 0.6)).events
+    assert twin.kind == "crossing-sliding"
+    assert abs(twin.parameter - event.parameter) < 1e-12
+
+
+@pytest.mark.slow
+def test_the_relays_sliding_bifurcations():
+    """The values of a half orbit; the short slide grazes, an exit is added."""
+    system = relay()
+    run = ns.simulate(system, [0.0, -0.001, -0.02], t_end=40.0)
+    orbit = ns.periodic_orbit(system, run, symmetry="odd")
+    branch = ns.continue_orbit(orbit, "w", bounds=(24.0, 25.3))
+    assert kinds(branch) == ["adding-sliding", "grazing-sliding"]
+    for event in branch.events:  # where each is, the orbits on both sides are real
+        for side in (-1e-3, 1e-3):
+            assert not branch[event.parameter + side].is_virtual
+    counts = [len(branch[w].legs) for w in (24.01, 24.6, 25.2)]
+    assert counts == [24, 28, 24]
+
+
+def test_a_period_that_diverges_ends_a_branch():
+    orbit = ns.periodic_orbit(welander(), [0.4, 0.3])
+    branch = ns.continue_orbit(orbit, "eps", bounds=(-0.05, -0.005))
+    assert branch.ends[0] is ns.BranchEnd.PERIOD_DIVERGES
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (dict(parameter="kappa"), ns.DefinitionError, "kappa"),
+        (dict(bounds=(3, 4)), ns.OptionError, "around A"),
+        (dict(step=0), ns.OptionError, "step"),
+        (dict(orbit="orbit"), ns.DefinitionError, "PeriodicOrbit"),
+    ],
+)
+def test_bad_input(forced, change, error, words):
+    given = {"orbit": forced.orbits[5], "parameter": "A", "bounds": (0.8, 3)} | change
+    with pytest.raises(error, match=words):
+        ns.continue_orbit(given.pop("orbit"), given.pop("parameter"), **given)
+
+
+def test_branches_are_switched_only_where_they_cross(forced):
+    with pytest.raises(ns.DefinitionError, match="switch"):
+        ns.continue_orbit(forced.events[0], "A", bounds=(0.8, 3))

@@ -120,7 +120,10 @@ class EventCurve(Curve):
         # what vanishes with the event, as at the twin of it in a symmetric orbit
         tests = self.base.tests(Point(start, np.zeros(len(start))))
         self.twins = {k for k, v in tests.items() if abs(v) <= 1e-8 and k != name}
-        self.secant = Secant(lambda v: np.array([self.test(v * self.scale) / self.unit]), 1.0)
+        self.secant = Secant(self._scaled_test, 1.0)
+
+    def _scaled_test(self, v: Array) -> Array:
+        return np.array([self.test(v * self.scale) / self.unit])
 
     def _probe(self) -> Array:
         """A direction in which no test is stationary by chance."""

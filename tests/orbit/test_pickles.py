@@ -1,0 +1,80 @@
+"""Every result about orbits survives pickling and deep copies, and still computes."""
+
+import copy
+import pickle
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, v, mu, a, b = (ca.SX.sym(s) for s in ("x", "y", "v", "mu", "a", "b"))
+SPRINGS = ns.FilippovSystem(
+    [x, v],
+    surface=x,
+    above=[v, -x + mu * (1 - x**2) * v],
+    below=[v, -4 * x],
+    parameters={mu: 0.5},
+)
+SADDLE = ns.FilippovSystem([x, y], surface=y, above=[x + y, -1], below=[x, 1])
+TURN = ns.FilippovSystem(
+    [x, y],
+    surface=y,
+    above=[a + b * x - x**3, 1 - y],
+    below=[1, 1],
+    parameters={a: 0.0, b: 0.5},
+)
+
+
+def run():
+    return ns.simulate(SPRINGS, [0.5, 1.0], 40.0)
+
+
+def branch():
+    return ns.continue_equilibrium(TURN, [-1.5, 1.0], "a", bounds=(-2, 2))
+
+
+def curve():
+    fold = branch().events[0]
+    return ns.continue_bifurcation(fold, ("a", "b"), bounds=[(-1, 1), (0.1, 1)])
+
+
+RESULTS = {
+    "Trajectory": (run, lambda r: r(3.0)),
+    "Sensitivity": (lambda: ns.sensitivity(run()), lambda r: r.dx_dx0 * r.clearance),
+    "Gradient": (lambda: ns.gradient(run(), x * v), lambda r: r.x0),
+    "PeriodicOrbit": (lambda: ns.periodic_orbit(SPRINGS, run()), lambda r: r.multipliers),
+    "Branch": (branch, lambda r: [e.parameter for e in r.events]),
+    "BifurcationCurve": (curve, lambda r: r.values),
+    "FixedItinerary": (
+        lambda: ns.FixedItinerary(SPRINGS, "+ -", until="h0"),
+        lambda r: r.arrive([0.5, 1.0]).x,
+    ),
+    "PoincareOrbit": (
+        lambda: ns.poincare(SPRINGS, "h0", [0.5, 1.0], count=4),
+        lambda r: r.jacobian(2),
+    ),
+    "LyapunovSpectrum": (
+        lambda: ns.lyapunov_spectrum(SPRINGS, [0.5, 1.0], t_end=20.0),
+        lambda r: r.exponents,
+    ),
+    "Basins": (
+        lambda: ns.basins(SPRINGS, {"x": [0.5, 1.0], "v": 0.0}, t_end=40.0),
+        lambda r: r.labels,
+    ),
+    "Manifold": (
+        lambda: ns.manifold(SADDLE, ns.find_pseudo_equilibrium(SADDLE, [0.1, 0.0]), length=1.0),
+        lambda r: r.arcs[0].points,
+    ),
+}
+
+
+@pytest.mark.parametrize("kind", RESULTS)
+def test_a_copy_says_and_computes_the_same(kind):
+    make, question = RESULTS[kind]
+    result = make()
+    assert type(result).__name__ == kind
+    for again in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
+        assert np.array_equal(question(again), question(result))
+        assert repr(again) == repr(result) or kind == "FixedItinerary"

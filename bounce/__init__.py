@@ -41,7 +41,9 @@ from .maps.dividing import DividingCurve, critical_eta, dividing_curve
 from .maps.dividing_surface import DividingSurface, dividing_surface
 from .maps.lift_offs import lift_off
 from .maps.outcomes import OutcomeMap, outcome_map
+from .maps.proven import ProvenMap, proven_map
 from .maps.results import BounceStatus, LiftOffs
+from .shot.certify import BounceProof, certify
 from .shot.sensitivity import Sensitivity, sensitivity
 from .shot.single import Shot, State, simulate
 from .units import BALLS, Ball, Landing, Scaling
@@ -52,6 +54,7 @@ if TYPE_CHECKING:
 __all__ = [
     "BALLS",
     "Ball",
+    "BounceProof",
     "BounceStatus",
     "ContactModel",
     "Coulomb",
@@ -76,6 +79,7 @@ __all__ = [
     "ModelError",
     "NormalKelvinVoigt",
     "OutcomeMap",
+    "ProvenMap",
     "Scaling",
     "Sensitivity",
     "Shot",
@@ -84,6 +88,7 @@ __all__ = [
     "Tsuji",
     "UnknownNameError",
     "Viscous",
+    "certify",
     "critical_eta",
     "dividing_curve",
     "dividing_surface",
@@ -92,6 +97,7 @@ __all__ = [
     "lift_off",
     "outcome_map",
     "plot",
+    "proven_map",
     "sensitivity",
     "simulate",
 ]

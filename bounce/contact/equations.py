@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol
 
@@ -150,8 +150,10 @@ class Equations:
         old, new = [self._sign, self._slip], [ca.SX(sign), sign * self.contact_speed]
         return ca.substitute(self.field(self.friction_force), old, new)
 
-    def build(self, defaults: Mapping[str, float] | None = None) -> ns.FilippovSystem:
-        """Return the Filippov system of the contact phase."""
+    def build(
+        self, defaults: Mapping[str, float] | None = None, further: Sequence[ns.Stop] = ()
+    ) -> ns.FilippovSystem:
+        """Return the Filippov system of the contact phase, with further stops."""
         definition: dict[str, Any]
         field = self.field(self.friction_force)
         if ca.depends_on(ca.vertcat(*field), self._slip):
@@ -162,7 +164,7 @@ class Equations:
             list(self.x.values()),
             surface=self.contact_speed,
             parameters=self._defaults(defaults),
-            stops=self._ends(),
+            stops=[*self._ends(), *further],
             **definition,
         )
 

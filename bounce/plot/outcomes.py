@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -117,7 +118,7 @@ def outcome_map(
         else:
             _field(figure, ax, outcomes, quantity)
         if curve is not None:
-            _curve(ax, outcomes, curve)
+            draw_curve(ax, outcomes.names, curve)
         else:
             _contour(ax, outcomes)
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
@@ -207,10 +208,11 @@ def _contour(ax: Axes, outcomes: OutcomeMap) -> None:
         ax.contour(*_axes(outcomes), sign, levels=[0.0], colors="black", linewidths=1.6)
 
 
-def _curve(ax: Axes, outcomes: OutcomeMap, curve: DividingCurve) -> None:
+def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> None:
+    """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``."""
     from matplotlib.legend import Legend
 
-    order = [("xdot", "omega").index(name) for name in outcomes.names]
+    order = [("xdot", "omega").index(name) for name in names]
     styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
     lines: dict[str, Any] = {}
     for arc in (*curve.arcs, *curve.reverse):

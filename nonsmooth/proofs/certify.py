@@ -9,8 +9,7 @@ from typing import Any
 from ..local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ..model import FilippovSystem, OptionError, explain, real, whole
 from .arithmetic import Numbers, precision, radius
-from .decimals import enclosure, inner
-from .described import enclosed
+from .decimals import enclosure, given, inner
 from .equations import Equations
 from .flint import arb
 from .krawczyk import Zero, prove_zero
@@ -176,7 +175,7 @@ def _wide(subject: Subject) -> bool:
 
 def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits: int) -> Proof:
     kind, names = subject.question.kind, subject.parameter_names
-    ranges = [enclosure(v) for v in enclosed(subject.parameters)]
+    ranges = [given(*pair) for pair in subject.parameters]
     parameters = dict(zip(names, ranges, strict=True))
     condition = f"For {intervals(parameters)}: " if parameters else ""
     if best is None:
@@ -243,11 +242,7 @@ def _where(subject: Subject) -> str:
     described = subject.question.described
     free = {i for vector, i in subject.unknowns if vector == 0}
     names = [*described.system.state_names, "t"]
-    held = [
-        f"{names[i]} = {enclosure(enclosed([(v, v)])[0])}"
-        for i, v in enumerate(subject.values)
-        if i not in free
-    ]
+    held = [f"{names[i]} = {given(v, v)}" for i, v in enumerate(subject.values) if i not in free]
     text = f" with {', '.join(held)}" if held else ""
     if subject.normals:
         text += (
@@ -260,7 +255,7 @@ def _where(subject: Subject) -> str:
 def _together(subject: Subject, pieces: list[Proof]) -> Proof:
     """One statement of all pieces."""
     kind, names = subject.question.kind, subject.parameter_names
-    whole_range = [enclosure(v) for v in enclosed(subject.parameters)]
+    whole_range = [given(*pair) for pair in subject.parameters]
     parameters = dict(zip(names, whole_range, strict=True))
     proven = all(p.proven for p in pieces)
     exists = all(p.exists for p in pieces)

@@ -24,6 +24,8 @@ class Described:
     surface : int
     mode : str, optional
         The sides of the other surfaces, one letter for each surface.
+    moving : sequence of int, optional
+        Parameters that are taken as further states that do not change.
 
     Attributes
     ----------
@@ -35,14 +37,23 @@ class Described:
         F1 and F2, the rate of time included.
     """
 
-    def __init__(self, system: FilippovSystem, surface: int = 0, mode: str | None = None):
+    def __init__(
+        self,
+        system: FilippovSystem,
+        surface: int = 0,
+        mode: str | None = None,
+        moving: Sequence[int] = (),
+    ):
         self.system, self.surface = system, system.surface_index(surface)
         self.tape = tape = Tape()
         d = system.definition
         n = d.states.numel()
-        self.x = [tape.symbol(0, i) for i in range(system.extended_dimension)]
+        count = system.extended_dimension
+        self.x = [tape.symbol(0, i) for i in range(count + len(moving))]
         self.p = [tape.symbol(1, i) for i in range(d.parameters.numel())]
-        self._places = [self.x[:n], self.x[n:], self.p]
+        for k, i in enumerate(moving):
+            self.p[i] = self.x[count + k]
+        self._places = [self.x[:n], self.x[n:count], self.p]
         self._symbols = [d.states, d.time, d.parameters]
         ((self.h,),) = self.insert([d.surfaces[self.surface]])
         self.fields = tuple(self._field(s) for s in self._sides(mode))
@@ -68,7 +79,8 @@ class Described:
         (rows,) = tape.insert(
             [d.field], [*self._symbols, d.multipliers, d.reactions], [*self._places, *values]
         )
-        return [*rows, *(tape.constant(1) for _ in range(d.time.numel()))]
+        more = len(self.x) - self.system.extended_dimension
+        return [*rows, *[tape.constant(1)] * d.time.numel(), *[tape.constant(0)] * more]
 
     def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
         """Write expressions in states, time and parameters onto the tape."""
@@ -92,32 +104,33 @@ class Described:
         """L11, L12, L21, L22 with L_ij = F_i . grad L_j."""
         return [self.lie_derivative(i, self.lie[j]) for i in (0, 1) for j in (0, 1)]
 
-    def parameters(
-        self, given: Mapping[Any, Range] | None, numbers: Numbers
-    ) -> list[tuple[Any, Any]]:
-        """Ends of the intervals of all parameters, as exact fractions.
 
-        Raises
-        ------
-        ParameterError
-            An unknown or missing parameter, an interval that is empty or not finite.
-        """
-        intervals: dict[str, tuple[Any, Any]] = {}
-        for key, value in (given or {}).items():
-            name = key if isinstance(key, str) else str(key)
-            ends = value if isinstance(value, (tuple, list)) else (value, value)
-            if len(ends) != 2:
-                raise ParameterError(_interval(name, value))
-            low, high = (exact(v, numbers, f"parameter {name!r}") for v in ends)
-            if low > high:
-                raise ParameterError(_interval(name, value))
-            intervals[name] = low, high
-        point = self.system.parameter_vector(
-            {name: float((low + high) / 2) for name, (low, high) in intervals.items()}
-        )
-        names = self.system.parameter_names
-        defaults = [exact(float(v), numbers) for v in point]
-        return [intervals.get(k, (v, v)) for k, v in zip(names, defaults, strict=True)]
+def parameter_ranges(
+    system: FilippovSystem, given: Mapping[Any, Range] | None, numbers: Numbers
+) -> list[tuple[Any, Any]]:
+    """Ends of the intervals of all parameters, as exact fractions.
+
+    Raises
+    ------
+    ParameterError
+        An unknown or missing parameter, an interval that is empty or not finite.
+    """
+    intervals: dict[str, tuple[Any, Any]] = {}
+    for key, value in (given or {}).items():
+        name = key if isinstance(key, str) else str(key)
+        ends = value if isinstance(value, (tuple, list)) else (value, value)
+        if len(ends) != 2:
+            raise ParameterError(_interval(name, value))
+        low, high = (exact(v, numbers, f"parameter {name!r}") for v in ends)
+        if low > high:
+            raise ParameterError(_interval(name, value))
+        intervals[name] = low, high
+    point = system.parameter_vector(
+        {name: float((low + high) / 2) for name, (low, high) in intervals.items()}
+    )
+    names = system.parameter_names
+    defaults = [exact(float(v), numbers) for v in point]
+    return [intervals.get(k, (v, v)) for k, v in zip(names, defaults, strict=True)]
 
 
 def _interval(name: str, value: Any) -> str:

@@ -14,7 +14,7 @@ from .arithmetic import Numbers, enclose, exact, precision
 from .batch import Floats, of_fractions
 from .census import Census, Undecided
 from .certify import prove_subject
-from .described import Described
+from .described import Described, parameter_ranges
 from .enclosure import Enclosure
 from .flint import arb
 from .proof import Proof, paragraph
@@ -167,7 +167,7 @@ def _subject(
         values,
         [],
         [Fraction(0)] * len(free),
-        question.described.parameters(parameters, numbers),
+        parameter_ranges(system, parameters, numbers),
         numbers,
     )
 

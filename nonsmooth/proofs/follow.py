@@ -16,9 +16,9 @@ from .arithmetic import hull, radius, sign
 from .equations import column, entries
 from .flint import arb, arb_mat, ctx
 from .krawczyk import identity
-from .modes import Mode, Modes, Watch
+from .modes import Mode, Modes, Watch, beyond
 from .proof import UnprovenError
-from .roots import Polynomial, UnsureError, first_zero
+from .roots import Polynomial, UnsureError, first_zero, narrowed
 from .series import horner
 from .steps import Step, at, growth, orthogonal
 
@@ -86,7 +86,7 @@ class Follower:
         if sign(h):
             return "+" if h > 0 else "-", 0
         if h.is_zero():
-            found = _beyond(l1, l2)
+            found = beyond(l1, l2)
             if found:
                 return found
         raise UnprovenError(
@@ -179,6 +179,8 @@ class Follower:
                 f"steps become too small at t = {float(self.t.mid()):.9g} (a singularity is near)"
             )
         guards = mode.watched_series(c, self.p)
+        if wide > 0:
+            guards = mode.narrowed(guards, self.middle, (self.frame, self.r), self.p)
         return Step(h, natural, tube, x, c, top, guards, mode.watched_series(top, self.p))
 
     def _tube(self, x: list[arb], h: float) -> list[arb] | None:
@@ -207,19 +209,52 @@ class Follower:
             if t is not None:
                 hits.append((t, k))
         hits.sort(key=lambda hit: float(hit[0].upper()))
-        first = hits[0] if hits else None
-        if first is not None and float(first[0].upper()) < unsure:
-            late = [name for t, name in hits[1:] if not first[0] < t]
-            if late:
-                names = [self.now.watches[k].name for k in (first[1], *late)]
-                raise UnprovenError(
-                    f"which comes first is undecided: {', '.join(names)} at t = "
-                    f"{float((self.t + first[0]).mid()):.9g}"
-                )
-            return first[1], first[0]
+        if hits and float(hits[0][0].upper()) < unsure:
+            return self._earliest(made, hits)
         if unsure < float("inf"):
             raise UnsureError(unsure)
         return None
+
+    def _earliest(self, made: Step, hits: list[tuple[arb, int]]) -> tuple[int, arb]:
+        """The first of the zeros; of zeros that may be at once only one may mean anything."""
+        time, k = hits[0]
+        together = [hits[0], *((t, j) for t, j in hits[1:] if not time < t)]
+        if len(together) == 1:
+            return k, time
+        counting = [(t, j) for t, j in together if self._counts(j)]
+        if len(counting) == 1 and self.now.watches[counting[0][1]].kind == "stop":
+            return counting[0][1], counting[0][0]
+        for t, j in counting:
+            others = [hit for hit in together if hit[1] != j]
+            if all(self._comes_before(made, (j, t), other) for other in others):
+                return j, t
+        names = ", ".join(self.now.watches[j].name for _, j in together)
+        when = float((self.t + time).mid())
+        raise UnprovenError(f"which comes first is undecided: {names} at t = {when:.9g}")
+
+    def _comes_before(self, made: Step, hit: tuple[int, arb], other: tuple[arb, int]) -> bool:
+        """Whether every orbit meets one event while another guard, which only falls, is positive."""
+        t, j = other
+        f = self._polynomial(made, j, self.now.watches[j])
+        if not f.slope(hull(hit[1], t)) < 0:
+            return False
+        image, derivative = self._at_event(made, hit)
+        move = (derivative * self.frame) * self.r
+        around = [v + w for v, w in zip(image, entries(move), strict=True)]
+        row = self.now.slope(j, around, self.p)
+        value = self.now.watched(image, self.p)[j] + (arb_mat([row]) * move)[0, 0]
+        tied = ((arb_mat([row]) * (derivative * self.frame)) * self.r)[0, 0]
+        value = value.intersection(self.now.watched(image, self.p)[j] + tied)
+        watch = self.now.watches[j]
+        falling = watch.kind not in ("stop", "reset") or self.signs[j - self._first()] > 0
+        return bool((value if falling else -value) > 0)
+
+    def _counts(self, k: int) -> bool:
+        """Whether a zero of a guard is an event: stops and resets have a direction."""
+        watch = self.now.watches[k]
+        if watch.kind not in ("stop", "reset"):
+            return True
+        return watch.direction * -self.signs[k - self._first()] >= 0
 
     def _polynomial(self, made: Step, k: int, watch: Watch) -> Polynomial:
         c, top = made.guards[k][:-1], made.guard_tops[k][-1]
@@ -232,17 +267,21 @@ class Follower:
         time = arb(made.h) if hit is None else hit[1]
         if hit is None and (t_end - self.t) <= made.h:
             time = t_end - self.t  # the end itself, also where it is no double
-        c = mode.series(self.middle, self.p, self.order + 2)
-        derivative = self._derivative(made, time)
         if hit is None:
-            image = at(c, made.top, time)
+            c = mode.series(self.middle, self.p, self.order + 2)
+            image, derivative = at(c, made.top, time), self._derivative(made, time)
         else:
-            own = self._own_time(c, made, hit)
-            image = at(c, made.top, own)
-            derivative = self._return_map(made, hit[0], time, derivative)
+            image, derivative = self._at_event(made, hit)
         self._moved(image, derivative)
         self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
         return None if hit is None else self._serve(mode.watches[hit[0]], hit[0])
+
+    def _at_event(self, made: Step, hit: tuple[int, arb]) -> tuple[list[arb], arb_mat]:
+        """Where the middle meets an event, and the derivative of the return map there."""
+        c = self.now.series(self.middle, self.p, self.order + 2)
+        image = at(c, made.top, self._own_time(c, made, hit))
+        derivative = self._derivative(made, hit[1])
+        return image, self._return_map(made, hit[0], hit[1], derivative)
 
     def _derivative(self, made: Step, time: arb) -> arb_mat:
         """Derivatives of the flow to times in ``time``, for all states of the set."""
@@ -263,17 +302,7 @@ class Follower:
         """The event's time of the middle alone, narrower than that of the whole set."""
         k, time = hit
         g = self.now.watched_series(c, self.p)[k]
-        f = Polynomial(g[:-1], made.guard_tops[k][-1])
-        for _ in range(60):
-            m = time.mid()
-            slope = f.slope(time)
-            if slope.contains(0) or not slope.is_finite():
-                break
-            new = (m - f.value(m) / slope).intersection(time)
-            if not new.is_finite() or radius(new) > 0.9 * radius(time):
-                break
-            time = new
-        return time
+        return narrowed(Polynomial(g[:-1], made.guard_tops[k][-1]), time)
 
     def _return_map(self, made: Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
         """(1 - f grad g/(grad g . f)) D where the event is met."""
@@ -302,7 +331,7 @@ class Follower:
                     "other field's sign is undecided (a two-fold?)"
                 )
         else:
-            found = _beyond(l1, l2)
+            found = beyond(l1, l2)
             if found is None:
                 raise UnprovenError(
                     f"surface at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so what "
@@ -318,9 +347,9 @@ class Follower:
     def _end(self, watch: Watch, k: int, x: list[arb]) -> Met | None:
         """A stop or a reset was met; it counts if its direction does."""
         place = k - self._first()
-        falling = self.signs[place] > 0
+        counts = self._counts(k)
         self.signs[place] = -self.signs[place]
-        if watch.direction * (-1 if falling else 1) < 0:
+        if not counts:
             self.zeros[k] = 1
             return None
         before = self.mode
@@ -354,15 +383,6 @@ class Follower:
             if at_zero:
                 self.zeros[k] = 1
         return Met(watch, "reset", met.t, new, met.before, self.mode)
-
-
-def _beyond(l1: arb, l2: arb) -> tuple[str, int] | None:
-    """The mode beyond a point of the surface, and how many coefficients of h are zero in it."""
-    if l1 < 0 and l2 > 0:
-        return "s", 0
-    if l1 > 0 and l2 > 0:
-        return "+", 1
-    return ("-", 1) if l1 < 0 and l2 < 0 else None
 
 
 def _not_transversal(follower: Follower) -> arb_mat:

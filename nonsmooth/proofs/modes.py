@@ -71,6 +71,14 @@ class Mode:
         moving = tape.ancestors(k for row in rows for k in row)
         places = [tape.nodes[k].payload for k in moving if tape.nodes[k].op == "input"]
         self.affine = all(place[0] == 1 for place in places)  # type: ignore[index]
+        rows = [tape.gradient(k, x) for k in nodes]
+        self.affine_watches = [
+            all(
+                tape.nodes[a].op != "input" or tape.nodes[a].place[0] == 1
+                for a in tape.ancestors(row)
+            )
+            for row in rows
+        ]
 
     def _values(self, program: Program, x: Sequence[arb], p: Sequence[arb]) -> list[list[arb]]:
         return program(Enclosures([x, p, []], self.numbers))
@@ -103,6 +111,34 @@ class Mode:
             rate = matrix * rate / k
         return result
 
+    def narrowed(
+        self,
+        wide: list[list[arb]],
+        middle: Sequence[arb],
+        spread: tuple[arb_mat, arb_mat],
+        p: Sequence[arb],
+    ) -> list[list[arb]]:
+        """Taylor coefficients of affine functions along an affine motion, from middle + frame r.
+
+        They are affine in the start: those of the middle plus row A^k/k! frame r, in which the
+        states keep what ties them together.
+        """
+        if not self.affine:
+            return wide
+        frame, r = spread
+        own = self.watched_series(self.series(middle, p, len(wide[0])), p)
+        rows = self._values(self._slopes, middle, p)
+        matrix, power = self.jacobian(middle, p), frame
+        result = [list(c) for c in wide]
+        for k in range(len(wide[0]) - 1):  # the last one is the remainder's
+            for i, row in enumerate(rows):
+                if self.affine_watches[i]:
+                    value = own[i][k] + ((arb_mat([row]) * power) * r)[0, 0]
+                    if value.is_finite() and value.overlaps(wide[i][k]):
+                        result[i][k] = value.intersection(wide[i][k])
+            power = matrix * power / (k + 1)
+        return result
+
     def watched_series(self, c: Sequence[Sequence[arb]], p: Sequence[arb]) -> list[list[arb]]:
         """Taylor coefficients of the watched functions along a motion."""
         return along(self._watched, c, p, self.numbers)[0]
@@ -132,12 +168,14 @@ class Modes:
     system : FilippovSystem
         With one surface, without impacts.
     numbers : {"stored", "written"}
+    moving : sequence of int
+        Parameters with intervals, which are followed as states: what depends on them stays so.
     """
 
-    def __init__(self, system: FilippovSystem, numbers: Numbers):
+    def __init__(self, system: FilippovSystem, numbers: Numbers, moving: Sequence[int] = ()):
         _require_supported(system)
         self.system, self.numbers = system, numbers
-        self.described = Described(system)
+        self.described = Described(system, moving=moving)
         self.tape = self.described.tape
         self._ends = self._stops_and_resets()
         self._modes: dict[str, Mode] = {}
@@ -209,12 +247,21 @@ class Modes:
         d = self.described
         guard = d.system.definition.guards[self._ends.index(of)]
         n = d.system.dimension
-        values = [list(watch.map[:n]), list(watch.map[n:]), d.p]
+        values = [list(watch.map[:n]), list(watch.map[n : d.system.extended_dimension]), d.p]
         definition = d.system.definition
         ((node,),) = self.tape.insert(
             [guard], [definition.states, definition.time, definition.parameters], values
         )
         return bool(node == of.node)
+
+
+def beyond(l1: arb, l2: arb) -> tuple[str, int] | None:
+    """The mode beyond a point of the surface, and how many coefficients of h are zero in it."""
+    if l1 < 0 and l2 > 0:
+        return "s", 0
+    if l1 > 0 and l2 > 0:
+        return "+", 1
+    return ("-", 1) if l1 < 0 and l2 < 0 else None
 
 
 def _require_supported(system: Any) -> None:

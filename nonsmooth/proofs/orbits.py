@@ -3,17 +3,26 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Any
+from fractions import Fraction
+from typing import Any, NamedTuple
 
 from ..model import FilippovSystem, OptionError, PointError, explain, require_system, whole
 from .arithmetic import Numbers, exact, precision
-from .decimals import enclosure
-from .described import enclosed
+from .decimals import enclosure, given
+from .described import enclosed, parameter_ranges
+from .enclosure import Enclosure
 from .flint import arb, ctx
 from .follow import Follower, Met
 from .modes import Modes
 from .orbit_proof import OrbitProof, ProvenEvent
 from .proof import UnprovenError
+
+
+class Begin(NamedTuple):
+    """Where orbits start, and their parameters, as exact intervals."""
+
+    start: list[tuple[Fraction, Fraction]]
+    ranges: list[tuple[Fraction, Fraction]]
 
 
 def certify_orbit(
@@ -82,17 +91,18 @@ def certify_orbit(
     whole(bits, "bits", least=32)
     whole(max_bits, "max_bits", least=32)
     whole(max_steps, "max_steps")
-    modes = Modes(system, numbers)
     start = _read_start(system, x0, numbers)
     if system.time_dependent:
         t = exact(t0, numbers, "t0")
         start.append((t, t))
-    ranges = modes.described.parameters(parameters, numbers)
+    ranges = parameter_ranges(system, parameters, numbers)
+    moving = [i for i, (a, b) in enumerate(ranges) if a < b]
+    modes = Modes(system, numbers, moving)
     points = all(a == b for a, b in (*start, *ranges))
     while True:
         with precision(bits):
-            x, p, end = enclosed(start), enclosed(ranges), enclosed([(duration, duration)])[0]
-            result = _run(modes, x, p, end, max_steps)
+            end = enclosed([(duration, duration)])[0]
+            result = _run(modes, Begin(start, ranges), end, max_steps)
         if result.proven or not points or 2 * bits > max_bits:
             return result
         bits *= 2
@@ -100,10 +110,10 @@ def certify_orbit(
 
 def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> list[Any]:
     try:
-        given = list(x0)
+        values = list(x0)
     except TypeError:
-        given = []
-    if len(given) != system.dimension:
+        values = []
+    if len(values) != system.dimension:
         raise PointError(
             explain(
                 "x0",
@@ -113,7 +123,7 @@ def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> 
             )
         )
     result = []
-    for name, value in zip(system.state_names, given, strict=True):
+    for name, value in zip(system.state_names, values, strict=True):
         ends = list(value) if isinstance(value, (tuple, list)) else [value, value]
         fractions = [exact(v, numbers, f"start of {name!r}") for v in ends]
         if len(fractions) != 2 or fractions[0] > fractions[1]:
@@ -129,48 +139,50 @@ def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> 
     return result
 
 
-def _run(modes: Modes, x: list[arb], p: list[arb], t_end: arb, max_steps: int) -> OrbitProof:
+def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> OrbitProof:
     """Follow until the end, a stop, or something undecided."""
     follower, why, status = None, "", ""
+    moving = [r for r in begin.ranges if r[0] < r[1]]
+    x = enclosed([*begin.start, *moving])
     try:
-        follower = Follower(modes, x, p, order=max(12, int(ctx.prec * 0.3)))
+        order = max(12, int(ctx.prec * 0.3))
+        follower = Follower(modes, x, enclosed(begin.ranges), order=order)
         follower.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
-        itinerary = [follower.mode]
         while not status:
             if follower.steps >= max_steps:
                 raise UnprovenError(f"more than {max_steps} steps")
             met = follower.step(t_end)
             if met is not None and met.kind == "stop":
                 status = met.watch.name
-            elif met is not None:
-                itinerary.append(met.after)
-            elif not (t_end - follower.t) > 0:
+            elif met is None and not (t_end - follower.t) > 0:
                 status = "end"
     except UnprovenError as error:
         why = str(error)
     except KeyboardInterrupt:
         why = "interrupted"
-    return _result(modes, follower, x, p, status, why)
+    return _result(modes, follower, begin, x, status, why)
 
 
 def _result(
-    modes: Modes, follower: Follower | None, x: list[arb], p: list[arb], status: str, why: str
+    modes: Modes, follower: Follower | None, begin: Begin, x: list[arb], status: str, why: str
 ) -> OrbitProof:
     system = modes.system
     names = (*system.state_names, *(("t",) if system.time_dependent else ()))
-    named = lambda values: dict(zip(names, map(enclosure, values), strict=True))
-    events = tuple(_event(e, named) for e in follower.events) if follower else ()
-    itinerary = [follower.events[0].before if events else follower.mode] if follower else []
-    itinerary += [e.after for e in (follower.events if follower else []) if e.kind != "stop"]
+    # Parameters that were followed as states are left out.
+    named = lambda values: dict(zip(names, map(enclosure, values), strict=False))
+    events = follower.events if follower else []
+    itinerary = [events[0].before if events else follower.mode] if follower else []
+    itinerary += [e.after for e in events if e.kind != "stop"]
+    ranges = [given(*pair) for pair in begin.ranges]
     return OrbitProof(
         proven=bool(status),
         status=status or "undecided",
         why=why,
         itinerary=" ".join(itinerary),
-        events=events,
-        start=named(x),
-        parameters=dict(zip(system.parameter_names, map(enclosure, p), strict=True)),
-        t=enclosure(follower.t) if follower else enclosure(arb(0)),
+        events=tuple(_event(e, named) for e in events),
+        start=dict(zip(names, (given(*pair) for pair in begin.start), strict=True)),
+        parameters=dict(zip(system.parameter_names, ranges, strict=True)),
+        t=enclosure(follower.t) if follower else Enclosure("0", "0"),
         end=named(follower.hull() if follower else x),
         steps=follower.steps if follower else 0,
         bits=int(ctx.prec),

@@ -99,7 +99,7 @@ def _falling(f: Polynomial, a: float, b: float, h: float) -> arb | None:
         if not f.slope(t) < 0:
             return None
         if f.value(arb(b)) < 0:
-            return _narrowed(f, t)
+            return narrowed(f, t)
         if f.value(arb(b)) > 0 or b >= h:
             return None
         width *= 2
@@ -107,11 +107,13 @@ def _falling(f: Polynomial, a: float, b: float, h: float) -> arb | None:
     return None
 
 
-def _narrowed(f: Polynomial, t: arb) -> arb:
+def narrowed(f: Polynomial, t: arb) -> arb:
     """Interval Newton: m - f(m)/f'(T) holds the zero of every function enclosed."""
     for _ in range(60):
-        m = t.mid()
-        new = (m - f.value(m) / f.slope(t)).intersection(t)
+        m, slope = t.mid(), f.slope(t)
+        if slope.contains(0):
+            break
+        new = (m - f.value(m) / slope).intersection(t)
         if not new.is_finite() or radius(new) > 0.9 * radius(t):
             break
         t = new

@@ -13,7 +13,7 @@ from ..local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ..local.search import unknowns
 from ..model import FilippovSystem, OptionError, explain
 from .arithmetic import Numbers, exact
-from .described import Described, enclosed
+from .described import Described, enclosed, parameter_ranges
 from .equations import Equations, plane
 from .flint import arb
 from .questions import QUESTIONS, Question
@@ -102,7 +102,7 @@ def subject_of(
     point += [float(getattr(found, "t", 0.0))] if system.time_dependent else []
     free = unknowns(system, hold, 1, kind)
     extra = [1 - 2 * found.alpha] if isinstance(found, PseudoEquilibrium) else []
-    normals = _across(question, point, free, described.parameters(given, numbers), numbers)
+    normals = _across(question, point, free, parameter_ranges(system, given, numbers), numbers)
     return Subject(
         question,
         [point[i] for i in free] + extra,
@@ -111,7 +111,7 @@ def subject_of(
         [exact(v, numbers) for v in point],
         normals,
         [exact(point[i], numbers) for i in free],
-        described.parameters(given, numbers),
+        parameter_ranges(system, given, numbers),
         numbers,
     )
 

@@ -1,0 +1,159 @@
+"""Which landings are proven to lift off forward, and which in reverse: a map of theorems."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..contact.model import ContactModel
+from ..errors import LandingError
+from ..shot.certify import certify
+
+#: Outcomes by number, as in ``ProvenMap.outcome``.
+OUTCOMES = ("undecided", "forward", "reverse", "rolling")
+
+
+@dataclass(frozen=True, eq=False)
+class ProvenMap:
+    """Boxes of landings with what is proven about all bounces from each.
+
+    Attributes
+    ----------
+    model : ContactModel
+    ydot : float
+    boxes : ndarray (m, 4)
+        xdot low, xdot high, omega low, omega high.
+    outcome : ndarray of int (m,)
+        Index in ``OUTCOMES``.
+    itinerary : tuple of str
+        Proven phases, ``""`` where undecided.
+    interrupted : bool
+        Whether Ctrl-C ended it before its time; the rest is undecided.
+    """
+
+    model: ContactModel
+    ydot: float
+    boxes: NDArray[np.float64]
+    outcome: NDArray[np.int64]
+    itinerary: tuple[str, ...]
+    interrupted: bool = False
+
+    @property
+    def area(self) -> dict[str, float]:
+        """Share of the map's area by outcome."""
+        sizes = (self.boxes[:, 1] - self.boxes[:, 0]) * (self.boxes[:, 3] - self.boxes[:, 2])
+        return {
+            name: float(sizes[self.outcome == k].sum() / sizes.sum())
+            for k, name in enumerate(OUTCOMES)
+        }
+
+    def at(self, xdot: float, omega: float) -> str:
+        """Outcome proven for a landing of the map.
+
+        Raises
+        ------
+        LandingError
+            It is not on the map.
+        """
+        b = self.boxes
+        on = (b[:, 0] <= xdot) & (xdot <= b[:, 1]) & (b[:, 2] <= omega) & (omega <= b[:, 3])
+        if not on.any():
+            raise LandingError(f"landing: expected one of the map, received ({xdot}, {omega}).")
+        return OUTCOMES[int(self.outcome[on].max())]
+
+
+@dataclass
+class _Growing:
+    boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
+    outcome: list[int] = field(default_factory=list)
+    itinerary: list[str] = field(default_factory=list)
+
+    def add(self, box: tuple[float, float, float, float], outcome: str, itinerary: str) -> None:
+        self.boxes.append(box)
+        self.outcome.append(OUTCOMES.index(outcome))
+        self.itinerary.append(itinerary)
+
+
+def proven_map(
+    model: ContactModel,
+    xdot: tuple[float, float],
+    omega: tuple[float, float],
+    *,
+    ydot: float = -1.0,
+    parameters: Mapping[str, Any] | None = None,
+    depth: int = 6,
+    **options: Any,
+) -> ProvenMap:
+    """Divide a rectangle of landings until each piece is proven to lift off one way, or is small.
+
+    Parameters
+    ----------
+    model : ContactModel
+    xdot, omega : (float, float)
+        Ranges of the landing's speed and spin.
+    ydot : float, optional
+    parameters : mapping, optional
+        As in :func:`certify`.
+    depth : int, optional
+        How often a piece may be quartered; a piece may take 0.1 s.
+    **options
+        As in :func:`certify`.
+
+    Returns
+    -------
+    ProvenMap
+        Ctrl-C returns what was proven so far.
+
+    Raises
+    ------
+    LandingError, ModelError, nonsmooth.MissingError, nonsmooth.OptionError
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> found = bounce.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
+    >>> found.at(0.105, 1.01)
+    'forward'
+    """
+    ranges = [*_range(xdot, "xdot"), *_range(omega, "omega")]
+    todo = [((ranges[0], ranges[1], ranges[2], ranges[3]), 0)]
+    found, interrupted = _Growing(), False
+    while todo:
+        box, level = todo.pop()
+        try:
+            a, b, c, d = box
+            proof = certify(model, (a, b), ydot, (c, d), parameters=parameters, **options)
+        except KeyboardInterrupt:
+            interrupted = True
+            for rest, _ in [*todo, (box, level)]:
+                found.add(rest, "undecided", "")
+            break
+        if proof.proven or level >= depth:
+            found.add(box, proof.outcome, proof.itinerary if proof.proven else "")
+        else:
+            todo += [(part, level + 1) for part in _quarters(box)]
+    boxes, outcome = np.array(found.boxes), np.array(found.outcome)
+    return ProvenMap(model, float(ydot), boxes, outcome, tuple(found.itinerary), interrupted)
+
+
+def _range(value: Any, name: str) -> tuple[float, float]:
+    try:
+        low, high = (float(v) for v in value)
+    except (TypeError, ValueError):
+        low = high = float("nan")
+    if not (np.isfinite([low, high]).all() and low < high):
+        raise LandingError(f"{name}: expected (low, high) with low < high, received {value!r}.")
+    return low, high
+
+
+def _quarters(
+    box: tuple[float, float, float, float],
+) -> list[tuple[float, float, float, float]]:
+    a, b, c, d = box
+    m, n = 0.5 * (a + b), 0.5 * (c + d)
+    return [(a, m, c, n), (m, b, c, n), (a, m, n, d), (m, b, n, d)]

@@ -9,9 +9,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..flow.status import Status
 from ..flow.trajectory import Trajectory
 from ..model import (
     Array,
+    DegenerateError,
     FilippovSystem,
     OptionError,
     ParameterError,
@@ -298,6 +300,12 @@ def _require_run(run: Trajectory) -> Trajectory:
         raise OptionError(
             f"run: expected a motion, received one without a step ({run.message}) "
             "Give a start from which the run moves."
+        )
+    if run.status not in (Status.REACHED_END, Status.STOPPED):
+        raise DegenerateError(
+            f"run: expected one that came to its end or to a stop, received {run.status} at "
+            f"t = {run.t[-1]:.6g}: {run.message} Its end is not a smooth function of its start: end the "
+            "run before."
         )
     return run
 

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import math
+from functools import partial
 
 import casadi as ca
+import mpmath as mp
 import numpy as np
 import pytest
 
@@ -273,6 +275,60 @@ def test_an_orbit_that_slides_all_the_time() -> None:
     assert orbit.itinerary == "s" and orbit.period == pytest.approx(2 * math.pi, rel=1e-13)
     assert abs(orbit.start[2]) < 1e-15
     assert agree(orbit.multipliers, [1, math.exp(-4 * math.pi), 0])
+
+
+def test_an_orbit_that_rests_on_a_shaken_table() -> None:
+    y, v, t, A = (ca.SX.sym(s) for s in "yvtA")
+    system = ns.FilippovSystem(
+        [y, v],
+        field=[v, -1],
+        impacts=ns.Impact(y - A * ca.sin(t), restitution=0.0),
+        time=t,
+        parameters={A: 1.5},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [2.0, 0.0], 30))
+    assert orbit.multipliers.tolist() == [0, 0] and orbit.period == pytest.approx(2 * math.pi)
+    flight = next(leg for leg in orbit.legs if leg.mode == "o")
+    assert 1.5 * math.sin(flight.t) == pytest.approx(1.0, rel=1e-13)  # where the table falls freely
+    assert flight.start == pytest.approx([1.0, 1.5 * math.cos(flight.t)], rel=1e-12)
+
+
+def test_multipliers_agree_with_the_return_map_in_forty_digits() -> None:
+    rng = np.random.default_rng(3)
+    for _ in range(3):
+        a, b, k = (
+            0.8 + 0.05 * rng.uniform(-1, 1),
+            0.5 + 0.05 * rng.uniform(-1, 1),
+            5 + rng.uniform(),
+        )
+        T, S = ca.SX.sym("T"), ca.SX.sym("S")
+        system = ns.FilippovSystem(
+            [T, S],
+            surface=S - a * T + 0.01,
+            above=[1 - (1 + k) * T, b * (1 - S) - k * S],
+            below=[1 - T, b * (1 - S)],
+        )
+        orbit = ns.periodic_orbit(system, [0.4, 0.3])
+        (x0,) = [leg.start[0] for leg in orbit.legs if leg.mode == "+"]
+        with mp.workdps(40):
+            slope = mp.diff(partial(_returned, a=a, b=b, k=k, orbit=orbit), x0)
+        assert abs(orbit.multipliers[1] - float(slope)) < 1e-12
+
+
+def _returned(T0, a, b, k, orbit):
+    """T after one turn of the box from T0 on the surface, by closed-form phases."""
+    S0 = a * T0 - mp.mpf("0.01")
+    for mode, mixing in (("+", mp.mpf(k)), ("-", mp.mpf(0))):
+        guess = next(leg.duration for leg in orbit.legs if leg.mode == mode)
+        rest = 1 / (1 + mixing), b / (b + mixing)
+
+        def phase(t, T0=T0, S0=S0, mixing=mixing, rest=rest):
+            T = rest[0] + (T0 - rest[0]) * mp.exp(-(1 + mixing) * t)
+            return T, rest[1] + (S0 - rest[1]) * mp.exp(-(b + mixing) * t)
+
+        t = mp.findroot(lambda t: phase(t)[1] - a * phase(t)[0] + mp.mpf("0.01"), guess)
+        T0, S0 = phase(t)
+    return T0
 
 
 # Bad input ---------------------------------------------------------------------------------------

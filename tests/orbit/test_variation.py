@@ -214,6 +214,31 @@ def test_a_grazing_is_refused_by_name() -> None:
         ns.sensitivity(run)
 
 
+def test_a_run_that_ended_for_another_reason_is_refused() -> None:
+    focus = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[-1, -x])
+    run = ns.simulate(focus, [-1.0, 0.5], 90.0, max_events=3)
+    with pytest.raises(ns.DegenerateError, match="TOO_MANY_EVENTS"):
+        ns.sensitivity(run)
+
+
+def test_a_body_that_rests_on_a_shaken_table() -> None:
+    rest = ns.FilippovSystem(
+        [y, v],
+        field=[v, -1],
+        impacts=ns.Impact(y - a * ca.sin(b * t), restitution=0.0),
+        time=t,
+        parameters={a: 1.5, b: 1.0},
+    )
+    s = check(rest, [2.0, 0.0], 6.0)
+    assert np.abs(s.dx_dx0).max() < 1e-12  # all starts rest, and take off together
+
+
+def test_impacts_that_accumulate_are_refused() -> None:
+    bouncing = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
+    with pytest.raises(ns.DegenerateError, match="accumulate"):
+        ns.sensitivity(ns.simulate(bouncing, [1.0, 0.0], 9.0))
+
+
 def test_a_corner_is_refused() -> None:
     both = ns.FilippovSystem(
         [x, y],

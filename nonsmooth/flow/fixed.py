@@ -9,12 +9,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from typing import Protocol
+from typing import Any, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError, Evaluator
+from ..model.printing.tape import Series
+from ..model.variational import ORDER
+from .compiled import find_compiler
+from .compiled.tape import FixedFlow
 
 #: Part of the size of a group of states that the last terms of a step may reach.
 TOLERANCE = 2.0**-53
@@ -36,8 +41,17 @@ class SmoothField(Protocol):
         ...
 
 
+class CompiledField(SmoothField, Protocol):
+    """A smooth field that the interpreter in C can integrate."""
+
+    @property
+    def series(self) -> Series:
+        """Its Taylor rules."""
+        ...
+
+
 def flow_for(
-    field: SmoothField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
+    field: CompiledField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
 ) -> Array:
     """State of a smooth flow after a duration of either sign.
 
@@ -60,9 +74,26 @@ def flow_for(
     ConvergenceError
         The field is not finite on the way, or steps become too small.
     """
+    if duration and find_compiler() is not None:
+        flow = _FLOWS.get(field) or _FLOWS.setdefault(field, _compiled(field, len(z)))
+        end, left = flow(z, p, duration, tol, _MOST_STEPS)
+        if left:
+            raise _stuck(duration, left, end)
+        return end
     for _, _, end in steps_for(field, z, p, duration, tol):
         z = end
     return z
+
+
+#: What the interpreter needs of a field, as long as there is the field.
+_FLOWS: WeakKeyDictionary[Any, FixedFlow] = WeakKeyDictionary()
+
+
+def _compiled(field: CompiledField, size: int) -> FixedFlow:
+    group = np.full(size, -1, np.int32)
+    for k, entries in enumerate(field.groups):
+        group[entries] = k
+    return FixedFlow(field.series, group, ORDER)
 
 
 def steps_for(
@@ -89,13 +120,17 @@ def steps_for(
         left -= h
         yield sign * h, c, z
     if left:
-        raise ConvergenceError(
-            f"flow of a leg: expected a smooth field over the duration {duration:.6g}, received one "
-            f"that is not finite, or steps too small, {left:.6g} before the end, near "
-            f"{np.array2string(z[:6], precision=6)}. The itinerary, the durations or the start are "
-            "far from an orbit: start from a simulation.",
-            point=z,
-        )
+        raise _stuck(duration, left, z)
+
+
+def _stuck(duration: float, left: float, z: Array) -> ConvergenceError:
+    return ConvergenceError(
+        f"flow of a leg: expected a smooth field over the duration {duration:.6g}, received one "
+        f"that is not finite, or steps too small, {left:.6g} before the end, near "
+        f"{np.array2string(z[:6], precision=6)}. The itinerary, the durations or the start are "
+        "far from an orbit: start from a simulation.",
+        point=z,
+    )
 
 
 _DEGREES = np.arange(64)

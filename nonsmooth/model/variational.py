@@ -21,6 +21,7 @@ from .explicit import explicit, solved
 from .jets import taylor
 from .motion import Motion
 from .multipliers import newton_multipliers, sliding_multipliers
+from .printing.tape import Series, series_of
 from .system import FilippovSystem
 from .values import Array
 
@@ -128,6 +129,11 @@ class VariationalField:
         jet, _ = taylor(self.field, ca.SX(0, 1), self.states, self.parameters, ORDER)
         inputs = [self.states, self.parameters]
         return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
+
+    @cached_property
+    def series(self) -> Series:
+        """The Taylor rules of the whole field."""
+        return series_of([self.states, self.parameters], [self.field], self.states.numel())
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:

@@ -173,7 +173,7 @@ def _finished(process: subprocess.Popen[str]) -> str:
     try:
         return process.communicate(timeout=_QUIET)[1]
     except subprocess.TimeoutExpired:
-        _say("nonsmooth: compiling the fast engine of this system (once; it is kept) ... ")
+        _say("nonsmooth: compiling a fast engine (once; it is kept) ... ")
         errors = process.communicate()[1]
         _say("failed\n" if process.returncode else "done\n")
         return errors

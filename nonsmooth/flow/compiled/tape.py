@@ -108,6 +108,17 @@ def library() -> ctypes.CDLL:
     made.run_read.argtypes = [_POINTER] * 5
     made.run_resume.argtypes = [_POINTER] * 2
     made.run_many.argtypes = [*[_POINTER] * 5, _I64]
+    made.fixed_flow.restype = _D
+    arguments = "series n order group groups p z duration tol steps work".split()
+    kinds: dict[str, Any] = {
+        "n": _I32,
+        "order": _I32,
+        "groups": _I32,
+        "duration": _D,
+        "tol": _D,
+        "steps": _I64,
+    }
+    made.fixed_flow.argtypes = [kinds.get(name, _POINTER) for name in arguments]
     return made
 
 
@@ -118,6 +129,43 @@ def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     if any(system.nonlinear) or order >= _MOST_ORDER or not coupled_of(system).affine:
         return None
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
+
+
+class FixedFlow:
+    """A smooth field's flow over known durations, without events.
+
+    Parameters
+    ----------
+    series : Series
+        Of the field, in states and parameters.
+    group : ndarray of int (m,)
+        Which states' errors have one scale; -1 for what is exact.
+    order : int
+    """
+
+    def __init__(self, series: Series, group: NDArray[np.int32], order: int):
+        self._kept: list[NDArray[Any]] = []
+        self._c = _series_structure(series, self._kept)
+        self._group, self._groups = np.ascontiguousarray(group, np.int32), int(group.max()) + 1
+        self._order = order
+        self._room = len(series.rule) * (order + 1) + len(group) * (order + 2)
+
+    def __call__(
+        self, z: Array, p: Array, duration: float, tol: float, most_steps: int
+    ) -> tuple[Array, float]:
+        """State after a duration of either sign, and the time that is left where it fails, else 0."""
+        end, p = np.array(z, float), np.append(np.array(p, float), 0.0)
+        work, n = np.empty(self._room), len(self._group)
+        sizes = (n, self._order, address(self._group), self._groups)
+        where = (address(p), address(end), duration, tol, most_steps, address(work))
+        return end, library().fixed_flow(ctypes.byref(self._c), *sizes, *where)
+
+
+def _series_structure(s: Series, kept: list[NDArray[Any]]) -> _Series:
+    sizes = (len(s.rule), len(s.still), len(s.moving), len(s.late), len(s.outputs), 0)
+    arrays = (s.rule, s.a, s.b, s.c, s.op, s.still, s.moving, s.late, s.outputs, s.first, s.second)
+    kept += arrays
+    return _Series(*sizes, *[a.ctypes.data for a in arrays])
 
 
 class TapeEngine:
@@ -150,7 +198,7 @@ class TapeEngine:
             resets=len(system.resets),
             order=self.order,
             slope_outputs=tape.slope_outputs,
-            series=self._series(tape.series),
+            series=_series_structure(tape.series, self._kept),
             linear=int(coupled.linear),
         )
         for name in _VALUES:
@@ -182,11 +230,6 @@ class TapeEngine:
         arrays = (v.op, v.a, v.b, v.still, v.moving, v.outputs, v.constant)
         sizes = (len(v.op), len(v.still), len(v.moving), len(v.outputs))
         return _Values(*sizes, *[self._at(a) for a in arrays])
-
-    def _series(self, s: Series) -> _Series:
-        sizes = (len(s.rule), len(s.still), len(s.moving), len(s.late), len(s.outputs), 0)
-        arrays = (s.rule, s.a, s.b, s.c, s.op, s.still, s.moving, s.late, s.outputs)
-        return _Series(*sizes, *[self._at(a) for a in (*arrays, s.first, s.second)])
 
     def _entries(self, e: Entries) -> _Entries:
         return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))

@@ -18,8 +18,8 @@ from numpy.typing import NDArray
 from ..model import Array, ConvergenceError, Evaluator
 from ..model.printing.tape import Series
 from ..model.variational import ORDER
-from .compiled import find_compiler
-from .compiled.tape import FixedFlow
+from .compiled.tape import FixedFlow, library
+from .select import compiled_or_none, use_compiled
 
 #: Part of the size of a group of states that the last terms of a step may reach.
 TOLERANCE = 2.0**-53
@@ -74,7 +74,7 @@ def flow_for(
     ConvergenceError
         The field is not finite on the way, or steps become too small.
     """
-    if duration and find_compiler() is not None:
+    if duration and _has_interpreter():
         flow = _FLOWS.get(field) or _FLOWS.setdefault(field, _compiled(field, len(z)))
         end, left = flow(z, p, duration, tol, _MOST_STEPS)
         if left:
@@ -83,6 +83,10 @@ def flow_for(
     for _, _, end in steps_for(field, z, p, duration, tol):
         z = end
     return z
+
+
+def _has_interpreter() -> bool:
+    return use_compiled("auto") and compiled_or_none("auto", library, library) is not None
 
 
 #: What the interpreter needs of a field, as long as there is the field.

@@ -58,7 +58,8 @@ def ensemble(
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
     tol, rtol, atol, start_mode, max_step, max_steps, max_events : optional
-        As in :func:`simulate`.
+        As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
+        NON_UNIQUE.
     at_event : (kind, k), optional
         Keep the state at the k-th event (from 1) of a kind, e.g. ``("crossing", 1)``.
     t_eval : array_like (K,), optional

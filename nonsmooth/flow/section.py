@@ -30,7 +30,8 @@ class Section:
         of event (``"crossing"``, ``"entry"``, ``"exit"``, ``"reset"``, ...). A number, or an
         expression in parameters, is a period: the run is looked at after each, from ``t_start``. An
         expression in states is a section of its own: the system gets a reset named ``"section"``
-        where it is zero, which changes nothing.
+        where it is zero, which changes nothing. One that is a surface of the system, written alike,
+        means that surface.
     direction : {-1, 0, 1}, optional
         Of a surface or expression: only where it falls, either way, only where it rises. Stops and
         resets have directions of their own.

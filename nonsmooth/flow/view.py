@@ -21,6 +21,7 @@ from ..model import (
     periods,
     read_period,
     real_array,
+    surface_of,
     with_section,
 )
 from .facts import AT_END
@@ -83,6 +84,10 @@ def sectioned(system: FilippovSystem, at: Any) -> tuple[FilippovSystem, Any]:
         return system, at
     if not is_function(section.at) or read_period(system, section.at) is not None:
         return system, at
+    surface = surface_of(system, section.at)
+    if surface is not None:  # the motion may slide there, and stay on it
+        name, sign = surface
+        return system, replace(section, at=name, direction=sign * section.direction)
     wider = with_section(system, section.at, section.direction)
     return wider, replace(section, at=SECTION, direction=0)
 

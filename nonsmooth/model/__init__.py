@@ -27,7 +27,7 @@ from .periods import is_function, periods, read_period
 from .reading import Parameters
 from .regularise import regularise
 from .reversal import reversed_system
-from .sections import SECTION, with_section
+from .sections import SECTION, surface_of, with_section
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
@@ -79,6 +79,7 @@ __all__ = [
     "require_system",
     "reversed_system",
     "sliding_multipliers",
+    "surface_of",
     "watched_functions",
     "whole",
     "with_section",

@@ -48,3 +48,30 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
         return wider
 
     return system.cached((SECTION, Content([known], h), direction), build)
+
+
+def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
+    """Name of the surface where a function is zero, written alike, and its sign there; else None.
+
+    Examples
+    --------
+    >>> x = ca.SX.sym("x")
+    >>> surface_of(FilippovSystem([x], surface=x - 1, above=[-1], below=[3]), 1 - x)
+    ('h0', -1)
+    """
+    for i in range(system.surface_count):
+        for sign in (1, -1):
+            h, other = system.surface_function(i), sign * ca.SX(function)
+            if ca.is_equal(h, other, 20) or _vanishes(ca.simplify(h - other)):
+                return f"h{i}", sign
+    return None
+
+
+def _vanishes(expression: ca.SX) -> bool:
+    """Whether an expression is a sum in which everything cancels; only linear ones are seen through."""
+    symbols = ca.vertcat(*ca.symvar(expression))
+    if not ca.is_linear(expression, symbols):
+        return False
+    slope = ca.simplify(ca.jacobian(expression, symbols))
+    rest = ca.simplify(ca.substitute(expression, symbols, ca.SX.zeros(symbols.numel(), 1)))
+    return bool(slope.is_zero() or ca.densify(slope).is_zero()) and bool(rest.is_zero())

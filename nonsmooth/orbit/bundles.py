@@ -20,7 +20,7 @@ _CLOSEST = 1e-10
 
 def bundle(
     seed: Callable[[float], Arc | None], closed: bool, spacing: float, count: int, most: int
-) -> list[tuple[float, Arc]]:
+) -> tuple[list[tuple[float, Arc]], bool]:
     """Arcs from seeds on a curve with the parameter 0 to 1, with further ones where they part.
 
     Parameters
@@ -34,33 +34,44 @@ def bundle(
     count, most : int
         Arcs at the beginning, and at most.
 
+    Returns
+    -------
+    arcs : list of (parameter, Arc)
+        In the order of their parameters.
+    complete : bool
+        False if interrupted.
+
     Notes
     -----
     Krauskopf et al. 2005 (Int. J. Bifurcation Chaos 15, 763) compare this with other methods.
     """
-    first = np.linspace(0.0, 1.0, count, endpoint=not closed)
-    arcs = {float(u): arc for u in first if (arc := seed(float(u))) is not None}
+    arcs: dict[float, Arc] = {}
     tried: set[float] = set()
-    while len(arcs) < most:
-        order = sorted(arcs)
-        pairs = list(
-            zip(order, [*order[1:], order[0] + 1.0][: len(order) - (not closed)], strict=False)
-        )
-        wide = [
-            (a + b) / 2
-            for a, b in pairs
-            if b - a > _CLOSEST
-            and _gap(arcs[a], arcs[b % 1.0 if b >= 1.0 else b]) > _APART * spacing
-        ]
-        new = [u for u in wide if u not in tried][: most - len(arcs)]
-        if not new:
-            break
-        tried.update(new)
-        for u in new:
-            arc = seed(u % 1.0 if closed else u)
-            if arc is not None:
-                arcs[u % 1.0 if closed else u] = arc
-    return sorted(arcs.items())
+    new = np.linspace(0.0, 1.0, count, endpoint=not closed).tolist()
+    try:
+        while new:
+            tried.update(new)
+            for u in new:
+                arc = seed(u)
+                if arc is not None:
+                    arcs[u] = arc
+            new = [u for u in _wide(arcs, closed, spacing) if u not in tried][: most - len(arcs)]
+    except KeyboardInterrupt:
+        if len(arcs) < 2:
+            raise
+        return sorted(arcs.items()), False
+    return sorted(arcs.items()), True
+
+
+def _wide(arcs: dict[float, Arc], closed: bool, spacing: float) -> list[float]:
+    """Parameters in the middle of neighbours that are too far apart."""
+    order = sorted(arcs)
+    ends = [*order[1:], order[0] + 1.0] if closed and order else order[1:]
+    return [
+        (a + b) / 2 % 1.0
+        for a, b in zip(order, ends, strict=False)
+        if b - a > _CLOSEST and _gap(arcs[a], arcs[b % 1.0 if closed else b]) > _APART * spacing
+    ]
 
 
 def _gap(one: Arc, other: Arc) -> float:

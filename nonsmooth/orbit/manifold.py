@@ -55,6 +55,8 @@ class Manifold(Savable):
     triangles : ndarray of int (q, 3)
         Of a surface, as rows of ``points``. There are holes where neighbours part faster than
         ``max_orbits`` allows, or for good.
+    complete : bool
+        False if the computation was interrupted.
     """
 
     stable: bool
@@ -63,6 +65,7 @@ class Manifold(Savable):
     arcs: list[Arc]
     points: Array = field(default_factory=lambda: np.zeros((0, 0)))
     triangles: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
+    complete: bool = True
 
     def __repr__(self) -> str:
         what = "stable" if self.stable else "unstable"
@@ -110,7 +113,8 @@ def manifold(
     -------
     Manifold
         Curves where the manifold has one dimension, a surface where it has two. Backward it ends
-        where it meets sliding: what arrives there comes from a whole neighbourhood.
+        where it meets sliding: what arrives there comes from a whole neighbourhood. Ctrl-C ends a
+        surface with the orbits that it has.
 
     Raises
     ------
@@ -293,6 +297,7 @@ class _Grower:
             [arc for part in parts for arc in part.arcs],
             np.concatenate([part.points for part in parts]),
             np.concatenate([parts[0].triangles, parts[1].triangles + offset]),
+            all(part.complete for part in parts),
         )
 
     def _sliding_curve(self, direction: Array) -> Callable[[float], Array]:
@@ -317,10 +322,11 @@ class _Grower:
 
     def _surface(self, seed: Any, closed: bool) -> Manifold:
         f = self.follower
-        arcs = bundle(seed, closed, f.spacing, _FIRST, self.most)
+        arcs, complete = bundle(seed, closed, f.spacing, _FIRST, self.most)
         if len(arcs) < 2:
             raise DegenerateError(
                 f"of: expected a point with orbits around it, received {self.of}."
             )
         points, table = triangles(arcs, closed, f.spacing)
-        return Manifold(self.stable, self.point, 2, [arc for _, arc in arcs], points, table)
+        found = [arc for _, arc in arcs]
+        return Manifold(self.stable, self.point, 2, found, points, table, complete)

@@ -12,8 +12,8 @@ from ..flow.saving import Savable
 from ..flow.section import Section
 from ..flow.simulate import simulate
 from ..flow.trajectory import Trajectory
+from ..flow.view import sectioned
 from ..model import (
-    SECTION,
     Array,
     FilippovSystem,
     OptionError,
@@ -203,6 +203,7 @@ def poincare(
         length = float(periods(period, system.parameter_vector(parameters)))
         wanted = replace(wanted, at=length, direction=0)
         t_end = t_start + length * (wanted.skip + wanted.every * count + 0.5)
+    system, wanted = sectioned(system, wanted)
     run = simulate(
         system,
         x0,
@@ -216,8 +217,6 @@ def poincare(
     )
     assert run.sample_t is not None and run.sample_x is not None
     met = np.isfinite(run.sample_t)
-    if period is None and not isinstance(wanted.at, str):
-        wanted = replace(wanted, at=SECTION, direction=0)  # the name that the run knows it by
     return PoincareOrbit(run.sample_x[met], run.sample_t[met], run, wanted)
 
 

@@ -58,6 +58,17 @@ def test_an_expression_in_states_is_a_section_and_its_start_is_no_hit(sample, en
         sample(TWO_SPRINGS, [-0.5, 0.0], 1.0, at=ns.Section(v - w, count=1))
 
 
+def test_a_section_written_as_a_surface_is_that_surface_where_motion_may_slide():
+    dry = ns.FilippovSystem([x, v], surface=v - 0.3, multipliers=lam, field=[v, -x - 0.4 * lam])
+    plain = ns.simulate(dry, [0.0, 0.0], 20.0)
+    entries = [e.t for e in plain.events if e.kind == "entry"]
+    for section in (ns.Section(v - 0.3, direction=1), ns.Section(0.3 - v, direction=-1)):
+        run = ns.simulate(dry, [0.0, 0.0], 20.0, at=section)
+        assert run.sample_t.tolist() == entries and run.itinerary == plain.itinerary
+    away = ns.simulate(dry, [0.0, 0.0], 20.0, at=ns.Section(0.3 - v, direction=1))
+    assert away.sample_t.tolist() == [e.t for e in plain.events if e.mode_before == "+"]
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 def test_every_third_hit_after_two_that_are_passed_over(sample, engine):
     # from rest at the height 1 the ball lands at 1, 3, 5, ... with the speed 2

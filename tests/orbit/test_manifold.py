@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.orbit.arcs import Follower
 
 CASES = {
     case["id"]: case
@@ -103,6 +104,24 @@ def test_the_surface_that_ends_on_a_sliding_curve():
     assert {arc.itinerary for arc in found.arcs} == {"+", "-"}
     out = ns.manifold(system, saddle, stable=False, length=1.0)
     assert out.dimension == 1 and np.abs(out.arcs[0].points[:, 1:]).max() < 1e-9
+
+
+def test_an_interrupted_surface_keeps_its_orbits(monkeypatch):
+    system = ns.FilippovSystem(
+        [x, y, z], surface=x + 9, above=[-x, -y, z], below=[-x, -y, z + 0 * x]
+    )
+    saddle, plain, calls = ns.find_equilibrium(system, [0.1, 0.1, 0.1]), Follower.arc, []
+
+    def arc(*args):
+        calls.append(1)
+        if len(calls) > 9:
+            raise KeyboardInterrupt
+        return plain(*args)
+
+    monkeypatch.setattr(Follower, "arc", arc)
+    found = ns.manifold(system, saddle, length=0.5, spacing=0.1)
+    assert not found.complete and len(found.arcs) == 9 and "interrupted" in repr(found)
+    assert np.abs(found.points[:, 2]).max() < 1e-12
 
 
 def test_backward_a_manifold_ends_where_sliding_begins():

@@ -110,6 +110,18 @@ def test_nor_from_one_that_lies_where_others_could_exchange_it(open_to, tmp_path
     assert build(SOURCE).answer() == 42 and entry(above / "cache").exists()
 
 
+def test_a_group_of_nobody_else_may_write_the_folders_above(tmp_path, monkeypatch):
+    above = tmp_path / "above"
+    monkeypatch.setenv("NONSMOOTH_CACHE", str(above / "cache"))
+    above.mkdir()
+    above.chmod(0o775)
+    monkeypatch.setattr(store, "_is_private", lambda group: False)
+    with pytest.warns(CompilerWarning, match="above"):
+        assert build(SOURCE).answer() == 42
+    monkeypatch.setattr(store, "_is_private", lambda group: group == above.stat().st_gid)
+    assert build(SOURCE).answer() == 42 and entry(above / "cache").exists()
+
+
 @pytest.mark.parametrize("open_to", [0o660, 0o606, 0o666, 0o620])
 def test_an_entry_that_others_can_write_is_built_again(open_to, cache, tmp_path):
     cache.mkdir(mode=0o700)

@@ -74,9 +74,9 @@ class Manifold(Savable):
             if self.dimension == 1
             else f"{len(self.arcs)} orbits, {len(self.triangles)} triangles"
         )
-        return (
-            f"Manifold({what}, of {self.point.round(6).tolist()}, dimension {self.dimension}: {of})"
-        )
+        cut = "" if self.complete else "; interrupted"
+        point = self.point.round(6).tolist()
+        return f"Manifold({what}, of {point}, dimension {self.dimension}: {of}{cut})"
 
 
 def manifold(

@@ -87,6 +87,9 @@ def run_chunk(
         _refuse(chunk, system, start, job.options)
     else:
         _run_compiled(job, system, start, p, chunk, stop, times)
+    handed = bool(np.any(chunk.status == HAND_OVER))
+    if handed and job.engine in ("scalar", "lanes"):
+        _run_rest(job, system, start, p, chunk, stop, times)
     rest = np.flatnonzero(chunk.status == HAND_OVER)
     words = dict(enumerate(chunk.words))
     for i in rest.tolist():
@@ -94,7 +97,7 @@ def run_chunk(
             raise Stopped
         words[len(words)] = _run_reference(chunk, system, i, start[i], p, len(words), job, times)
     chunk.x[bad] = x[bad, : system.dimension]
-    if job.engine == "reference" or len(rest):
+    if job.engine == "reference" or handed:
         used = np.bincount(chunk.itinerary).nonzero()[0].tolist()
         chunk.rename({code: words[code] for code in used})
     return chunk
@@ -118,6 +121,29 @@ def _run_compiled(
         assert generated is not None
         lanes = job.engine == "lanes"
         generated.run_many(x, p, job.options, job.at, lanes, out, stop, times)
+
+
+def _run_rest(
+    job: Job,
+    system: FilippovSystem,
+    x: Array,
+    p: Array,
+    out: Chunk,
+    stop: Callable[[], bool],
+    times: Array | None,
+) -> None:
+    """Give what the generated programs hand over, sliding on several surfaces, to the interpreter."""
+    tape = tape_for(system, job.options)
+    if tape is None:
+        return
+    rest = np.flatnonzero(out.status == HAND_OVER)
+    own = lambda a: a if a is None or a.ndim == 1 else a[rest]
+    chunk = Chunk.empty(len(rest), system.dimension, job.at is not None, job.room)
+    tape.run_many(x[rest], own(p), job.options, job.at, chunk, stop, own(times))
+    for name, array in chunk.arrays().items():
+        out.arrays()[name][rest] = array
+    out.itinerary[rest] += len(out.words)
+    out.words += chunk.words
 
 
 def _refuse(chunk: Chunk, system: FilippovSystem, x: Array, options: Options) -> None:

@@ -157,6 +157,8 @@ def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: s
             return _converted(system, x, p, options, run)
     fast = generated
     run = compiled_or_none(engine, fast, lambda: fast.run(x, p, options)) if fast else None
+    if run is not None and run.status == HAND_OVER and tape is not None:
+        run = tape.run(x, p, options)  # sliding on several surfaces
     return _converted(system, x, p, options, run)
 
 

@@ -194,6 +194,21 @@ def test_ensembles_are_the_runs_one_by_one():
     assert [str(ns.Status(s)) for s in many.status[2:]] == ["NOT_FINITE", "INCONSISTENT"]
 
 
+def test_what_generated_programs_hand_over():
+    """Sliding on two surfaces at once, of many trajectories: as one by one."""
+    system = blocks(2)
+    starts = np.column_stack([np.linspace(-1, 1, 80), np.linspace(1, -0.5, 80), *np.zeros((2, 80))])
+    many = ns.ensemble(system, starts, 12.0, at_event=("entry", 2), t_eval=[11.0])
+    assert any("ss" in word for word in many.itineraries)
+    for k in range(0, 80, 13):
+        run = ns.simulate(system, starts[k], 12.0)
+        assert (many.status[k], many.itinerary[k]) == (run.status, run.itinerary)
+        np.testing.assert_allclose(many.x[k], run.x[-1], rtol=0, atol=1e-12)
+        np.testing.assert_allclose(many.sample_x[k], run([11.0]), rtol=0, atol=1e-12)
+        entries = [e for e in run.events if e.kind == "entry"]
+        np.testing.assert_allclose(many.event_t[k], entries[1].t, rtol=0, atol=1e-12)
+
+
 def test_a_section_at_an_impact():
     at = ns.Section("impact", count=3)
     run = ns.simulate(TABLE, [1.0, 0.0], 5.0, at=at)

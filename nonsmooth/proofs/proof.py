@@ -79,8 +79,8 @@ class Proof:
     def save(self, path: str | Path) -> None:
         """Write the proof as JSON: the graph, the box, the matrix and the claims.
 
-        ``python nonsmooth/proofs/check_proof.py FILE`` checks it; that program shares no code with
-        the one that proved it and needs nothing but Python.
+        ``python checker FILE`` (in the repository) checks it; that program shares no code with the
+        one that proved it and needs nothing but Python.
         """
         records = [p.record for p in self.pieces] or [self.record]
         Path(path).write_text(json.dumps({"proofs": records}, indent=1), encoding="utf-8")

@@ -99,10 +99,14 @@ class TwoFolds(Question):
         return Program(self.described.tape, [self.described.second])
 
     @cached_property
-    def _difference(self) -> tuple[Difference, Program]:
+    def difference(self) -> Difference:
+        """F1 - F2 with its common factor."""
         d = self.described
-        found = Difference(d.tape, d.fields, d.gradient(d.h), self.numbers)
-        return found, Program(d.tape, [[found.transverse]])
+        return Difference(d.tape, d.fields, d.gradient(d.h), self.numbers)
+
+    @cached_property
+    def _transverse(self) -> Program:
+        return Program(self.described.tape, [[self.difference.transverse]])
 
     def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
         """Class, by enclosures of the second derivatives; exact algebra for coincident fields."""
@@ -124,7 +128,7 @@ class TwoFolds(Question):
         return Verdict(found.label, title, found.why, lines + _meaning(found.label), values, facts)
 
     def _coincident(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool, str]:
-        difference, program = self._difference
+        difference, program = self.difference, self._transverse
         if difference.identical:
             return True, "F1 = F2 everywhere, so Delta = 0 exactly."
         ((transverse,),) = self.values(program, inputs)

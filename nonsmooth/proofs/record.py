@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -23,14 +22,18 @@ def interval(a: arb) -> list[str]:
     return [text(v) for v in ends(a)]
 
 
-def graph_of(question: Any) -> dict[str, Any]:
+def graph_of(question: Any, coincident: bool) -> dict[str, Any]:
     """The surface and the fields as instructions, with constants as exact fractions.
 
     An instruction is [operation, arguments ...]; ``const`` has its value, ``input`` its vector (0
     states, 1 parameters, 2 further unknowns) and position, ``power`` its argument and exponent.
     """
     described = question.described
-    program = Program(described.tape, [[described.h], *described.fields])
+    rows = [[described.h], *described.fields]
+    difference = question.difference if coincident else None
+    if difference is not None:
+        rows += [[difference.factor], difference.direction]
+    program = Program(described.tape, rows)
     nodes: list[list[Any]] = []
     for node in program.nodes:
         if node.op == "const":
@@ -41,11 +44,14 @@ def graph_of(question: Any) -> dict[str, Any]:
             nodes.append(["power", node.args[0], node.payload])
         else:
             nodes.append([node.op, *node.args])
-    (surface,), above, below = program.rows
-    return {"nodes": nodes, "surface": surface, "above": above, "below": below}
+    (surface,), above, below, *more = program.rows
+    graph = {"nodes": nodes, "surface": surface, "above": above, "below": below}
+    if more:  # F1 - F2 = factor direction
+        graph |= {"factor": more[0][0], "direction": more[1]}
+    return graph
 
 
-def asked(subject: Any) -> dict[str, Any]:
+def asked(subject: Any, coincident: bool = False) -> dict[str, Any]:
     """The question: graph, unknowns, what is held, planes and parameters."""
     question = subject.question
     return {
@@ -53,7 +59,7 @@ def asked(subject: Any) -> dict[str, Any]:
         "kind": question.kind,
         "side": getattr(question, "side", None),
         "numbers": subject.numbers,
-        "graph": graph_of(question),
+        "graph": graph_of(question, coincident),
         "states": len(subject.values),
         "names": list(subject.names),
         "unknowns": [list(place) for place in subject.unknowns],
@@ -68,7 +74,7 @@ def record_of(subject: Any, equations: Any, zero: Any, verdict: Any, bits: int) 
     """Everything that a checker needs about one zero."""
     n = equations.n
     return {
-        **asked(subject),
+        **asked(subject, bool(verdict.facts.get("coincident"))),
         "bits": bits,
         "box": [interval(b) for b in zero.box],
         "matrix": [[text(fraction(zero.matrix[i, j])) for j in range(n)] for i in range(n)],
@@ -78,8 +84,3 @@ def record_of(subject: Any, equations: Any, zero: Any, verdict: Any, bits: int) 
             k: interval(v) for k, v in verdict.values.items() if v.is_finite() and k[0] == "L"
         },
     }
-
-
-def rows(values: Sequence[Sequence[Fraction]]) -> list[list[str]]:
-    """Rows of fractions as strings."""
-    return [[text(v) for v in row] for row in values]

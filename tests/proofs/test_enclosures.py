@@ -52,7 +52,7 @@ def check_random_expressions(seed, graphs, samples):
                 for value, enclosure, interval in zip(truth, flat, arrays, strict=True):
                     near = slack * (1 + abs(value))
                     assert interval.low - near <= value <= interval.high + near, f
-                    if enclosure.is_finite():
+                    if enclosure.is_finite() and enclosure.abs_upper() < 1e30:  # no gigabytes
                         a, b = (mpmath.mpf(v.numerator) / v.denominator for v in ends(enclosure))
                         assert a - near <= value <= b + near, f
     return compared

@@ -1,0 +1,192 @@
+"""Intervals in fixed point, rounded outward, and elementary functions of them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from fractions import Fraction
+from math import isqrt
+from typing import Any
+
+BITS = 640
+ONE = 1 << BITS
+
+
+class CheckError(Exception):
+    """A claim that does not hold, or cannot be checked."""
+
+
+class Iv:
+    """An interval [a, b]/2^BITS."""
+
+    __slots__ = ("a", "b")
+
+    def __init__(self, a: int, b: int):
+        self.a, self.b = a, b
+
+    @staticmethod
+    def of(low: Any, high: Any = None) -> Iv:
+        p, q = Fraction(low), Fraction(low if high is None else high)
+        return Iv(p.numerator * ONE // p.denominator, -(-q.numerator * ONE // q.denominator))
+
+    def __add__(self, o: Iv) -> Iv:
+        return Iv(self.a + o.a, self.b + o.b)
+
+    def __sub__(self, o: Iv) -> Iv:
+        return Iv(self.a - o.b, self.b - o.a)
+
+    def __neg__(self) -> Iv:
+        return Iv(-self.b, -self.a)
+
+    def __mul__(self, o: Iv) -> Iv:
+        p = (self.a * o.a, self.a * o.b, self.b * o.a, self.b * o.b)
+        return Iv(min(p) >> BITS, -(-max(p) >> BITS))
+
+    def __truediv__(self, o: Iv) -> Iv:
+        if o.a <= 0 <= o.b:
+            raise CheckError("a division by an interval that contains zero")
+        p = [(n << BITS, d) for n in (self.a, self.b) for d in (o.a, o.b)]
+        return Iv(min(n // d for n, d in p), max(-(-n // d) for n, d in p))
+
+    def sq(self) -> Iv:
+        low = 0 if self.a <= 0 <= self.b else min(self.a * self.a, self.b * self.b) >> BITS
+        return Iv(low, -(-max(self.a * self.a, self.b * self.b) >> BITS))
+
+    def sign(self) -> int:
+        return 1 if self.a > 0 else -1 if self.b < 0 else 0
+
+    def inside(self, o: Iv) -> bool:
+        return o.a < self.a and self.b < o.b
+
+    @property
+    def zero(self) -> bool:
+        return self.a == self.b == 0
+
+    def mid(self) -> Iv:
+        m = (self.a + self.b) >> 1
+        return Iv(m, m)
+
+
+def whole(n: int) -> Iv:
+    return Iv(n * ONE, n * ONE)
+
+
+def _ends(f: Callable[[Iv], Iv], x: Iv) -> Iv:
+    """A rising function from its values at both ends."""
+    return Iv(f(Iv(x.a, x.a)).a, f(Iv(x.b, x.b)).b)
+
+
+def _series(first: Iv, factor: Callable[[Iv, int], Iv]) -> Iv:
+    """Sum of terms, each from the last; the rest is below twice the first term left out.
+
+    The terms must come to fall at least by half each; the remainder is added on both sides.
+    """
+    total, term, n = first, first, 0
+    while max(abs(term.a), abs(term.b)) > 2 or n < 4:
+        n += 1
+        term = factor(term, n)
+        total = total + term
+        if n > 5000:
+            raise CheckError("a series does not converge")
+    r = 4 * max(abs(term.a), abs(term.b)) + 8
+    return Iv(total.a - r, total.b + r)
+
+
+def exp(x: Iv) -> Iv:
+    def point(p: Iv) -> Iv:
+        k = max(0, abs(p.a).bit_length() - BITS + 4)
+        small = Iv(p.a >> k, -(-p.b >> k))
+        value = _series(whole(1), lambda t, n: t * small / whole(n))
+        for _ in range(k):
+            value = value * value
+        return value
+
+    return _ends(point, x)
+
+
+def _atanh_series(z: Iv) -> Iv:
+    s, powers = z.sq(), {0: z}
+
+    def factor(t: Iv, n: int) -> Iv:
+        powers[n] = powers[n - 1] * s
+        return powers[n] / whole(2 * n + 1)
+
+    return _series(z, factor)
+
+
+def log(x: Iv) -> Iv:
+    def point(p: Iv) -> Iv:
+        if p.a <= 0:
+            raise CheckError("a logarithm of what is not positive")
+        k = p.a.bit_length() - BITS
+        m = Iv(p.a << -k, p.b << -k) if k < 0 else Iv(p.a >> k, -(-p.b >> k))
+        ln2 = whole(2) * _atanh_series(whole(1) / whole(3))
+        return whole(k) * ln2 + whole(2) * _atanh_series((m - whole(1)) / (m + whole(1)))
+
+    return _ends(point, x)
+
+
+def sqrt(x: Iv) -> Iv:
+    if x.a < 0:
+        raise CheckError("a root of what may be negative")
+    return Iv(isqrt(x.a << BITS), isqrt(x.b << BITS) + 1)
+
+
+def atan(x: Iv) -> Iv:
+    def point(p: Iv) -> Iv:
+        for _ in range(4):
+            p = p / (whole(1) + sqrt(whole(1) + p.sq()))
+        s, powers = p.sq(), {0: p}
+
+        def factor(t: Iv, n: int) -> Iv:
+            powers[n] = -(powers[n - 1] * s)
+            return powers[n] / whole(2 * n + 1)
+
+        return whole(16) * _series(p, factor)
+
+    return _ends(point, x)
+
+
+PI = whole(4) * atan(whole(1))
+
+
+def _circular(x: Iv, shift: int) -> Iv:
+    """sin (shift 0) or cos (shift 1): the value at the middle, and the width on both sides."""
+    m = x.mid()
+    turns = whole((m.a + PI.a) // (2 * PI.a))
+    y = m - turns * whole(2) * PI
+    s = y.sq()
+    first = whole(1) if shift else y
+    value = _series(
+        first, lambda t, n: -(t * s) / whole(2 * n * (2 * n - 1 if shift else 2 * n + 1))
+    )
+    r = (x.b - x.a + 1) // 2 + 1
+    return Iv(max(value.a - r, -ONE - 1), min(value.b + r, ONE + 1))
+
+
+def sin(x: Iv) -> Iv:
+    return _circular(x, 0)
+
+
+def cos(x: Iv) -> Iv:
+    return _circular(x, 1)
+
+
+def erf(x: Iv) -> Iv:
+    def point(p: Iv) -> Iv:
+        s, powers = p.sq(), {0: p}
+
+        def factor(t: Iv, n: int) -> Iv:
+            powers[n] = -(powers[n - 1] * s) / whole(n)
+            return powers[n] / whole(2 * n + 1)
+
+        return whole(2) / sqrt(PI) * _series(p, factor)
+
+    if max(abs(x.a), abs(x.b)) > 8 * ONE:
+        raise CheckError("erf of a large number")
+    return _ends(point, x)
+
+
+def power(a: Iv, n: int) -> Iv:
+    if n % 2 == 0:
+        return whole(1) if n == 0 else power(a.sq(), n // 2) if n > 2 else a.sq()
+    return a * power(a, n - 1) if n > 1 else a

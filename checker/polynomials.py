@@ -1,0 +1,75 @@
+"""Recorded instructions as polynomials with rational coefficients in what is no polynomial."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+Monomial = tuple[tuple[Any, int], ...]
+Polynomial = dict[Monomial, Fraction]
+
+
+def add(a: Polynomial, b: Polynomial, sign: int) -> Polynomial:
+    """a + sign b."""
+    result = dict(a)
+    for m, c in b.items():
+        result[m] = result.get(m, Fraction(0)) + sign * c
+        if result[m] == 0:
+            del result[m]
+    return result
+
+
+def times(a: Polynomial, b: Polynomial) -> Polynomial:
+    """a b."""
+    result: Polynomial = {}
+    for m, c in a.items():
+        for n, d in b.items():
+            powers = dict(m)
+            for atom, k in n:
+                powers[atom] = powers.get(atom, 0) + k
+            key = tuple(sorted(powers.items(), key=repr))
+            result[key] = result.get(key, Fraction(0)) + c * d
+            if result[key] == 0:
+                del result[key]
+    return result
+
+
+def polynomials(graph: dict[str, Any]) -> list[Polynomial]:
+    """The polynomial of every node."""
+    values: list[Polynomial] = []
+    for k, (op, *rest) in enumerate(graph["nodes"]):
+        if op == "const":
+            c = Fraction(rest[0])
+            values.append({(): c} if c else {})
+        elif op in ("add", "sub"):
+            values.append(add(values[rest[0]], values[rest[1]], 1 if op == "add" else -1))
+        elif op == "mul":
+            values.append(times(values[rest[0]], values[rest[1]]))
+        elif op == "div":
+            values.append(times(values[rest[0]], {((("inv", rest[1]), 1),): Fraction(1)}))
+        elif op == "inv":
+            values.append({((("inv", rest[0]), 1),): Fraction(1)})
+        elif op == "neg":
+            values.append(add({}, values[rest[0]], -1))
+        elif op == "twice":
+            values.append(add(values[rest[0]], values[rest[0]], 1))
+        elif op in ("sq", "power"):
+            result = values[rest[0]]
+            for _ in range((2 if op == "sq" else rest[1]) - 1):
+                result = times(result, values[rest[0]])
+            values.append(result)
+        else:
+            values.append({(((op, k), 1),): Fraction(1)})
+    return values
+
+
+def is_multiple(graph: dict[str, Any]) -> bool:
+    """Whether F1 - F2 = g G for the recorded factor g and direction G."""
+    if "factor" not in graph:
+        return False
+    p = polynomials(graph)
+    g = p[graph["factor"]]
+    return all(
+        not add(add(p[a], p[b], -1), times(g, p[d]), -1)
+        for a, b, d in zip(graph["above"], graph["below"], graph["direction"], strict=True)
+    )

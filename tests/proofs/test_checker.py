@@ -1,0 +1,103 @@
+"""Saved proofs are checked by a program of its own, and altered ones are not."""
+
+import ast
+import json
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
+import casadi as ca
+import pytest
+
+import nonsmooth as ns
+
+CHECKER = Path(__file__).parents[2] / "checker"
+x, y, z = (ca.SX.sym(s) for s in "xyz")
+
+
+def run(path):
+    done = subprocess.run(
+        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
+    )
+    return done.returncode, done.stdout + done.stderr
+
+
+def proof_of(above, below, surface, near, **options):
+    system = ns.FilippovSystem([x, y, z], surface=surface, above=above, below=below)
+    return ns.certify(ns.find_two_fold(system, near=near), **options)
+
+
+TRANSCENDENTAL = proof_of(
+    [1 + ca.exp(-y), ca.cos(z) - 0.4, ca.sin(2 * x) + ca.exp(y) / 2 - 0.6],
+    [-1 + 0.2 * x, 1 + y * y, ca.atan(x - 0.3) + ca.log(1 + y * y + x * x) + 0.2 * y - 0.3],
+    z + 0.1 * ca.sin(x * y),
+    (0.257, -0.62, 0.016),
+    width=1e-30,
+)
+
+
+def test_the_checker_imports_nothing_of_the_prover():
+    for path in CHECKER.glob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            names = [a.name for a in node.names] if isinstance(node, ast.Import) else []
+            names += [node.module] if isinstance(node, ast.ImportFrom) else []
+            assert not {n.split(".")[0] for n in names} & {"nonsmooth", "flint", "casadi", "numpy"}
+
+
+def test_proofs_of_every_kind_are_checked(tmp_path):
+    mostly = proof_of([-y, 1, -2], [z, -1, 1 + 0.1 * y], x, (0, 0.1, -0.1))
+    many = proof_of(
+        [ca.sqrt(1 + y) - ca.tanh(z) - 1, ca.atan2(1 + z, 2), ca.asinh(z) - 2],
+        [z + y**3 / 3, -1, ca.erf(y) + ca.cosh(z) + (1 + y) ** 1.5],
+        x,
+        (0.0, 0.01, 0.01),
+    )
+    n, lam = z - 0.3 * y * y, ca.SX.sym("lam")
+    f, g = [y, 1, -1], [1, 0.5, 0.25 * y]
+    coulomb = ns.FilippovSystem(
+        [x, y, z],
+        surface=x,
+        multipliers=lam,
+        field=[a - lam * 0.7 * n * b for a, b in zip(f, g, strict=True)],
+    )
+    same = ns.certify(ns.find_two_fold(coulomb, near=(0.0, 0.1, 0.1)))
+    plane = ns.FilippovSystem([x, y], surface=y, above=[y - x, x**2 - 2], below=[1, 1])
+    fold = ns.certify(ns.local.find_fold(plane, [1.4, 0.0]), system=plane)
+    for k, proof in enumerate((TRANSCENDENTAL, mostly, many, same, fold)):
+        assert proof.proven, proof
+        path = tmp_path / f"{k}.json"
+        proof.save(path)
+        code, words = run(path)
+        assert code == 0 and "checked: exactly one" in words, words
+        assert "class" in words or "visible" in words
+    assert "F1 = F2" in str(same)
+
+
+def altered(record):
+    """False statements made of a true one."""
+    yield "label", {**record, "claims": {**record["claims"], "label": "VV-F"}}
+    shifted = [[str(1 + float.fromhex("0x1p-1")), "2"], *record["box"][1:]]
+    yield "box", {**record, "box": shifted}
+    wide = [["-9", "9"]] * len(record["box"])
+    yield "a box with more than is proven", {**record, "box": wide}
+    singular = [["0"] * len(row) for row in record["matrix"]]
+    yield "matrix", {**record, "matrix": singular}
+    moved = [[str(Fraction(v) + Fraction(1, 10**25)) for v in pair] for pair in record["point"]]
+    yield "point", {**record, "point": moved}
+    nodes = [
+        ["const", "1/11"] if n[:1] == ["const"] and n[1] == str(Fraction(0.1)) else n
+        for n in record["graph"]["nodes"]
+    ]
+    yield "graph", {**record, "graph": {**record["graph"], "nodes": nodes}}
+    yield "coincident fields", {**record, "claims": {**record["claims"], "coincident": True}}
+
+
+@pytest.mark.parametrize("k", range(7))
+def test_false_statements_are_not_checked(k, tmp_path):
+    record = json.loads(json.dumps(TRANSCENDENTAL.record))
+    what, false = list(altered(record))[k]
+    path = tmp_path / "false.json"
+    path.write_text(json.dumps({"proofs": [false]}))
+    code, words = run(path)
+    assert code == 1 and "NOT CHECKED" in words, (what, words)

@@ -344,6 +344,15 @@ static void inputs_of(Run *r, const Expansion *e, int k) {
   set_inputs(r, x, k ? r->none : r->held, lam);
 }
 
+/* Coefficients k of all that a mode needs. */
+static void advance_series(Run *r, const Layout *l, int k) {
+  const Series *t = &r->s->series;
+  int slides = 0;
+  for (int i = 0; i < r->width; i++) slides |= l->letter[i] == 0;
+  if (slides) series_rules(t, t->moving, t->moving_count, k, r->stride, r->input, r->series);
+  else series_rules(t, t->free, t->free_count, k, r->stride, r->input, r->series);
+}
+
 static void jets(Run *r, Expansion *e) {
   const Series *t = &r->s->series;
   int slides = e->l.slides, order = r->order, stride = r->stride;
@@ -355,7 +364,7 @@ static void jets(Run *r, Expansion *e) {
   start[slides] = count;
   for (int k = 0; k <= order; k++) {
     inputs_of(r, e, k);
-    series_rules(t, t->moving, t->moving_count, k, stride, r->input, r->series);
+    advance_series(r, &e->l, k);
     if (k && slides) {
       follow_layer(r, e, k, start);
       inputs_of(r, e, k);
@@ -482,11 +491,10 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
   int n = r->n, w = r->width, order = r->order, stride = r->stride, slides = e->l.slides;
   double *x = r->vector, *lam = x + n, *slope = lam + w, ignored;
-  const Series *t = &r->s->series;
   for (int i = 0; i < n; i++) x[i] = horner(e->states + (int64_t)i * stride, order, time, &slope[i]);
   for (int i = 0; i < w; i++) lam[i] = horner(e->series + (int64_t)i * stride, order, time, &ignored);
   set_inputs(r, x, held_of(r, e->l.letter), lam);
-  series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+  advance_series(r, &e->l, 0);
   for (int i = 0; i < n; i++) {
     double defect = fabs(row_of(r, i)[0] - slope[i]) * dt;
     if (!(defect <= WRONG * e->allowed[i] + VANISHES * dt * fabs(slope[i]))) return 0;

@@ -12,10 +12,10 @@ typedef struct {
 } Values;
 
 /* Power series by rules (nonsmooth/model/rules.py), order by order. ``late`` are those that multipliers
- * enter, which follow from the equations of the same order. */
+ * enter, which follow from the equations of the same order; ``free`` suffice where nothing slides. */
 typedef struct {
-  int32_t size, still_count, moving_count, late_count, output_count, pad;
-  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *late, *output;
+  int32_t size, still_count, moving_count, late_count, free_count, output_count;
+  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *late, *free, *output;
   const double *first, *second;
 } Series;
 

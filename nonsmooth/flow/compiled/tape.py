@@ -50,9 +50,9 @@ class _Values(ctypes.Structure):
 class _Series(ctypes.Structure):
     _fields_ = [
         *[(name, _I32) for name in ("size", "still_count", "moving_count", "late_count")],
-        *[(name, _I32) for name in ("output_count", "pad")],
+        *[(name, _I32) for name in ("free_count", "output_count")],
         *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "late")],
-        *[(name, _POINTER) for name in ("output", "first", "second")],
+        *[(name, _POINTER) for name in ("free", "output", "first", "second")],
     ]
 
 
@@ -162,10 +162,10 @@ class FixedFlow:
 
 
 def _series_structure(s: Series, kept: list[NDArray[Any]]) -> _Series:
-    sizes = (len(s.rule), len(s.still), len(s.moving), len(s.late), len(s.outputs), 0)
-    arrays = (s.rule, s.a, s.b, s.c, s.op, s.still, s.moving, s.late, s.outputs, s.first, s.second)
+    lists = (s.still, s.moving, s.late, s.free, s.outputs)
+    arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.first, s.second)
     kept += arrays
-    return _Series(*sizes, *[a.ctypes.data for a in arrays])
+    return _Series(len(s.rule), *map(len, lists), *[a.ctypes.data for a in arrays])
 
 
 class TapeEngine:

@@ -64,9 +64,9 @@ class Series:
         Rule, its arguments (vector and position of an input in a and b), its operation.
     first, second : ndarray
         Its numbers.
-    still, moving, late : ndarray of int32
-        Rules that are known once the parameters are, those advanced order by order, and those of them
-        that multipliers enter.
+    still, moving, late, free : ndarray of int32
+        Rules that are known once the parameters are, those advanced order by order, those of them
+        that multipliers enter, and those that suffice where nothing slides.
     outputs : ndarray of int32
     """
 
@@ -80,6 +80,7 @@ class Series:
     still: Integers
     moving: Integers
     late: Integers
+    free: Integers
     outputs: Integers
 
 
@@ -131,7 +132,7 @@ def tape_of(coupled: Coupled) -> Tape:
     output, moves, slopes = _moving_slopes(coupled)
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
     return Tape(
-        series=series_of([coupled.moving, p], [*coupled.outputs, slopes], x.numel()),
+        series=series_of([coupled.moving, p], [*coupled.outputs, slopes], x.numel(), (0, 2, 4)),
         point=values_of([coupled.moving, p], point),
         surfaces=values_of([x, p], [kept, surface_gradient[0]]),
         maps=values_of([x, p], [d.maps]),
@@ -175,13 +176,20 @@ def values_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Values:
     )
 
 
-def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], states: int) -> Series:
+def series_of(
+    inputs: Sequence[ca.SX],
+    outputs: Sequence[ca.SX],
+    states: int,
+    free: Sequence[int] = (),
+) -> Series:
     """Write the Taylor rules of expressions in two vectors, of which the first moves.
 
     Parameters
     ----------
     states : int
         So many of its entries are states; the others are multipliers.
+    free : sequence of int, optional
+        Outputs that are asked for where nothing slides.
     """
     outputs = [ca.densify(o) for o in outputs]
     nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
@@ -208,8 +216,20 @@ def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], states: int) ->
         still=_where(still, True),
         moving=_where(still, False),
         late=_integers([j for j in late if not still[j]]),
+        free=_reached(rules, still, [place[j] for k in free for j in rows[k]]),
         outputs=_integers([place[j] for row in rows for j in row]),
     )
+
+
+def _reached(rules: Sequence[Rule], still: Sequence[bool], roots: Sequence[int]) -> Integers:
+    """Rules that some follow from, in order, without those that are still."""
+    found, pending = set[int](), list(roots)
+    while pending:
+        j = pending.pop()
+        if j not in found and not still[j]:
+            found.add(j)
+            pending += rules[j].args
+    return _integers(sorted(found))
 
 
 def _is_still(rule: Rule) -> bool:

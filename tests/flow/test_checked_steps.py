@@ -10,7 +10,7 @@ import nonsmooth as ns
 
 x, y, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "lam"))
 
-ENGINES = ("reference", "compiled", "ensemble")
+ENGINES = ("reference", "auto", "compiled", "ensemble")
 
 
 def end(system, start, t_end, engine, tol=1e-10, **options):

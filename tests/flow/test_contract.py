@@ -10,7 +10,7 @@ from nonsmooth.flow.facts import KINDS
 x, y, v, w, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "w", "t", "lam"))
 G = 9.81
 
-engines = pytest.mark.parametrize("engine", ["reference", "compiled", "ensemble"])
+engines = pytest.mark.parametrize("engine", ["reference", "auto", "compiled", "ensemble"])
 
 
 def ends(system, start, t_end, engine, **options):
@@ -234,7 +234,7 @@ def test_a_reset_that_changes_side_is_one_event(engine):
     assert itinerary == "- + - + - + -" and abs(state[1] - 3.0) < 1e-12
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 def test_events_know_what_they_led_to(engine):
     run = ns.simulate(ramp(), [0.0, 0.0], 1.25, engine=engine)
     assert [(e.kind, e.name, e.mode_before, e.mode_after) for e in run.events] == [

@@ -15,7 +15,7 @@ FALL = ns.FilippovSystem(
     [x, v], field=[v, -2], resets=ns.Reset(x, [x, -v], direction=-1, name="floor")
 )
 FORCED = ns.FilippovSystem([x], field=[ca.cos(w * t)], parameters={w: 2.0}, time=t)
-ENGINES = ["reference", "compiled"]
+ENGINES = ["reference", "auto", "compiled"]
 
 
 @pytest.fixture(params=["simulate", "ensemble"])

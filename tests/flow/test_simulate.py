@@ -54,7 +54,7 @@ def test_limits_of_steps_are_those_of_the_whole_run(engines, monkeypatch):
     assert run.status is ns.Status.TOO_MANY_STEPS and len(run.steps.starts) == 50
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 @pytest.mark.parametrize(("start", "mode"), [(1.0, "-"), (-1.0, "+"), (1.0, "s")])
 def test_a_start_mode_on_another_side_than_the_point_is_refused(engine, start, mode):
     x = ca.SX.sym("x")

@@ -11,7 +11,7 @@ import nonsmooth as ns
 x, v, q, T = (ca.SX.sym(s) for s in ("x", "v", "q", "T"))
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 def test_a_ramp_compared_with_the_state_switches_as_pulse_width_modulation_does(engine):
     # x' = u - x, u = 1 while x < 1 - phase; within a period the switch is at an algebraic root
     clock = ns.Clock(1.0)

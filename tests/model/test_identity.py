@@ -71,7 +71,7 @@ def test_fields_that_are_nearly_equal_near_the_origin():
 
 
 @pytest.mark.parametrize("size", [1e-12, 1e-30, 1e-200, 1e30])
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 def test_small_fields_slide_as_large_ones(size, engine):
     system = ns.FilippovSystem(
         [x, y], surface=y, above=[size, -size], below=[2 * size, size], parameters={}
@@ -87,7 +87,7 @@ def test_coefficients_that_differ_by_rounding_are_the_same():
 
 
 @pytest.mark.parametrize("unit", [1e-13, 1e-9, 1e-3, 1e9])
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 def test_the_unit_of_the_states_does_not_matter(unit, engine):
     """Stick-slip with a tolerance in the same unit: the same itinerary and times."""
     v = y

@@ -118,7 +118,7 @@ def test_finite_time_to_a_teixeira_singularity():
     np.testing.assert_allclose(run.x[-1], 0.0, atol=1e-10)
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 def test_sliding_into_a_mixed_two_fold_is_not_taken_for_an_exit(engine):
     """mix-C, sigma = (+, +), nu = (-3, -1/2): a whole sector reaches s, none of it leaves there."""
     system = ns.FilippovSystem([x, y, z], surface=x, above=[-y, -1, -3], below=[z, -0.5, 1])
@@ -263,7 +263,7 @@ def test_a_stop_inside_the_singular_step_is_not_skipped():
     assert run.status is ns.Status.STOPPED and run.t[-1] == pytest.approx(1e-6, rel=1e-9)
 
 
-ENGINES = ["reference", "compiled"]
+ENGINES = ["reference", "auto", "compiled"]
 
 
 def rows(start, engine):

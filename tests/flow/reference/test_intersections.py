@@ -149,7 +149,7 @@ def test_an_intersection_is_left_at_any_tolerance(tol):
     assert abs(run.events[0].t - left) <= 10 * tol
 
 
-@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("engine", ["reference", "auto", "compiled"])
 def test_sliding_into_a_two_fold_of_one_of_two_surfaces(engine):
     """The other surface is far away: t* = -(1, 1) M^-1 z0 as with one surface, then no future."""
     x, y, z, w, one, two = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "one", "two"))

@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from .cache import Content
 from .coupled import coupled_of
 from .errors import DegenerateError
 from .evaluators import Evaluator
@@ -123,8 +124,13 @@ def event_map(
 
 def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap:
     """The map of a leg that ends where a function of states, parameters and time is zero."""
-    guard = Guard("zero", 0, 0, str(function)[:40])
-    return EventMap(system, explicit(system, mode).states, function, guard)
+    symbols = [system.extended_states, system.parameter_symbols]
+
+    def build() -> EventMap:
+        guard = Guard("zero", 0, 0, str(function)[:40])
+        return EventMap(system, explicit(system, mode).states, function, guard)
+
+    return system.cached(("function map", mode, Content(symbols, function)), build)
 
 
 def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.SX | None:

@@ -199,14 +199,25 @@ class VariationalField:
 
     def initial(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
         """The matrix (x, X, P) at the start of a leg, (N + k, 1 + N + q)."""
-        b = self.blocks
-        matrix = np.zeros((b.states, 1 + b.starts + b.parameters))
+        b, matrix = self.blocks, self._identity.copy()
         matrix[: b.starts, 0] = x
-        matrix[: b.starts, 1 : 1 + b.starts] = np.eye(b.starts)
         if b.states > b.starts:
             matrix[b.starts :, 0] = self._unknowns(x, p, unknowns)
             matrix[b.starts :, 1:] = self._multipliers.copied(matrix[:, 0], p)[0]
         return matrix
+
+    @cached_property
+    def _identity(self) -> Array:
+        b = self.blocks
+        matrix = np.zeros((b.states, 1 + b.starts + b.parameters))
+        matrix[: b.starts, 1 : 1 + b.starts] = np.eye(b.starts)
+        return matrix
+
+    def states_at(self, x: Array, p: Array) -> Array:
+        """The states (N + k,) of the leg at extended states (N,): with the multipliers that are states."""
+        if self.blocks.states == self.blocks.starts:
+            return x
+        return np.concatenate([x, self._unknowns(x, p, None)])
 
     def _unknowns(self, x: Array, p: Array, near: Array | None) -> Array:
         system, mode = self.motion.system, self.motion.mode

@@ -96,7 +96,7 @@ def _at_start(
     orders = [_order(system, guard, before) for guard in field.motion.guards]
     if all(order is None for order in orders):
         return []
-    y = variational_field(system, leg.mode).initial(x, p)[:, 0]
+    y = variational_field(system, leg.mode).states_at(x, p)
     rows = field.jets(y, p)[1]
     return [
         (Condition("start", i, guard), float(rows[k, order]))

@@ -78,7 +78,7 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     guards = field.motion.guards
     approaches: list[Approach] = []
     seen: list[list[tuple[float, float, float]]] = [[] for _ in guards]  # time, value, scale
-    y = variational_field(system, mode).initial(x, p)[:, 0]
+    y = variational_field(system, mode).states_at(x, p)
     t, margin = 0.0, _ENDS * duration
     for h, states, end in steps_for(field, y, p, duration):
         rows = field.jets.outputs[1].copy()
@@ -188,7 +188,7 @@ def _following_fault(
 ) -> str:
     """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
     field = guarded_field(system, following)
-    y = variational_field(system, following).initial(after, p)[:, 0]
+    y = variational_field(system, following).states_at(after, p)
     states, rows = field.starts.copied(y, p)
     slopes = field.gradients.copied(y, p)[0]
     for k, guard in enumerate(field.motion.guards):
@@ -218,7 +218,7 @@ def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) ->
         if g.name == leg.name and (g.kind != "exit" or leg.side in (0, g.side))
     )
     direction = guards[row].side if guards[row].kind in ("stop", "reset") else -1
-    y = variational_field(system, leg.mode).initial(x, p)[:, 0]
+    y = variational_field(system, leg.mode).states_at(x, p)
     t = 0.0
     for h, _, end in steps_for(field, y, p, t_max):
         c = field.jets.outputs[1][row].copy()

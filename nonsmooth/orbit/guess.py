@@ -172,7 +172,7 @@ def _problem(
             phase[-1] = 1.0
         else:
             field = legs[0].field(system)
-            rate = field.rate.copied(field.initial(starts[0], p)[:, 0], p)[0]
+            rate = field.rate.copied(field.states_at(starts[0], p), p)[0]
             phase = rate[: system.extended_dimension, 0] / float(np.linalg.norm(rate))
     problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
     return Start(problem, problem.pack(starts, durations), p)
@@ -299,6 +299,6 @@ def _letters(system: FilippovSystem, x: Array, p: Array) -> str:
 def _natural_time(system: FilippovSystem, x: Array, p: Array) -> float:
     """The time in which the state changes by its size."""
     field = Leg(_letters(system, x, p)).field(system)
-    rate = field.rate.copied(field.initial(x, p)[:, 0], p)[0][: system.dimension, 0]
+    rate = field.rate.copied(field.states_at(x, p), p)[0][: system.dimension, 0]
     size, speed = float(np.linalg.norm(x[: system.dimension])), float(np.linalg.norm(rate))
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

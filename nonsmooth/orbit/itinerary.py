@@ -223,7 +223,7 @@ class FixedItinerary:
             t, x = float(run.t[-1]), run.x[-1]
             if not fault and leg is not None:
                 at = system.extended_point(x, t)
-                y = leg.field(system).initial(at, p)[:, 0]
+                y = leg.field(system).states_at(at, p)
                 fault = change_fault(system, leg, self.modes[k + 1], y, at, p)
                 fault = f"{what}: {fault}" if fault else ""
             legs.append(leg or Leg(mode))
@@ -265,7 +265,7 @@ class FixedItinerary:
                 return f"{what}: {described(guard)} fails at t = {event.t:.6g}"
         middle = system.extended_point(run(0.5 * (start + end)), 0.5 * (start + end))
         p = system.parameter_vector(self.parameters)
-        y = variational_field(system, mode).initial(middle, p)[:, 0]
+        y = variational_field(system, mode).states_at(middle, p)
         values = guarded_field(system, mode).starts(y, p)[1][:, 0]
         for guard, value in zip(of_mode.guards, values, strict=True):
             if guard.kind in _NEAR and value <= 0.0:
@@ -333,7 +333,7 @@ class FixedItinerary:
             if k + 1 < len(arrival.legs):
                 at = leg.at_end(system, flown.end, p)
                 following = arrival.legs[k + 1].field(system)
-                y = following.initial(at.after, p)[:, 0]
+                y = following.states_at(at.after, p)
                 rate = following.rate.copied(y, p)[0][: system.extended_dimension, 0]
                 dx = saltation(at, flown.rate, rate, f"leg {k + 1} ({leg.mode})").matrix @ dx
         assert flown is not None

@@ -255,7 +255,7 @@ def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
         letters = "".join(choice)
         at = event_map(system, mode, event.name, 0, letters)
         x = _extended(system, event.x, event.t)
-        y = variational_field(system, mode).initial(x, p)[:, 0]
+        y = variational_field(system, mode).states_at(x, p)
         after = _extended(system, event.x_after, event.t)
         misses.append((float(np.abs(at(y, p).after - after).max()), letters))
     return min(misses)[1]
@@ -265,7 +265,7 @@ def _caused(
     system: FilippovSystem, leg: Leg, further: Sequence[Leg], x: Array, p: Array, t: float
 ) -> tuple[Leg, ...]:
     """The resets among events that follow at once, each of which the ones before must cause."""
-    y = leg.field(system).initial(x, p)[:, 0]
+    y = leg.field(system).states_at(x, p)
     kept: tuple[Leg, ...] = ()
     for then in further:
         at = replace(leg, further=kept).at_end(system, y, p)

@@ -149,7 +149,7 @@ def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
         flown, event, last = at.flown[i], at.events[i], i + 1 == count
         if leg.name:
             following = problem.legs[(i + 1) % count].field(problem.system)
-            start = following.initial(at.starts[(i + 1) % count], p)[:, 0]
+            start = following.states_at(at.starts[(i + 1) % count], p)
             after = following.rate.copied(start, p)[0][:n, 0]
             if last:
                 after = np.asarray(np.linalg.solve(problem.wrap, after), float)

@@ -17,6 +17,7 @@ mechanical systems", ch. 7; di Bernardo et al. 2008, "Piecewise-smooth dynamical
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 
 import numpy as np
@@ -82,22 +83,26 @@ def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> 
            [ 0. ,  0. ]])
     """
     speed = float(at.gradient @ before)
-    size = float(np.linalg.norm(at.gradient) * np.linalg.norm(before))
+    size = _length(at.gradient) * _length(before)
     angle = abs(speed) / size if size else 0.0
     carried = at.after_state @ before
     jump = after - carried
-    scale = max(float(np.linalg.norm(after)), float(np.linalg.norm(carried)))
-    continuous = float(np.linalg.norm(jump)) <= _CONTINUOUS * scale
+    scale = max(_length(after), _length(carried))
+    continuous = _length(jump) <= _CONTINUOUS * scale
     if angle < GRAZING and not continuous:
         raise DegenerateError(grazing(what, angle, at, jump))
-    with np.errstate(divide="ignore", invalid="ignore"):
-        time_x, time_p = -at.gradient / speed, -at.by_parameters / speed
+    rate = -1.0 / speed if speed else np.inf
+    time_x, time_p = rate * at.gradient, rate * at.by_parameters
     if continuous:
         matrix, by_parameters = at.after_state, at.after_parameters
     else:
-        matrix = at.after_state - np.outer(jump, time_x)
-        by_parameters = at.after_parameters - np.outer(jump, time_p)
+        matrix = at.after_state - jump[:, None] * time_x
+        by_parameters = at.after_parameters - jump[:, None] * time_p
     return Saltation(matrix, by_parameters, time_x, time_p, angle)
+
+
+def _length(v: Array) -> float:
+    return math.sqrt(float(v @ v))
 
 
 def grazing(what: str, angle: float, at: AtEvent, jump: Array) -> str:

@@ -24,7 +24,7 @@ from ..model import (
     real_array,
     require_system,
 )
-from ..model.event_maps import function_map
+from ..model.event_maps import EventMap, function_map
 from .itinerary import leg_between
 from .legs import Leg
 from .saltation import saltation
@@ -144,12 +144,24 @@ def gradient(
     parts = passages(run, chosen)
     p = system.parameter_vector(run.parameters)
     last = parts[-1]
-    function = read_function(system.definition, cost, "cost")
-    at = function_map(system, last.stretch.leg.mode, function)(last.flown.end, p)
+    at = _cost(system, last.stretch.leg.mode, cost)(last.flown.end, p)
     row, by_parameters = _pulled(parts, at.gradient, chosen, stopped=_stopped(last))
     by_parameters = by_parameters + at.by_parameters[list(chosen)]
     numbers = dict(zip(names, by_parameters.tolist(), strict=True))
     return Gradient(at.value, row[:n] + 0.0, numbers)
+
+
+def _cost(system: FilippovSystem, mode: str, cost: Any) -> EventMap:
+    """A cost as a function of the last leg's states, read once for the same expression object."""
+    known = getattr(cost, "element_hash", None)
+    if known is None or cost.numel() != 1:
+        return function_map(system, mode, read_function(system.definition, cost, "cost"))
+
+    def build() -> tuple[Any, EventMap]:
+        # the expression is kept, so that its hash stands for nothing else
+        return cost, function_map(system, mode, read_function(system.definition, cost, "cost"))
+
+    return system.cached(("cost", mode, known()), build)[1]
 
 
 def vjp(
@@ -252,7 +264,7 @@ def saltation_matrix(
     field, following = leg.field(system), Leg(after).field(system)
     y = field.initial(x, p)
     at = leg.at_end(system, y[:, 0], p)
-    start = following.initial(at.after, p)[:, 0]
+    start = following.states_at(at.after, p)
     rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
     size, n = system.extended_dimension, system.dimension
     matrix = saltation(at, rates[0], rates[1][:size], f"{leg.name!r} at {x[:n].tolist()}").matrix

@@ -106,13 +106,13 @@ def saltation_after(
     """
     if not part.leg.name:
         return None
-    system, n = run.system, run.system.extended_dimension
+    system, n = run.system, len(part.start)
     at = part.leg.at_end(system, flown.end, p)
     if part.leg.kind == "stop" or following is None:
         after = at.after_state @ flown.rate
     else:
         field = following.leg.field(system)
-        start = field.initial(at.after, p)[:, 0]
+        start = field.states_at(at.after, p)
         after = field.rate.copied(start, p)[0][:n, 0]
         if not np.all(np.isfinite(after)):
             after = at.after_state @ flown.rate

@@ -331,6 +331,16 @@ def _returned(T0, a, b, k, orbit):
     return T0
 
 
+def test_one_of_a_family_of_orbits() -> None:
+    # u keeps its size for ever, so every u > 1/2 has an orbit: a multiplier is 1.
+    x, u = ca.SX.sym("x"), ca.SX.sym("u")
+    jumps = [ns.Reset(x - 1, [x, -u], 1, "up"), ns.Reset(x + 1, [x, -u], -1, "down")]
+    relay = ns.FilippovSystem([x, u], field=[2 * u - x, 0], resets=jumps)
+    orbit = ns.periodic_orbit(relay, ns.simulate(relay, [0.0, 1.0], t_end=5.0))
+    assert orbit.period == pytest.approx(4 * math.atanh(0.5), rel=1e-13)
+    assert orbit.stability == "neutral to first order, 1 multiplier on the unit circle"
+
+
 # Bad input ---------------------------------------------------------------------------------------
 
 

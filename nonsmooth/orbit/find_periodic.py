@@ -106,8 +106,8 @@ def periodic_orbit(
     >>> c = 2.5 * np.sqrt(1 - (np.pi / 5)**2)
     >>> bool(abs(orbit.multipliers[0] - ((c - 1) / (c + 1))**2) < 1e-14)
     True
-    >>> print(orbit.itinerary, "|", orbit.stability)
-    - + | asymptotically stable
+    >>> orbit.stability
+    'asymptotically stable'
     """
     require_system(system)
     mirror = mirror_of(system, symmetry)
@@ -235,7 +235,8 @@ class _Solver:
             try:
                 step = -self.problem.solve(at.jacobian, at.residual)
             except np.linalg.LinAlgError:  # one of a family of orbits: the nearest
-                step = -np.linalg.lstsq(at.jacobian, at.residual, rcond=1e-12)[0]
+                least = np.linalg.lstsq(at.jacobian, at.residual, rcond=1e-12)[0]
+                step = -np.asarray(least, float)
             new = u + step
             if np.abs(step).max() <= 1e-15 * np.abs(u).max():
                 break

@@ -150,6 +150,10 @@ class EventCurve(Curve):
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         values, jacobian = self.base.equations(u)
+        known = self.base.test_row(self.name, u)
+        if known is not None:
+            value, slope = known
+            return np.append(values, value), np.vstack([jacobian, slope])
         test, row = self.secant(u / self.scale)
         return np.append(values, test), np.vstack([jacobian, row / self.scale])
 

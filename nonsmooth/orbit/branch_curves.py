@@ -50,6 +50,10 @@ class BranchCurve(Curve):
         """Further functions whose zeros on a curve of events are of codimension two."""
         return {}
 
+    def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
+        """A test and its derivatives by the unknowns, where few of them matter; else None."""
+        return None
+
     def named(self, test: str, u: Array) -> str:
         """The bifurcation at a zero of a test."""
         return test

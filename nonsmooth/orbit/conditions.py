@@ -62,13 +62,47 @@ def conditions_of(
             (Condition("duration", i), float(at.durations[i])),
             *_at_start(problem.system, i, leg, before, at.starts[i], p),
             *_at_end(problem, i, at, p),
-            *_interior(problem.system, i, leg, at, p),
+            *_interior(problem.system, i, leg, at.starts[i], float(at.durations[i]), p),
         ]
         for test, value in rows:
             known.setdefault(test.name, test)
             found[test.name] = value
     found.update(smooth_tests(problem, at))
     return {name: value for name, value in found.items() if np.isfinite(value)}
+
+
+def condition_row(
+    problem: BoundaryProblem, u: Array, p: Array, free: tuple[int, ...], condition: Condition
+) -> tuple[float, Array] | None:
+    """Value of a condition on one leg, and its derivatives by the unknowns and free parameters.
+
+    Only the start of its leg and the parameters matter, by which differences are taken; they steer
+    Newton's method, whose accuracy is that of the value. None for conditions on the end of a leg.
+    """
+    if condition.what not in ("interior", "start"):
+        return None
+    i, n = condition.leg, problem.dimension
+    starts, durations = problem.split(u)
+    duration, count = float(durations[i]), problem.size
+
+    def value(x: Array, q: Array) -> float:
+        if condition.what == "start":
+            before = problem.legs[i - 1]
+            rows = _at_start(problem.system, i, problem.legs[i], before, x, q)
+        else:
+            rows = _interior(problem.system, i, problem.legs[i], x, duration, q)
+        return dict((test.name, v) for test, v in rows).get(condition.name, np.nan)
+
+    row, x = np.zeros(count + len(free)), starts[i]
+    sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
+    for k in range(n):
+        step = sizes[k] * np.eye(n)[k]
+        row[i * n + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
+    for j, k in enumerate(free):
+        size = 1e-6 * max(abs(float(p[k])), 1e-3)
+        step = size * np.eye(p.size)[k]
+        row[count + j] = (value(x, p + step) - value(x, p - step)) / (2 * size)
+    return value(x, p), row
 
 
 def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
@@ -158,14 +192,13 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def _interior(
-    system: FilippovSystem, i: int, leg: Leg, at: Evaluation, p: Array
+    system: FilippovSystem, i: int, leg: Leg, x: Array, duration: float, p: Array
 ) -> list[tuple[Condition, float]]:
     """Smallest minimum of each guard inside a leg."""
-    duration = float(at.durations[i])
     if duration <= 0.0:
         return []
     least: dict[Guard, float] = {}
-    for near in watch(system, leg.mode, at.starts[i], duration, p).approaches:
+    for near in watch(system, leg.mode, x, duration, p).approaches:
         sign = -near.guard.side if near.guard.kind in ("stop", "reset") else 1
         value = (sign or 1) * near.value
         least[near.guard] = min(value, least.get(near.guard, np.inf))

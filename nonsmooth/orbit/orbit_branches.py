@@ -13,13 +13,13 @@ from collections.abc import Mapping
 import numpy as np
 
 from ..local.checks import positive
-from ..local.newton import Secant, converge
+from ..local.newton import converge
 from ..local.read_only import ReadOnly
 from ..model import Array, DefinitionError, NonsmoothError, explain, whole
 from .boundary import BoundaryProblem, Evaluation
 from .branch import Branch, BranchEvent, FarSide
 from .branch_curves import BranchCurve, check_bounds, follow_branch
-from .conditions import Condition, conditions_of, is_smooth
+from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .continuation import Departure, Point, Zero
 from .edits import Edited, edited, kind_of
 from .far_side import far_side
@@ -117,6 +117,12 @@ class OrbitCurve(BranchCurve):
         unknowns = np.array(u[: self.problem.size])
         return PeriodicOrbit(self.system, named(self.system, p), self.problem, unknowns, at, 0)
 
+    def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
+        if test not in self.known:
+            return None
+        p, unknowns = self.parameters_at(u), u[: self.problem.size]
+        return condition_row(self.problem, unknowns, p, self.free, self.known[test])
+
     def named(self, test: str, u: Array) -> str:
         if is_smooth(test) or test not in self.known:
             return test
@@ -202,21 +208,15 @@ class OrbitCurve(BranchCurve):
     def located(self, guess: Array, name: str) -> Point | None:
         """The orbit at which a test of this itinerary vanishes, near a guess."""
         scale = self.scale
-        self._last = None
-
-        def test(v: Array) -> Array:
-            u = v * scale
-            found = conditions_of(
-                self.problem, self.evaluation(u), self.parameters_at(u), self.known
-            )
-            return np.array([found.get(name, np.nan)])
-
-        secant = Secant(test, 1.0)
+        self.tests(Point(guess, np.zeros(guess.size)))  # what the conditions are
+        if name not in self.known or self.test_row(name, guess) is None:
+            return None
 
         def equations(v: Array) -> tuple[Array, Array]:
             values, jacobian = self.scaled(v)
-            value, row = secant(v)
-            return np.append(values, value), np.vstack([jacobian, row])
+            found = self.test_row(name, v * scale)
+            assert found is not None
+            return np.append(values, found[0]), np.vstack([jacobian, found[1] * scale])
 
         try:
             root = converge(equations, guess / scale, tol=1e-15, max_iterations=30)

@@ -41,7 +41,12 @@ def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
     """
     names = [k for k in a.tests if k in b.tests and a.tests[k] * b.tests[k] < 0]
     segment = _Segment(curve, a, b)
-    found = [_zero(segment, name) for name in names]
+    found: list[Zero | None] = []
+    for name in names:
+        twin = next((z for z in found if z is not None and segment.shares(z.point, name)), None)
+        found.append(
+            _zero(segment, name) if twin is None else Zero(name, twin.point, segment.slope(name))
+        )
     zeros = [zero for zero in found if zero is not None]
     lost = [n for n, zero in zip(names, found, strict=True) if zero is None and curve.ends(n)]
     lost = [n for n in lost if not segment.jumps(n)]
@@ -95,6 +100,11 @@ class _Segment:
     def slope(self, name: str) -> float:
         """Mean slope of a test over the step."""
         return (self.b.tests[name] - self.a.tests[name]) / (self.b.arclength - self.a.arclength)
+
+    def shares(self, point: Point, name: str) -> bool:
+        """Whether a test vanishes at the zero of another one, as events of a symmetric orbit do."""
+        size = max(abs(self.a.tests[name]), abs(self.b.tests[name]))
+        return abs(point.tests.get(name, np.inf)) <= 1e-10 * size
 
     def jumps(self, name: str) -> bool:
         """Whether a test changes its sign without passing small values, where it was followed."""

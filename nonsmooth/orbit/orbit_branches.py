@@ -22,11 +22,15 @@ from .branch_curves import BranchCurve, check_bounds, follow_branch
 from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .continuation import Departure, Point, Zero
 from .edits import Edited, edited, kind_of
+from .elimination import applies, eliminated
 from .far_side import far_side
 from .periodic import PeriodicOrbit, faults_of, named
 
 #: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
+
+#: Equations of more unknowns are solved from leg to leg.
+_MANY = 24
 
 #: What names an event of which several conditions vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
@@ -63,6 +67,7 @@ class OrbitCurve(BranchCurve):
         self.system, self.widths = problem.system, widths
         self.scale = np.append(problem.scales(u), widths)
         self.known: dict[str, Condition] = {}
+        self._many = problem.size > _MANY and applies(problem)
         self._last: tuple[bytes, Evaluation] | None = None
 
     # equations ----------------------------------------------------------------------------------
@@ -93,6 +98,17 @@ class OrbitCurve(BranchCurve):
     def equations(self, u: Array) -> tuple[Array, Array]:
         at = self.evaluation(u)
         return at.residual, np.hstack([at.jacobian, at.by_parameters])
+
+    def solve(self, matrix: Array, right: Array) -> Array:
+        if not self._many:
+            return super().solve(matrix, right)
+        return eliminated(self.problem, matrix, right).solution()
+
+    def determinant(self, matrix: Array) -> float:
+        if not self._many:
+            return super().determinant(matrix)
+        small = eliminated(self.problem, matrix, np.zeros(len(matrix))).matrix
+        return float(np.linalg.det(small))
 
     def tests(self, point: Point) -> Mapping[str, float]:
         return conditions_of(

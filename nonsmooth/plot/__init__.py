@@ -8,9 +8,11 @@ from . import style
 from .basin_map import (
     basins,
 )
+from .branches import bifurcation_curves, branch
 from .manifold_picture import (
     manifold,
 )
+from .orbits import multipliers, periodic_orbit
 from .phase_portrait import phase_portrait
 from .sliding_portrait import sliding_portrait
 from .trajectory import trajectory
@@ -20,7 +22,11 @@ from .two_fold_space import two_fold_3d
 
 __all__ = [
     "basins",
+    "bifurcation_curves",
+    "branch",
     "manifold",
+    "multipliers",
+    "periodic_orbit",
     "phase_portrait",
     "sliding_portrait",
     "style",

@@ -12,7 +12,7 @@ Sources: Keller 1977 (pseudo-arclength); Allgower & Georg 1990; Kuznetsov 2004, 
 
 from ...local.newton import Secant, Values, converge
 from .arc import Arc, ahead, trace
-from .curve import Curve, Point, along
+from .curve import Curve, Point
 from .pieces import Departure, changes_around, depart, directions, other_direction, pieces
 from .zeros import Zero
 
@@ -25,7 +25,6 @@ __all__ = [
     "Values",
     "Zero",
     "ahead",
-    "along",
     "changes_around",
     "converge",
     "depart",

@@ -130,7 +130,12 @@ class Curve:
             # exact derivatives converge quadratically: near a branch point rounding is magnified
             noise = 1e-8 if self.exact else 1e-11
             return converge(
-                bordered, start, tol=self.tol, max_iterations=max_iterations, noise=noise
+                bordered,
+                start,
+                tol=self.tol,
+                max_iterations=max_iterations,
+                linear=self.solve,
+                noise=noise,
             )
 
         try:
@@ -149,7 +154,7 @@ class Curve:
             return Point(u, chord, arclength, tests=dict(self.tests(plain)))
         try:
             _, jacobian = self.scaled(u / self.scale)
-            tangent, sign = along(jacobian, before)
+            tangent, sign = self.along(jacobian, before)
             tests: dict[str, float] = {}
             if self.parameter is not None:
                 tests["fold"] = float(tangent[self.parameter])
@@ -160,27 +165,33 @@ class Curve:
             return None
         return Point(u, tangent, arclength, jacobian, tests)
 
+    def solve(self, matrix: Array, right: Array) -> Array:
+        """Solve the equations of a corrector: the Jacobian, then the row across.
 
-def along(jacobian: Array, before: Array) -> tuple[Array, float]:
-    """Null vector of a Jacobian that continues ``before``, and the bordered determinant.
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+        """
+        return np.asarray(np.linalg.solve(matrix, right), float)
 
-    The determinant is that of the Jacobian bordered by the tangent: it changes sign at a simple
-    branch point.
+    def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
+        """Null vector of a Jacobian that continues ``before``, and a determinant.
 
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        At a branch point.
+        That of the Jacobian bordered by the tangent: it changes its sign at a simple branch point.
 
-    Examples
-    --------
-    >>> along(np.array([[0.0, 2.0]]), np.array([0.6, 0.8]))[0].tolist()
-    [1.0, 0.0]
-    """
-    bordered = np.vstack([jacobian, before])
-    target = np.zeros(before.size)
-    target[-1] = 1.0
-    tangent = np.linalg.solve(bordered, target)
-    length = float(np.linalg.norm(tangent))
-    sign, size = np.linalg.slogdet(bordered)
-    return np.asarray(tangent / length), float(sign) * float(np.exp(size)) * length
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+            At a branch point.
+        """
+        bordered = np.vstack([jacobian, before])
+        target = np.zeros(before.size)
+        target[-1] = 1.0
+        tangent = self.solve(bordered, target)
+        length = float(np.linalg.norm(tangent))
+        return tangent / length, self.determinant(bordered) * length
+
+    def determinant(self, matrix: Array) -> float:
+        """Determinant of bordered equations, up to a factor that keeps its sign."""
+        sign, size = np.linalg.slogdet(matrix)
+        return float(sign) * float(np.exp(size))

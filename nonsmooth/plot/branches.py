@@ -1,0 +1,294 @@
+"""Bifurcation diagrams: branches with stability and events, and curves in two parameters."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from itertools import groupby
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..local import Equilibrium
+from ..model import Array, DefinitionError, OptionError, explain
+from ..orbit import BifurcationCurve, Branch, PeriodicOrbit
+from . import style
+
+#: Marker and fill of each kind of event; shape tells them apart without colour.
+MARKERS = {
+    "fold": ("o", "white"),
+    "pseudo-saddle-node": ("o", style.GREY),
+    "branch point": ("P", "white"),
+    "Hopf": ("s", "white"),
+    "period doubling": ("s", style.YELLOW),
+    "Neimark-Sacker": ("s", style.SKY),
+    "pitchfork": ("P", style.YELLOW),
+    "boundary equilibrium": ("D", style.YELLOW),
+    "two-fold": ("X", style.PURPLE),
+    "grazing-sliding": ("v", style.ORANGE),
+    "crossing-sliding": ("^", style.SKY),
+    "switching-sliding": (">", style.GREEN),
+    "adding-sliding": ("<", style.PURPLE),
+    "impact grazing": ("v", style.VERMILLION),
+    "corner": ("d", "white"),
+}
+_OTHER = ("X", "white")
+_CURVES = (
+    style.BLUE,
+    style.VERMILLION,
+    style.GREEN,
+    style.PURPLE,
+    style.ORANGE,
+    style.SKY,
+    style.BLACK,
+)
+_DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), style.DASH_DOT, style.DOTS)
+_SAMPLES = 240
+
+Measure = str | Callable[[Any], float]
+
+
+def branch(
+    found: Branch | Sequence[Branch],
+    *,
+    against: Measure | None = None,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (6.4, 4.4),
+    legend: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw a bifurcation diagram: stable solutions as full lines, unstable ones dashed, events marked.
+
+    Parameters
+    ----------
+    found : Branch or sequence of Branch
+        From ``continue_equilibrium`` or ``continue_orbit``, in the same parameter.
+    against : str or callable, optional
+        What is drawn over the parameter: ``"period"``, the name of a state (of an orbit its largest
+        value), or a function of a solution. By default the period of autonomous orbits, otherwise
+        the first state.
+    ax : matplotlib Axes, optional
+        A new figure is made without it.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    DefinitionError
+        Not branches.
+    OptionError
+        An unknown state, or branches in several parameters.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[mu - x**2, 1 - y], below=[1, 1],
+    ...                       parameters={mu: 0.5})
+    >>> found = ns.continue_equilibrium(s, [0.7, 1.0], "mu", bounds=(-1, 1))
+    >>> figure = ns.plot.branch(found)
+    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
+    ('mu', 'x')
+    """
+    several = _branches(found)
+    measure, label = _measure(several[0], against)
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        looks: dict[str, Any] = {}
+        for one in several:
+            values = np.array([measure(solution) for solution in one.solutions])
+            for (name, look), part in _parts(one):
+                axes.plot(one.values[part], values[part], zorder=3, gid=name, **look)
+                looks[name] = style.line(look["color"], name, look["linewidth"], look["linestyle"])
+            for event in one.events:
+                shape, fill = MARKERS.get(event.kind, _OTHER)
+                height = measure(event.solution)
+                axes.plot(
+                    event.parameter,
+                    height,
+                    shape,
+                    markerfacecolor=fill,
+                    markeredgecolor=style.BLACK,
+                    markersize=7,
+                    zorder=5,
+                    gid=f"event {event.kind}",
+                )
+                looks[event.kind] = style.marker(shape, event.kind, fill)
+        axes.set(xlabel=several[0].parameter, ylabel=label, title=title or "")
+        axes.margins(0.05)
+        if legend:
+            axes.legend(handles=list(looks.values()), loc="best")
+    return figure
+
+
+def _branches(found: Any) -> list[Branch]:
+    several = [found] if isinstance(found, Branch) else list(found)
+    if not several or not all(isinstance(one, Branch) for one in several):
+        raise DefinitionError(
+            explain(
+                "found",
+                expected="a Branch or several",
+                received=repr(found)[:60],
+                advice="continue_equilibrium and continue_orbit return them.",
+            )
+        )
+    if len({one.parameter for one in several}) > 1:
+        raise OptionError(
+            explain(
+                "found",
+                expected="branches in one parameter",
+                received=", ".join(sorted({one.parameter for one in several})),
+                advice="Draw them in figures of their own.",
+            )
+        )
+    return several
+
+
+def _measure(one: Branch, against: Measure | None) -> tuple[Callable[[Any], float], str]:
+    """What is drawn, as a function of a solution, and its name."""
+    if callable(against):
+        return against, getattr(against, "__name__", "").replace("<lambda>", "")
+    system, orbits = one.nodes[0][0].system, isinstance(one.solutions[0], PeriodicOrbit)
+    if against is None:
+        against = "period" if orbits and not system.time_dependent else system.state_names[0]
+    if against == "period" and orbits:
+        return lambda orbit: float(orbit.period), "period"
+    if against not in system.state_names:
+        raise OptionError(
+            explain(
+                "against",
+                expected=f"a state {list(system.state_names)}{', period' * orbits} or a function",
+                received=repr(against),
+                advice="Leave it out for the default.",
+            )
+        )
+    k = system.state_names.index(against)
+    if not orbits:
+        return lambda at: float(np.asarray(getattr(at, "point", at))[k]), against
+    return lambda orbit: float(samples(orbit)[:, k].max()), f"max {against}"
+
+
+def samples(orbit: PeriodicOrbit) -> Array:
+    """States (m, n) along one period of an orbit."""
+    run = orbit.trajectory
+    return np.asarray(run(np.linspace(run.t[0], run.t[-1], _SAMPLES)))
+
+
+def _parts(one: Branch) -> Iterator[tuple[tuple[str, dict[str, Any]], slice]]:
+    """Stretches of one look, each with a node of the next so that lines join."""
+    names = [_look(solution)[0] for solution in one.solutions]
+    first = 0
+    for _, group in groupby(names):
+        last = first + len(list(group))
+        yield _look(one.solutions[first]), slice(first, min(last + 1, len(names)))
+        first = last
+
+
+def _look(solution: Any) -> tuple[str, dict[str, Any]]:
+    """How a solution is drawn, and what the legend says."""
+    if isinstance(solution, PeriodicOrbit):
+        stable = "asymptotically stable" in solution.stability or "super" in solution.stability
+        name, color = ("stable orbit" if stable else "unstable orbit"), style.BLUE
+    elif isinstance(solution, Equilibrium):
+        stable = solution.kind.startswith("stable") and solution.status != "virtual"
+        name = f"{'stable' if stable else 'unstable'} equilibrium of {solution.side}"
+        if solution.status == "virtual":
+            name = "virtual equilibrium"
+        color = style.FIELDS[solution.side]
+    else:
+        stable = bool(solution.stable) and solution.status == "real"
+        name, color = ("stable" if stable else "unstable") + " pseudo-equilibrium", style.BLACK
+        if solution.status == "virtual" and solution.margin > 1e-9:
+            name = "virtual pseudo-equilibrium"
+    dashes: Any = "-" if stable else style.DOTS if name.startswith("virtual") else style.DASHED
+    return name, dict(color=color, linestyle=dashes, linewidth=1.9 if stable else 1.4)
+
+
+def bifurcation_curves(
+    found: BifurcationCurve | Sequence[BifurcationCurve],
+    *,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (6.0, 4.8),
+    legend: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw curves of bifurcations in the plane of two parameters, with points of codimension two.
+
+    Parameters
+    ----------
+    found : BifurcationCurve or sequence of BifurcationCurve
+        From ``continue_bifurcation``, in the same two parameters.
+    ax : matplotlib Axes, optional
+        A new figure is made without it.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    DefinitionError, OptionError
+        Not curves, or curves in other parameters.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, a, b = (ca.SX.sym(s) for s in ("x", "y", "a", "b"))
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[a + b * x - x**3, 1 - y], below=[1, 1],
+    ...                       parameters={a: -1.0, b: 0.75})
+    >>> found = ns.continue_equilibrium(s, [-1.5, 1.0], "a", bounds=(-2, 2))
+    >>> cusp = ns.continue_bifurcation(found.events[0], ("a", "b"), bounds=[(-1, 1), (-1, 1)])
+    >>> figure = ns.plot.bifurcation_curves(cusp)
+    >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
+    ('a', 'b')
+    """
+    several = [found] if isinstance(found, BifurcationCurve) else list(found)
+    if not several or not all(isinstance(one, BifurcationCurve) for one in several):
+        raise DefinitionError(
+            "found: expected a BifurcationCurve or several, received "
+            f"{repr(found)[:60]}. continue_bifurcation returns them."
+        )
+    if len({one.parameters for one in several}) > 1:
+        raise OptionError(
+            "found: expected curves in the same two parameters, received "
+            f"{sorted({one.parameters for one in several})}. Draw them in figures of their own."
+        )
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        kinds = list(dict.fromkeys(one.kind for one in several))
+        handles: dict[str, Any] = {}
+        for one in several:
+            k = kinds.index(one.kind)
+            color, dashes = _CURVES[k % len(_CURVES)], _DASHES[k % len(_DASHES)]
+            axes.plot(*one.values.T, color=color, linestyle=dashes, linewidth=1.8, gid=one.kind)
+            handles[one.kind] = style.line(color, one.kind, 1.8, dashes)
+            for point in one.special:
+                axes.plot(
+                    *point.values, "o", color=style.BLACK, markersize=5.5, zorder=5, gid=point.kind
+                )
+                style.write(
+                    axes,
+                    point.values,
+                    f" {point.kind}",
+                    fontsize=8,
+                    ha="left",
+                    va="bottom",
+                    zorder=6,
+                )
+        axes.set(xlabel=several[0].parameters[0], ylabel=several[0].parameters[1])
+        axes.set_title(title or "")
+        axes.margins(0.06)
+        if legend:
+            axes.legend(handles=list(handles.values()), loc="best")
+    return figure

@@ -1,0 +1,206 @@
+"""Periodic orbits in their phase plane, and their multipliers beside the unit circle."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ..model import DefinitionError, OptionError, explain
+from ..orbit import Branch, PeriodicOrbit
+from . import style
+from .trajectory import draw_surfaces
+
+_MODES: dict[str, tuple[str, Any, float]] = {
+    "+": (style.ABOVE, "-", 1.8),
+    "-": (style.BELOW, (0, (5, 1.5)), 1.8),
+    "s": (style.BLACK, "-", 3.2),
+}
+_CYCLE = (style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.BLUE)
+_POINTS = 120  # of a leg
+
+
+def periodic_orbit(
+    orbit: PeriodicOrbit,
+    *,
+    states: Sequence[str] | None = None,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (5.4, 4.6),
+    legend: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw a periodic orbit in a plane of two states, with its modes and events.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit
+    states : two str, optional
+        Names of the states of the plane; the first two by default.
+    ax : matplotlib Axes, optional
+        For example that of a phase portrait, over which it is drawn. A new figure is made without
+        it; for a planar autonomous system with the surfaces.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+    title : str, optional
+        By default period and stability.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    DefinitionError, OptionError
+        Not a periodic orbit; unknown states.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    >>> block = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1 + 0.2 * (v - 0.5)],
+    ...                           below=[v, -x + 1 + 0.2 * (v - 0.5)])
+    >>> orbit = ns.periodic_orbit(block, ns.simulate(block, [0.3, 0.4], 30))
+    >>> figure = ns.plot.periodic_orbit(orbit)
+    >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
+    ['-', 's']
+    """
+    if not isinstance(orbit, PeriodicOrbit):
+        raise DefinitionError(
+            explain(
+                "orbit",
+                expected="a PeriodicOrbit",
+                received=repr(orbit)[:60],
+                advice="periodic_orbit(system, guess) finds one.",
+            )
+        )
+    system, names = orbit.system, list(states or orbit.system.state_names[:2])
+    if len(names) != 2 or not set(names) <= set(system.state_names):
+        raise OptionError(
+            explain(
+                "states",
+                expected=f"two names among {list(system.state_names)}",
+                received=repr(states),
+                advice="A system of one state has no plane: draw orbit.trajectory.",
+            )
+        )
+    i, j = (system.state_names.index(name) for name in names)
+    run = orbit.trajectory
+    with style.settings():
+        own = ax is None
+        figure, axes = style.axes_for(ax, size)
+        modes = list(dict.fromkeys(segment.mode for segment in run.segments))
+        looks = {mode: _look(mode, k) for k, mode in enumerate(modes)}
+        for segment in run.segments:
+            color, dashes, width = looks[segment.mode]
+            x = run(np.linspace(segment.t_start, segment.t_end, _POINTS))
+            axes.plot(x[:, i], x[:, j], color=color, linestyle=dashes, linewidth=width, zorder=6)
+            if segment.mode.count("s") == 0 and np.ptp(x[:, [i, j]], axis=0).max() > 0:
+                style.arrowhead(axes, x[:, [i, j]], 0.5, color, mutation_scale=11, zorder=7)
+        starts = np.array([leg.start[[i, j]] for leg in orbit.legs])
+        axes.plot(
+            *starts.T, "o", color="white", markeredgecolor=style.BLACK, markersize=4.5, zorder=8
+        )
+        axes.margins(0.08)
+        box = (*axes.get_xlim(), *axes.get_ylim())
+        if own and system.dimension == 2 and not system.time_dependent:
+            draw_surfaces(axes, system, orbit.parameter_vector, box)
+            axes.set(xlim=box[:2], ylim=box[2:])
+        axes.set(xlabel=names[0], ylabel=names[1])
+        axes.set_title(f"period {orbit.period:.6g}, {orbit.stability}" if title is None else title)
+        if legend:
+            handles = [style.line(c, m or "smooth", w, d) for m, (c, d, w) in looks.items()]
+            axes.legend(handles=handles, loc="best", title="mode")
+    return figure
+
+
+def _look(mode: str, k: int) -> tuple[str, Any, float]:
+    if mode in _MODES:
+        return _MODES[mode]
+    return _CYCLE[k % len(_CYCLE)], "-", 3.2 if "s" in mode else 1.8
+
+
+def multipliers(
+    found: PeriodicOrbit | Branch,
+    *,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (4.8, 4.6),
+    title: str | None = None,
+) -> Figure:
+    """Draw Floquet multipliers beside the unit circle; along a branch coloured by its parameter.
+
+    Parameters
+    ----------
+    found : PeriodicOrbit or Branch
+        Structural multipliers (1 of the flow, 0 of sliding) are drawn as crosses.
+    ax : matplotlib Axes, optional
+        A new figure is made without it.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    title : str, optional
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Raises
+    ------
+    DefinitionError
+        Neither an orbit nor a branch of orbits.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
+    >>> relay = ns.FilippovSystem([x], surface=x, time=t, parameters={a: 2.5},
+    ...                           above=[a * ca.cos(t) - 1], below=[a * ca.cos(t) + 1])
+    >>> figure = ns.plot.multipliers(ns.periodic_orbit(relay, [0.5]))
+    >>> figure.axes[0].get_xlabel()
+    'Re μ'
+    """
+    orbits = [found] if isinstance(found, PeriodicOrbit) else list(getattr(found, "solutions", ()))
+    if not orbits or not all(isinstance(orbit, PeriodicOrbit) for orbit in orbits):
+        raise DefinitionError(
+            explain(
+                "found",
+                expected="a PeriodicOrbit or a Branch of them",
+                received=repr(found)[:60],
+                advice="periodic_orbit and continue_orbit return them.",
+            )
+        )
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        circle = np.exp(1j * np.linspace(0, 2 * np.pi, 361))
+        axes.plot(circle.real, circle.imag, color=style.GREY, linewidth=1.2, zorder=1)
+        axes.axhline(0, color=style.GREY, linewidth=0.6, zorder=0)
+        axes.axvline(0, color=style.GREY, linewidth=0.6, zorder=0)
+        free, colors = [], []
+        for k, orbit in enumerate(orbits):
+            values = orbit.floquet.values
+            free.append(values[np.abs(values) > 0])
+            value = found.values[k] if isinstance(found, Branch) else 0.0
+            colors.append(np.full(free[-1].size, value))
+        points, shade = np.concatenate(free), np.concatenate(colors)
+        drawn = axes.scatter(
+            points.real,
+            points.imag,
+            c=shade if isinstance(found, Branch) else style.BLUE,
+            cmap="viridis" if isinstance(found, Branch) else None,
+            s=26,
+            edgecolors=style.BLACK,
+            linewidths=0.4,
+            zorder=4,
+            gid="multipliers",
+        )
+        structural = [0.0] * bool(orbits[-1].floquet.zeros)
+        structural += [1.0] * (not orbits[-1].system.time_dependent)
+        axes.plot(structural, np.zeros(len(structural)), "x", color=style.BLACK, zorder=5)
+        if isinstance(found, Branch):
+            figure.colorbar(drawn, ax=axes, label=found.parameter, shrink=0.8)
+        axes.set(xlabel="Re μ", ylabel="Im μ", title=title or "")
+        axes.set_aspect("equal")
+        axes.margins(0.08)
+    return figure

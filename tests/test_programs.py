@@ -61,3 +61,14 @@ def test_proof(tmp_path, monkeypatch, capsys):
     assert names["everything"].zeros[0].label == "II-C"
     printed = capsys.readouterr().out
     assert "exactly one two-fold" in printed and "itinerary + -" in printed
+
+
+@pytest.mark.slow
+def test_orbit(tmp_path, monkeypatch, capsys):
+    names = run("orbit", tmp_path, monkeypatch)
+    kinds = [event.kind for event in names["branch"].events]
+    assert kinds == ["adding-sliding", "grazing-sliding"]
+    assert names["orbit"].stability == "asymptotically stable"
+    assert (tmp_path / "branch.png").stat().st_size > 10_000
+    printed = capsys.readouterr().out
+    assert "grazing-sliding 25.118" in printed and "LyapunovSpectrum" in printed

@@ -186,6 +186,9 @@ def _half(
         assert isinstance(at, BranchCurve)
         points = arc.points[1:] if half.nodes else arc.points  # pieces share their ends
         half.nodes += [(at, point) for point in points]
+        last = known[id(arc.zeros[-1])] if arc.zeros and arc.zeros[-1].name == arc.end else None
+        if last is not None and last.curve is not at and last.point is not None:
+            half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
         found = [known[id(zero)] for zero in arc.zeros]
         half.events += [event for event in found if event is not None]
         half.end = end_of(arc)

@@ -129,7 +129,7 @@ def branch(
 
 
 def _branches(found: Any) -> list[Branch]:
-    several = [found] if isinstance(found, Branch) else list(found)
+    several = list(found) if isinstance(found, (list, tuple)) else [found]
     if not several or not all(isinstance(one, Branch) for one in several):
         raise DefinitionError(
             explain(
@@ -253,7 +253,7 @@ def bifurcation_curves(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('a', 'b')
     """
-    several = [found] if isinstance(found, BifurcationCurve) else list(found)
+    several = list(found) if isinstance(found, (list, tuple)) else [found]
     if not several or not all(isinstance(one, BifurcationCurve) for one in several):
         raise DefinitionError(
             "found: expected a BifurcationCurve or several, received "

@@ -1,0 +1,115 @@
+"""Bifurcation diagrams show every solution and event where it is, stable and unstable ones apart."""
+
+import casadi as ca
+import numpy as np
+import pytest
+from numpy.testing import assert_allclose
+
+import nonsmooth as ns
+
+x, y, t, a, b = (ca.SX.sym(s) for s in ("x", "y", "t", "a", "b"))
+BOX = [(-1, 1), (-1.5, 1)]
+
+
+@pytest.fixture(scope="module")
+def takens():
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y + 100,
+        above=[y, a + b * x + x**2 - x * y],
+        below=[1, 1],
+        parameters={a: 0.1, b: -1.0},
+    )
+    return ns.continue_equilibrium(system, [0.11, 0], "a", bounds=(-0.5, 0.5))
+
+
+@pytest.fixture(scope="module")
+def relay():
+    drive = a * ca.cos(t)
+    system = ns.FilippovSystem(
+        [x], surface=x, time=t, parameters={a: 2.5}, above=[drive - 1], below=[drive + 1]
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    return ns.continue_orbit(orbit, "a", bounds=(1.6, 2.2))
+
+
+def test_every_solution_is_on_a_line_and_every_event_on_a_marker(takens):
+    ax = ns.plot.branch(takens).axes[0]
+    lines = [line for line in ax.lines if not str(line.get_gid()).startswith("event")]
+    drawn = {(float(u), float(v)) for line in lines for u, v in zip(*line.get_data(), strict=True)}
+    wanted = {(v, s.point[0]) for v, s in zip(takens.values, takens.solutions, strict=True)}
+    assert drawn == wanted
+    for event in takens.events:
+        (mark,) = [line for line in ax.lines if line.get_gid() == f"event {event.kind}"]
+        assert_allclose([d[0] for d in mark.get_data()], [event.parameter, event.solution.point[0]])
+
+
+def test_stable_and_unstable_solutions_differ_without_colour(takens):
+    ax = ns.plot.branch(takens).axes[0]
+    styles = {line.get_gid(): line.get_linestyle() for line in ax.lines}
+    assert styles["stable equilibrium of +"] == "-"
+    assert styles["unstable equilibrium of +"] == "--"
+
+
+def test_orbits_are_drawn_by_their_largest_state_or_as_one_asks(relay):
+    ax = ns.plot.branch(relay).axes[0]
+    assert (ax.get_xlabel(), ax.get_ylabel()) == ("a", "max x")
+    heights = np.concatenate([line.get_ydata() for line in ax.lines])
+    assert heights.min() > 0.5
+    periods = ns.plot.branch(relay, against="period").axes[0]
+    assert_allclose(np.concatenate([line.get_ydata() for line in periods.lines]), 2 * np.pi)
+    lengths = ns.plot.branch(relay, against=lambda orbit: len(orbit.legs)).axes[0]
+    assert set(np.concatenate([line.get_ydata() for line in lengths.lines])) == {2, 4}
+
+
+def test_curves_in_two_parameters_with_their_special_points(takens):
+    curves = [ns.continue_bifurcation(e, ("a", "b"), bounds=BOX) for e in takens.events]
+    ax = ns.plot.bifurcation_curves(curves).axes[0]
+    for curve in curves:
+        (line,) = [one for one in ax.lines if one.get_gid() == curve.kind]
+        assert_allclose(np.column_stack(line.get_data()), curve.values)
+    marks = [line for line in ax.lines if line.get_gid() == "Bogdanov-Takens"]
+    assert marks and all(np.abs(m.get_data()).max() < 1e-9 for m in marks)
+    assert {text.get_text() for text in ax.get_legend().get_texts()} == {"Hopf", "fold"}
+
+
+def test_an_orbit_has_its_modes_and_lies_over_a_portrait():
+    block = ns.FilippovSystem(
+        [x, y],
+        surface=y - 0.5,
+        above=[y, -x - 1 + 0.2 * (y - 0.5)],
+        below=[y, -x + 1 + 0.2 * (y - 0.5)],
+    )
+    orbit = ns.periodic_orbit(block, ns.simulate(block, [0.3, 0.4], 30))
+    ax = ns.plot.periodic_orbit(orbit).axes[0]
+    drawn = np.concatenate([np.column_stack(line.get_data()) for line in ax.lines[:2]])
+    assert_allclose(drawn.max(axis=0), orbit.trajectory(np.linspace(0, 1, 2)).max(axis=0), atol=2)
+    assert np.abs(drawn[:, 1].max() - 0.5) < 1e-9  # it sticks to the belt and slips below it
+    under = ns.plot.phase_portrait(block, (-2, 2, -1, 1))
+    figure = ns.plot.periodic_orbit(orbit, ax=under.axes[0])
+    assert figure is under
+
+
+def test_multipliers_are_where_they_are_and_along_a_branch_coloured(relay):
+    (crossing,) = [o for o in [relay[2.1]] if len(o.legs) == 2]
+    ax = ns.plot.multipliers(crossing).axes[0]
+    (points,) = [c for c in ax.collections if c.get_gid() == "multipliers"]
+    assert_allclose(points.get_offsets()[:, 0], crossing.multipliers.real)
+    assert len(ns.plot.multipliers(relay).axes) == 2  # with a colour bar
+
+
+@pytest.mark.parametrize(
+    ("call", "error", "words"),
+    [
+        (lambda b: ns.plot.branch("branch"), ns.DefinitionError, "Branch"),
+        (lambda b: ns.plot.branch(b, against="z"), ns.OptionError, "against"),
+        (lambda b: ns.plot.branch([]), ns.DefinitionError, "Branch"),
+        (lambda b: ns.plot.bifurcation_curves(b), ns.DefinitionError, "BifurcationCurve"),
+        (lambda b: ns.plot.periodic_orbit(b), ns.DefinitionError, "PeriodicOrbit"),
+        (lambda b: ns.plot.multipliers(b), ns.DefinitionError, "PeriodicOrbit"),
+        (lambda b: ns.plot.branch(b, ax="axes"), ns.OptionError, "axes"),
+    ],
+)
+def test_bad_input(takens, call, error, words):
+    with pytest.raises(error, match=words):
+        call(takens)

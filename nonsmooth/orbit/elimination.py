@@ -25,12 +25,19 @@ class Small:
         Equations of the first start and the k parameters.
     starts, durations : list of (ndarray, ndarray), list of (ndarray, float)
         Of each leg as affine functions of these.
+    pivots : float
+        Product of the pivots of the durations, of rows of length 1.
     """
 
     matrix: Array
     right: Array
     starts: list[tuple[Array, Array]]
     durations: list[tuple[Array, float]]
+    pivots: float
+
+    def determinant(self) -> float:
+        """Of all equations, up to a factor that keeps its sign."""
+        return float(np.linalg.det(self.matrix)) * self.pivots
 
     def solution(self) -> Array:
         """All unknowns.
@@ -64,10 +71,12 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
     border = np.zeros((k, few))
     border[:, n:] = matrix[m:, m:]
     level = right[m:].copy()
+    pivots = 1.0
     small, rest = np.zeros((n, few)), np.zeros(n)
     for i in range(count):
         own, time = slice(i * n, (i + 1) * n), count * n + i
         row = matrix[time]
+        pivots *= float(row[time] / np.linalg.norm(row))
         b = -(row[own] @ a) / row[time]
         b[n:] -= row[m:] / row[time]
         d = float((right[time] - row[own] @ c) / row[time])
@@ -85,4 +94,4 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
             break
         diagonal = -np.diag(matrix[own, (i + 1) * n : (i + 2) * n])
         a, c = ahead / diagonal[:, None], constant / diagonal
-    return Small(np.vstack([small, border]), np.append(rest, level), starts, durations)
+    return Small(np.vstack([small, border]), np.append(rest, level), starts, durations, pivots)

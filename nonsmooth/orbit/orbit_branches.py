@@ -107,8 +107,7 @@ class OrbitCurve(BranchCurve):
     def determinant(self, matrix: Array) -> float:
         if not self._many:
             return super().determinant(matrix)
-        small = eliminated(self.problem, matrix, np.zeros(len(matrix))).matrix
-        return float(np.linalg.det(small))
+        return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
     def tests(self, point: Point) -> Mapping[str, float]:
         return conditions_of(

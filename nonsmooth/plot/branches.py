@@ -253,7 +253,7 @@ def bifurcation_curves(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('a', 'b')
     """
-    several = list(found) if isinstance(found, (list, tuple)) else [found]
+    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
     if not several or not all(isinstance(one, BifurcationCurve) for one in several):
         raise DefinitionError(
             "found: expected a BifurcationCurve or several, received "

@@ -36,3 +36,18 @@ def test_the_solution_is_that_of_a_dense_solver(borders):
         small = eliminated(problem, matrix, right)
         assert np.abs(small.solution() - wanted).max() < 1e-9 * np.abs(wanted).max()
         assert small.matrix.shape == (problem.dimension + k,) * 2
+
+
+def test_the_determinant_changes_its_sign_with_that_of_the_whole_matrix():
+    rng = np.random.default_rng(1)
+    for orbit in problems():
+        problem, p = orbit.problem, orbit.parameter_vector
+        at = problem.evaluate(orbit.unknowns, p, (0,))
+        upper = np.hstack([at.jacobian, at.by_parameters])
+        ratios = []
+        for _ in range(4):
+            matrix = np.vstack([upper, rng.normal(size=problem.size + 1)])
+            sign = np.linalg.slogdet(matrix)[0]
+            small = eliminated(problem, matrix, np.zeros(len(matrix)))
+            ratios.append(sign * np.sign(small.determinant()))
+        assert len(set(ratios)) == 1

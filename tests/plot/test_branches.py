@@ -30,7 +30,7 @@ def relay():
         [x], surface=x, time=t, parameters={a: 2.5}, above=[drive - 1], below=[drive + 1]
     )
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    return ns.continue_orbit(orbit, "a", bounds=(1.6, 2.2))
+    return ns.continue_orbit(orbit, "a", bounds=(1.6, 2.6))
 
 
 def test_every_solution_is_on_a_line_and_every_event_on_a_marker(takens):

@@ -1,0 +1,64 @@
+"""Blocks on a belt, each with a friction surface: up to four against an independent integrator, more by their
+symmetry."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+from .independent import blocks
+from .independent.integrator import Run
+
+
+def chain(k):
+    """The chain of ``independent.blocks``."""
+    q, v, lam = (ca.SX.sym(name, k) for name in ("q", "v", "lam"))
+    force = [
+        -blocks.SPRING * q[i]
+        - blocks.friction(k)[i] * lam[i]
+        + blocks.FALL * (v[i] - blocks.BELT)
+        + blocks.COUPLING * sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k)
+        for i in range(k)
+    ]
+    return ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(v)],
+        field=[*ca.vertsplit(v), *force],
+        surfaces=[v[i] - blocks.BELT for i in range(k)],
+        multipliers=ca.vertsplit(lam),
+    )
+
+
+@pytest.mark.parametrize("k", [1, 2, 3, 4])
+def test_blocks_agree_with_an_independent_integrator(k):
+    rng, t_end = np.random.default_rng(k), 15.0
+    starts = np.hstack([rng.normal(size=(2, k)), rng.uniform(-0.5, 0.2, (2, k))])
+    for start, path in zip(starts, Run(blocks.Blocks(starts), t_end).run(), strict=True):
+        run = ns.simulate(chain(k), start, t_end, tol=1e-12)
+        assert not path.trouble and run.itinerary == path.itinerary
+        assert len(path.times) >= k
+        assert np.abs(run.x[-1] - path.x).max() < 1e-9
+        times = [event.t for event in run.events[:-1]]
+        assert np.abs(np.array(times) - path.times).max() < 1e-9
+
+
+def test_a_long_chain_keeps_its_symmetry():
+    """Equal blocks that start at rest in a mirror image of themselves stay one, event by event."""
+    k = 12
+    q, v, lam = (ca.SX.sym(name, k) for name in ("q", "v", "lam"))
+    force = [
+        -0.1 * q[i] - lam[i] + sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k)
+        for i in range(k)
+    ]
+    system = ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(v)],
+        field=[*ca.vertsplit(v), *force],
+        surfaces=[v[i] - 0.3 for i in range(k)],
+        multipliers=ca.vertsplit(lam),
+    )
+    half = 0.1 * np.array([3.0, 1.0, 4.0, 1.0, 5.0, 9.0])
+    run = ns.simulate(system, [*half, *half[::-1], *[0.0] * k], 30.0)
+    assert run.status is ns.Status.REACHED_END and len(run.events) > 5
+    q_end, v_end = run.x[-1, :k], run.x[-1, k:]
+    np.testing.assert_allclose(q_end, q_end[::-1], atol=1e-9)
+    np.testing.assert_allclose(v_end, v_end[::-1], atol=1e-9)

@@ -9,7 +9,17 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
 
-from . import bounces, correctness, elsewhere, long_runs, report, resources, startup, two_folds
+from . import (
+    bounces,
+    chain,
+    correctness,
+    elsewhere,
+    long_runs,
+    report,
+    resources,
+    startup,
+    two_folds,
+)
 from .measure import ROOT, machine
 
 BOUNCES = ("linear", "nonlinear")
@@ -23,6 +33,7 @@ def sections(folder: Path, quick: bool) -> dict[str, Callable[[], Any]]:
         "bounces": lambda: {name: bounces.run(name, folder, quick) for name in BOUNCES},
         "long runs": lambda: long_runs.run(quick),
         "elsewhere": lambda: elsewhere.run(quick),
+        "chain": lambda: chain.run(quick),
         "two-folds": lambda: two_folds.run(quick),
         "startup": lambda: startup.run(quick),
         "memory": lambda: resources.memory(quick),

@@ -6,7 +6,7 @@ Friction falls with the speed of slip by b, so that blocks go on sticking and sl
 against a run of a tolerance a thousand times smaller; Siconos' is against the same run, and falls with
 its step h as O(h).
 
-``python -m benchmarks.chain [--blocks 100] [--t-end 100] [--engine compiled]`` prints the table alone.
+``python -m benchmarks.chain [--blocks 100] [--t-end 100] [--engine auto]`` prints the table alone.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ import numpy as np
 
 import nonsmooth as ns
 
-from .report import table
+from . import report
 
 K, V, B = 0.1, 0.3, 0.1
 VARIABLE = "BENCH_SICONOS_PYTHON"
@@ -39,7 +39,7 @@ def friction(count: int) -> np.ndarray:
 
 
 def start(count: int) -> np.ndarray:
-    """Displacements as in shared examples of chains, at rest."""
+    """Displacements that repeat every three blocks, at rest."""
     return np.concatenate([0.1 * (np.arange(count) % 3), np.zeros(count)])
 
 
@@ -99,7 +99,7 @@ def run(
     quick: bool,
     count: int = 100,
     t_end: float = 100.0,
-    engine: str = "compiled",
+    engine: str = "auto",
     steps: Sequence[float] = STEPS,
 ) -> dict[str, Any]:
     """Errors at t_end and processor seconds of both, for the steps of Siconos and our tolerance."""
@@ -123,35 +123,15 @@ def run(
     return result
 
 
-def markdown(section: dict[str, Any]) -> str:
-    """The table of a result."""
-    rows = []
-    for label, s in section.items():
-        if not isinstance(s, dict):
-            continue
-        if "missing" in s:
-            rows.append([label, "", "", s["missing"]])
-        for row in s.get("rows", []):
-            cells = [f"{row['tolerance']:g}", f"{row['error']:.1e}", f"{row['seconds']:.3g}"]
-            rows.append([label, *cells])
-    head = ["solver", "step or tolerance", f"error at t = {section['t_end']:g}", "s"]
-    events = section["nonsmooth"]["rows"][0]["events"]
-    same = "the same" if section["same itinerary"] else "another"
-    return (
-        f"{section['blocks']} blocks, {events} events, {section['status']}; {same} itinerary at a "
-        f"tolerance a thousand times smaller.\n\n" + table(head, rows)
-    )
-
-
 def main() -> None:
     """Print the table."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.chain", description=__doc__)
     parser.add_argument("--blocks", type=int, default=100)
     parser.add_argument("--t-end", type=float, default=100.0)
-    parser.add_argument("--engine", default="compiled", choices=["compiled", "reference"])
+    parser.add_argument("--engine", default="auto", choices=["auto", "compiled", "reference"])
     parser.add_argument("--steps", nargs="+", type=float, default=STEPS, help="of Siconos")
     o = parser.parse_args()
-    print(markdown(run(False, o.blocks, o.t_end, o.engine, o.steps)))
+    print(report.chain(run(False, o.blocks, o.t_end, o.engine, o.steps)))
 
 
 if __name__ == "__main__":

@@ -262,9 +262,30 @@ def _correct(section: dict[str, Any]) -> str:
     return found + ("\n\nThe wrong ones:\n\n" + "\n".join(wrong) if wrong else "")
 
 
+def chain(section: dict[str, Any]) -> str:
+    """The table of a result."""
+    rows = []
+    for label, s in section.items():
+        if not isinstance(s, dict):
+            continue
+        if "missing" in s:
+            rows.append([label, "", "", s["missing"]])
+        for row in s.get("rows", []):
+            cells = [f"{row['tolerance']:g}", f"{row['error']:.1e}", f"{row['seconds']:.3g}"]
+            rows.append([label, *cells])
+    head = ["solver", "step or tolerance", f"error at t = {section['t_end']:g}", "s"]
+    events = section["nonsmooth"]["rows"][0]["events"]
+    same = "the same" if section["same itinerary"] else "another"
+    return (
+        f"{section['blocks']} blocks, {events} events, {section['status']}; {same} itinerary at a "
+        f"tolerance a thousand times smaller.\n\n" + table(head, rows)
+    )
+
+
 _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "long runs": _long,
     "elsewhere": _elsewhere,
+    "chain": chain,
     "startup": _start,
     "scaling": _scaling,
     "memory": _memory,

@@ -2,14 +2,26 @@
 
 from __future__ import annotations
 
+import json
 import math
+import subprocess
 
 import mpmath as mp
 import numpy as np
 import pytest
 
 import nonsmooth as ns
-from benchmarks import bounces, correctness, measure, ours, problems, reference, report, two_folds
+from benchmarks import (
+    bounces,
+    chain,
+    correctness,
+    measure,
+    ours,
+    problems,
+    reference,
+    report,
+    two_folds,
+)
 from benchmarks.peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
 
 NAMES = ("linear", "nonlinear")
@@ -116,3 +128,26 @@ def test_ratios_and_tables():
     assert found["linear bounce: times scipy"] == pytest.approx(1500.0)
     rows = report._targets(results).splitlines()[2:]
     assert [row.split("|")[-2].strip() for row in rows] == ["met", "**missed**", "met"]
+
+
+def test_a_chain_is_the_same_for_siconos_and_us(monkeypatch):
+    """Its matrices give the field, and a run without Siconos says what is missing."""
+    count, given = 3, []
+    system, x = chain.chain(count), np.arange(6.0)
+
+    def peer(*_, **options):
+        given.append(json.loads(options["input"]))
+        return subprocess.CompletedProcess([], 0, '{"rows": []}', "")
+
+    monkeypatch.setattr(chain.subprocess, "run", peer)
+    chain.siconos("python", count, 1.0, [1e-2])
+    p = given[0]
+    for mode, lam in (("+++", 1.0), ("---", -1.0)):
+        ours = np.ravel(system.evaluate(system.field(mode), x))
+        push = np.array(p["push"]) @ np.full(count, -lam)  # Siconos' relay acts against the slip
+        theirs = np.array(p["matrix"]) @ x + p["offset"] + push
+        np.testing.assert_allclose(ours, theirs, atol=1e-14)
+    monkeypatch.delenv(chain.VARIABLE, raising=False)
+    found = chain.run(True, 2, 5.0, "reference")
+    assert found["same itinerary"] and found["nonsmooth"]["rows"][0]["error"] < 1e-9
+    assert chain.VARIABLE in report.chain(found)

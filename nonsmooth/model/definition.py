@@ -190,6 +190,29 @@ def _two_fields(
     return lam, ca.vertcat(*entries)
 
 
+def _direction(impact: Impact, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
+    """Direction of a reaction that is not given: the gradient of the gap's rate by the velocities."""
+    positions = _depends_on_each(gap, x)
+    push = ca.densify(ca.gradient(rate, x))
+    velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
+    if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
+        raise DefinitionError(
+            explain(
+                f"reaction of {impact.name!r}",
+                expected="reaction=, a symbol in the field",
+                received=f"none, and the rate {rate} of the gap, which is not linear in the states that "
+                "are not in the gap",
+                advice="The direction in which the contact pushes cannot be seen from it.",
+            )
+        )
+    return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
+
+
+def _depends_on_each(function: ca.SX, x: ca.SX) -> list[bool]:
+    """Which of some symbols an expression depends on."""
+    return [bool(ca.depends_on(function, x[i])) for i in range(x.numel())]
+
+
 def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Symbols of the reactions, and the field with those that were not in it."""
     given: list[ca.SX] = []
@@ -200,5 +223,5 @@ def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> t
         gap = column([impact.gap], f"gap of {impact.name!r}", 1)
         rate = ca.jtimes(gap, ca.vertcat(x, t), ca.vertcat(field, ca.SX.ones(t.numel(), 1)))
         given.append(ca.SX.sym(f"reaction{j}"))
-        field = field + given[-1] * ca.densify(ca.gradient(rate, x))
+        field = field + given[-1] * _direction(impact, gap, rate, x)
     return ca.vertcat(*given) if given else ca.SX(0, 1), field

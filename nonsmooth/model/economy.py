@@ -20,6 +20,8 @@ from .graph import Node, depends_on, instructions, operation
 Product = tuple[int, ...]  # factors, sorted; () is the constant term
 Sum = dict[Product, ca.SX]  # coefficients that do not depend on the variables
 
+_LEAST = 1e-100  # coefficients smaller than this, or larger than its inverse, stay where they are
+
 _DEPTH = 12  # coefficients count as equal when their expressions are, to this depth
 
 
@@ -133,10 +135,16 @@ class _Reader:
         """One scaling of a sum instead of one for each of its terms."""
         coefficient, product = self._single(j)
         new = coefficient * factor
+        if _is_extreme(new) and not factor.is_zero():
+            return {self._inside(j): factor}
         return {} if new.is_zero() else {product: new}
 
     def _product(self, a: int, b: int) -> Sum:
         total, factors = ca.SX(1), Product()
+        (c, product), (d, _) = self._single(a), self._single(b)
+        # The powers of a coefficient overflow or underflow before those of what it belongs to.
+        if _is_extreme(c * d) or (a == b and len(product) > 1 and not c.is_one()):
+            return {tuple(sorted(self._inside(a) + self._inside(b))): ca.SX(1)}
         for coefficient, product in (self._single(a), self._single(b)):
             # A square costs half as much as a product.
             whole = len(product) > 1 and (a == b or product in self._several)
@@ -153,10 +161,25 @@ class _Reader:
         ((product, coefficient),) = terms.items()
         return coefficient, product
 
+    def _inside(self, j: int) -> Product:
+        """Node j as one factor, its coefficient included."""
+        terms = self._sums[j]
+        if terms.keys() and next(iter(terms.values())).is_one() and len(next(iter(terms))) == 1:
+            return next(iter(terms))
+        self._sums[j] = {self._new(_Factor(None, (terms,))): ca.SX(1)}
+        return next(iter(self._sums[j]))
+
     def _as_factor(self, product: Product) -> Product:
         if product not in self.whole:
             self.whole[product] = self._new(_Factor(None, ({product: ca.SX(1)},)))
         return self.whole[product]
+
+
+def _is_extreme(coefficient: ca.SX) -> bool:
+    """Whether a number is so large or small that products with it leave the range of doubles."""
+    if not coefficient.is_constant():
+        return False
+    return not _LEAST < abs(float(coefficient)) < 1.0 / _LEAST
 
 
 def _add(a: Sum, b: Sum, subtract: bool) -> Sum:

@@ -167,3 +167,26 @@ def test_states_that_are_not_finite_end_the_run(engine):
     grows = ns.FilippovSystem([x], field=[x])
     state, status, _ = end(grows, [1.0], 1e300, engine)
     assert status is ns.Status.NOT_FINITE and np.all(np.isfinite(state))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("far", [1e8, -1e9])
+def test_far_from_zero_rounding_is_no_defect(far, engine):
+    """cos of a time or a state of 1e9 is known to 1e-7 only: no step of it agrees better."""
+    clock = ns.FilippovSystem([y], field=[ca.cos(t - far)], time=t)
+    state, status, _ = end(clock, [0.0], far + 5.0, engine, t_start=far)
+    assert status is ns.Status.REACHED_END and abs(state[0] - np.sin(5.0)) < 1e-15 * abs(far)
+    moved = ns.FilippovSystem([x, y], field=[1, ca.cos(x - far)])
+    state, status, _ = end(moved, [far, 0.0], 5.0, engine)
+    assert status is ns.Status.REACHED_END and abs(state[1] - np.sin(5.0)) < 1e-15 * abs(far)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_field_whose_first_steps_are_all_too_long_has_no_branch_point(engine):
+    """x^40 grows by more than its series shows at every step; in units of 1e9 its coefficients are below
+    the least double."""
+    far = swept(lambda u: (u / 1e9) ** 40)
+    state, status, _ = end(far, [0.0, 0.0], 2e9, engine)
+    assert status is ns.Status.REACHED_END and state[1] == pytest.approx(
+        1e9 * 2.0**41 / 41, rel=1e-8
+    )

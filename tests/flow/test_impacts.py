@@ -206,3 +206,26 @@ def test_wrong_impacts_are_refused():
         ns.FilippovSystem([y, v, x], field=[v, -G, r], impacts=ns.Impact(y, reaction=r))
     with pytest.raises(ns.DefinitionError, match=r"impacts\[0\]: expected a Impact"):
         ns.FilippovSystem([y, v], field=[v, -G], impacts=[ns.Stop(y)])
+
+
+@engines
+def test_a_curved_wall_pushes_along_its_normal(engine):
+    """Without reaction=: a bead that rests in a parabola, and one that oscillates at the inside of a circle
+    as a pendulum does, energy kept."""
+    bowl = ns.FilippovSystem([x, y, u, v], field=[u, v, 0, -G], impacts=ns.Impact(y - x**2))
+    run = ns.simulate(bowl, [0.1, 0.01, 0.0, 0.0], 3.0, engine=engine)
+    assert run.itinerary == "c" and abs(run.x[-1, 1] - run.x[-1, 0] ** 2) < 1e-12
+    energy = (run.x[:, 2] ** 2 + run.x[:, 3] ** 2) / 2 + G * run.x[:, 1]
+    np.testing.assert_allclose(energy, energy[0], atol=1e-9)
+    ring = ns.FilippovSystem([x, y, u, v], field=[u, v, 0, -G], impacts=ns.Impact(1 - x**2 - y**2))
+    swing = ns.simulate(ring, [0.1, -((1 - 0.01) ** 0.5), 0.0, 0.0], 4.0, engine=engine)
+    pendulum = ns.simulate(
+        ns.FilippovSystem([q, v], field=[v, -G * ca.sin(q)]), [np.arcsin(0.1), 0.0], 4.0
+    )
+    assert swing.itinerary == "c" and abs(swing.x[-1, 0] - np.sin(pendulum.x[-1, 0])) < 1e-8
+
+
+def test_a_reaction_whose_direction_cannot_be_seen_is_asked_for():
+    """A point that moves at speed v in the direction q before a wall: the gap's rate is v cos q."""
+    with pytest.raises(ns.DefinitionError, match="expected reaction=, a symbol in the field"):
+        ns.FilippovSystem([x, q, v], field=[v * ca.cos(q), 1, 0], impacts=ns.Impact(1 - x))

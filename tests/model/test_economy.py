@@ -109,3 +109,15 @@ def test_deep_graphs():
     for _ in range(1000):
         deep = ca.sin(0.9 * (deep * y + 0.5) * z + deep)
     assert_same([deep], rewrite(deep))
+
+
+@pytest.mark.parametrize("unit", [1e9, 1e-9])
+@pytest.mark.parametrize("power", [17, 36, 40])
+@pytest.mark.parametrize("named", [False, True])
+def test_coefficients_do_not_leave_the_range_of_doubles(unit, power, named):
+    """(x/unit)^power near x = unit is near one, though unit^power is no double."""
+    x, p = ca.SX.sym("x"), ca.SX.sym("p")
+    scale = p if named else unit
+    (rewritten,) = economise([x, p], [(x / scale) ** power], [True, False])
+    value = ca.Function("f", [x, p], [rewritten])(1.01 * unit, unit)
+    assert float(value) == pytest.approx(1.01**power, rel=1e-13)

@@ -152,16 +152,29 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
 /* Whether field and guards at a time of the step are those of the polynomials. */
 static int agrees(const Run *r, const Expansion *e, const double *allowed, const double *of_guards, double s,
                   double dt) {
-  double x[N], slope[N], f[N], g[NG1], ignored;
+  double x[N], slope[N], f[N], g[NG1], f_noise[N] = {0}, g_noise[NG1] = {0}, ignored;
   for (int i = 0; i < N; i++) x[i] = horner(e->states[i], P, s, &slope[i]);
   values(e->mode, x, r->q, f, g);
-  for (int i = 0; i < N; i++)
-    if (!(fabs(f[i] - slope[i]) * dt <= WRONG * allowed[i] + VANISHES * dt * fabs(slope[i]))) return 0;
-  for (int j = 0; j < GUARDS[e->mode]; j++) {
-    double miss = fabs(g[j] - horner(e->guards[j], P, s, &ignored));
-    if (!(miss <= WRONG * of_guards[j] + VANISHES * e->scale[j])) return 0;
+  for (int again = 0; again < 2; again++) {
+    int near = 1;
+    for (int i = 0; i < N; i++)
+      near &= fabs(f[i] - slope[i]) * dt <= WRONG * allowed[i] + dt * (VANISHES * fabs(slope[i]) + f_noise[i]);
+    for (int j = 0; j < GUARDS[e->mode]; j++) {
+      double miss = fabs(g[j] - horner(e->guards[j], P, s, &ignored));
+      near &= miss <= WRONG * of_guards[j] + VANISHES * e->scale[j] + g_noise[j];
+    }
+    if (near) return 1;
+    /* What rounding in the states, and in the time, makes of it: far from zero more than a tolerance. */
+    for (int k = 0; k < N && !again; k++) {
+      double kept = x[k], moved[N], guards[NG1];
+      x[k] += VANISHES * kept;
+      values(e->mode, x, r->q, moved, guards);
+      x[k] = kept;
+      for (int i = 0; i < N; i++) f_noise[i] += fabs(moved[i] - f[i]);
+      for (int j = 0; j < GUARDS[e->mode]; j++) g_noise[j] += fabs(guards[j] - g[j]);
+    }
   }
-  return 1;
+  return 0;
 }
 
 /* dt where the polynomials agree at the part ``end`` of a step and at points inside, else half of the
@@ -812,10 +825,12 @@ static void step(Run *r) {
   double safe = safe_length(r, &e, by_series), good;
   while (dt > 0 && (good = verified(r, &e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt)
     dt = good;
+  int shrinks = dt < wanted && !(r->mode == r->length_mode && dt > 0.9 * r->length);
+  r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;
-  r->shortened = larger(0, r->shortened + (dt < wanted ? 1 : -0.2));
-  if (r->shortened >= SHORTENED || (dt == 0 && wanted > 0)) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
+  int swallowed = dt < smaller(wanted, SHORTEST * larger(1, fabs(r->t)));
+  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
   if (dt < wanted) { row = -1; last = 0; }
   if (dt > 0) {
     note_sides(r, &e, dt);

@@ -72,8 +72,9 @@ class Modes(Protocol):
         """Jets at an extended state, with the multipliers of what slides."""
         ...
 
-    def at(self, e: Expansion, s: float) -> tuple[Array, Array, Array]:
-        """Field (N,), guards (m,) at the polynomials' state at time s; multipliers' errors."""
+    def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
+        """Field (N,), guards (m,) at the polynomials' state at time s, moved by ``nudge``;
+        multipliers' errors."""
         ...
 
     def gradient(self, mode: str, x: Array) -> Array:
@@ -224,9 +225,9 @@ class SeparateModes:
         """Multipliers are eliminated."""
         return unknowns
 
-    def at(self, e: Expansion, s: float) -> tuple[Array, Array, Array]:
+    def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
         """Field (N,), guards (m,) at the polynomials' state at time s; no multipliers."""
-        state = e.states @ powers(s, e.states.shape[1])
+        state = e.states @ powers(s, e.states.shape[1]) + nudge
         field, guards = self._evaluator("value", e.mode)(state, self._p)
         return field[:, 0], guards[:, 0] if guards.size else np.zeros(0), np.zeros(0)
 
@@ -315,13 +316,13 @@ class CoupledModes:
         """Not asked for: multipliers are series."""
         raise NotImplementedError
 
-    def at(self, e: Expansion, s: float) -> tuple[Array, Array, Array]:
+    def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
         """Field (N,), guards (m,) at the polynomials' state at time s; multipliers' errors."""
         powered = powers(s, e.states.shape[1])
         sliding = self.coupled.sliding(e.mode)
         unknowns = e.unknowns @ powered
         held = self.coupled.held(e.mode)
-        found = self.coupled.values(e.states @ powered, held, unknowns, self._p)
+        found = self.coupled.values(e.states @ powered + nudge, held, unknowns, self._p)
         field, layer, *others = found
         columns = [v[:, None] for v in (unknowns, layer, *others)]
         rows = self.coupled.rows(e.mode, *columns)

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import math
 import sys
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -219,9 +219,11 @@ class Stepper:
             if good == dt:
                 break
             dt = good
+        shrinks = dt < wanted and not (e.mode == self._mode and dt > 0.9 * self._length)
+        self._shortened = max(0.0, self._shortened + (1.0 if shrinks else -0.2))
         self._mode, self._length = e.mode, h if dt == wanted else dt
-        self._shortened = max(0.0, self._shortened + (1.0 if dt < wanted else -0.2))
-        if self._shortened >= SHORTENED or dt == 0.0 < wanted:
+        swallowed = dt < min(wanted, SHORTEST * max(1.0, abs(t)))
+        if self._shortened >= SHORTENED or swallowed:
             return Plan(0.0, [], False, messages.branch_point(t))
         if dt < wanted:
             return Plan(dt, [], False)
@@ -255,19 +257,47 @@ class Stepper:
 
     def _agrees(self, e: Expansion, s: float, dt: float, sign: float) -> bool:
         """Whether field and guards at a time s of a step dt are those of the polynomials."""
+        with np.errstate(over="ignore", invalid="ignore"):
+            found = [v.copy() for v in self.modes.at(e, s)]  # the next call overwrites them
+            return self._is_near(e, s, dt, sign, found) or self._is_near(
+                e, s, dt, sign, found, self._rounding(e, s, found)
+            )
+
+    def _is_near(
+        self,
+        e: Expansion,
+        s: float,
+        dt: float,
+        sign: float,
+        found: Sequence[Array],
+        rounding: Sequence[Array] = (np.zeros(1),) * 3,
+    ) -> bool:
+        """Whether what was found at a time s is what the polynomials say, to ``rounding``."""
+        (field, guards, drift), (of_field, of_guards, of_drift) = found, rounding
         degrees = np.arange(1, e.states.shape[1])
         powered = powers(s, e.states.shape[1])
-        with np.errstate(over="ignore", invalid="ignore"):
-            field, guards, drift = self.modes.at(e, s)
-            slope = e.states[:, 1:] @ (degrees * powered[:-1])
-            defect = np.abs(sign * field - slope) * dt
-            if not np.all(defect <= WRONG * e.allowed + VANISHES * dt * np.abs(slope)):
-                return False
-            if not np.all(drift <= WRONG * SAFETY * self.rtol + VANISHES):
-                return False
-            of_guards = e.guard_allowed + SAFETY * self.rtol * np.abs(e.guards[:, 0])
-            miss = np.abs(guards - e.guards @ powered)
-            return bool(np.all(miss <= WRONG * of_guards + VANISHES * e.scales))
+        slope = e.states[:, 1:] @ (degrees * powered[:-1])
+        defect = np.abs(sign * field - slope) * dt
+        allowed = WRONG * e.allowed + dt * (VANISHES * np.abs(slope) + of_field)
+        if not np.all(defect <= allowed):
+            return False
+        if not np.all(drift <= WRONG * SAFETY * self.rtol + VANISHES + of_drift):
+            return False
+        tolerated = e.guard_allowed + SAFETY * self.rtol * np.abs(e.guards[:, 0])
+        miss = np.abs(guards - e.guards @ powered)
+        return bool(np.all(miss <= WRONG * tolerated + VANISHES * e.scales + of_guards))
+
+    def _rounding(self, e: Expansion, s: float, found: Sequence[Array]) -> list[Array]:
+        """What rounding in the states, and in the time, makes of field, guards and multipliers at a time
+        s: far from zero (a time of 1e9) it is more than any tolerance."""
+        result = [np.zeros_like(v) for v in found]
+        state = e.states @ powers(s, e.states.shape[1])
+        for j in np.flatnonzero(state):
+            nudge = np.zeros_like(state)
+            nudge[j] = VANISHES * state[j]
+            for total, value, moved in zip(result, found, self.modes.at(e, s, nudge), strict=True):
+                total += np.abs(moved - value)
+        return result
 
     def singular_step(self, e: Expansion, h_max: float) -> tuple[Array, float]:
         """Short step from a point where high derivatives do not exist (a power law at zero).

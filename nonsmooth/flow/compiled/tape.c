@@ -80,7 +80,7 @@ typedef struct {
   const double *times;
   double *sample_t, *sample_x;
   /* programs' values, inputs, yardsticks */
-  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector;
+  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
   void *arena;
@@ -487,36 +487,60 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
   return h > FAR * natural ? FIRST * natural : INFINITY;
 }
 
-/* Whether field, guards and the layer's rates at a time of the step are those of the polynomials. */
-static int agrees(Run *r, const Expansion *e, double time, double dt) {
-  int n = r->n, w = r->width, order = r->order, stride = r->stride, slides = e->l.slides;
-  double *x = r->vector, *lam = x + n, *slope = lam + w, ignored;
-  for (int i = 0; i < n; i++) x[i] = horner(e->states + (int64_t)i * stride, order, time, &slope[i]);
-  for (int i = 0; i < w; i++) lam[i] = horner(e->series + (int64_t)i * stride, order, time, &ignored);
+/* Field (n), errors of the multipliers that slide, and guards at a state and multipliers. */
+static void sampled(Run *r, const Expansion *e, const double *x, const double *lam, double *found) {
+  int n = r->n, w = r->width, stride = r->stride, slides = e->l.slides;
   set_inputs(r, x, held_of(r, e->l.letter), lam);
   advance_series(r, &e->l, 0);
-  for (int i = 0; i < n; i++) {
-    double defect = fabs(row_of(r, i)[0] - slope[i]) * dt;
-    if (!(defect <= WRONG * e->allowed[i] + VANISHES * dt * fabs(slope[i]))) return 0;
-  }
-  for (int i = 0; i < slides; i++) {
-    double drift = 0;
+  for (int i = 0; i < n; i++) *found++ = row_of(r, i)[0];
+  for (int i = 0; i < slides; i++, found++) {
+    *found = 0;
     for (int j = 0; j < slides; j++) {
       double a = fabs(e->inverse[i * slides + j]);
-      if (a != 0) drift += a * fabs(row_of(r, n + e->l.sliding[j])[0]);
+      if (a != 0) *found += a * fabs(row_of(r, n + e->l.sliding[j])[0]);
     }
-    if (!(drift <= WRONG * SAFETY * r->o.rtol + VANISHES)) return 0;
   }
   double *g = r->work, *now = g + (int64_t)e->l.rows * stride;
   for (int i = 0; i < w; i++) now[(int64_t)i * stride] = lam[i];
   guard_rows(r, &e->l, now, 1, g);
-  for (int j = 0; j < e->l.rows - e->l.branches; j++) {
-    const double *c = e->guards + (int64_t)j * stride;
-    double of_guard = e->of_guards[j] + SAFETY * r->o.rtol * fabs(c[0]);
-    double miss = fabs(g[(int64_t)j * stride] - horner(c, order, time, &ignored));
-    if (!(miss <= WRONG * of_guard + VANISHES * e->scale[j])) return 0;
+  for (int j = 0; j < e->l.rows - e->l.branches; j++) *found++ = g[(int64_t)j * stride];
+}
+
+/* Whether field and guards at a time of the step are those of the polynomials. */
+static int agrees(Run *r, const Expansion *e, double time, double dt) {
+  int n = r->n, w = r->width, order = r->order, stride = r->stride, slides = e->l.slides;
+  int guards = e->l.rows - e->l.branches, all = n + slides + guards;
+  double *x = r->vector, *lam = x + n, *slope = lam + w, ignored;
+  double *found = r->sample, *noise = found + all, *moved = noise + all;
+  for (int i = 0; i < n; i++) x[i] = horner(e->states + (int64_t)i * stride, order, time, &slope[i]);
+  for (int i = 0; i < w; i++) lam[i] = horner(e->series + (int64_t)i * stride, order, time, &ignored);
+  sampled(r, e, x, lam, found);
+  memset(noise, 0, sizeof(double) * all);
+  for (int again = 0; again < 2; again++) {
+    int near = 1;
+    for (int i = 0; near && i < n; i++)
+      near = fabs(found[i] - slope[i]) * dt
+             <= WRONG * e->allowed[i] + dt * (VANISHES * fabs(slope[i]) + noise[i]);
+    for (int i = n; near && i < n + slides; i++)
+      near = found[i] <= WRONG * SAFETY * r->o.rtol + VANISHES + noise[i];
+    for (int j = 0; near && j < guards; j++) {
+      const double *c = e->guards + (int64_t)j * stride;
+      double of_guard = e->of_guards[j] + SAFETY * r->o.rtol * fabs(c[0]);
+      double miss = fabs(found[n + slides + j] - horner(c, order, time, &ignored));
+      near = miss <= WRONG * of_guard + VANISHES * e->scale[j] + noise[n + slides + j];
+    }
+    if (near) return 1;
+    /* What rounding in the states, and in the time, makes of it: far from zero more than a tolerance. */
+    for (int k = 0; k < n && !again; k++) {
+      double kept = x[k];
+      if (kept == 0) continue;
+      x[k] += VANISHES * kept;
+      sampled(r, e, x, lam, moved);
+      x[k] = kept;
+      for (int i = 0; i < all; i++) noise[i] += fabs(moved[i] - found[i]);
+    }
   }
-  return 1;
+  return 0;
 }
 
 /* dt where the polynomials agree at the part ``end`` of a step and at points inside, else half of the
@@ -1022,7 +1046,7 @@ static int rests(const Run *r, const int8_t *letter) {
 /* What is to be said of a point without a motion. */
 static int no_motion(Run *r, int contacts) {
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
-  else if (r->active_count == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
+  else if (r->active_count == 2 && r->n == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
   else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
   else finish(r, NON_UNIQUE, DEGENERATE, 0);
   return 0;
@@ -1504,10 +1528,12 @@ static void step(Run *r) {
   dt = row < 0 ? h : smaller(dt, h);
   double wanted = dt, safe = safe_length(r, e, by_series), good;
   while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
+  int shrinks = dt < wanted && !(r->mode == r->length_mode && dt > 0.9 * r->length);
+  r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;
-  r->shortened = larger(0, r->shortened + (dt < wanted ? 1 : -0.2));
-  if (r->shortened >= SHORTENED || (dt == 0 && wanted > 0)) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
+  int swallowed = dt < smaller(wanted, SHORTEST * larger(fabs(r->t), 1));
+  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
   if (dt < wanted) { row = -1; last = 0; }
   if (dt > 0) {
     note_sides(r, e, dt);
@@ -1605,6 +1631,7 @@ static size_t place_run(Run *r, char *base) {
   r->none = DOUBLES(w);
   r->slope = DOUBLES(square);
   r->vector = DOUBLES(3 * n + 2 * w);
+  r->sample = DOUBLES(3 * ((size_t)n + w + g));
   r->work = DOUBLES(2 * square + 4 * w + rows + g);
   r->gradient_row = DOUBLES((size_t)all * n + 2 * all);
   r->rates = DOUBLES(2 * all + c);

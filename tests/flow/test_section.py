@@ -58,6 +58,20 @@ def test_an_expression_in_states_is_a_section_and_its_start_is_no_hit(sample, en
         sample(TWO_SPRINGS, [-0.5, 0.0], 1.0, at=ns.Section(v - w, count=1))
 
 
+@pytest.mark.parametrize("engine", ["reference", "auto"])
+def test_impacts_and_contacts_are_sections(sample, engine):
+    # speed halves at each impact: the flights last 2, 1, 1/2, ... after a fall of 1
+    ball = ns.FilippovSystem([x, v], field=[v, -2], impacts=ns.Impact(x, restitution=0.5))
+    at = ns.Section("impact", count=3, after=True)
+    times, states, _ = sample(ball, [1.0, 0.0], 10.0, at=at, engine=engine)
+    assert np.allclose(times, [1.0, 2.0, 2.5], rtol=0, atol=1e-9)
+    assert np.allclose(states, [[0, 1], [0, 0.5], [0, 0.25]], rtol=0, atol=1e-9)
+    times, states, _ = sample(
+        ball, [1.0, 0.0], 10.0, at=ns.Section("contact", count=1), engine=engine
+    )
+    assert np.allclose(times, [3.0], rtol=0, atol=1e-6) and np.allclose(states, 0.0, atol=1e-6)
+
+
 def test_a_section_written_as_a_surface_is_that_surface_where_motion_may_slide():
     dry = ns.FilippovSystem([x, v], surface=v - 0.3, multipliers=lam, field=[v, -x - 0.4 * lam])
     plain = ns.simulate(dry, [0.0, 0.0], 20.0)

@@ -817,6 +817,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
     r->out.event_guard[k] = guard;
   }
   if (r->o.hit_kinds && guard >= 0) count_hit(r, kind, r->met.kind, r->met.index, r->met.side, x);
+  if (r->o.hit_kinds && guard < 0) count_hit(r, kind, IMPACT_GUARD, 0, 0, x); /* impacts that accumulated */
   if (kind == END || kind == STOP) return;
   int at = r->history++ % HISTORY;
   r->interval[at] = r->t - r->last_event;

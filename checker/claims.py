@@ -29,7 +29,7 @@ class Equations:
         size = self.n + self.further
         unit = [[whole(int(i == j)) for j in range(size)] for i in range(size)]
         zero = [[whole(0)] * size for _ in range(size)]
-        x = [D(Iv.of(v), unit[i], zero) for i, v in enumerate(self.record["held"])]
+        x = [D(Iv.of(*v), unit[i], zero) for i, v in enumerate(self.record["held"])]
         more = [D(whole(0), unit[self.n + k], zero) for k in range(self.further)]
         for (vector, i), value in zip(self.unknowns, u, strict=True):
             target = x if vector == 0 else more

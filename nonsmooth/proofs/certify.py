@@ -30,7 +30,7 @@ def certify(
     system: FilippovSystem | None = None,
     width: float = 1e-12,
     parameters: Mapping[Any, Any] | None = None,
-    hold: Sequence[str] = (),
+    hold: Sequence[str] | Mapping[str, Any] = (),
     numbers: Numbers = "stored",
     max_bits: int = 2048,
     max_pieces: int = 64,
@@ -52,8 +52,8 @@ def certify(
     parameters : mapping, optional
         Values, as numbers or strings, or pairs (low, high): the theorem is then for all of them.
         The others have the value they had in the search, or their default.
-    hold : sequence of str, optional
-        States that keep their value.
+    hold : sequence of str, or mapping, optional
+        States that keep their value, or have that given, or any of an interval (low, high).
     numbers : {"stored", "written"}
         Whether the constant 0.1 is the double nearest to one tenth, or one tenth.
     max_bits : int, optional
@@ -170,7 +170,7 @@ def prove_subject(subject: Subject, zero: Zero, width: float, max_bits: int = 10
 
 
 def _wide(subject: Subject) -> bool:
-    return any(a < b for a, b in subject.parameters)
+    return any(a < b for a, b in (*subject.parameters, *subject.values))
 
 
 def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits: int) -> Proof:
@@ -242,7 +242,7 @@ def _where(subject: Subject) -> str:
     described = subject.question.described
     free = {i for vector, i in subject.unknowns if vector == 0}
     names = [*described.system.state_names, "t"]
-    held = [f"{names[i]} = {given(v, v)}" for i, v in enumerate(subject.values) if i not in free]
+    held = [intervals({names[i]: given(*v)}) for i, v in enumerate(subject.values) if i not in free]
     text = f" with {', '.join(held)}" if held else ""
     if subject.normals:
         text += (

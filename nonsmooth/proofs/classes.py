@@ -11,7 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
-from .arithmetic import sign
+from .arithmetic import hull, sign
 from .flint import arb
 
 FOLDS = {(1, -1): "VV", (-1, 1): "II", (1, 1): "VI", (-1, -1): "IV"}
@@ -57,11 +57,12 @@ def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass
         )
     if coincident:
         l12, l21 = _both(l12, l22), _both(l21, l11)
-    root = abs(l11 * l22).sqrt()
+    size = _product(abs(l11), abs(l22))
+    root = size.sqrt()
     delta = arb(0) if coincident else l11 * l22 - l12 * l21
     trace = l12 - l21
     lean = s[0] * (-l21 - l12)  # g = lean/root
-    gap = lean * lean - 4 * abs(l11 * l22)
+    gap = lean * lean - 4 * size
     # Where L1j = L2j, g = -(|L11| + |L22|)/root <= -2.
     above = -1 if coincident or lean < 0 or gap < 0 else 1 if lean > 0 and gap > 0 else 0
     jordan = not coincident and bool(lean > 0 and gap.is_zero())
@@ -71,7 +72,11 @@ def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass
     if jordan:
         between = {-1: "mix-0|mix-C", 1: "mix-0|mix-F"}.get(sign(trace), "")
         label = f"boundary disc=0: {between}" if FOLDS[s] in ("VI", "IV") and between else label
-    numbers = _numbers(l12 / root, -l21 / root, delta / abs(l11 * l22), sign(trace))
+    nu1, nu2 = l12 / root, -l21 / root
+    if coincident:  # nu1 nu2 = -sigma1 sigma2, and both numbers follow from one ratio
+        nu1 = s[1] * _ratio(abs(l22), abs(l11)).sqrt()
+        nu2 = -s[0] * _ratio(abs(l11), abs(l22)).sqrt()
+    numbers = _numbers(nu1, nu2, delta if coincident else delta / size, sign(trace))
     why = (
         ""
         if label
@@ -81,6 +86,16 @@ def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass
         )
     )
     return ProvenClass(s, label, why, numbers)
+
+
+def _product(a: arb, b: arb) -> arb:
+    """Of positive numbers, from both ends: wide ones stay positive."""
+    return hull(a.lower() * b.lower(), a.upper() * b.upper())
+
+
+def _ratio(a: arb, b: arb) -> arb:
+    """Of positive numbers, from both ends."""
+    return hull(a.lower() / b.upper(), a.upper() / b.lower())
 
 
 def _both(a: arb, b: arb) -> arb:

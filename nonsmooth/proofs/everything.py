@@ -158,7 +158,7 @@ def _subject(
                 else "Give more states a range.",
             )
         )
-    values = [v[0] if isinstance(v, tuple) else v for v in ranges]
+    values = [(v[0], v[0]) if isinstance(v, tuple) else (v, v) for v in ranges]
     return Subject(
         question,
         [0.0] * unknown,

@@ -46,13 +46,17 @@ class Follower:
     p : sequence of arb
         Parameters.
     order : int
+    on_surface : bool
+        Whether every start is on the surface, exactly.
     """
 
-    def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
+    def __init__(
+        self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int, on_surface: bool
+    ):
         self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)
         self._adopt(list(x))
         self.t, self.steps, self.events, self.smallest = arb(0), 0, list[Met](), 0.0
-        self.mode, zeros = self._first_mode(list(x))
+        self.mode, zeros = self._first_mode(list(x), on_surface)
         self.zeros: dict[int, int] = {}
         self.signs: dict[int, int] = {}
         self._watch_afresh(zeros)
@@ -81,11 +85,11 @@ class Follower:
 
     # modes and guards ----------------------------------------------------------------------------
 
-    def _first_mode(self, x: list[arb]) -> tuple[str, int]:
+    def _first_mode(self, x: list[arb], on_surface: bool) -> tuple[str, int]:
         h, l1, l2 = self.modes.surface(x, self.p)
         if sign(h):
             return "+" if h > 0 else "-", 0
-        if h.is_zero():
+        if on_surface:
             found = beyond(l1, l2)
             if found:
                 return found

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
@@ -12,8 +13,12 @@ from .algebra import Difference
 from .arithmetic import Enclosures, Numbers
 from .described import Described
 from .flint import arb, arb_mat
+from .rationals import is_zero
 from .series import along, coefficients
 from .tape import Program, Tape
+
+#: Exact ends of an interval.
+Range = tuple[Fraction, Fraction]
 
 
 @dataclass(frozen=True)
@@ -237,6 +242,11 @@ class Modes:
     def surface(self, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
         """h, L1 and L2."""
         return self._surface(Enclosures([x, p, []], self.numbers))[0]
+
+    def starts_on_surface(self, x: Sequence[Range], p: Sequence[Range]) -> bool:
+        """Whether h is zero at exact starts; what has a width counts as unknown."""
+        inputs = [[a if a == b else None for a, b in vector] for vector in (x, p)]
+        return is_zero(Program(self.tape, [[self.described.h]]), inputs, self.numbers)
 
     def jump(self, watch: Watch, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
         """The state after a reset."""

@@ -146,7 +146,8 @@ def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> OrbitProof:
     x = enclosed([*begin.start, *moving])
     try:
         order = max(12, int(ctx.prec * 0.3))
-        follower = Follower(modes, x, enclosed(begin.ranges), order=order)
+        on_surface = modes.starts_on_surface([*begin.start, *moving], begin.ranges)
+        follower = Follower(modes, x, enclosed(begin.ranges), order, on_surface)
         follower.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
         while not status:
             if follower.steps >= max_steps:

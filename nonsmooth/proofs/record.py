@@ -63,7 +63,7 @@ def asked(subject: Any, coincident: bool = False) -> dict[str, Any]:
         "states": len(subject.values),
         "names": list(subject.names),
         "unknowns": [list(place) for place in subject.unknowns],
-        "held": [text(v) for v in subject.values],
+        "held": [[text(v) for v in pair] for pair in subject.values],
         "normals": [[text(v) for v in row] for row in subject.normals],
         "through": [text(v) for v in subject.through],
         "parameters": [[text(v) for v in pair] for pair in subject.parameters],

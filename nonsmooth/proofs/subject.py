@@ -31,7 +31,7 @@ class Subject:
     unknowns : list of (int, int)
         Vector and position among the inputs.
     names : list of str
-    values : list of Fraction
+    values : list of (Fraction, Fraction)
         Extended states, for those that are held.
     normals, through : planes across sets of such points.
     parameters : list of (Fraction, Fraction)
@@ -42,7 +42,7 @@ class Subject:
     start: list[float]
     unknowns: list[tuple[int, int]]
     names: list[str]
-    values: list[Fraction]
+    values: list[tuple[Fraction, Fraction]]
     normals: list[list[Fraction]]
     through: list[Fraction]
     parameters: list[tuple[Fraction, Fraction]]
@@ -57,7 +57,7 @@ class Subject:
         tape = self.question.described.tape
         inputs = [tape.symbol(*place) for place in self.unknowns if place[0] == 0]
         nodes = [*self.question.nodes, *plane(tape, inputs, self.normals, self.through)]
-        held = [enclosed([(v, v) for v in self.values]), enclosed(self.parameters)]
+        held = [enclosed(self.values), enclosed(self.parameters)]
         held.append([arb(0)] * len(self.question.further))
         return Equations(tape, nodes, self.unknowns, self.names, held, self.numbers)
 
@@ -65,7 +65,7 @@ class Subject:
 def subject_of(
     found: Any,
     system: FilippovSystem | None,
-    hold: Sequence[str],
+    hold: Sequence[str] | Mapping[str, Any],
     numbers: Numbers,
     parameters: Mapping[Any, Any] | None,
 ) -> Subject:
@@ -100,7 +100,10 @@ def subject_of(
     question = QUESTIONS[kind](described, numbers, getattr(found, "side", "+"))
     point = [float(v) for v in found.point]
     point += [float(getattr(found, "t", 0.0))] if system.time_dependent else []
-    free = unknowns(system, hold, 1, kind)
+    free = unknowns(system, list(hold) if not isinstance(hold, str) else hold, 1, kind)
+    held = _held(system, hold, numbers)
+    for i, (low, high) in held.items():
+        point[i] = float((low + high) / 2)
     extra = [1 - 2 * found.alpha] if isinstance(found, PseudoEquilibrium) else []
     normals = _across(question, point, free, parameter_ranges(system, given, numbers), numbers)
     return Subject(
@@ -108,12 +111,33 @@ def subject_of(
         [point[i] for i in free] + extra,
         [(0, i) for i in free] + [(2, k) for k in range(len(extra))],
         [system.state_names[i] for i in free] + [name for name, *_ in question.further],
-        [exact(v, numbers) for v in point],
+        [held.get(i, (exact(v, numbers),) * 2) for i, v in enumerate(point)],
         normals,
         [exact(point[i], numbers) for i in free],
         parameter_ranges(system, given, numbers),
         numbers,
     )
+
+
+def _held(
+    system: FilippovSystem, hold: Sequence[str] | Mapping[str, Any], numbers: Numbers
+) -> dict[int, tuple[Fraction, Fraction]]:
+    """Values and ranges given for held states."""
+    found = {}
+    for name, value in hold.items() if isinstance(hold, Mapping) else ():
+        ends = value if isinstance(value, (tuple, list)) else (value, value)
+        fractions = [exact(v, numbers, f"hold of {name!r}") for v in ends]
+        if len(fractions) != 2 or fractions[0] > fractions[1]:
+            raise OptionError(
+                explain(
+                    f"hold of {name!r}",
+                    expected="a number or (low, high) with low <= high",
+                    received=repr(value),
+                    advice="A sequence of names holds states at the values of the point.",
+                )
+            )
+        found[system.state_names.index(name)] = fractions[0], fractions[1]
+    return found
 
 
 def _across(

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 
 from .. import program
 from ..pictures import save
-from . import equations, errata, figures, report, results, table
+from . import equations, errata, figures, report, results, table, theorems
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     folder = program.folder_of("biber_2022", arguments)
     steps = [
         *[("erratum", lambda n=n: errata.erratum(n)) for n in range(1, len(errata.ALL) + 1)],
-        *[("claim", compute) for compute in results.ALL],
+        *[("claim", compute) for compute in (*results.ALL, *theorems.ALL)],
         *[("equation", compute) for compute in equations.ALL],
         *[("figure", lambda p=p: save(p, folder)) for p in figures.PICTURES],
     ]

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from papers.biber_2022 import __main__ as program
-from papers.biber_2022 import equations, errata, figures, results, table
+from papers.biber_2022 import equations, errata, figures, results, table, theorems
 from papers.biber_2022.errata_general import fold_of
 from papers.biber_2022.exact import evaluate, identical
 from papers.biber_2022.model import LAWS, linear
@@ -45,12 +45,15 @@ VERDICTS = {
     "one-canard": "agrees",
     "rigid-limit": "agrees",
     "topspin-or-slip": "corrected",
+    "proven-nu-product": "corrected",
+    "proven-class": "agrees",
+    "proven-slip-reversal": "agrees",
 }
 
 
 @pytest.fixture(scope="module")
 def claims():
-    return list(results.claims())
+    return [*results.claims(), *(compute() for compute in theorems.ALL)]
 
 
 @pytest.mark.parametrize("number", range(1, len(errata.ALL) + 1))

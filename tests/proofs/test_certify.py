@@ -218,3 +218,16 @@ def test_without_the_package_the_error_says_what_to_install():
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "python-flint" in done.stdout and "nonsmooth-dynamics[proofs]" in done.stdout
+
+
+def test_held_states_may_be_intervals():
+    q = ca.SX.sym("q")
+    system = ns.FilippovSystem(
+        [x, y, z, q], surface=x, above=[-y + q, 1, -2, 0], below=[z, -1, 1, 0]
+    )
+    fold = ns.find_two_fold(system, near=[0, 0.1, -0.1, 0.5], hold=["q"])
+    proof = ns.certify(fold, hold={"q": (0.25, 0.75)})
+    assert proof.proven and "with q in [0.25, 0.75]" in str(proof).replace("\n ", "")
+    assert 0.25 in proof.point["y"] and 0.75 in proof.point["y"]
+    with pytest.raises(ns.OptionError, match="hold of 'q'"):
+        ns.certify(fold, hold={"q": (0.75, 0.25)})

@@ -149,3 +149,13 @@ def test_what_is_given_wrongly_is_refused():
     none = ns.FilippovSystem([x], field=[1])
     with pytest.raises(ns.DefinitionError, match="one surface"):
         ns.certify_orbit(none, [1], t_end=1)
+
+
+def test_a_start_on_the_surface_is_told_exactly():
+    s = ns.FilippovSystem([x, v], surface=v - 0.1 * x, above=[1, -1], below=[1, 2 - x])
+    orbit = ns.certify_orbit(s, ["3/10", "3/100"], t_end=1, numbers="written")
+    assert orbit.proven and orbit.itinerary == "s"
+    orbit = ns.certify_orbit(s, ["3/10", "0.0300000001"], t_end=1, numbers="written")
+    assert orbit.itinerary == "+ s"
+    undecided = ns.certify_orbit(s, [("0.29", "0.31"), "3/100"], t_end=1, numbers="written")
+    assert not undecided.proven and "undecided" in undecided.why

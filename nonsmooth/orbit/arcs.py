@@ -92,7 +92,6 @@ class Follower:
                 tol=self.tol,
                 start_mode=mode,
                 max_steps=_CHUNK,
-                engine="reference",
             )
             if not len(part.steps):
                 if not pieces:

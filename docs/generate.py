@@ -32,6 +32,7 @@ GALLERY = (
     "leine",
     "harvest",
     "basins",
+    "wells",
     "friction_cone",
     "outcome_map",
 )

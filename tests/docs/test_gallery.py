@@ -139,3 +139,17 @@ def test_dividing_curve_divides_the_map():
     inside = np.abs(speeds) < 0.4  # where the curve is one spin for each speed
     above = spins[:, None] > curve.omega(speeds[inside])
     assert np.mean((slip[:, inside] > 0) == above) > 0.998
+
+
+def test_wells_are_divided_where_the_closed_form_says():
+    wells = ran("wells")
+    zeta = 0.1
+    truth = 1 + math.exp(zeta * math.pi / math.sqrt(1 - zeta**2))
+    assert wells["threshold"] == pytest.approx(truth, abs=1e-7)
+    labels, (xs, vs) = wells["found"].labels, wells["found"].axes.values()
+    assert set(np.unique(labels)) == {1, 2}
+    assert np.array_equal(labels, 3 - labels[::-1, ::-1])  # the system is odd
+    row = labels[:, int(np.argmin(abs(vs)))]
+    beyond = (xs > truth + 0.1) & (xs < 3.2)
+    assert len(set(row[(xs > 0.2) & (xs < truth - 0.1)])) == 1
+    assert set(row[beyond]).isdisjoint(row[(xs > 0.2) & (xs < truth - 0.1)])

@@ -6,7 +6,7 @@ an event the next one begins in the solutions on the other side.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -124,9 +124,16 @@ def follow_branch(
     step: float,
     max_points: int,
     through: bool,
-    report: Callable[[Point], None] | None = None,
+    progress: bool = False,
 ) -> Branch:
     """Continue a solution both ways to the bounds of the parameter, through events if asked to."""
+    bar = _bar(progress)
+
+    def report(point: Point) -> None:
+        if bar is not None:
+            bar.set_postfix_str(f"{name} = {point.u[-1]:.6g}", refresh=False)
+            bar.update()
+
     forward = np.zeros(start.size)
     forward[-1] = 1.0
     options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
@@ -136,7 +143,17 @@ def follow_branch(
             halves.append(_Half(end=halves[0].end))
             continue
         halves.append(_half(curve, start, sign * forward, through, options))
+    if bar is not None:
+        bar.close()
     return _joined(name, *halves)
+
+
+def _bar(progress: bool) -> Any:
+    if not progress:
+        return None
+    from tqdm import tqdm  # here: it is not needed to import the library
+
+    return tqdm(disable=None, delay=1.0, unit=" points")
 
 
 @dataclass
@@ -167,7 +184,12 @@ def _half(
         curve = departure.curve
         assert isinstance(curve, BranchCurve)
         _drop_turning(arc)
-        known.update({id(zero): curve.event(zero) for zero in arc.zeros})
+        known.update(dict.fromkeys(map(id, arc.zeros)))
+        try:
+            for zero in arc.zeros:
+                known[id(zero)] = curve.event(zero)
+        except KeyboardInterrupt:
+            arc.end = "interrupted"
         return arc
 
     def following(departure: Departure, arc: Arc) -> Departure | None:
@@ -175,7 +197,11 @@ def _half(
         if event is None or arc.zeros[-1].name != arc.end:
             return None
         assert isinstance(departure.curve, BranchCurve)
-        return departure.curve.onward(event, arc.zeros[-1])
+        try:
+            return departure.curve.onward(event, arc.zeros[-1])
+        except KeyboardInterrupt:
+            half.end = BranchEnd.INTERRUPTED
+            return None
 
     whole = ("bound", "closed", "interrupted", "points")
     first = Departure(curve, [start], tangent)

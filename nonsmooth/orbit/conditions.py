@@ -142,13 +142,13 @@ def _at_start(
 def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
     """Order at which a guard is positive after the event of the leg before; None if not watched.
 
-    A crossing or impact leaves the guard zero and its rate positive. After an exit or release the
-    rate is zero too, and its positive second derivative is the transversality of that event.
+    A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
+    too, and its positive second derivative is the transversality of that event.
     """
     if guard.kind not in ("surface", "exit", "impact", "release"):
         return None
     if before.kind in ("reset", "impact") and guard.kind != "surface":
-        return 1 if guard.name == before.name else None
+        return None  # the rate after it is that before it, the transversality of the event
     if guard.kind == "surface" and surface_of(system, before) == guard.index:
         return 1 if before.kind == "crossing" else None
     if guard.kind == "impact" and before.name == guard.name:

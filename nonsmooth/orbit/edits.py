@@ -245,18 +245,12 @@ def _added(
 
 
 def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
+    if kind in ("impact grazing", "grazing of a reset"):
+        return _missed(before, at.leg, p)
     turned = _turned(before, at.leg, p)
     i = turned.origin.index(before.origin[at.leg])
     chain = _Chain(turned.problem, turned.u, turned.origin)
     legs = chain.legs
-    if kind in ("impact grazing", "grazing of a reset"):
-        if i + 1 >= len(legs):
-            return None
-        guard = _guard(turned.problem, legs[i])
-        legs[i] = replace(legs[i + 1], mode=legs[i].mode)
-        chain.durations[i] += chain.durations[i + 1]
-        chain.remove(i + 1)
-        return chain.done(test=Condition("interior", i, guard))
     if i == 0:
         return None
     if kind in ("crossing-sliding", "switching-sliding"):
@@ -277,6 +271,21 @@ def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | Non
         chain.remove(i)
         return chain.done(test=Condition("interior", i - 1, guard))
     return _swapped(chain, i) if kind == "corner" and at.what == "duration" else None
+
+
+def _missed(before: Edited, i: int, p: Array) -> Edited:
+    """An impact or reset that is only touched, left out."""
+    count = len(before.problem.legs)
+    turned = _rotated(before, i, p) if i + 1 == count > 1 else before
+    i = 0 if turned is not before else i
+    chain = _Chain(turned.problem, turned.u, turned.origin)
+    if count == 1:
+        return _smooth(chain, p)
+    guard = _guard(turned.problem, chain.legs[i])
+    chain.legs[i] = replace(chain.legs[i + 1], mode=chain.legs[i].mode)
+    chain.durations[i] += chain.durations[i + 1]
+    chain.remove(i + 1)
+    return chain.done(test=Condition("interior", i, guard))
 
 
 def _smooth(chain: _Chain, p: Array) -> Edited:
@@ -342,7 +351,11 @@ def _turned(before: Edited, i: int, p: Array) -> Edited:
     count = len(before.problem.legs)
     if 0 < i < count - 1 or (count == 2 and i == 1) or count == 1:
         return before
-    k = 1 if count == 2 else (i - 1) % count
+    return _rotated(before, 1 if count == 2 else (i - 1) % count, p)
+
+
+def _rotated(before: Edited, k: int, p: Array) -> Edited:
+    """The same orbit from leg ``k``; legs moved to the end are those of the next round."""
     problem, (starts, durations) = before.problem, before.problem.split(before.u)
     legs = (*problem.legs[k:], *(mirrored(problem, leg) for leg in problem.legs[:k]))
     shift = np.zeros(problem.dimension)

@@ -276,6 +276,7 @@ def continue_equilibrium(
     step: float = 0.02,
     max_points: int = 2000,
     through: bool = True,
+    progress: bool = False,
 ) -> Branch:
     """Follow an equilibrium or pseudo-equilibrium as a parameter varies.
 
@@ -302,6 +303,8 @@ def continue_equilibrium(
     through : bool, optional
         Whether to go on beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
         that end there too.
+    progress : bool, optional
+        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
 
     Returns
     -------
@@ -369,4 +372,5 @@ def continue_equilibrium(
         step=step,
         max_points=max_points,
         through=through,
+        progress=progress,
     )

@@ -295,6 +295,7 @@ def continue_orbit(
     step: float = 0.05,
     max_points: int = 1000,
     through: bool = True,
+    progress: bool = False,
 ) -> Branch:
     """Follow a periodic orbit as a parameter varies.
 
@@ -317,6 +318,8 @@ def continue_orbit(
         Of each piece.
     through : bool, optional
         Whether to edit the itinerary and go on beyond what changes it.
+    progress : bool, optional
+        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
 
     Returns
     -------
@@ -360,6 +363,7 @@ def continue_orbit(
         step=step,
         max_points=max_points,
         through=through,
+        progress=progress,
     )
 
 

@@ -11,6 +11,7 @@ from tests.orbit.periodic_cases import (
     forced_friction,
     friction_oscillator,
     grazing_circle,
+    impact_oscillator,
     relay,
     scalar_relay,
     table,
@@ -145,6 +146,46 @@ def test_crossing_sliding_of_dry_friction_by_its_symmetry_and_without_it():
     (twin,) = ns.continue_orbit(whole, "f", bounds=(0.15, 0.6)).events
     assert twin.kind == "crossing-sliding"
     assert abs(twin.parameter - event.parameter) < 1e-12
+
+
+@pytest.mark.parametrize("hits", [False, True])
+def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
+    """x'' + 2 z x' + x = F cos w t touches the wall x = 1 where F^2 = (1 - w^2)^2 + 4 z^2 w^2."""
+    system, w, z = impact_oscillator(), 0.8, 0.05
+    if hits:
+        orbit = ns.periodic_orbit(system, [1.0, -0.32], t_start=0.088, itinerary=[("o", "impact")])
+    else:
+        rest = ns.simulate(system, [0, 0], 300, parameters={"F": 0.35}).x[-1]
+        run = ns.simulate(system, rest, 360, t_start=300, parameters={"F": 0.35})
+        orbit = ns.periodic_orbit(system, run, parameters={"F": 0.35})
+    branch = ns.continue_orbit(orbit, "F", bounds=(0.33, 0.505))
+    (event,) = branch.events
+    assert event.kind == "impact grazing"
+    assert abs(event.parameter - np.hypot(1 - w * w, 2 * z * w)) < 1e-12
+    assert "square root" in event.far_side.verdict
+    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert "asymptotically stable" in branch[0.34].stability
+    assert "unstable" in branch[0.45].stability and branch[0.45].legs[0].event == "impact"
+    assert abs(branch[0.5].multipliers[0] - float(CASES["I2"]["multipliers"][0])) < 1e-10
+
+
+@pytest.mark.parametrize("calls", [3, 40, 90])
+def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
+    system = scalar_relay()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
+    count, evaluate = [0], type(orbit.problem).evaluate
+
+    def interrupted(*args, **more):
+        count[0] += 1
+        if count[0] == calls:
+            raise KeyboardInterrupt
+        return evaluate(*args, **more)
+
+    monkeypatch.setattr(type(orbit.problem), "evaluate", interrupted)
+    branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
+    assert ns.BranchEnd.INTERRUPTED in branch.ends
+    assert len(branch) >= calls // 10
+    assert np.all(np.isfinite(branch.values))
 
 
 @pytest.mark.slow

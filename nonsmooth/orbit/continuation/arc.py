@@ -95,6 +95,8 @@ def trace(
                 arc.end = "points"
     except KeyboardInterrupt:
         arc.end = "interrupted"
+        if not arc.points:
+            arc.points.append(Point(np.asarray(rows[-1], float), np.asarray(tangent, float)))
     return arc
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -47,28 +48,28 @@ class Structure:
 
     # shape -------------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """Number n of states."""
         return int(self.definition.states.numel())
 
-    @property
+    @cached_property
     def surface_count(self) -> int:
         """Number of switching surfaces."""
         return int(self.definition.surfaces.numel())
 
-    @property
+    @cached_property
     def coupled(self) -> bool:
         """Whether multipliers are not eliminated: several surfaces, one that enters nonlinearly, or
         reactions."""
         return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
 
-    @property
+    @cached_property
     def time_dependent(self) -> bool:
         """Whether the system depends on time explicitly."""
         return bool(self.definition.time.numel())
 
-    @property
+    @cached_property
     def extended_dimension(self) -> int:
         """Number of states, plus one if the system depends on time."""
         return int(self.definition.states.numel() + self.definition.time.numel())

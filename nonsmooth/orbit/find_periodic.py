@@ -28,6 +28,9 @@ from .periodic import PeriodicOrbit, faults_of, named
 #: Newton's method ends when the next step would be below this, relative to the orbit.
 _TOLERANCE = 1e-10
 
+#: Steps below this, relative to the orbit, are rounding.
+_ROUNDING = 1e-14
+
 #: Starts of legs that are as near as this, relative to the orbit, are one.
 _SAME = 1e-7
 
@@ -230,7 +233,7 @@ class _Solver:
 
     def _polished(self, u: Array) -> tuple[Array, Evaluation]:
         """Two more steps at most, as long as they shrink: to rounding."""
-        at = self.problem.evaluate(u, self.p)
+        at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
         for _ in range(2):
             try:
                 step = -self.problem.solve(at.jacobian, at.residual)
@@ -238,7 +241,7 @@ class _Solver:
                 least = np.linalg.lstsq(at.jacobian, at.residual, rcond=1e-12)[0]
                 step = -np.asarray(least, float)
             new = u + step
-            if np.abs(step).max() <= 1e-15 * np.abs(u).max():
+            if np.abs(step / scales).max() <= _ROUNDING:
                 break
             there = self.problem.evaluate(new, self.p)
             self.iterations += 1

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from ..flow.fixed import steps_for
-from ..flow.reference.polynomial import first_crossing, keeps_sign
+from ..flow.reference.polynomial import first_crossing, first_root, sign_changes
 from ..model import Array, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .legs import Leg
@@ -83,8 +83,8 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     for h, states, end in steps_for(field, y, p, duration):
         rows = field.jets.outputs[1].copy()
         slopes = rows[:, 1:] * np.arange(1, rows.shape[1])
-        turning = np.flatnonzero(~keeps_sign(slopes, h)) if len(guards) else ()
-        points = [(s, int(k)) for k in turning for s in _extrema(rows[k], h)]
+        changes = sign_changes(slopes, h).tolist() if len(guards) else []
+        points = [(s, k) for k, c in enumerate(changes) if c for s in _extrema(slopes[k], h, c)]
         if t + h < duration - margin:
             points += [(h, k) for k in range(len(guards))]
         for s, k in points:
@@ -103,10 +103,12 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     return Watch(approaches, faults)
 
 
-def _extrema(row: Array, h: float) -> list[float]:
-    """Times in (0, h] at which a polynomial's derivative is zero."""
-    degrees = np.arange(1, len(row))
-    d = row[1:] * degrees * abs(h) ** (degrees - 1)
+def _extrema(slope: Array, h: float, changes: int) -> list[float]:
+    """Zeros in (0, h] of a polynomial whose Bernstein coefficients change sign so many times."""
+    if changes == 1:
+        root = first_root((slope if slope[0] > 0.0 else -slope).tolist(), h)
+        return [] if root is None else [root]
+    d = slope * h ** np.arange(len(slope))
     size = np.abs(d)
     if size[0] > size[1:].sum() or not np.all(np.isfinite(d)):
         return []

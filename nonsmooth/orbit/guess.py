@@ -83,7 +83,7 @@ def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
     if not system.time_dependent:
         return None
     if period is None:
-        found = frequencies(system)
+        found = system.cached("frequencies", lambda: frequencies(system))
         if len(found) != 1:
             raise OptionError(
                 explain(
@@ -93,7 +93,7 @@ def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
                     advice="Give period=2*pi/w.",
                 )
             )
-        return Forcing(system, 2.0 * math.pi / found[0])
+        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / found[0]))
     return Forcing(system, period)
 
 

@@ -34,20 +34,21 @@ def _to_bernstein(degree: int) -> NDArray[np.float64]:
     )
 
 
-def keeps_sign(coefficients: NDArray[np.float64], h: float) -> NDArray[np.bool_]:
-    """Whether polynomials (rows, in powers of t) surely have no zero for t between 0 and h.
+def sign_changes(coefficients: NDArray[np.float64], h: float) -> NDArray[np.int64]:
+    """Sign changes of the Bernstein coefficients of polynomials (rows, in powers of t) on 0 .. h.
 
-    By their Bernstein coefficients, between whose least and largest all values lie; where that does
-    not decide, the answer is False.
+    None says that there is surely no zero between 0 and h, one that there is exactly one; where rounding
+    leaves a coefficient at zero the answer is at least two, and more says nothing.
 
     Examples
     --------
-    >>> keeps_sign(np.array([[1.0, -0.5], [1.0, -2.0]]), 1.0).tolist()
-    [True, False]
+    >>> sign_changes(np.array([[1.0, -0.5], [1.0, -2.0]]), 1.0).tolist()
+    [0, 1]
     """
     degree = coefficients.shape[1] - 1
-    b = (coefficients * h ** np.arange(degree + 1)) @ _to_bernstein(degree).T
-    return np.asarray((b > 0.0).all(axis=1) | (b < 0.0).all(axis=1))
+    b = np.sign((coefficients * h ** np.arange(degree + 1)) @ _to_bernstein(degree).T)
+    changes = np.count_nonzero(b[:, 1:] != b[:, :-1], axis=1)
+    return np.where(np.all(b != 0.0, axis=1), changes, np.maximum(changes, 2))
 
 
 def first_root(coefficients: Sequence[float], h: float) -> float | None:

@@ -166,6 +166,15 @@ class Place:
         found = self._rows("parameters", build, x)
         return found[0], found[1:].reshape(2, size, -1)
 
+    def lie_parameter_derivatives(self, x: Array) -> Array:
+        """Derivatives of h, L1 and L2 by the q parameters, at a point; (3, q)."""
+
+        def build() -> Sequence[Any]:
+            h, lie, _ = self._expressions()
+            return [self.system.parameter_gradient(e) for e in (h, *lie)]
+
+        return self._rows("lie parameters", build, x)
+
     def orbit(self, x: Array, letter: str, order: int) -> tuple[Array, Array]:
         """Taylor coefficients of the orbit of F1 or F2 (N, order + 1) and of h on it (order + 1,).
 

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..local.find_two_fold import search_two_fold
-from ..local.place import place
+from ..local.place import Place, place
 from ..local.search import unknowns
 from ..local.two_fold import TwoFold
 from ..model import (
@@ -26,6 +27,7 @@ from ..model import (
     PointError,
     explain,
 )
+from .continuation import Curve, trace
 
 
 class TraceError(ConvergenceError):
@@ -63,8 +65,10 @@ def trace_two_folds(
 ) -> list[TwoFold]:
     """Follow two-folds while a parameter, or one coordinate of the state, takes given values.
 
-    Natural continuation: each search starts from the two-fold before, extrapolated along the last
-    two. It does not go round a turning point in the value: trace over another coordinate there.
+    From one value to the next the curve of two-folds is continued by
+    :mod:`nonsmooth.continuation`, in as many steps as it needs. It ends at a turning point in the
+    value: trace over another coordinate there. Where two-folds form a set of higher dimension each
+    search starts from the two-fold before.
 
     Parameters
     ----------
@@ -115,13 +119,14 @@ def trace_two_folds(
     free = unknowns(system, held, 3, "two-fold")
     folds: list[TwoFold] = []
     for value in numbers:
-        guess = _predict(start, folds, numbers)
-        given = dict(parameters or {})
+        given = _given(parameters, {} if state else {name: value})
+        last = folds[-1].point if folds else start
+        where, x = place(system, last, given, t, surface, mode)
+        x = x.copy()
         if state:
-            guess[system.state_names.index(name)] = value
-        else:
-            given = {k: v for k, v in given.items() if str(k) != name} | {name: value}
-        where, x = place(system, guess, given, t, surface, mode)
+            x[system.state_names.index(name)] = value
+        if folds and len(free) == 3:
+            x = _ahead(TwoFoldCurve(where, x, free, name), last, numbers[len(folds) - 1], value)
         try:
             folds.append(search_two_fold(where, x, free, tol, max_iterations))
         except (ConvergenceError, DegenerateError, PointError) as error:
@@ -132,7 +137,7 @@ def trace_two_folds(
                 value=value,
                 folds=folds,
                 residual=error.residual if isinstance(error, ConvergenceError) else math.nan,
-                point=error.point if isinstance(error, ConvergenceError) else guess,
+                point=error.point if isinstance(error, ConvergenceError) else x,
             ) from error
     return folds
 
@@ -147,12 +152,68 @@ def _values(values: ArrayLike) -> list[float]:
     return [float(v) for v in numbers]
 
 
-def _predict(start: Array, folds: list[TwoFold], values: list[float]) -> Array:
-    """Extrapolate the last two two-folds to the next value; the last one, or the start, if few."""
-    k = len(folds)
-    if k == 0:
-        return start.copy()
-    if k == 1 or values[k - 1] == values[k - 2]:
-        return folds[-1].point.copy()
-    ratio = (values[k] - values[k - 1]) / (values[k - 1] - values[k - 2])
-    return folds[-1].point + np.clip(ratio, -2, 2) * (folds[-1].point - folds[-2].point)
+def _given(parameters: Parameters | None, changed: dict[str, float]) -> dict[str, Any]:
+    """Parameters by name, some of them changed."""
+    return {str(k): v for k, v in (parameters or {}).items()} | changed
+
+
+class TwoFoldCurve(Curve):
+    """h = L1 = L2 = 0 in three states and a parameter, or a fourth state, for continuation.
+
+    Parameters
+    ----------
+    where : Place
+    x : ndarray (N,)
+        An extended point; its held coordinates stay.
+    free : sequence of int
+        The three states that are unknowns.
+    name : str
+        Of the parameter or state that is the last unknown.
+    """
+
+    def __init__(self, where: Place, x: Array, free: Sequence[int], name: str):
+        names = where.system.state_names
+        self.where, self.x, self.free = where, x, list(free)
+        self.state = names.index(name) if name in names else -1
+        self.index = -1 if self.state >= 0 else where.system.parameter_names.index(name)
+        self.scale = np.ones(len(self.free) + 1)
+
+    def point_at(self, u: Array) -> Array:
+        """The extended point of unknowns."""
+        x = self.x.copy()
+        x[self.free] = u[:-1]
+        if self.state >= 0:
+            x[self.state] = u[-1]
+        return x
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        x, p = self.point_at(u), self.where.parameters.copy()
+        if self.index >= 0:
+            p[self.index] = u[-1]
+        here = replace(self.where, parameters=p)
+        numbers = here.at(x)
+        last = (
+            numbers.gradients[:, self.state]
+            if self.state >= 0
+            else here.lie_parameter_derivatives(x)[:, self.index]
+        )
+        values = np.array([numbers.h, *numbers.lie])
+        return values, np.column_stack([numbers.gradients[:, self.free], last])
+
+
+def _ahead(curve: TwoFoldCurve, last: Array, before: float, value: float) -> Array:
+    """Start of a search at the next value: the point where the curve reaches it, if it does."""
+    start = np.append(last[curve.free], before)
+    if value == before:
+        return curve.point_at(start)
+    size = max(1.0, float(np.abs(last).max()))
+    curve.scale = np.append(np.full(len(curve.free), size), abs(value - before))
+    tangent = np.zeros(start.size)
+    tangent[-1] = np.sign(value - before)
+    low, high = min(before, value), max(before, value)
+    bounds = [(start.size - 1, low, high)]
+    arc = trace(curve, [start], tangent, step=0.2, first=0.2, most=200, bounds=bounds)
+    if arc.end == "interrupted":
+        raise KeyboardInterrupt
+    end = arc.points[-1].u
+    return curve.point_at(end if arc.end == "bound" and end[-1] == value else start)

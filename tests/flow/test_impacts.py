@@ -229,3 +229,48 @@ def test_a_reaction_whose_direction_cannot_be_seen_is_asked_for():
     """A point that moves at speed v in the direction q before a wall: the gap's rate is v cos q."""
     with pytest.raises(ns.DefinitionError, match="expected reaction=, a symbol in the field"):
         ns.FilippovSystem([x, q, v], field=[v * ca.cos(q), 1, 0], impacts=ns.Impact(1 - x))
+
+
+def pile(count, e, mu=0.4):
+    """Blocks on each other on the floor, with friction at every contact; masses 1, 2, ..."""
+    q, v, u, n, lam = (ca.SX.sym(name, count) for name in ("q", "v", "u", "n", "lam"))
+    fall, push, slips, impacts = [-9.81] * count, [0] * count, [], []
+    for i in range(count):
+        fall[i] += n[i] / (i + 1)
+        push[i] -= mu * lam[i] * n[i] / (i + 1)
+        below, slip = 0, u[i]
+        if i:
+            fall[i - 1] -= n[i] / i
+            push[i - 1] += mu * lam[i] * n[i] / i
+            below, slip = q[i - 1] + 0.5, u[i] - u[i - 1]
+        slips.append(slip)
+        impacts.append(ns.Impact(q[i] - below, e, reaction=n[i], name=f"contact {i}"))
+    states = [*ca.vertsplit(q), *ca.vertsplit(v), *ca.vertsplit(u)]
+    field = [*ca.vertsplit(v), *fall, *push]
+    multipliers = ca.vertsplit(lam)
+    return ns.FilippovSystem(
+        states, field=field, surfaces=slips, multipliers=multipliers, impacts=impacts
+    )
+
+
+@pytest.mark.parametrize("engine", ["reference", "auto"])
+@pytest.mark.parametrize("e", [0.0, 0.4])
+def test_a_pile_of_three_falls_and_comes_to_rest(engine, e):
+    """The momentum of the slips goes into the floor; at rest, one on the other, all stick."""
+    system = pile(3, e)
+    start = [0.2, 0.9, 1.7, 0.0, 0.0, 0.0, 0.3, -0.2, 0.1]
+    run = ns.simulate(system, start, 4.0, engine=engine)
+    assert run.status is ns.Status.REACHED_END, run.message
+    assert run.itinerary.endswith("sssccc")
+    np.testing.assert_allclose(run.x[-1, :3], [0.0, 0.5, 1.0], rtol=0, atol=1e-12)
+    np.testing.assert_allclose(run.x[-1, 3:], 0.0, rtol=0, atol=1e-12)
+
+
+@pytest.mark.parametrize("engine", ["reference", "auto"])
+def test_a_neighbour_is_not_behind_by_the_error_of_a_root(engine):
+    """While one gap chatters the others are met within the tolerance, from all sides."""
+    system = pile(2, 0.5)
+    for k in range(6):
+        start = [0.1 + 0.07 * k, 0.75 + 0.05 * k, 0.1 * k, -0.3 * k, 0.3 * k, -0.2]
+        run = ns.simulate(system, start, 3.0, tol=1e-8, engine=engine)
+        assert run.status is ns.Status.REACHED_END, run.message

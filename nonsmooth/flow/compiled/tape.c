@@ -5,7 +5,8 @@
  * repelling sliding, stability that no simple test shows) is handed over to them.
  */
 #define HISTORY 48
-#define TRIED 4 /* surfaces on which letters are tried one by one */
+#define TRIED 256 /* modes that are tried one by one, where the rates do not decide */
+#define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
 #define TINY 2.2250738585072014e-308
 
@@ -933,22 +934,32 @@ static int is_left(const Run *r, int which, const Known *known, int count) {
 
 static void many_may_hold(Run *r) { finish(r, NON_UNIQUE, POSSIBLY_SEVERAL, 0); }
 
+static int bits(int a) { return (a & 1) + (a >> 1 & 1) + (a >> 2 & 1); }
+
+/* Number of the modes that are possible, or one more than are tried. */
+static int choices_of(const int8_t *possible, int count) {
+  int total = 1;
+  for (int i = 0; i < count && total <= TRIED; i++) total *= bits(possible[i]);
+  return total <= TRIED ? total : TRIED + 1;
+}
+
 /* Letters that are possible at the active surfaces, as bits of +1 (1), -1 (2) and sliding (4), for contacts
  * open (1) and closed (4): one where the rates decide, else all. 0 if the run ends. */
 static int by_rates(Run *r, const int8_t *letter, const Known *known, int known_count, int8_t *possible) {
-  int k = r->active_count, contacts = 0, open = 0;
+  int k = r->active_count, contacts = 0;
   for (int i = 0; i < k; i++) {
     contacts |= r->active[i] >= r->m;
     possible[i] = r->active[i] < r->m ? 7 : 5;
   }
   if (k < 2) return 1;
+  int choices = choices_of(possible, k);
   if (!rates(r, letter)) {
-    if (k > TRIED) many_may_hold(r);
-    return k <= TRIED;
+    if (choices > TRIED) many_may_hold(r);
+    return choices <= TRIED;
   }
   double *a = r->matrix, *m = a + k, *scale = m + (int64_t)k * k;
   if (!shown(m, k, r->work, r->pending)) {
-    if (k > TRIED || (k == TRIED && !contacts)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
+    if (choices > TRIED || (k > FEW && !contacts)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
     return 1;
   }
   int8_t *contact = (int8_t *)(scale + k), *guess = contact + k;
@@ -965,13 +976,13 @@ static int by_rates(Run *r, const int8_t *letter, const Known *known, int known_
     for (int j = 0; j < k; j++)
       if (m[i * k + j] != 0) { rate += m[i * k + j] * r->lam[j]; sum += fabs(m[i * k + j]); }
     double room = contact[i] ? lam : 1 - fabs(lam);
-    if (is_left(r, r->active[i], known, known_count)) { open++; continue; }
+    if (is_left(r, r->active[i], known, known_count)) continue;
     if (room > VANISHES * (1 + scale[i] / fabs(m[i * k + i]))) possible[i] = 4;
     else if (fabs(rate) > VANISHES * (scale[i] + sum)) possible[i] = contact[i] || lam > 0 ? 1 : 2;
-    open += (possible[i] & (possible[i] - 1)) != 0;
   }
-  if (open > TRIED) many_may_hold(r);
-  return open <= TRIED;
+  choices = choices_of(possible, k);
+  if (choices > TRIED) many_may_hold(r);
+  return choices <= TRIED;
 }
 
 /* Whether sliding is stable across its layer: 1, 0, or -1 where no simple test shows it. */
@@ -1053,8 +1064,6 @@ static int no_motion(Run *r, int contacts) {
   return 0;
 }
 
-static int bits(int a) { return (a & 1) + (a >> 1 & 1) + (a >> 2 & 1); }
-
 /* Choose, as r->chosen, the motion that continues from a point of the active surfaces; 0 if the run ends.
  * ``letter`` has those of the other surfaces. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
@@ -1066,7 +1075,7 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     return 0;
   }
   if (!by_rates(r, letter, known, known_count, possible)) return 0;
-  for (int i = 0; i < k; i++) total *= bits(possible[i]);
+  total = choices_of(possible, k);
   r->several_count = 0;
   for (int number = 0; number < total && r->status == RUNNING; number++) {
     int rest = number;
@@ -1368,12 +1377,29 @@ static void reset(Run *r, int row) {
   arm(r, index);
 }
 
+/* Functions that are kept, and gaps that are negative by no more than the tolerance: by what the root's error
+ * moves a neighbour. */
+static int with_touched(Run *r, int32_t *onto, int kept) {
+  int all = kept;
+  surface_values(r, r->x);
+  const double *scale = surface_scales(r, r->x);
+  for (int i = r->m; i < r->m + r->c; i++) {
+    int known = 0;
+    for (int k = 0; k < kept; k++) known |= onto[k] == i;
+    if (!known && r->rates[i] < 0 && r->rates[i] >= -r->o.rtol * scale[i]) onto[all++] = i;
+  }
+  return all;
+}
+
 /* The impulses of a gap that closes, and of the contacts that are closed there. */
 static void impact(Run *r, int row) {
   int before = r->mode, contact = r->now.index[row], count = 0;
-  int32_t onto = r->m + contact, *involved = r->involved;
+  int32_t *involved = r->involved, *onto = involved, kept = kept_by(r, r->letter, onto);
   double *x = r->before;
-  project(r, &onto, 1);
+  onto[kept++] = r->m + contact; /* what is closed stays so to rounding */
+  project(r, onto, kept);
+  int more = with_touched(r, onto, kept);
+  if (more > kept) project(r, onto, more);
   renote(r);
   memcpy(x, r->x, sizeof(double) * r->n);
   const double *gap = gaps(r, x), *rate = gap + r->c;
@@ -1619,7 +1645,7 @@ static size_t place_run(Run *r, char *base) {
   r->side = INTEGERS(s->stops + s->resets);
   r->fired = INTEGERS(s->resets);
   r->active = INTEGERS(w);
-  r->involved = INTEGERS(2 * w);
+  r->involved = INTEGERS(3 * w + 1);
   r->p = DOUBLES(s->parameters);
   r->series = DOUBLES((size_t)s->series.size * stride);
   r->point = DOUBLES(s->point.size);

@@ -61,6 +61,14 @@ class Contacts:
         found = np.flatnonzero(gaps < 0.0)
         return int(found[0]) if found.size else None
 
+    def touched(self, x: Array) -> list[int]:
+        """Contacts whose gap is negative by no more than the tolerance of the run."""
+        h, gradient = self._surfaces.values(x, self._p)
+        scale = rounding_scale(np.abs(gradient), x, self._options.size) * self._options.rtol
+        gaps = h[self._first : self._first + self._count]
+        near = scale[self._first : self._first + self._count]
+        return np.flatnonzero((gaps < 0.0) & (gaps >= -near)).tolist()
+
     def strike(self, x: Array, mode: str, involved: Sequence[int], plastic: bool) -> Array | None:
         """State after the impulses at some closed gaps; None if none are consistent.
 

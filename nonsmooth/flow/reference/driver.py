@@ -120,13 +120,13 @@ class Driver(Bookkeeping):
 
     def _settle(self, e: Expansion, x: Array, dt: float) -> None:
         """Keep a sliding state on its surfaces, and multipliers on their equations."""
-        kept = self._kept(self.mode)
+        kept = self.kept(self.mode)
         self.x = self.surfaces.project(x, self.p, kept)
         if e.unknowns.size and kept:
             ahead = e.unknowns @ powers(dt, e.unknowns.shape[1])
             self.unknowns = self.modes.improve(self.mode, self.x, ahead)
 
-    def _kept(self, mode: str) -> list[int]:
+    def kept(self, mode: str) -> list[int]:
         """Functions that a mode keeps at zero: surfaces, gaps and their rates."""
         m, c = self.system.surface_count, len(self.system.impacts)
         closed = [i for i, letter in enumerate(mode) if letter == "c"]

@@ -57,8 +57,12 @@ def impact(driver: Driver, guard: Guard) -> None:
     """The impulses of a gap that closes, and of the contacts that are closed there."""
     assert driver.contacts is not None
     before, x = driver.mode, driver.x
-    onto = driver.system.surface_count + guard.index
-    driver.x = driver.surfaces.project(x, driver.p, [onto])
+    onto = {driver.system.surface_count + guard.index, *driver.kept(driver.mode)}
+    driver.x = driver.surfaces.project(x, driver.p, sorted(onto))
+    first = driver.system.surface_count
+    touched = {first + j for j in driver.contacts.touched(driver.x)} - onto
+    if touched:  # by what the root's error moves a neighbour
+        driver.x = driver.surfaces.project(driver.x, driver.p, sorted(onto | touched))
     driver.record.correct(driver.x)
     x = driver.x
     gaps, rates = driver.contacts.gaps(x)

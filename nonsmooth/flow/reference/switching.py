@@ -9,6 +9,7 @@ there is no push off the surface by an epsilon.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
@@ -25,8 +26,9 @@ from .stepper import Stepper
 #: Number of leading coefficients of a guard that vanish by construction, by (kind, surface, side).
 Known = Mapping[tuple[str, int, int], int]
 
-#: Surfaces on which letters are tried one by one where the rates do not decide: 3 to that number.
-_TRIED = 4
+#: Modes that are tried one by one where the rates do not decide, and surfaces of which all are tried
+#: where no matrix is known to have one solution.
+_TRIED, _FEW = 256, 3
 
 
 @dataclass(frozen=True)
@@ -134,14 +136,14 @@ def _by_rates(
         return undecided
     problem = stepper.modes.rates(mode, x, active)
     if problem is None:
-        return undecided if len(active) <= _TRIED else _too_many(active)
+        return undecided if _choices(undecided) <= _TRIED else _too_many(active)
     a, m, scales = problem
     if complementarity.is_unique(m):
         guess = np.array([{"+": 1.0, "-": -1.0, "o": -1.0}.get(mode[i], 0.0) for i in active])
         lam = complementarity.solve(a, m, guess, [i >= first for i in active])
     else:
-        if len(active) <= _TRIED - 1 or max(active) >= first:
-            return undecided if len(active) <= _TRIED else _too_many(active)
+        if len(active) <= _FEW or max(active) >= first:
+            return undecided if _choices(undecided) <= _TRIED else _too_many(active)
         found = complementarity.all_solutions(a, m)
         if found is None or len(found) > 1:
             return _too_many(active)
@@ -159,9 +161,14 @@ def _by_rates(
             undecided[i] = "s" if i < first else "c"
         elif clear_rate[k]:
             undecided[i] = "o" if i >= first else ("+" if lam[k] > 0.0 else "-")
-    if sum(len(letters) > 1 for letters in undecided.values()) > _TRIED:
+    if _choices(undecided) > _TRIED:
         return _too_many(active)
     return undecided
+
+
+def _choices(letters: Mapping[int, str]) -> int:
+    """Number of the modes that are possible."""
+    return math.prod(len(possible) for possible in letters.values())
 
 
 def _too_many(active: Sequence[int]) -> Decision:

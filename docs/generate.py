@@ -121,6 +121,7 @@ def regions() -> str:
         ns.Region.TANGENT_ABOVE: "L1 = 0",
         ns.Region.TANGENT_BELOW: "L2 = 0",
         ns.Region.TWO_FOLD: "L1 = L2 = 0",
+        ns.Region.MIXED: "on an intersection of surfaces",
     }
     return table(
         ("where", "region", "name"), ((when[r], str(r), f"`Region.{r.name}`") for r in ns.Region)

@@ -68,6 +68,11 @@ def test_decision_table_is_the_code_s():
         assert f"| {row.into} | {row.out_of} |" in line
 
 
+def test_every_region_is_listed():
+    text = generate.regions()
+    assert all(f"`Region.{region.name}`" in text for region in ns.Region)
+
+
 def test_every_status_is_listed_with_its_advice():
     text = generate.fill((DOCS / "statuses.md").read_text(encoding="utf-8"))
     for status in ns.Status:

@@ -94,9 +94,7 @@ def compare(found: Sample, engine: str) -> None:
     assert decided >= 0.9 * len(results)
 
 
-@pytest.mark.parametrize(
-    "size", [Size(2, 1), Size(3, 2), Size(4, 1), Size(3, 3), Size(5, 2)], ids=str
-)
+@pytest.mark.parametrize("size", [Size(2, 1), Size(3, 2), Size(4, 1), Size(3, 3)], ids=str)
 def test_a_few_random_systems_agree_with_an_independent_integrator(size):
     compare(sample(size, FEW), "reference")
 

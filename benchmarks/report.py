@@ -27,6 +27,9 @@ TARGETS = {
     "first result, ensemble, cached (s)": (0.4, "at most"),
     "import nonsmooth (s)": (0.25, "at most"),
     "1e7 bounces (GiB)": (3.0, "at most"),
+    "proof: a two-fold with its class, to 1e-30 (s)": (0.05, "at most"),
+    "proof: a linear bounce (s)": (0.05, "at most"),
+    "proof: all 100 two-folds of a box (s)": (10.0, "at most"),
     "wrong itineraries, random starts": (0, "at most"),
     "wrong itineraries, within 1e-9 of a boundary": (0, "at most"),
 }
@@ -55,6 +58,9 @@ def figures(results: dict[str, Any]) -> dict[str, float]:
             if all("seconds" in s for s in pair):
                 ratio = pair[0]["seconds"]["median"] / pair[1]["seconds"]["median"]
                 found[f"{belt}, dense {word}: time over heyoka's"] = ratio
+    for name, timing in results.get("proofs", {}).items():
+        if f"proof: {name} (s)" in TARGETS:
+            found[f"proof: {name} (s)"] = timing["median"]
     return found | _startup(results) | _itineraries(results)
 
 
@@ -234,6 +240,14 @@ def _folds(section: dict[str, Any]) -> str:
     )
 
 
+def _proofs(section: dict[str, Any]) -> str:
+    rows = [
+        [name, f"{s['median']:.3g} s", f"{s['spread']:.0%}", "yes" if s["proven"] else "NO"]
+        for name, s in section.items()
+    ]
+    return table(["theorem", "processor time", "spread", "proven"], rows)
+
+
 def _correct(section: dict[str, Any]) -> str:
     rows = []
     for name, s in section.items():
@@ -291,6 +305,7 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "memory": _memory,
     "peak": _peak,
     "two-folds": _folds,
+    "proofs": _proofs,
     "correctness": _correct,
 }
 

@@ -293,6 +293,8 @@ class Follower:
         if mode.affine:
             return (mode.jacobian(made.hull, self.p) * time).exp()
         jacobian = mode.jacobian(made.tube, self.p)
+        if not all(v.is_finite() for v in jacobian.entries()):
+            raise UnprovenError(f"the field has no derivative near t = {float(self.t.mid()):.9g}")
         bound = max(
             sum(float(abs(v).upper()) for v in row) * (1 + 1e-12) for row in jacobian.tolist()
         )

@@ -47,7 +47,9 @@ def operator(
         matrix = inverse(jacobian)
         if matrix is None:
             return None
-    _, slopes = equations.with_jacobian(box)
+    values, slopes = equations.with_jacobian(box)
+    if not all(v.is_finite() for v in values.entries()):
+        return None  # where it has no finite value it may jump, its derivative being finite
     move = column([x - m for x, m in zip(box, middle, strict=True)])
     image = (identity(equations.n) - matrix * slopes) * move - matrix * equations.values(middle)
     return [m + k for m, k in zip(middle, entries(image), strict=True)], matrix

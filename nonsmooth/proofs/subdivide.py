@@ -102,7 +102,10 @@ class Search:
     def _sweep(self, low: Floats, high: Floats) -> tuple[Floats, Floats]:
         values, both = self.equations.programs
         (f,) = self._evaluate(values, Intervals(low, high))
-        keep = np.all([np.broadcast_to(v.has_zero, len(low)) for v in f], axis=0)
+        over = _stacked([f], len(low))[:, 0]
+        keep = np.all(over.has_zero, axis=1)
+        # A function may jump where it has no finite value, and its derivative be finite all the same.
+        smooth = np.all(np.isfinite(over.low) & np.isfinite(over.high), axis=1)[keep]
         low, high = low[keep], high[keep]
         if not len(low):
             return low, high
@@ -114,10 +117,11 @@ class Search:
         move = Intervals(low, high) - points(middle)
         with np.errstate(all="ignore"):
             mean = at_middle + _times(slopes, move)
-        keep = np.all(mean.has_zero, axis=1)
+        keep = np.all(mean.has_zero, axis=1) | ~smooth
         low, high, middle = low[keep], high[keep], middle[keep]
         slopes, at_middle, move = slopes[keep], at_middle[keep], move[keep]
-        low, high, single, keep = _krawczyk(low, high, middle, slopes, at_middle, move)
+        smooth = smooth[keep]
+        low, high, single, keep = _krawczyk(low, high, middle, slopes, at_middle, move, smooth)
         low, high, single, slopes = low[keep], high[keep], single[keep], slopes[keep]
         open_ = self._resolve(low, high, single)
         low, high, slopes = low[open_], high[open_], slopes[open_]
@@ -208,12 +212,13 @@ def _krawczyk(
     slopes: Intervals,
     at_middle: Intervals,
     move: Intervals,
+    smooth: NDArray[np.bool_],
 ) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
     """Pieces cut down by Krawczyk's operator; which hold one zero at most; which are left."""
     n = low.shape[1]
     with np.errstate(all="ignore"):
         mean = 0.5 * (slopes.low + slopes.high)
-        usable = np.all(np.isfinite(mean), axis=(1, 2))
+        usable = smooth & np.all(np.isfinite(mean), axis=(1, 2))
         usable[usable] &= np.abs(np.linalg.det(mean[usable])) > 1e-280
         inverse = np.zeros_like(mean)
         inverse[usable] = np.linalg.inv(mean[usable])

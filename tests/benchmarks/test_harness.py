@@ -18,6 +18,7 @@ from benchmarks import (
     measure,
     ours,
     problems,
+    proofs,
     reference,
     report,
     two_folds,
@@ -110,6 +111,10 @@ def test_a_fresh_process_reports():
 def test_the_script_by_hand_gives_the_same_classes():
     grid = np.array([(-2.0, 1.0), (1.5, -2.5), (2.5, 2.0)])
     assert two_folds.library(grid) == two_folds.by_hand(grid)
+
+
+def test_what_is_timed_is_proven():
+    assert len(proofs.zeros(2)().zeros) == 4 and proofs.two_fold()().proven
 
 
 def test_ratios_and_tables():

@@ -145,3 +145,17 @@ def test_what_is_given_wrongly_is_refused():
     with pytest.raises(ns.OptionError, match="kind"):
         ns.prove_all(s, BOX, "cusp")
     assert ns.prove_all(s, [(-1, 1), 0.25, (-1, 1)], "fold").complete
+
+
+def test_a_jump_with_a_finite_derivative_is_not_passed_over():
+    """atan2 jumps by 2 pi over its cut, where its derivative is finite."""
+    for offset in (3.1, -3.1, 0.0, 3.0):
+        for box in ((-1.0, 1.0), (-0.9, 1.1), (-1e-3, 1.0)):
+            system = flat(ca.atan2(x, -1) - offset, y)
+            everything = ns.prove_all(system, [box, *BOX[1:]])
+            truth = np.tan(np.pi - abs(offset)) * np.sign(offset)  # where it is on that side
+            inside = offset != 0.0 and box[0] < truth < box[1]
+            assert len(everything.zeros) <= inside
+            assert len(everything.zeros) == inside or not everything.complete
+            for proof in everything.zeros:  # and no box of uniqueness reaches over the jump
+                assert 0 not in proof.box["x"]

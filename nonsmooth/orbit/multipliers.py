@@ -73,9 +73,11 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
     zeros = n - 1 - nontrivial.size
     matrix = monodromy(problem, at, p)
     whole = np.linalg.eigvals(matrix)
-    one = int(np.argmin(np.abs(whole - 1.0)))
-    rest = np.sort(np.abs(np.delete(whole, one)))
-    error = max(float(np.abs(whole[one] - 1.0)), *rest[:zeros].tolist(), 0.0)
+    # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
+    held = len(problem.kept)
+    ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]
+    rest = np.sort(np.abs(np.delete(whole, ones)))
+    error = max(float(np.abs(whole[ones] - 1.0).max()), *rest[: zeros - held].tolist(), 0.0)
     of_map = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
     power = 2 if problem.symmetry is not None else 1
     return Multipliers(_sorted(of_map**power), of_map, zeros, reduced, matrix, error)

@@ -56,6 +56,13 @@ def test_orbits_beyond_an_event_have_the_reference_values(forced):
     assert abs(forced[2.5].multipliers[0] - number("F1", "multiplier")) < 1e-12
 
 
+def test_an_orbit_that_slides_all_the_time_is_superstable(forced):
+    """x = 0 attracts: the sliding field keeps x whatever it is, but x is no neighbour's to choose."""
+    rest = forced[0.9]
+    assert rest.itinerary == "s" and rest.stability == "superstable"
+    assert rest.error_estimate < 1e-12
+
+
 def test_the_branch_can_stop_at_the_event():
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))

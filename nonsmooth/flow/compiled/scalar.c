@@ -829,7 +829,7 @@ static void step(Run *r) {
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;
-  int swallowed = dt < smaller(wanted, SHORTEST * larger(1, fabs(r->t)));
+  int swallowed = dt < wanted && dt <= SHORTEST * fabs(r->t); /* close to t = 0 steps may be tiny */
   if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
   if (dt < wanted) { row = -1; last = 0; }
   if (dt > 0) {

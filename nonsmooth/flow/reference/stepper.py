@@ -222,7 +222,7 @@ class Stepper:
         shrinks = dt < wanted and not (e.mode == self._mode and dt > 0.9 * self._length)
         self._shortened = max(0.0, self._shortened + (1.0 if shrinks else -0.2))
         self._mode, self._length = e.mode, h if dt == wanted else dt
-        swallowed = dt < min(wanted, SHORTEST * max(1.0, abs(t)))
+        swallowed = dt < wanted and dt <= SHORTEST * abs(t)  # close to t = 0 steps may be tiny
         if self._shortened >= SHORTENED or swallowed:
             return Plan(0.0, [], False, messages.branch_point(t))
         if dt < wanted:

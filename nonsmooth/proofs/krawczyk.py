@@ -144,7 +144,8 @@ def _grown(equations: Equations, u: list[arb], sizes: list[float], r: float, fou
             found, r = larger, r * step
         elif r >= 0.25:
             break
-    return found
+    # A little inside the limit, so that other arithmetics than this one find it proven too.
+    return _attempt(equations, u, sizes, 0.5 * r) or found
 
 
 def _narrowed(equations: Equations, u: list[arb], found: Zero) -> Zero:

@@ -8,6 +8,7 @@ from fractions import Fraction
 from pathlib import Path
 
 import casadi as ca
+import numpy as np
 import pytest
 
 import nonsmooth as ns
@@ -101,3 +102,22 @@ def test_false_statements_are_not_checked(k, tmp_path):
     path.write_text(json.dumps({"proofs": [false]}))
     code, words = run(path)
     assert code == 1 and "NOT CHECKED" in words, (what, words)
+
+
+def test_every_two_fold_of_random_systems_is_checked(tmp_path):
+    """Boxes of uniqueness are a little inside the limit: the checker's intervals are wider."""
+    rng = np.random.default_rng(77)
+    monomials = [1, x, y, z, x**2, y**2, x * y, x**3, y**3, x * y**2, z * x]
+    records = []
+    for _ in range(20):
+        first, second = (
+            sum(float(c) * m for c, m in zip(rng.normal(size=11), monomials, strict=True))
+            for _ in "ab"
+        )
+        system = ns.FilippovSystem([x, y, z], surface=z, above=[1, 1, first], below=[1, -1, second])
+        found = ns.prove_all(system, [(-1.5, 1.5), (-1.5, 1.5), (-1, 1)])
+        records += [p.record for p in found.zeros if p.proven]
+    path = tmp_path / "all.json"
+    path.write_text(json.dumps({"proofs": records}))
+    code, words = run(path)
+    assert len(records) > 10 and code == 0, words

@@ -33,6 +33,10 @@ CHECKS, OCTAVE = 1, 8
 #: So many steps that had to be halved for their defect, most of them in a row, are an end.
 SHORTENED = 40
 
+#: Halved steps are steady above this part of the one before. Steady ones are an end only if they do not
+#: grow and are much shorter (FAR) than what the series allows: at a branch point.
+STEADY = 0.9
+
 #: Part of a step at which its end is looked at, and of one that ends with an event: that may be the
 #: end of the field's domain, or a point where it is 0/0.
 JUST = 1 - 1e-9

@@ -825,7 +825,8 @@ static void step(Run *r) {
   double safe = safe_length(r, &e, by_series), good;
   while (dt > 0 && (good = verified(r, &e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt)
     dt = good;
-  int shrinks = dt < wanted && !(r->mode == r->length_mode && dt > 0.9 * r->length);
+  int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);
+  int shrinks = dt < wanted && !(r->mode == r->length_mode && held);
   r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
   r->length_mode = r->mode;
   r->length = dt == wanted ? h : dt;

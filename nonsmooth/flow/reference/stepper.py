@@ -32,6 +32,7 @@ from ..facts import (
     SAFETY,
     SHORTENED,
     SHORTEST,
+    STEADY,
     TIE,
     VANISHES,
     WRONG,
@@ -219,7 +220,8 @@ class Stepper:
             if good == dt:
                 break
             dt = good
-        shrinks = dt < wanted and not (e.mode == self._mode and dt > 0.9 * self._length)
+        held = dt > STEADY * self._length and (dt > self._length / STEADY or dt > wanted / FAR)
+        shrinks = dt < wanted and not (e.mode == self._mode and held)
         self._shortened = max(0.0, self._shortened + (1.0 if shrinks else -0.2))
         self._mode, self._length = e.mode, h if dt == wanted else dt
         swallowed = dt < wanted and dt <= SHORTEST * abs(t)  # close to t = 0 steps may be tiny

@@ -1060,7 +1060,7 @@ static int no_motion(Run *r, int contacts) {
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
   else if (r->active_count == 2 && r->n == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
   else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
-  else finish(r, NON_UNIQUE, DEGENERATE, 0);
+  else finish(r, HAND_OVER, NO_REASON, 0); /* a degenerate tangency: other programs tell zeros apart */
   return 0;
 }
 

@@ -3,7 +3,7 @@
 Most operations need one rule. Others need series of their own beside them: sin the cosine, tan its
 square plus one, a whole power the squares that lead to it. A rule's arguments are numbers of rules;
 a sine and a cosine refer to each other. The recurrences behind the rules are in ``jets`` (on any
-arithmetic) and in ``flow/compiled/tape.h``.
+arithmetic) and in ``flow/compiled/interpreter/programs.h``.
 """
 
 from __future__ import annotations

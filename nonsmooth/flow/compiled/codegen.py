@@ -30,7 +30,7 @@ _SCALAR_FUNCTIONS = (
 ).split()
 
 
-@lru_cache(maxsize=8)
+@lru_cache(maxsize=32)
 def driver_text(name: str) -> str:
     """Return one of the files in C beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")

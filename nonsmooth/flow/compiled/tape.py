@@ -37,6 +37,12 @@ from .codegen import driver_text, facts_header
 #: Largest order of the series, for arrays on the stack.
 _MOST_ORDER = 48
 
+#: The driver in C, in the order in which it is read: one text.
+_FILES = (
+    *("programs.h", "linear.h", "state.c", "modes.c", "stepper.c", "surfaces.c", "record.c"),
+    *("switching.c", "contacts.c", "driver.c", "memory.c", "entry.c", "fixed.c"),
+)
+
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 
@@ -91,7 +97,7 @@ def library() -> ctypes.CDLL:
         for prefix, names in enumerations
     )
     sizes = f"#define P {_MOST_ORDER}\n#define MODES 1000000\n#define M 1\n#define NG 1\n"
-    texts = [driver_text(name) for name in ("common.h", "tape.h", "linear.h", "tape.c")]
+    texts = [driver_text("common.h"), *[driver_text(f"interpreter/{name}") for name in _FILES]]
     made = build("".join([facts_header(), sizes, head, *texts]))
     require_size(made.options_size, OptionsStructure)
     require_size(made.batch_size, BatchStructure)

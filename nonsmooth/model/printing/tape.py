@@ -94,7 +94,7 @@ class Entries:
 
 @dataclass(frozen=True)
 class Tape:
-    """What the driver in C reads of a system; see ``System`` in ``flow/compiled/tape.c``."""
+    """What the driver in C reads of a system; see ``System`` in ``flow/compiled/interpreter/state.c``."""
 
     series: Series
     point: Values

@@ -1,0 +1,391 @@
+/* Events: nonsmooth/flow/reference/driver.py ----------------------------------------------------------- */
+
+static int change_kind(const Run *r, int before, int after) {
+  const int8_t *one = r->table->letter + (int64_t)before * r->width;
+  const int8_t *two = r->table->letter + (int64_t)after * r->width;
+  int closed = 0, slides = 0;
+  for (int i = 0; i < r->width; i++)
+    if (i < r->m) slides += (two[i] == 0) - (one[i] == 0); else closed += (two[i] == 0) - (one[i] == 0);
+  if (closed) return closed > 0 ? CONTACT : RELEASE;
+  return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
+}
+
+static void adopt(Run *r, const Continuation *c) {
+  memcpy(r->letter, c->letter, r->width);
+  memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
+  memcpy(r->unknowns, c->unknowns, sizeof(double) * r->width);
+  lay_out(r, r->letter, &r->now);
+  r->mode = r->now.mode;
+  enter_segment(r, r->mode);
+}
+
+/* Adopt the mode that continues; 0 where there is none or more than one. */
+static int choose(Run *r, const int8_t *letter, const Known *known, int known_count) {
+  if (r->active_count) {
+    if (!decide(r, letter, known, known_count)) return 0;
+  } else {
+    memcpy(r->chosen.letter, letter, r->width);
+    memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
+    memset(r->chosen.unknowns, 0, sizeof(double) * r->width);
+  }
+  adopt(r, &r->chosen);
+  return 1;
+}
+
+/* Sides of all surfaces; what is on one counts as below until it is decided. Contacts are open. */
+static int letters_of(Run *r, int8_t *letter) {
+  if (!r->width) return 1;
+  const double *h = surface_values(r, r->x);
+  int finite = finite_all(h, r->m + 2 * r->c);
+  for (int i = 0; i < r->width; i++) letter[i] = i >= r->m || h[i] > 0 ? 1 : -1;
+  return finite;
+}
+
+/* A closed gap that is closing further is struck at once; one that opens has a known zero. */
+static void strike_due(Run *r) {
+  if (!r->c || r->status != RUNNING) return;
+  const double *gap = gaps(r, r->x), *rate = gap + r->c;
+  r->due_impact = -1;
+  for (int row = 0; row < r->now.rows; row++) {
+    if (r->now.kind[row] != IMPACT_GUARD || gap[r->now.index[row]] != 0) continue;
+    if (rate[r->now.index[row]] < 0) r->due_impact = row;
+    else if (rate[r->now.index[row]] > 0) r->drop[row] = 1;
+  }
+}
+
+/* Find the mode of a state that was jumped to. */
+static void settle_in(Run *r) {
+  letters_of(r, r->start);
+  active_surfaces(r, -1, r->start);
+  if (r->status != RUNNING) return;
+  choose(r, r->start, 0, 0);
+  strike_due(r);
+}
+
+static void start_in(Run *r, const int8_t *asked) {
+  for (int i = 0; i < r->width; i++) {
+    int active = 0;
+    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == i;
+    if (!active && asked[i] != r->letter[i]) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  }
+  memset(r->unknowns, 0, sizeof(double) * r->width);
+  memcpy(r->letter, asked, r->width);
+  lay_out(r, r->letter, &r->now);
+  r->mode = r->now.mode;
+  if (!improve(r, &r->now, r->x, r->unknowns, 1)) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  Expansion *e = &r->e;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  for (int row = 0; row < e->l.rows; row++) {
+    int kind = e->l.kind[row], active = 0;
+    if (kind != SURFACE_GUARD && kind != EXIT_GUARD) continue;
+    for (int j = 0; j < r->active_count; j++) active |= r->active[j] == e->l.index[row];
+    if (!active) continue;
+    double value;
+    int k = leading(r, e, row, kind == SURFACE_GUARD, &value);
+    r->drop[row] = k;
+    if (value < 0) { /* repelling sliding, or a mode that cannot hold: the reference knows which */
+      finish(r, HAND_OVER, NO_REASON, 0);
+      return;
+    }
+  }
+}
+
+/* After a reset that stays on its zero the motion turns round or passes; or it is pressed. */
+static void pass(Run *r, int row, int zeros, double value, int side) {
+  int heading = side ? -side : r->now.side[row];
+  if (zeros > 1 && value * heading > 0) {
+    r->limit = r->t;
+    finish(r, ACCUMULATION, PRESSED, r->now.index[row]);
+  }
+}
+
+/* The state after a reset; the time is kept. */
+static void reset_map(Run *r, int index, const double *x, double *after) {
+  int nd = r->s->dimension;
+  values_run(&r->s->maps, x, r->p, r->maps);
+  for (int i = 0; i < nd; i++) after[i] = out_of(&r->s->maps, r->maps, index * nd + i);
+  if (r->s->timed) after[nd] = x[nd];
+}
+
+/* Whether a start on the zero of a reset is met at once. */
+static int is_pressed(Run *r, int row, double value) {
+  if (r->now.side[row]) return value * r->now.side[row] > 0;
+  double *after = r->at_work, back;
+  reset_map(r, r->now.index[row], r->x, after);
+  expand(r, r->letter, after, r->unknowns, &r->trial);
+  int zeros = leading(r, &r->trial, row, 0, &back), least = zeros < r->drop[row] ? zeros : r->drop[row];
+  if (zeros > 0 && (back * value <= 0 || least > 1)) finish(r, NON_UNIQUE, TWO_SIDED, r->now.index[row]);
+  return 0;
+}
+
+/* The stop or reset, on whose zero the run stands, that is met; ``fired`` is the reset that led here or
+ * -1. */
+static void arm(Run *r, int fired) {
+  int needed = 0;
+  r->due = -1;
+  if (r->status != RUNNING) return;
+  for (int j = 0; j < r->now.rows; j++) needed |= r->now.kind[j] == STOP_GUARD || r->now.kind[j] == RESET_GUARD;
+  if (!needed) return;
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  for (int j = 0; j < r->now.rows; j++) {
+    int kind = r->now.kind[j], resets = kind == RESET_GUARD, met = 0;
+    double value;
+    if (kind != STOP_GUARD && !resets) continue;
+    r->drop[j] = leading(r, &r->e, j, 0, &value);
+    int32_t *kept = side_of(r, &r->now, j), side = *kept;
+    if (r->drop[j] == 0) *kept = value > 0 ? 1 : -1; /* where a jump carried it is no passage */
+    if (r->drop[j] == 0 || value == 0) continue;
+    if (resets && r->now.index[j] == fired) pass(r, j, r->drop[j], value, side);
+    else if (resets && r->fired[r->now.index[j]]) continue;
+    else if (side) met = side * value < 0 && side * r->now.side[j] <= 0;
+    else if (resets) met = is_pressed(r, j, value);
+    if (met && (r->due < 0 || PRIORITY[kind] < PRIORITY[r->now.kind[r->due]])) r->due = j;
+  }
+}
+
+static void begin(Run *r, const int8_t *start_mode) {
+  note(r);
+  int finite = letters_of(r, r->letter);
+  lay_out(r, r->letter, &r->now);
+  r->mode = r->now.mode;
+  if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
+  active_surfaces(r, -1, r->letter);
+  if (r->status == RUNNING) {
+    int surfaces = 0;
+    while (surfaces < r->active_count && r->active[surfaces] < r->m) surfaces++;
+    project(r, r->active, surfaces);
+    renote(r);
+    if (start_mode) start_in(r, start_mode);
+    else if (r->active_count) {
+      memcpy(r->start, r->letter, r->width);
+      choose(r, r->start, 0, 0);
+    }
+  }
+  enter_segment(r, r->mode);
+  strike_due(r);
+  arm(r, -1);
+}
+
+static void reset(Run *r, int row) {
+  double *x = r->before;
+  int before = r->mode, index = r->now.index[row];
+  memcpy(x, r->x, sizeof(double) * r->n);
+  reset_map(r, index, x, r->x);
+  if (finite_all(r->x, r->s->dimension)) {
+    note(r);
+    settle_in(r);
+  } else {
+    memcpy(r->x, x, sizeof(double) * r->n);
+    finish(r, NOT_FINITE, RESET_MAP, index);
+  }
+  event(r, RESET, before, row, x);
+  r->fired[index] = 1;
+  arm(r, index);
+}
+
+/* Functions that are kept, and gaps that are negative by no more than the tolerance: by what the root's error
+ * moves a neighbour. */
+static int with_touched(Run *r, int32_t *onto, int kept) {
+  int all = kept;
+  surface_values(r, r->x);
+  const double *scale = surface_scales(r, r->x);
+  for (int i = r->m; i < r->m + r->c; i++) {
+    int known = 0;
+    for (int k = 0; k < kept; k++) known |= onto[k] == i;
+    if (!known && r->rates[i] < 0 && r->rates[i] >= -r->o.rtol * scale[i]) onto[all++] = i;
+  }
+  return all;
+}
+
+/* The impulses of a gap that closes, and of the contacts that are closed there. */
+static void impact(Run *r, int row) {
+  int before = r->mode, contact = r->now.index[row], count = 0;
+  int32_t *involved = r->involved, *onto = involved, kept = kept_by(r, r->letter, onto);
+  double *x = r->before;
+  onto[kept++] = r->m + contact; /* what is closed stays so to rounding */
+  project(r, onto, kept);
+  int more = with_touched(r, onto, kept);
+  if (more > kept) project(r, onto, more);
+  renote(r);
+  memcpy(x, r->x, sizeof(double) * r->n);
+  const double *gap = gaps(r, x), *rate = gap + r->c;
+  for (int j = 0; j < r->c; j++) if ((gap[j] == 0 && rate[j] <= 0) || j == contact) involved[count++] = j;
+  if (!strike(r, involved, count, 0, r->at_work)) { finish(r, INCONSISTENT, NO_IMPULSE, contact); return; }
+  memcpy(r->x, r->at_work, sizeof(double) * r->n);
+  note(r);
+  settle_in(r);
+  event(r, IMPACT, before, row, x);
+  arm(r, -1);
+}
+
+static void release(Run *r, int row) {
+  int before = r->mode, j = r->now.index[row];
+  Known known[] = {{RELEASE_GUARD, j, 0, 1}, {IMPACT_GUARD, j, 1, 3}};
+  active_surfaces(r, r->m + j, r->letter);
+  if (r->status != RUNNING) return;
+  memcpy(r->start, r->letter, r->width);
+  if (choose(r, r->start, known, 2) && r->mode != before) event(r, change_kind(r, before, r->mode), before, row, r->x);
+}
+
+static int advance(Run *r, const Expansion *e, double dt);
+
+/* After impacts that accumulate the contact is closed; whether there is one. */
+static int come_to_rest(Run *r, double left) {
+  int count = 0, kept = 0;
+  int32_t *involved = r->involved, *which = r->involved + r->c;
+  if (!r->c) return 0;
+  for (int k = 1; k <= 6 && k <= r->history; k++) if (r->kind[(r->history - k) % HISTORY] != IMPACT) return 0;
+  const double *gap = gaps(r, r->x);
+  for (int j = 0; j < r->c; j++) if (gap[j] == 0) involved[count++] = j;
+  if (!strike(r, involved, count, 1, r->at_work)) return 0;
+  int before = r->mode;
+  memcpy(r->x, r->at_work, sizeof(double) * r->n);
+  for (int i = 0; i < count; i++) which[kept++] = r->m + involved[i];
+  for (int i = 0; i < count; i++) which[kept++] = r->m + r->c + involved[i];
+  project(r, which, kept);
+  letters_of(r, r->start);
+  for (int i = 0; i < count; i++) which[i] = r->m + involved[i];
+  active_surfaces(r, -1, r->start);
+  for (int i = 0; i < count; i++) { /* those that rest are so, whatever rounding says */
+    int at = 0;
+    while (at < r->active_count && r->active[at] < which[i]) at++;
+    if (at < r->active_count && r->active[at] == which[i]) continue;
+    memmove(r->active + at + 1, r->active + at, sizeof(int32_t) * (r->active_count - at));
+    r->active[at] = which[i];
+    r->active_count++;
+  }
+  if (r->status != RUNNING || !choose(r, r->start, 0, 0)) return 1;
+  note(r);
+  r->history = 0;
+  expand(r, r->letter, r->x, r->unknowns, &r->e);
+  int closed = 0;
+  for (int i = r->m; i < r->width; i++) closed |= r->letter[i] == 0;
+  if (closed && r->e.finite && advance(r, &r->e, left)) {
+    r->limit = r->t;
+    event(r, change_kind(r, before, r->mode), before, -1, r->x);
+  }
+  return 1;
+}
+
+static int only_sliding(const Run *r) {
+  int found = -1;
+  for (int i = 0; i < r->m; i++) if (r->letter[i] == 0) { if (found >= 0) return -1; found = i; }
+  return found;
+}
+
+static void watch_two_fold(Run *r) {
+  int s = only_sliding(r);
+  if (s >= 0 && is_two_fold(r, r->letter, s, r->o.rtol)) finish(r, NON_UNIQUE, SLID_TO_TWO_FOLD, s);
+}
+
+static void serve(Run *r, int row) {
+  int kind = r->now.kind[row], index = r->now.index[row], side = r->now.side[row], before = r->mode;
+  r->met = (Met){kind, index, side};
+  if (kind == STOP_GUARD) {
+    event(r, STOP, r->mode, row, r->x);
+    finish(r, STOPPED, NO_REASON, index);
+  } else if (kind == RESET_GUARD) reset(r, row);
+  else if (kind == IMPACT_GUARD) impact(r, row);
+  else if (kind == RELEASE_GUARD) release(r, row);
+  else {
+    Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
+    active_surfaces(r, index, r->letter);
+    if (r->status != RUNNING) return;
+    int kept = 0; /* contacts among them keep their gaps */
+    for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
+    project(r, r->involved, kept);
+    renote(r);
+    if (kind != SURFACE_GUARD) watch_two_fold(r);
+    else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
+    if (r->status != RUNNING) return;
+    memcpy(r->start, r->letter, r->width);
+    if (choose(r, r->start, known, kind == EXIT_GUARD ? 2 : 0) && r->mode != before)
+      event(r, change_kind(r, before, r->mode), before, row, r->x);
+  }
+}
+
+/* 0 where the state after the step is not finite; the run then ends before it. */
+static int advance(Run *r, const Expansion *e, double dt) {
+  int n = r->n, stride = r->stride, kept = 0;
+  double *x = r->at_work;
+  for (int i = 0; i < n; i++) {
+    const double *c = e->states + (int64_t)i * stride;
+    double v = c[r->order];
+    for (int k = r->order - 1; k >= 0; k--) v = v * dt + c[k];
+    x[i] = v;
+  }
+  if (!finite_all(x, n)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
+  if (r->o.dense) {
+    int64_t k = r->out.steps++;
+    r->out.start[k] = r->t;
+    r->out.step_mode[k] = r->mode;
+    memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
+  }
+  if (r->times) sample_step(r, e, dt);
+  memcpy(r->x, x, sizeof(double) * n);
+  r->t += dt;
+  r->step_count++;
+  r->segment_steps++;
+  if (r->s->timed) r->x[n - 1] = r->t;
+  kept = kept_by(r, r->letter, r->involved);
+  project(r, r->involved, kept);
+  if (e->l.slides) {
+    double *ahead = r->lam, ignored;
+    for (int i = 0; i < r->width; i++) ahead[i] = horner(e->series + (int64_t)i * stride, r->order, dt, &ignored);
+    memcpy(r->unknowns, ahead, sizeof(double) * r->width);
+    improve(r, &r->now, r->x, r->unknowns, 2);
+  }
+  memset(r->drop, 0, sizeof(int32_t) * r->guards);
+  note(r);
+  return 1;
+}
+
+static void step(Run *r) {
+  if (r->due >= 0) { serve(r, r->due); return; }
+  if (r->due_impact >= 0) { serve(r, r->due_impact); return; }
+  double left = r->o.t_end - r->t, dt = 0;
+  if (left <= 0) { finish(r, REACHED_END, NO_REASON, 0); return; }
+  if (r->step_count >= r->o.max_steps) { finish(r, TOO_MANY_STEPS, NO_REASON, 0); return; }
+  Expansion *e = &r->e;
+  expand(r, r->letter, r->x, r->unknowns, e);
+  if (!e->finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
+  double by_series = step_size(r, e), h = smaller(by_series, r->o.max_step);
+  if (h <= SHORTEST * larger(fabs(r->t), 1) && h < left) {
+    finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
+    return;
+  }
+  int last = h >= left;
+  if (last) h = left;
+  /* What happens at the end, to rounding, happens. */
+  int row = first_hit(r, e, last ? h + AT_END * larger(1, fabs(r->t + h)) : h, &dt);
+  dt = row < 0 ? h : smaller(dt, h);
+  double wanted = dt, safe = safe_length(r, e, by_series), good;
+  while (dt > 0 && (good = verified(r, e, dt, row >= 0 && dt == wanted ? BEFORE_EVENT : JUST, safe)) < dt) dt = good;
+  int held = dt > STEADY * r->length && (dt > r->length / STEADY || dt > wanted / FAR);
+  int shrinks = dt < wanted && !(r->mode == r->length_mode && held);
+  r->shortened = larger(0, r->shortened + (shrinks ? 1 : -0.2));
+  r->length_mode = r->mode;
+  r->length = dt == wanted ? h : dt;
+  int swallowed = dt < wanted && dt <= SHORTEST * fabs(r->t); /* close to t = 0 steps may be tiny */
+  if (r->shortened >= SHORTENED || swallowed) { finish(r, STEP_TOO_SMALL, BRANCH_POINT, 0); return; }
+  if (dt < wanted) { row = -1; last = 0; }
+  if (dt > 0) {
+    note_sides(r, e, dt);
+    memset(r->fired, 0, sizeof(int32_t) * (r->s->resets + 1));
+  }
+  last &= dt == h;
+  if (!advance(r, e, dt)) return;
+  if (last) {
+    r->t = r->o.t_end;
+    if (r->s->timed) r->x[r->n - 1] = r->t;
+    if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
+  }
+  if (row >= 0) serve(r, row);
+  else if (!last) watch_two_fold(r);
+}
+
+/* The last mode counts only if it lasted for a step (or is the only one). */
+static int32_t final_itinerary(const Run *r) {
+  int32_t above = r->table->tree.node[r->itinerary].parent;
+  return r->segment_steps == 0 && above > 0 ? above : r->itinerary;
+}

@@ -1,0 +1,142 @@
+/* The reference driver in C for any number of surfaces and impacts; the system is data, not code.
+ *
+ * The functions have the names and the order of nonsmooth/flow/reference/{modes,stepper,switching,contacts,
+ * driver}.py; read those first. What is rare and slow anyway (points where the jet is not finite, starts in
+ * repelling sliding, stability that no simple test shows) is handed over to them.
+ */
+#define HISTORY 48
+#define TRIED 256 /* modes that are tried one by one, where the rates do not decide */
+#define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
+#define SEVERAL 16 /* modes that can continue, for the message */
+#define TINY 2.2250738585072014e-308
+
+/* Entries of a sparse matrix in the order of a program's outputs. */
+typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
+
+typedef struct {
+  int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
+  Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
+  Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops */
+  Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
+  Values maps;        /* states after each reset */
+  Values restitution; /* of each impact */
+  Values columns;     /* entries of the field's derivatives by the unknowns */
+  Entries slope, layer_gradient, height_gradient, stop_gradient, surface_gradient, column;
+  const int32_t *stop_direction, *reset_direction, *continuous, *scaled, *carries, *component;
+  const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
+  int32_t linear, pad;
+} System;
+
+/* The guards of a mode, and what slides in it. */
+typedef struct {
+  int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts */
+  int32_t rows, slides, mode, branches;
+  int32_t *sliding, *kind, *index, *side;
+} Layout;
+
+typedef struct {
+  Layout l;
+  int finite;
+  double *states, *guards, *series, *allowed, *of_guards, *scale, *steep, *inverse;
+} Expansion;
+
+/* A mode that can continue, and the zeros of its guards. */
+typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
+
+/* Modes met, by number: their letters. */
+typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
+
+/* What a run writes, when dense: steps, points and events, emptied by the caller when full. */
+typedef struct {
+  int64_t steps, points, events, step_room, point_room, event_room;
+  double *start, *coefficients, *point_t, *point_x, *event_t, *event_x, *event_after_x;
+  int32_t *step_mode, *event_kind, *event_before, *event_after, *event_guard;
+} Output;
+
+/* The guard that is served. */
+typedef struct { int kind, index, side; } Met;
+
+typedef struct {
+  Options o;
+  const System *s;
+  Table *table;
+  double *p;
+  int32_t n, m, c, width, order, stride, guards;
+  double t, begun, last_event, limit, at_t, *x, *at_x, *unknowns;
+  int8_t *letter, *start; /* present ones, and those that a choice is made from */
+  Layout now; /* of the present mode */
+  Met met;
+  int32_t mode, status, reason, where, due, due_impact, *drop, *side, *fired;
+  int64_t step_count, event_count, kinds[KINDS], segment_steps, history;
+  int32_t itinerary, segment_mode;
+  double interval[HISTORY];
+  int64_t pattern[HISTORY];
+  int32_t kind[HISTORY];
+  double size, length, shortened;
+  int32_t length_mode, active_count, several_count, several[SEVERAL], *active;
+  Expansion e, trial;
+  Continuation chosen, one, first, rest, found;
+  Output out;
+  int64_t hits, kept, room; /* of the section; samples kept, in row of the results */
+  const double *times;
+  double *sample_t, *sample_x;
+  /* programs' values, inputs, yardsticks */
+  double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
+  double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
+  int32_t *pending, *sparse, *involved;
+  void *arena;
+} Run;
+
+static void finish(Run *r, int status, int reason, int where) {
+  if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }
+}
+
+/* Modes by number ------------------------------------------------------------------------------ */
+
+static uint32_t hash_of(const int8_t *letter, int width) {
+  uint32_t h = 2166136261u;
+  for (int i = 0; i < width; i++) h = (h ^ (uint8_t)letter[i]) * 16777619u;
+  return h;
+}
+
+static int32_t mode_number(Table *t, const int8_t *letter) {
+  uint32_t at = hash_of(letter, t->width) % (uint32_t)t->buckets;
+  for (; t->bucket[at] >= 0; at = (at + 1) % (uint32_t)t->buckets)
+    if (!memcmp(t->letter + (int64_t)t->bucket[at] * t->width, letter, t->width)) return t->bucket[at];
+  if (t->count == t->room) {
+    int32_t room = 2 * t->room, buckets = 4 * room;
+    int8_t *more = realloc(t->letter, (size_t)room * (t->width + 1));
+    int32_t *bucket = malloc(sizeof(int32_t) * buckets);
+    if (!more || !bucket) return 0;
+    memset(bucket, -1, sizeof(int32_t) * buckets);
+    for (int32_t k = 0; k < t->count; k++) {
+      uint32_t place = hash_of(more + (int64_t)k * t->width, t->width) % (uint32_t)buckets;
+      while (bucket[place] >= 0) place = (place + 1) % (uint32_t)buckets;
+      bucket[place] = k;
+    }
+    free(t->bucket);
+    t->letter = more; t->bucket = bucket; t->room = room; t->buckets = buckets;
+    return mode_number(t, letter);
+  }
+  memcpy(t->letter + (int64_t)t->count * t->width, letter, t->width);
+  t->bucket[at] = t->count;
+  return t->count++;
+}
+
+Table *table_new(int32_t width) {
+  Table *t = calloc(1, sizeof(Table));
+  t->tree = (Tree){malloc(64 * sizeof(Node)), 1, 64};
+  t->tree.node[0] = (Node){.parent = -1, .mode = -1};
+  t->width = width; t->room = 64; t->buckets = 256;
+  t->letter = malloc((size_t)t->room * (width + 1));
+  t->bucket = malloc(sizeof(int32_t) * t->buckets);
+  memset(t->bucket, -1, sizeof(int32_t) * t->buckets);
+  return t;
+}
+int32_t table_modes(const Table *t) { return t->count; }
+int32_t table_size(const Table *t) { return t->tree.size; }
+void table_read(const Table *t, int32_t *parent, int32_t *mode, int8_t *letter) {
+  tree_read(&t->tree, parent, mode);
+  memcpy(letter, t->letter, (size_t)t->count * t->width);
+}
+void table_free(Table *t) { free(t->tree.node); free(t->letter); free(t->bucket); free(t); }

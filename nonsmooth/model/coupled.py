@@ -87,6 +87,7 @@ class Coupled:
         self.continuous = tuple(self._is_continuous(i) for i in range(self._surfaces))
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
+        self._stable: dict[tuple[int, ...], list[ca.SX]] = {}
         self._series: dict[tuple[int, ...], tuple[Expansion, list[int]]] = {}
         kept = ca.vertcat(d.surfaces, d.gap_rates)
         self.layer = ca.densify(ca.jtimes(kept, x, field))
@@ -182,8 +183,10 @@ class Coupled:
         """
         changing = self._changing(sliding)
         if len(sliding) == 2 and len(changing) == 2 and max(sliding) < self._surfaces:
-            slope = ca.densify(self.slope[changing, changing])
-            return [ca.det(slope), ca.trace(slope)]
+            if (pair := tuple(changing)) not in self._stable:
+                both = ca.densify(self.slope[changing, changing])
+                self._stable[pair] = [ca.det(both), ca.trace(both)]
+            return self._stable[pair]
         return [self.slope[i, i] for i in changing]
 
     # expressions --------------------------------------------------------------------------------

@@ -218,7 +218,11 @@ static int decide(Run *r, const int8_t *letter, const Known *known, int known_co
     if (rests(r, trial) && resting++ == 0) copy_continuation(r, &r->rest, &r->found);
   }
   if (r->status != RUNNING) return 0;
-  if (strict > 1) { finish(r, NON_UNIQUE, AMBIGUOUS, 0); return 0; }
+  if (strict > 1) { /* rounding may have hidden which: where multipliers are eliminated one sees more */
+    int handed = known_count || (r->m == 1 && r->c == 0);
+    finish(r, handed ? HAND_OVER : NON_UNIQUE, handed ? NO_REASON : AMBIGUOUS, 0);
+    return 0;
+  }
   if (strict == 1) copy_continuation(r, &r->chosen, &r->one);
   else if (found == 1) copy_continuation(r, &r->chosen, &r->first);
   else if (resting) copy_continuation(r, &r->chosen, &r->rest);

@@ -48,7 +48,7 @@ class Yardsticks:
         Its derivatives by the unknown of each surface (lambda_i, or nu_i).
     factors : ndarray (m,)
         n_i; 1 where there is none.
-    layer_gradient, surface_gradient, stop_gradient : ndarray (m, N), (m, N), (s, N)
+    layer_gradient, surface_gradient, stop_gradient, factor_gradient : ndarray (m, N) or (s, N)
         Magnitudes of the state derivatives of G, of surfaces and gaps, of stops and resets.
     """
 
@@ -58,6 +58,7 @@ class Yardsticks:
     layer_gradient: Array
     surface_gradient: Array
     stop_gradient: Array
+    factor_gradient: Array
 
 
 class Coupled:
@@ -103,8 +104,8 @@ class Coupled:
         #: Whether field, layer and guards are affine in states and multipliers together.
         everything = ca.vertcat(field, self.layer, heights, stops)
         self.linear = not any(self.scaled) and bool(ca.is_linear(everything, self.moving))
-        #: Of layer, of surfaces and gaps, and of stops and resets, by the states.
-        self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops)]
+        #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
+        self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
         self._column_function: Evaluator | None = None
 

@@ -275,13 +275,17 @@ class CoupledModes:
         allowed = tolerances(self._system, x, self._options)
         inverse = np.abs(_inverse(marks.slope[np.ix_(sliding, sliding)]))
 
-        def of_rows(surface: Array, layer: Array, stops: Array) -> Array:
+        def of_rows(surface: Array, layer: Array, stops: Array, factors: Array) -> Array:
             of_unknowns = layer.copy()
             of_unknowns[sliding] = inverse @ layer[sliding]
+            of_unknowns[: self._system.surface_count] += factors[: self._system.surface_count]
             return self._of_rows(signs, surface, of_unknowns, stops, len(guards))
 
         size = self._options.size
-        gradients = (marks.surface_gradient, marks.layer_gradient, marks.stop_gradient)
+        gradients = (
+            *(marks.surface_gradient, marks.layer_gradient, marks.stop_gradient),
+            marks.factor_gradient,
+        )
         return Expansion(
             mode=mode,
             states=states,

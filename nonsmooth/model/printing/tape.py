@@ -106,6 +106,7 @@ class Tape:
     layer_gradient: Entries
     height_gradient: Entries
     stop_gradient: Entries
+    factor_gradient: Entries
     surface_gradient: Entries
     column: Entries
     component: Integers
@@ -142,6 +143,7 @@ def tape_of(coupled: Coupled) -> Tape:
         layer_gradient=gradients[0][1],
         height_gradient=gradients[1][1],
         stop_gradient=gradients[2][1],
+        factor_gradient=gradients[3][1],
         surface_gradient=surface_gradient[1],
         column=column[1],
         component=_components(surface_gradient[1], kept.numel()),

@@ -79,7 +79,7 @@ static size_t place_run(Run *r, char *base) {
   r->rates = DOUBLES(2 * all + c);
   r->lam = DOUBLES(2 * w);
   r->matrix = DOUBLES(square + 6 * w + all + 2 * c);
-  r->small = DOUBLES(3 * w + s->stops + s->resets);
+  r->small = DOUBLES(4 * w + s->stops + s->resets);
   r->pending = INTEGERS(6 * w + 2 * all);
   r->sparse = INTEGERS(square + 2 * w + 1);
   return used;

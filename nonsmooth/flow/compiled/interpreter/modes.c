@@ -89,12 +89,14 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
   const System *s = r->s;
   const Layout *l = &e->l;
   int w = r->width, first = 2 * w + s->slope.count, row = 0, slides = l->slides;
-  double *layer = r->small, *height = layer + w, *stop = height + w, *through = stop + s->stops + s->resets;
+  double *layer = r->small, *height = layer + w, *stop = height + w, *through = stop + s->stops + s->resets, *factor = through + w;
   gradient_sums(r, &s->point, r->point, first, &s->layer_gradient, w, vector, finite_only, layer);
   first += s->layer_gradient.count;
   gradient_sums(r, &s->point, r->point, first, &s->height_gradient, w, vector, finite_only, height);
   first += s->height_gradient.count;
   gradient_sums(r, &s->point, r->point, first, &s->stop_gradient, s->stops + s->resets, vector, finite_only, stop);
+  first += s->stop_gradient.count;
+  gradient_sums(r, &s->point, r->point, first, &s->factor_gradient, w, vector, finite_only, factor);
   for (int i = 0; i < slides; i++) {
     through[i] = 0;
     for (int j = 0; j < slides; j++) {
@@ -103,6 +105,7 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
     }
   }
   for (int i = 0; i < slides; i++) layer[l->sliding[i]] = through[i];
+  for (int i = 0; i < s->m; i++) layer[i] += factor[i];
   double worst = 0;
   for (int i = 0; i < w; i++) worst = larger(layer[i], worst);
   for (; row < l->rows; row++) {

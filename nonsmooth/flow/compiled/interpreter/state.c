@@ -16,12 +16,12 @@ typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
 typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
-  Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops */
+  Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops, factors */
   Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
   Values maps;        /* states after each reset */
   Values restitution; /* of each impact */
   Values columns;     /* entries of the field's derivatives by the unknowns */
-  Entries slope, layer_gradient, height_gradient, stop_gradient, surface_gradient, column;
+  Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, column;
   const int32_t *stop_direction, *reset_direction, *continuous, *scaled, *carries, *component;
   const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
   int32_t linear, pad;

@@ -13,7 +13,8 @@ PARAMETERS = st.fixed_dictionaries(
         mu=st.floats(0.05, 1.5),
         d1=st.floats(0.0, 0.5),
         d2=st.floats(0.0, 0.5),
-        eta=st.floats(0.0, 4.0),
+        # between 0 and rounding nobody knows whether friction can hold at touch-down: NON_UNIQUE is said
+        eta=st.just(0.0) | st.floats(1e-9, 4.0),
         G=st.floats(0.0, 0.01),
     )
 )

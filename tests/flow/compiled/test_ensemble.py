@@ -316,6 +316,14 @@ def endless():
     return system, starts
 
 
+@pytest.fixture
+def keyboard():
+    """Ctrl-C is heard as at a terminal, also where a shell has put the tests in the background."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
 def press():
     """Press Ctrl-C, from whatever thread."""
     signal.pthread_kill(threading.main_thread().ident, signal.SIGINT)
@@ -324,7 +332,7 @@ def press():
 
 @needs_compiler
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(endless, monkeypatch):
+def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(endless, keyboard, monkeypatch):
     monkeypatch.setattr(chunks.run_chunk, "__defaults__", (None, press))  # asked between bursts
     with pytest.raises(KeyboardInterrupt):
         ensemble(*endless, **LONG, work=Work(chunk=50, threads=1))
@@ -332,7 +340,9 @@ def test_interrupt_from_the_keyboard_is_heard_inside_a_chunk(endless, monkeypatc
 
 @needs_compiler
 @pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_interrupt_from_the_keyboard_is_heard_inside_the_chunks_of_threads(endless, monkeypatch):
+def test_interrupt_from_the_keyboard_is_heard_inside_the_chunks_of_threads(
+    endless, keyboard, monkeypatch
+):
     class Pressed(threading.Event):
         pressed = False
 

@@ -67,7 +67,7 @@ VANISHES = 64 * EPSILON
 #: Both fields are tangent where they are at this angle to the surface.
 TANGENT = 2e-14
 
-#: A step this short, relative to 1 + the time, is swallowed by rounding.
+#: A step this short, relative to the time and to that of the run, is swallowed by rounding.
 SHORTEST = 4 * EPSILON
 
 #: Halvings of the interval before two roots count as one that touches without crossing.

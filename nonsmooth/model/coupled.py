@@ -392,8 +392,7 @@ def _inverse(matrix: Array) -> Array:
 
 
 def _sign(row: Array) -> float:
-    """Sign of a series just after its start."""
-    return float(np.sign(next((v for v in np.ravel(row) if v), 1.0)))
+    return float(np.sign(next((v for v in np.ravel(row) if v), 1.0)))  # just after its start
 
 
 def coupled_of(system: FilippovSystem) -> Coupled:

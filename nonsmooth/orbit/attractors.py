@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.spatial import cKDTree
 
 from ..flow.ensemble import ensemble
 from ..flow.saving import savable
@@ -100,7 +99,7 @@ class Search:
         self._measure(self.x0)
         self.labels = np.zeros(len(self.x0), np.int32)
         self.found: list[Attractor] = []
-        self._trees: list[cKDTree] = []
+        self._trees: list[Any] = []
 
     def _read_section(self, section: Any) -> None:
         self.period: float | None = None
@@ -136,7 +135,7 @@ class Search:
                 f"attractors: expected points (m, {self.system.dimension}), received {points.shape}."
             )
         self.found.append(Attractor(points))
-        self._trees.append(cKDTree(points / self.scale))
+        self._trees.append(_tree(points / self.scale))
 
     def _beside(self, looks: Array) -> NDArray[np.int32]:
         """Attractor beside which all looks (m, K, n) are, from 1; 0 where there is none."""
@@ -163,7 +162,7 @@ class Search:
                 continue
             quarter = max(1, len(settled) // 4)
             before, after = settled[:-quarter], settled[-quarter:]
-            tree = cKDTree(before / self.scale)
+            tree = _tree(before / self.scale)
             if len(before) and np.all(tree.query(after / self.scale, p=np.inf)[0] <= self.near):
                 self.known(_thinned(settled[::-1], self.scale, self.near / 8))
                 label[i] = len(self.found)
@@ -175,7 +174,7 @@ class Search:
             if np.mean(tree.query(points / self.scale, p=np.inf)[0] <= self.near) > 0.5:
                 more = np.vstack([self.found[k].points, points])
                 self.found[k] = Attractor(_thinned(more, self.scale, self.near / 8))
-                self._trees[k] = cKDTree(self.found[k].points / self.scale)
+                self._trees[k] = _tree(self.found[k].points / self.scale)
                 return k + 1
         return 0
 
@@ -198,7 +197,7 @@ class Search:
         if len(seen):  # but for a twentieth: some may run away
             ends = np.quantile(seen, [0.05, 0.95], axis=0)
             self._measure(np.vstack([self.x0, ends]))
-            self._trees = [cKDTree(a.points / self.scale) for a in self.found]
+            self._trees = [_tree(a.points / self.scale) for a in self.found]
         self._learn(looks)
 
     def _long(self, x: Array, t: float) -> Array:
@@ -292,3 +291,9 @@ def _thinned(points: Array, scale: Array, least: float) -> Array:
         if not len(others) or np.abs((others - point) / scale).max(axis=1).min() > least:
             kept.append(point)
     return np.array(kept)
+
+
+def _tree(points: Array) -> Any:
+    from scipy.spatial import cKDTree  # here: it is not needed to import the library
+
+    return cKDTree(points)

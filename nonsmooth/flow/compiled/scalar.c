@@ -812,7 +812,7 @@ static void step(Run *r) {
   expand(r, r->mode, &e);
   if (!e.finite) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   double by_series = step_size(r, &e), h = smaller(by_series, r->o.max_step);
-  if (h <= SHORTEST * larger(fabs(r->t), 1) && h < left) {
+  if (h <= SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)) && h < left) {
     finish(r, STEP_TOO_SMALL, r->shortened > SHORTENED / 10 ? BRANCH_POINT : NO_REASON, 0);
     return;
   }

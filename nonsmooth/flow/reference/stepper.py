@@ -84,7 +84,7 @@ class Stepper:
         self.order = options.order
         self._mode: str | None = None  # of the step before
         self._length = math.inf
-        self._shortened = 0.0
+        self._shortened, self._begun = 0.0, options.t_start
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Return the guards of a mode, in the order of the rows of its expansion."""
@@ -205,7 +205,7 @@ class Stepper:
         """
         by_series = self.step_size(e)
         h = min(by_series, max_step)
-        if h <= SHORTEST * max(1.0, abs(t)) and h < left:
+        if h <= SHORTEST * max(abs(t - self._begun), abs(t)) and h < left:
             often = self._shortened > SHORTENED / 10
             fault = messages.branch_point(t) if often else messages.step_too_small(h)
             return Plan(0.0, [], False, fault)

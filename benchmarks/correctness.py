@@ -1,4 +1,4 @@
-"""Itineraries: 100,000 random starts, and starts bisected to 1e-9 of every boundary between them.
+"""Itineraries: a million random starts, and starts bisected to 1e-9 of every boundary between them.
 
 Random starts: the compiled engine at its default tolerance against itself at 1e-14 for all, against
 the reference driver at 1e-15 and against mpmath for samples. Boundaries: against mpmath for all.
@@ -22,7 +22,7 @@ GAP = 1e-9
 
 def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
     """Count wrong itineraries of one bounce."""
-    count, sample = (5_000, 50) if quick else (100_000, 1_000)
+    count, sample = (5_000, 50) if quick else (1_000_000, 1_000)
     starts = random_starts(count, seed=5)
     solve, tight = ours.make(name, DEFAULT), ours.make(name, TIGHT)
     ends, exact = solve(starts), tight(starts)

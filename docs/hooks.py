@@ -14,7 +14,8 @@ from typing import Any
 DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
-import generate  # noqa: E402  (a neighbour; docs is not a package)
+import api  # noqa: E402  (neighbours; docs is not a package)
+import generate  # noqa: E402
 from mkdocs.structure.files import File, Files  # noqa: E402
 
 PICTURES = DOCS.parent / "build" / "gallery"
@@ -29,7 +30,7 @@ def on_files(files: Files, config: Any) -> Files:
         figure = generate.run_example(name)["figure"]
         figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
         files.append(File.generated(config, f"gallery/{name}.svg", abs_src_path=str(path)))
-    for uri, text in generate.api_pages().items():
+    for uri, text in api.pages().items():
         files.append(File.generated(config, uri, content=text))
     return files
 

@@ -59,14 +59,14 @@ class Coulomb(FrictionLaw):
 class Stribeck(FrictionLaw):
     """From ``mu`` at rest to ``mu_kinetic``: mu_kinetic + (mu - mu_kinetic) exp(-(slip/v)^2).
 
+    Source: Stribeck 1902; this form Armstrong-Helouvry 1991.
+
     Parameters
     ----------
     mu_kinetic : float
         Coefficient of fast slip.
     stribeck_speed : float
         The speed v, in the model's units.
-
-    Source: Stribeck 1902; this form Armstrong-Helouvry 1991.
 
     Examples
     --------
@@ -86,11 +86,12 @@ class Stribeck(FrictionLaw):
 class ExponentialDecay(FrictionLaw):
     """mu_kinetic + (mu - mu_kinetic) exp(-slip/decay_speed), with a corner at zero slip.
 
+    Source: Oden & Martins 1985; the law of finite-element codes.
+
     Parameters
     ----------
     mu_kinetic, decay_speed : float
-
-    Source: Oden & Martins 1985; the law of finite-element codes.
+        Coefficient of fast slip, and the slip over which the difference falls by a factor e.
     """
 
     parameters = dict(mu_kinetic=None, decay_speed=None)
@@ -122,6 +123,9 @@ class LuGre(FrictionLaw):
     The traction is -(bristle_stiffness z + bristle_damping z' + viscosity H). It is single-valued:
     the ball creeps instead of rolling exactly, and stick is H near zero.
 
+    Source: Canudas de Wit, Olsson, Astrom & Lischinsky 1995, with the force per unit of load as in
+    their later tyre models.
+
     Parameters
     ----------
     bristle_stiffness : float
@@ -130,9 +134,6 @@ class LuGre(FrictionLaw):
         Per unit of speed.
     mu_kinetic, stribeck_speed : float
         Of g, as in :class:`Stribeck`.
-
-    Source: Canudas de Wit, Olsson, Astrom & Lischinsky 1995, with the force per unit of load as in
-    their later tyre models.
     """
 
     parameters = dict(
@@ -170,12 +171,12 @@ class LuGre(FrictionLaw):
 class Dahl(FrictionLaw):
     """A bristle without Stribeck effect: z' = H - bristle_stiffness |H| z / mu, traction -k z.
 
+    Source: Dahl 1968.
+
     Parameters
     ----------
     bristle_stiffness : float
         k, per unit of length.
-
-    Source: Dahl 1968.
     """
 
     parameters = dict(bristle_stiffness=None)

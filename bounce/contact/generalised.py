@@ -29,6 +29,8 @@ class GeneralisedContact(ContactModel):
 
     X'' + eps upsilon X' + eps^2 zeta X = Lambda_T,  Y'' + delta Y' + kappa Y = -G.
 
+    Source: Biber, Champneys & Szalai 2022, Sec. 4, eq. (generic_rescaled).
+
     Parameters
     ----------
     upsilon, zeta : callable (s, p) -> expression
@@ -41,9 +43,9 @@ class GeneralisedContact(ContactModel):
         See obligation 7 of :class:`ContactModel`: needed where the load ends in a power law's
         zero, such as Hertz's without gravity.
     mu, eps : float
+        Friction coefficient; ratio of time scales, small for a hard normal contact.
     G : float, optional
-
-    Source: Biber, Champneys & Szalai 2022, Sec. 4, eq. (generic_rescaled).
+        Gravity relative to the contact force.
 
     Examples
     --------
@@ -134,6 +136,7 @@ class GeneralisedContact(ContactModel):
         order_one : float
             What still counts as O(1).
         samples : int
+            Number of states at which the conditions are looked at.
 
         Returns
         -------
@@ -198,6 +201,7 @@ class Conditions:
     Attributes
     ----------
     rows : tuple of Condition
+        One for each condition.
     """
 
     rows: tuple[Condition, ...]

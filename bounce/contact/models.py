@@ -43,6 +43,8 @@ class KelvinVoigt(_LinearTangential):
 
     X'' + 2 d1 eta X' + eta^2 X = Lambda_T,  Y'' + 2 d2 Y' + Y = -G,  Omega' = Lambda_T / inertia.
 
+    Source: Biber, Champneys & Szalai 2022, Sec. 3.
+
     Parameters
     ----------
     mu : float
@@ -55,8 +57,6 @@ class KelvinVoigt(_LinearTangential):
         Scaled gravity eps2^2 g, >= 0.
     load : {"contact", "net"}
         "net" is the paper's Lambda_N = -2 d2 Y' - Y - G.
-
-    Source: Biber, Champneys & Szalai 2022, Sec. 3.
 
     Examples
     --------
@@ -87,7 +87,9 @@ class NormalKelvinVoigt(ContactModel):
     Parameters
     ----------
     mu, d2 : float
+        Friction coefficient, and damping ratio of the normal contact.
     G : float, optional
+        Gravity relative to the normal spring's force.
 
     Examples
     --------
@@ -156,7 +158,10 @@ class DepthDampedKelvinVoigt(_LinearTangential):
     Parameters
     ----------
     mu, d1, d2, eta : float
+        Friction coefficient; damping ratios, tangential and normal; tangential frequency relative to
+        the normal one.
     G : float, optional
+        Gravity relative to the normal spring's force.
     """
 
     parameters = dict(mu=None, d1=None, d2=None, eta=None, G=0.0)
@@ -205,12 +210,14 @@ class _PowerLaw(_LinearTangential):
 class Hertz(_PowerLaw):
     """Elastic Hertzian contact: normal force stiffness (-Y)^(3/2).
 
+    Source: Hertz 1881; Johnson 1985, Contact Mechanics, eq. (4.22).
+
     Parameters
     ----------
     mu, stiffness : float
+        Friction coefficient, and stiffness of the normal contact.
     d1, eta, G : float, optional
-
-    Source: Hertz 1881; Johnson 1985, Contact Mechanics, eq. (4.22).
+        Tangential damping ratio and frequency, and gravity; default 0.
 
     Examples
     --------
@@ -235,12 +242,14 @@ class Hertz(_PowerLaw):
 class HuntCrossley(_PowerLaw):
     """Hertzian contact whose damping vanishes with the depth: (-Y)^(3/2) (stiffness - damping Y').
 
+    Source: Hunt & Crossley 1975.
+
     Parameters
     ----------
     mu, stiffness, damping : float
+        Friction coefficient; stiffness and damping of the normal contact.
     d1, eta, G : float, optional
-
-    Source: Hunt & Crossley 1975.
+        Tangential damping ratio and frequency, and gravity; default 0.
     """
 
     parameters = dict(mu=None, stiffness=None, damping=None, d1=0.0, eta=0.0, G=0.0)
@@ -258,13 +267,14 @@ class HuntCrossley(_PowerLaw):
 class Tsuji(_PowerLaw):
     """Hertzian contact with restitution nearly free of speed: (-Y)^(1/4) (k (-Y)^(5/4) - c Y').
 
+    Source: Tsuji, Tanaka & Ishida 1992, eq. for eta_n.
+
     Parameters
     ----------
     mu, stiffness, damping : float
         k and c; Tsuji's alpha is c / sqrt(k) for unit mass.
     d1, eta, G : float, optional
-
-    Source: Tsuji, Tanaka & Ishida 1992, eq. for eta_n.
+        Tangential damping ratio and frequency, and gravity; default 0.
     """
 
     parameters = dict(mu=None, stiffness=None, damping=None, d1=0.0, eta=0.0, G=0.0)
@@ -280,13 +290,15 @@ class Tsuji(_PowerLaw):
 class KuwabaraKono(_PowerLaw):
     """Hertzian contact of viscoelastic bodies: (-Y)^(1/2) (stiffness (-Y) - damping Y').
 
+    Source: Kuwabara & Kono 1987; Brilliantov, Spahn, Hertzsch & Poeschel 1996. Sometimes also
+    listed under Tsuji's name.
+
     Parameters
     ----------
     mu, stiffness, damping : float
+        Friction coefficient; stiffness and damping of the normal contact.
     d1, eta, G : float, optional
-
-    Source: Kuwabara & Kono 1987; Brilliantov, Spahn, Hertzsch & Poeschel 1996. Sometimes also
-    listed under Tsuji's name.
+        Tangential damping ratio and frequency, and gravity; default 0.
     """
 
     parameters = dict(mu=None, stiffness=None, damping=None, d1=0.0, eta=0.0, G=0.0)
@@ -308,11 +320,13 @@ class Maxwell(_LinearTangential):
     Parameters
     ----------
     mu : float
+        Friction coefficient.
     branch_stiffness : float
         k, relative to the spring in parallel.
     relaxation : float
         Time in which the branch's force decays.
     d1, eta, G : float, optional
+        Tangential damping ratio and frequency, and gravity; default 0.
     """
 
     parameters = dict(mu=None, branch_stiffness=None, relaxation=None, d1=0.0, eta=0.0, G=0.0)

@@ -36,6 +36,7 @@ class Start:
     Attributes
     ----------
     values : dict of str to float
+        Where the search started.
     cost : float
         Sum of squares there; infinite where not every bounce could be simulated.
     problem : str
@@ -44,6 +45,7 @@ class Start:
         Where the least squares from here ended, or was after a dozen steps if another was better
         then; None if it was not among the best.
     fitted_cost : float
+        Half the sum of squares that it ended with.
     """
 
     values: dict[str, float]
@@ -64,13 +66,16 @@ class FitResult:
     values, errors : dict of str to float
         Fitted values and their standard errors (infinite where the data do not determine one).
     covariance : ndarray (k, k)
+        Covariance of the fitted values, in their order.
     residuals : dict of str to ndarray (n,)
         Predicted less measured, for each component measured; m/s, spins as surface speeds (without
         units: in the model's).
     measurements : Measurements
         What was fitted; ``measurements.left_out`` names what was not.
     degrees_of_freedom : int
+        Numbers measured less parameters fitted.
     starts : tuple of Start
+        The starts of the search, the best first.
     at_bound : tuple of str
         Parameters that ended on a bound; errors and intervals assume that they do not.
     condition : float

@@ -54,6 +54,7 @@ def fit(
     parameters : sequence of str
         Names to fit; for a law also "restitution" and "tilt" where they are numbers.
     ball : Ball, optional
+        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
     scaling : Scaling, optional
         The units of a contact model; needed for data with units.
     bounds : mapping of str to (float, float), optional
@@ -72,6 +73,7 @@ def fit(
         What to do with rows that cannot be read or cannot be simulated at the model's own values:
         an error that names them, or a fit without them that names them in ``left_out``.
     tol : float, optional
+        Relative tolerance.
     progress : bool, optional
         Show a bar (only on a terminal).
 

@@ -45,6 +45,7 @@ class Air:
     largest_spin_ratio : float, optional
         Beyond it the coefficients keep their value there: a slow ball leaves every measured range.
     name, source : str, optional
+        What the law is called, and where its coefficients come from.
 
     Examples
     --------
@@ -170,6 +171,7 @@ def flight(
     launch : Landing
         With ``ydot > 0``, or any where ``start`` is above the ground.
     ball : Ball, optional
+        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
     air : Air, optional
         Drag and lift; none by default.
     slope : float, optional

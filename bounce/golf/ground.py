@@ -51,6 +51,7 @@ class Ground(ABC):
     Attributes
     ----------
     model : BounceLaw or ContactModel
+        The ground: a contact model or a law in closed form.
     """
 
     model: Model
@@ -183,12 +184,16 @@ def rebound(
     Parameters
     ----------
     model : BounceLaw or ContactModel
+        The ground: a contact model or a law in closed form.
     landing : Landing
+        The landing, in SI units.
     ball : Ball, optional
+        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
     scaling : Scaling, optional
         The units of a contact model (needed for one, unused by a law). Its scaled gravity is the
         model's own ``G``; ``scaling.gravity`` is the value that fits the ball.
     tol : float, optional
+        Relative tolerance.
 
     Returns
     -------

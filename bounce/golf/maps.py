@@ -38,6 +38,7 @@ def landing_map(
     Parameters
     ----------
     model : BounceLaw or ContactModel
+        The ground: a contact model or a law in closed form.
     over : mapping
         Two names with their values, e.g. ``{"speed": speeds, "angle": angles}``; the first is
         horizontal. ``speed`` in m/s, ``angle`` of descent in rad, ``spin`` in rad/s, backspin
@@ -45,6 +46,7 @@ def landing_map(
     fixed : mapping, optional
         The other ones.
     ball : Ball, optional
+        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
     scaling : Scaling, optional
         The units of a contact model; unused by a law.
     **options

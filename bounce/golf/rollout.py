@@ -48,6 +48,7 @@ class Bounce:
     t, x : float
         Touch-down, s and m.
     rebound : Rebound
+        The bounce itself: landing, lift-off and how it was found.
     hop : Flight or None
         None after the last bounce.
     """
@@ -65,6 +66,7 @@ class Glide:
     Attributes
     ----------
     mode : str
+        Whether the ball slips or rolls.
     t, x, xdot : float
         At its start.
     time : float
@@ -93,6 +95,7 @@ class Run:
     Attributes
     ----------
     bounces : tuple of Bounce
+        The bounces, in order.
     glides : tuple of Glide
         Sliding and rolling, in order; empty if the ball stops dead.
     time : float
@@ -191,7 +194,9 @@ def play(
     model : BounceLaw or ContactModel
         What every bounce follows.
     landing : Landing
+        The first landing, in SI units.
     ball : Ball, optional
+        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
     scaling : Scaling, optional
         Needed for a contact model, see :func:`rebound`.
     air : Air, optional
@@ -205,7 +210,9 @@ def play(
     min_height : float, optional
         m; 5 mm is Penner's choice (2002, p. 935).
     max_bounces : int, optional
+        After so many the run ends with a status that says so.
     tol : float, optional
+        Relative tolerance.
 
     Returns
     -------

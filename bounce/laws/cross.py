@@ -18,16 +18,19 @@ class CrossBounce(BounceLaw):
     Where that needs more than friction can give, the ball slips throughout. With
     ``tangential_restitution = 0`` it is :class:`RigidBounce`.
 
+    Source: Cross 2002, Grip-slip behavior of a bouncing ball, Am. J. Phys. 70, 1093; Garwin 1969
+    for the super ball.
+
     Parameters
     ----------
     mu : float
+        Friction coefficient.
     restitution : float or callable
+        Of the normal speed, between 0 and 1, or a function of it.
     tangential_restitution : float
         In [0, 1]: 0 leaves the ball rolling, 1 is a perfect super ball.
     inertia : float, optional
-
-    Source: Cross 2002, Grip-slip behavior of a bouncing ball, Am. J. Phys. 70, 1093; Garwin 1969
-    for the super ball.
+        Moment of inertia over mass and radius squared; default 2/5.
 
     Examples
     --------

@@ -29,6 +29,7 @@ class RigidShot:
         from restitution on, rolling from compression on. "I/II+" is a boundary; no sign without
         slip.
     normal_impulse, tangential_impulse : ndarray
+        Impulses over the ball's mass, so speeds.
     rolling_impulse, rolling_speed : ndarray
         Normal impulse and normal speed when rolling begins; NaN in case I.
     """
@@ -55,6 +56,7 @@ class LandingRange:
     spin : (float, float)
         Lowest and highest spin, rad/s, backspin positive.
     source : str
+        Where the range was read.
 
     Examples
     --------
@@ -153,6 +155,7 @@ class BounceLaw(Parametrised, ABC):
         Parameters
         ----------
         covers : LandingRange or None
+            The range, or None for every landing.
         """
         copy = self.replace()
         copy._set("covers", covers)

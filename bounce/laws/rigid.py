@@ -28,6 +28,8 @@ _BOUNDARY = 4e-15
 class RigidBounce(BounceLaw):
     """Rigid ball, rigid ground, Coulomb friction: the limit that has no reversal of slip.
 
+    Source: Biber, Champneys & Szalai 2022, Sec. 2.2; Stronge 2000, Impact Mechanics.
+
     Parameters
     ----------
     mu : float
@@ -39,8 +41,6 @@ class RigidBounce(BounceLaw):
     hypothesis : {"kinematic", "poisson", "energetic"}
         What ``restitution`` is the ratio of: normal speeds, normal impulses, or the square root of
         the ratio of the normal force's work. Equal for a sphere.
-
-    Source: Biber, Champneys & Szalai 2022, Sec. 2.2; Stronge 2000, Impact Mechanics.
 
     Examples
     --------

@@ -27,16 +27,18 @@ class TiltedBounce(BounceLaw):
     speed becomes height. A ball that falls vertically meets no tilt, so a constant tilt jumps there. A ball
     with much backspin may leave with ydot <= 0, into the ground: the law does not exclude it.
 
+    Source: Penner 2002, The run of a golf ball, Can. J. Phys. 80, 931.
+
     Parameters
     ----------
     mu : float
+        Friction coefficient.
     restitution : float or callable
         Of the normal speed relative to the tilted plane.
     tilt : float or callable
         rad in [0, pi/2); a function (speed, angle of descent in rad) is allowed.
     inertia : float, optional
-
-    Source: Penner 2002, The run of a golf ball, Can. J. Phys. 80, 931.
+        Moment of inertia over mass and radius squared; default 2/5.
 
     Examples
     --------
@@ -180,16 +182,17 @@ def penner_tilt(speed: ArrayLike, angle: ArrayLike) -> Array:
 class PennerBounce(BounceLaw):
     """Penner's law: the plane tilts and the restitution falls with speed; speeds in m/s.
 
+    Source: Penner 2002, The run of a golf ball, Can. J. Phys. 80, 931, as quoted by public golf
+    simulators. It gives his worked heights of the first bounce: 1.176 m (printed: 1.17) for a drive
+    that lands at 26.2 m/s, 46.2 deg from the vertical, with 315 rad/s of backspin, and 2.817 m
+    (2.82) for 26.8 m/s, 68.0 deg, 224 rad/s.
+
     Parameters
     ----------
     mu : float, optional
         0.40 (Penner 2002, p. 933).
     inertia : float, optional
-
-    Source: Penner 2002, The run of a golf ball, Can. J. Phys. 80, 931, as quoted by public golf
-    simulators. It gives his worked heights of the first bounce: 1.176 m (printed: 1.17) for a drive
-    that lands at 26.2 m/s, 46.2 deg from the vertical, with 315 rad/s of backspin, and 2.817 m
-    (2.82) for 26.8 m/s, 68.0 deg, 224 rad/s.
+        Moment of inertia over mass and radius squared; default 2/5.
 
     Examples
     --------

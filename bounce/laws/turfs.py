@@ -17,7 +17,9 @@ class PublishedFit:
     Attributes
     ----------
     law : BounceLaw
+        The law with the published values.
     source : str
+        Where they were published.
     checked : str
         What the values here were compared with.
     """

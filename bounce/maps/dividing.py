@@ -41,6 +41,7 @@ class DividingCurve:
     Attributes
     ----------
     model : ContactModel
+        The contact model.
     ydot : float
         Normal speed at touch-down.
     arcs : tuple of Arc
@@ -50,6 +51,7 @@ class DividingCurve:
     mirrored : bool
         Whether the other half follows by the symmetry (xdot, omega) -> -(xdot, omega).
     tol : float
+        Tolerance of the runs that the curve was found with.
     """
 
     model: ContactModel
@@ -203,6 +205,7 @@ def dividing_curve(
     Parameters
     ----------
     model : ContactModel
+        The contact model.
     ydot : float
         Normal speed at touch-down, < 0.
     reach : float, optional
@@ -271,6 +274,7 @@ def critical_eta(
     Parameters
     ----------
     model : ContactModel
+        The contact model.
     name : str, optional
         The parameter that is varied.
     bounds : (float, float), optional

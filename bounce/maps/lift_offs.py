@@ -33,6 +33,7 @@ def lift_off(
     Parameters
     ----------
     model : ContactModel
+        The contact model.
     xdot, ydot, omega, x, y : array_like (...)
         Landings, as in :func:`simulate`.
     parameters : mapping of str to array_like, optional
@@ -42,6 +43,7 @@ def lift_off(
     work : nonsmooth.Work, optional
         Threads, executor, chunk, bar and checkpoint of :func:`nonsmooth.ensemble`; by default no bar.
     engine : {"auto", "reference", "compiled"}
+        Which driver: ``"auto"`` takes the compiled one where there is a compiler.
 
     Returns
     -------

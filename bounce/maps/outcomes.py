@@ -30,7 +30,9 @@ class OutcomeMap:
     Attributes
     ----------
     model : ContactModel or BounceLaw
+        The contact model or law.
     names : (str, str)
+        Names of the two that vary.
     axes : (ndarray (m,), ndarray (n,))
         Values of the two.
     fixed : dict
@@ -108,6 +110,7 @@ def outcome_map(
     Parameters
     ----------
     model : ContactModel
+        The contact model.
     over : mapping
         Two names with their values, e.g. ``{"xdot": speeds, "omega": spins}`` or
         ``{"eta": ratios, "omega": spins}``; the first is horizontal.

@@ -24,7 +24,9 @@ class ProvenMap:
     Attributes
     ----------
     model : ContactModel
+        The contact model.
     ydot : float
+        Normal speed at touch-down.
     boxes : ndarray (m, 4)
         xdot low, xdot high, omega low, omega high.
     outcome : ndarray of int (m,)
@@ -93,9 +95,11 @@ def proven_map(
     Parameters
     ----------
     model : ContactModel
+        The contact model.
     xdot, omega : (float, float)
         Ranges of the landing's speed and spin.
     ydot : float, optional
+        Normal speed at touch-down, negative; default -1.
     parameters : mapping, optional
         As in :func:`certify`.
     depth : int, optional

@@ -80,6 +80,7 @@ def outcome_map(
     Parameters
     ----------
     outcomes : OutcomeMap
+        The map, from :func:`bounce.outcome_map`.
     quantity : {"itinerary", "slip", "omega", "spin_reversal", "lift_off_angle"}
         ``omega`` is the spin at lift-off.
     curve : DividingCurve, optional

@@ -33,6 +33,7 @@ def proven_map(
     Parameters
     ----------
     found : ProvenMap
+        The map, from :func:`bounce.proven_map`.
     curve : DividingCurve, optional
         Drawn over it; the undecided pieces surround it.
     ax : matplotlib Axes, optional

@@ -20,6 +20,7 @@ def residuals(found: FitResult) -> Figure:
     Parameters
     ----------
     found : FitResult
+        The fit, from :func:`bounce.golf.fit`.
 
     Returns
     -------

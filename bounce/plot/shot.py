@@ -34,6 +34,7 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
     Parameters
     ----------
     shot : Shot
+        The bounce, from :func:`bounce.simulate`.
     ax : matplotlib Axes, optional
         Draw here instead of in a new figure.
 

@@ -49,6 +49,7 @@ def sensitivity(shot: Shot, names: Sequence[str]) -> Sensitivity:
     Parameters
     ----------
     shot : Shot
+        The bounce, from :func:`bounce.simulate`.
     names : sequence of str
         Parameters of ``shot.model``, or "xdot", "ydot", "omega", "x" at touch-down.
 

@@ -59,6 +59,7 @@ class Shot:
     Attributes
     ----------
     model : ContactModel
+        The contact model.
     landing, lift_off : State
         Touch-down and lift-off.
     time : float
@@ -128,6 +129,7 @@ class Shot:
         Parameters
         ----------
         t : array_like (...)
+            Times since touch-down.
 
         Returns
         -------
@@ -143,6 +145,7 @@ class Shot:
         Parameters
         ----------
         t : array_like (...)
+            Times since touch-down.
 
         Returns
         -------
@@ -210,6 +213,7 @@ def simulate(
     Parameters
     ----------
     model : ContactModel
+        The contact model to bounce on.
     xdot, ydot, omega : float
         Speeds along and normal to the ground and spin at touch-down. ``ydot < 0``, unless the ball
         starts in the ground.

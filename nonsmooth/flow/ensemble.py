@@ -51,10 +51,13 @@ def ensemble(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     x0 : array_like (..., n)
         Starts. Those that are not finite get the status NOT_FINITE; the others go on.
     t_end : float
+        Time at which every run ends, unless something ends it before.
     t_start : float, optional
+        Time at which every run starts; default 0.
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
     tol, rtol, atol, start_mode, max_step, max_steps, max_events : optional
@@ -69,6 +72,7 @@ def ensemble(
     work : Work, optional
         Threads or an executor, size of a chunk, progress bar, checkpoint; see :class:`Work`.
     engine : {"auto", "reference", "compiled"}
+        Which driver: ``"auto"`` takes the compiled one where there is a compiler.
 
     Returns
     -------

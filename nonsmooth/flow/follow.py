@@ -59,7 +59,9 @@ def follow(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     point : array_like (n,)
+        Where the orbit starts.
     t_end : float
         Final time; before ``t_start`` the flow is followed backward.
     mode : str

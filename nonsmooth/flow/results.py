@@ -119,6 +119,7 @@ class Ensemble(Savable):
     sample_x, sample_t : ndarray (..., K, n), (..., K) or None
         States and times asked for with ``t_eval`` or ``at``; NaN where they did not happen.
     state_names : tuple of str
+        Names of the states, in their order on the last axis.
     """
 
     x: Array

@@ -51,6 +51,7 @@ def simulate(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     x0 : array_like (n,)
         Start; on a surface the mode follows from Filippov's convention.
     t_end : float

@@ -25,6 +25,7 @@ class Event:
     kind : {"crossing", "entry", "exit", "stop", "reset", "zero", "end"}
         ``entry`` and ``exit`` are of sliding; ``zero`` is a zero found by ``follow``.
     t : float
+        Time of the event.
     x : ndarray (n,)
         State before a reset, on the surface otherwise.
     mode_before, mode_after : str
@@ -109,15 +110,19 @@ class Trajectory(Savable):
     Attributes
     ----------
     system : FilippovSystem
+        The system that was run.
     parameters : dict
         Name and value of every parameter of the run.
     t, x : ndarray (m,), (m, n)
         Accepted steps and events, both ends included; a reset appears twice at its time.
     events : list of Event
+        What happened, in order of time; the last one is the end.
     itinerary : str
         Modes in order, separated by blanks.
     segments : list of Segment
+        Pieces in one mode each, between events.
     status : Status
+        Why the run ended.
     message : str
         What happened, in words.
     accumulation_time : float or None

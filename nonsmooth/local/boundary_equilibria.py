@@ -34,6 +34,7 @@ class BoundaryEquilibrium:
     Attributes
     ----------
     point : ndarray (n,)
+        The point, in the order of the states.
     side : {"+", "-"}
         Whose equilibrium: of F1 or F2.
     label : str
@@ -77,6 +78,7 @@ class BoundaryBifurcation:
     Attributes
     ----------
     point : ndarray (n,)
+        The point, in the order of the states.
     parameter : str
         The one that was varied.
     value : float
@@ -88,7 +90,9 @@ class BoundaryBifurcation:
     distance : float
         From the start of the search, in the states.
     residual : float
+        What is left of the equations at the point.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     """
 
     point: Array
@@ -125,6 +129,7 @@ def boundary_equilibrium(
     system, parameters, surface, mode
         As in :func:`region`.
     point : array_like (n,)
+        The point, in the order of the states.
     side : {"+", "-"}, optional
         Whose equilibrium; by default the field that vanishes there.
     tol : float, optional
@@ -308,8 +313,11 @@ def find_boundary_equilibrium(
     vary : str
         Name of the parameter; the search starts from its value in ``parameters``.
     side : {"+", "-"}
+        Whose field: ``"+"`` is F1 (above), ``"-"`` is F2 (below).
     tol : float, optional
+        The residual at which the search is satisfied.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------

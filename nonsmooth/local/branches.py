@@ -61,6 +61,7 @@ def sliding_branches(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     point : array_like (n,)
         A point on the sliding surfaces.
     mode : str, optional

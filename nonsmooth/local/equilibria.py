@@ -25,6 +25,7 @@ class Equilibrium:
     Attributes
     ----------
     point : ndarray (n,)
+        The point, in the order of the states.
     side : {"+", "-"}
         Of the field F1 (h > 0) or F2 (h < 0).
     status : {"real", "virtual", "boundary"}
@@ -35,12 +36,15 @@ class Equilibrium:
     eigenvalues : ndarray (n,)
         Of DF_i, by real part.
     h : float
+        Value of the switching function there: on which side it is, and how far.
     margin : float
         Smallest real part relative to the largest modulus: distance from a degenerate one.
     distance : float
         From the start of the search.
     residual : float
+        What is left of the equations at the point.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     """
 
     point: Array
@@ -113,11 +117,13 @@ def find_equilibrium(
     system, parameters, surface, mode
         As in :func:`region`; the point need not be on the surface.
     near : array_like (n,)
+        Where the search starts.
     side : {"+", "-"}
         Of the field F1 or F2.
     tol : float, optional
         Accepted residual (a distance), relative to 1 + |x|.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------

@@ -98,6 +98,7 @@ def two_fold(
     system, parameters, t, surface, mode
         As in :func:`region`.
     point : array_like (n,)
+        The point, in the order of the states.
     tol : float, optional
         How well h = L1 = L2 = 0 must hold: each |.|/|grad .| is at most ``tol (1 + |x|)``.
 
@@ -162,11 +163,13 @@ def find_two_fold(
     system, parameters, t, surface, mode
         As in :func:`region`; the point need not be on the surface. Time is kept.
     near : array_like (n,)
+        Where the search starts.
     hold : sequence of str, optional
         Names of states that keep their value.
     tol : float, optional
         Accepted residual (a distance), relative to 1 + |x|; the search itself goes to rounding.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------

@@ -28,16 +28,19 @@ class FoldFold:
     Attributes
     ----------
     point : ndarray (2,)
+        The point, in the order of the states.
     label : str
         ``"VV1"``, ``"VV2"``, ``"VI1"``, ``"VI2"``, ``"VI3"``, ``"II1"``, ``"II2"``, or
         ``"degenerate"``.
     visible : (bool, bool)
         Of the folds of F1 and F2.
     same_direction : bool
+        Whether the two fields point the same way along the surface.
     numbers : mapping
         ``L11``, ``L22``, ``a1``, ``a2``, ``b1``, ``b2``; for II2 also ``stability``: positive if
         the fused focus is stable (its pseudo-Hopf cycle is then stable too).
     margins : mapping
+        How far each inequality of the label is from equality.
     """
 
     point: Array
@@ -70,6 +73,7 @@ def fold_fold(
     system, parameters, surface, mode
         As in :func:`region`.
     point : array_like (2,)
+        The point, in the order of the states.
     tol : float, optional
         Largest angle of a field with the surface, and relative distance from it.
     margin : float, optional

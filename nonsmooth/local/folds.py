@@ -28,6 +28,7 @@ class Fold:
     Attributes
     ----------
     point : ndarray (n,)
+        The point, in the order of the states.
     side : {"+", "-"}
         Of the field F1 (h > 0) or F2 (h < 0).
     order : int or None
@@ -45,6 +46,7 @@ class Fold:
     residual : float
         Distance to the solution of h = L_i = 0 to first order.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     """
 
     point: Array
@@ -153,6 +155,7 @@ def fold(
     system, point, parameters, t, surface, mode, tol
         As in :func:`region`.
     side : {"+", "-"}
+        Whose field: ``"+"`` is F1 (above), ``"-"`` is F2 (below).
     max_order : int, optional
         Highest order of contact to look at.
 
@@ -217,6 +220,7 @@ def find_fold(
     system, parameters, t, surface, mode
         As in :func:`region`; the point need not be on the surface.
     near : array_like (n,)
+        Where the search starts.
     side : {"+", "-"}, optional
         Whose fold: of F1 or F2.
     hold : sequence of str, optional
@@ -226,6 +230,7 @@ def find_fold(
     tol : float, optional
         Accepted residual (a distance), relative to 1 + |x|; the search itself goes to rounding.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------

@@ -42,6 +42,7 @@ def intersection_range(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     point : array_like (n,)
         A point on the surfaces.
     of : expression

@@ -54,6 +54,7 @@ class Continuation:
     multipliers : ndarray (m,)
         Of all surfaces.
     velocity : ndarray (n,)
+        Velocity of the states in that mode.
     rates : ndarray (k,)
         d h_i/dt of the surfaces that meet at the point.
     eigenvalues : ndarray
@@ -78,7 +79,9 @@ class Intersection:
     Attributes
     ----------
     point : ndarray (n,)
+        The point, in the order of the states.
     surfaces : tuple of int
+        Which surfaces meet there, by index.
     continuations : tuple of Continuation
         Modes that can go on. One: the future is unique for independent multipliers.
     attraction : str
@@ -128,6 +131,7 @@ def intersection(
     system : FilippovSystem
         Contacts of impacts count as open.
     point : array_like (n,)
+        The point, in the order of the states.
     surfaces : sequence of int, optional
         Those that meet at the point; by default those closer than ``tol``.
     parameters, t : optional
@@ -209,6 +213,7 @@ class Meeting:
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     x : ndarray (N,)
     p : ndarray
     surfaces : list of int

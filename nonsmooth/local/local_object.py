@@ -28,6 +28,7 @@ class LocalObject:
     side : {"+", "-", ""}
         The field to which a fold, cusp, equilibrium or boundary equilibrium belongs.
     point : ndarray (n,)
+        The point, in the order of the states.
     distance : float
         To the nearest degenerate case; below the margin the kind is ``"degenerate"``.
     nearest : str

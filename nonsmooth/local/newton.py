@@ -37,6 +37,7 @@ class Root:
     residual : float
         Largest distance |r_i|/|grad r_i| of the equations.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     history : tuple of float
         Residual at the start and after each step.
     conditioning : float
@@ -113,6 +114,7 @@ def solve(
     tol : float
         Accepted residual, relative to 1 + |x|; its square root at a multiple root.
     max_iterations : int
+        Newton's method gives up after this many.
     what : str
         Named in messages, e.g. ``"two-fold"``.
 
@@ -257,11 +259,13 @@ def converge(
         x (n,) -> values (n,), Jacobian (n, n); a :class:`Secant` is tried again with fresh
         differences.
     start : ndarray (n,)
+        Where the iteration starts.
     tol : float, optional
         Accepted error, relative to ``scale``.
     scale : float, optional
         Size of the unknowns.
     max_iterations : int, optional
+        Newton's method gives up after this many.
     linear : callable, optional
         Solves the linear equations of a step, where their structure is known.
     noise : float, optional

@@ -43,9 +43,11 @@ def find_pseudo_equilibrium(
         As in :func:`region`; the point need not be on the surface. A ``mode`` with several ``s``, such
         as ``"ss+"``, looks on the intersection of those surfaces.
     near : array_like (n,)
+        Where the search starts.
     tol : float, optional
         Accepted residual (a distance), relative to 1 + |x|.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------

@@ -18,6 +18,7 @@ class PseudoEquilibrium:
     Attributes
     ----------
     point : ndarray (n,)
+        The point, in the order of the states.
     alpha : float
         Weight of F2; in (0, 1) for a real one. NaN on several surfaces.
     status : {"real", "virtual"}
@@ -36,7 +37,9 @@ class PseudoEquilibrium:
     margin : float
         Smallest of: alpha, 1 - alpha, the real parts relative to the largest modulus of DF_i.
     distance, residual : float
+        Distance from the start of the search, and what is left of the equations.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     mode : str
         One letter for each surface, ``s`` for those that slide.
     multipliers : ndarray (k,)

@@ -67,6 +67,7 @@ def region(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     point : array_like (n,)
         A point on the surface: |h|/|grad h| <= tol (1 + |x|).
     parameters : mapping, optional

@@ -38,6 +38,7 @@ class Found:
     residual : float
         Largest first-order distance to a zero of one of the equations.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     linear : bool
         Whether the point is a multiple root (see :class:`nonsmooth.local.newton.Root`).
     """
@@ -149,6 +150,7 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
         Takes a start (n,), returns an object with a ``point``, e.g. ``lambda x:
         find_equilibrium(system, x, side="-")``.
     starts : array_like (k, n)
+        Points from which to search.
     apart : float, optional
         Two results closer than this, relative to 1 + |x|, are the same.
 

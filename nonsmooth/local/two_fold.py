@@ -27,14 +27,19 @@ class TwoFold:
     Attributes
     ----------
     system : FilippovSystem
+        The system that the two-fold belongs to.
     point : ndarray (n,)
+        The point, in the order of the states.
     t : float
         Time, where the system depends on it.
     parameters : mapping of str to float
+        Values of all parameters there.
     surface : int
+        Index of the surface it lies on.
     form : NormalForm
         theta, phi and the reduced flow.
     classification : Classification
+        Class, canards and determinism, from signs and numbers alone.
     lie : mapping
         ``L11``, ``L12``, ``L21``, ``L22`` with L_ij = F_i . grad L_j.
     coincident_fields : bool
@@ -44,6 +49,7 @@ class TwoFold:
     residual : float
         Largest first-order distance to h = 0, L1 = 0, L2 = 0.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     chart : Chart
         The coordinates of the normal form as functions; see ``coordinates`` and ``point_at``.
     """
@@ -162,6 +168,7 @@ class TwoFold:
         Parameters
         ----------
         x : array_like (..., n)
+            States, on the last axis.
 
         Returns
         -------

@@ -56,7 +56,9 @@ class FilippovSystem(Structure):
     time : SX symbol, optional
         The symbol of time if the system depends on it.
     stops : sequence of Stop, optional
+        Surfaces on which a run ends.
     resets : sequence of Reset, optional
+        Surfaces on which the state jumps.
     impacts : sequence of Impact, optional
         Contacts that cannot be passed.
     clocks : sequence of Clock, optional
@@ -337,7 +339,9 @@ class FilippovSystem(Structure):
         Parameters
         ----------
         expression : SX
+            Any expression in states, parameters and time.
         point : array_like (n,)
+            Where, in the order of the states.
         parameters : mapping, optional
             Values that replace defaults.
         t : float, optional

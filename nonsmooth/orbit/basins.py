@@ -61,9 +61,11 @@ class Basins(Savable):
     attractors : list of Attractor
         ``attractors[k - 1]`` has the label k.
     starts : ndarray (..., n)
+        The starts, in the shape of the grid.
     axes : dict of str to ndarray
         The grid's axes by names of states, if it was given so.
     state_names : tuple of str
+        Names of the states, in their order on the last axis.
     complete : bool
         False if the computation was interrupted; what was not decided by then has the label 0.
     """
@@ -120,6 +122,7 @@ def basins(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     grid : mapping or array_like (..., n)
         Starts; or for each state, by name, a number or the values (k,) of an axis.
     t_end : float

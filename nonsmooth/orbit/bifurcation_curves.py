@@ -38,6 +38,7 @@ class CodimensionTwo:
     Attributes
     ----------
     kind : str
+        Which point of codimension two it is.
     values : ndarray (2,)
         Of the two parameters.
     solution
@@ -61,11 +62,15 @@ class BifurcationCurve:
     kind : str
         Of the bifurcation.
     parameters : tuple of two str
+        Names of the two parameters.
     values : ndarray (k, 2)
+        Their values along the curve.
     points : tuple of k ndarray
         Unknowns of the equations at each point.
     special : tuple of CodimensionTwo
+        Points of codimension two that were passed.
     ends : tuple of two BranchEnd
+        Why the curve ends at its two ends.
     curve : Curve
         The equations.
     """

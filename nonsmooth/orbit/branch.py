@@ -84,6 +84,7 @@ class BranchEvent:
     solution
         What is continued, there: an equilibrium or a periodic orbit.
     far_side : FarSide
+        What continues the branch beyond the event.
     coefficients : mapping of str to float
         Of normal forms and conditions.
     curve, point, test
@@ -116,6 +117,7 @@ class Branch:
     Attributes
     ----------
     parameter : str
+        Name of the parameter that varies.
     values : ndarray (k,)
         Of the parameter; a branch that turns back has values more than once.
     solutions : tuple of k solutions

@@ -56,7 +56,9 @@ class Connection:
     Attributes
     ----------
     system : FilippovSystem
+        The system that has the connection.
     parameter : str
+        Name of the parameter that was varied.
     value : float
         Of that parameter at the connection.
     parameters : dict of str to float
@@ -70,7 +72,9 @@ class Connection:
     legs : tuple of OrbitLeg
         Of the flight.
     iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
     residual : float
+        What is left of the equations at the point.
     faults : tuple of str
         What its guards contradict; empty unless it is virtual.
     """
@@ -140,6 +144,7 @@ def find_homoclinic(
     parameters : mapping, optional
         Values that replace defaults.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------

@@ -58,6 +58,7 @@ def periodic_orbit(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     guess : Trajectory, state (n,) or PeriodicOrbit
         A run whose end is near the orbit; a state near it, from which the system is simulated; an
         orbit at other parameters, whose itinerary is kept.
@@ -77,6 +78,7 @@ def periodic_orbit(
     virtual : bool, optional
         Accept an orbit that no motion takes because guards disagree.
     max_iterations : int, optional
+        Newton's method gives up after this many.
 
     Returns
     -------
@@ -315,6 +317,7 @@ class VirtualOrbitError(ConvergenceError):
     Attributes
     ----------
     orbit : PeriodicOrbit
+        The orbit that solves the equations and is no motion of the system.
     """
 
     def __init__(self, message: str, orbit: PeriodicOrbit):

@@ -44,6 +44,7 @@ class Funnel:
     Attributes
     ----------
     system : FilippovSystem
+        The system whose future is not unique.
     t : float
         When the future stops being unique.
     point : ndarray (n,)
@@ -51,6 +52,7 @@ class Funnel:
     cause : str
         Why, in words.
     two_fold : TwoFold or None
+        The two-fold that the set begins at, if it does at one.
     trajectories : tuple of Trajectory
         From ``point`` on. One that meets another point without a unique future ends there, with
         status NON_UNIQUE.

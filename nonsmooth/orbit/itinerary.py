@@ -105,6 +105,7 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     mode, following : str
     name : str
         Of the event, where the letters do not tell it: a reset, a stop, an impact.
@@ -159,13 +160,16 @@ class FixedItinerary:
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     word : str or sequence of str
         Modes in order, e.g. ``"+ s"``.
     until : str or expression
         What ends the last leg: the name of an event, or a function of states, parameters and time.
         What else its guards say is a fault, not an end.
     parameters : mapping, optional
+        Values of parameters; default the system's.
     tol : float, optional
+        Relative tolerance.
     t_max : float, optional
         Longest leg.
 
@@ -200,7 +204,9 @@ class FixedItinerary:
         Parameters
         ----------
         start : array_like (n,)
+            The states at the start.
         t_start : float, optional
+            Time at the start.
 
         Raises
         ------

@@ -104,7 +104,9 @@ def lyapunov_spectrum(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     x0 : array_like (n,)
+        States at the start.
     t_end : float
         The run ends here. Errors fall as the square root of the length of a chaotic run.
     transient : float, optional

@@ -44,6 +44,7 @@ class Manifold(Savable):
     Attributes
     ----------
     stable : bool
+        Whether orbits come to the point (True) or leave it.
     point : ndarray (n,)
         Of the saddle, pseudo-saddle or fold.
     dimension : int
@@ -100,6 +101,7 @@ def manifold(
         From ``find_equilibrium``, ``find_pseudo_equilibrium``, ``fold``, ``fold_fold``. Of a visible
         fold in the plane: the orbits that come to it, or leave it.
     stable : bool, optional
+        Whether orbits that come to the point are asked for (True) or those that leave it.
     length : float
         Of the orbits on it.
     spacing : float, optional

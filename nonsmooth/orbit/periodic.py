@@ -27,10 +27,13 @@ class OrbitLeg:
     Attributes
     ----------
     mode : str
+        One letter for each surface.
     start : ndarray (n,)
+        States at its start.
     t : float
         Of the start: of the forcing, or since the start of the orbit.
     duration : float
+        Time that it takes.
     event, kind : str
         Name of the guard that ends it and kind of the event; empty where a time ends it.
     """
@@ -71,10 +74,13 @@ class OrbitDerivative(NamedTuple):
     Attributes
     ----------
     period : float
+        Derivative of the period.
     start : ndarray (n,)
+        Derivative of the start of the first leg.
     starts : ndarray (N, n)
         Of all legs.
     durations : ndarray (N,)
+        Derivatives of the durations of all legs.
     """
 
     period: float
@@ -90,7 +96,9 @@ class PeriodicOrbit:
     Attributes
     ----------
     system : FilippovSystem
+        The system that has the orbit.
     parameters : dict of str to float
+        Values of all parameters.
     problem : BoundaryProblem
         Its equations; with ``unknowns`` what continuation needs.
     unknowns : ndarray (m,)

@@ -42,9 +42,11 @@ class PoincareOrbit(Savable):
     points : ndarray (m, n)
         States at the hits; fewer than asked for if the run ended before.
     t : ndarray (m,)
+        Times of the hits, the start first.
     run : Trajectory
         Its status says how it ended; STOPPED after the last hit.
     section : Section
+        The section that was asked for.
     """
 
     points: Array
@@ -156,6 +158,7 @@ def poincare(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     section : expression, str, number or Section
         A function of states, parameters and time; a name of a surface, reset or impact, or a kind of
         event; a period. See :class:`Section`.

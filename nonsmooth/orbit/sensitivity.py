@@ -87,6 +87,7 @@ class Gradient:
     Attributes
     ----------
     value : float
+        The quantity whose gradient it is.
     x0 : ndarray (n,)
         Derivatives by the start.
     parameters : dict of str to float
@@ -110,6 +111,7 @@ def gradient(
     Parameters
     ----------
     run : Trajectory
+        The run, from :func:`nonsmooth.simulate`.
     cost : expression
         Of the states at the end, parameters and time. An integral is a further state.
     wrt : str or sequence of str, optional
@@ -172,6 +174,7 @@ def vjp(
     Parameters
     ----------
     run : Trajectory
+        The run, from :func:`nonsmooth.simulate`.
     cotangent : array_like (n,)
         Derivatives of something by the final state.
     wrt : str or sequence of str, optional
@@ -223,6 +226,7 @@ def saltation_matrix(
     Parameters
     ----------
     system : FilippovSystem
+        The system the question is about.
     before, after : str
         Modes.
     point : array_like (n,)
@@ -232,6 +236,7 @@ def saltation_matrix(
     t : float, optional
         Time, where the system depends on it.
     parameters : mapping, optional
+        Values of parameters; default the system's.
 
     Returns
     -------

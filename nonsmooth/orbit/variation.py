@@ -131,6 +131,7 @@ class Sensitivity:
     dx_dp : ndarray (n, q)
         Of the final state by the parameters ``names``.
     event_times : ndarray (m,)
+        Times of the events that the derivatives pass.
     dt_dx0, dt_dp : ndarray (m, n), (m, q)
         Of the event times.
     dt_end_dx0, dt_end_dp : ndarray (n,), (q,)
@@ -138,6 +139,7 @@ class Sensitivity:
     names : tuple of str
         Of the parameters.
     run : Trajectory
+        The run that was differentiated.
     """
 
     dx_dx0: Array

@@ -73,7 +73,9 @@ def branch(
     size : (width, height), optional
         Of a new figure, in inches.
     legend : bool, optional
+        Whether a legend is drawn.
     title : str, optional
+        Title of the picture; the default says what is shown.
 
     Returns
     -------
@@ -230,7 +232,9 @@ def bifurcation_curves(
     size : (width, height), optional
         Of a new figure, in inches.
     legend : bool, optional
+        Whether a legend is drawn.
     title : str, optional
+        Title of the picture; the default says what is shown.
 
     Returns
     -------

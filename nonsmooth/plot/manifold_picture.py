@@ -40,7 +40,9 @@ def manifold(
     size : (width, height), optional
         Of a new figure, in inches.
     legend : bool, optional
+        Whether a legend is drawn.
     title : str, optional
+        Title of the picture; the default says what is shown.
 
     Returns
     -------

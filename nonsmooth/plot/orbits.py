@@ -37,6 +37,7 @@ def periodic_orbit(
     Parameters
     ----------
     orbit : PeriodicOrbit
+        The orbit to draw.
     states : two str, optional
         Names of the states of the plane; the first two by default.
     ax : matplotlib Axes, optional
@@ -45,6 +46,7 @@ def periodic_orbit(
     size : (width, height), optional
         Of a new figure, in inches.
     legend : bool, optional
+        Whether a legend is drawn.
     title : str, optional
         By default period and stability.
 
@@ -141,6 +143,7 @@ def multipliers(
     size : (width, height), optional
         Of a new figure, in inches.
     title : str, optional
+        Title of the picture; the default says what is shown.
 
     Returns
     -------

@@ -66,6 +66,7 @@ def phase_portrait(
     system : FilippovSystem
         Two states, one surface, no explicit time.
     box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
+        The window that is drawn, in the two states.
     parameters : mapping, optional
         Values that replace defaults.
     starts : array_like (k, 2), optional
@@ -75,10 +76,13 @@ def phase_portrait(
     separatrices : bool, optional
         Whether to draw them.
     ax : matplotlib Axes, optional
+        Axes to draw into; default a new figure.
     size : (float, float), optional
         Inches, of a new figure.
     legend : bool, optional
+        Whether a legend is drawn.
     title : str, optional
+        Title of the picture; the default says what is shown.
 
     Returns
     -------

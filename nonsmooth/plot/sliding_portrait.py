@@ -77,10 +77,13 @@ def sliding_portrait(
     orbits : int, optional
         About how many sliding orbits would fit across the box; 0 for none.
     ax : matplotlib Axes, optional
+        Axes to draw into; default a new figure.
     size : (float, float), optional
         Inches, of a new figure.
     legend : bool, optional
+        Whether a legend is drawn.
     title : str, optional
+        Title of the picture; the default says what is shown.
 
     Returns
     -------

@@ -120,6 +120,7 @@ def check_size(size: object) -> tuple[float, float]:
     Parameters
     ----------
     size : (float, float)
+        Width and height in inches.
 
     Returns
     -------
@@ -182,13 +183,13 @@ def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
     Parameters
     ----------
     ax : matplotlib Axes or None
+        Axes to draw into; None for a new figure.
     size : (float, float)
         Width and height in inches, of a new figure.
 
     Returns
     -------
-    figure : matplotlib Figure
-    ax : matplotlib Axes
+    (matplotlib Figure, matplotlib Axes)
 
     Raises
     ------
@@ -205,13 +206,9 @@ def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
         figure = new_figure(size)
         return figure, figure.add_subplot()
     if not isinstance(ax, Axes):
+        received, advice = type(ax).__name__, "For example ax=pyplot.subplots()[1]."
         raise OptionError(
-            explain(
-                "ax",
-                expected="matplotlib axes",
-                received=type(ax).__name__,
-                advice="For example ax=pyplot.subplots()[1].",
-            )
+            explain("ax", expected="matplotlib axes", received=received, advice=advice)
         )
     parent = ax.get_figure(root=True)
     assert parent is not None
@@ -226,6 +223,7 @@ def halo(width: float = 2.5, color: str = "white") -> list[Any]:
     width : float, optional
         In points.
     color : str, optional
+        Any colour that matplotlib knows.
 
     Returns
     -------
@@ -241,9 +239,11 @@ def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str = BLACK, **opti
     Parameters
     ----------
     ax : matplotlib Axes
+        Axes to draw into.
     start, end : array_like (2,)
         In data coordinates.
     color : str, optional
+        Any colour that matplotlib knows.
     **options
         Of ``matplotlib.patches.FancyArrowPatch``.
     """
@@ -266,9 +266,11 @@ def write(ax: Axes, place: ArrayLike, text: str, **options: Any) -> None:
     Parameters
     ----------
     ax : matplotlib Axes
+        Axes to draw into.
     place : array_like (2,)
         In data coordinates.
     text : str
+        What is written.
     **options
         Of ``Axes.text``.
     """
@@ -290,11 +292,13 @@ def arrowhead(
     Parameters
     ----------
     ax : matplotlib Axes
+        Axes to draw into.
     curve : array_like (m, 2)
         In data coordinates.
     at : float
         From 0 at the start to 1 at the end.
     color : str
+        Any colour that matplotlib knows.
     scale : array_like (2,), optional
         Units of the two coordinates in which the length is measured; where the axes have very
         different ones, the widths of what is shown.
@@ -320,6 +324,7 @@ def inside(curve: ArrayLike, box: tuple[float, float, float, float]) -> list[Arr
     Parameters
     ----------
     curve : array_like (m, 2)
+        Points along the curve; NaN separates its parts.
     box : (float, float, float, float)
         xmin, xmax, ymin, ymax.
 
@@ -351,11 +356,13 @@ def line(
     Parameters
     ----------
     color, label : str
+        Colour, and text of its entry in the legend.
     width : float, optional
         In points.
     dashes : optional
         A line style of matplotlib.
     alpha : float, optional
+        Opacity, between 0 and 1.
 
     Returns
     -------
@@ -377,6 +384,7 @@ def marker(shape: str, label: str, fill: str = BLACK, size: float = 6.0, **optio
     shape : str
         A marker of matplotlib.
     label : str
+        Text of its entry in the legend.
     fill : str, optional
         Colour inside.
     size : float, optional

@@ -151,9 +151,11 @@ def two_fold_map(
     kind : {"VV", "II", "VI", "IV"}
         V for visible, I for invisible; the fold of F1 first.
     ax : matplotlib Axes, optional
+        Axes to draw into; default a new figure.
     size : (float, float), optional
         Inches, of a new figure.
     legend : bool, optional
+        Whether a legend is drawn.
 
     Returns
     -------

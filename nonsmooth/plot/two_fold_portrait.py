@@ -55,6 +55,7 @@ def two_fold(
     Parameters
     ----------
     fold : TwoFold or pair (sigma, nu)
+        The two-fold, or its two signs and two numbers.
     ax : matplotlib Axes, optional
         Where to draw; a new figure by default.
     size : (float, float), optional

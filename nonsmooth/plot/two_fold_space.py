@@ -56,6 +56,7 @@ def two_fold_3d(
     Parameters
     ----------
     fold : TwoFold or pair (sigma, nu)
+        The two-fold, or its two signs and two numbers.
     ax : matplotlib Axes, optional
         Where to draw (plain axes, not 3-D ones); a new figure by default.
     size : (float, float), optional

@@ -18,6 +18,7 @@ class Undecided:
     box : dict of str to Enclosure
         Range of each unknown.
     why : str
+        What stopped the proof, in words.
     """
 
     box: Mapping[str, Enclosure]
@@ -34,6 +35,7 @@ class Census:
     Attributes
     ----------
     kind : str
+        What was looked for: ``"two-fold"``, ``"fold"`` and so on.
     complete : bool
         Whether the list is proven to be complete.
     zeros : tuple of Proof
@@ -45,6 +47,7 @@ class Census:
     boxes : int
         Pieces looked at.
     statement : str
+        The theorem, or what is missing to it, in one sentence.
     """
 
     kind: str

@@ -16,7 +16,9 @@ class ProvenEvent:
     Attributes
     ----------
     kind : {"crossing", "entry", "exit", "stop", "reset"}
+        What happens there.
     name : str
+        The surface, stop or reset it belongs to.
     t : Enclosure
         Time since the start.
     x : mapping of str to Enclosure
@@ -52,13 +54,17 @@ class OrbitProof:
     itinerary : str
         Modes in order, as far as proven.
     events : tuple of ProvenEvent
+        The events, each with enclosures of its time and state.
     start, end : mapping of str to Enclosure
         States; the end is the last one proven.
     parameters : mapping of str to Enclosure
+        Enclosures of the values of the parameters.
     t : Enclosure
         Time of the end, since the start.
     steps, bits : int
+        Steps taken, and bits of the arithmetic.
     numbers : {"stored", "written"}
+        How the constants of the system were read: as doubles or as decimals.
     """
 
     proven: bool

@@ -60,6 +60,7 @@ def certify_orbit(
     bits, max_bits : int, optional
         Precision to start with, and to give up at.
     max_steps : int, optional
+        The proof gives up after this many steps.
 
     Returns
     -------

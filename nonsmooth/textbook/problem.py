@@ -31,6 +31,7 @@ class Reference:
     quantity : str
         Unique within its problem.
     value : float or tuple of float
+        The answer, known from outside the code.
     tolerance : float
         Largest error relative to each value; absolute where the value is 0.
     how : str
@@ -51,6 +52,7 @@ class Reference:
         Parameters
         ----------
         computed : float or array_like
+            The value to compare with the answer.
 
         Examples
         --------
@@ -132,13 +134,19 @@ class Problem:
     name : str
         Of the function that makes it.
     title : str
+        What the problem is, in a few words.
     source : str
+        Where it comes from.
     system : FilippovSystem
+        The system, with its default parameters.
     parameters : mapping
         Names and values; the defaults of the system.
     start : tuple of float
+        Where its standard run starts.
     t_end : float
+        When its standard run ends.
     references : tuple of Reference
+        Answers that are known from outside the code.
     note : str
         What is special or uncertain, e.g. parameters quoted from memory.
     """
@@ -186,6 +194,7 @@ class Problem:
         at : mapping, optional
             Parameters or states that replace the problem's.
         t_end : float, optional
+            When the run ends; default the problem's.
         **options
             As in :func:`nonsmooth.simulate`.
 

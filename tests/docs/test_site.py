@@ -103,22 +103,6 @@ def test_every_marker_has_its_part_and_every_part_its_marker():
     assert asked == set(generate.PARTS)
 
 
-def test_every_public_name_is_in_the_api():
-    pages = "\n".join(text for uri, text in generate.api_pages().items() if "index" not in uri)
-    for module in (ns, bounce, bounce.golf, bounce.laws):
-        things = {n: getattr(module, n) for n in module.__all__}
-        wanted = [n for n, t in things.items() if generate._documented(t)]
-        assert wanted
-        assert [n for n in wanted if f"::: {module.__name__}.{n}\n" not in pages] == []
-    for path, names in (
-        ("nonsmooth.two_folds", ns.two_folds.__all__),
-        ("nonsmooth.continuation", generate._own(ns.continuation)),
-        ("nonsmooth.local", generate.returned_types()),
-        ("nonsmooth.plot.style", ("settings", "arrowhead", "line", "marker")),
-    ):
-        assert [n for n in names if f"::: {path}.{n}\n" not in pages] == []
-
-
 def test_sources_load_nothing_from_elsewhere():
     config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     assert "font: false" in config

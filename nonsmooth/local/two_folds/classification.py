@@ -148,6 +148,7 @@ class Slopes:
     Attributes
     ----------
     kind : {"none", "one", "all", "sector", "undecided"}
+        How many slopes connect: none, one, all of them, a sector, or not decided.
     low, high : float
         Closed range of slopes; the open quadrant is 0 < m < inf. NaN if there is none.
     """
@@ -176,6 +177,7 @@ class Boundary:
     name : str
         For example ``"Delta=0"``.
     meaning : str
+        What happens on the boundary, in words.
     between : tuple of str
         Classes on its two sides; one class if the boundary leaves the sliding portrait unchanged.
     """
@@ -201,6 +203,7 @@ class Classification:
         ``"mix-F"``; on a boundary where the class changes its name and the classes that meet,
         ``"boundary Delta=0: VV-C1|VV-F"``.
     kind : {"visible", "invisible", "visible-invisible"}
+        Whether the two folds are visible.
     canards, faux_canards : float
         0, 1 or inf; NaN on a boundary where the class changes: leading order does not decide.
     into, out_of : Slopes
@@ -289,6 +292,7 @@ def classify_two_fold(
     sigma : (int, int)
         Signs of L11 and L22.
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
     tol : float, optional
         A boundary counts as met within this relative distance: |Delta| against max(1, |nu1 nu2|),
         |g - 2| and nu_i against the larger of 1, |nu1| and |nu2|.

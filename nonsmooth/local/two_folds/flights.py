@@ -57,6 +57,7 @@ def flight_above(z: ArrayLike, nu: Nu) -> Array:
     z : array_like (..., 2)
         (z2, z3) with z2 <= 0.
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
 
     Returns
     -------
@@ -79,6 +80,7 @@ def flight_below(z: ArrayLike, nu: Nu) -> Array:
     z : array_like (..., 2)
         (z2, z3) with z3 <= 0.
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
 
     Returns
     -------
@@ -101,6 +103,7 @@ def return_matrix(nu: Nu) -> Array:
     Parameters
     ----------
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
 
     Returns
     -------
@@ -128,6 +131,7 @@ def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
     sigma : (int, int)
         Signs of the two folds.
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
 
     Returns
     -------
@@ -175,6 +179,7 @@ def diabolo_slopes(nu: Nu) -> tuple[float, float]:
     Parameters
     ----------
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
 
     Returns
     -------

@@ -35,6 +35,7 @@ class ReducedFlow:
     sigma : (int, int)
         +1 or -1 each. The fold of F1 is visible if sigma1 = 1, that of F2 if sigma2 = -1.
     nu : (float, float)
+        The two numbers (nu1, nu2) of the two-fold.
 
     Examples
     --------

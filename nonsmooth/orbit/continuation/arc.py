@@ -28,6 +28,7 @@ class Arc:
     Attributes
     ----------
     points : list of Point
+        The points, in order along the curve.
     zeros : list of Zero
         Zeros of the tests, in their order along the arc.
     end : str
@@ -62,6 +63,7 @@ def trace(
     Parameters
     ----------
     curve : Curve
+        The curve: its equations and what is watched along it.
     rows : sequence of ndarray (N,)
         At least one point of the curve; earlier ones help the predictor.
     tangent : ndarray (N,)

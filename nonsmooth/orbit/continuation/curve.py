@@ -115,9 +115,11 @@ class Curve:
         Parameters
         ----------
         guess : ndarray (N,)
+            A point near the curve.
         across : ndarray (N,)
             In scaled unknowns; a unit vector keeps that unknown at its value in ``guess``.
         max_iterations : int, optional
+            Newton's method gives up after this many.
         """
         start = guess / self.scale
         level = float(across @ start)

@@ -74,10 +74,13 @@ def depart(
     Parameters
     ----------
     curve : Curve
+        The curve: its equations and what is watched along it.
     u : ndarray (N,)
+        The point of the curve to leave from.
     direction : ndarray (N,)
         In scaled unknowns.
     distance : float
+        How far the first point is from there.
     forward : ndarray (N,)
         How the point was reached.
     """

@@ -21,6 +21,7 @@ class Zero:
     name : str
         Of the test.
     point : Point
+        Where on the curve the watched function is zero.
     slope : float
         Derivative of the test by arclength, from the ends of the step.
     together : tuple of str

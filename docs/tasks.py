@@ -1,0 +1,166 @@
+"""The API by task: which page describes which name, and what the page says first.
+
+A public name that is on no page fails `tests/docs/test_site.py`: add it here, where a reader who has the
+task would look for it. Pages come in the order of the navigation of mkdocs.yml.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Task:
+    """A page of the API.
+
+    Attributes
+    ----------
+    title : str
+        What a reader wants to do.
+    about : str
+        The first paragraph: what is here, and which page explains it.
+    package : str
+        Where the names are imported from.
+    names : tuple of str
+        In the order in which the page describes them.
+    """
+
+    title: str
+    about: str
+    package: str
+    names: tuple[str, ...]
+
+
+def _task(title: str, about: str, package: str, names: str) -> Task:
+    return Task(title, about, package, tuple(names.split()))
+
+
+#: Pages that are written by hand-made lists of names; the file is `api/<key>.md`.
+TASKS = {
+    "systems": _task(
+        "Write a system",
+        "A system is a list of states, a smooth field on each side of its switching surfaces, and what "
+        "else happens to the state: stops, jumps, impacts, clocks. "
+        "[Surfaces and sliding](../theory.md) explains the words.",
+        "nonsmooth",
+        "FilippovSystem Stop Reset Impact Clock regularise call",
+    ),
+    "runs": _task(
+        "Follow an orbit",
+        "From a point and for a time: events, modes, dense output, and the reason why a run ended.",
+        "nonsmooth",
+        "simulate Trajectory Segment Event Status Section follow first_crossing first_root load",
+    ),
+    "many": _task(
+        "Run many starts",
+        "Arrays of starts or of parameters, in threads, on a cluster, with checkpoints; and which "
+        "attractor each start goes to.",
+        "nonsmooth",
+        "ensemble Ensemble Work basins Basins",
+    ),
+    "points": _task(
+        "Ask what a point is",
+        "What the fields do at a point of a surface, and what is special about it. Nothing here "
+        "steps in time.",
+        "nonsmooth",
+        "classify region Region alpha sliding_field sliding_branches fold fold_fold two_fold "
+        "boundary_equilibrium intersection intersection_range",
+    ),
+    "search": _task(
+        "Find special points",
+        "Folds, two-folds, equilibria and pseudo-equilibria near a guess, or all that can be found "
+        "from many guesses. That a list is complete is proven on another page, [Prove](proofs.md).",
+        "nonsmooth",
+        "find_two_fold TwoFold find_fold find_equilibrium find_pseudo_equilibrium "
+        "find_boundary_equilibrium find_all trace_two_folds",
+    ),
+    "orbits": _task(
+        "Find periodic orbits",
+        "An orbit that closes, stable or not, with its itinerary, its period and its multipliers; "
+        "and the successive returns of any orbit to a section.",
+        "nonsmooth",
+        "periodic_orbit PeriodicOrbit poincare PoincareOrbit FixedItinerary",
+    ),
+    "derivatives": _task(
+        "Differentiate a run",
+        "How the end of a run changes with its start and its parameters, through crossings, sliding "
+        "and jumps; and the mean rates of that over a long time.",
+        "nonsmooth",
+        "sensitivity Sensitivity gradient Gradient vjp saltation_matrix lyapunov_spectrum "
+        "LyapunovSpectrum",
+    ),
+    "branches": _task(
+        "Vary a parameter",
+        "Orbits and equilibria followed as a parameter varies, the events on the way, and their curves "
+        "in two parameters. [Branches and bifurcations](../branches.md) shows them at work.",
+        "nonsmooth",
+        "continue_orbit continue_equilibrium Branch BranchEvent FarSide BranchEnd continue_bifurcation "
+        "BifurcationCurve CodimensionTwo find_homoclinic Connection",
+    ),
+    "futures": _task(
+        "Follow sets of orbits",
+        "Every future of a point whose future is not unique, and the orbits that come to a special "
+        "point or leave it.",
+        "nonsmooth",
+        "funnel Funnel manifold Manifold",
+    ),
+    "proofs": _task(
+        "Prove",
+        "Theorems in interval arithmetic, by the extra `proofs` (python-flint). "
+        "[Proofs](../proofs.md) says what a proof rests on.",
+        "nonsmooth",
+        "certify Proof Enclosure prove_all Census certify_orbit OrbitProof",
+    ),
+    "bounce_shot": _task(
+        "One bounce",
+        "From touch-down to lift-off: slip, rolling, forces, and derivatives of the lift-off.",
+        "bounce",
+        "simulate Shot shot.Phase shot.Forces State BounceStatus sensitivity Sensitivity certify "
+        "BounceProof",
+    ),
+    "bounce_models": _task(
+        "What the surface is",
+        "A contact model is a normal and a tangential force; friction is one of the laws below. "
+        "[Write your own contact model](../contact_model.md) shows how.",
+        "bounce",
+        "ContactModel KelvinVoigt NormalKelvinVoigt DepthDampedKelvinVoigt Hertz HuntCrossley Tsuji "
+        "KuwabaraKono Maxwell GeneralisedContact contact.Conditions contact.Condition FrictionLaw "
+        "Coulomb Stribeck ExponentialDecay Viscous LuGre Dahl",
+    ),
+    "bounce_maps": _task(
+        "Many bounces, and what divides them",
+        "Arrays of landings, maps of outcomes, and the curve that divides forward from reverse slip.",
+        "bounce",
+        "lift_off LiftOffs outcome_map OutcomeMap proven_map ProvenMap dividing_curve DividingCurve "
+        "maps.Arc dividing_surface DividingSurface critical_eta",
+    ),
+    "bounce_units": _task(
+        "Metres and seconds",
+        "Balls and landings in SI units, and the scales between them and the models without units.",
+        "bounce",
+        "Ball Landing Scaling",
+    ),
+}
+
+#: Exceptions and warnings, by package.
+ERRORS = (
+    "nonsmooth",
+    "bounce",
+    "bounce.golf",
+)
+
+#: Golf has two tasks.
+GOLF = {
+    "bounce_golf": _task(
+        "From launch to rest",
+        "Flight, bounces and roll of a golf ball in SI units.",
+        "bounce.golf",
+        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map",
+    ),
+    "bounce_fits": _task(
+        "Fit measured bounces",
+        "Read a table of measured bounces and find the parameters of a model that agree best.",
+        "bounce.golf",
+        "read_measurements Measurements fit FitResult Start",
+    ),
+}

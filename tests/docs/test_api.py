@@ -1,0 +1,106 @@
+"""Every public name is on one page of the API, and every parameter and attribute is described there."""
+
+import importlib.util
+import inspect
+import re
+import textwrap
+from collections import Counter
+from pathlib import Path
+
+import pytest
+
+import bounce
+import nonsmooth as ns
+
+DOCS = Path(__file__).parents[2] / "docs"
+_spec = importlib.util.spec_from_file_location("docs_api", DOCS / "api.py")
+api = importlib.util.module_from_spec(_spec)
+_spec.loader.exec_module(api)
+
+OBJECTS = dict(api.objects())
+SECTION = re.compile(
+    r"^(?:Other Parameters|Parameters|Attributes)\n-+\n(.*?)(?=^[A-Z][A-Za-z ]*\n-+$|\Z)",
+    re.MULTILINE | re.DOTALL,
+)
+
+
+def undescribed(doc):
+    """Entries of a docstring's lists of parameters and attributes that have no description."""
+    bare = []
+    for section in SECTION.findall(inspect.cleandoc(doc)):
+        entries = re.split(r"^(?=\S)", section, flags=re.MULTILINE)
+        bare += [e.strip() for e in entries if e.strip() and not e.partition("\n")[2].strip()]
+    return bare
+
+
+def docstrings(path, thing):
+    """The docstring of an object and those of its public methods, properties included."""
+    yield path, thing.__doc__
+    if inspect.isclass(thing):
+        for name, member in vars(thing).items():
+            function = getattr(member, "fget", None) or getattr(member, "__func__", member)
+            if not name.startswith("_") and inspect.isfunction(function) and function.__doc__:
+                yield f"{path}.{name}", function.__doc__
+
+
+@pytest.mark.parametrize("path", OBJECTS)
+def test_every_parameter_and_attribute_is_described(path):
+    missing = {
+        where: bare for where, doc in docstrings(path, OBJECTS[path]) if (bare := undescribed(doc))
+    }
+    assert missing == {}
+
+
+def test_what_is_undescribed_is_seen():
+    doc = """Say something.
+
+    Parameters
+    ----------
+    a : int
+    b, c : float
+        Two numbers.
+
+    Attributes
+    ----------
+    d : str
+
+    Examples
+    --------
+    """
+    assert undescribed(doc) == ["a : int", "d : str"]
+
+
+@pytest.mark.parametrize("module", [ns, bounce, bounce.golf, bounce.laws], ids=lambda m: m.__name__)
+def test_every_public_name_is_on_a_page(module):
+    names = [n for n in module.__all__ if api.documented(getattr(module, n))]
+    assert names
+    missing = [n for n in names if f"{module.__name__}.{n}" not in OBJECTS]
+    assert missing == [], "add them to docs/tasks.py"
+
+
+def test_rooms_of_the_ball_are_there():
+    for room in ("contact", "shot", "maps"):
+        for name in getattr(bounce, room).__all__:
+            assert f"bounce.{room}.{name}" in OBJECTS
+
+
+def test_no_name_is_on_two_pages():
+    counts = Counter(path for path, _ in api.objects())
+    assert [path for path, n in counts.items() if n > 1] == []
+
+
+def test_pages_ask_for_each_name_and_are_in_the_navigation():
+    pages = api.pages()
+    text = "\n".join(t for uri, t in pages.items() if uri != "api/index.md")
+    asked = re.findall(r"^::: ([\w.]+)$", text, re.MULTILINE)
+    assert sorted(asked) == sorted(OBJECTS)
+    navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
+    assert [uri for uri in pages if f": {uri}\n" not in navigation] == []
+
+
+def test_overview_says_what_each_name_is():
+    overview = api.overview()
+    for path, thing in OBJECTS.items():
+        assert f"[{path}] | " in overview
+        first = (thing.__doc__ or "").partition("\n")[0]
+        assert textwrap.shorten(first, 400), path

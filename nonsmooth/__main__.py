@@ -1,10 +1,11 @@
-"""The textbook on the command line: ``python -m nonsmooth list`` and ``show NAME``."""
+"""On the command line, ``python -m nonsmooth``: the textbook (list, show NAME) and the explorer."""
 
 from __future__ import annotations
 
 import argparse
 import importlib
 import sys
+import webbrowser
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -14,14 +15,36 @@ from .textbook import PROBLEMS, Problem, by_name
 
 def _parser() -> argparse.ArgumentParser:
     parser = argparse.ArgumentParser(
-        prog="python -m nonsmooth", description="Textbook problems of nonsmooth dynamics."
+        prog="python -m nonsmooth",
+        description="Textbook problems of nonsmooth dynamics, and two-folds explored in a browser.",
     )
     verbs = parser.add_subparsers(dest="verb", required=True)
     verbs.add_parser("list", help="names and titles of the problems")
     show = verbs.add_parser("show", help="a problem: system, start, known values, one run")
     show.add_argument("name", help="a name from the list")
     show.add_argument("--out", type=Path, help="draw the run into this file (.png, .svg, .pdf)")
+    explore = verbs.add_parser("explore", help="two-folds in a browser: one page, without a network")
+    explore.add_argument(
+        "--out",
+        type=Path,
+        default=Path("two_folds.html"),
+        help="file to write (default: two_folds.html)",
+    )
+    explore.add_argument("--open", action="store_true", help="open it in the browser")
     return parser
+
+
+def _explore(path: Path, show: bool) -> int:
+    plot = importlib.import_module("nonsmooth.plot")
+    try:
+        path.write_text(plot.two_fold_explorer(), encoding="utf-8")
+    except OSError as error:
+        print(error, file=sys.stderr)
+        return 2
+    print(f"wrote {path}")
+    if show:
+        webbrowser.open(path.resolve().as_uri())
+    return 0
 
 
 def _draw(problem: Problem, path: Path) -> None:
@@ -56,6 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
     0
     """
     given = _parser().parse_args(arguments)
+    if given.verb == "explore":
+        return _explore(given.out, given.open)
     if given.verb == "list":
         width = max(map(len, PROBLEMS))
         for name, make in PROBLEMS.items():

@@ -8,7 +8,10 @@ ones, and many more, to look for a counterexample.
 
 import os
 
+import pytest
 from hypothesis import settings
+
+from tests.browser import opened
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -16,3 +19,9 @@ settings.register_profile("quick", derandomize=True, deadline=None, max_examples
 settings.register_profile("whole", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, max_examples=2000, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+
+
+@pytest.fixture(scope="session")
+def browser():
+    """A headless Chromium (tests/browser.py); tests without it are skipped with the reason."""
+    yield from opened()

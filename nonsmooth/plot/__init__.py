@@ -1,7 +1,8 @@
 """Pictures (matplotlib): two-folds, trajectories, phase portraits, basins. Imported only on use.
 
-Every function returns a matplotlib Figure and leaves matplotlib's global settings alone. What they
-share of colours, dashes and arrows is in ``style``, for pictures of one's own.
+Every function that draws returns a matplotlib Figure and leaves matplotlib's global settings alone.
+What they share of colours, dashes and arrows is in ``style``, for pictures of one's own.
+``two_fold_explorer`` is a page for the browser, and ``offline_page`` puts such pages together.
 """
 
 from . import style
@@ -12,11 +13,13 @@ from .branches import bifurcation_curves, branch
 from .manifold_picture import (
     manifold,
 )
+from .offline_page import offline_page
 from .orbits import multipliers, periodic_orbit
 from .phase_portrait import phase_portrait
 from .sliding_portrait import sliding_portrait
 from .trajectory import trajectory
 from .two_fold_atlas import two_fold_atlas, two_fold_map
+from .two_fold_explorer import two_fold_explorer
 from .two_fold_portrait import two_fold
 from .two_fold_space import two_fold_3d
 
@@ -26,6 +29,7 @@ __all__ = [
     "branch",
     "manifold",
     "multipliers",
+    "offline_page",
     "periodic_orbit",
     "phase_portrait",
     "sliding_portrait",
@@ -34,5 +38,6 @@ __all__ = [
     "two_fold",
     "two_fold_3d",
     "two_fold_atlas",
+    "two_fold_explorer",
     "two_fold_map",
 ]

@@ -40,7 +40,8 @@ CASES: dict[str, Numbers] = {
     "II-F with ν1=0": ((-1, 1), (0.0, -1.0)),
     "mix-0 with ν2=0": ((1, 1), (0.5, 0.0)),
 }
-_SIGMA = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
+#: Signs of L11 and L22 by the kind of the folds.
+SIGMA: dict[str, tuple[int, int]] = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
 _TITLES = {
     "VV": "visible (VV)",
     "II": "invisible (II)",
@@ -68,7 +69,8 @@ _NAMES = {
         "mix-F": (-0.13, 2.6),
     },
 }
-_REACH = 3.0
+#: Of the maps: nu1 and nu2 from -REACH to REACH.
+REACH = 3.0
 _FLIGHTS = (3, 4, 5, 6, 8)  # n of the curves nu1 nu2 = cos^2(pi/n) that are drawn
 
 
@@ -172,13 +174,13 @@ def two_fold_map(
     >>> ns.plot.two_fold_map("II").axes[0].get_xlabel()
     '$\\\\nu_1$'
     """
-    if kind not in _SIGMA:
-        raise OptionError(f"kind: expected one of {list(_SIGMA)}, received {kind!r}.")
+    if kind not in SIGMA:
+        raise OptionError(f"kind: expected one of {list(SIGMA)}, received {kind!r}.")
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         _fill(axes, kind)
         handles = _boundaries(axes, kind)
-        for name, place in _places(kind).items():
+        for name, place in places(kind).items():
             box = {
                 "boxstyle": "round,pad=0.15",
                 "facecolor": "white",
@@ -186,11 +188,11 @@ def two_fold_map(
                 "alpha": 0.85,
             }
             style.write(axes, place, name, fontsize=11, bbox=box, zorder=6)
-        for x, y in (([-_REACH, _REACH], [0, 0]), ([0, 0], [-_REACH, _REACH])):
+        for x, y in (([-REACH, REACH], [0, 0]), ([0, 0], [-REACH, REACH])):
             axes.plot(x, y, color=style.GREY, linewidth=0.5, zorder=1)
         axes.set(
-            xlim=(-_REACH, _REACH),
-            ylim=(-_REACH, _REACH),
+            xlim=(-REACH, REACH),
+            ylim=(-REACH, REACH),
             xlabel=r"$\nu_1$",
             ylabel=r"$\nu_2$",
             title=_TITLES[kind],
@@ -224,7 +226,8 @@ def _legend() -> list[Line2D | Patch]:
     ]
 
 
-def _places(kind: str) -> dict[str, tuple[float, float]]:
+def places(kind: str) -> dict[str, tuple[float, float]]:
+    """Where the names of the classes stand in the map of a kind."""
     if kind == "IV":  # the other side up: (nu1, nu2) -> (nu2, nu1)
         return {name: (b, a) for name, (a, b) in _NAMES["VI"].items()}
     return _NAMES[kind]
@@ -238,7 +241,7 @@ def areas(kind: str) -> list[tuple[str, Array]]:
     >>> [label for label, _ in areas("II")]
     ['II-F', 'II-C']
     """
-    r = _REACH
+    r = REACH
     box = np.array([[-r, -r], [r, -r], [r, r], [-r, r]])
     if kind in ("VV", "II"):
         side = 1 if kind == "VV" else -1
@@ -272,8 +275,8 @@ def _fill(ax: Axes, kind: str) -> None:
 
 def _hyperbola(product: float, branch: int) -> Array:
     """Branch nu1 > 0 or nu1 < 0 of nu1 nu2 = product, within reach; (m, 2)."""
-    low = abs(product) / _REACH
-    x = branch * np.geomspace(max(low, 1e-3), _REACH, 200)
+    low = abs(product) / REACH
+    x = branch * np.geomspace(max(low, 1e-3), REACH, 200)
     return np.column_stack([x, product / x])
 
 
@@ -313,7 +316,7 @@ def _hyperbolas(ax: Axes, kind: str) -> list[Line2D]:
             style.write(
                 ax, at, f"{n}", fontsize=7, color=style.BLUE, zorder=3, path_effects=style.halo(2.5)
             )
-        for line in ([[0, -_REACH], [0, _REACH]], [[-_REACH, 0], [_REACH, 0]]):
+        for line in ([[0, -REACH], [0, REACH]], [[-REACH, 0], [REACH, 0]]):
             handle = _stroke(
                 ax, np.array(line), style.VERMILLION, 1.2, ":", r"$\nu_i=0$: itinerary changes"
             )
@@ -323,7 +326,7 @@ def _hyperbolas(ax: Axes, kind: str) -> list[Line2D]:
 
 def _mixed_boundaries(ax: Axes, kind: str) -> list[Line2D]:
     swap = -1 if kind == "IV" else 1  # (nu1, nu2) -> (nu2, nu1)
-    line = np.linspace(-_REACH, _REACH, 3)
+    line = np.linspace(-REACH, REACH, 3)
     jordan = np.column_stack([line, line + 2.0])[:, ::swap]
     outside = np.column_stack([line, line - 2.0])[:, ::swap]
     rank = _hyperbola(-1.0, -1 if kind == "VI" else 1)

@@ -1,0 +1,94 @@
+"""One HTML page from its parts: styles, scripts and data inside, nothing loaded from elsewhere.
+
+The parts that every such page shares (its colours, and ``controls.js`` for planes, draggable points
+and sliders) are in the folder ``web`` beside this module.
+"""
+
+from __future__ import annotations
+
+import html
+import json
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+from ..model import OptionError, explain
+
+WEB = Path(__file__).parent / "web"
+#: In the page's head: a browser then refuses to load anything, also if a part asked for it.
+_POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
+
+
+def offline_page(
+    title: str,
+    body: str,
+    *,
+    styles: Sequence[str] = (),
+    scripts: Sequence[str] = (),
+    data: Mapping[str, Any] | None = None,
+) -> str:
+    """Put a page together that opens from a file, without a server and without a network.
+
+    Parameters
+    ----------
+    title : str
+    body : str
+        HTML of what is between ``<body>`` and the scripts.
+    styles, scripts : sequence of str, optional
+        Further style sheets and scripts (their text), after those that all pages share.
+    data : mapping, optional
+        What ``Page.data(name)`` gives the scripts: anything that JSON can hold.
+
+    Returns
+    -------
+    str
+
+    Raises
+    ------
+    OptionError
+        Data that JSON cannot hold, such as NaN.
+
+    Examples
+    --------
+    >>> page = offline_page("A page", "<p id='p'></p>", data={"one": {"a": "</script>"}})
+    >>> page.count("<script"), "https" in page
+    (2, False)
+    """
+    sheets = "\n".join([_shared("page.css"), *styles])
+    blocks = [_data(name, value) for name, value in (data or {}).items()]
+    blocks += [f"<script>\n{text}</script>" for text in (_shared("controls.js"), *scripts)]
+    return "\n".join(
+        [
+            "<!doctype html>",
+            '<html lang="en"><head><meta charset="utf-8">',
+            f'<meta http-equiv="Content-Security-Policy" content="{_POLICY}">',
+            '<meta name="viewport" content="width=device-width, initial-scale=1">',
+            '<meta name="color-scheme" content="light dark">',
+            '<link rel="icon" href="data:,">',
+            f"<title>{html.escape(title)}</title>",
+            f"<style>\n{sheets}</style></head>",
+            f"<body>\n{body}",
+            *blocks,
+            "</body></html>\n",
+        ]
+    )
+
+
+def _shared(name: str) -> str:
+    return (WEB / name).read_text(encoding="utf-8")
+
+
+def _data(name: str, value: Any) -> str:
+    try:
+        text = json.dumps(value, ensure_ascii=False, allow_nan=False)
+    except (TypeError, ValueError) as error:
+        raise OptionError(
+            explain(
+                f"data: {name}",
+                expected="finite numbers, texts, and lists and dicts of them",
+                received=f"{type(value).__name__} {str(value)[:60]!r}",
+                advice=f"JSON cannot hold it: {error}",
+            )
+        ) from error
+    text = text.replace("<", "\\u003c")  # no end of the script inside a text
+    return f'<script type="application/json" id="data-{html.escape(name)}">{text}</script>'

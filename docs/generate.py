@@ -155,6 +155,14 @@ def gallery() -> str:
     return "\n".join(parts)
 
 
+# Explorers ----------------------------------------------------------------------------------------
+
+
+def explorers() -> dict[str, str]:
+    """The pages that compute in the browser, by their address in the site."""
+    return {"explore/two_folds.html": ns.plot.two_fold_explorer()}
+
+
 # Pages --------------------------------------------------------------------------------------------
 
 PARTS: dict[str, Callable[[], str]] = {

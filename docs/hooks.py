@@ -23,14 +23,14 @@ _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
 
 
 def on_files(files: Files, config: Any) -> Files:
-    """Add the pictures of the gallery and the pages of the API."""
+    """Add the pictures of the gallery, the pages of the API and the explorers."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     for name in generate.GALLERY:
         path = PICTURES / f"{name}.svg"
         figure = generate.run_example(name)["figure"]
         figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
         files.append(File.generated(config, f"gallery/{name}.svg", abs_src_path=str(path)))
-    for uri, text in api.pages().items():
+    for uri, text in {**api.pages(), **generate.explorers()}.items():
         files.append(File.generated(config, uri, content=text))
     return files
 

@@ -23,7 +23,9 @@ def _parser() -> argparse.ArgumentParser:
     show = verbs.add_parser("show", help="a problem: system, start, known values, one run")
     show.add_argument("name", help="a name from the list")
     show.add_argument("--out", type=Path, help="draw the run into this file (.png, .svg, .pdf)")
-    explore = verbs.add_parser("explore", help="two-folds in a browser: one page, without a network")
+    explore = verbs.add_parser(
+        "explore", help="two-folds in a browser: one page, without a network"
+    )
     explore.add_argument(
         "--out",
         type=Path,

@@ -111,7 +111,9 @@ class Browser:
     def faults(self) -> dict[str, list[str]]:
         """What is wrong with the page as it is now, by kind; empty if nothing."""
         self._drain()
-        elsewhere = [u for u in self.requests if not u.startswith(("file:", "data:", "about:", "blob:"))]
+        elsewhere = [
+            u for u in self.requests if not u.startswith(("file:", "data:", "about:", "blob:"))
+        ]
         found = {
             "wider than the window": self.driver.execute_script(_OVERFLOW),
             "broken picture": self.driver.execute_script(_BROKEN),

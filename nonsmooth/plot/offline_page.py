@@ -9,6 +9,7 @@ from __future__ import annotations
 import html
 import json
 from collections.abc import Mapping, Sequence
+from importlib import metadata
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +33,7 @@ def offline_page(
     Parameters
     ----------
     title : str
+        What the browser's tab says.
     body : str
         HTML of what is between ``<body>`` and the scripts.
     styles, scripts : sequence of str, optional
@@ -72,6 +74,14 @@ def offline_page(
             "</body></html>\n",
         ]
     )
+
+
+def installed_version() -> str:
+    """Version of the installed distribution, for the foot of a page; empty in a bare checkout."""
+    try:
+        return metadata.version("nonsmooth-dynamics")
+    except metadata.PackageNotFoundError:
+        return ""
 
 
 def _shared(name: str) -> str:

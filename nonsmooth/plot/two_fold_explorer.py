@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from ..local.two_folds.classification import TABLE
-from .offline_page import WEB, offline_page
+from .offline_page import WEB, installed_version, offline_page
 from .two_fold_atlas import CASES, REACH, SIGMA, areas, places
 
 
@@ -44,12 +44,10 @@ def two_fold_explorer() -> str:
 
 def _data() -> dict[str, Any]:
     """What the page takes from the code: the decision table, its maps, and examples."""
-    from .. import __version__  # the package is complete by now
-
     kinds = {sigma: kind for kind, sigma in SIGMA.items()}
     words = ("label", "folds", "condition", "into", "out_of", "determinism")
     return dict(
-        version=__version__,
+        version=installed_version(),
         reach=REACH,
         table=[{word: getattr(row, word) for word in words} for row in TABLE],
         areas={

@@ -60,7 +60,15 @@ def expected(folds, nu):
     c = two_folds.classify_two_fold(SIGMA[folds], nu)
     real = flow.discriminant >= 0
     numbers = [
-        *(c.canards, c.faux_canards, c.margin, c.into.low, c.into.high, c.out_of.low, c.out_of.high),
+        *(
+            c.canards,
+            c.faux_canards,
+            c.margin,
+            c.into.low,
+            c.into.high,
+            c.out_of.low,
+            c.out_of.high,
+        ),
         *(flow.trace, flow.determinant, flow.discriminant, flow.gap),
         two_folds.max_flights(SIGMA[folds], nu),
         *(flow.eigenvalues if real else ()),
@@ -123,7 +131,9 @@ def test_orbits_and_eigenlines_are_python_s(browser, page):
         flow = two_folds.ReducedFlow(sigma, nu)
         starts = [[0.3, 1.1], [1.7, 0.2]]
         got = browser.run(ORBITS, kinds[sigma], nu, starts)
-        np.testing.assert_allclose(got["lines"], np.reshape(eigenlines(flow), (-1, 2)).tolist() or [])
+        np.testing.assert_allclose(
+            got["lines"], np.reshape(eigenlines(flow), (-1, 2)).tolist() or []
+        )
         assert got["ends"] == [[s.orbit.comes_from, s.orbit.goes_to] for s in sectors(flow)], name
         for z, (first, last, comes, goes) in zip(starts, got["orbits"], strict=True):
             run = orbit(flow, z)
@@ -196,7 +206,9 @@ def test_keys_move_the_point_and_everything_follows(browser, page):
     assert shown(browser)["label"] == "Class mix-S"
     field.send_keys("7")  # 2.57, and then outside the map
     field.send_keys(Keys.BACKSPACE * 4, "25")
-    assert browser.run("return document.getElementById('nu2').getAttribute('aria-invalid')") == "true"
+    assert (
+        browser.run("return document.getElementById('nu2').getAttribute('aria-invalid')") == "true"
+    )
     assert shown(browser)["hash"] == "#folds=VI&nu=-3,2"
     assert browser.faults() == {}
 

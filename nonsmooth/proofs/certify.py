@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from collections import deque
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
+from fractions import Fraction
 from typing import Any
 
 from ..local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ..model import FilippovSystem, OptionError, explain, real, whole
-from .arithmetic import Numbers, precision, radius
+from .arithmetic import Numbers, between, precision, radius
 from .decimals import enclosure, given, inner
 from .equations import Equations
 from .flint import arb
@@ -18,7 +20,8 @@ from .questions import Verdict
 from .record import record_of
 from .subject import Subject, subject_of
 
-_READ = {
+#: What a constant means, in words.
+READ = {
     "stored": "Constants are the doubles stored in the expressions.",
     "written": "Constants are the decimals that the stored doubles are written as.",
 }
@@ -92,7 +95,7 @@ def certify(
     limit = real(width, "width", low=5e-324, expected="a positive number")
     whole(max_bits, "max_bits", least=64)
     whole(max_pieces, "max_pieces")
-    if numbers not in _READ:
+    if numbers not in READ:
         raise OptionError(
             explain(
                 "numbers",
@@ -110,9 +113,11 @@ def certify(
 
 def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> list[Proof]:
     """Proofs over pieces of the parameters' intervals, halved where one proof does not do."""
-    todo, done, failed = [subject], list[Proof](), 0
+    todo, done, failed = deque([subject]), list[Proof](), 0
     while todo:
-        one = todo.pop()
+        one = (
+            todo.popleft()
+        )  # the largest: what is undecided does not use up the pieces of the rest
         proof, start = _one(one, width, max_bits)
         wide = [k for k, (a, b) in enumerate(one.parameters) if a < b]
         if (
@@ -127,7 +132,7 @@ def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> 
         sizes = [(b - a) / (1 + abs(a + b)) for a, b in one.parameters]
         k = max(wide, key=lambda j: sizes[j])
         low, high = one.parameters[k]
-        for part in (((low + high) / 2, high), (low, (low + high) / 2)):
+        for part in ((low, (low + high) / 2), ((low + high) / 2, high)):
             ends = [part if j == k else v for j, v in enumerate(one.parameters)]
             todo.append(replace(one, parameters=ends, start=start))
     return done
@@ -164,9 +169,11 @@ def _one(subject: Subject, width: float, max_bits: int) -> tuple[Proof, list[flo
 def prove_subject(subject: Subject, zero: Zero, width: float, max_bits: int = 1024) -> Proof | None:
     """A proof for a zero that is known to exist; None where it cannot be told to be that one."""
     start = [float(v.mid()) for v in zero.point]
-    proof, end = _one(replace(subject, start=start), width, max_bits)
-    same = all(b.contains(arb(v)) for b, v in zip(zero.box, end, strict=True))
-    return proof if proof.exists and same else None
+    proof, _ = _one(replace(subject, start=start), width, max_bits)
+    if not proof.exists:
+        return None
+    found = [between(Fraction(a), Fraction(b)) for a, b in proof.record["point"]]
+    return proof if all(b.contains(v) for b, v in zip(zero.box, found, strict=True)) else None
 
 
 def _wide(subject: Subject) -> bool:
@@ -178,14 +185,19 @@ def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits:
     ranges = [given(*pair) for pair in subject.parameters]
     parameters = dict(zip(names, ranges, strict=True))
     condition = f"For {intervals(parameters)}: " if parameters else ""
-    if best is None:
+    if best is None or not best[1].here:
+        why = (
+            "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
+            "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
+            "parameters are too wide."
+            if best is None
+            else f"The fields were those of other sides: {best[1].why}."
+        )
         statement = paragraph(
             f"{condition}No proof of a {kind} near "
             + ", ".join(f"{k} = {v:.8g}" for k, v in zip(subject.names, subject.start, strict=True))
             + f" with up to {bits} bits.",
-            "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
-            "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
-            "parameters are too wide.",
+            why,
         )
         return Proof(kind, False, False, "", statement, {}, {}, {}, parameters, bits)
     zero, verdict, equations = best
@@ -220,7 +232,7 @@ def _statement(
     values: Mapping[str, Any],
 ) -> str:
     kind = subject.question.kind
-    where = _where(subject)
+    place = where(subject)
     article = "an" if verdict.title[0] in "aeiou" else "a"
     shown = {k: v for k, v in values.items() if not (k[0] == "L" and k[1:].isdigit())}
     classed = f", class {verdict.label}" if kind == "two-fold" and verdict.label else ""
@@ -228,22 +240,24 @@ def _statement(
         classed = f", exactly on the {verdict.label}"
     head = "Theorem" if verdict.label else "Theorem on existence, with the class undecided"
     return paragraph(
-        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{where}.",
+        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{place}.",
         f"It is {article} {verdict.title}{classed}, at {listed(point)}.",
         f"{listed(shown)}." if shown else "",
         *verdict.lines,
         f"Not decided: {verdict.why}." if verdict.why and not verdict.label else "",
-        _READ[subject.numbers],
+        READ[subject.numbers],
     )
 
 
-def _where(subject: Subject) -> str:
-    """What is held, and the plane."""
+def where(subject: Subject) -> str:
+    """What is held, the plane, and the sides of other surfaces."""
     described = subject.question.described
     free = {i for vector, i in subject.unknowns if vector == 0}
     names = [*described.system.state_names, "t"]
     held = [intervals({names[i]: given(*v)}) for i, v in enumerate(subject.values) if i not in free]
     text = f" with {', '.join(held)}" if held else ""
+    if described.system.surface_count > 1:
+        text += f" in mode {described.mode!r}"
     if subject.normals:
         text += (
             f" on the plane through the given point across the set of such points (of codimension "
@@ -274,7 +288,7 @@ def _together(subject: Subject, pieces: list[Proof]) -> Proof:
         f"Over all pieces {intervals(hulls([p.point for p in pieces if p.exists]))}.",
         f"Undecided on {len(missing)} pieces." if missing else "",
         *lines,
-        _READ[subject.numbers],
+        READ[subject.numbers],
     )
     points = [p.point for p in pieces if p.exists]
     values = [p.values for p in pieces if p.exists]

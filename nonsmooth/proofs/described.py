@@ -15,15 +15,12 @@ from .tape import Tape
 Range = Any
 
 
-class Described:
-    """The stored expressions of one surface of a system and what follows from them.
+class Written:
+    """The stored expressions of a system on a tape.
 
     Parameters
     ----------
     system : FilippovSystem
-    surface : int
-    mode : str, optional
-        The sides of the other surfaces, one letter for each surface.
     moving : sequence of int, optional
         Parameters that are taken as further states that do not change.
 
@@ -32,19 +29,10 @@ class Described:
     tape : Tape
     x, p : list of int
         Input nodes of the extended states and the parameters.
-    h : int
-    fields : (list of int, list of int)
-        F1 and F2, the rate of time included.
     """
 
-    def __init__(
-        self,
-        system: FilippovSystem,
-        surface: int = 0,
-        mode: str | None = None,
-        moving: Sequence[int] = (),
-    ):
-        self.system, self.surface = system, system.surface_index(surface)
+    def __init__(self, system: FilippovSystem, moving: Sequence[int] = ()):
+        self.system = system
         self.tape = tape = Tape()
         d = system.definition
         n = d.states.numel()
@@ -55,40 +43,126 @@ class Described:
             self.p[i] = self.x[count + k]
         self._places = [self.x[:n], self.x[n:count], self.p]
         self._symbols = [d.states, d.time, d.parameters]
-        ((self.h,),) = self.insert([d.surfaces[self.surface]])
-        self.fields = tuple(self._field(s) for s in self._sides(mode))
 
-    def _sides(self, mode: str | None) -> list[list[float]]:
-        signs = [0.0] * self.system.surface_count
-        if mode is not None:
-            signs = [float(s) for s in self.system.parse_mode(mode)]
-        if any(s == 0 for i, s in enumerate(signs) if i != self.surface):
-            raise DefinitionError(
-                explain(
-                    "mode",
-                    expected="a side, + or -, of every other surface",
-                    received=repr(mode),
-                    advice="Proofs where several surfaces slide at once are not built.",
-                )
-            )
-        return [[s if i == self.surface else t for i, t in enumerate(signs)] for s in (1.0, -1.0)]
+    def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
+        """Write expressions in states, time and parameters onto the tape."""
+        return self.tape.insert(expressions, self._symbols, self._places)
 
-    def _field(self, multipliers: Sequence[float]) -> list[int]:
+    def inserted_at(self, expression: Any, x: Sequence[int]) -> int:
+        """Write a function of states, time and parameters with other nodes in the states' place."""
+        n, count = self.system.dimension, self.system.extended_dimension
+        places = [list(x[:n]), list(x[n:count]), self.p]
+        ((node,),) = self.tape.insert([expression], self._symbols, places)
+        return int(node)
+
+    def field(
+        self, multipliers: Sequence[int], reactions: Sequence[int] | None = None
+    ) -> list[int]:
+        """Rates of the extended states, for nodes of the multipliers; without reactions unless given."""
         d, tape = self.system.definition, self.tape
-        values = [[tape.constant(m) for m in multipliers], [tape.constant(0)] * d.reactions.numel()]
+        still = [tape.constant(0)] * d.reactions.numel()
+        values = [list(multipliers), still if reactions is None else list(reactions)]
         (rows,) = tape.insert(
             [d.field], [*self._symbols, d.multipliers, d.reactions], [*self._places, *values]
         )
         more = len(self.x) - self.system.extended_dimension
         return [*rows, *[tape.constant(1)] * d.time.numel(), *[tape.constant(0)] * more]
 
-    def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
-        """Write expressions in states, time and parameters onto the tape."""
-        return self.tape.insert(expressions, self._symbols, self._places)
-
     def gradient(self, k: int) -> list[int]:
         """Derivatives with respect to the extended states."""
         return self.tape.gradient(k, self.x)
+
+
+class Described:
+    """One surface of a system and what follows from its expressions.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    surface : int
+    mode : str, optional
+        The sides of the other surfaces, one letter for each surface.
+    written : Written, optional
+        The system on a tape; a new one by default.
+
+    Attributes
+    ----------
+    tape : Tape
+    x, p : list of int
+        Input nodes of the extended states and the parameters.
+    h : int
+    fields : (list of int, list of int)
+        F1 and F2, the rate of time included.
+    elsewhere : list of (str, int)
+        What must be positive where the fields are those of the mode: the sides of the other surfaces
+        and open gaps, in words and as nodes.
+    """
+
+    def __init__(
+        self,
+        system: FilippovSystem,
+        surface: int = 0,
+        mode: str | None = None,
+        written: Written | None = None,
+    ):
+        self.system, self.surface, self.mode = system, system.surface_index(surface), mode
+        self.written = written or Written(system)
+        self.tape, self.x, self.p = self.written.tape, self.written.x, self.written.p
+        ((self.h,),) = self.insert([system.definition.surfaces[self.surface]])
+        sides = self._sides()
+        constant = self.tape.constant
+        self.fields = tuple(self.written.field([constant(m) for m in s]) for s in sides)
+        self.elsewhere = self._elsewhere(sides[0])
+
+    def _sides(self) -> list[list[float]]:
+        signs = [0.0] * self.system.surface_count
+        if self.mode is not None:
+            letters = self.system.parse_letters(self.mode)
+            signs = [float(s) for s in letters[: len(signs)]]
+            if 0 in letters[len(signs) :]:
+                raise DefinitionError(
+                    explain(
+                        "mode",
+                        expected="open contacts",
+                        received=repr(self.mode),
+                        advice="Points of closed contacts are not proven.",
+                    )
+                )
+        if any(s == 0 for i, s in enumerate(signs) if i != self.surface):
+            raise DefinitionError(
+                explain(
+                    "mode",
+                    expected="a side, + or -, of every other surface",
+                    received=repr(self.mode),
+                    advice="Proofs where several surfaces slide at once are not built.",
+                )
+            )
+        return [[s if i == self.surface else t for i, t in enumerate(signs)] for s in (1.0, -1.0)]
+
+    def _elsewhere(self, signs: Sequence[float]) -> list[tuple[str, int]]:
+        d, found = self.system.definition, []
+        for i, s in enumerate(signs):
+            if i != self.surface:
+                ((h,),) = self.insert([d.surfaces[i]])
+                node = h if s > 0 else self.tape.apply("neg", [h])
+                found.append((f"the side {'+' if s > 0 else '-'} of surface {i}", node))
+        for k, name in enumerate(self.system.impacts):
+            ((gap,),) = self.insert([d.gaps[k]])
+            found.append((f"an open gap of {name!r}", gap))
+        return found
+
+    def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
+        """Write expressions in states, time and parameters onto the tape."""
+        return self.written.insert(expressions)
+
+    @property
+    def nonlinear(self) -> bool:
+        """Whether the surface's multiplier enters nonlinearly."""
+        return bool(self.system.nonlinear[self.surface])
+
+    def gradient(self, k: int) -> list[int]:
+        """Derivatives with respect to the extended states."""
+        return self.written.gradient(k)
 
     def lie_derivative(self, k: int, of: int) -> int:
         """Derivative of a node along field k (0: F1, 1: F2)."""

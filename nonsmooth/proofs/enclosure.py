@@ -62,11 +62,18 @@ class Enclosure:
         places = places_of((high - low) / 2) + 1
         middle = rounded((low + high) / 2, places, 0)
         wide = max(high - Fraction(middle), Fraction(middle) - low)
-        shown = rounded(wide, places_of(wide) + 1, 1)
-        return f"{middle} +- {Decimal(shown):.1e}".replace(".0e", "e")
+        return f"{middle} +- {_two_digits(wide)}"
 
     def __repr__(self) -> str:
         return f"Enclosure({self.low!r}, {self.high!r})"
+
+
+def _two_digits(width: Fraction) -> str:
+    """A positive number with two digits, rounded up."""
+    places = places_of(width) + 1
+    while (digits := math.ceil(width * Fraction(10) ** places)) > 99:
+        places -= 1
+    return f"{Decimal(digits).scaleb(-places):.1e}".replace(".0e", "e")
 
 
 def places_of(width: Fraction) -> int:
@@ -74,7 +81,7 @@ def places_of(width: Fraction) -> int:
     if width <= 0:
         return 0
     digits = len(str(width.numerator)) - len(str(width.denominator))
-    return 1 - digits if Fraction(10) ** (digits - 1) > width else -digits + 1
+    return 1 - digits
 
 
 def rounded(q: Fraction, places: int, direction: int) -> str:

@@ -8,16 +8,17 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..local.sides import Side
+from ..local.sides import FIELDS, Side
 from ..model import FilippovSystem, OptionError, explain, real, require_system, whole
 from .arithmetic import Numbers, enclose, exact, precision
 from .batch import Floats, of_fractions
 from .census import Census, Undecided
-from .certify import prove_subject
+from .certify import READ, prove_subject, where
+from .decimals import given
 from .described import Described, parameter_ranges
 from .enclosure import Enclosure
 from .flint import arb
-from .proof import Proof, paragraph
+from .proof import Proof, intervals, paragraph
 from .questions import QUESTIONS, Question
 from .subdivide import Search, clusters
 from .subject import Subject
@@ -178,15 +179,15 @@ def _census(
 ) -> Census:
     zeros, edge, left = [], [], []
     for found in search.zeros:
-        where = _place(found.point, bounds)
+        place = _place(found.point, bounds)
         counts = subject.question.counts(search.equations.inputs(found.point))
-        if where == "outside" or counts is False:
+        if place == "outside" or counts is False:
             continue
         proof = prove_subject(subject, found, width)
         if proof is None or counts is None:
             why = "a zero on the surface or at the end of sliding: its status is undecided"
             left.append(Undecided(proof.point if proof else {}, why))
-        elif where == "edge":
+        elif place == "edge":
             edge.append(proof)
         else:
             zeros.append(proof)
@@ -240,15 +241,16 @@ def _words(
     complete: bool,
 ) -> str:
     kind = subject.question.kind
-    ranges = ", ".join(
-        f"{name} in [{float(a):g}, {float(b):g}]"
-        for name, (a, b) in zip(subject.names, bounds, strict=True)
-    )
-    count = {0: f"no {kind}", 1: f"exactly one {kind}"}.get(
-        len(zeros), f"exactly {len(zeros)} points of kind {kind}"
+    ranges = intervals({n: given(*pair) for n, pair in zip(subject.names, bounds, strict=True)})
+    parameters = zip(subject.parameter_names, subject.parameters, strict=True)
+    condition = intervals({name: given(*pair) for name, pair in parameters})
+    side = getattr(subject.question, "side", None)
+    what = f"{kind} of {FIELDS[side]}" if side else kind
+    count = {0: f"no {what}", 1: f"exactly one {what}"}.get(
+        len(zeros), f"exactly {len(zeros)} points of kind {what}"
     )
     if not complete:
-        count = f"at least {len(zeros)} of kind {kind}; the list is not proven complete"
+        count = f"at least {len(zeros)} of kind {what}; the list is not proven complete"
     lines = [
         f"{p.label or 'class undecided'}: {', '.join(f'{k} = {v}' for k, v in p.point.items())}."
         for p in zeros[:20]
@@ -257,7 +259,8 @@ def _words(
     lines += [f"Undecided: {u}." for u in left[:10]]
     head = "Theorem" if complete else "Theorem in part"
     return paragraph(
-        f"{head}. The box {ranges} holds {count}.",
+        f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{where(subject)} "
+        f"holds {count}.",
         *lines,
-        f"{search.boxes} pieces of the box were looked at.",
+        f"{search.boxes} pieces of the box were looked at. {READ[subject.numbers]}",
     )

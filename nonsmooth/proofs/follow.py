@@ -3,40 +3,32 @@
 A step: an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
 remainder, and the set of states as middle + frame r with an orthogonal frame (Lohner 1987). Guards
 are proven positive, or to have one simple zero; there the time is eliminated by the derivative of the
-return map, (1 - f grad g/(grad g . f)) D. Modes follow from proven signs.
+return map, (1 - f grad g/(grad g . f)) D. What follows an event is told by ``journey``.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
 
-from .arithmetic import hull, radius, sign
+from .arithmetic import hull, radius
 from .equations import column, entries
 from .flint import arb, arb_mat, ctx
 from .krawczyk import identity
-from .modes import Mode, Modes, Watch, beyond
+from .modes import Modes
+from .motion import Mode
 from .proof import UnprovenError
 from .roots import Polynomial, UnsureError, first_zero, narrowed
 from .series import horner
 from .steps import Step, at, growth, orthogonal
 
 
-@dataclass(frozen=True)
-class Met:
-    """An event in enclosures."""
-
-    watch: Watch
-    kind: str
-    t: arb
-    x: list[arb]
-    before: str
-    after: str
+#: How often a step is shortened for the sake of watched functions.
+_SHORTER = 5
 
 
 class Follower:
-    """A set of states that moves.
+    """A set of states that moves in one mode.
 
     Parameters
     ----------
@@ -46,24 +38,27 @@ class Follower:
     p : sequence of arb
         Parameters.
     order : int
-    on_surface : bool
-        Whether every start is on the surface, exactly.
+
+    Attributes
+    ----------
+    mode : str
+        The word of the mode that it is in.
+    zeros : dict of int to int
+        For watched functions that are zero here how many of their coefficients are.
+    signs : dict of int to int
+        Of stops, resets and impacts, by their index.
     """
 
-    def __init__(
-        self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int, on_surface: bool
-    ):
+    def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
         self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)
-        self._adopt(list(x))
-        self.t, self.steps, self.events, self.smallest = arb(0), 0, list[Met](), 0.0
-        self.mode, zeros = self._first_mode(list(x), on_surface)
+        self.adopt(list(x))
+        self.t, self.steps, self.smallest, self.mode = arb(0), 0, 0.0, ""
         self.zeros: dict[int, int] = {}
         self.signs: dict[int, int] = {}
-        self._watch_afresh(zeros)
 
     # the set -------------------------------------------------------------------------------------
 
-    def _adopt(self, x: list[arb]) -> None:
+    def adopt(self, x: list[arb]) -> None:
         self.middle, self.frame = [v.mid() for v in x], identity(self.n)
         self.r = column([v - m for v, m in zip(x, self.middle, strict=True)])
 
@@ -72,7 +67,7 @@ class Follower:
         move = entries(self.frame * self.r)
         return [m + v for m, v in zip(self.middle, move, strict=True)]
 
-    def _moved(self, image: list[arb], derivative: arb_mat) -> None:
+    def moved(self, image: list[arb], derivative: arb_mat) -> None:
         """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
         product = derivative * self.frame
         wide = any(radius(v) > 0 for v in entries(self.r))
@@ -83,59 +78,15 @@ class Follower:
         self.r = inverse * miss + (inverse * product) * self.r
         self.frame = frame
 
-    # modes and guards ----------------------------------------------------------------------------
-
-    def _first_mode(self, x: list[arb], on_surface: bool) -> tuple[str, int]:
-        h, l1, l2 = self.modes.surface(x, self.p)
-        if sign(h):
-            return "+" if h > 0 else "-", 0
-        if on_surface:
-            found = beyond(l1, l2)
-            if found:
-                return found
-        raise UnprovenError(
-            f"start: h in {h.str(5)}, L1 in {l1.str(5)}, L2 in {l2.str(5)}: where it goes is undecided"
-        )
-
     @property
     def now(self) -> Mode:
         """The mode that it is in."""
         return self.modes[self.mode]
 
-    def _watch_afresh(self, surface_zeros: int) -> None:
-        """Signs of stops and resets at the start, or after a jump."""
-        x = self.hull()
-        self.zeros, values = {}, self.now.watched(x, self.p)
-        coefficients = None
-        for k, watch in enumerate(self.now.watches):
-            if watch.kind == "surface":
-                self.zeros[k] = surface_zeros
-            if watch.kind not in ("stop", "reset"):
-                continue
-            self.signs[k - self._first()] = sign(values[k])
-            if values[k].is_zero():
-                if coefficients is None:
-                    c = self.now.series(x, self.p, 8)
-                    coefficients = self.now.watched_series(c, self.p)
-                self._from_zero(k, coefficients[k])
-            elif not sign(values[k]):
-                raise UnprovenError(f"{watch.name}: its sign is undecided at the start")
-
-    def _from_zero(self, k: int, c: Sequence[arb]) -> None:
-        """Sign just after a zero, by the first coefficient that is not zero."""
-        order = next((j for j, v in enumerate(c) if not v.is_zero()), 0)
-        if not order or not sign(c[order]):
-            raise UnprovenError(f"{self.now.watches[k].name}: its sign after a zero is undecided")
-        self.zeros[k], self.signs[k - self._first()] = order, sign(c[order])
-
-    def _first(self) -> int:
-        """Number of the first stop or reset among the mode's watches."""
-        return sum(w.kind in ("surface", "exit") for w in self.now.watches)
-
     # steps ---------------------------------------------------------------------------------------
 
-    def step(self, t_end: arb) -> Met | None:
-        """One step, to an event if one comes first; the event or None."""
+    def step(self, t_end: arb) -> int | None:
+        """One step, to an event if one comes first: the number of the function that is met."""
         left = math.nextafter(float((t_end - self.t).upper()), math.inf)
         limit = left
         for _ in range(40):
@@ -161,14 +112,20 @@ class Follower:
         wide = max(radius(v) for v in x)
         tolerance = max(2.0 ** (2 - ctx.prec), 1e-3 * wide)
         natural = min((tolerance / size) ** (1 / self.order), 1e6)
-        h = min(natural, limit)
+        h, shorter, guards = min(natural, limit), 0, mode.watched_series(c, self.p)
         for _ in range(60):
             tube = self._tube(x, h)
             if tube is not None:
                 top = mode.series(tube, self.p, count)
                 rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (self.order + 1)
                 if rest <= 8 * tolerance:
-                    break
+                    tops = mode.watched_series(top, self.p)
+                    coarse = _coarse(guards, tops, h, tolerance)
+                    if not coarse or shorter == _SHORTER:
+                        break
+                    shorter += 1
+                    h *= 0.6
+                    continue
                 ratio = (8 * tolerance / rest) ** (1 / (self.order + 1)) if rest < 1e300 else 0.0
                 h *= min(0.9, max(0.3, 0.9 * ratio))
             else:
@@ -182,10 +139,9 @@ class Follower:
             raise UnprovenError(
                 f"steps become too small at t = {float(self.t.mid()):.9g} (a singularity is near)"
             )
-        guards = mode.watched_series(c, self.p)
         if wide > 0:
             guards = mode.narrowed(guards, self.middle, (self.frame, self.r), self.p)
-        return Step(h, natural, tube, x, c, top, guards, mode.watched_series(top, self.p))
+        return Step(h, natural, tube, x, c, top, guards, tops)
 
     def _tube(self, x: list[arb], h: float) -> list[arb] | None:
         """B with x + [0, h] F(B) inside B: every orbit from x exists on [0, h] and stays in B."""
@@ -203,8 +159,8 @@ class Follower:
     def _first_event(self, made: Step) -> tuple[int, arb] | None:
         """The guard that comes first, proven, and its time."""
         hits, unsure = [], float("inf")
-        for k, watch in enumerate(self.now.watches):
-            f = self._polynomial(made, k, watch)
+        for k in range(len(self.now.watches)):
+            f = self._polynomial(made, k)
             try:
                 t = first_zero(f, made.h)
             except UnsureError as error:
@@ -225,7 +181,10 @@ class Follower:
         together = [hits[0], *((t, j) for t, j in hits[1:] if not time < t)]
         if len(together) == 1:
             return k, time
-        counting = [(t, j) for t, j in together if self._counts(j)]
+        counting = [(t, j) for t, j in together if self.counts(j)]
+        passed = [hit for hit in together if not self.counts(hit[1])]
+        if any(not self._stays_past(made, hit, together) for hit in passed):
+            counting = []  # one that is passed the other way may come back in its own direction
         if len(counting) == 1 and self.now.watches[counting[0][1]].kind == "stop":
             return counting[0][1], counting[0][0]
         for t, j in counting:
@@ -236,10 +195,20 @@ class Follower:
         when = float((self.t + time).mid())
         raise UnprovenError(f"which comes first is undecided: {names} at t = {when:.9g}")
 
+    def _stays_past(
+        self, made: Step, hit: tuple[arb, int], together: list[tuple[arb, int]]
+    ) -> bool:
+        """Whether a guard that is passed has no second zero while others are met."""
+        f = self._polynomial(made, hit[1])
+        until = hit[0]
+        for t, _ in together:
+            until = hull(until, t)
+        return bool(f.slope(until) < 0)
+
     def _comes_before(self, made: Step, hit: tuple[int, arb], other: tuple[arb, int]) -> bool:
         """Whether every orbit meets one event while another guard, which only falls, is positive."""
         t, j = other
-        f = self._polynomial(made, j, self.now.watches[j])
+        f = self._polynomial(made, j)
         if not f.slope(hull(hit[1], t)) < 0:
             return False
         image, derivative = self._at_event(made, hit)
@@ -249,24 +218,25 @@ class Follower:
         value = self.now.watched(image, self.p)[j] + (arb_mat([row]) * move)[0, 0]
         tied = ((arb_mat([row]) * (derivative * self.frame)) * self.r)[0, 0]
         value = value.intersection(self.now.watched(image, self.p)[j] + tied)
-        watch = self.now.watches[j]
-        falling = watch.kind not in ("stop", "reset") or self.signs[j - self._first()] > 0
-        return bool((value if falling else -value) > 0)
+        return bool(self._turned(j) * value > 0)
 
-    def _counts(self, k: int) -> bool:
+    def _turned(self, k: int) -> int:
+        """The sign by which a watched function is positive in the mode now."""
+        watch = self.now.watches[k]
+        return self.signs[watch.index] if watch.passes else 1
+
+    def counts(self, k: int) -> bool:
         """Whether a zero of a guard is an event: stops and resets have a direction."""
         watch = self.now.watches[k]
-        if watch.kind not in ("stop", "reset"):
-            return True
-        return watch.direction * -self.signs[k - self._first()] >= 0
+        return not watch.passes or watch.direction * -self.signs[watch.index] >= 0
 
-    def _polynomial(self, made: Step, k: int, watch: Watch) -> Polynomial:
+    def _polynomial(self, made: Step, k: int) -> Polynomial:
         c, top = made.guards[k][:-1], made.guard_tops[k][-1]
-        if watch.kind in ("stop", "reset") and self.signs[k - self._first()] < 0:
+        if self._turned(k) < 0:
             c, top = [-v for v in c], -top
         return Polynomial(c, top, self.zeros.get(k, 0))
 
-    def _advance(self, made: Step, hit: tuple[int, arb] | None, t_end: arb) -> Met | None:
+    def _advance(self, made: Step, hit: tuple[int, arb] | None, t_end: arb) -> int | None:
         mode = self.now
         time = arb(made.h) if hit is None else hit[1]
         if hit is None and (t_end - self.t) <= made.h:
@@ -276,9 +246,9 @@ class Follower:
             image, derivative = at(c, made.top, time), self._derivative(made, time)
         else:
             image, derivative = self._at_event(made, hit)
-        self._moved(image, derivative)
+        self.moved(image, derivative)
         self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
-        return None if hit is None else self._serve(mode.watches[hit[0]], hit[0])
+        return None if hit is None else hit[0]
 
     def _at_event(self, made: Step, hit: tuple[int, arb]) -> tuple[list[arb], arb_mat]:
         """Where the middle meets an event, and the derivative of the return map there."""
@@ -321,74 +291,14 @@ class Follower:
         across = arb_mat([[int(i == j) - f[i] * g[j] / rate for j in range(n)] for i in range(n)])
         return across * derivative
 
-    # events --------------------------------------------------------------------------------------
 
-    def _serve(self, watch: Watch, k: int) -> Met | None:
-        before, x = self.mode, self.hull()
-        if watch.kind in ("stop", "reset"):
-            return self._end(watch, k, x)
-        _, l1, l2 = self.modes.surface(x, self.p)
-        if watch.kind == "exit":
-            self.mode, zeros, kind = ("+" if watch.direction > 0 else "-"), 2, "exit"
-            other = l2 if watch.direction > 0 else -l1
-            if not other > 0:
-                raise UnprovenError(
-                    f"exit at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so the "
-                    "other field's sign is undecided (a two-fold?)"
-                )
-        else:
-            found = beyond(l1, l2)
-            if found is None:
-                raise UnprovenError(
-                    f"surface at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so what "
-                    "follows is undecided"
-                )
-            self.mode, zeros = found
-            kind = "entry" if self.mode == "s" else "crossing"
-        self.zeros = {j: zeros for j, w in enumerate(self.now.watches) if w.kind == "surface"}
-        met = Met(watch, kind, self.t, x, before, self.mode)
-        self.events.append(met)
-        return met
-
-    def _end(self, watch: Watch, k: int, x: list[arb]) -> Met | None:
-        """A stop or a reset was met; it counts if its direction does."""
-        place = k - self._first()
-        counts = self._counts(k)
-        self.signs[place] = -self.signs[place]
-        if not counts:
-            self.zeros[k] = 1
-            return None
-        before = self.mode
-        met = Met(watch, watch.kind, self.t, x, before, before)
-        if watch.kind == "reset":
-            met = self._jump(watch, met)
-        self.events.append(met)
-        return met
-
-    def _jump(self, watch: Watch, met: Met) -> Met:
-        """After a reset: a new state, whose side and signs must be decided anew."""
-        new = self.modes.jump(watch, met.x, self.p)
-        own = self.modes.kept(watch, watch)
-        self._adopt(new)
-        h, *_ = self.modes.surface(new, self.p)
-        if not sign(h):
-            raise UnprovenError(
-                f"{watch.name} at t = {self.t.str(8)}: the side after it is undecided"
-            )
-        self.mode = "+" if h > 0 else "-"
-        self.zeros = {}
-        c = self.now.watched_series(self.now.series(new, self.p, 3), self.p)
-        for k, w in enumerate(self.now.watches):
-            if w.kind not in ("stop", "reset"):
-                continue
-            at_zero = w is watch and own
-            value = c[k][1 if at_zero else 0]
-            if not sign(value):
-                raise UnprovenError(f"{w.name}: its sign after {watch.name} is undecided")
-            self.signs[k - self._first()] = sign(value)
-            if at_zero:
-                self.zeros[k] = 1
-        return Met(watch, "reset", met.t, new, met.before, self.mode)
+def _coarse(guards: list[list[arb]], tops: list[list[arb]], h: float, tolerance: float) -> bool:
+    """Whether the remainder of a watched function is far larger than that of the motion."""
+    for c, top in zip(guards, tops, strict=True):
+        size = max(float(abs(v.mid())) * h**k for k, v in enumerate(c[:-1]))
+        if not float(abs(top[-1]).upper()) * h ** (len(c) - 1) <= 64 * tolerance * size:
+            return True
+    return False
 
 
 def _not_transversal(follower: Follower) -> arb_mat:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from fractions import Fraction
+from itertools import groupby
 from typing import Any, NamedTuple
 
 from ..model import FilippovSystem, OptionError, PointError, explain, require_system, whole
@@ -12,7 +13,7 @@ from .decimals import enclosure, given
 from .described import enclosed, parameter_ranges
 from .enclosure import Enclosure
 from .flint import arb, ctx
-from .follow import Follower, Met
+from .journey import Journey, Met
 from .modes import Modes
 from .orbit_proof import OrbitProof, ProvenEvent
 from .proof import UnprovenError
@@ -46,7 +47,8 @@ def certify_orbit(
     Parameters
     ----------
     system : FilippovSystem
-        With one surface; stops and resets are served, impacts are not.
+        Stops, resets and impacts without friction are served. Of several surfaces one may slide at a
+        time; sliding along an intersection, closed contacts and hidden dynamics are not proven.
     x0 : sequence of n numbers, strings or pairs (low, high)
         The start; pairs make a box, and the theorem is for all orbits from it.
     t_end : number or string
@@ -147,13 +149,13 @@ def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> OrbitProof:
     x = enclosed([*begin.start, *moving])
     try:
         order = max(12, int(ctx.prec * 0.3))
-        on_surface = modes.starts_on_surface([*begin.start, *moving], begin.ranges)
-        follower = Follower(modes, x, enclosed(begin.ranges), order, on_surface)
+        exactly = [*begin.start, *moving], begin.ranges
+        follower = Journey(modes, x, enclosed(begin.ranges), order, exactly)
         follower.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
         while not status:
             if follower.steps >= max_steps:
                 raise UnprovenError(f"more than {max_steps} steps")
-            met = follower.step(t_end)
+            met = follower.travel(t_end)
             if met is not None and met.kind == "stop":
                 status = met.watch.name
             elif met is None and not (t_end - follower.t) > 0:
@@ -166,21 +168,21 @@ def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> OrbitProof:
 
 
 def _result(
-    modes: Modes, follower: Follower | None, begin: Begin, x: list[arb], status: str, why: str
+    modes: Modes, follower: Journey | None, begin: Begin, x: list[arb], status: str, why: str
 ) -> OrbitProof:
     system = modes.system
     names = (*system.state_names, *(("t",) if system.time_dependent else ()))
     # Parameters that were followed as states are left out.
     named = lambda values: dict(zip(names, map(enclosure, values), strict=False))
     events = follower.events if follower else []
-    itinerary = [events[0].before if events else follower.mode] if follower else []
-    itinerary += [e.after for e in events if e.kind != "stop"]
+    modes_met = [events[0].before if events else follower.mode] if follower else []
+    modes_met += [e.after for e in events]
     ranges = [given(*pair) for pair in begin.ranges]
     return OrbitProof(
         proven=bool(status),
         status=status or "undecided",
         why=why,
-        itinerary=" ".join(itinerary),
+        itinerary=" ".join(word or "o" for word, _ in groupby(modes_met)),
         events=tuple(_event(e, named) for e in events),
         start=dict(zip(names, (given(*pair) for pair in begin.start), strict=True)),
         parameters=dict(zip(system.parameter_names, ranges, strict=True)),

@@ -37,6 +37,8 @@ class Verdict:
     values : dict of str to arb
     facts : dict
         For the record.
+    here : bool
+        Whether the fields that were looked at are those of the system there.
     """
 
     label: str
@@ -45,6 +47,7 @@ class Verdict:
     lines: list[str] = field(default_factory=list)
     values: dict[str, arb] = field(default_factory=dict)
     facts: dict[str, Any] = field(default_factory=dict)
+    here: bool = True
 
 
 class Question:
@@ -71,13 +74,42 @@ class Question:
     def nodes(self) -> list[int]:
         raise NotImplementedError
 
-    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
-        """Say what the zero enclosed in the inputs is."""
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Say what the zero is, if both fields are those of the mode there."""
         raise NotImplementedError
+
+    def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+        """Whether a zero is a point of this kind, if both fields are those of the mode there."""
+        return True
+
+    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Say what the zero enclosed in the inputs is; nothing where it is not proven to be in the
+        mode."""
+        _, why = self._place(inputs)
+        return Verdict("", self.kind, why, here=False) if why else self.judged(inputs)
 
     def counts(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
         """Whether a zero is one of the points asked for; None where that is undecided."""
-        return True
+        answers = (self._place(inputs)[0], self.own(inputs))
+        return False if False in answers else None if None in answers else True
+
+    @cached_property
+    def _conditions(self) -> Program:
+        return Program(self.described.tape, [[node for _, node in self.described.elsewhere]])
+
+    def _place(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool | None, str]:
+        """Whether the zero is where the mode's fields apply; if not surely, what is not proven."""
+        if not self.described.elsewhere:
+            return True, ""
+        (values,) = self.values(self._conditions, inputs)
+        open_ = [
+            (v, f"that it is on {name} is not proven, its distance is in {v.str(5)}")
+            for (name, _), v in zip(self.described.elsewhere, values, strict=True)
+            if not v > 0
+        ]
+        if not open_:
+            return True, ""
+        return (False if any(v < 0 for v, _ in open_) else None), open_[0][1]
 
     def values(self, program: Program, inputs: Sequence[Sequence[arb]]) -> list[list[arb]]:
         """Enclose a program's values."""
@@ -108,7 +140,7 @@ class TwoFolds(Question):
     def _transverse(self) -> Program:
         return Program(self.described.tape, [[self.difference.transverse]])
 
-    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
         """Class, by enclosures of the second derivatives; exact algebra for coincident fields."""
         (second,) = self.values(self._second, inputs)
         found, coincident, reason = proven_class(second), False, ""
@@ -117,6 +149,11 @@ class TwoFolds(Question):
             if coincident:
                 found = proven_class(second, coincident=True)
         values = dict(zip(("L11", "L12", "L21", "L22"), second, strict=True)) | found.numbers
+        if self.described.nonlinear:
+            why = (
+                "the multiplier enters nonlinearly, and the classes are those of Filippov's sliding"
+            )
+            return Verdict("", "two-fold", why, values=values)
         facts = {"sigma": list(found.sigma), "label": found.label, "coincident": coincident}
         if 0 in found.sigma:
             return Verdict("", "two-fold", found.why, values=values)
@@ -172,10 +209,10 @@ class Folds(Question):
         second = d.lie_derivative(k, d.lie[k])
         return Program(d.tape, [[second, d.lie_derivative(k, second), d.lie[1 - k]]])
 
-    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
         """Visible, invisible, or a cusp where L_ii is zero exactly."""
         ((second, third, other),) = self.values(self._looked_at, inputs)
-        i = self._k + 1
+        i, d = self._k + 1, self.described
         values = {f"L{i}{i}": second, f"L{2 - self._k}": other}
         facts: dict[str, Any] = {"side": self.side}
         s = sign(second)
@@ -183,7 +220,7 @@ class Folds(Question):
             visible = (s > 0) == (self._k == 0)
             label = "visible" if visible else "invisible"
             title = f"{label} fold of {FIELDS[self.side]}"
-            lines = [_beside(other, self._k)]
+            lines = [] if d.nonlinear else [_beside(other, self._k)]
             return Verdict(label, title, "", lines, values, facts | {"label": label})
         values |= {f"L{i}{i}{i}": third}
         if second.is_zero() and sign(third):
@@ -222,13 +259,13 @@ class Equilibria(Question):
         d = self.described
         return Program(d.tape, [[d.h], *(d.gradient(f) for f in d.fields[self._k])])
 
-    def counts(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+    def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
         """Whether it is on its field's own side."""
         h = self.values(self._looked_at, inputs)[0][0]
         s = sign(h)
         return None if s == 0 and not h.is_zero() else s == (1, -1)[self._k]
 
-    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
         """Real or virtual, and its kind by the signs of the eigenvalues."""
         (h,), *jacobian = self.values(self._looked_at, inputs)
         kind, why, values = eigenvalue_kind(jacobian)
@@ -250,7 +287,7 @@ class PseudoEquilibria(Question):
     def __init__(self, described: Described, numbers: Numbers):
         super().__init__(described, numbers)
         _autonomous(described, self.kind)
-        if described.system.nonlinear[described.surface]:
+        if described.nonlinear:
             raise DefinitionError(
                 explain(
                     "pseudo-equilibrium",
@@ -283,19 +320,19 @@ class PseudoEquilibria(Question):
         gradient = d.gradient(d.h)
         return Program(tape, [list(d.lie), gradient, *(d.gradient(f) for f in field)])
 
-    def counts(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+    def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
         """Whether it slides: -1 < lambda < 1."""
         lam = inputs[2][0]
         if lam > -1 and lam < 1:
             return True
         return False if lam < -1 or lam > 1 or lam == 1 or lam == -1 else None
 
-    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
         """Region, and kind along the surface."""
         lie, gradient, *jacobian = self.values(self._looked_at, inputs)
         l1, l2 = map(sign, lie)
         kind, why, values = _along_surface(gradient, jacobian)
-        real = self.counts(inputs)
+        real = self.own(inputs)
         status = {True: "real", False: "virtual", None: ""}[real]
         region = {(-1, 1): "attracting sliding", (1, -1): "repelling sliding"}.get((l1, l2), "")
         if l1 * l2 > 0:

@@ -42,7 +42,7 @@ class Tape:
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
-        self._known: dict[Node, int] = {}
+        self._known: dict[tuple[Node, type], int] = {}
         self._gradients: dict[int, dict[int, int]] = {}
 
     # an algebra of node numbers ------------------------------------------------------------------
@@ -50,10 +50,11 @@ class Tape:
     def node(self, op: str, *args: int, payload: Any = None) -> int:
         """Return the number of an instruction, new or known."""
         new = Node(op, args, payload)
-        if new not in self._known:
-            self._known[new] = len(self.nodes)
+        key = new, type(payload)  # a float may mean a decimal, an equal fraction never does
+        if key not in self._known:
+            self._known[key] = len(self.nodes)
             self.nodes.append(new)
-        return self._known[new]
+        return self._known[key]
 
     def constant(self, value: float | Fraction) -> int:
         """Return a constant: a float as the graph holds it, or an exact fraction."""

@@ -146,9 +146,6 @@ def test_what_is_given_wrongly_is_refused():
         ns.certify_orbit(s, [1, 1], t_end=-1)
     with pytest.raises(ns.OptionError, match="start of 'x'"):
         ns.certify_orbit(s, [np.nan, 1], t_end=1)
-    none = ns.FilippovSystem([x], field=[1])
-    with pytest.raises(ns.DefinitionError, match="one surface"):
-        ns.certify_orbit(none, [1], t_end=1)
 
 
 def test_a_start_on_the_surface_is_told_exactly():

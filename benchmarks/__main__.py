@@ -19,6 +19,7 @@ from . import (
     report,
     resources,
     startup,
+    theorems,
     two_folds,
 )
 from .measure import ROOT, machine
@@ -37,6 +38,7 @@ def sections(folder: Path, quick: bool) -> dict[str, Callable[[], Any]]:
         "chain": lambda: chain.run(quick),
         "two-folds": lambda: two_folds.run(quick),
         "proofs": lambda: proofs.run(quick),
+        "theorems": lambda: theorems.run(quick),
         "startup": lambda: startup.run(quick),
         "memory": lambda: resources.memory(quick),
         "scaling": lambda: resources.scaling(quick),

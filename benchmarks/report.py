@@ -7,6 +7,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from . import theorems
+
 #: What the project asks of itself, and whether more or less is better.
 TARGETS = {
     "linear bounce: times heyoka, one integrator per mode": (25.0, "at least"),
@@ -30,6 +32,7 @@ TARGETS = {
     "proof: a two-fold with its class, to 1e-30 (s)": (0.05, "at most"),
     "proof: a linear bounce (s)": (0.05, "at most"),
     "proof: all 100 two-folds of a box (s)": (10.0, "at most"),
+    "wrong or missing theorems": (0, "at most"),
     "wrong itineraries, random starts": (0, "at most"),
     "wrong itineraries, within 1e-9 of a boundary": (0, "at most"),
 }
@@ -61,6 +64,8 @@ def figures(results: dict[str, Any]) -> dict[str, float]:
     for name, timing in results.get("proofs", {}).items():
         if f"proof: {name} (s)" in TARGETS:
             found[f"proof: {name} (s)"] = timing["median"]
+    if "theorems" in results:
+        found["wrong or missing theorems"] = theorems.wrong(results["theorems"])
     return found | _startup(results) | _itineraries(results)
 
 
@@ -306,6 +311,7 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "peak": _peak,
     "two-folds": _folds,
     "proofs": _proofs,
+    "theorems": theorems.markdown,
     "correctness": _correct,
 }
 

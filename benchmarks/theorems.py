@@ -125,3 +125,32 @@ def run(quick: bool) -> dict[str, Any]:
     }
     print(f"  {result}", flush=True)
     return result
+
+
+def wrong(section: dict[str, Any]) -> int:
+    """Theorems that are wrong or were not found."""
+    found = section["lists"]
+    count = sum(len(found[k]) for k in ("missed", "twice", "unfound"))
+    count += found["systems"] - found["complete"]
+    for s in section["bounces"].values():
+        count += len(s["wrong itineraries"]) + len(s["outside"]) + s["starts"] - s["proven"]
+    return count
+
+
+def markdown(section: dict[str, Any]) -> str:
+    """The table of a result."""
+    found = section["lists"]
+    counts = ", ".join(f"{k} {len(found[k])}" for k in ("missed", "twice", "unfound"))
+    cases = f"{found['systems']}, {found['starts']:,} starts"
+    lines = [
+        "| theorems and their judge | random cases | proven | wrong |",
+        "| --- | --- | --- | --- |",
+        f"| lists of two-folds, Newton's method | {cases} | {found['complete']} complete, "
+        f"{found['zeros']} two-folds | {counts} |",
+    ]
+    lines += [
+        f"| {name} bounces, mpmath | {s['starts']} | {s['proven']} | itineraries "
+        f"{len(s['wrong itineraries'])}, ends {len(s['outside'])} |"
+        for name, s in section["bounces"].items()
+    ]
+    return "\n".join(lines)

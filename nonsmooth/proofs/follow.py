@@ -22,7 +22,6 @@ from .roots import Polynomial, UnsureError, first_zero, narrowed
 from .series import horner
 from .steps import Step, at, growth, orthogonal
 
-
 #: How often a step is shortened for the sake of watched functions.
 _SHORTER = 5
 

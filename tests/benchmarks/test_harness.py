@@ -21,6 +21,7 @@ from benchmarks import (
     proofs,
     reference,
     report,
+    theorems,
     two_folds,
 )
 from benchmarks.peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
@@ -115,6 +116,16 @@ def test_the_script_by_hand_gives_the_same_classes():
 
 def test_what_is_timed_is_proven():
     assert len(proofs.zeros(2)().zeros) == 4 and proofs.two_fold()().proven
+
+
+def test_theorems_have_judges_of_their_own():
+    found = theorems.lists(seed=1, systems=2, starts=10)
+    assert found.sound and found.starts == 20
+    section = {"lists": vars(found), "bounces": {"linear": theorems.bounces("linear", 1, 2)}}
+    assert theorems.wrong(section) == 0 and "2 complete" in theorems.markdown(section)
+    found.missed.append((0, [0.0] * 3))
+    section["bounces"]["linear"]["outside"].append(1)
+    assert theorems.wrong(section) == 2 and not found.sound
 
 
 def test_ratios_and_tables():

@@ -5,6 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from benchmarks import theorems
 
 x, y, z = (ca.SX.sym(s) for s in "xyz")
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
@@ -81,46 +82,15 @@ def test_planar_points():
     ]
 
 
-def compare_with_newton(seed, systems, starts):
-    """Random systems: every zero that Newton's method finds is proven, each proven one is found."""
-    rng = np.random.default_rng(seed)
-    monomials = [1, x, y, z, x**2, y**2, x * y, x**3, y**3, x * y**2]
-    for k in range(systems):
-        f, g = (
-            sum(
-                float(c) * m
-                for c, m in zip(rng.normal(size=len(monomials)), monomials, strict=True)
-            )
-            for _ in "fg"
-        )
-        if k % 3 == 1:
-            f = f + ca.sin(2 * x * y)
-        if k % 3 == 2:
-            g = g + ca.exp(0.5 * x) - ca.cos(y)
-        system = flat(f, g, surface=z + 0.1 * x * y if k % 2 else z)
-        everything = ns.prove_all(system, BOX)
-        assert everything.complete, everything
-        points = rng.uniform(*np.array(BOX).T, size=(starts, 3))
-        tangent = lambda p, s=system: ns.find_two_fold(s, p)
-        with np.errstate(over="ignore", invalid="ignore"):  # starts that run away
-            found = [f.point for f in ns.find_all(tangent, points)]
-        inside = [p for p in found if all(a <= v <= b for v, (a, b) in zip(p, BOX, strict=True))]
-        proven = np.array([[v.middle for v in p.point.values()] for p in everything.zeros])
-        proven = proven.reshape(-1, 3)
-        for p in inside:
-            assert np.min(np.linalg.norm(proven - p, axis=1), initial=np.inf) < 1e-8, (k, p)
-        for i, p in enumerate(proven):
-            assert np.min(np.linalg.norm(np.delete(proven, i, 0) - p, axis=1), initial=1) > 1e-9
-    return systems
-
-
 def test_newton_finds_nothing_that_is_not_proven():
-    assert compare_with_newton(seed=3, systems=4, starts=15)
+    assert theorems.lists(seed=3, systems=4, starts=15).sound
 
 
 @pytest.mark.slow
 def test_newton_finds_nothing_in_60_random_systems():
-    assert compare_with_newton(seed=4, systems=60, starts=300)
+    """All 500 are in the benchmark: ``python -m benchmarks --only theorems``."""
+    found = theorems.lists(seed=5, systems=60, starts=100)
+    assert found.sound and found.zeros > 60, found
 
 
 def test_intervals_of_parameters():

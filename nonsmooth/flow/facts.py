@@ -117,6 +117,7 @@ REASONS = (
     "looked_at",
     "behind",
     "no_impulse",
+    "restitution",
     "no_reaction",
     "no_stable_motion",
     "possibly_several",

@@ -123,6 +123,11 @@ def no_impulse(name: str, t: float) -> str:
     return f"No impulse fits the impact {name!r} at t = {t:.10g}."
 
 
+def restitution(name: str, t: float) -> str:
+    """A coefficient of restitution that gives energy, or pushes on."""
+    return f"The restitution of {name!r} is not from 0 to 1 at t = {t:.10g}."
+
+
 def no_reaction(names: Sequence[str]) -> str:
     """No reactions are consistent with closed or opening contacts."""
     return f"At {' and '.join(map(repr, names))} neither the closed contact nor an open one holds."

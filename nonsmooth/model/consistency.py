@@ -2,13 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import casadi as ca
 
 from .cancel import powers
-from .errors import DefinitionError, explain
+from .errors import DefinitionError, ParameterError, explain
 from .form import Definition
 from .graph import require_smooth
-from .reading import listed, require_finite, require_known, require_unique
+from .reading import Parameters, listed, require_finite, require_known, require_unique
+from .values import Array, parameter_values
 
 
 def require_consistent(d: Definition) -> None:
@@ -81,6 +84,29 @@ def _check_impact(d: Definition, j: int) -> None:
         raise DefinitionError(
             f"restitution of {d.impacts[j]!r}: expected a number from 0 to 1, received {float(e):g}."
         )
+
+
+def consistent_parameters(
+    d: Definition, names: Sequence[str], parameters: Parameters | None
+) -> Array:
+    """Numbers for all parameters; a restitution that depends on nothing else must be one.
+
+    Raises
+    ------
+    ParameterError
+        An unknown name, a missing value, or one that is not a finite number or no restitution.
+    """
+    p = parameter_values(names, d.defaults, parameters)
+    for j, name in enumerate(d.impacts):
+        e = d.restitutions[j]
+        if e.is_constant() or ca.depends_on(e, d.extended_states):
+            continue
+        value = float(ca.evalf(ca.substitute(e, d.parameters, ca.DM(p))))
+        if not 0.0 <= value <= 1.0:
+            raise ParameterError(
+                f"restitution of {name!r}: expected a number from 0 to 1, received {value:g} (= {e})."
+            )
+    return p
 
 
 def _require_linear(d: Definition) -> None:

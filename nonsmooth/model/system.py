@@ -18,6 +18,7 @@ from .cache import Cache, Content
 from .calls import call
 from .checks import real
 from .clock import Clock, with_clocks
+from .consistency import consistent_parameters
 from .definition import read_definition
 from .errors import DefinitionError, PointError
 from .events import Impact, Reset, Stop
@@ -25,7 +26,7 @@ from .form import Definition
 from .lift import lift
 from .reading import Expression, Parameters, column, listed, matrix, require_known
 from .structure import Structure
-from .values import Array, parameter_values, state_values
+from .values import Array, state_values
 
 T = TypeVar("T")
 
@@ -225,9 +226,8 @@ class FilippovSystem(Structure):
 
     def __eq__(self, other: object) -> bool:
         """Whether another system has the same definition; its symbols may be others."""
-        if self is other or not isinstance(other, FilippovSystem):
-            return self is other
-        return self.content_hash() == other.content_hash()
+        same = isinstance(other, FilippovSystem) and self.content_hash() == other.content_hash()
+        return self is other or same
 
     def __hash__(self) -> int:
         return hash(self.content_hash())
@@ -383,9 +383,9 @@ class FilippovSystem(Structure):
         Raises
         ------
         ParameterError
-            An unknown name, a missing value or one that is not a finite number.
+            An unknown name, a missing value, or one that is not a finite number or no restitution.
         """
-        return parameter_values(self.parameter_names, self.definition.defaults, parameters)
+        return consistent_parameters(self.definition, self.parameter_names, parameters)
 
     def extended_point(self, point: ArrayLike, t: float = 0.0) -> Array:
         """Check a state and append the time where the system depends on it.

@@ -10,7 +10,7 @@ import nonsmooth as ns
 x, y, u, v, t, lam, r, q = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "lam", "r", "q"))
 G = 9.81
 
-engines = pytest.mark.parametrize("engine", ["reference"])
+engines = pytest.mark.parametrize("engine", ["reference", "compiled"])
 
 
 def kinds(run):
@@ -48,6 +48,27 @@ def test_a_table_throws_the_ball_off_when_its_reaction_ends(restitution, engine)
     np.testing.assert_allclose(released, (phase + 2 * np.pi * turns) / omega, atol=1e-11)
     heights = run(np.linspace(0.0, 5.0, 2001))[:, 0]
     assert np.min(heights - a * np.sin(omega * np.linspace(0.0, 5.0, 2001))) > -1e-9
+
+
+@engines
+@pytest.mark.parametrize("e", [-0.5, 1.5])
+def test_a_restitution_that_only_the_run_knows_ends_it_where_it_is_improper(e, engine):
+    """Below zero the ball would be pushed through the floor, above one energy would come from nowhere."""
+    ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=e + y))
+    run = ns.simulate(ball, [1.0, 0.0], 5.0, engine=engine)
+    assert run.status is ns.Status.INCONSISTENT and "restitution of 'impact'" in run.message
+    assert abs(run.t[-1] - (2 / G) ** 0.5) < 1e-12
+
+
+@pytest.mark.parametrize("e", [-0.5, 1.5])
+def test_a_parameter_that_is_no_restitution_is_refused(e):
+    ball = ns.FilippovSystem(
+        [y, v], field=[v, -G], impacts=ns.Impact(y, restitution=1 - q), parameters={q: 0.5}
+    )
+    with pytest.raises(ns.ParameterError, match=r"'impact': expected .* from 0 to 1"):
+        ns.simulate(ball, [1.0, 0.0], 5.0, parameters={"q": 1 - e})
+    run = ns.ensemble(ball, [[1.0, 0.0]] * 2, 5.0, parameters={"q": [0.5, 1 - e]})
+    assert [ns.Status(s) for s in run.status] == [ns.Status.REACHED_END, ns.Status.INCONSISTENT]
 
 
 @engines

@@ -131,6 +131,8 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
         return messages.behind(system.impacts[run.where], t)
     if reason == "no_impulse":
         return messages.no_impulse(system.impacts[run.where], t)
+    if reason == "restitution":
+        return messages.restitution(system.impacts[run.where], t)
     if reason == "no_reaction":
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":

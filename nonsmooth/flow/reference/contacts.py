@@ -69,6 +69,11 @@ class Contacts:
         near = scale[self._first : self._first + self._count]
         return np.flatnonzero((gaps < 0.0) & (gaps >= -near)).tolist()
 
+    def improper(self, x: Array, involved: Sequence[int]) -> int | None:
+        """One of some contacts whose restitution is not from 0 to 1, if there is one."""
+        e = self._restitution(x, self._p)[0][:, 0]
+        return next((j for j in involved if not 0.0 <= e[j] <= 1.0), None)
+
     def strike(self, x: Array, mode: str, involved: Sequence[int], plastic: bool) -> Array | None:
         """State after the impulses at some closed gaps; None if none are consistent.
 

@@ -67,7 +67,12 @@ def impact(driver: Driver, guard: Guard) -> None:
     x = driver.x
     gaps, rates = driver.contacts.gaps(x)
     involved = [j for j in range(len(gaps)) if gaps[j] == 0.0 and rates[j] <= 0.0]
-    after = driver.contacts.strike(x, driver.mode, sorted({*involved, guard.index}), False)
+    involved = sorted({*involved, guard.index})
+    improper = driver.contacts.improper(x, involved)
+    if improper is not None:
+        message = messages.restitution(driver.system.impacts[improper], driver.t)
+        return driver.end(Status.INCONSISTENT, message)
+    after = driver.contacts.strike(x, driver.mode, involved, False)
     if after is None:
         return driver.end(Status.INCONSISTENT, messages.no_impulse(guard.name, driver.t))
     driver.x = after

@@ -51,6 +51,16 @@ static int impulses_fit(Run *r, const double *x, const int32_t *involved, int co
   return 1;
 }
 
+/* One of some contacts whose restitution is not from 0 to 1, or -1. */
+static int improper(Run *r, const double *x, const int32_t *involved, int count) {
+  values_run(&r->s->restitution, x, r->p, r->restitution);
+  for (int i = 0; i < count; i++) {
+    double e = out_of(&r->s->restitution, r->restitution, involved[i]);
+    if (!(e >= 0 && e <= 1)) return involved[i];
+  }
+  return -1;
+}
+
 /* State after the impulses at some closed gaps; 0 if none are consistent. All possibilities are tried, with
  * most contacts and with the present letters first. */
 static int strike(Run *r, const int32_t *involved, int count, int plastic, double *after) {

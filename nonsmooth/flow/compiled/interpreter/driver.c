@@ -210,6 +210,8 @@ static void impact(Run *r, int row) {
   memcpy(x, r->x, sizeof(double) * r->n);
   const double *gap = gaps(r, x), *rate = gap + r->c;
   for (int j = 0; j < r->c; j++) if ((gap[j] == 0 && rate[j] <= 0) || j == contact) involved[count++] = j;
+  int wrong = improper(r, x, involved, count);
+  if (wrong >= 0) { finish(r, INCONSISTENT, RESTITUTION, wrong); return; }
   if (!strike(r, involved, count, 0, r->at_work)) { finish(r, INCONSISTENT, NO_IMPULSE, contact); return; }
   memcpy(r->x, r->at_work, sizeof(double) * r->n);
   note(r);

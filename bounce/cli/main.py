@@ -11,9 +11,9 @@ from typing import Any, NoReturn
 
 import nonsmooth as ns
 
-from . import fit, flight, map, models, shot
+from . import explore, fit, flight, map, models, shot
 
-_COMMANDS = (shot, flight, map, fit, models)
+_COMMANDS = (shot, flight, map, fit, explore, models)
 _USAGE = (ns.ParameterError, ns.OptionError, ns.DefinitionError, ns.PointError)
 
 

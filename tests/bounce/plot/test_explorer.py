@@ -1,0 +1,285 @@
+"""The page on one bounce computes what Python computes, follows mouse and keys, and needs no network."""
+
+import json
+import re
+
+import numpy as np
+import pytest
+
+import bounce
+import nonsmooth as ns
+from bounce.plot.explorer import START
+from tests.browser import WIDTHS
+
+TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+
+
+@pytest.fixture(scope="module")
+def page(tmp_path_factory):
+    path = tmp_path_factory.mktemp("explorer") / "bounce.html"
+    path.write_text(bounce.plot.explorer(), encoding="utf-8")
+    return path
+
+
+def surface_of(model):
+    """A model as the page has it."""
+    names = ("mu", "eta", "d1", "d2", "G", "inertia")
+    return {**{n: model.values[n] for n in names}, "load": model.convention}
+
+
+# One bounce -----------------------------------------------------------------------------------------
+
+BOUNCE = """
+const [cases] = given;
+return cases.map(([surface, landing]) => {
+  const shot = Bounce.simulate(surface, landing);
+  return [shot.fault, shot.itinerary, shot.time, shot.liftOff];
+});
+"""
+
+
+def random_cases(count, seed):
+    """Surfaces and landings of all kinds: also without damping, friction, stiffness or slip."""
+    rng = np.random.default_rng(seed)
+
+    def some(high, zero=0.05, low=-3):
+        kinds = (0.0, rng.uniform(0, high), 10 ** rng.uniform(low, np.log10(high)))
+        return float(rng.choice(kinds, p=[zero, 0.75 - zero, 0.25]))
+
+    cases = []
+    for _ in range(count):
+        values = dict(mu=some(1.5), eta=some(3.0), d1=some(1.0), d2=some(0.95), G=some(0.5, 0.2))
+        values["inertia"] = float(rng.choice([2 / 5, 1 / 2, 2 / 3, 1.0]))
+        xdot, omega = rng.uniform(-3, 3), rng.uniform(-6, 6)
+        kind = rng.choice(["any", "no slip", "straight down"], p=[0.9, 0.07, 0.03])
+        landing = dict(
+            xdot=0.0 if kind == "straight down" else float(xdot),
+            ydot=float(rng.choice([-1.0, -(10 ** rng.uniform(-1, 0.5))])),
+            omega={"any": float(omega), "no slip": -float(xdot)}.get(kind, 0.0),
+        )
+        cases.append((values, str(rng.choice(["contact", "net"])), landing))
+    return cases
+
+
+def compare(browser, page, count, seed):
+    """Compare lift-offs to 1e-6, and count how many bounces have which itinerary."""
+    cases = random_cases(count, seed)
+    browser.open(page)
+    asked = [({**values, "load": load}, landing) for values, load, landing in cases]
+    seen = {}
+    for (values, load, landing), answer in zip(cases, browser.run(BOUNCE, asked), strict=True):
+        fault, itinerary, time, lift_off = answer
+        model = bounce.KelvinVoigt(**values, load=load)
+        try:
+            shot = bounce.simulate(model, **landing, tol=1e-12)
+        except bounce.LiftOffError:
+            assert fault, (values, load, landing)
+            seen["none"] = seen.get("none", 0) + 1
+            continue
+        speed = max(1.0, *map(abs, landing.values()))
+        rests = shot.lift_off.ydot < 1e-9 * speed  # a load that ends by rounding, or nearly so
+        if rests and fault:
+            continue
+        assert itinerary == shot.itinerary, (values, load, landing)
+        wanted = [shot.time, *(getattr(shot.lift_off, n) for n in lift_off)]
+        got = [time, *lift_off.values()]
+        worst = np.abs(np.subtract(got, wanted)).max() / speed
+        assert rests or worst < 1e-6, (values, load, landing, worst)
+        seen[itinerary] = seen.get(itinerary, 0) + 1
+    return seen
+
+
+@pytest.mark.browser
+def test_bounces_are_python_s(browser, page):
+    seen = compare(browser, page, 150, seed=0)
+    assert {"+", "-", "+ -", "- s +", "+ s -", "s"} <= set(seen) and seen["none"] < 40
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_thousands_of_bounces_are_python_s(browser, page):
+    seen = compare(browser, page, 4000, seed=1)
+    assert len(seen) > 40 and sum(seen.values()) > 3_950 and seen["none"] < 800
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_the_course_of_a_bounce_is_python_s(browser, page):
+    browser.open(page)
+    landing = dict(xdot=0.6, ydot=-1.0, omega=0.9)
+    script = """
+    const shot = Bounce.simulate(given[0], given[1], true);
+    return shot.phases.map((phase) => [phase.mode, Bounce.along(phase, 40)]);
+    """
+    phases = browser.run(script, surface_of(TURF), landing)
+    shot = bounce.simulate(TURF, **landing, tol=1e-12)
+    assert [mode for mode, _ in phases] == shot.itinerary.split()
+    for (_, points), phase in zip(phases, shot.phases, strict=True):
+        t = np.array([p["t"] for p in points])
+        assert len(t) >= 40 and np.all(np.diff(t) > 0)
+        np.testing.assert_allclose(t[[0, -1]], [phase.t_start, phase.t_end], atol=1e-9)
+        inner = np.clip(t, phase.t_start, phase.t_end)[1:-1]
+        state, forces = shot(inner), shot.forces(inner)
+        columns = dict(zip(("x", "xdot", "y", "ydot", "omega"), state.T, strict=True))
+        columns |= dict(load=forces.load, friction=forces.friction, slip=state[:, 1] + state[:, 4])
+        for name, wanted in columns.items():
+            got = [p[name] for p in points[1:-1]]
+            np.testing.assert_allclose(got, wanted, atol=1e-8, err_msg=name)
+
+
+@pytest.mark.browser
+def test_first_roots_of_polynomials(browser, page):
+    browser.open(page)
+    rng = np.random.default_rng(3)
+    cases = [([0.3, 0.30001], 0), ([0.5, 0.5], 0), ([0.5, 0.5, 0.5], 0), ([2.0, -0.1], 0), ([0.0, 0.7], 1)]
+    cases += [(np.sort(rng.uniform(-1, 2, 5)).tolist(), 0) for _ in range(50)]
+    asked = [(np.poly(roots)[::-1].tolist(), drop) for roots, drop in cases]
+    script = """
+    const [cases, h] = given;
+    const whole = (c) => Float64Array.from({length: Bounce.ORDER + 1}, (_, k) => c[k] || 0);
+    return cases.map(([c, drop]) => String(Bounce.firstRoot(whole(c), h, drop)));
+    """
+    for (roots, _), got in zip(cases, browser.run(script, asked, 1.0), strict=True):
+        odd = [r for r in set(roots) if roots.count(r) % 2 and 0 < r <= 1]
+        wanted = min(odd, default=np.inf)  # where it touches zero it does not change its sign
+        close = 1e-4 if roots.count(wanted) > 1 else 1e-10
+        assert float(got.replace("Infinity", "inf")) == pytest.approx(wanted, abs=close), roots
+
+
+# Maps -----------------------------------------------------------------------------------------------
+
+MAP = """
+const [surface, ydot, reach, count, tolerance] = given;
+const map = Maps.empty(surface, ydot, reach, count);
+Maps.compute(map, Infinity);
+Maps.divide(map, tolerance, Infinity);
+return {...map, code: [...map.code], curve: Maps.curve(map), rooms: Maps.rooms(map), shares: Maps.shares(map)};
+"""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("load", ["contact", pytest.param("net", marks=pytest.mark.slow)])
+def test_map_is_that_of_python(browser, page, load):
+    model = TURF.replace(eta=0.8, G=0.15, load=load)
+    browser.open(page)
+    got = browser.run(MAP, surface_of(model), -1.0, [3, 6], 40, 1e-3)
+    over = {"xdot": got["xdot"], "omega": got["omega"]}
+    wanted = bounce.outcome_map(model, over, tol=1e-11)
+    names = np.array([*got["regions"], ""])[np.array(got["code"]).reshape(40, 40)]
+    assert np.array_equal(names, np.array([*wanted.regions, ""])[wanted.code])
+    for entry in got["shares"]:
+        assert entry["share"] == pytest.approx(wanted.share()[entry["name"]])
+    for name, room in zip(got["regions"], got["rooms"], strict=True):
+        i, j = got["xdot"].index(room["xdot"]), got["omega"].index(room["omega"])
+        assert names[j, i] == name and room["room"] >= 1
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_dividing_curve_is_that_of_python(browser, page):
+    browser.open(page)
+    curve = bounce.dividing_curve(TURF, reach=2.0)
+    got = browser.run(MAP, surface_of(TURF), -1.0, [3, 6], 60, 1e-9)["curve"]
+    kinds = {line["kind"] for line in got}
+    assert kinds == {"two-fold", "slipping"} and len(got) <= 6  # joined, and cut at the junctions
+    junction = abs(curve.junction[0])
+    checked = 0
+    for line in got:
+        for xdot, omega in line["points"][1:-1:4]:
+            if abs(xdot) > 2.0 or abs(abs(xdot) - junction) < 0.1:
+                continue
+            assert curve.omega(xdot) == pytest.approx(omega, abs=1e-7)
+            assert line["kind"] == ("two-fold" if abs(xdot) < junction else "slipping")
+            checked += 1
+    assert checked >= 10
+
+
+# What one sees --------------------------------------------------------------------------------------
+
+SHOWN = """
+await new Promise((go) => requestAnimationFrame(() => requestAnimationFrame(go)));
+const text = (id) => document.getElementById(id).textContent;
+return {
+  hash: location.hash, verdict: text("verdict"), story: text("story"), facts: text("facts"),
+  cone: document.querySelectorAll("#cone .phase").length,
+  slip: document.querySelectorAll("#slip .phase").length,
+  names: [...document.querySelectorAll("#map .region-name")].map((e) => e.textContent),
+  say: document.querySelector(".handle").getAttribute("aria-valuetext"),
+};
+"""
+
+
+def name_of(shot):
+    return bounce.maps.outcomes.region_name(shot.itinerary).replace("-", "−")
+
+
+FINE = """
+while (document.documentElement.dataset.map !== "fine") await new Promise((go) => setTimeout(go, 20));
+"""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", WIDTHS)
+def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, width):
+    browser.open(page, width)
+    seen = browser.run(SHOWN)
+    start = {n: START[n] for n in ("mu", "eta", "d1", "d2", "G", "inertia", "load")}
+    shot = bounce.simulate(bounce.KelvinVoigt(**start), START["xdot"], START["ydot"], START["omega"])
+    assert seen["verdict"] == "S+ R S−" and shot.itinerary == "+ s -"
+    assert seen["story"].endswith("slips forward, rolls, then slips in reverse, and leaves in reverse slip.")
+    assert f"{shot.slip:.5f}".replace("-", "−") in seen["facts"]
+    assert (seen["cone"], seen["slip"]) == (3, 3)
+    browser.run(FINE)
+    assert {"S+", "S−", "S+ R S−"} <= set(browser.run(SHOWN)["names"])
+    assert browser.faults() == {} and browser.unnamed() == []
+
+
+@pytest.mark.browser
+def test_keys_and_fields_move_everything(browser, page):
+    from selenium.webdriver.common.by import By
+    from selenium.webdriver.common.keys import Keys
+
+    browser.open(page, hash="xdot=1&omega=0.5&ydot=-1&eta=0&mu=0.1")
+    before = browser.run(SHOWN)
+    assert before["verdict"] == "S+"
+    browser.run("document.querySelector('.handle').focus()")
+    handle = browser.driver.find_element(By.CSS_SELECTOR, ".handle")
+    handle.send_keys(Keys.SHIFT, Keys.ARROW_DOWN * 4)
+    seen = browser.run(SHOWN)
+    assert seen["hash"].endswith("&omega=-1.5") and seen["say"] == "speed 1, spin −1.5"
+    assert seen["verdict"] == "S− R"  # nothing pulls it along the ground: it rolls to the end
+    slider = browser.driver.find_element(By.ID, "eta-range")
+    slider.send_keys(Keys.ARROW_RIGHT * 40)
+    seen = browser.run(SHOWN)
+    assert "eta=0.4&" in seen["hash"]
+    soft = bounce.KelvinVoigt(mu=0.1, d1=0.1, d2=0.1, eta=0.4, G=1e-4)
+    assert seen["verdict"] == name_of(bounce.simulate(soft, 1.0, -1.0, -1.5))
+    field = browser.driver.find_element(By.ID, "G")
+    field.clear()
+    field.send_keys("0.45")
+    browser.run("document.getElementById('d2').focus()")
+    browser.driver.find_element(By.CSS_SELECTOR, "input[value=net]").click()
+    assert "load=net" in browser.run(SHOWN)["hash"]
+    browser.driver.find_element(By.ID, "reset").click()
+    assert browser.run(SHOWN)["verdict"] == "S+ R S−"
+    assert browser.faults() == {}
+
+
+@pytest.mark.browser
+def test_a_ball_that_stays_is_said_in_words(browser, page):
+    browser.open(page, hash="d2=1&G=0.5&ydot=-0.1")
+    seen = browser.run(SHOWN)
+    assert seen["verdict"] == "No lift-off" and "the ball stays in the ground" in seen["story"]
+    assert (seen["cone"], seen["slip"]) == (0, 0)
+    with pytest.raises(bounce.LiftOffError):
+        values = {n: START[n] for n in ("mu", "eta", "d1")}
+        bounce.simulate(bounce.KelvinVoigt(**values, d2=1.0, G=0.5), 0.6, -0.1, 0.9)
+    browser.run(FINE)
+    assert browser.faults() == {}
+
+
+def test_every_itinerary_of_the_start_has_its_colour():
+    text = bounce.plot.explorer()
+    data = json.loads(re.search(r'id="data-bounce">(.*?)</script>', text)[1])
+    assert data["start"] == START and data["version"] == ns.__version__
+    assert {"S+ R S-", "S+"} <= set(data["colours"])

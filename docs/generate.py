@@ -160,7 +160,10 @@ def gallery() -> str:
 
 def explorers() -> dict[str, str]:
     """The pages that compute in the browser, by their address in the site."""
-    return {"explore/two_folds.html": ns.plot.two_fold_explorer()}
+    return {
+        "explore/two_folds.html": ns.plot.two_fold_explorer(),
+        "explore/bounce.html": bounce.plot.explorer(),
+    }
 
 
 # Pages --------------------------------------------------------------------------------------------

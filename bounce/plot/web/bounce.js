@@ -6,7 +6,7 @@
   const given = Page.data("bounce");
   const byId = (id) => document.getElementById(id);
   const REACH = [3, 6]; // of the map, in xdot and omega
-  const FINE = 120;
+  const FINE = 160;
   const COARSE = 30;
   const state = { ...given.start };
 

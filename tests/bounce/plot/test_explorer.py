@@ -131,7 +131,13 @@ def test_the_course_of_a_bounce_is_python_s(browser, page):
 def test_first_roots_of_polynomials(browser, page):
     browser.open(page)
     rng = np.random.default_rng(3)
-    cases = [([0.3, 0.30001], 0), ([0.5, 0.5], 0), ([0.5, 0.5, 0.5], 0), ([2.0, -0.1], 0), ([0.0, 0.7], 1)]
+    cases = [
+        ([0.3, 0.30001], 0),
+        ([0.5, 0.5], 0),
+        ([0.5, 0.5, 0.5], 0),
+        ([2.0, -0.1], 0),
+        ([0.0, 0.7], 1),
+    ]
     cases += [(np.sort(rng.uniform(-1, 2, 5)).tolist(), 0) for _ in range(50)]
     asked = [(np.poly(roots)[::-1].tolist(), drop) for roots, drop in cases]
     script = """
@@ -224,9 +230,13 @@ def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, w
     browser.open(page, width)
     seen = browser.run(SHOWN)
     start = {n: START[n] for n in ("mu", "eta", "d1", "d2", "G", "inertia", "load")}
-    shot = bounce.simulate(bounce.KelvinVoigt(**start), START["xdot"], START["ydot"], START["omega"])
+    shot = bounce.simulate(
+        bounce.KelvinVoigt(**start), START["xdot"], START["ydot"], START["omega"]
+    )
     assert seen["verdict"] == "S+ R S−" and shot.itinerary == "+ s -"
-    assert seen["story"].endswith("slips forward, rolls, then slips in reverse, and leaves in reverse slip.")
+    assert seen["story"].endswith(
+        "slips forward, rolls, then slips in reverse, and leaves in reverse slip."
+    )
     assert f"{shot.slip:.5f}".replace("-", "−") in seen["facts"]
     assert (seen["cone"], seen["slip"]) == (3, 3)
     browser.run(FINE)

@@ -26,6 +26,9 @@ Values = Callable[[Array], Array]
 
 _HALVINGS = 40
 
+#: Changes over steps shorter than this part of the unknowns are rounding, which says nothing.
+_SHORT = 1e-11
+
 
 @dataclass(frozen=True, eq=False)
 class Root:
@@ -231,7 +234,7 @@ class Secant:
         elif self._last is not None:
             step, change = x - self._last[0], r - self._last[1]
             square = float(step @ step)
-            if square > 0:
+            if square > (_SHORT * self.scale) ** 2:
                 miss = change - self.jacobian @ step
                 self.jacobian = self.jacobian + np.outer(miss, step) / square
         self._last = x, r

@@ -11,6 +11,7 @@ from .canards import Path, Slider, paths_from
 from .connections import Connection, find_homoclinic
 from .equilibrium_branches import continue_equilibrium
 from .find_periodic import VirtualOrbitError, periodic_orbit
+from .follow_orbits import continue_orbit
 from .funnels import Departure, Funnel
 from .futures import funnel
 from .itinerary import Arrival, FixedItinerary
@@ -22,7 +23,6 @@ from .manifold import (
     Manifold,
     manifold,
 )
-from .orbit_branches import continue_orbit
 from .periodic import PeriodicOrbit
 from .poincare import (
     PoincareOrbit,

@@ -162,6 +162,10 @@ class EventCurve(Curve):
         test, row = self.secant(u / self.scale)
         return np.append(values, test), np.vstack([jacobian, row / self.scale])
 
+    def renewed(self, point: Point) -> Point | None:
+        tangent = self.base.turned(point.u, point.tangent)
+        return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
+
     def tests(self, point: Point) -> Mapping[str, float]:
         """Other events that happen at the same time, and what degenerates."""
         u = point.u

@@ -17,7 +17,7 @@ legs in place of collocation.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -29,6 +29,9 @@ from .legs import Flown, Leg, fly
 
 #: Up to so many unknowns a dense solution is faster than elimination in Python.
 _DENSE = 60
+
+#: Up to so many legs the states where they start do not tell the size of the orbit.
+_FEW = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -233,6 +236,22 @@ class BoundaryProblem:
             jacobian[first + k, :n] = at.gradient
             by_parameters[first + k] = at.by_parameters[list(columns)]
 
+    def rephased(self, u: Array, p: Array) -> BoundaryProblem:
+        """The problem with the plane through an orbit's start across the flow there.
+
+        An autonomous orbit without events starts on a plane, which may miss the orbits that it
+        becomes as a parameter varies. Problems with events, or with forcing, are as they were.
+        """
+        if self.phase is None or self.system.time_dependent:
+            return self
+        start, leg = self.split(u)[0][0], self.legs[0]
+        field = leg.field(self.system)
+        rate = field.rate.copied(field.states_at(start, p), p)[0][: self.dimension, 0]
+        speed = float(np.linalg.norm(rate))
+        if not speed > 0.0:
+            return self
+        return replace(self, phase=rate / speed, reference=start.copy())
+
     def solve(self, jacobian: Array, right: Array) -> Array:
         """Solve equations with the Jacobian of this problem, by elimination from leg to leg.
 
@@ -270,11 +289,22 @@ class BoundaryProblem:
             x = steps[i] @ x + shifts[i]
         return result
 
-    def scales(self, u: Array) -> Array:
-        """Sizes of the unknowns: states by their range over the legs, times by the duration."""
+    def scales(self, u: Array, p: Array | None = None) -> Array:
+        """Sizes of the unknowns: states by their range over the legs, times by the duration.
+
+        With parameters ``p`` the states inside of few legs count, not only where they start.
+        """
         starts, durations = self.split(u)
         span = float(np.abs(durations).sum()) or 1.0
-        size = np.abs(starts).max(axis=0)
+        seen = starts
+        if p is not None and len(self.legs) <= _FEW:
+            inside = [
+                fly(self.system, leg, x, part * float(duration), p).end[: self.dimension]
+                for leg, x, duration in zip(self.legs, starts, durations, strict=True)
+                for part in (0.2, 0.4, 0.6, 0.8)
+            ]
+            seen = np.vstack([starts, *inside])
+        size = np.abs(seen).max(axis=0)
         if self.system.time_dependent:
             size[-1] = span
         size = np.where(size > 1e-6 * max(size.max(), 1e-300), size, max(size.max(), 1e-300))

@@ -46,6 +46,17 @@ class BranchCurve(Curve):
         """
         raise NotImplementedError
 
+    def restart(self, u: Array) -> None:
+        """Prepare to be followed from a point of it."""
+
+    def turned(self, u: Array, tangent: Array) -> Array | None:
+        """Prepare to be followed on from a point, if need be; the tangent of the new equations."""
+        return None
+
+    def renewed(self, point: Point) -> Point | None:
+        tangent = self.turned(point.u, point.tangent)
+        return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
+
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
         """Further functions whose zeros on a curve of events are of codimension two."""
         return {}
@@ -125,8 +136,12 @@ def follow_branch(
     max_points: int,
     through: bool,
     progress: bool = False,
+    away: Departure | None = None,
 ) -> Branch:
-    """Continue a solution both ways to the bounds of the parameter, through events if asked to."""
+    """Continue a solution both ways to the bounds of the parameter, through events if asked to.
+
+    With ``away`` one way only, from an event.
+    """
     bar = _bar(progress)
 
     def report(point: Point) -> None:
@@ -137,12 +152,13 @@ def follow_branch(
     forward = np.zeros(start.size)
     forward[-1] = 1.0
     options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
-    halves: list[_Half] = []
-    for sign in (-1.0, 1.0):
+    ways = [Departure(curve, [start], sign * forward) for sign in (-1.0, 1.0)]
+    halves = [] if away is None else [_Half()]
+    for way in ways if away is None else [away]:
         if halves and halves[0].end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
             halves.append(_Half(end=halves[0].end))
             continue
-        halves.append(_half(curve, start, sign * forward, through, options))
+        halves.append(_half(way, through, options))
     if bar is not None:
         bar.close()
     return _joined(name, *halves)
@@ -165,15 +181,16 @@ class _Half:
     end: BranchEnd = BranchEnd.EVENT
 
 
-def _half(
-    curve: BranchCurve, start: Array, tangent: Array, through: bool, options: Mapping[str, Any]
-) -> _Half:
+def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
     half, (low, high) = _Half(), options["bounds"]
     known: dict[int, BranchEvent | None] = {}  # by the identity of the zero, kept in its arc
 
     def follow(departure: Departure) -> Arc:
+        curve = departure.curve
+        assert isinstance(curve, BranchCurve)
+        curve.restart(departure.rows[-1])
         arc = trace(
-            departure.curve,
+            curve,
             departure.rows,
             departure.tangent,
             step=options["step"],
@@ -181,8 +198,6 @@ def _half(
             bounds=[(len(departure.rows[-1]) - 1, low, high)],
             report=options["report"],
         )
-        curve = departure.curve
-        assert isinstance(curve, BranchCurve)
         _drop_turning(arc)
         known.update(dict.fromkeys(map(id, arc.zeros)))
         try:
@@ -204,7 +219,6 @@ def _half(
             return None
 
     whole = ("bound", "closed", "interrupted", "points")
-    first = Departure(curve, [start], tangent)
     for departure, arc in pieces(
         first, follow, following, last=lambda arc: arc.end in whole, apart=0.0
     ):
@@ -225,12 +239,14 @@ def _drop_turning(arc: Arc) -> None:
     """Forget a turning or branch point that only mirrors the event at which an arc ends.
 
     Where a new leg grows like a square root the branch is tangent to a constant parameter, and where
-    it grows like a cube root the equations are singular.
+    it grows like a cube root the equations are singular; so they are at a Hopf point.
     """
     if not arc.zeros or arc.zeros[-1].name != arc.end:
         return
     end = arc.zeros[-1].point.arclength
     near = 1e-6 * max(1.0, end)
+    if arc.zeros[-1].name == "Hopf":  # where the equilibrium has any period
+        near = max(near, end - arc.points[-2].arclength)
     arc.zeros[:] = [
         zero
         for zero in arc.zeros

@@ -20,7 +20,7 @@ from .guards import watch
 from .legs import Leg
 from .multipliers import return_map
 
-_SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker")
+_SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
 
 @dataclass(frozen=True)

@@ -21,6 +21,7 @@ from ..model import (
     require_system,
 )
 from .boundary import BoundaryProblem, Evaluation
+from .edits import mirrored
 from .guess import Itinerary, mirror_of, start_of
 from .legs import Leg, fly, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
@@ -33,6 +34,9 @@ _ROUNDING = 1e-14
 
 #: Starts of legs that are as near as this, relative to the orbit, are one.
 _SAME = 1e-7
+
+#: An orbit without an event is asked whether it goes round up to so many times.
+_MOST_ROUNDS = 60
 
 #: No leg may grow to so many times the guess of the whole orbit.
 _LONGEST = 10.0
@@ -131,21 +135,25 @@ def periodic_orbit(
 
 
 def _primitive(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
-    """The orbit once, where the legs go round it several times."""
+    """The orbit once, where the legs go round it several times.
+
+    The half of a symmetric orbit goes round an odd number of times.
+    """
     starts, durations = problem.split(u)
     count, n = len(problem.legs), problem.system.dimension
-    if problem.symmetry is not None:
-        return problem, u
     if not problem.legs[-1].name:
         return _primitive_leg(problem, starts[0], float(durations[0]), p)
     size = problem.scales(u)[:n]
     for k in range(1, count // 2 + 1):
-        if count % k or problem.legs != problem.legs[:k] * (count // k):
+        if count % k or (problem.symmetry is not None and count // k % 2 == 0):
             continue
-        apart = np.abs((np.roll(starts, -k, axis=0) - starts)[:, :n] / size).max()
-        if apart < _SAME:
-            periods = problem.periods * k / count
-            once = replace(problem, legs=problem.legs[:k], periods=float(round(periods)))
+        legs = problem.legs[:k]
+        following = legs if problem.symmetry is None else [mirrored(problem, leg) for leg in legs]
+        if any(problem.legs[i] != (legs, following)[i // k % 2][i % k] for i in range(count)):
+            continue
+        once = replace(problem, legs=legs, periods=round(2 * problem.periods * k / count) / 2)
+        apart = starts[k : 2 * k, :n] @ once.wrap[:n, :n].T - starts[:k, :n]
+        if np.abs(apart / size).max() < _SAME:
             return once, once.pack(starts[:k], durations[:k])
     return problem, u
 
@@ -153,16 +161,20 @@ def _primitive(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
 def _primitive_leg(
     problem: BoundaryProblem, x: Array, duration: float, p: Array
 ) -> tuple[BoundaryProblem, Array]:
-    """The same for a forced orbit without an event."""
-    count, n = round(problem.periods), problem.system.dimension
+    """The same for an orbit without an event."""
+    n, half = problem.system.dimension, problem.symmetry is not None
     size = np.abs(x[:n]).max() or 1.0
-    for k in range(1, count // 2 + 1):
-        if count % k:
+    rounds = round(2 * problem.periods) if half else round(problem.periods)
+    most = rounds if problem.forcing is not None else _MOST_ROUNDS
+    for k in range(most, 1, -1):
+        if (half and k % 2 == 0) or (problem.forcing is not None and rounds % k):
             continue
-        there = fly(problem.system, problem.legs[0], x, duration * k / count, p).end
-        if np.abs(there[:n] - x[:n]).max() < _SAME * size:
-            once = replace(problem, periods=float(k))
-            return once, once.pack(x, np.array([duration * k / count]))
+        there = (
+            problem.wrap[:n, :n] @ fly(problem.system, problem.legs[0], x, duration / k, p).end[:n]
+        )
+        if np.abs(there - x[:n]).max() < _SAME * size:
+            once = replace(problem, periods=problem.periods / k)
+            return once, once.pack(x, np.array([duration / k]))
     return problem, problem.pack(x, np.array([duration]))
 
 

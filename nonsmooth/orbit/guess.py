@@ -166,14 +166,18 @@ def _problem(
 ) -> Start:
     phase = reference = None
     if not legs[-1].name:
-        reference = starts[0]
         phase = np.zeros(system.extended_dimension)
-        if system.time_dependent:
+        if system.time_dependent:  # from time 0, which is the same phase of every forcing period
+            assert forcing is not None
+            wait = forcing(p)[0] - starts[0, -1]
+            starts = fly(system, legs[0], starts[0], wait, p).end[None, : starts.shape[1]].copy()
+            starts[0, -1] = 0.0
             phase[-1] = 1.0
         else:
             field = legs[0].field(system)
             rate = field.rate.copied(field.states_at(starts[0], p), p)[0]
             phase = rate[: system.extended_dimension, 0] / float(np.linalg.norm(rate))
+        reference = starts[0]
     problem = BoundaryProblem(system, legs, mirror, periods, forcing, phase, reference)
     return Start(problem, problem.pack(starts, durations), p)
 

@@ -9,25 +9,31 @@ the other one (``edits``).
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
+from dataclasses import replace
 
 import numpy as np
 
-from ..local.checks import positive
 from ..local.newton import converge
 from ..local.read_only import ReadOnly
-from ..model import Array, DefinitionError, NonsmoothError, explain, whole
+from ..model import Array, NonsmoothError
 from .boundary import BoundaryProblem, Evaluation
-from .branch import Branch, BranchEvent, FarSide
-from .branch_curves import BranchCurve, check_bounds, follow_branch
+from .branch import BranchEvent, FarSide
+from .branch_curves import BranchCurve
 from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .continuation import Departure, Point, Zero
 from .edits import Edited, edited, kind_of
 from .elimination import applies, eliminated
 from .far_side import far_side
+from .hopf_ends import hopf_point
+from .legs import fly
 from .periodic import PeriodicOrbit, faults_of, named
 
 #: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
+
+#: Relative growth of a long period, over a change of the parameter by its bounds, that diverges.
+_STEEP = 30.0
 
 #: Equations of more unknowns are solved from leg to leg.
 _MANY = 24
@@ -35,8 +41,9 @@ _MANY = 24
 #: What names an event of which several conditions vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 
-#: An orbit this many times as long as the first one is near a homoclinic orbit.
-_LONG = 10.0
+#: Cosines of the angle between the flow and the normal of the plane on which an orbit without events
+#: starts: below the first it gets a new plane, below the second a step was too long.
+_OBLIQUE, _LEFT = 0.9, 0.5
 
 
 class OrbitCurve(BranchCurve):
@@ -65,7 +72,7 @@ class OrbitCurve(BranchCurve):
     ):
         self.problem, self.p, self.free, self.longest = problem, p, free, longest
         self.system, self.widths = problem.system, widths
-        self.scale = np.append(problem.scales(u), widths)
+        self.scale = np.append(problem.scales(u, p), widths)
         self.known: dict[str, Condition] = {}
         self._many = problem.size > _MANY and applies(problem)
         self._last: tuple[bytes, Evaluation] | None = None
@@ -110,16 +117,70 @@ class OrbitCurve(BranchCurve):
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
     def tests(self, point: Point) -> Mapping[str, float]:
-        return conditions_of(
-            self.problem, self.evaluation(point.u), self.parameters_at(point.u), self.known
-        )
+        at, p = self.evaluation(point.u), self.parameters_at(point.u)
+        found = conditions_of(self.problem, at, p, self.known)
+        if self._on_plane:  # the flow across the plane on which the orbit starts
+            assert self.problem.phase is not None
+            found["Hopf"] = float(self.problem.phase @ at.flown[0].rate[: self.problem.dimension])
+        return found
+
+    def restart(self, u: Array) -> None:
+        self.problem = self.problem.rephased(u[: self.problem.size], self.parameters_at(u))
+        self._last = None
+
+    @property
+    def _on_plane(self) -> bool:
+        return self.problem.phase is not None and not self.system.time_dependent
 
     def ends(self, name: str) -> bool:
-        return not is_smooth(name)
+        return name == "Hopf" or not is_smooth(name)
+
+    def singular(self, name: str) -> bool:
+        """At a Hopf point the equations hold for the equilibrium with any duration."""
+        return name in ("branch point", "Hopf")
+
+    def _across(self, u: Array) -> float:
+        """Cosine of the angle between the flow at the start and the normal of the plane."""
+        assert self.problem.phase is not None
+        rate = self.evaluation(u).flown[0].rate[: self.problem.dimension]
+        return float(self.problem.phase @ rate) / (float(np.linalg.norm(rate)) or 1.0)
+
+    def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
+        """As of any curve; none where an orbit without events has nearly left its plane."""
+        found = super().point(u, before, chord, arclength)
+        lost = found is not None and self._on_plane and abs(self._across(u)) < _LEFT
+        return None if lost else found
+
+    def turned(self, u: Array, tangent: Array) -> Array | None:
+        """Take a plane across the flow at the start, where that of an orbit without events is oblique."""
+        if not self._on_plane or self._across(u) > _OBLIQUE:
+            return None
+        rate = self.evaluation(u).flown[0].rate[: self.problem.dimension]
+        self.restart(u)
+        ahead = tangent * self.scale  # the same way, less what only moves along the orbit
+        ahead[: rate.size] -= float(rate @ ahead[: rate.size]) / float(rate @ rate) * rate
+        ahead = ahead / self.scale
+        return np.asarray(ahead / np.linalg.norm(ahead))
+
+    def solution_at(self, guess: Array, value: float) -> PeriodicOrbit:
+        """The orbit near a guess at a value of the parameter."""
+        curve = copy(self)
+        unknowns = guess[: self.problem.size]
+        curve.problem = self.problem.rephased(unknowns, self.parameters_at(guess))
+        curve._last = None
+        found = BranchCurve.solution_at(curve, guess, value)
+        assert isinstance(found, PeriodicOrbit)
+        return found
 
     def out(self, u: Array) -> str:
-        period = float(u[: self.problem.size][-len(self.problem.legs) :].sum())
-        return "period diverges" if period > self.longest else ""
+        """The period diverges where it is long and grows without the parameter changing."""
+        durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
+        period = float(u[durations].sum())
+        if period <= self.longest:
+            return ""
+        tangent = np.linalg.svd(self.equations(u)[1] * self.scale)[2][-1] * self.scale
+        growth = abs(float(tangent[durations].sum())) * float(self.widths[-1])
+        return "period diverges" if growth > _STEEP * period * abs(float(tangent[-1])) else ""
 
     def faults(self, u: Array) -> list[str]:
         """What the guards contradict."""
@@ -128,9 +189,12 @@ class OrbitCurve(BranchCurve):
     # results ------------------------------------------------------------------------------------
 
     def describe(self, u: Array) -> PeriodicOrbit:
-        p, at = self.parameters_at(u), self.evaluation(u)
-        unknowns = np.array(u[: self.problem.size])
-        return PeriodicOrbit(self.system, named(self.system, p), self.problem, unknowns, at, 0)
+        p, unknowns = self.parameters_at(u), np.array(u[: self.problem.size])
+        problem = self.problem.rephased(unknowns, p)
+        at = self.evaluation(u)
+        if problem is not self.problem:
+            at = problem.evaluate(unknowns, p, self.free)
+        return PeriodicOrbit(self.system, named(self.system, p), problem, unknowns, at, 0)
 
     def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
         if test not in self.known:
@@ -198,6 +262,8 @@ class OrbitCurve(BranchCurve):
             words = "two orbits meet and vanish"
         elif zero.name == "branch point":
             words = "branches cross"
+        elif zero.name == "Hopf":
+            return self._hopf(zero)
         elif zero.name == "Neimark-Sacker":
             values = orbit.floquet.of_map
             k, l = np.triu_indices(values.size, 1)
@@ -213,6 +279,21 @@ class OrbitCurve(BranchCurve):
             words = "two orbits without the symmetry branch off"
         side = FarSide("", words, ReadOnly(numbers))
         return self._event(zero.name, self, zero.point, zero.name, side)
+
+    def _hopf(self, zero: Zero) -> BranchEvent:
+        """The orbit shrinks: where its equilibrium has two imaginary eigenvalues."""
+        u, leg = zero.point.u, self.problem.legs[0]
+        p, (starts, durations) = self.parameters_at(u), self.problem.split(u)
+        opposite = fly(self.system, leg, starts[0], 0.5 * float(durations[0]), p).end
+        n = self.system.dimension
+        middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[:n]
+        found = hopf_point(self.system, leg.mode, middle, p, self.free[-1])
+        words = "the orbit shrinks to an equilibrium"
+        event = self._event("Hopf", self, zero.point, "", FarSide("", words))
+        if found is None:
+            return event
+        numbers = ReadOnly({"frequency": found[2]})
+        return replace(event, parameter=found[1], coefficients=numbers)
 
     def _edited(self, kind: str, conditions: list[Condition], u: Array, p: Array) -> Edited | None:
         try:
@@ -250,6 +331,8 @@ class OrbitCurve(BranchCurve):
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """The branch in the other itinerary."""
         assert event.point is not None
+        if is_smooth(zero.name):
+            return None
         curve, u = event.curve, event.point.u
         if curve is not self:  # located on the side with fewer legs, which is ahead
             return curve.leave(u, -1)
@@ -285,115 +368,3 @@ class OrbitCurve(BranchCurve):
 
 def _word(problem: BoundaryProblem) -> str:
     return " ".join(leg.mode or "o" for leg in problem.legs)
-
-
-def continue_orbit(
-    orbit: PeriodicOrbit | BranchEvent,
-    parameter: str,
-    *,
-    bounds: tuple[float, float],
-    step: float = 0.05,
-    max_points: int = 1000,
-    through: bool = True,
-    progress: bool = False,
-) -> Branch:
-    """Follow a periodic orbit as a parameter varies.
-
-    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The
-    itinerary is kept as long as it holds; what ends it is located in the itinerary with fewer legs,
-    where it is regular, and named.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit or BranchEvent
-        Where to start; at a period doubling, pitchfork or branch point the other branch is followed.
-    parameter : str
-        Name of the parameter that varies.
-    bounds : (float, float)
-        Where the branch ends.
-    step : float, optional
-        Largest step where the branch bends, relative to the width of the bounds and to the size of
-        the orbit.
-    max_points : int, optional
-        Of each piece.
-    through : bool, optional
-        Whether to edit the itinerary and go on beyond what changes it.
-    progress : bool, optional
-        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
-
-    Returns
-    -------
-    Branch
-        Its ``solutions`` (or ``orbits``) are PeriodicOrbits. Events: ``"fold"``, ``"period
-        doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
-        point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
-        ``"adding-sliding"``, ``"impact grazing"``, ``"grazing, escaping"``, ``"corner"``,
-        ``"two-fold"``.
-
-    Raises
-    ------
-    ConvergenceError, DefinitionError, OptionError
-
-    Examples
-    --------
-    A relay that is forced, x' = A cos t - sgn x: crossing orbits end to cross at
-    A = sqrt(1 + pi^2/4), below which they slide.
-
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
-    >>> relay = ns.FilippovSystem([x], surface=x, time=t, parameters={a: 2.5},
-    ...                           above=[a * ca.cos(t) - 1], below=[a * ca.cos(t) + 1])
-    >>> orbit = ns.periodic_orbit(relay, [0.5])
-    >>> branch = ns.continue_orbit(orbit, "a", bounds=(1.5, 3.0))
-    >>> [(e.kind, round(e.parameter, 12)) for e in branch.events]
-    [('crossing-sliding', 1.862095889119)]
-    """
-    positive(step, "step")
-    whole(max_points, "max_points", least=2)
-    curve, start = _begin(orbit, parameter)
-    value = float(start[-1])
-    low, high = check_bounds(bounds, value, parameter)
-    curve.widths = np.array([high - low])
-    curve.scale = np.append(curve.scale[:-1], high - low)
-    return follow_branch(
-        curve,
-        start,
-        name=parameter,
-        bounds=(low, high),
-        step=step,
-        max_points=max_points,
-        through=through,
-        progress=progress,
-    )
-
-
-def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCurve, Array]:
-    """The curve and its first point."""
-    if not isinstance(orbit, (PeriodicOrbit, BranchEvent)):
-        raise DefinitionError(
-            explain(
-                "orbit",
-                expected="a PeriodicOrbit or an event of a branch of them",
-                received=repr(orbit),
-                advice="periodic_orbit(system, guess) finds one.",
-            )
-        )
-    system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
-    if parameter not in system.parameter_names:
-        raise DefinitionError(
-            explain(
-                "parameter",
-                expected=f"a parameter among {list(system.parameter_names)}",
-                received=repr(parameter),
-                advice="Give its name.",
-            )
-        )
-    free = (system.parameter_names.index(parameter),)
-    if isinstance(orbit, BranchEvent):
-        from .switching_branches import switched
-
-        return switched(orbit, free)
-    p, u = orbit.parameter_vector, orbit.unknowns
-    longest = _LONG * float(orbit.evaluation.durations.sum())
-    curve = OrbitCurve(orbit.problem, p, free, np.ones(1), u, longest)
-    return curve, np.append(u, p[list(free)])

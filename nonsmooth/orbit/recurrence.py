@@ -172,8 +172,14 @@ def _returns(
     height = (states - x) @ rate
     crossings = np.flatnonzero((height[:-1] < 0.0) & (height[1:] >= 0.0))
     away = [k for k in crossings if abs(times[k] - anchor) > 3 * (times[1] - times[0])]
-    weights = [height[k] / (height[k] - height[k + 1]) for k in away]
-    return [float(times[k] + w * (times[1] - times[0])) for k, w in zip(away, weights, strict=True)]
+
+    def above(t: float) -> float:
+        there = run(t) if symmetry is None else symmetry @ run(t)
+        return float((there - x) @ rate)
+
+    from scipy.optimize import brentq  # here: it is not needed to import the library
+
+    return [float(brentq(above, times[k], times[k + 1], xtol=1e-13 * end)) for k in away]
 
 
 def refused(run: Trajectory, found: Recurrence | None) -> ConvergenceError:

@@ -17,8 +17,11 @@ from .orbit_branches import OrbitCurve
 _AWAY = (1e-3, 1e-2, 3e-2)
 
 
-def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, Array]:
+def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
     """The branch that crosses at an event: its curve, and a point near the event.
+
+    Where rounds double the event itself comes first: the other half of the branch has the same orbits,
+    begun a round later.
 
     Raises
     ------
@@ -44,7 +47,7 @@ def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, Arr
     for away in _AWAY:
         found = curve.correct(u + away * way * curve.scale, way)
         if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
-            return curve, found
+            return curve, [u, found] if event.kind == "period doubling" else [found]
     raise ConvergenceError(
         explain(
             event.kind,
@@ -59,7 +62,7 @@ def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
     """Twice the legs, and the direction in which the orbit parts from its first round."""
     problem = curve.problem
     starts, durations = problem.split(u)
-    at, p = curve.evaluation(u), curve.parameters_at(u)
+    p = curve.parameters_at(u)
     changes, times = _alternating(curve, u)
     n = problem.dimension
     shift = np.zeros(n)
@@ -72,11 +75,13 @@ def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
     double = replace(
         problem, legs=legs, symmetry=None, periods=2 * problem.periods, phase=None, reference=None
     )
-    if problem.phase is not None:
-        raise DefinitionError(
-            "period doubling of an orbit without events: expected an orbit with at least one event, "
-            "received none. Add a section, e.g. a surface where both fields are equal."
-        )
+    if problem.phase is not None:  # no event divides the rounds
+        double = replace(problem, legs=problem.legs, symmetry=None, periods=2 * problem.periods)
+        unknowns = double.pack(starts, 2.0 * durations)
+        way = np.concatenate([changes.ravel(), [0.0], np.zeros(len(curve.free))])
+        new = curve.with_problem(double, unknowns)
+        way = way / new.scale
+        return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
     unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
     way = np.append(
         double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times])),
@@ -84,7 +89,6 @@ def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
     )
     new = curve.with_problem(double, unknowns)
     way = way / new.scale
-    del at
     return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
 
 

@@ -115,6 +115,7 @@ class _Tracing:
     ):
         self.curve, self.arc, self.bounds = curve, arc, bounds
         self.step, self.smallest, self.closing = step, smallest, False
+        self.smooth = 0  # the first point of those that one curve passes
 
     def begin(self, rows: Sequence[Array], tangent: Array, first: float) -> None:
         tangent = tangent / np.linalg.norm(tangent)
@@ -133,7 +134,8 @@ class _Tracing:
         """Take one step, or halve it."""
         curve, last = self.curve, self.arc.points[-1]
         u, tangent = last.u, last.tangent
-        guess = ahead([p.u / curve.scale for p in self.arc.points[-_ROWS:]], self.size, tangent)
+        known = self.arc.points[max(self.smooth, len(self.arc.points) - _ROWS) :]
+        guess = ahead([p.u / curve.scale for p in known], self.size, tangent)
         trial = curve.correct(guess * curve.scale, tangent)
         chord = np.zeros(u.size) if trial is None else (trial - u) / curve.scale
         bend = 0.0 if trial is None else angle(chord, tangent)
@@ -177,6 +179,9 @@ class _Tracing:
                 self.arc.points.append(zero.point)
                 self.arc.end = zero.name
                 return
+        renewed = None if self.arc.end else self.curve.renewed(new)
+        if renewed is not None:  # other equations: what they have in common is this point
+            new, self.smooth = renewed, len(self.arc.points)
         self.arc.points.append(new)
         self.arc.end = self.arc.end or self.curve.out(new.u) or self._closed(last, new)
 

@@ -94,6 +94,14 @@ class Curve:
         """Whether the curve ends at a zero of this test."""
         return False
 
+    def singular(self, name: str) -> bool:
+        """Whether the equations are singular at a zero of this test, so that it is interpolated."""
+        return name == "branch point"
+
+    def renewed(self, point: Point) -> Point | None:
+        """The same point of better equations, e.g. on a new section; None to keep these."""
+        return None
+
     def out(self, u: Array) -> str:
         """Why the curve need not be followed beyond a point; empty if it is."""
         return ""

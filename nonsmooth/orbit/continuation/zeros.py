@@ -41,6 +41,7 @@ def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
     along the curve; then it is taken to be at the last point before it.
     """
     names = [k for k in a.tests if k in b.tests and a.tests[k] * b.tests[k] < 0]
+    names.sort(key=lambda name: not (curve.singular(name) and curve.ends(name)))
     segment = _Segment(curve, a, b)
     found: list[Zero | None] = []
     for name in names:
@@ -72,7 +73,7 @@ def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
 
 
 def _zero(segment: _Segment, name: str) -> Zero | None:
-    if name == "branch point":
+    if segment.curve.singular(name):
         return _interpolated(segment, name)
     weight = segment.root(name)
     point = None if weight is None else segment.at(weight)
@@ -174,7 +175,10 @@ class _Segment:
         for _ in range(3):
             wanted = middle + width * np.cos(np.pi * (np.arange(_NODES) + 0.5) / _NODES)
             pairs = [(w, p) for w in wanted.tolist() if (p := self.at(w)) is not None]
-            pairs = [(w, p) for w, p in pairs if name in p.tests]
+            least = 1e-9 * (
+                abs(low) + abs(high)
+            )  # not on a branch that crosses where the test is zero
+            pairs = [(w, p) for w, p in pairs if abs(p.tests.get(name, 0.0)) > least]
             if len(pairs) < _NODES - 2:
                 return point
             nodes, points = np.array([w for w, _ in pairs]), [p for _, p in pairs]

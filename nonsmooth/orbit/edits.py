@@ -38,19 +38,20 @@ class Edited:
     u : ndarray (m,)
         Unknowns of the same orbit in it.
     origin : tuple of int
-        For each leg its number before; -1 for a new one.
-    fresh : int
-        The leg whose duration grows from zero; -1 if there is none.
+        For each leg its number before; -1 for a new one, -2 for one that grows from zero.
     test : str
-        In an itinerary with fewer legs: the condition that vanishes there, by which the bifurcation
-        is located; else empty.
+        In an itinerary with fewer legs the condition that vanishes there; else empty.
     """
 
     problem: BoundaryProblem
     u: Array
     origin: tuple[int, ...]
-    fresh: int = -1
     test: str = ""
+
+    @property
+    def fresh(self) -> tuple[int, ...]:
+        """The legs that grow from zero; several in an orbit that is symmetric."""
+        return tuple(i for i, before in enumerate(self.origin) if before == -2)
 
 
 class _Chain:
@@ -75,7 +76,9 @@ class _Chain:
     def done(self, fresh: int = -1, test: Condition | None = None) -> Edited:
         whole = replace(self.problem, legs=tuple(self.legs))
         u = whole.pack(np.array(self.starts), np.array(self.durations))
-        return Edited(whole, u, tuple(self.origin), fresh, "" if test is None else test.name)
+        if fresh >= 0:
+            self.origin[fresh] = -2
+        return Edited(whole, u, tuple(self.origin), "" if test is None else test.name)
 
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
@@ -197,7 +200,7 @@ def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None
         shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
         later = [state + shift for state in states[: len(legs) - 1]]
         v = whole.pack(np.array([states[-1], *later]), np.array(times))
-        return Edited(whole, v, (0, *[-1] * (len(legs) - 1)), len(legs) - 1)
+        return Edited(whole, v, (*[0, *[-1] * len(legs)][: len(legs) - 1], -2))
     for k, (new, start) in enumerate(zip([*between[1:], leg], states, strict=True)):
         chain.insert(i + 1 + k, new, start)
     chain.legs[i], chain.durations[i] = between[0], t
@@ -302,7 +305,7 @@ def _smooth(chain: _Chain, p: Array) -> Edited:
         phase = rate / np.linalg.norm(rate)
     whole = replace(problem, legs=(Leg(leg.mode),), phase=phase, reference=start.copy())
     u = whole.pack(np.array([start]), np.array([period]))
-    return Edited(whole, u, (chain.origin[0],), -1, Condition("interior", 0, guard).name)
+    return Edited(whole, u, (chain.origin[0],), Condition("interior", 0, guard).name)
 
 
 def _swapped(chain: _Chain, i: int) -> Edited | None:

@@ -153,7 +153,8 @@ def _primitive(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
             continue
         once = replace(problem, legs=legs, periods=round(2 * problem.periods * k / count) / 2)
         apart = starts[k : 2 * k, :n] @ once.wrap[:n, :n].T - starts[:k, :n]
-        if np.abs(apart / size).max() < _SAME:
+        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / np.abs(durations).sum()
+        if max(np.abs(apart / size).max(), later) < _SAME:
             return once, once.pack(starts[:k], durations[:k])
     return problem, u
 

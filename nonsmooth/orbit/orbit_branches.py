@@ -8,7 +8,7 @@ the other one (``edits``).
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from copy import copy
 from dataclasses import replace
 
@@ -25,6 +25,7 @@ from .continuation import Departure, Point, Zero
 from .edits import Edited, edited, kind_of
 from .elimination import applies, eliminated
 from .far_side import far_side
+from .growing_legs import grown
 from .hopf_ends import hopf_point
 from .legs import fly
 from .periodic import PeriodicOrbit, faults_of, named
@@ -335,15 +336,15 @@ class OrbitCurve(BranchCurve):
             return None
         curve, u = event.curve, event.point.u
         if curve is not self:  # located on the side with fewer legs, which is ahead
-            return curve.leave(u, -1)
+            return curve.leave(u, ())
         beyond = self._edited(event.kind, self._vanishing(zero), u, self.parameters_at(u))
         if beyond is None:
             return None
         start = np.append(beyond.u, u[-len(self.free) :])
         return self.with_problem(beyond.problem, beyond.u).leave(start, beyond.fresh)
 
-    def leave(self, u: Array, fresh: int) -> Departure | None:
-        """Leave an event into the side where the itinerary holds, a new leg growing from zero."""
+    def leave(self, u: Array, fresh: Sequence[int]) -> Departure | None:
+        """Leave an event into the side where the itinerary holds, new legs growing from zero."""
         k = len(u) - len(self.free)
         for size in _STARTS:
             ways: list[tuple[Array, Array]] = []
@@ -351,10 +352,12 @@ class OrbitCurve(BranchCurve):
                 tangent = np.linalg.svd(self.scaled(u / self.scale)[1])[2][-1]
             except NonsmoothError:
                 return None
-            if fresh >= 0:
+            if fresh:
                 axis = np.zeros(u.size)
-                axis[k - len(self.problem.legs) + fresh] = 1.0
-                ways.append((u + size * axis * self.scale, axis))
+                axis[[k - len(self.problem.legs) + i for i in fresh]] = len(fresh) ** -0.5
+                by = size * float(self.scale[k - 1])
+                guess = grown(self.problem, u[:k], self.parameters_at(u), fresh, by)
+                ways.append((np.append(guess, u[k:]), axis))
             ways += [(u + s * size * tangent * self.scale, tangent) for s in (1.0, -1.0)]
             for guess, axis in ways:
                 found = self.correct(guess, axis)

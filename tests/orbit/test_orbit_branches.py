@@ -1,6 +1,7 @@
 """Branches of periodic orbits: every bifurcation is at its reference value, from both sides, and the
 orbits beyond it are those that a search finds there."""
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -14,6 +15,7 @@ from tests.orbit.periodic_cases import (
     impact_oscillator,
     relay,
     scalar_relay,
+    symbols,
     table,
     walker,
     welander,
@@ -234,3 +236,64 @@ def test_bad_input(forced, change, error, words):
 def test_branches_are_switched_only_where_they_cross(forced):
     with pytest.raises(ns.DefinitionError, match="switch"):
         ns.continue_orbit(forced.events[0], "A", bounds=(0.8, 3))
+
+
+# two harmonics: every kind of sliding bifurcation, one or two at a time ---------------------------
+
+
+def two_harmonics(symmetry, C, start):
+    x, t, A, c, k = symbols("x t A C k")
+    drive = A * ca.cos(t) + c * ca.cos(3 * t)
+    system = ns.FilippovSystem(
+        [x], surface=x, above=[drive - k], below=[drive + k], time=t, parameters={A: 3, c: C, k: 1}
+    )
+    run = ns.simulate(system, [0.5], 80.0)
+    orbit = ns.periodic_orbit(system, run, period=2 * np.pi, symmetry=symmetry)
+    return ns.continue_orbit(orbit, "A", bounds=(start, 4.0))
+
+
+def crossing_by_closed_form(A, C):
+    """Crossing orbits begin where A sin t + C/3 sin 3t = -pi/2; what is left of the drive over 1."""
+    sines = np.roots([-4 * C / 3, 0, A + C, np.pi / 2])
+    t = np.arcsin(sines[(abs(sines.imag) < 1e-9) & (abs(sines) <= 1)].real)
+    return np.abs(A * np.cos(t) + C * np.cos(3 * t) - 1).min()
+
+
+@pytest.mark.parametrize("symmetry", ["odd", pytest.param(None, marks=pytest.mark.slow)])
+def test_a_drive_of_two_harmonics_switches_and_adds_slides(symmetry):
+    branch = two_harmonics(symmetry, 1.6, 0.9)
+    assert kinds(branch) == ["switching-sliding", "adding-sliding", "crossing-sliding"]
+    _, adding, crossing = (event.parameter for event in branch.events)
+    assert abs(crossing_by_closed_form(crossing, 1.6)) < 1e-12
+    # inside a slide the drive comes to -1 where 12 cos^2 t = 3 - A/C
+    c = np.sqrt((3 - adding / 1.6) / 12)
+    assert abs(adding * c + 1.6 * (4 * c**3 - 3 * c) + 1) < 1e-12
+    counts = [len(branch[A].legs) for A in (1.0, 1.2, 1.5, 3.0)]
+    assert counts == [10, 8, 4, 2]
+    for A in (0.95, 1.0, 1.2, 1.5, 3.0):  # a second method: the orbit attracts
+        found, system = branch[A], branch.orbits[0].system
+        run = ns.simulate(system, [0.1], 40 * np.pi, parameters={"A": A}, tol=1e-12)
+        events = [e.t % (2 * np.pi) for e in run.events if 36 * np.pi < e.t < 38 * np.pi]
+        assert len(events) == len(found.legs)
+        starts = [leg.t % (2 * np.pi) for leg in found.legs]
+        assert np.abs(np.sort(events) - np.sort(starts)).max() < 1e-9
+
+
+@pytest.mark.parametrize("symmetry", ["odd", pytest.param(None, marks=pytest.mark.slow)])
+def test_a_drive_against_its_third_harmonic_grazes_and_adds(symmetry):
+    branch = two_harmonics(symmetry, -1.6, 0.35)
+    assert kinds(branch) == ["crossing-sliding", "adding-sliding", "grazing-sliding"]
+    assert abs(branch.events[1].parameter - 0.6) < 1e-12  # the drive at 0 is A + C = -1
+    whole = branch[0.4]
+    assert not whole.is_virtual and len(whole.legs) == 12
+    grazing = branch.events[2]
+    assert [len(branch[grazing.parameter + d].legs) for d in (-1e-3, 1e-3)] == [6, 2]
+
+
+def test_three_equal_thirds_of_a_forcing_period_are_no_shorter_orbit():
+    """On the surface only the clock tells the starts of legs apart."""
+    x, t = symbols("x t")
+    drive = 0.35 * ca.cos(t) - 1.6 * ca.cos(3 * t)
+    system = ns.FilippovSystem([x], surface=x, above=[drive - 1], below=[drive + 1], time=t)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.1], 125.0), period=2 * np.pi)
+    assert len(orbit.legs) == 12 and abs(orbit.period - 2 * np.pi) < 1e-12

@@ -29,7 +29,7 @@ check: lint ## everything that must hold before a release: lint, then all tests
 bench: .venv/.bench ## measured speeds, beside the peers
 	@$(BIN)/python -m benchmarks
 
-docs: .venv/.docs ## the documentation, into build/docs/
+docs: .venv/.docs ## the documentation, into build/docs/, with the reports that `make reproduce` wrote
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs --quiet build --strict
 	@echo "docs: build/docs/index.html"
 

@@ -22,6 +22,7 @@ from nonsmooth.local.two_folds.classification import TABLE
 DOCS = Path(__file__).parent
 sys.path.append(str(DOCS))  # docs is not a package
 
+from elsewhere import measured  # noqa: E402
 from markdown_table import first_line, table  # noqa: E402
 
 EXAMPLES = DOCS / "examples"
@@ -44,20 +45,43 @@ GALLERY = (
 
 def decision_table() -> str:
     """The classes of two-folds, from the table that classifies them."""
-    signs = {"VV": "(+1, −1)", "II": "(−1, +1)", "VI": "(+1, +1)", "IV": "(−1, −1)"}
+    signs = {"VV": "(+1, -1)", "II": "(-1, +1)", "VI": "(+1, +1)", "IV": "(-1, -1)"}
     rows = [
         (
             f"**{row.label}**",
-            " or ".join(signs[kind] for kind in row.folds),
-            f"`{row.condition}`",
+            " or ".join(f"${signs[kind]}$" for kind in row.folds),
+            f"${latex(row.condition)}$",
             row.into,
             row.out_of,
-            row.determinism,
         )
         for row in TABLE
     ]
-    head = ("class", "σ", "condition", "orbits of Da that reach s", "that come from s", "meaning")
-    return table(head, rows)
+    return table(
+        ("class", "$\\sigma$", "condition", "orbits of Da that reach s", "that come from s"), rows
+    )
+
+
+def meanings() -> str:
+    """What each class means for determinism, as the classification says it."""
+    return "\n\n".join(f"**{row.label}**\n:   {row.determinism}" for row in TABLE)
+
+
+_LATEX = (
+    (r"\bkappa_([-+])", r"\\kappa_{\1}"),
+    (r"\bnu([12])\b", r"\\nu_\1"),
+    (r"\bgap\b", r"\\mathrm{gap}"),
+    (r"\bDelta\b", r"\\Delta"),
+    (r" and ", r" \\text{ and } "),
+    (r" \(", r" \\quad ("),
+    (r", (?=[A-Z\\])", r",\\; "),
+)
+
+
+def latex(condition: str) -> str:
+    """A condition of the decision table as LaTeX."""
+    for pattern, written in _LATEX:
+        condition = re.sub(pattern, written, condition)
+    return condition
 
 
 def examples_of_classes() -> str:
@@ -68,8 +92,8 @@ def examples_of_classes() -> str:
         counts = (
             "∞" if c == float("inf") else f"{c:g}" for c in (found.canards, found.faux_canards)
         )
-        rows.append((f"**{label}**", f"`{sigma}`", f"`{nu}`", found.kind, *counts))
-    return table(("class", "σ", "ν", "folds", "canards", "faux canards"), rows)
+        rows.append((f"**{label}**", f"${sigma}$", f"${nu}$", found.kind, *counts))
+    return table(("class", "$\\sigma$", "$\\nu$", "folds", "canards", "faux canards"), rows)
 
 
 def status_table() -> str:
@@ -111,13 +135,13 @@ def problems() -> str:
 def regions() -> str:
     """What the fields do at a point of the surface."""
     when = {
-        ns.Region.ATTRACTING: "L1 < 0 < L2",
-        ns.Region.REPELLING: "L2 < 0 < L1",
-        ns.Region.CROSSING_UP: "L1, L2 > 0",
-        ns.Region.CROSSING_DOWN: "L1, L2 < 0",
-        ns.Region.TANGENT_ABOVE: "L1 = 0",
-        ns.Region.TANGENT_BELOW: "L2 = 0",
-        ns.Region.TWO_FOLD: "L1 = L2 = 0",
+        ns.Region.ATTRACTING: "$L_1 < 0 < L_2$",
+        ns.Region.REPELLING: "$L_2 < 0 < L_1$",
+        ns.Region.CROSSING_UP: "$L_1, L_2 > 0$",
+        ns.Region.CROSSING_DOWN: "$L_1, L_2 < 0$",
+        ns.Region.TANGENT_ABOVE: "$L_1 = 0$",
+        ns.Region.TANGENT_BELOW: "$L_2 = 0$",
+        ns.Region.TWO_FOLD: "$L_1 = L_2 = 0$",
         ns.Region.MIXED: "on an intersection of surfaces",
     }
     return table(
@@ -172,6 +196,8 @@ PARTS: dict[str, Callable[[], str]] = {
     f.__name__: f
     for f in (
         decision_table,
+        meanings,
+        measured,
         examples_of_classes,
         status_table,
         error_table,

@@ -1,13 +1,14 @@
 """What `make docs` does besides turning pages into HTML (an mkdocs hook).
 
-It draws the gallery by running the programs of docs/examples, writes the API's pages, and puts the
-generated parts into the pages. All of it lands in build/, nothing in docs/.
+It draws the gallery by running the programs of docs/examples, writes the API's pages, puts the
+generated parts into the pages, and typesets mathematics. All of it lands in build/, nothing in docs/.
 """
 
 from __future__ import annotations
 
 import re
 import sys
+import tomllib
 from pathlib import Path
 from typing import Any
 
@@ -15,11 +16,24 @@ DOCS = Path(__file__).parent
 sys.path.insert(0, str(DOCS))
 
 import api  # noqa: E402  (neighbours; docs is not a package)
+import elsewhere  # noqa: E402
 import generate  # noqa: E402
+import notebooks  # noqa: E402
+import typeset  # noqa: E402
 from mkdocs.structure.files import File, Files  # noqa: E402
 
 PICTURES = DOCS.parent / "build" / "gallery"
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
+
+
+def on_config(config: Any) -> Any:
+    """Show the version, and link the repository where pyproject.toml names one."""
+    project = tomllib.loads((DOCS.parent / "pyproject.toml").read_text(encoding="utf-8"))
+    config.copyright = f"nonsmooth-dynamics {project['project']['version']}, Apache-2.0"
+    repository = project["tool"]["nonsmooth"]["repository"]
+    if repository:
+        config.repo_url, config.repo_name = repository, "Repository"
+    return config
 
 
 def on_files(files: Files, config: Any) -> Files:
@@ -30,16 +44,27 @@ def on_files(files: Files, config: Any) -> Files:
         figure = generate.run_example(name)["figure"]
         figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
         files.append(File.generated(config, f"gallery/{name}.svg", abs_src_path=str(path)))
-    for uri, text in {**api.pages(), **generate.explorers()}.items():
+    for page in sorted(DOCS.glob("tutorial_*.md")):
+        done = notebooks.run(page.read_text(encoding="utf-8"), page.stem)
+        for uri, content in notebooks.files(done, page.stem).items():
+            files.append(File.generated(config, uri, content=content))
+    for uri, path in {**elsewhere.pictures(), **elsewhere.reports()}.items():
+        files.append(File.generated(config, uri, abs_src_path=str(path)))
+    for uri, text in {**api.pages(), **elsewhere.pages(), **generate.explorers()}.items():
         files.append(File.generated(config, uri, content=text))
     return files
 
 
-def on_page_markdown(markdown: str, **_: Any) -> str:
-    """Put the generated parts into a page."""
+def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
+    """Put the generated parts into a page, and a tutorial's pictures and notebook."""
+    name = Path(page.file.src_uri).stem
+    if name.startswith("tutorial_"):
+        title, _, rest = notebooks.with_pictures(markdown, name).partition("\n")
+        offer = f"[The same as a notebook, executed](tutorials/{name}.ipynb){{ download }}"
+        markdown = f"{title}\n\n{offer}\n{rest}"
     return generate.fill(markdown)
 
 
 def on_page_content(html: str, **_: Any) -> str:
-    """Take Sphinx's roles out of docstrings; what they name is set as code."""
-    return _ROLE.sub("", html)
+    """Take Sphinx's roles out of docstrings, typeset formulas, label the cells of tables."""
+    return typeset.labelled(typeset.mathematics(_ROLE.sub("", html)))

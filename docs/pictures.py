@@ -1,6 +1,6 @@
-"""Draw the README's picture again: `python docs/pictures.py`.
+"""Draw the README's pictures again: `python docs/pictures.py`.
 
-It runs the program in the README, so the picture is what the text beside it draws.
+It runs the programs in the README, so the pictures are what the text beside them draws.
 """
 
 from __future__ import annotations
@@ -11,30 +11,36 @@ import tempfile
 from pathlib import Path
 
 ROOT = Path(__file__).parents[1]
-PICTURE = ROOT / "docs" / "images" / "two_fold.png"
+FOLDER = ROOT / "docs" / "images"
 
 
-def first_program() -> str:
-    """Return the first Python block of README.md, which saves the picture."""
+def program() -> str:
+    """Return the Python blocks of README.md as one program; it saves the pictures."""
     text = (ROOT / "README.md").read_text(encoding="utf-8")
-    found = re.search(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
-    if found is None:
-        raise LookupError("README.md: expected a ```python block that draws a two-fold, found none")
-    return found.group(1)
+    blocks = re.findall(r"^```python\n(.*?)^```$", text, re.MULTILINE | re.DOTALL)
+    if not blocks:
+        raise LookupError("README.md: expected ```python blocks that draw, found none")
+    return "\n".join(blocks)
 
 
-def draw(folder: Path) -> Path:
-    """Run the program in a folder and return the picture that it saves there."""
+def names() -> list[str]:
+    """Names of the pictures that the program saves."""
+    return re.findall(r'savefig\("(\w+\.png)"\)', program())
+
+
+def draw(folder: Path) -> list[Path]:
+    """Run the program in a folder and return the pictures that it saves there."""
     here = Path.cwd()
     try:
         os.chdir(folder)
-        exec(compile(first_program(), "README.md", "exec"), {"__name__": "readme"})
+        exec(compile(program(), "README.md", "exec"), {"__name__": "readme"})
     finally:
         os.chdir(here)
-    return folder / PICTURE.name
+    return [folder / name for name in names()]
 
 
 if __name__ == "__main__":
     with tempfile.TemporaryDirectory() as folder:
-        PICTURE.write_bytes(draw(Path(folder)).read_bytes())
-    print(PICTURE.relative_to(ROOT))
+        for path in draw(Path(folder)):
+            (FOLDER / path.name).write_bytes(path.read_bytes())
+            print(f"docs/images/{path.name}")

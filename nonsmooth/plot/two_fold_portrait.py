@@ -339,7 +339,7 @@ def _legend(ax: Axes, portrait: Portrait, parts: list[Sector]) -> None:
     handles.append(style.line(style.BELOW, "through the surface: below it", 1.2, "--"))
     for value, _ in eigenlines(portrait.flow):
         color, name, dashes = line_style(value, portrait.flow)
-        text = f"{name}, $\\lambda$ = {number(value)}" if abs(value) > ZERO else name
+        text = f"{name}, $\\kappa$ = {number(value)}" if abs(value) > ZERO else name
         handles.append(style.line(color, text, 2.6, dashes))
     if portrait.flow.discriminant > 0 and any(m < 0 for m in np.real(portrait.flow.slopes)):
         handles.append(style.line(style.GREY, "eigenline outside sliding", 0.9, ":"))

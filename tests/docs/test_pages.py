@@ -19,7 +19,7 @@ BLOCK = re.compile(
     r"(?:\n*^```text\n(?P<output>.*?)^```[ ]*$)?",
     re.MULTILINE | re.DOTALL,
 )
-SAME = doctest.NORMALIZE_WHITESPACE | doctest.ELLIPSIS
+SAME = doctest.NORMALIZE_WHITESPACE
 
 
 def check_block(name, line, source, wanted, namespace):
@@ -32,7 +32,14 @@ def check_block(name, line, source, wanted, namespace):
         assert agrees, f"{name}:{line}: expected\n{wanted}\nprinted\n{printed.getvalue()}"
 
 
-@pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page",
+    [
+        pytest.param(page, marks=pytest.mark.slow) if page.stem.startswith("tutorial_") else page
+        for page in PAGES
+    ],
+    ids=lambda page: page.stem,
+)
 def test_blocks_run_and_print_what_the_page_says(page, tmp_path, monkeypatch):
     text = page.read_text(encoding="utf-8")
     monkeypatch.chdir(tmp_path)  # what a block saves stays out of the repository

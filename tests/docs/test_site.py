@@ -60,12 +60,21 @@ def loads(text):
 
 def test_decision_table_is_the_code_s():
     text = generate.fill((DOCS / "two_folds.md").read_text(encoding="utf-8"))
-    rows = [line for line in text.splitlines() if re.match(r"\| \*\*[\w-]+\*\* \| \(", line)]
-    assert len(rows) == len(TABLE) == 8
-    for line, row in zip(rows, TABLE, strict=True):
-        assert line.startswith(f"| **{row.label}** |")
-        assert row.condition in line and row.determinism in line
+    assert len(TABLE) == 8
+    for row in TABLE:
+        lines = [x for x in text.splitlines() if x.startswith(f"| **{row.label}** |")]
+        line = lines[0]  # the second is the example of the class
+        assert f"${generate.latex(row.condition)}$" in line
         assert f"| {row.into} | {row.out_of} |" in line
+        assert f"**{row.label}**\n:   {row.determinism}" in text
+
+
+def test_conditions_become_latex():
+    assert generate.latex("kappa_- > 0 (nu1, nu2 > 0 and nu1 nu2 > 1)") == (
+        r"\kappa_{-} > 0 \quad (\nu_1,\; \nu_2 > 0 \text{ and } \nu_1 \nu_2 > 1)"
+    )
+    written = " ".join(generate.latex(row.condition) for row in TABLE)
+    assert not re.search(r"(?<![\\{])\b(?:kappa|nu\d|gap|Delta)", written)
 
 
 def test_every_region_is_listed():
@@ -128,17 +137,25 @@ def test_loads_are_found():
 # The README's picture ------------------------------------------------------------------------------
 
 
-def test_picture_of_the_readme_is_what_its_program_draws(tmp_path):
+def test_pictures_of_the_readme_are_what_its_programs_draw(tmp_path):
     image = pytest.importorskip("matplotlib.image")
     spec = importlib.util.spec_from_file_location("docs_pictures", DOCS / "pictures.py")
     pictures = importlib.util.module_from_spec(spec)
     spec.loader.exec_module(pictures)
-    kept, drawn = image.imread(pictures.PICTURE), image.imread(pictures.draw(tmp_path))
-    for ours, theirs in zip(kept.shape, drawn.shape, strict=True):
-        assert abs(ours - theirs) <= 0.02 * ours  # fonts differ a little between versions
-    rows, columns = (min(a, b) for a, b in zip(kept.shape[:2], drawn.shape[:2], strict=True))
-    difference = abs(kept[:rows, :columns] - drawn[:rows, :columns]).mean()
-    assert difference < 0.02, "run `python docs/pictures.py` and look at the picture"
+    made = pictures.draw(tmp_path)
+    assert [path.name for path in made] == ["two_fold.png", "bounce.png"]
+    for path in made:
+        kept, drawn = image.imread(pictures.FOLDER / path.name), image.imread(path)
+        for ours, theirs in zip(kept.shape, drawn.shape, strict=True):
+            assert abs(ours - theirs) <= 0.02 * ours  # fonts differ a little between versions
+        rows, columns = (min(a, b) for a, b in zip(kept.shape[:2], drawn.shape[:2], strict=True))
+        difference = abs(kept[:rows, :columns] - drawn[:rows, :columns]).mean()
+        assert difference < 0.02, "run `python docs/pictures.py` and look at the pictures"
+
+
+def test_readme_shows_the_measured_table():
+    text = (ROOT / "README.md").read_text(encoding="utf-8")
+    assert generate.measured() in text, "copy what docs/elsewhere.py's measured() returns"
 
 
 # The built site ------------------------------------------------------------------------------------

@@ -1,7 +1,7 @@
 """The classes of generic two-folds: one decision table, its boundaries, and what each class means.
 
 Da is attracting sliding, Dr repelling, s the two-fold. An orbit Da -> s -> Dr along an eigenline
-with lambda < 0 is a canard; along one with lambda > 0 it runs Dr -> s -> Da, a faux canard. The
+with kappa < 0 is a canard; along one with kappa > 0 it runs Dr -> s -> Da, a faux canard. The
 table was derived for this library from the slope equation of ``ReducedFlow`` and is tested by
 integration of every row (Filippov 1988; Teixeira 1990; Colombo & Jeffrey 2011 for parts of it). In
 R^n it holds across the (n-3)-dimensional set of two-folds, and "one orbit" reads "a set of
@@ -51,7 +51,7 @@ TABLE: tuple[Row, ...] = (
     Row(
         "VV-C1",
         ("VV",),
-        "lambda_- < 0",
+        "kappa_- < 0",
         lambda f: _low(f) < 0,
         into="one",
         out_of="none",
@@ -63,7 +63,7 @@ TABLE: tuple[Row, ...] = (
     Row(
         "VV-F",
         ("VV",),
-        "lambda_- > 0 (nu1, nu2 > 0 and nu1 nu2 > 1)",
+        "kappa_- > 0 (nu1, nu2 > 0 and nu1 nu2 > 1)",
         lambda f: _low(f) > 0,
         into="none",
         out_of="all",
@@ -74,7 +74,7 @@ TABLE: tuple[Row, ...] = (
     Row(
         "II-C",
         ("II",),
-        "lambda_+ < 0 (nu1, nu2 < 0 and nu1 nu2 > 1)",
+        "kappa_+ < 0 (nu1, nu2 < 0 and nu1 nu2 > 1)",
         lambda f: _high(f) < 0,
         into="all",
         out_of="none",
@@ -85,7 +85,7 @@ TABLE: tuple[Row, ...] = (
     Row(
         "II-F",
         ("II",),
-        "lambda_+ > 0",
+        "kappa_+ > 0",
         lambda f: _high(f) > 0,
         into="none",
         out_of="one",
@@ -96,7 +96,7 @@ TABLE: tuple[Row, ...] = (
     Row(
         "mix-0",
         MIXED,
-        "g < 2",
+        "gap < 2",
         lambda f: f.gap < 2,
         into="none",
         out_of="none",
@@ -106,7 +106,7 @@ TABLE: tuple[Row, ...] = (
     Row(
         "mix-S",
         MIXED,
-        "g > 2, Delta < 0",
+        "gap > 2, Delta < 0",
         lambda f: f.gap > 2 and f.determinant < 0,
         into="one",
         out_of="one",
@@ -117,18 +117,18 @@ TABLE: tuple[Row, ...] = (
     Row(
         "mix-C",
         MIXED,
-        "g > 2, Delta > 0, T < 0",
+        "gap > 2, Delta > 0, T < 0",
         lambda f: f.gap > 2 and f.determinant > 0 and f.trace < 0,
         into="sector",
         out_of="none",
         determinism="Determinism breaks on an open set: every orbit of a sector of Da reaches s in "
         "finite time, and from s a sector of Dr is open (infinitely many canards); the strong "
-        "canard of lambda_- bounds the sector. The other orbits leave through the visible fold.",
+        "canard of kappa_- bounds the sector. The other orbits leave through the visible fold.",
     ),
     Row(
         "mix-F",
         MIXED,
-        "g > 2, Delta > 0, T > 0",
+        "gap > 2, Delta > 0, T > 0",
         lambda f: f.gap > 2 and f.determinant > 0 and f.trace > 0,
         into="none",
         out_of="sector",

@@ -97,7 +97,7 @@ class ReducedFlow:
 
     @property
     def eigenvalues(self) -> NDArray[Any]:
-        """Eigenvalues (lambda_-, lambda_+) of M, ascending; complex where ``discriminant < 0``."""
+        """Eigenvalues (kappa_-, kappa_+) of M, ascending; complex where ``discriminant < 0``."""
         half, disc = self.trace / 2, self.discriminant
         if disc < 0:
             root = 0.5j * np.sqrt(-disc)
@@ -108,7 +108,7 @@ class ReducedFlow:
 
     @property
     def slopes(self) -> NDArray[Any]:
-        """Slopes m = z3/z2 = (nu2 - lambda)/sigma1 of the eigenlines, in the eigenvalues' order."""
+        """Slopes m = z3/z2 = (nu2 - kappa)/sigma1 of the eigenlines, in the eigenvalues' order."""
         (s1, s2), difference, disc = self.sigma, self.nu[0] - self.nu[1], self.discriminant
         if disc < 0:
             return (self.nu[1] - self.eigenvalues) / s1

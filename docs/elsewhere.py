@@ -1,0 +1,135 @@
+"""Pages of the site that are kept elsewhere in the repository: changelog, citation, benchmarks, papers.
+
+They are read from where they are and only their links are changed, so there is one of each.
+"""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+PAPERS = (
+    "biber_2022",
+    "jeffrey_colombo_2009",
+    "colombo_jeffrey_2011",
+    "kuznetsov_2003",
+    "welander_1982",
+)
+
+#: The folder of the whole reports, seen from the pages of the papers.
+REPORTS = "../reports"
+
+
+def text_of(path: str) -> str:
+    """Text of a file of the repository."""
+    return (ROOT / path).read_text(encoding="utf-8")
+
+
+def pages() -> dict[str, str]:
+    """Return the pages by their address."""
+    found = {
+        "changelog.md": text_of("CHANGELOG.md"),
+        "benchmarks.md": text_of("benchmarks/README.md"),
+        "cite.md": cite(),
+    }
+    for name in PAPERS:
+        found[f"papers/{name}.md"] = paper(name)
+    return {uri: _without_comments(text) for uri, text in found.items()}
+
+
+def pictures() -> dict[str, Path]:
+    """Pictures of those pages, by their address."""
+    return {"work_precision.png": ROOT / "benchmarks" / "work_precision.png"}
+
+
+def cite() -> str:
+    """The page on how to cite, from CITATION.cff."""
+    return (
+        "# How to cite\n\n"
+        "Cite the software, and the papers whose mathematics you used. This is `CITATION.cff`, which "
+        "reference managers read:\n\n```yaml\n" + text_of("CITATION.cff").rstrip() + "\n```\n"
+    )
+
+
+def paper(name: str) -> str:
+    """The page of a paper: its README with a link to the whole report."""
+    text = text_of(f"papers/{name}/README.md")
+    title, _, rest = text.partition("\n")
+    if f"reports/{name}.html" not in reports():
+        return text
+    link = f"[The whole report, with its figures]({REPORTS}/{name}.html){{ .md-button }}"
+    return f"{title}\n\n{link}\n{rest}"
+
+
+def reports() -> dict[str, Path]:
+    """Whole reports by their address, as `make reproduce` wrote them."""
+    found = {name: ROOT / "build" / name / "report.html" for name in PAPERS}
+    return {f"reports/{name}.html": path for name, path in found.items() if path.is_file()}
+
+
+def measured() -> str:
+    """A table of measured speeds and errors with their conditions, from the benchmarks' own tables."""
+    text = text_of("benchmarks/README.md")
+    fast, many = _rows(text, "### Linear bounce"), _rows(text, "### Nonlinear bounce")
+    targets = {row[0]: row for row in _rows(text, "### Targets").values()}
+    heyoka, scipy = (
+        _value(targets, f"linear bounce: times {peer}") for peer in ("heyoka", "scipy")
+    )
+    cold, cached = (
+        _value(targets, f"first result, simulate, {how}")
+        for how in ("compiled, cold", "compiled, cached")
+    )
+    wrong, near = (_value(targets, f"wrong itineraries, {where}") for where in ("random", "within"))
+    ours, nonlinear = fast["nonsmooth"], many["nonsmooth"]
+    rows = [
+        (
+            "bounces with friction",
+            f"{_millions(ours)} million a second",
+            f"linear contact, one thread; largest error of 500 is {ours[4]}",
+        ),
+        (
+            "bounces with friction",
+            f"{_millions(nonlinear)} million a second",
+            f"nonlinear contact; largest error {nonlinear[4]}",
+        ),
+        (
+            "how many times faster than heyoka, and than scipy",
+            f"{heyoka:.0f} and {scipy:.0f}",
+            "linear contact; each solver at its fastest tolerance with errors below 1e-9",
+        ),
+        (
+            "wrong sequences of slipping and rolling",
+            f"{wrong:.0f} of 1,000,000",
+            f"random starts; and {near:.0f} among starts within 1e-9 of a boundary between two sequences",
+        ),
+        (
+            "first answer of a new process",
+            f"{cached:.2g} s",
+            f"{cold:.2g} s the first time, with a compilation",
+        ),
+    ]
+    head = "| what | measured | conditions |\n| --- | --- | --- |\n"
+    return head + "\n".join("| " + " | ".join(row) + " |" for row in rows)
+
+
+def _rows(text: str, title: str) -> dict[str, list[str]]:
+    part = text.split(title + "\n", 1)[1].split("\n### ", 1)[0]
+    cells = [
+        [c.strip() for c in line.strip("|").split("|")]
+        for line in part.splitlines()
+        if line.startswith("|")
+    ]
+    return {row[0]: row for row in cells[2:]}
+
+
+def _value(targets: dict[str, list[str]], start: str) -> float:
+    return next(float(row[2]) for what, row in targets.items() if what.startswith(start))
+
+
+def _millions(row: list[str]) -> str:
+    return f"{float(row[1].replace(',', '')) / 1e6:.1f}"
+
+
+def _without_comments(text: str) -> str:
+    return re.sub(r"^<!--.*?-->\n", "", text, flags=re.MULTILINE | re.DOTALL)

@@ -16,15 +16,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError, Evaluator
-from ..model.printing.tape import Series
+from ..model.printing.tape import Series, Values
 from ..model.variational import ORDER
-from .compiled.tape import FixedFlow, library
+from .compiled.smooth import LegsProgram, SmoothProgram, ValuesProgram
+from .compiled.tape import library
 from .select import compiled_or_none, use_compiled
 
 #: Part of the size of a group of states that the last terms of a step may reach.
 TOLERANCE = 2.0**-53
 
-_MOST_STEPS = 20_000
+MOST_STEPS = 20_000
 
 
 class SmoothField(Protocol):
@@ -33,6 +34,11 @@ class SmoothField(Protocol):
     @property
     def jets(self) -> Evaluator:
         """(z, p) -> coefficients (m, order + 1)."""
+        ...
+
+    @property
+    def entries(self) -> int:
+        """Number of entries of z."""
         ...
 
     @property
@@ -74,30 +80,69 @@ def flow_for(
     ConvergenceError
         The field is not finite on the way, or steps become too small.
     """
-    if duration and _has_interpreter():
-        flow = _FLOWS.get(field) or _FLOWS.setdefault(field, _compiled(field, len(z)))
-        end, left = flow(z, p, duration, tol, _MOST_STEPS)
+    if duration and has_interpreter():
+        end, left = program_of(field).flow(z, p, duration, tol, MOST_STEPS)
         if left:
-            raise _stuck(duration, left, end)
+            raise stuck(duration, left, end)
         return end
     for _, _, end in steps_for(field, z, p, duration, tol):
         z = end
     return z
 
 
-def _has_interpreter() -> bool:
+def has_interpreter() -> bool:
+    """Whether smooth fields are integrated in C."""
+    if library.cache_info().currsize:  # it is loaded
+        return True
     return use_compiled("auto") and compiled_or_none("auto", library, library) is not None
 
 
-#: What the interpreter needs of a field, as long as there is the field.
-_FLOWS: WeakKeyDictionary[Any, FixedFlow] = WeakKeyDictionary()
+#: What the interpreter needs of a field or of expressions, as long as they live.
+_PROGRAMS: WeakKeyDictionary[Any, Any] = WeakKeyDictionary()
 
 
-def _compiled(field: CompiledField, size: int) -> FixedFlow:
-    group = np.full(size, -1, np.int32)
-    for k, entries in enumerate(field.groups):
-        group[entries] = k
-    return FixedFlow(field.series, group, ORDER)
+def program_of(field: CompiledField) -> SmoothProgram:
+    """A smooth field as the interpreter takes it, written once."""
+    made: SmoothProgram | None = _PROGRAMS.get(field)
+    if made is None:
+        group = np.full(field.entries, -1, np.int32)
+        for k, entries in enumerate(field.groups):
+            group[entries] = k
+        made = _PROGRAMS.setdefault(field, SmoothProgram(field.series, group, ORDER))
+    return made
+
+
+class Evaluated(Protocol):
+    """Expressions of states and parameters that the interpreter in C can evaluate."""
+
+    @property
+    def values(self) -> Values:
+        """Them as a graph."""
+        ...
+
+
+def legs_program(
+    fields: Sequence[CompiledField], events: Sequence[Evaluated | None], parameters: int
+) -> LegsProgram:
+    """Legs of smooth fields, with expressions of the state at their ends, to be flown in one call.
+
+    Parameters
+    ----------
+    fields : sequence of CompiledField
+        Of each leg.
+    events : sequence of Evaluated or None
+    parameters : int
+    """
+    return LegsProgram(
+        [program_of(field) for field in fields],
+        [None if event is None else _evaluated(event) for event in events],
+        parameters,
+    )
+
+
+def _evaluated(event: Evaluated) -> ValuesProgram:
+    made: ValuesProgram | None = _PROGRAMS.get(event)
+    return made or _PROGRAMS.setdefault(event, ValuesProgram(event.values))
 
 
 def steps_for(
@@ -108,7 +153,7 @@ def steps_for(
     The coefficients are overwritten by the next step.
     """
     left, sign = abs(duration), math.copysign(1.0, duration)
-    for _ in range(_MOST_STEPS):
+    for _ in range(MOST_STEPS):
         if left == 0.0:
             return
         c, *watched = field.jets(z, p)
@@ -124,10 +169,11 @@ def steps_for(
         left -= h
         yield sign * h, c, z
     if left:
-        raise _stuck(duration, left, z)
+        raise stuck(duration, left, z)
 
 
-def _stuck(duration: float, left: float, z: Array) -> ConvergenceError:
+def stuck(duration: float, left: float, z: Array) -> ConvergenceError:
+    """The error for a flow that does not come to its end."""
     return ConvergenceError(
         f"flow of a leg: expected a smooth field over the duration {duration:.6g}, received one "
         f"that is not finite, or steps too small, {left:.6g} before the end, near "

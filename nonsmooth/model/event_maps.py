@@ -7,6 +7,7 @@ if there is none. Both are read off the definition of the system, and come with 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import casadi as ca
 
@@ -15,9 +16,22 @@ from .coupled import coupled_of
 from .errors import DegenerateError
 from .evaluators import Evaluator
 from .explicit import explicit, guard_named, solved
+from .printing.tape import Values, values_of
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlainMap:
+    """An event's state after it and function, without derivatives.
+
+    Attributes
+    ----------
+    values : Values
+    """
+
+    values: Values
 
 
 class EventMap:
@@ -50,8 +64,21 @@ class EventMap:
         g = states[:n] if after is None else after
         outputs = [g, ca.jacobian(g, states), ca.jacobian(g, p)]
         outputs += [event, ca.jacobian(event, states), ca.jacobian(event, p)]
-        outputs = [ca.densify(e) for e in outputs]
-        self._function = Evaluator(ca.Function("event", [states, p], outputs, {"cse": True}))
+        self._inputs, self._outputs = [states, p], [ca.densify(e) for e in outputs]
+
+    @cached_property
+    def _function(self) -> Evaluator:
+        return Evaluator(ca.Function("event", self._inputs, self._outputs, {"cse": True}))
+
+    @cached_property
+    def values(self) -> Values:
+        """The entries of g, g_x, g_p, e, e_x and e_p, column after column, as a graph."""
+        return values_of(self._inputs, self._outputs)
+
+    @cached_property
+    def plain(self) -> PlainMap:
+        """g and e alone."""
+        return PlainMap(values_of(self._inputs, [self._outputs[0], self._outputs[3]]))
 
     def __call__(self, y: Array, p: Array) -> AtEvent:
         """Evaluate at the end of a leg."""

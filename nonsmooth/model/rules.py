@@ -98,6 +98,7 @@ class _Lowering:
     def __init__(self) -> None:
         self.rules: list[Rule] = []
         self.place: list[int] = []
+        self._pairs: dict[tuple[str, int], int] = {}
 
     def add(self, node: Node, moves: bool, nodes: Sequence[Node], moving: Sequence[bool]) -> None:
         args = tuple(self.place[a] for a in node.args)
@@ -174,10 +175,12 @@ class _Lowering:
         return w
 
     def _pair(self, one: str, other: str, u: int, signs: tuple[float, float]) -> int:
-        w = len(self.rules)
-        self._integral(one, u, w + 1, signs[0])
-        self._integral(other, u, w, signs[1])
-        return w
+        """A function and the one that its derivative is made of, which serves both of them."""
+        if (one, u) not in self._pairs:
+            w = len(self.rules)
+            self._pairs[one, u] = self._integral(one, u, w + 1, signs[0])
+            self._pairs[other, u] = self._integral(other, u, w, signs[1])
+        return self._pairs[one, u]
 
     def _from_square(self, op: str, u: int, factor: float) -> int:
         """w' = (1 + factor w^2) u'."""

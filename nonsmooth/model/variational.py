@@ -130,6 +130,11 @@ class VariationalField:
         inputs = [self.states, self.parameters]
         return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
 
+    @property
+    def entries(self) -> int:
+        """Number of entries of z."""
+        return int(self.states.numel())
+
     @cached_property
     def series(self) -> Series:
         """The Taylor rules of the whole field."""
@@ -278,8 +283,8 @@ def variational_field(
     return system.cached(key, lambda: VariationalField(explicit(system, mode), chosen))
 
 
-class GuardedField:
-    """One mode's flow with its guards along it, as a smooth field to be stepped through.
+class PlainField:
+    """One mode's flow as a smooth field.
 
     Parameters
     ----------
@@ -295,6 +300,46 @@ class GuardedField:
             moving = np.delete(moving, system.dimension)
         #: Entries whose errors are measured together; the time is exact.
         self.groups: tuple[NDArray[np.intp], ...] = (moving,)
+
+    @property
+    def entries(self) -> int:
+        """Number of states."""
+        return int(self.motion.states.numel())
+
+    @cached_property
+    def jets(self) -> Evaluator:
+        """(y, p) -> Taylor coefficients (N + k, ORDER + 1) of the flow."""
+        m, p = self.motion, self.motion.system.parameter_symbols
+        jet, _ = taylor(m.field, ca.SX(0, 1), m.states, p, ORDER)
+        return Evaluator(ca.Function("jets", [m.states, p], [ca.densify(jet)], {"cse": True}))
+
+    @cached_property
+    def series(self) -> Series:
+        """The Taylor rules of the field."""
+        m = self.motion
+        return series_of([m.states, m.system.parameter_symbols], [m.field], self.entries)
+
+
+def plain_field(system: FilippovSystem, mode: str) -> PlainField:
+    """Return the field of a mode without guards, built once per system."""
+    return system.cached(("plain field", mode), lambda: PlainField(explicit(system, mode)))
+
+
+class GuardedField(PlainField):
+    """One mode's flow with its guards along it, as a smooth field to be stepped through.
+
+    Parameters
+    ----------
+    of_mode : Motion
+        With all multipliers solved for.
+    """
+
+    @cached_property
+    def series(self) -> Series:
+        """The Taylor rules of the field and of the guards."""
+        m = self.motion
+        inputs = [m.states, m.system.parameter_symbols]
+        return series_of(inputs, [m.field, m.functions], self.entries)
 
     @cached_property
     def jets(self) -> Evaluator:

@@ -18,13 +18,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import NDArray
 
+from ..flow.fixed import TOLERANCE
 from ..model import Array, FilippovSystem
 from ..model.event_maps import AtEvent, surface_map
 from ..model.forcing import Forcing
+from .flight import Flight, Flights
 from .legs import Flown, Leg, fly
 
 #: Up to so many unknowns a dense solution is faster than elimination in Python.
@@ -45,10 +50,9 @@ class Evaluation:
         By the unknowns.
     by_parameters : ndarray (m, q)
         By the chosen parameters.
-    flown : tuple of Flown
-        The legs.
-    events : tuple of AtEvent
-        At their ends; for a leg without an event the identity and the phase condition.
+    flight : Flight
+        The legs, with the events at their ends; for a leg without an event the identity and the phase
+        condition.
     starts : ndarray (N, n)
     durations : ndarray (N,)
     """
@@ -56,10 +60,19 @@ class Evaluation:
     residual: Array
     jacobian: Array
     by_parameters: Array
-    flown: tuple[Flown, ...]
-    events: tuple[AtEvent, ...]
+    flight: Flight
     starts: Array
     durations: Array
+
+    @property
+    def flown(self) -> tuple[Flown, ...]:
+        """Leg by leg."""
+        return self.flight.flown
+
+    @property
+    def events(self) -> tuple[AtEvent, ...]:
+        """Event by event."""
+        return self.flight.events
 
 
 @dataclass(frozen=True, eq=False)
@@ -136,7 +149,9 @@ class BoundaryProblem:
         value, slope = self.forcing(p)
         return self.periods * value, self.periods * slope
 
-    def evaluate(self, u: Array, p: Array, chosen: tuple[int, ...] = ()) -> Evaluation:
+    def evaluate(
+        self, u: Array, p: Array, chosen: tuple[int, ...] = (), tol: float = TOLERANCE
+    ) -> Evaluation:
         """Residual, Jacobian by the unknowns, and derivatives by chosen parameters.
 
         Parameters
@@ -146,6 +161,8 @@ class BoundaryProblem:
             All parameters.
         chosen : tuple of int
             Parameters by which one differentiates.
+        tol : float, optional
+            Local errors of the steps.
 
         Raises
         ------
@@ -153,55 +170,78 @@ class BoundaryProblem:
             A leg cannot be flown.
         """
         starts, durations = self.split(u)
-        count, n = len(self.legs), self.dimension
-        residual, jacobian = np.zeros(self.size), np.zeros((self.size, self.size))
-        by_parameters = np.zeros((self.size, len(chosen)))
-        flown, events, columns = list[Flown](), list[AtEvent](), list(chosen)
-        for i, leg in enumerate(self.legs):
-            part = fly(self.system, leg, starts[i], float(durations[i]), p, chosen)
-            at = self._at_end(leg, part, starts[i], p)
-            own = slice(i * n, (i + 1) * n)
-            time, last = count * n + i, i + 1 == count
-            following = slice(0, n) if last else slice((i + 1) * n, (i + 2) * n)
-            by_end, after = at.after_state, at.after
-            by_p = by_end @ part.by_parameters + at.after_parameters[:, columns]
-            if last:
-                by_end, after, by_p = self.wrap @ by_end, self.wrap @ after, self.wrap @ by_p
-            residual[own] = after - starts[0 if last else i + 1]
-            jacobian[own, own] += by_end @ part.by_start
-            jacobian[own, following] -= np.eye(n)
-            jacobian[own, time] = by_end @ part.rate
-            by_parameters[own] = by_p
-            if last:
-                self._advance(residual, by_parameters, own, p, columns)
-            if leg.name:
-                residual[time] = at.value
-                jacobian[time, own] = at.gradient @ part.by_start
-                jacobian[time, time] = at.gradient @ part.rate
-                by_parameters[time] = at.gradient @ part.by_parameters + at.by_parameters[columns]
-            else:
-                assert self.phase is not None and self.reference is not None
-                residual[time] = self.phase @ (starts[i] - self.reference)
-                jacobian[time, own] = self.phase
-            flown.append(part)
-            events.append(at)
+        count, n, size, columns = len(self.legs), self.dimension, self.size, list(chosen)
+        flight = self._flights(chosen)(starts, durations, p, tol)
+        after, by_end = flight.after, flight.after_state
+        by_p = by_end @ flight.by_parameters + flight.after_parameters[:, :, columns]
+        if self.symmetry is not None:
+            after, by_end, by_p = after.copy(), by_end.copy(), by_p
+            after[-1], by_end[-1] = self.wrap @ after[-1], self.wrap @ by_end[-1]
+            by_p[-1] = self.wrap @ by_p[-1]
+        at, flat = _places(count, n), np.zeros(size * size)
+        residual, by_parameters = np.empty(size), np.empty((size, len(columns)))
+        residual[: count * n] = (after - starts[at.next_leg]).ravel()
+        residual[count * n :] = flight.value
+        flat[at.blocks] = (by_end @ flight.by_start).ravel()
+        flat[at.following] -= 1.0
+        rate = flight.rate[:, :, None]
+        flat[at.by_duration] = (by_end @ rate).ravel()
+        gradient = flight.gradient[:, None, :]
+        flat[at.event_rows] = (gradient @ flight.by_start).ravel()
+        flat[at.event_durations] = (gradient @ rate).ravel()
+        by_parameters[: count * n] = by_p.reshape(count * n, -1)
+        by_parameters[count * n :] = (gradient @ flight.by_parameters)[:, 0]
+        by_parameters[count * n :] += flight.value_parameters[:, columns]
+        jacobian = flat.reshape(size, size)
+        self._advance(residual, by_parameters, slice((count - 1) * n, count * n), p, columns)
+        if self.phase is not None:
+            self._phased(residual, jacobian, by_parameters, flight, starts[0])
         if self.kept:
             self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
-        return Evaluation(
-            residual, jacobian, by_parameters, tuple(flown), tuple(events), starts, durations
-        )
+        return Evaluation(residual, jacobian, by_parameters, flight, starts, durations)
 
-    def _at_end(self, leg: Leg, part: Flown, start: Array, p: Array) -> AtEvent:
-        if leg.name:
-            return leg.at_end(self.system, part.end, p)
-        n, size = self.dimension, len(part.end)
-        assert self.phase is not None
-        gradient = np.zeros(size)
-        gradient[:n] = self.phase @ self.wrap
-        identity = np.eye(n, size)
-        return AtEvent(
-            part.end[:n], identity, np.zeros((n, p.size)), 0.0, gradient, np.zeros(p.size)
-        )
+    def exact_residual(self, u: Array, p: Array) -> Array | None:
+        """Residual with errors far below those of doubles; None where there is no such one.
+
+        Parameters
+        ----------
+        u : ndarray (m,)
+        p : ndarray
+        """
+        starts, durations = self.split(u)
+        if self.phase is not None or self.kept:
+            return None
+        found = self._flights(()).exact(starts, durations, p)
+        if found is None:
+            return None
+        after, rest, value = found
+        if self.symmetry is not None:
+            after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
+        gap = after - starts[_places(*starts.shape).next_leg]
+        gap[-1, -1] -= self.advance(p)[0]
+        gap += rest
+        return np.concatenate([gap.ravel(), value])
+
+    def _flights(self, chosen: tuple[int, ...]) -> Flights:
+        made = _FLIGHTS.setdefault(self, {})
+        found = made.get(chosen)
+        if found is None:
+            key = ("flights", self.legs, chosen)
+            found = self.system.cached(key, lambda: Flights(self.system, self.legs, chosen))
+            made[chosen] = found
+        return found
+
+    def _phased(
+        self, residual: Array, jacobian: Array, by_parameters: Array, flight: Flight, start: Array
+    ) -> None:
+        """The phase condition in place of the event that the one leg does not have."""
+        assert self.phase is not None and self.reference is not None
+        n = self.dimension
+        residual[n] = self.phase @ (start - self.reference)
+        jacobian[n] = 0.0
+        jacobian[n, :n] = self.phase
+        by_parameters[n] = 0.0
+        flight.gradient[0, :n] = self.phase @ self.wrap
 
     def _advance(
         self, residual: Array, by_parameters: Array, own: slice, p: Array, columns: Sequence[int]
@@ -307,5 +347,41 @@ class BoundaryProblem:
         size = np.abs(seen).max(axis=0)
         if self.system.time_dependent:
             size[-1] = span
-        size = np.where(size > 1e-6 * max(size.max(), 1e-300), size, max(size.max(), 1e-300))
-        return self.pack(np.tile(size, (len(self.legs), 1)), np.full(len(self.legs), span))
+        largest = max(float(size.max()), 1e-300)
+        size[~(size > 1e-6 * largest)] = largest
+        result = np.empty(self.size)
+        result[: starts.size].reshape(starts.shape)[:] = size
+        result[starts.size :] = span
+        return result
+
+
+#: Legs of a problem ready to be flown, by the chosen parameters.
+_FLIGHTS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], Flights]] = WeakKeyDictionary()
+
+
+class _Places(NamedTuple):
+    """Where entries of the Jacobian are in it, row after row: states by starts (own and following),
+    states by durations, events by starts and by durations; and the number of the next leg."""
+
+    blocks: NDArray[Any]
+    following: NDArray[Any]
+    by_duration: NDArray[Any]
+    event_rows: NDArray[Any]
+    event_durations: NDArray[Any]
+    next_leg: NDArray[Any]
+
+
+@lru_cache(maxsize=256)
+def _places(count: int, n: int) -> _Places:
+    size = count * (n + 1)
+    places = np.arange(size * size).reshape(size, size)
+    rows = np.arange(count * n).reshape(count, n)
+    times = np.arange(count * n, size)
+    return _Places(
+        places[rows[:, :, None], rows[:, None, :]].ravel(),
+        places[rows, np.roll(rows, -1, axis=0)].ravel(),
+        places[rows, times[:, None]].ravel(),
+        places[times[:, None], rows].ravel(),
+        places[times, times].ravel(),
+        np.roll(np.arange(count), -1),
+    )

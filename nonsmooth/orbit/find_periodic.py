@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..flow.fixed import TOLERANCE
 from ..flow.trajectory import Trajectory
 from ..local.newton import Equations, converge, solve
 from ..model import (
@@ -31,6 +32,12 @@ _TOLERANCE = 1e-10
 
 #: Steps below this, relative to the orbit, are rounding.
 _ROUNDING = 1e-14
+
+#: Legs far from the orbit are flown with local errors up to this.
+_COARSE = 1e-8
+
+#: Steps below this, relative to the orbit, change its derivatives by rounding.
+_FINAL = 1e-13
 
 #: Starts of legs that are as near as this, relative to the orbit, are one.
 _SAME = 1e-7
@@ -195,19 +202,25 @@ class _Solver:
         ConvergenceError
         """
         scales = self.problem.scales(u)
+        last: list[Array] = []
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
 
         def equations(v: Array) -> tuple[Array, Array]:
-            self.last = v * scales, None
-            durations = self.problem.split(v * scales)[1]
-            if not np.abs(durations).max() <= longest:
+            u = v * scales
+            self.last = u, None
+            durations = self.problem.split(u)[1]
+            if not max(-float(durations.min()), float(durations.max())) <= longest:
                 i = int(np.argmax(np.abs(durations)))
                 raise ConvergenceError(
                     f"Leg {i + 1} {leg_name(self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
-            at = self.problem.evaluate(v * scales, self.p)
-            self.last = v * scales, at
+            size = float(np.abs(v - last[-1]).max()) if last else 1e-2
+            # after a step of this size the next one is its square, and what it leaves its fourth power
+            tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
+            at = self.problem.evaluate(u, self.p, tol=tol)
+            last.append(v)
+            self.last = u, at
             self.iterations += 1
             return at.residual, at.jacobian * scales
 
@@ -250,20 +263,34 @@ class _Solver:
         """Two more steps at most, as long as they shrink: to rounding."""
         at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
         for _ in range(2):
-            try:
-                step = -self.problem.solve(at.jacobian, at.residual)
-            except np.linalg.LinAlgError:  # one of a family of orbits: the nearest
-                least = np.linalg.lstsq(at.jacobian, at.residual, rcond=1e-12)[0]
-                step = -np.asarray(least, float)
-            new = u + step
-            if np.abs(step / scales).max() <= _ROUNDING:
+            exact = self.problem.exact_residual(u, self.p)
+            step = self._step(at.jacobian, at.residual if exact is None else exact)
+            size = float(np.abs(step / scales).max())
+            if exact is not None and size <= _FINAL:  # the derivatives are those of the orbit
+                return self._moved(u, step, at, exact)
+            if size <= _ROUNDING:
                 break
-            there = self.problem.evaluate(new, self.p)
+            there = self.problem.evaluate(u + step, self.p)
             self.iterations += 1
             if not np.abs(there.residual).max() < np.abs(at.residual).max():
                 break
-            u, at = new, there
+            u, at = u + step, there
         return u, at
+
+    def _step(self, jacobian: Array, residual: Array) -> Array:
+        try:
+            return -self.problem.solve(jacobian, residual)
+        except np.linalg.LinAlgError:  # one of a family of orbits: the nearest
+            return -np.asarray(np.linalg.lstsq(jacobian, residual, rcond=1e-12)[0], float)
+
+    def _moved(
+        self, u: Array, step: Array, at: Evaluation, exact: Array
+    ) -> tuple[Array, Evaluation]:
+        """The last step, by which derivatives change less than rounding."""
+        there = u + step
+        starts, durations = self.problem.split(there)
+        residual = exact + at.jacobian @ (there - u)  # rounding of the unknowns is what remains
+        return there, replace(at, residual=residual, starts=starts, durations=durations)
 
     def _largest(self, at: Evaluation) -> str:
         """The leg whose equations are least satisfied, in words."""

@@ -6,14 +6,14 @@ derivative: an itinerary is judged by them, not by samples.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
-from ..flow.fixed import steps_for
-from ..flow.reference.polynomial import first_crossing, first_root, sign_changes
+from ..flow.watched import passing, watched
 from ..model import Array, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .legs import Leg
@@ -76,55 +76,23 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     """
     field = guarded_field(system, mode)
     guards = field.motion.guards
+    y = variational_field(system, mode).states_at(x, p)
     approaches: list[Approach] = []
     seen: list[list[tuple[float, float, float]]] = [[] for _ in guards]  # time, value, scale
-    y = variational_field(system, mode).states_at(x, p)
-    t, margin = 0.0, _ENDS * duration
-    for h, states, end in steps_for(field, y, p, duration):
-        rows = field.jets.outputs[1].copy()
-        slopes = rows[:, 1:] * np.arange(1, rows.shape[1])
-        changes = sign_changes(slopes, h).tolist() if len(guards) else []
-        points = [(s, k) for k, c in enumerate(changes) if c for s in _extrema(slopes[k], h, c)]
-        if t + h < duration - margin:
-            points += [(h, k) for k in range(len(guards))]
-        for s, k in points:
-            if not margin < t + s < duration - margin:
-                continue
-            powered = s ** np.arange(rows.shape[1])
-            at = states @ powered if s != h else end
-            slope = field.gradients(at, p)[0][k]
-            size = float(np.linalg.norm(slope))
-            value = float(rows[k] @ powered)
-            seen[k].append((t + s, value, float(np.abs(slope) @ np.abs(at)) + size * 1e-3))
-            if s != h and size > 0.0 and _is_minimum(guards[k], rows[k], s, value):
-                approaches.append(Approach(guards[k], t + s, value, value / size))
-        t += h
+    for row in watched(field, y, p, duration, _ENDS * duration):
+        k, (t, value, bend) = int(row[0]), row[1:4].tolist()
+        guard, scale = guards[k], 0.0
+        passed = guard.kind in ("stop", "reset")
+        if (bend and (passed or bend > 0.0)) or (value < 0.0 and not passed):
+            at = row[4:]
+            slope = field.gradients.copied(at, p)[0][k]
+            size = math.sqrt(float(slope @ slope))
+            scale = float(np.abs(slope) @ np.abs(at)) + size * 1e-3
+            if size > 0.0 and bend and (passed or bend > 0.0):
+                approaches.append(Approach(guard, t, value, value / size))
+        seen[k].append((t, value, scale))
     faults = [f for g, values in zip(guards, seen, strict=True) for f in _faults(g, values)]
     return Watch(approaches, faults)
-
-
-def _extrema(slope: Array, h: float, changes: int) -> list[float]:
-    """Zeros in (0, h] of a polynomial whose Bernstein coefficients change sign so many times."""
-    if changes == 1:
-        root = first_root((slope if slope[0] > 0.0 else -slope).tolist(), h)
-        return [] if root is None else [root]
-    d = slope * h ** np.arange(len(slope))
-    size = np.abs(d)
-    if size[0] > size[1:].sum() or not np.all(np.isfinite(d)):
-        return []
-    kept = np.flatnonzero(size > 1e-17 * size.max()) if size.max() > 0.0 else np.zeros(0, int)
-    if not kept.size or kept[-1] == 0:
-        return []
-    roots = np.roots(d[kept[-1] :: -1])
-    real = roots.real[np.abs(roots.imag) <= 1e-8]
-    return [float(r) * h for r in real if 0.0 < r <= 1.0]
-
-
-def _is_minimum(guard: Guard, row: Array, s: float, value: float) -> bool:
-    if guard.kind in ("stop", "reset"):
-        return True
-    degrees = np.arange(2, len(row))
-    return float(row[2:] @ (degrees * (degrees - 1) * s ** (degrees - 2.0))) > 0.0
 
 
 def _faults(guard: Guard, values: Sequence[tuple[float, float, float]]) -> list[str]:
@@ -221,15 +189,5 @@ def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) ->
     )
     direction = guards[row].side if guards[row].kind in ("stop", "reset") else -1
     y = variational_field(system, leg.mode).states_at(x, p)
-    t = 0.0
-    for h, _, end in steps_for(field, y, p, t_max):
-        c = field.jets.outputs[1][row].copy()
-        if t == 0.0:
-            scale = float(np.linalg.norm(field.gradients(y, p)[0][row])) * float(np.abs(y).max())
-            drop = int(np.argmax(np.abs(c) > 1e-9 * scale))
-            c = c[drop:]
-        found = first_crossing(c.tolist(), h, direction)
-        if found is not None and t + found > 0.0:
-            return t + found
-        t, y = t + h, end
-    return None
+    size = float(np.linalg.norm(field.gradients.copied(y, p)[0][row])) * float(np.abs(y).max())
+    return passing(field, row, y, p, t_max, direction=direction, still=1e-9 * size)

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..flow.fixed import flow_for
 from ..flow.simulate import simulate
 from ..flow.status import Status
 from ..flow.trajectory import Trajectory
@@ -25,6 +26,7 @@ from ..model import (
     real_array,
 )
 from ..model.forcing import Forcing, frequencies
+from ..model.variational import plain_field
 from .boundary import BoundaryProblem
 from .guards import march
 from .itinerary import leg_between, read_word
@@ -206,7 +208,8 @@ def _from_word(
             following = following.translate(str.maketrans("+-", "-+"))
         leg = leg_between(system, mode, following, name)
         begin = system.extended_point(state, t)
-        duration = march(system, leg, begin, p, _LONGEST * _natural_time(system, begin, p))
+        longest = _LONGEST * _natural_time(system, begin, p, mode)
+        duration = march(system, leg, begin, p, longest)
         if duration is None:
             raise ConvergenceError(
                 f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
@@ -216,7 +219,8 @@ def _from_word(
         starts.append(begin)
         durations.append(duration)
         t += duration
-        end = fly(system, leg, begin, duration, p).end
+        y = leg.field(system).states_at(begin, p)
+        end = flow_for(plain_field(system, mode), y, p, duration)
         state = leg.at_end(system, end, p).after[:n]
         legs.append(leg)
     periods = 0.0
@@ -300,9 +304,9 @@ def _letters(system: FilippovSystem, x: Array, p: Array) -> str:
     return "".join("+" if v > 0 else "-" for v in h) + "o" * len(system.impacts)
 
 
-def _natural_time(system: FilippovSystem, x: Array, p: Array) -> float:
+def _natural_time(system: FilippovSystem, x: Array, p: Array, mode: str | None = None) -> float:
     """The time in which the state changes by its size."""
-    field = Leg(_letters(system, x, p)).field(system)
+    field = Leg(_letters(system, x, p) if mode is None else mode).field(system)
     rate = field.rate.copied(field.states_at(x, p), p)[0][: system.dimension, 0]
     size, speed = float(np.linalg.norm(x[: system.dimension])), float(np.linalg.norm(rate))
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

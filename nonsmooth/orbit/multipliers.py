@@ -9,6 +9,7 @@ dimension lost are exact. The full matrix gives them with rounding, which estima
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from ..model import Array
 from ..model.event_maps import surface_map
 from .boundary import BoundaryProblem, Evaluation
 from .legs import leg_name
-from .saltation import saltation
+from .saltation import saltations
 
 #: A direction of which a leg leaves no more than this part is lost.
 _LOST = 1e-12
@@ -40,8 +41,8 @@ class Multipliers:
         The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
     matrix : ndarray (N, N)
         The full derivative of the legs' map.
-    error : float
-        Distance of the structural multipliers of ``matrix`` from 1 and 0.
+    held : int
+        Surfaces on which the orbit slides all the time.
     """
 
     values: NDArray[np.complex128]
@@ -49,7 +50,17 @@ class Multipliers:
     zeros: int
     reduced: Array
     matrix: Array
-    error: float
+    held: int
+
+    @cached_property
+    def error(self) -> float:
+        """Distance of the structural multipliers of ``matrix`` from 1 and 0."""
+        whole = np.linalg.eigvals(self.matrix)
+        # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
+        ones = np.argsort(np.abs(whole - 1.0))[: 1 + self.held]
+        rest = np.sort(np.abs(np.delete(whole, ones)))
+        structural = rest[: self.zeros - self.held].tolist()
+        return max(float(np.abs(whole[ones] - 1.0).max()), *structural, 0.0)
 
 
 def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multipliers:
@@ -72,15 +83,9 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
     nontrivial = np.linalg.eigvals(reduced) if reduced.size else np.zeros(0)
     zeros = n - 1 - nontrivial.size
     matrix = monodromy(problem, at, p)
-    whole = np.linalg.eigvals(matrix)
-    # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
-    held = len(problem.kept)
-    ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]
-    rest = np.sort(np.abs(np.delete(whole, ones)))
-    error = max(float(np.abs(whole[ones] - 1.0).max()), *rest[: zeros - held].tolist(), 0.0)
     of_map = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
     power = 2 if problem.symmetry is not None else 1
-    return Multipliers(_sorted(of_map**power), of_map, zeros, reduced, matrix, error)
+    return Multipliers(_sorted(of_map**power), of_map, zeros, reduced, matrix, len(problem.kept))
 
 
 def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
@@ -88,16 +93,16 @@ def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
     return np.asarray(values[order], complex)
 
 
-def leg_maps(problem: BoundaryProblem, at: Evaluation) -> list[Array]:
-    """Derivatives of the maps from the start of each leg to that of the next, across the flow."""
-    count, maps = len(problem.legs), list[Array]()
-    for i in range(count):
-        flown, event = at.flown[i], at.events[i]
-        speed = float(event.gradient @ flown.rate)
-        across = flown.by_start - np.outer(flown.rate, event.gradient @ flown.by_start) / speed
-        step = event.after_state @ across
-        maps.append(problem.wrap @ step if i + 1 == count else step)
-    return maps
+def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Derivatives (L, N, N) of the maps from the start of each leg to that of the next, across the flow."""
+    flight = at.flight
+    row = flight.gradient[:, None, :] @ flight.by_start
+    speed = (flight.gradient * flight.rate).sum(axis=1)
+    across = flight.by_start - flight.rate[:, :, None] * (row / speed[:, None, None])
+    maps = flight.after_state @ across
+    if problem.symmetry is not None:
+        maps[-1] = problem.wrap @ maps[-1]
+    return np.asarray(maps)
 
 
 def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -145,23 +150,17 @@ def _range(matrix: Array, size: float) -> Array:
 
 def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
-    count, n = len(problem.legs), problem.dimension
+    n, flight = problem.dimension, at.flight
+    after = np.roll(flight.before[:, :n], -1, axis=0)
+    if problem.symmetry is not None:
+        after[-1] = np.linalg.solve(problem.wrap, after[-1])
+    jumps = saltations(
+        flight, after, lambda i: f"leg {i + 1} {leg_name(problem.legs[i])}", _events(problem)
+    ).matrix
     product: Array = np.eye(n)
-    for i, leg in enumerate(problem.legs):
-        flown, event, last = at.flown[i], at.events[i], i + 1 == count
-        if leg.name:
-            following = problem.legs[(i + 1) % count].field(problem.system)
-            start = following.states_at(at.starts[(i + 1) % count], p)
-            after = following.rate.copied(start, p)[0][:n, 0]
-            if last:
-                after = np.asarray(np.linalg.solve(problem.wrap, after), float)
-            jump = saltation(event, flown.rate, after, f"leg {i + 1} {leg_name(leg)}").matrix
-        else:
-            jump = event.after_state
-        product = np.asarray(jump @ flown.by_start @ product, float)
-        if last:
-            product = np.asarray(problem.wrap @ product, float)
-    return product
+    for step in jumps @ flight.by_start:
+        product = step @ product
+    return np.asarray(problem.wrap @ product, float)
 
 
 def stability(values: NDArray[np.complex128], error: float) -> str:
@@ -182,3 +181,7 @@ def stability(values: NDArray[np.complex128], error: float) -> str:
         on = int(np.sum(sizes > 1.0 - margin))
         return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
     return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"
+
+
+def _events(problem: BoundaryProblem) -> NDArray[np.bool_]:
+    return np.array([bool(leg.name) for leg in problem.legs])

@@ -121,7 +121,7 @@ class PeriodicOrbit:
 
     # what it is ---------------------------------------------------------------------------------
 
-    @property
+    @cached_property
     def parameter_vector(self) -> Array:
         """Values of all parameters."""
         return self.system.parameter_vector(self.parameters)

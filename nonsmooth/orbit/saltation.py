@@ -17,10 +17,12 @@ mechanical systems", ch. 7; di Bernardo et al. 2008, "Piecewise-smooth dynamical
 
 from __future__ import annotations
 
-import math
+from collections.abc import Callable
 from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model import Array, DegenerateError
 from ..model.event_maps import AtEvent
@@ -34,17 +36,17 @@ _CONTINUOUS = 1e-10
 
 @dataclass(frozen=True)
 class Saltation:
-    """Derivatives through an event.
+    """Derivatives through an event, or stacked through many.
 
     Attributes
     ----------
-    matrix : ndarray (N, N)
+    matrix : ndarray (N, N + k)
         S.
     by_parameters : ndarray (N, np)
         S_p.
-    time_by_state, time_by_parameters : ndarray (N,), (np,)
+    time_by_state, time_by_parameters : ndarray (N + k,), (np,)
         Derivatives of the time of the event.
-    angle : float
+    angle : float or ndarray
         ``|e_x f-|/(|e_x| |f-|)``, zero at a grazing.
     """
 
@@ -52,7 +54,7 @@ class Saltation:
     by_parameters: Array
     time_by_state: Array
     time_by_parameters: Array
-    angle: float
+    angle: Any
 
 
 def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
@@ -82,38 +84,111 @@ def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> 
     array([[ 1. , -0.5],
            [ 0. ,  0. ]])
     """
-    speed = float(at.gradient @ before)
-    size = _length(at.gradient) * _length(before)
-    angle = abs(speed) / size if size else 0.0
-    carried = at.after_state @ before
+    found = saltations(_One.of(at, before), after[None], lambda _: what)
+    return Saltation(
+        found.matrix[0],
+        found.by_parameters[0],
+        found.time_by_state[0],
+        found.time_by_parameters[0],
+        float(found.angle[0]),
+    )
+
+
+class Ended(Protocol):
+    """Ends of legs with their events, stacked; as :class:`~nonsmooth.orbit.flight.Flight`."""
+
+    @property
+    def rate(self) -> Array: ...
+    @property
+    def after(self) -> Array: ...
+    @property
+    def after_state(self) -> Array: ...
+    @property
+    def after_parameters(self) -> Array: ...
+    @property
+    def value(self) -> Array: ...
+    @property
+    def gradient(self) -> Array: ...
+    @property
+    def value_parameters(self) -> Array: ...
+
+
+class _One(NamedTuple):
+    """One event, stacked."""
+
+    rate: Array
+    after: Array
+    after_state: Array
+    after_parameters: Array
+    value: Array
+    gradient: Array
+    value_parameters: Array
+
+    @classmethod
+    def of(cls, at: AtEvent, rate: Array) -> _One:
+        rows = (rate, at.after, at.after_state, at.after_parameters, np.array(at.value))
+        return cls(*[row[None] for row in (*rows, at.gradient, at.by_parameters)])
+
+
+def saltations(
+    ends: Ended,
+    after: Array,
+    named: Callable[[int], str],
+    events: NDArray[np.bool_] | None = None,
+) -> Saltation:
+    """Saltation matrices of the events of many legs, stacked.
+
+    Parameters
+    ----------
+    ends : Flight
+    after : ndarray (L, N)
+        Fields after the events.
+    named : callable
+        An event by the number of its leg, for messages.
+    events : ndarray of bool (L,), optional
+        Legs that end by an event. The others end at a time: the map alone is their matrix.
+
+    Raises
+    ------
+    DegenerateError
+        An event that is grazed.
+    """
+    e, rate, g = ends.gradient, ends.rate, ends.after_state
+    speed = (e * rate).sum(axis=1)
+    size = np.sqrt((e * e).sum(axis=1) * (rate * rate).sum(axis=1))
+    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
+    carried = (g @ rate[:, :, None])[:, :, 0]
     jump = after - carried
-    scale = max(_length(after), _length(carried))
-    continuous = _length(jump) <= _CONTINUOUS * scale
-    if angle < GRAZING and not continuous:
-        raise DegenerateError(grazing(what, angle, at, jump))
-    rate = -1.0 / speed if speed else np.inf
-    time_x, time_p = rate * at.gradient, rate * at.by_parameters
-    if continuous:
-        matrix, by_parameters = at.after_state, at.after_parameters
-    else:
-        matrix = at.after_state - jump[:, None] * time_x
-        by_parameters = at.after_parameters - jump[:, None] * time_p
+    scale = np.maximum((after * after).sum(axis=1), (carried * carried).sum(axis=1))
+    kept = np.sqrt((jump * jump).sum(axis=1)) <= _CONTINUOUS * np.sqrt(scale)
+    if events is not None:
+        kept |= ~events
+    grazed = np.flatnonzero((angle < GRAZING) & ~kept)
+    if grazed.size:
+        i = int(grazed[0])
+        raise DegenerateError(grazing(named(i), float(angle[i]), ends, i, jump[i]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time_x = -e / speed[:, None]
+        time_p = -ends.value_parameters / speed[:, None]
+    matrix, by_parameters = g, ends.after_parameters
+    if not kept.all():
+        jump[kept] = 0.0
+        x, p = np.where(kept[:, None], 0.0, time_x), np.where(kept[:, None], 0.0, time_p)
+        matrix = matrix - jump[:, :, None] * x[:, None, :]
+        by_parameters = by_parameters - jump[:, :, None] * p[:, None, :]
     return Saltation(matrix, by_parameters, time_x, time_p, angle)
 
 
-def _length(v: Array) -> float:
-    return math.sqrt(float(v @ v))
-
-
-def grazing(what: str, angle: float, at: AtEvent, jump: Array) -> str:
-    """Message for an event that the orbit only touches."""
-    moved = not np.array_equal(at.after_state[:, : len(at.after)], np.eye(len(at.after)))
+def grazing(what: str, angle: float, ends: Ended, i: int, jump: Array) -> str:
+    """Message for an event that the orbit only touches, of leg i."""
+    n = jump.size
+    moved = not np.array_equal(ends.after_state[i, :, :n], np.eye(n))
     if moved:
         kind = (
             "a grazing of a reset or impact: neighbours that miss it and those that meet it differ "
             "by a square root, whose derivative is infinite"
         )
-    elif float(at.gradient[: len(jump)] @ jump) > 0.0:
+    elif float(ends.gradient[i, :n] @ jump) > 0.0:
         kind = (
             "a grazing of a sliding surface: the derivative is one matrix on the side that misses "
             "it and another one on the side that slides"

@@ -18,7 +18,7 @@ PENDULUM = ns.FilippovSystem([x, y], field=[y, -k * ca.sin(x)], parameters={k: 1
 @pytest.fixture(params=["C", "Python"])
 def engine(request, monkeypatch):
     if request.param == "Python":
-        monkeypatch.setattr(fixed, "_has_interpreter", lambda: False)
+        monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
     elif find_compiler() is None:
         pytest.skip("no C compiler")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -40,20 +41,24 @@ _MOST_ORDER = 48
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
     *("programs.h", "linear.h", "state.c", "modes.c", "stepper.c", "surfaces.c", "record.c"),
-    *("switching.c", "contacts.c", "driver.c", "memory.c", "entry.c", "fixed.c"),
+    *("switching.c", "contacts.c", "driver.c", "memory.c", "entry.c", "flow.c"),
 )
 
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 
-class _Values(ctypes.Structure):
+class ValuesStructure(ctypes.Structure):
+    """A graph as C reads it."""
+
     _fields_ = [
         *[(name, _I32) for name in ("size", "still_count", "moving_count", "output_count")],
         *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "output", "constant")],
     ]
 
 
-class _Series(ctypes.Structure):
+class SeriesStructure(ctypes.Structure):
+    """Rules of series as C reads them."""
+
     _fields_ = [
         *[(name, _I32) for name in ("size", "still_count", "moving_count", "late_count")],
         *[(name, _I32) for name in ("free_count", "output_count")],
@@ -75,8 +80,8 @@ class _System(ctypes.Structure):
     _fields_ = [
         *[(name, _I32) for name in ("n", "dimension", "timed", "m", "c", "parameters")],
         *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
-        ("series", _Series),
-        *[(name, _Values) for name in _VALUES],
+        ("series", SeriesStructure),
+        *[(name, ValuesStructure) for name in _VALUES],
         *[(name, _Entries) for name in _ENTRIES],
         *[(name, _POINTER) for name in (*_TABLES, "slope_output", "slope_moves")],
         *[(name, _I32) for name in ("linear", "pad")],
@@ -98,6 +103,7 @@ def library() -> ctypes.CDLL:
     )
     sizes = f"#define P {_MOST_ORDER}\n#define MODES 1000000\n#define M 1\n#define NG 1\n"
     texts = [driver_text("common.h"), *[driver_text(f"interpreter/{name}") for name in _FILES]]
+    texts += [_extended("programs.h", "flow.c"), driver_text("interpreter/fixed.c")]
     made = build("".join([facts_header(), sizes, head, *texts]))
     require_size(made.options_size, OptionsStructure)
     require_size(made.batch_size, BatchStructure)
@@ -114,18 +120,18 @@ def library() -> ctypes.CDLL:
     made.run_read.argtypes = [_POINTER] * 5
     made.run_resume.argtypes = [_POINTER] * 2
     made.run_many.argtypes = [*[_POINTER] * 5, _I64]
-    made.fixed_flow.restype = _D
-    arguments = "series n order group groups p z duration tol steps work".split()
-    kinds: dict[str, Any] = {
-        "n": _I32,
-        "order": _I32,
-        "groups": _I32,
-        "duration": _D,
-        "tol": _D,
-        "steps": _I64,
-    }
-    made.fixed_flow.argtypes = [kinds.get(name, _POINTER) for name in arguments]
     return made
+
+
+def _extended(*files: str) -> str:
+    """Functions of some files once more, under other names, on long doubles."""
+    text = "".join(driver_text(f"interpreter/{name}") for name in files)
+    text = re.sub(r"typedef struct \{[^}]*\} (Values|Series|Field);", "", text)
+    text = re.sub(r"\bdouble\b", "long double", text)
+    names = {"Flow", *re.findall(r"^static (?:inline )?[\w ]+?[ *](\w+)\(", text, re.MULTILINE)}
+    defined = "".join(f"#define {name} {name}_extended\n" for name in sorted(names))
+    undone = "".join(f"#undef {name}\n" for name in sorted(names))
+    return f"#include <tgmath.h>\n{defined}{text}{undone}"
 
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
@@ -137,41 +143,20 @@ def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 
 
-class FixedFlow:
-    """A smooth field's flow over known durations, without events.
-
-    Parameters
-    ----------
-    series : Series
-        Of the field, in states and parameters.
-    group : ndarray of int (m,)
-        Which states' errors have one scale; -1 for what is exact.
-    order : int
-    """
-
-    def __init__(self, series: Series, group: NDArray[np.int32], order: int):
-        self._kept: list[NDArray[Any]] = []
-        self._c = _series_structure(series, self._kept)
-        self._group, self._groups = np.ascontiguousarray(group, np.int32), int(group.max()) + 1
-        self._order = order
-        self._room = len(series.rule) * (order + 1) + len(group) * (order + 2)
-
-    def __call__(
-        self, z: Array, p: Array, duration: float, tol: float, most_steps: int
-    ) -> tuple[Array, float]:
-        """State after a duration of either sign, and the time that is left where it fails, else 0."""
-        end, p = np.array(z, float), np.append(np.array(p, float), 0.0)
-        work, n = np.empty(self._room), len(self._group)
-        sizes = (n, self._order, address(self._group), self._groups)
-        where = (address(p), address(end), duration, tol, most_steps, address(work))
-        return end, library().fixed_flow(ctypes.byref(self._c), *sizes, *where)
-
-
-def _series_structure(s: Series, kept: list[NDArray[Any]]) -> _Series:
+def series_structure(s: Series, kept: list[NDArray[Any]]) -> SeriesStructure:
+    """Rules as C reads them; what it points to is added to ``kept``."""
     lists = (s.still, s.moving, s.late, s.free, s.outputs)
     arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.first, s.second)
     kept += arrays
-    return _Series(len(s.rule), *map(len, lists), *[a.ctypes.data for a in arrays])
+    return SeriesStructure(len(s.rule), *map(len, lists), *[a.ctypes.data for a in arrays])
+
+
+def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
+    """A graph as C reads it; what it points to is added to ``kept``."""
+    arrays = (v.op, v.a, v.b, v.still, v.moving, v.outputs, v.constant)
+    kept += arrays
+    sizes = (len(v.op), len(v.still), len(v.moving), len(v.outputs))
+    return ValuesStructure(*sizes, *[a.ctypes.data for a in arrays])
 
 
 class TapeEngine:
@@ -204,11 +189,11 @@ class TapeEngine:
             resets=len(system.resets),
             order=self.order,
             slope_outputs=tape.slope_outputs,
-            series=_series_structure(tape.series, self._kept),
+            series=series_structure(tape.series, self._kept),
             linear=int(coupled.linear),
         )
         for name in _VALUES:
-            setattr(made, name, self._values(getattr(tape, name)))
+            setattr(made, name, values_structure(getattr(tape, name), self._kept))
         for name in _ENTRIES:
             setattr(made, name, self._entries(getattr(tape, name)))
         carries = np.zeros((m, c))
@@ -231,11 +216,6 @@ class TapeEngine:
     def _at(self, array: NDArray[Any]) -> int:
         self._kept.append(array)
         return array.ctypes.data
-
-    def _values(self, v: Values) -> _Values:
-        arrays = (v.op, v.a, v.b, v.still, v.moving, v.outputs, v.constant)
-        sizes = (len(v.op), len(v.still), len(v.moving), len(v.outputs))
-        return _Values(*sizes, *[self._at(a) for a in arrays])
 
     def _entries(self, e: Entries) -> _Entries:
         return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))

@@ -1,53 +1,175 @@
-/* Flow of a fixed duration: nonsmooth/flow/fixed.py -------------------------------------------------------- */
+/* Flows of known durations: nonsmooth/flow/fixed.py -------------------------------------------------------- */
 
-/* Step for which the last two terms stay below ``tol`` times the size of their group of states. */
-static double group_step(const double *c, int n, int order, const int32_t *group, int groups, double duration,
-                         double tol) {
-  double h = INFINITY;
-  for (int g = 0; g < groups; g++) {
-    double size = 0, rate = 0, before = 0, final = 0;
-    for (int i = 0; i < n; i++) {
-      const double *own = c + (int64_t)i * (order + 1);
-      if (group[i] != g) continue;
-      size = larger(fabs(own[0]), size);
-      rate = larger(fabs(own[1]), rate);
-      before = larger(fabs(own[order - 1]), before);
-      final = larger(fabs(own[order]), final);
-    }
-    double allowed = tol * larger(size, rate * duration);
-    if (allowed == 0) continue;
-    if (final > 0) h = smaller(pow(allowed / final, 1.0 / order), h);
-    if (before > 0) h = smaller(pow(allowed / before, 1.0 / (order - 1)), h);
-  }
-  return h;
+int64_t field_size(void) { return sizeof(Field); }
+
+/* Numbers that the work of a field needs. */
+int64_t field_work(const Field *f) {
+  int64_t stride = f->order + 1;
+  return f->series.size * stride + (f->n + f->watched) * stride + f->n;
 }
 
-/* Move z (n) along a smooth field by a duration of either sign; ``work`` has room for the series of the rules
- * and of the states. The time that is left where the field is not finite or steps are too small, else 0. */
-double fixed_flow(const Series *t, int32_t n, int32_t order, const int32_t *group, int32_t groups, const double *p,
-                  double *z, double duration, double tol, int64_t most_steps, double *work) {
-  int stride = order + 1;
-  double *s = work, *c = work + (int64_t)t->size * stride, *x = c + (int64_t)n * stride;
-  double left = fabs(duration), whole = left, sign = duration < 0 ? -1 : 1;
-  memset(s, 0, sizeof(double) * t->size * stride);
-  series_prepare(t, stride, p, s);
-  for (int64_t step = 0; step < most_steps && left > 0; step++) {
-    double zero = 0;
-    for (int i = 0; i < n; i++) c[(int64_t)i * stride] = z[i];
-    for (int k = 0; k < order; k++) {
-      for (int i = 0; i < n; i++) x[i] = c[(int64_t)i * stride + k];
-      series_rules(t, t->moving, t->moving_count, k, stride, x, s);
-      for (int i = 0; i < n; i++)
-        c[(int64_t)i * stride + k + 1] = s[(int64_t)t->output[i] * stride + k] / (k + 1);
-    }
-    for (int64_t i = 0; i < (int64_t)n * stride; i++) zero += 0 * c[i];
-    double h = group_step(c, n, order, group, groups, whole, tol), ignored;
-    if (!(h > 1e-14 * whole) || zero != 0) return left;
-    /* Two equal steps rather than a long one and the rest of it. */
-    if (h >= left) h = left;
-    else if (left < 1.5 * h) h = smaller(h, 0.5 * left);
-    for (int i = 0; i < n; i++) z[i] = horner(c + (int64_t)i * stride, order, sign * h, &ignored);
-    left -= h;
+/* Move z (n) along a smooth field by a duration of either sign. The time that is left where the field is not
+ * finite or steps are too small, else 0. */
+double fixed_flow(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
+                  double *work) {
+  Flow w = flow_of(f, p, duration, tol, work);
+  run_flow(&w, z, most_steps);
+  return w.left;
+}
+
+/* Legs ----------------------------------------------------------------------------------------------------- */
+
+/* Legs and what happens at their ends. One array has, from the places given: parameters, and in rows for each leg
+ * its state (width), duration, field at its start and at its end (width each), what the event's program gives of
+ * the state at its end (results); then room for work. A leg without a program ends at a time. */
+typedef struct {
+  int64_t count, width, results, states, durations, before, after, events, work;
+  const Field *const *field;
+  const Values *const *event;
+} Legs;
+
+int64_t legs_size(void) { return sizeof(Legs); }
+
+/* Move all states to the ends of their legs. The number of a leg that fails and what is left of it, or -1. */
+int64_t fly_legs(const Legs *l, double *a, double tol, int64_t most_steps, double *left) {
+  for (int64_t i = 0; i < l->count; i++) {
+    const Field *f = l->field[i];
+    const Values *e = l->event[i];
+    double *z = a + l->states + i * l->width, *found = a + l->events + i * l->results, *work = a + l->work;
+    Flow w = flow_of(f, a, a[l->durations + i], tol, work);
+    field_at(&w, z, a + l->before + i * l->width);
+    run_flow(&w, z, most_steps);
+    *left = w.left;
+    if (w.left > 0 || w.left != w.left) return i;
+    field_at(&w, z, a + l->after + i * l->width);
+    if (!e) continue;
+    memset(work, 0, sizeof(double) * e->size);
+    values_prepare(e, a, work);
+    values_run(e, z, a, work);
+    for (int k = 0; k < e->output_count; k++) found[k] = work[e->output[k]];
   }
-  return left;
+  return -1;
+}
+
+/* The same in extended precision (as ``long double`` has it), for residuals of equations whose solution is known to
+ * rounding. Results come in two parts: rounded, and in ``rest`` (results for each leg) what that leaves. */
+int64_t fly_legs_extended(const Legs *l, double *a, double tol, int64_t most_steps, double *left, double *rest) {
+  int64_t room = 0;
+  for (int64_t i = 0; i < l->count; i++) {
+    int64_t own = field_work(l->field[i]) + l->field[i]->n;
+    if (l->event[i] && l->event[i]->size > own) own = l->event[i]->size;
+    if (own > room) room = own;
+  }
+  long double *memory = calloc(room + l->width + l->states, sizeof(long double)), *work = memory + l->width + l->states;
+  long double *z = memory, *p = memory + l->width;
+  if (!memory) return 0;
+  int64_t failed = -1;
+  for (int64_t k = 0; k < l->states; k++) p[k] = a[k];
+  for (int64_t i = 0; i < l->count && failed < 0; i++) {
+    const Values *e = l->event[i];
+    for (int k = 0; k < l->field[i]->n; k++) z[k] = a[l->states + i * l->width + k];
+    Flow_extended w = flow_of_extended(l->field[i], p, a[l->durations + i], tol, work);
+    run_flow_extended(&w, z, most_steps);
+    *left = w.left;
+    if (w.left > 0 || w.left != w.left) failed = i;
+    if (failed >= 0) continue;
+    memset(work, 0, sizeof(long double) * e->size);
+    values_prepare_extended(e, p, work);
+    values_run_extended(e, z, p, work);
+    for (int k = 0; k < e->output_count; k++) {
+      long double value = work[e->output[k]];
+      a[l->events + i * l->results + k] = value;
+      rest[i * l->results + k] = value - (long double)(double)value;
+    }
+  }
+  free(memory);
+  return failed;
+}
+
+/* What is watched ------------------------------------------------------------------------------------------ */
+
+typedef struct { double *root; int count, room; } Roots;
+
+/* Roots on (lo, hi] of a polynomial given its Bernstein coefficients there, in order. */
+static void roots_in(const double *c, int n, double *b, double lo, double hi, int depth, Roots *found) {
+  int changes = 0;
+  for (int j = 0; j < n; j++) changes += (b[j] > 0) != (b[j + 1] > 0);
+  if (!changes || found->count == found->room) return;
+  if (changes == 1 || depth == DEPTH) {
+    double up[P + 1], sign = b[0] > 0 ? 1 : -1;
+    for (int k = 0; k <= n; k++) up[k] = sign * c[k];
+    found->root[found->count++] = changes == 1 ? newton(up, n, lo, hi, 0.5 * (lo + hi)) : hi;
+    return;
+  }
+  double left[P + 1], mid = 0.5 * (lo + hi);
+  left[0] = b[0];
+  for (int level = n; level > 0; level--) {
+    for (int i = 0; i < level; i++) b[i] = 0.5 * (b[i] + b[i + 1]);
+    left[n - level + 1] = b[0];
+  }
+  roots_in(c, n, left, lo, mid, depth + 1, found);
+  roots_in(c, n, b, mid, hi, depth + 1, found);
+}
+
+/* Extrema in (0, h] of a polynomial of degree n. */
+static int extrema(const double *c, int n, double h, double *root, int room) {
+  double slope[P + 1], b[P + 1], power = 1;
+  Roots found = {root, 0, room};
+  for (int k = 0; k < n; k++) {
+    slope[k] = (k + 1) * c[k + 1];
+    b[k] = slope[k] * power;
+    power *= h;
+  }
+  bernstein(b, n - 1);
+  roots_in(slope, n - 1, b, 0, h, 0, &found);
+  return found.count;
+}
+
+/* Values of what is watched at its extrema and at the ends of steps, further than ``margin`` from both ends of the
+ * flow. Rows of ``found``: number, time, value, second derivative (0 at the end of a step), state. What is left of
+ * the flow; the number of rows goes to ``count``, which stops at ``room``. */
+double fixed_watch(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
+                   double margin, double *found, int64_t room, int64_t *count, double *work) {
+  Flow w = flow_of(f, p, duration, tol, work);
+  int64_t stride = f->order + 1, width = 4 + f->n;
+  double root[P + 1];
+  *count = 0;
+  for (int64_t step = 0; step < most_steps && w.left > 0; step++) {
+    double h = expand_flow(&w, z) ? flow_step(&w) : 0, t = w.whole - w.left, slope;
+    if (!(h > 0)) break;
+    for (int j = 0; j < f->watched; j++) {
+      const double *c = w.watched + j * stride;
+      int many = extrema(c, f->order, h, root, P);
+      root[many] = h;
+      for (int k = 0; k <= many; k++) {
+        double s = root[k], bend = 0, *row = found + *count * width;
+        if (k == many && t + h >= w.whole - margin) continue;
+        if (!(margin < t + s && t + s < w.whole - margin) || *count == room) continue;
+        for (int i = f->order; i >= 2 && k < many; i--) bend = bend * s + i * (i - 1) * c[i];
+        row[0] = j; row[1] = t + s; row[2] = horner(c, f->order, s, &slope); row[3] = bend;
+        for (int i = 0; i < f->n; i++) row[4 + i] = horner(w.states + i * stride, f->order, s, &slope);
+        ++*count;
+      }
+    }
+    advance_flow(&w, h, z);
+  }
+  return w.left;
+}
+
+/* Time until a watched function passes zero in a direction; a start nearer to zero than ``still`` is not counted.
+ * -1 if it does not within the duration, -2 where the flow ends before. */
+double fixed_march(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
+                   int32_t row, int32_t direction, double still, double *work) {
+  Flow w = flow_of(f, p, duration, tol, work);
+  for (int64_t step = 0; step < most_steps && w.left > 0; step++) {
+    double h = expand_flow(&w, z) ? flow_step(&w) : 0;
+    if (!(h > 0)) return -2;
+    const double *c = w.watched + (int64_t)row * (f->order + 1);
+    int drop = 0;
+    while (step == 0 && drop < f->order && !(fabs(c[drop]) > still)) drop++;
+    double t = first_crossing(c + drop, f->order - drop, h, direction);
+    if (t >= 0 && w.whole - w.left + t > 0) return w.whole - w.left + t;
+    advance_flow(&w, h, z);
+  }
+  return w.left > 0 ? -2 : -1;
 }

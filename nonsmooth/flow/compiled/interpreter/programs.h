@@ -95,18 +95,37 @@ static void values_run(const Values *t, const double *x, const double *p, double
   values_nodes(t, t->moving, t->moving_count, x, p, w);
 }
 
-/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in two chains. */
+/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {
-  double even = 0, odd = 0;
+  double a = 0, b = 0, c = 0, d = 0;
   int i = first;
-  for (; i < last; i += 2) { even += u[i] * v[k - i]; odd += u[i + 1] * v[k - i - 1]; }
-  return i == last ? (even + u[i] * v[k - i]) + odd : even + odd;
+  v += k;
+  for (; i + 3 <= last; i += 4) {
+    a += u[i] * v[-i];
+    b += u[i + 1] * v[-i - 1];
+    c += u[i + 2] * v[-i - 2];
+    d += u[i + 3] * v[-i - 3];
+  }
+  if (i <= last) a += u[i] * v[-i];
+  if (i + 1 <= last) b += u[i + 1] * v[-i - 1];
+  if (i + 2 <= last) c += u[i + 2] * v[-i - 2];
+  return (a + b) + (c + d);
 }
 static inline double weigh(const double *u, const double *v, int k, int first, int last) {
-  double even = 0, odd = 0;
+  double a = 0, b = 0, c = 0, d = 0;
   int i = first;
-  for (; i < last; i += 2) { even += i * (u[i] * v[k - i]); odd += (i + 1) * (u[i + 1] * v[k - i - 1]); }
-  return i == last ? (even + i * (u[i] * v[k - i])) + odd : even + odd;
+  double x = first;
+  v += k;
+  for (; i + 3 <= last; i += 4, x += 4) {
+    a += x * u[i] * v[-i];
+    b += (x + 1) * u[i + 1] * v[-i - 1];
+    c += (x + 2) * u[i + 2] * v[-i - 2];
+    d += (x + 3) * u[i + 3] * v[-i - 3];
+  }
+  if (i <= last) a += x * u[i] * v[-i];
+  if (i + 1 <= last) b += (x + 1) * u[i + 1] * v[-i - 1];
+  if (i + 2 <= last) c += (x + 2) * u[i + 2] * v[-i - 2];
+  return (a + b) + (c + d);
 }
 
 /* A coefficient that is zero stays so, whatever it is divided by: a square root of zero at rest. */

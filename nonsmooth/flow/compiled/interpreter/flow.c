@@ -1,0 +1,113 @@
+/* Steps of a flow without events: nonsmooth/flow/fixed.py -------------------------------------------------- */
+
+/* A smooth field of n states and functions that are watched along it, as the outputs of one program; errors of
+ * states of one group have one scale, those of group -1 are exact. */
+typedef struct {
+  int32_t n, watched, order, groups;
+  const int32_t *group;
+  Series series;
+} Field;
+
+/* A flow on its way: series of the rules, of the states and of what is watched, and what is left. */
+typedef struct {
+  const Field *field;
+  double *rules, *states, *watched, *input;
+  double whole, left, sign, tol;
+} Flow;
+
+static Flow flow_of(const Field *f, const double *p, double duration, double tol, double *work) {
+  int64_t stride = f->order + 1;
+  Flow w = {.field = f, .rules = work, .whole = fabs(duration), .left = fabs(duration)};
+  w.sign = duration < 0 ? -1 : 1;
+  w.tol = tol;
+  w.states = work + f->series.size * stride;
+  w.watched = w.states + f->n * stride;
+  w.input = w.watched + f->watched * stride;
+  memset(w.rules, 0, sizeof(double) * f->series.size * stride);
+  series_prepare(&f->series, stride, p, w.rules);
+  return w;
+}
+
+/* The field at a state. */
+static void field_at(Flow *w, const double *z, double *rate) {
+  const Series *t = &w->field->series;
+  int64_t stride = w->field->order + 1;
+  series_rules(t, t->moving, t->moving_count, 0, stride, z, w->rules);
+  for (int i = 0; i < w->field->n; i++) rate[i] = w->rules[t->output[i] * stride];
+}
+
+/* Series of states and of what is watched at a state; whether they are finite. */
+static int expand_flow(Flow *w, const double *z) {
+  const Field *f = w->field;
+  const Series *t = &f->series;
+  int n = f->n, order = f->order;
+  int64_t stride = order + 1;
+  for (int i = 0; i < n; i++) w->states[i * stride] = z[i];
+  for (int k = 0; k < order + (f->watched > 0); k++) {
+    for (int i = 0; i < n; i++) w->input[i] = w->states[i * stride + k];
+    series_rules(t, t->moving, t->moving_count, k, stride, w->input, w->rules);
+    if (k < order)
+      for (int i = 0; i < n; i++) w->states[i * stride + k + 1] = w->rules[t->output[i] * stride + k] / (k + 1);
+    for (int j = 0; j < f->watched; j++) w->watched[j * stride + k] = w->rules[t->output[n + j] * stride + k];
+  }
+  double zero = 0;
+  for (int64_t i = 0; i < n * stride; i++) zero += 0 * w->states[i];
+  return zero == 0;
+}
+
+/* Step for which the last two terms of series with one scale stay below the tolerance. */
+static double scaled_step(const Flow *w, double size, double rate, double before, double final) {
+  double allowed = w->tol * larger(size, rate * w->whole), h = INFINITY;
+  int order = w->field->order;
+  if (allowed == 0) return h;
+  if (final > 0) h = pow(allowed / final, 1.0 / order);
+  if (before > 0) h = smaller(pow(allowed / before, 1.0 / (order - 1)), h);
+  return h;
+}
+
+/* Length of the next step; not above zero where it is too small. */
+static double flow_step(const Flow *w) {
+  const Field *f = w->field;
+  int order = f->order;
+  double h = INFINITY;
+  for (int g = 0; g < f->groups; g++) {
+    double size = 0, rate = 0, before = 0, final = 0;
+    for (int i = 0; i < f->n; i++) {
+      const double *own = w->states + (int64_t)i * (order + 1);
+      if (f->group[i] != g) continue;
+      size = larger(fabs(own[0]), size);
+      rate = larger(fabs(own[1]), rate);
+      before = larger(fabs(own[order - 1]), before);
+      final = larger(fabs(own[order]), final);
+    }
+    h = smaller(scaled_step(w, size, rate, before, final), h);
+  }
+  for (int j = 0; j < f->watched; j++) { /* a guard may vary where the states rest */
+    const double *own = w->watched + (int64_t)j * (order + 1);
+    h = smaller(scaled_step(w, fabs(own[0]), fabs(own[1]), fabs(own[order - 1]), fabs(own[order])), h);
+  }
+  if (!(h > 1e-14 * w->whole)) return 0;
+  /* Two equal steps rather than a long one and the rest of it. */
+  if (h >= w->left) return w->left;
+  return w->left < 1.5 * h ? smaller(h, 0.5 * w->left) : h;
+}
+
+/* Move z by a step. */
+static void advance_flow(Flow *w, double h, double *z) {
+  int order = w->field->order;
+  for (int i = 0; i < w->field->n; i++) {
+    const double *c = w->states + (int64_t)i * (order + 1);
+    double x = w->sign * h, sum = c[order];
+    for (int k = order - 1; k >= 0; k--) sum = sum * x + c[k];
+    z[i] = sum;
+  }
+  w->left -= h;
+}
+
+static void run_flow(Flow *w, double *z, int64_t most_steps) {
+  for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
+    double h = expand_flow(w, z) ? flow_step(w) : 0;
+    if (!(h > 0)) return;
+    advance_flow(w, h, z);
+  }
+}

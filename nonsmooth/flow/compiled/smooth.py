@@ -1,0 +1,242 @@
+"""Smooth fields in the interpreter: flows of known durations, legs in one call, functions along them."""
+
+from __future__ import annotations
+
+import ctypes
+from collections.abc import Sequence
+from functools import lru_cache
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array
+from ...model.printing.tape import Series, Values
+from .arrays import address, require_size
+from .tape import SeriesStructure, library, series_structure, values_structure
+
+_I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
+
+#: Rows of what is watched that are looked for at first.
+_ROOM = 64
+
+
+class _Field(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I32) for name in ("n", "watched", "order", "groups")],
+        ("group", _POINTER),
+        ("series", SeriesStructure),
+    ]
+
+
+class _Legs(ctypes.Structure):
+    _fields_ = [
+        *[(name, _I64) for name in ("count", "width", "results", "states", "durations")],
+        *[(name, _I64) for name in ("before", "after", "events", "work")],
+        ("field", _POINTER),
+        ("event", _POINTER),
+    ]
+
+
+@lru_cache(maxsize=1)
+def _library() -> ctypes.CDLL:
+    made = library()
+    require_size(made.field_size, _Field)
+    require_size(made.legs_size, _Legs)
+    flow: list[Any] = [_POINTER, _POINTER, _POINTER, _D, _D, _I64]
+    made.fixed_flow.restype = made.fixed_watch.restype = made.fixed_march.restype = _D
+    made.fixed_flow.argtypes = [*flow, _POINTER]
+    made.fixed_watch.argtypes = [*flow, _D, _POINTER, _I64, _POINTER, _POINTER]
+    made.fixed_march.argtypes = [*flow, _I32, _I32, _D, _POINTER]
+    made.fly_legs.restype = made.field_work.restype = _I64
+    made.fly_legs.argtypes = [_POINTER, _POINTER, _D, _I64, _POINTER]
+    made.field_work.argtypes = [_POINTER]
+    made.fly_legs_extended.restype = _I64
+    made.fly_legs_extended.argtypes = [_POINTER, _POINTER, _D, _I64, _POINTER, _POINTER]
+    return made
+
+
+class SmoothProgram:
+    """A smooth field, and functions that are watched along it.
+
+    Parameters
+    ----------
+    series : Series
+        Of the field, then of the functions, in states and parameters.
+    group : ndarray of int (n,)
+        Which states' errors have one scale; -1 for what is exact.
+    order : int
+    """
+
+    def __init__(self, series: Series, group: NDArray[np.int32], order: int):
+        self._kept: list[NDArray[Any]] = [np.ascontiguousarray(group, np.int32)]
+        self.size, groups = len(group), int(group.max(initial=-1)) + 1
+        watched = len(series.outputs) - self.size
+        rules = series_structure(series, self._kept)
+        self._c = _Field(self.size, watched, order, groups, address(self._kept[0]), rules)
+        self.pointer = ctypes.addressof(self._c)
+        self.work = int(_library().field_work(self.pointer))
+
+    def _given(self, z: Array, p: Array) -> tuple[Array, int, int, int]:
+        """Parameters, state and room for work in one array, and where they are."""
+        memory = np.empty(len(p) + 1 + self.size + self.work)
+        memory[: len(p)] = p
+        memory[len(p) + 1 : len(p) + 1 + self.size] = z
+        at = memory.ctypes.data
+        state = at + 8 * (len(p) + 1)
+        return memory, at, state, state + 8 * self.size
+
+    def flow(
+        self, z: Array, p: Array, duration: float, tol: float, most_steps: int
+    ) -> tuple[Array, float]:
+        """State after a duration of either sign, and the time that is left where it fails, else 0."""
+        memory, at, state, work = self._given(z, p)
+        left = _library().fixed_flow(self.pointer, at, state, duration, tol, most_steps, work)
+        return memory[len(p) + 1 : len(p) + 1 + self.size], left
+
+    def watch(
+        self, z: Array, p: Array, duration: float, tol: float, most_steps: int, margin: float
+    ) -> tuple[Array, Array, float]:
+        """Extrema of the functions and their values at the ends of steps, the end, and what is left.
+
+        Rows: number, time, value, second derivative (0 at the end of a step), state.
+        """
+        count, room = ctypes.c_int64(), _ROOM
+        while True:
+            memory, at, state, work = self._given(z, p)
+            found = np.empty((room, 4 + self.size))
+            where = (margin, address(found), room, ctypes.byref(count), work)
+            left = _library().fixed_watch(
+                self.pointer, at, state, duration, tol, most_steps, *where
+            )
+            if count.value < room:
+                return found[: count.value], memory[len(p) + 1 : len(p) + 1 + self.size], left
+            room *= 8
+
+    def march(
+        self,
+        z: Array,
+        p: Array,
+        duration: float,
+        tol: float,
+        most_steps: int,
+        row: int,
+        direction: int,
+        still: float,
+    ) -> float:
+        """Time until a function passes zero; -1 if it does not, -2 where the flow ends before."""
+        memory, at, state, work = self._given(z, p)
+        found: float = _library().fixed_march(
+            self.pointer, at, state, duration, tol, most_steps, row, direction, still, work
+        )
+        del memory
+        return found
+
+
+class ValuesProgram:
+    """Expressions of states and parameters.
+
+    Parameters
+    ----------
+    values : Values
+    """
+
+    def __init__(self, values: Values):
+        self._kept: list[NDArray[Any]] = []
+        self._c = values_structure(values, self._kept)
+        self.pointer = ctypes.addressof(self._c)
+        self.results, self.work = len(values.outputs), len(values.op)
+
+
+class FlownLegs(NamedTuple):
+    """Legs flown in one call.
+
+    Attributes
+    ----------
+    ends, before, after : ndarray (L, width)
+        States at the ends, fields at the starts and at the ends.
+    results : ndarray (L, results)
+        Of the events' programs.
+    failed : int
+        Number of a leg that fails, or -1.
+    left : float
+        Time that is left of it.
+    """
+
+    ends: Array
+    before: Array
+    after: Array
+    results: Array
+    failed: int
+    left: float
+
+
+class LegsProgram:
+    """Legs of smooth fields, with what happens at their ends, flown in one call.
+
+    Parameters
+    ----------
+    fields : sequence of SmoothProgram
+        Of each leg.
+    events : sequence of ValuesProgram or None
+        What is evaluated at the end of each leg.
+    parameters : int
+    """
+
+    def __init__(
+        self,
+        fields: Sequence[SmoothProgram],
+        events: Sequence[ValuesProgram | None],
+        parameters: int,
+    ):
+        self._kept = [*fields, *events]
+        count, own = len(fields), [e for e in events if e is not None]
+        self.width = max(f.size for f in fields)
+        results = max([e.results for e in own], default=0)
+        self._pointers = (_POINTER * count)(*[f.pointer for f in fields])
+        self._events = (_POINTER * count)(*[e.pointer if e else None for e in events])
+        sizes = [parameters + 1, count * self.width, count, count * self.width, count * self.width]
+        sizes += [count * results, max([*(f.work for f in fields), *(e.work for e in own)])]
+        places = np.cumsum([0, *sizes]).tolist()
+        self._places, self._count, self._parameters = places, count, parameters
+        pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
+        self._c = _Legs(count, self.width, results, *places[1:7], *pointers)
+
+    def __call__(
+        self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
+    ) -> FlownLegs:
+        """Fly all legs from states (L, width)."""
+        memory, parts = self._given(z, p, durations)
+        left = ctypes.c_double()
+        failed = _library().fly_legs(
+            ctypes.byref(self._c), memory.ctypes.data, tol, most_steps, ctypes.byref(left)
+        )
+        rows = [part.reshape(self._count, -1) for part in (parts[1], parts[3], parts[4], parts[5])]
+        return FlownLegs(rows[0], rows[1], rows[2], rows[3], failed, left.value)
+
+    def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
+        memory, at = np.empty(self._places[-1]), self._places
+        parts = [memory[at[k] : at[k + 1]] for k in range(6)]
+        parts[0][: self._parameters] = p
+        parts[1][:] = z.ravel()
+        parts[2][:] = durations
+        return memory, parts
+
+    def extended(
+        self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
+    ) -> tuple[Array, Array] | None:
+        """Results (L, results) in extended precision, rounded, and what that leaves; None where a leg
+        fails. Every leg must have an event."""
+        memory, parts = self._given(z, p, durations)
+        left, rest = ctypes.c_double(), np.empty(len(parts[5]))
+        failed = _library().fly_legs_extended(
+            ctypes.byref(self._c),
+            memory.ctypes.data,
+            tol,
+            most_steps,
+            ctypes.byref(left),
+            address(rest),
+        )
+        if failed >= 0:
+            return None
+        return parts[5].reshape(self._count, -1), rest.reshape(self._count, -1)

@@ -247,7 +247,9 @@ class Flights:
         count, n, most, q = len(self.legs), starts.shape[1], self._most, len(self.chosen)
         flight = Flight(
             self.sizes,
-            *(np.zeros((count, most)) for _ in range(3)),
+            np.zeros((count, most)),
+            np.zeros((count, most)),
+            np.zeros((count, most)),
             np.zeros((count, most, n)),
             np.zeros((count, most, q)),
             *self._events(np.zeros((count, 0)), n, p.size),

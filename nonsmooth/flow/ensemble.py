@@ -102,7 +102,7 @@ def ensemble(
         max_events=max_events,
         start_mode=start_mode,
     )
-    require_system(system)
+    require_system(system, sets=True)
     work = _work(work)
     if start_mode is not None:
         system.parse_mode(start_mode)

@@ -82,11 +82,19 @@ SHRINKS = 0.9999
 REMAINING = 1e-6
 AT_ONCE = 40  # events at one instant
 
+#: A set h = 0 is reached in one step where what friction's turning could still do is this part of the
+#: local tolerance. One that was left is far where |h| is this much of its terms.
+REACHED = 0.1
+LEFT = 1e-6
+
 #: Kinds of events, by number in ensembles and in C.
 KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
 
 #: Kinds of guards, by number in C, and which is served first among simultaneous ones.
-GUARDS = ("surface", "exit", "stop", "reset", "impact", "release", "branch")
+GUARDS = (
+    *("surface", "exit", "stop", "reset", "impact", "release", "branch"),
+    *("near", "slip"),
+)
 PRIORITY = {
     "stop": 0,
     "reset": 1,
@@ -95,6 +103,8 @@ PRIORITY = {
     "exit": 4,
     "release": 5,
     "branch": 6,
+    "near": 3,
+    "slip": 4,
 }
 
 #: Why a run ended, besides its status, by number in C.

@@ -30,7 +30,8 @@ from ..model import (
 )
 from . import messages
 from .options import Options
-from .reference.modes import CoupledModes, Expansion, Modes, SeparateModes, powers
+from .reference.coupled_modes import CoupledModes
+from .reference.modes import Expansion, Modes, SeparateModes, powers
 from .reference.polynomial import first_crossing
 from .reference.record import Record
 from .reference.stepper import Hit, Stepper

@@ -40,6 +40,19 @@ def multiple_zero(surface: int) -> str:
     )
 
 
+def indefinite(name: str) -> str:
+    """The multiplier of a set does not oppose h."""
+    return (
+        f"On {name} = 0 the matrix M = -dh/dx df/dlambda has a negative direction: friction that pushes "
+        "(Painleve's paradox, or a negative load), for which several motions can follow."
+    )
+
+
+def several_directions(count: int) -> str:
+    """A set can be left in several ways."""
+    return f"The set h = 0 can be left in {count} directions: M is far from symmetric."
+
+
 def degenerate() -> str:
     """No mode can continue, to rounding."""
     return "No mode continues from here to rounding: a degenerate tangency."

@@ -107,7 +107,7 @@ def simulate(
     >>> run.itinerary, bool(abs(run.x[-1, 0] + 0.2) < 1e-9)
     ('- + - + s', True)
     """
-    require_system(system)
+    require_system(system, sets=True)
     options = Options(
         t_end=t_end,
         t_start=t_start,

@@ -31,6 +31,8 @@ from .sections import SECTION, surface_of, with_section
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
+from .vectors import multiplier_enters
+from .yardsticks import Yardsticks
 
 __all__ = [
     "SECTION",
@@ -59,6 +61,7 @@ __all__ = [
     "Resets",
     "Stop",
     "Surfaces",
+    "Yardsticks",
     "call",
     "complementarity",
     "coupled_of",
@@ -70,6 +73,7 @@ __all__ = [
     "layer_of",
     "loop_at",
     "motion",
+    "multiplier_enters",
     "periods",
     "read_function",
     "read_period",

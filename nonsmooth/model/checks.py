@@ -101,8 +101,11 @@ def _number(value: Any) -> bool:
     return is_real(value) or (isinstance(value, float) and not math.isfinite(value))
 
 
-def require_system(value: Any) -> None:
-    """Raise DefinitionError unless a value is a FilippovSystem."""
+def require_system(value: Any, sets: bool = False) -> None:
+    """Raise DefinitionError unless a value is a FilippovSystem.
+
+    ``sets`` says whether it may have sets of codimension two or more, where multipliers are vectors.
+    """
     from .system import FilippovSystem
 
     if not isinstance(value, FilippovSystem):
@@ -113,5 +116,15 @@ def require_system(value: Any) -> None:
                 received=f"{value!r} ({type(value).__name__})",
                 advice="Make one with FilippovSystem(states, ...) or "
                 "FilippovSystem.from_expression(states, rhs).",
+            )
+        )
+    if value.sets and not sets:
+        raise DefinitionError(
+            explain(
+                "system",
+                expected="one whose multipliers are scalars, here",
+                received=repr(value),
+                advice="Vector multipliers, sets of codimension two and three, are known to simulate, "
+                "ensemble, region and limit_directions.",
             )
         )

@@ -12,6 +12,7 @@ from .form import Definition
 from .graph import require_smooth
 from .reading import Parameters, listed, require_finite, require_known, require_unique
 from .values import Array, parameter_values
+from .vectors import require_linear_sets
 
 
 def require_consistent(d: Definition) -> None:
@@ -53,6 +54,7 @@ def require_consistent(d: Definition) -> None:
         _check_impact(d, j)
     if not d.hidden:
         _require_linear(d)
+    require_linear_sets(d)
 
 
 def _check_impact(d: Definition, j: int) -> None:

@@ -2,9 +2,8 @@
 
 On a surface that does not slide the multiplier is the number +1 or -1. On those that slide the
 multipliers keep G_i = grad h_i . f(x, lambda) at zero: coefficient k of lambda enters coefficient k of
-G linearly, with the matrix M = dG/dlambda at the start of the step, so the series of the multipliers
-follow order by order from one factorisation of M (also where lambda enters nonlinearly: hidden
-dynamics). Nothing here grows as the number of modes.
+G linearly, with the matrix M = dG/dlambda at the start of the step (``multiplier_series``; also where
+lambda enters nonlinearly: hidden dynamics). Nothing here grows as the number of modes.
 
 Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), the
 unknown is nu_i = n_i lambda_i (``factors``).
@@ -16,7 +15,6 @@ complementarity of several surfaces; Jeffrey 2018 for hidden dynamics.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import casadi as ca
@@ -29,36 +27,13 @@ from .factors import with_factors
 from .graph import depends_on, instructions
 from .identity import vanish_on
 from .jets import Expansion
+from .multiplier_series import MultiplierSeries, unit
 from .numbers import Numbers
 from .rules import lower, touched
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
-
-
-@dataclass(frozen=True)
-class Yardsticks:
-    """Numbers at the start of a step.
-
-    Attributes
-    ----------
-    layer : ndarray (m,)
-        G at the multipliers given.
-    slope : ndarray (m, m)
-        Its derivatives by the unknown of each surface (lambda_i, or nu_i).
-    factors : ndarray (m,)
-        n_i; 1 where there is none.
-    layer_gradient, surface_gradient, stop_gradient, factor_gradient : ndarray (m, N) or (s, N)
-        Magnitudes of the state derivatives of G, of surfaces and gaps, of stops and resets.
-    """
-
-    layer: Array
-    slope: Array
-    factors: Array
-    layer_gradient: Array
-    surface_gradient: Array
-    stop_gradient: Array
-    factor_gradient: Array
+from .yardsticks import Yardsticks
 
 
 class Coupled:
@@ -103,7 +78,8 @@ class Coupled:
         self.affine = bool(ca.is_linear(field, every))
         #: Whether field, layer and guards are affine in states and multipliers together.
         everything = ca.vertcat(field, self.layer, heights, stops)
-        self.linear = not any(self.scaled) and bool(ca.is_linear(everything, self.moving))
+        smooth = not any(self.scaled) and not system.sets
+        self.linear = smooth and bool(ca.is_linear(everything, self.moving))
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
@@ -111,6 +87,8 @@ class Coupled:
 
     def _is_continuous(self, surface: int) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
+        if surface in self.system.set_of:
+            return False
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
         pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
@@ -125,7 +103,35 @@ class Coupled:
         """Multipliers that are known in a mode: +1 and -1; 0 for the others and open contacts."""
         signs = np.array(self.system.parse_letters(mode), float)
         signs[self._surfaces :] = 0.0
+        signs[list(self.system.set_of)] = 0.0
         return signs
+
+    def known_multipliers(self, mode: str, x: Array, unknowns: Array, p: Array) -> Array:
+        """Multipliers at a state that are known in a mode: as ``held``, and h/|h| off a set; ``unknowns``
+        of a set that was just left (letter ``b``) are h, of one being left (``l``) its direction."""
+        held = self.held(mode)
+        for members in self.moving_sets(mode):
+            own = list(members)
+            h = self.heights_at(x, p)[own] if mode[own[0]] == "*" else unknowns[own]
+            held[own] = unit(h)
+        return held
+
+    def moving_sets(self, mode: str) -> list[tuple[int, ...]]:
+        """Sets off which a mode is, or which it leaves."""
+        return [s for s in self.system.sets if self.system.widened(mode)[s[0]] in "*bl"]
+
+    def acting(self, mode: str, unknowns: Array) -> Array:
+        """Unknowns that multiply the field: not what is kept of sets that are left."""
+        slides = np.array(self.system.parse_letters(mode)) == 0
+        return np.where(slides, unknowns, 0.0) if self.system.sets else unknowns
+
+    def heights_at(self, x: Array, p: Array) -> Array:
+        """Switching functions and gaps (m,) at an extended state."""
+        return self._heights.copied(x, p)[0].ravel()
+
+    @cached_property
+    def _heights(self) -> Evaluator:
+        return Evaluator(self.system.function("heights", lambda: [self.heights]))
 
     def sliding(self, mode: str) -> list[int]:
         """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
@@ -142,15 +148,19 @@ class Coupled:
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
         result: list[Guard] = []
+        names = self.system.surface_names
         for i, sign in enumerate(self.system.parse_letters(mode)):
             j = i - self._surfaces
             if j >= 0:
                 kind, name = ("impact" if sign else "release"), self.system.impacts[j]
                 result.append(Guard(kind, j, sign, name))
+            elif i in self.system.set_of:
+                result += self._guards_of_set(i, mode[i])
             elif sign:
-                result.append(Guard("surface", i, sign, f"h{i}"))
+                result.append(Guard("surface", i, sign, names[i]))
             else:
-                result += [Guard("exit", i, side, f"lambda{i}") for side in (1, -1)]
+                name = f"lambda{names[i][1:]}"
+                result += [Guard("exit", i, side, name) for side in (1, -1)]
         items = [("stop", j, *s) for j, s in enumerate(self.system.stops)]
         items += [("reset", j, *r) for j, r in enumerate(self.system.resets)]
         result += [Guard(kind, j, direction, name) for kind, j, name, direction in items]
@@ -159,6 +169,13 @@ class Coupled:
         first = next((i for i in sliding if i < self._surfaces), 0)
         branches = len(self._changing(sliding))
         return (*result, *[Guard("branch", first, 0, "stability of sliding")] * branches)
+
+    def _guards_of_set(self, i: int, letter: str) -> list[Guard]:
+        """Those of the set that begins with a switching function; none with the others."""
+        if i != self.system.set_of[i][0] or letter == "i":
+            return []
+        kinds = ["near"] if letter != "s" else ["slip", *["near"] * self.scaled[i]]
+        return [Guard(kind, i, 0, self.system.surface_names[i]) for kind in kinds]
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:
@@ -301,94 +318,77 @@ class Coupled:
             self._series[key] = Expansion(rules, rows, [], Numbers()), late
         return self._series[key]
 
-    def jets(
-        self, mode: str, x: Array, unknowns: Array, slope: Array, p: Array, order: int
-    ) -> tuple[Array, Array, Array]:
+    def jets(self, law: MultiplierSeries, x: Array, p: Array) -> tuple[Array, Array]:
         """Taylor coefficients in a mode.
 
         Parameters
         ----------
-        mode : str
+        law : MultiplierSeries
+            Of the mode; filled.
         x : ndarray (N,)
-        unknowns : ndarray (m,)
-            lambda_i or nu_i of the surfaces that slide, at the start.
-        slope : ndarray (m, m)
-            dG/d(unknowns) there.
         p : ndarray
-        order : int
 
         Returns
         -------
         states : ndarray (N, order + 1)
         guards : ndarray (g, order + 1)
             In the order of ``guards``.
-        series : ndarray (m, order + 1)
-            Of the unknowns; zero where nothing slides.
         """
-        expansion, late = self._expansion(mode)
+        expansion, late = self._expansion(law.mode)
         expansion.restart([v or None for v in p.tolist()])
-        held = self.held(mode)
-        sliding = self.sliding(mode)
-        inverse = _inverse(slope[np.ix_(sliding, sliding)])
+        order = law.order
         states = np.zeros((x.size, order + 1))
         states[:, 0] = x
-        series = np.zeros((self.count, order + 1))
-        series[sliding, 0] = unknowns[sliding]
         found: list[list[list[float]]] = []
         for k in range(order + 1):
-            outputs = expansion.advance(k, self._now(states[:, k], held, series[:, k], k))
-            if k and sliding:
-                residual = np.array([outputs[1][i] or 0.0 for i in sliding])
-                series[sliding, k] = -inverse @ residual
-                now = self._now(states[:, k], held, series[:, k], k)
-                outputs = expansion.again(k, now, late)
+            outputs = expansion.advance(k, self._now(states[:, k], law, k))
+            if law.follow(k, outputs[2]):
+                outputs = expansion.again(k, self._now(states[:, k], law, k), late)
+            if law.solve(k, outputs[1]):
+                outputs = expansion.again(k, self._now(states[:, k], law, k), late)
+            law.close(k, outputs[1])
             numbers = [[v or 0.0 for v in row] for row in outputs]
             found.append(numbers[1:])
             if k < order:
                 states[:, k + 1] = np.array(numbers[0]) / (k + 1)
         parts = [np.array([numbers[j] for numbers in found]).T for j in range(5)]
-        return states, self.rows(mode, series, *parts), series
+        of_sets = law.rows(parts[1], parts[2], self) if self.system.sets else []
+        return states, self.rows(law.mode, law.series, of_sets, *parts)
 
-    def _now(self, states: Array, held: Array, unknowns: Array, k: int) -> list[float | None]:
+    def _now(self, states: Array, law: MultiplierSeries, k: int) -> list[float | None]:
         """Coefficients k of the moving inputs: states, lambda and reactions, nu."""
-        values = self._inputs(states, held if k == 0 else np.zeros(self.count), unknowns)
+        values = self._inputs(states, law.held[:, k], law.acting[:, k])
         return [v or None for v in values.tolist()]
 
     def rows(
         self,
         mode: str,
         series: Array,
+        of_sets: Sequence[list[Array]],
         layer: Array,
         heights: Array,
         factors: Array,
         stops: Array,
         stability: Array | None = None,
     ) -> Array:
-        """Guards of a mode, from coefficients or values (rows) of what they are made of."""
+        """Guards of a mode, from coefficients or values (rows) of what they are made of; those of the
+        sets as they are."""
         rows: list[Array] = []
-        signs = self.system.parse_letters(mode)
+        signs, first = self.system.parse_letters(mode), [s[0] for s in self.system.sets]
         for i, sign in enumerate(signs):
-            if sign:
+            if i in self.system.set_of:
+                rows += of_sets[first.index(i)] if i in first and mode[i] != "i" else []
+            elif sign:
                 rows.append(sign * heights[i])
-                continue
-            if i >= self._surfaces:
+            elif i >= self._surfaces:
                 rows.append(series[i])
-                continue
-            if self._is_idle(i, signs):
+            elif self._is_idle(i, signs):
                 rows += [-layer[i], layer[i]]
-                continue
-            turn = _sign(factors[i])
-            rows += [turn * (factors[i] - series[i]), turn * (factors[i] + series[i])]
+            else:
+                turn = _sign(factors[i])
+                rows += [turn * (factors[i] - series[i]), turn * (factors[i] + series[i])]
         rows += [*stops, *[_sign(row) * row for row in (() if stability is None else stability)]]
         return np.array(rows) if rows else np.zeros((0, *np.shape(series)[1:]))
-
-
-def _inverse(matrix: Array) -> Array:
-    """Inverse of a matrix; NaN where it has none."""
-    try:
-        return np.asarray(np.linalg.inv(matrix), float)
-    except np.linalg.LinAlgError:
-        return np.full_like(matrix, np.nan)
 
 
 def _sign(row: Array) -> float:

@@ -18,6 +18,7 @@ from .events import Impact, Reset, Stop
 from .form import Definition
 from .graph import require_smooth
 from .reading import Expression, Parameters, column, listed, require_known, scalar, symbols
+from .vectors import read_entry, require_alike
 
 _DIRECTIONS = (-1, 0, 1)
 
@@ -49,11 +50,12 @@ def read_definition(
         raise DefinitionError("states: expected at least one symbol, received none.")
     t = symbols([time], "time") if time is not None else ca.SX(0, 1)
     p, defaults = _parameters(parameters)
-    h = _surfaces(surface, surfaces)
+    h, sizes = _surfaces(surface, surfaces)
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
-        lam = symbols(listed(multipliers), "multipliers")
+        require_alike(sizes, multipliers)
+        lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
     stops, resets = _items(stops, Stop, "stops"), _items(resets, Reset, "resets")
@@ -81,6 +83,7 @@ def read_definition(
         resets=tuple((r.name, r.direction) for r in resets),
         defaults=defaults,
         hidden=hidden,
+        sizes=sizes if max(sizes, default=1) > 1 else (),
     )
     require_consistent(definition)
     return definition
@@ -131,15 +134,20 @@ def _parameters(
     return p, defaults
 
 
-def _surfaces(surface: Expression | None, surfaces: Sequence[Expression] | None) -> ca.SX:
+def _surfaces(
+    surface: Expression | None, surfaces: Sequence[Expression] | None
+) -> tuple[ca.SX, tuple[int, ...]]:
+    """All switching functions, and how many of them belong to each surface or set."""
     if surface is not None and surfaces is not None:
         raise DefinitionError(
             "surface: expected either surface= or surfaces=, received both. One switching "
             "function goes to surface=, several to surfaces=."
         )
     given = [surface] if surface is not None else listed(surfaces)
-    expressions = [scalar(v, f"surface {i}") for i, v in enumerate(given)]
-    return ca.vertcat(*expressions) if expressions else ca.SX(0, 1)
+    entries = [read_entry(v, f"surface {i}") for i, v in enumerate(given)]
+    expressions = [e for entry in entries for e in entry]
+    sizes = tuple(len(entry) for entry in entries)
+    return ca.vertcat(*expressions) if expressions else ca.SX(0, 1), sizes
 
 
 def _items(values: Any, kind: type[Any], what: str) -> list[Any]:

@@ -35,16 +35,17 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
     known, variables = ca.vertcat(p, lam), ca.vertcat(x, reactions)
     columns = ca.jacobian(plain, lam)
-    for i in range(system.surface_count):
-        rows, entries = columns[:, i].sparsity().row(), columns[:, i].nonzeros()
+    for members in system.entries:  # a set has one factor
+        places = [(row, i) for i in members for row in columns[:, i].sparsity().row()]
+        entries = [e for i in members for e in columns[:, i].nonzeros()]
         column = ca.vertcat(*entries)
         if ca.depends_on(column, lam) or not ca.depends_on(column, variables):
             continue  # products of multipliers, or hidden dynamics; a constant
         reduced, factor = cancel_common_factor(entries, variables, known)
         if ca.depends_on(factor, variables):
-            nu = ca.SX.sym(f"nu{i}")
             field = ca.SX(field)
-            for row, entry in zip(rows, reduced, strict=True):
-                field[row] += nu * entry  # lambda_i is 0 while the surface slides
-            factors[i], unknowns[i] = factor, nu
+            for i in members:
+                factors[i], unknowns[i] = factor, ca.SX.sym(f"nu{i}")
+            for (row, i), entry in zip(places, reduced, strict=True):
+                field[row] += unknowns[i] * entry  # lambda_i is 0 while the surface slides
     return field, factors, unknowns

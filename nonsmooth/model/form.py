@@ -36,6 +36,9 @@ class Definition:
         Values of the parameters by name; None where there is none.
     hidden : bool
         Whether multipliers may enter nonlinearly.
+    sizes : tuple of int
+        How many of the switching functions, in order, belong to each surface or set; 1 for a surface.
+        Empty where all are surfaces.
     """
 
     states: ca.SX
@@ -54,6 +57,7 @@ class Definition:
     impacts: tuple[str, ...]
     defaults: dict[str, float | None]
     hidden: bool
+    sizes: tuple[int, ...] = ()
 
     @property
     def extended_states(self) -> ca.SX:
@@ -80,7 +84,9 @@ class Definition:
         """Plain values from which ``from_state`` makes an equal definition."""
         inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
         outputs = [self.field, self.surfaces, self.guards, self.maps, self.gaps, self.restitutions]
+        sets = {"sizes": self.sizes} if self.sizes else {}
         return {
+            **sets,
             "definition": ca.Function("definition", inputs, outputs).serialize(),
             "names": [[str(s) for s in listed(v)] for v in inputs],
             "defaults": self.defaults,
@@ -101,4 +107,4 @@ class Definition:
         outputs = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *outputs), (*vectors, *expressions), strict=True))
-        return cls(**parts, **rest)
+        return cls(**parts, **rest, sizes=tuple(state.get("sizes", ())))

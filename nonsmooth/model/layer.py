@@ -13,6 +13,7 @@ from dataclasses import dataclass
 import casadi as ca
 import numpy as np
 
+from .checks import require_system
 from .evaluators import Evaluator
 from .system import FilippovSystem
 from .values import Array
@@ -46,6 +47,7 @@ class Layer:
     """The layer of a system, evaluated at numbers; made by ``layer_of``."""
 
     def __init__(self, system: FilippovSystem):
+        require_system(system)
         self._m = system.surface_count
         x, lam = system.extended_states, ca.SX.sym("lambda", self._m)
         field = system.field_with(lam)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from .coupled import Coupled
@@ -9,7 +11,12 @@ from .values import Array
 
 
 def sliding_multipliers(
-    of: Coupled, mode: str, x: Array, p: Array, stable_only: bool = True
+    of: Coupled,
+    mode: str,
+    x: Array,
+    p: Array,
+    stable_only: bool = True,
+    kept: Array | None = None,
 ) -> list[Array]:
     """Multipliers (surfaces,) that keep the sliding surfaces of a mode.
 
@@ -24,9 +31,11 @@ def sliding_multipliers(
     p : ndarray
     stable_only : bool, optional
         Only those that are stable across the layer (Jeffrey 2018).
+    kept : ndarray (m,), optional
+        h of sets that were just left, which stay in the result.
     """
     sliding = of.sliding(mode)
-    unknowns = np.zeros(of.count)
+    unknowns = np.zeros(of.count) if kept is None else kept.copy()
     if not sliding:
         return [unknowns]
     k = len(sliding)
@@ -49,7 +58,8 @@ def _is_solution(
     of: Coupled, mode: str, x: Array, unknowns: Array, p: Array, stable_only: bool
 ) -> bool:
     sliding = of.sliding(mode)
-    marks = of.yardsticks(x, of.held(mode), unknowns, p)
+    held = of.known_multipliers(mode, x, unknowns, p)
+    marks = of.yardsticks(x, held, of.acting(mode, unknowns), p)
     slope = marks.slope[np.ix_(sliding, sliding)]
     g = marks.layer[sliding]
     small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
@@ -58,19 +68,24 @@ def _is_solution(
         return False
     if not np.all(np.isfinite(slope)):
         return False
+    return not stable_only or is_stable(of, sliding, slope, marks.factors)
+
+
+def is_stable(of: Coupled, sliding: Sequence[int], slope: Array, factors: Array) -> bool:
+    """Whether sliding is stable across the layer, from the slope dG/d(unknowns) of what slides."""
     own = [k for k, i in enumerate(sliding) if i < of.system.surface_count]
-    stable = slope[np.ix_(own, own)] * np.sign(marks.factors)[np.array(sliding, int)[own]]
-    return not stable_only or not own or bool(np.linalg.eigvals(stable).real.max() < 0.0)
+    stable = slope[np.ix_(own, own)] * np.sign(factors)[np.array(sliding, int)[own]]
+    return not own or bool(np.linalg.eigvals(stable).real.max() < 0.0)
 
 
 def newton_multipliers(
     of: Coupled, mode: str, x: Array, unknowns: Array, p: Array, iterations: int
 ) -> Array | None:
     """Newton's method for the multipliers of a mode, from those given."""
-    signs, sliding = of.held(mode), of.sliding(mode)
+    held, sliding = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode)
     result = unknowns.copy()
     for _ in range(iterations):
-        marks = of.yardsticks(x, signs, result, p)
+        marks = of.yardsticks(x, held, of.acting(mode, result), p)
         try:
             step = np.linalg.solve(marks.slope[np.ix_(sliding, sliding)], marks.layer[sliding])
         except np.linalg.LinAlgError:

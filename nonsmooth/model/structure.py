@@ -37,7 +37,10 @@ class Structure:
             f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
         ]
         names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
-        parts.append(f"{self.surface_count} surface{'s' * (self.surface_count != 1)}{names}")
+        surfaces = len(self.entries) - len(self.sets)
+        if surfaces or not self.sets:
+            parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{names}")
+        parts += [f"set of codimension {len(members)}" for members in self.sets]
         if self.parameter_names:
             parts.append(f"parameters: {', '.join(self.parameter_names)}")
         if self.time_dependent:
@@ -55,14 +58,55 @@ class Structure:
 
     @cached_property
     def surface_count(self) -> int:
-        """Number of switching surfaces."""
+        """Number of switching functions: one for each surface, k for a set of codimension k."""
         return int(self.definition.surfaces.numel())
+
+    @cached_property
+    def entries(self) -> tuple[tuple[int, ...], ...]:
+        """Switching functions of each surface or set, in the order in which they were given."""
+        sizes = self.definition.sizes or (1,) * self.surface_count
+        firsts = [sum(sizes[:i]) for i in range(len(sizes))]
+        return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=True))
+
+    @cached_property
+    def sets(self) -> tuple[tuple[int, ...], ...]:
+        """Switching functions of each set of codimension two or more."""
+        return tuple(members for members in self.entries if len(members) > 1)
+
+    @cached_property
+    def set_of(self) -> dict[int, tuple[int, ...]]:
+        """The set to which a switching function belongs; surfaces are not in it."""
+        return {i: members for members in self.sets for i in members}
+
+    @cached_property
+    def surface_names(self) -> tuple[str, ...]:
+        """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set."""
+        return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
 
     @cached_property
     def coupled(self) -> bool:
         """Whether multipliers are not eliminated: several surfaces, one that enters nonlinearly, or
         reactions."""
         return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
+
+    def spelled(self, mode: str) -> str:
+        """Mode with one letter for each surface, set and impact, of one with a letter for each
+        switching function."""
+        if not self.sets:
+            return mode
+        letters = [mode[members[0]] for members in self.entries]
+        shown = ["*" if letter in "*bli" else letter for letter in letters]
+        return "".join(shown) + mode[self.surface_count :]
+
+    def widened(self, mode: str) -> str:
+        """Mode with a letter for each switching function, of one with a letter for each set."""
+        if not self.sets or not isinstance(mode, str):
+            return mode
+        if len(mode) not in (len(self.entries), len(self.entries) + len(self.impacts)):
+            return mode
+        pairs = zip(mode, self.entries, strict=False)
+        wide = "".join(letter * len(members) for letter, members in pairs)
+        return wide + mode[len(self.entries) :]
 
     @cached_property
     def time_dependent(self) -> bool:
@@ -88,12 +132,15 @@ class Structure:
     def modes(self) -> tuple[str, ...]:
         """The modes of one letter per surface in which at most one surface slides."""
         result = [""]
-        for _ in range(self.surface_count):
-            result = [m + c for m in result for c in "+-s" if not (c == "s" and "s" in m)]
+        for members in self.entries:
+            letters = "+-s" if len(members) == 1 else "*s"
+            result = [m + c for m in result for c in letters if not (c == "s" and "s" in m)]
         return tuple(result)
 
     def parse_mode(self, mode: str) -> tuple[int, ...]:
         """Turn the letters of the surfaces into signs: ``+`` 1, ``-`` -1, ``s`` 0.
+
+        The letters of a set, ``*`` and ``s``, stand for each of its switching functions: 2 and 0.
 
         Raises
         ------
@@ -111,22 +158,33 @@ class Structure:
         DefinitionError
             A wrong number of letters or another letter.
         """
-        letters = {"+": 1, "-": -1, "s": 0, "o": 1, "c": 0}
-        m, c = self.surface_count, len(self.impacts)
-        whole = mode + "o" * c if isinstance(mode, str) and len(mode) == m else mode
-        fits = isinstance(whole, str) and len(whole) == m + c
-        if not fits or set(whole[:m]) - set("+-s") or set(whole[m:]) - set("oc"):
-            contacts = f", and {c}, each of o c, one per impact" if c else ""
-            raise DefinitionError(
-                explain(
-                    "mode",
-                    expected=f"{m} letter(s), each of + - s, one per surface{contacts}",
-                    received=repr(mode),
-                    advice="'+' is h > 0, '-' is h < 0, 's' is sliding"
-                    + ("; 'o' is an open contact, 'c' a closed one." if c else "."),
-                )
-            )
+        # Within a run "b" is "*" close to a set that was left, "l" the moment of leaving it, "i" a set
+        # whose multiplier makes no difference.
+        letters = {"+": 1, "-": -1, "s": 0, "o": 1, "c": 0, **dict.fromkeys("*bli", 2)}
+        m, c, wide = self.surface_count, len(self.impacts), self.widened(mode)
+        whole = wide + "o" * c if isinstance(wide, str) and len(wide) == m else wide
+        fits = isinstance(whole, str) and len(whole) == m + c and not set(whole[m:]) - set("oc")
+        if not fits or any(
+            letter not in ("*sbli" if i in self.set_of else "+-s")
+            for i, letter in enumerate(whole[:m])
+        ):
+            raise DefinitionError(self._letters_expected(mode))
         return tuple(letters[letter] for letter in whole)
+
+    def _letters_expected(self, mode: object) -> str:
+        m, c, k = len(self.entries), len(self.impacts), len(self.sets)
+        kinds = "each of + - s, one per surface"
+        if k:
+            kinds = "+ - s for a surface and * s for a set, in their order"
+        contacts = f", and {c}, each of o c, one per impact" if c else ""
+        return explain(
+            "mode",
+            expected=f"{m} letter(s), {kinds}{contacts}",
+            received=repr(mode),
+            advice="'+' is h > 0, '-' is h < 0, 's' is sliding"
+            + (", '*' is off a set" if k else "")
+            + ("; 'o' is an open contact, 'c' a closed one." if c else "."),
+        )
 
     def surface_index(self, surface: int) -> int:
         """Check the number of a surface.
@@ -158,7 +216,7 @@ class Structure:
             One letter, ``+`` or ``-``, for each surface.
         """
         signs = self.parse_mode(mode)
-        if 0 in signs:
+        if 0 in signs or 2 in signs:
             raise DefinitionError(f"field: expected a mode of + and -, received {mode!r}.")
         return self.field_with(ca.DM(list(signs)))
 

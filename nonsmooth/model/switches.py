@@ -14,6 +14,7 @@ from typing import Protocol
 import casadi as ca
 
 from .cancel import cancel_common_factor, normal_forms
+from .checks import require_system
 from .identity import vanish_on
 from .system import FilippovSystem
 
@@ -77,6 +78,7 @@ class Sliding(Protocol):
 
 def sliding(system: FilippovSystem, mode: str) -> Sliding:
     """Return the kind of sliding that a mode has."""
+    require_system(system)
     surfaces = [i for i, s in enumerate(system.parse_mode(mode)) if s == 0]
     if not surfaces:
         return Free(system, mode)

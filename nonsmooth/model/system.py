@@ -49,9 +49,11 @@ class FilippovSystem(Structure):
     field : sequence of n expressions, optional
         The right-hand side in states, parameters, time and multipliers.
     multipliers : SX symbol or sequence of them, optional
-        One for each surface.
+        One for each surface; a vector of symbols for each set.
     surfaces : sequence of expressions, optional
-        Switching functions, one for each multiplier (``surface`` also takes one).
+        Switching functions, one for each multiplier (``surface`` also takes one). An entry that is a
+        vector h of two or three is one set h = 0, off which its multiplier is h/|h| and on which it is
+        of at most length 1: Coulomb friction in the plane.
     parameters : mapping or sequence, optional
         Symbols with their default values; None, or a bare sequence of symbols, means no default.
     time : SX symbol, optional

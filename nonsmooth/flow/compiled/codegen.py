@@ -39,7 +39,7 @@ def driver_text(name: str) -> str:
 def supports_scalar(system: FilippovSystem) -> bool:
     """Whether the scalar engine can be generated for a system."""
     if (
-        any(system.nonlinear) or system.impacts
+        any(system.nonlinear) or system.impacts or system.sets
     ):  # hidden dynamics has multipliers as states: the reference driver's
         return False
     return system.surface_count < 8 and len(system.modes) <= MAX_MODES

@@ -138,7 +138,12 @@ def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     """Return the interpreter with a system at the options' tolerance, or None where it has none: its
     multipliers must enter linearly."""
     order = options.order
-    if any(system.nonlinear) or order >= _MOST_ORDER or not coupled_of(system).affine:
+    if (
+        system.sets
+        or any(system.nonlinear)
+        or order >= _MOST_ORDER
+        or not coupled_of(system).affine
+    ):
         return None
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 

@@ -45,14 +45,13 @@ class Bookkeeping:
 
     def event(self, kind: str, before: str, name: str, x: Array | None = None) -> None:
         """Note an event at the state ``x``, the present one unless the event changed it."""
-        self.record.event(
-            kind, self.t, x if x is not None else self.x, before, self.mode, name, self.x
-        )
+        before, after = self.system.spelled(before), self.system.spelled(self.mode)
+        self.record.event(kind, self.t, x if x is not None else self.x, before, after, name, self.x)
         self._count_hit(kind, before, name)
         if kind in ("end", "stop"):
             return
         self.intervals.append(self.t - self._last_event)
-        self.patterns.append(f"{kind} {before} {self.mode} {name}")
+        self.patterns.append(f"{kind} {before} {after} {name}")
         self._last_event = self.t
         left = remaining_time(self.intervals, self.patterns, self.t - self.options.t_start)
         if left is not None and not (self.ended is None and self.come_to_rest(left)):
@@ -73,11 +72,14 @@ class Bookkeeping:
         """End the stretch of steps in a mode, where another follows."""
         start, first = self._segment_start
         count = len(self.record.starts)
-        if following == self.mode:
+        if following == self.mode.replace("b", "*") or following == self.mode:
             return
         if count > first:
-            self.record.segments.append(Segment(self.mode, start, self.t, first, count))
+            self.record.segments.append(self._segment(start, first, count))
         self._segment_start = (self.t, count)
+
+    def _segment(self, start: float, first: int, last: int) -> Segment:
+        return Segment(self.system.spelled(self.mode), start, self.t, first, last)
 
     def end(self, status: Status, message: str) -> None:
         """End the run, if it has not ended."""
@@ -91,7 +93,7 @@ class Bookkeeping:
         start, first = self._segment_start
         count = len(self.record.starts)
         if count > first or not self.record.segments:
-            self.record.segments.append(Segment(self.mode, start, self.t, first, count))
+            self.record.segments.append(self._segment(start, first, count))
         if status is not Status.STOPPED:
             self.event("end", self.mode, str(status))
         return self.record.trajectory(status, message, self.limit)

@@ -10,18 +10,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
-from ...model import Array, FilippovSystem, Guard, Resets, Surfaces
+from ...model import Array, Coupled, FilippovSystem, Guard, Resets, Surfaces, coupled_of
 from .. import messages
 from ..facts import ON_SURFACE, PRIORITY, VANISHES, change
 from ..options import Options
 from ..status import Status
 from ..trajectory import Trajectory
-from . import impacts
+from . import impacts, sets
 from .bookkeeping import Bookkeeping
-from .modes import Expansion, modes_of, powers, rounding_scale
+from .coupled_modes import modes_of
+from .modes import Expansion, powers, rounding_scale
 from .stepper import Hit, Sides, Stepper
 from .switching import Continuation, decide, is_two_fold
 
@@ -45,6 +47,7 @@ class Driver(Bookkeeping):
         self.surfaces, self.resets = Surfaces(system), Resets(system)
         self.unknowns = np.zeros(system.surface_count + len(system.impacts))  # of what slides
         self.contacts = impacts.contacts_of(self)
+        self._idle = sets.idle(system, p)
         self.drops: dict[int, int] = {}
         self._repelling = False  # sliding that only start_mode chooses
         self._due: int | None = None  # row of a stop or reset to be served where the run stands
@@ -122,9 +125,11 @@ class Driver(Bookkeeping):
         """Keep a sliding state on its surfaces, and multipliers on their equations."""
         kept = self.kept(self.mode)
         self.x = self.surfaces.project(x, self.p, kept)
-        if e.unknowns.size and kept:
+        if e.unknowns.size and (kept or self.system.sets):
             ahead = e.unknowns @ powers(dt, e.unknowns.shape[1])
             self.unknowns = self.modes.improve(self.mode, self.x, ahead)
+        if self.system.sets:
+            sets.after_step(self)
 
     def kept(self, mode: str) -> list[int]:
         """Functions that a mode keeps at zero: surfaces, gaps and their rates."""
@@ -166,8 +171,10 @@ class Driver(Bookkeeping):
             return impacts.impact(self, guard)
         if guard.kind == "release":
             return impacts.release(self, guard)
+        if guard.kind == "near":
+            return sets.near(self, guard)
         i, before = guard.index, self.mode
-        active = self.active({i}, self.mode)
+        active = self.active({*self.system.set_of.get(i, (i,))}, self.mode)
         self.x = self.surfaces.project(self.x, self.p, active)
         self.record.correct(self.x)
         if guard.kind == "surface" and not self._is_on(i):
@@ -177,6 +184,8 @@ class Driver(Bookkeeping):
             self._watch_two_fold()
         if guard.kind == "exit":
             known = {("exit", i, guard.side): 1, ("surface", i, guard.side): 2}
+        if guard.kind == "slip":
+            known = {("slip", i, 0): 1, ("near", i, 0): 2}
         layer = (float(guard.side), -guard.side) if guard.kind == "surface" else None
         self.go_on(active, known, before, guard.name, layer)
 
@@ -214,7 +223,7 @@ class Driver(Bookkeeping):
         layer: tuple[float, int] | None = None,
     ) -> bool:
         """Adopt the mode that continues; False where there is none or more than one."""
-        decision = decide(self.stepper, self.x, letters, active, known, layer)
+        decision = decide(self.stepper, self.x, letters, active, known, layer, self.unknowns)
         if decision.continuation is None:
             self.end(decision.status, decision.message)
             return False
@@ -245,7 +254,10 @@ class Driver(Bookkeeping):
     def letters(self) -> str:
         """Sides of all surfaces; what is on a surface counts as below until it is decided."""
         h = self.surfaces.values(self.x, self.p)[0][: self.system.surface_count]
-        return "".join("+" if v > 0 else "-" for v in h) + "o" * len(self.system.impacts)
+        signs = ["+" if v > 0 else "-" for v in h]
+        for i, members in self.system.set_of.items():
+            signs[i] = "i" if members in self._idle else "*"
+        return "".join(signs) + "o" * len(self.system.impacts)
 
     def _begin(self, start_mode: str | None) -> None:
         """Decide the first mode, or take the one asked for."""
@@ -271,29 +283,34 @@ class Driver(Bookkeeping):
 
     def _start_in(self, mode: str, active: Sequence[int]) -> None:
         self.system.parse_letters(mode)
-        mode = mode.ljust(len(self.mode), "o")
+        mode = sets.asked(self.system.widened(mode).ljust(len(self.mode), "o"), self.mode, active)
         wrong = [i for i, c in enumerate(mode) if i not in active and c != self.mode[i]]
         if wrong:
             return self.end(
                 Status.NON_UNIQUE,
-                messages.wrong_start(mode, self.mode),
+                messages.wrong_start(self.system.spelled(mode), self.system.spelled(self.mode)),
             )
-        self.mode = mode
-        affine = not any(self.system.nonlinear)
+        self.mode, affine = mode, not any(self.system.nonlinear)
         solutions = self.modes.solutions(mode, self.x, stable_only=not affine)
         if len(solutions) != 1:
             return self.end(Status.NON_UNIQUE, messages.start_solutions(mode, len(solutions)))
         self.unknowns = solutions[0]
         e, leading = self.expand(), {}
         for row, guard in enumerate(self.stepper.guards(mode)):
-            if guard.index in active and guard.kind in ("surface", "exit"):
-                k, value = self.stepper.leading(e, row, 1 if guard.kind == "surface" else 0)
+            if guard.index in active and sets.decides(guard, mode):
+                zeros = 1 if guard.kind in ("surface", "near") else 0
+                k, value = self.stepper.leading(e, row, zeros)
                 leading[row] = (guard.kind, value)
                 self.drops[row] = k
+        leaves = any(value < 0.0 for kind, value in leading.values() if kind in ("near", "slip"))
         exits = [value for kind, value in leading.values() if kind == "exit"]
         self._repelling = bool(exits) and max(exits) <= 0.0 and min(exits) < 0.0
         holds = self._repelling or all(value >= 0.0 for value in exits)
-        if not holds or any(kind == "surface" and value < 0.0 for kind, value in leading.values()):
+        if (
+            not holds
+            or leaves
+            or any(kind == "surface" and value < 0.0 for kind, value in leading.values())
+        ):
             self.end(Status.NON_UNIQUE, messages.impossible_start(mode))
 
     def arm(self, fired: Guard | None = None) -> None:
@@ -356,8 +373,26 @@ class Driver(Bookkeeping):
         h, gradient = self.surfaces.values(self.x, self.p)
         scale = rounding_scale(np.abs(gradient), self.x, self.options.size)
         near = {i for i in range(self.system.surface_count) if abs(h[i]) <= ON_SURFACE * scale[i]}
+        for members in self.system.sets:
+            if not near.issuperset(members) or mode[members[0]] in "bli":
+                near -= {*members}
         near |= {i for i, c in enumerate(mode) if c in "sc"}
         return sorted(near | certain | set(impacts.resting(self)))
+
+    @cached_property
+    def coupled(self) -> Coupled:
+        """The program of all modes."""
+        return coupled_of(self.system)
+
+    def jump(self, rate: Array, dt: float) -> None:
+        """Go on along a straight line for a time that is too short for a step."""
+        x = self.x
+        self.record.step(self.t, np.column_stack([x, rate]))
+        self.t, self.x = self.t + dt, x + dt * rate
+        if self.system.time_dependent:
+            self.x[self.system.dimension] = self.t
+        self.drops = {}
+        self.note()
 
     def come_to_rest(self, left: float) -> bool:
         """Whether contacts close after impacts that accumulate in the time left."""

@@ -1,22 +1,21 @@
-"""The modes of a system, expanded at a state: one by one, or all of them by one program.
+"""The modes of a system, expanded at a state, one by one.
 
 Systems of at most one surface with a multiplier that enters linearly have few modes; each has its own
-jets, in which sliding is written out. Others have their multipliers as series (``model.coupled``).
+jets, in which sliding is written out. Others have their multipliers as series (``coupled_modes``).
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 import numpy as np
 
-from ...model import Array, Coupled, Evaluator, FilippovSystem, Guard, Motion, coupled_of, motion
-from ...model.layer import spirals_in
-from ...model.multipliers import newton_multipliers, sliding_multipliers
+from ...model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
 from ..facts import SAFETY
 from ..options import Options
+from .laws_of_sets import Frozen
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,12 @@ class Expansion:
         Series of the multipliers that slide; empty where sliding is written out.
     inverse : ndarray
         Of the slope of the layer problem, in magnitude; empty likewise.
+    directions : ndarray (k, P+1)
+        Series whose relative accuracy counts: directions of slip close to a set that is left.
+    radii : ndarray (sets,)
+        |h| at the start, of sets off which the mode is.
+    limits : ndarray (sets, P+1)
+        Series of the factors n of sets: friction's limit is |nu| = |n|.
     """
 
     mode: str
@@ -55,6 +60,9 @@ class Expansion:
     finite: bool
     unknowns: Array
     inverse: Array
+    directions: Array = field(default_factory=lambda: np.zeros((0, 1)))
+    radii: Array = field(default_factory=lambda: np.zeros(0))
+    limits: Array = field(default_factory=lambda: np.zeros((0, 1)))
 
 
 class Modes(Protocol):
@@ -91,8 +99,16 @@ class Modes(Protocol):
         """Rates of the active surfaces as a + M lambda, and their scales of rounding."""
         ...
 
-    def solutions(self, mode: str, x: Array, stable_only: bool = True) -> list[Array]:
+    def solutions(
+        self, mode: str, x: Array, stable_only: bool = True, kept: Array | None = None
+    ) -> list[Array]:
         """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
+        ...
+
+    def frozen(
+        self, mode: str, x: Array, active: Sequence[int], kept: Array | None
+    ) -> Frozen | None:
+        """Rates of the active sets of codimension two and more as a - M lambda."""
         ...
 
     def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
@@ -102,13 +118,6 @@ class Modes(Protocol):
     def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
         """Correct multipliers that were advanced by a step."""
         ...
-
-
-def modes_of(system: FilippovSystem, p: Array, options: Options) -> Modes:
-    """Return the modes of a system as the drivers move in them."""
-    if system.coupled:
-        return CoupledModes(system, coupled_of(system), p, options)
-    return SeparateModes(system, p, options)
 
 
 def rounding_scale(gradient: Array, x: Array, size: float) -> Array:
@@ -213,9 +222,14 @@ class SeparateModes:
     def rates(self, mode: str, x: Array, active: Sequence[int]) -> None:
         """There is one surface."""
 
-    def solutions(self, mode: str, x: Array, stable_only: bool = True) -> list[Array]:
+    def solutions(
+        self, mode: str, x: Array, stable_only: bool = True, kept: Array | None = None
+    ) -> list[Array]:
         """Multipliers are eliminated."""
         return [np.zeros(len(mode))]
+
+    def frozen(self, mode: str, x: Array, active: Sequence[int], kept: Array | None) -> None:
+        """There are surfaces only."""
 
     def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
         """There is one surface."""
@@ -232,168 +246,6 @@ class SeparateModes:
         return field[:, 0], guards[:, 0] if guards.size else np.zeros(0), np.zeros(0)
 
 
-class CoupledModes:
-    """Modes of one program, with multipliers as numbers or series, in Python's doubles.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    coupled : Coupled
-    p : ndarray
-    options : Options
-    kinds : callable, optional
-        Guards of a mode, where they have other meanings than the program's.
-    """
-
-    def __init__(
-        self,
-        system: FilippovSystem,
-        coupled: Coupled,
-        p: Array,
-        options: Options,
-        kinds: Callable[[str], tuple[Guard, ...]] | None = None,
-    ):
-        self._system, self.coupled, self._p, self._options = system, coupled, p, options
-        self._kinds = kinds or coupled.guards
-
-    def guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards, in the order of the rows of an expansion."""
-        return self._kinds(mode)
-
-    def affine(self, mode: str) -> bool:
-        """Whether field and guards are affine in the states."""
-        return self.coupled.linear
-
-    def expand(self, mode: str, x: Array, unknowns: Array) -> Expansion:
-        """Jets at an extended state, with the multipliers of what slides."""
-        signs = self._system.parse_letters(mode)
-        sliding = self.coupled.sliding(mode)
-        marks = self.coupled.yardsticks(x, self.coupled.held(mode), unknowns, self._p)
-        states, guards, series = self.coupled.jets(
-            mode, x, unknowns, marks.slope, self._p, self._options.order
-        )
-        allowed = tolerances(self._system, x, self._options)
-        inverse = np.abs(_inverse(marks.slope[np.ix_(sliding, sliding)]))
-
-        def of_rows(surface: Array, layer: Array, stops: Array, factors: Array) -> Array:
-            of_unknowns = layer.copy()
-            of_unknowns[sliding] = inverse @ layer[sliding]
-            of_unknowns[: self._system.surface_count] += factors[: self._system.surface_count]
-            return self._of_rows(signs, surface, of_unknowns, stops, len(guards))
-
-        size = self._options.size
-        gradients = (
-            *(marks.surface_gradient, marks.layer_gradient, marks.stop_gradient),
-            marks.factor_gradient,
-        )
-        return Expansion(
-            mode=mode,
-            states=states,
-            guards=guards,
-            allowed=allowed,
-            guard_allowed=of_rows(*[g @ allowed for g in gradients]),
-            scales=of_rows(*[rounding_scale(g, x, size) for g in gradients]),
-            steepness=of_rows(*[g.sum(axis=1) for g in gradients]),
-            finite=bool(np.all(np.isfinite(states)) and np.all(np.isfinite(guards))),
-            unknowns=series,
-            inverse=inverse,
-        )
-
-    def _of_rows(
-        self,
-        signs: Sequence[int],
-        surface: Array,
-        unknowns: Array,
-        stops: Array,
-        count: int,
-    ) -> Array:
-        """Yardsticks of the guards, from those of surfaces, of sliding multipliers and of stops."""
-        rows: list[float] = []
-        for i, sign in enumerate(signs):
-            exits = 2 if i < self._system.surface_count else 1
-            rows += [float(surface[i])] if sign else [float(unknowns[i])] * exits
-        rows += stops.tolist()
-        worst = max(unknowns.tolist(), default=1.0)
-        return np.array(rows + [worst] * (count - len(rows)))
-
-    def gradient(self, mode: str, x: Array) -> Array:
-        """Not asked for: multipliers are series."""
-        raise NotImplementedError
-
-    def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
-        """Field (N,), guards (m,) at the polynomials' state at time s; multipliers' errors."""
-        powered = powers(s, e.states.shape[1])
-        sliding = self.coupled.sliding(e.mode)
-        unknowns = e.unknowns @ powered
-        held = self.coupled.held(e.mode)
-        found = self.coupled.values(e.states @ powered + nudge, held, unknowns, self._p)
-        field, layer, *others = found
-        columns = [v[:, None] for v in (unknowns, layer, *others)]
-        rows = self.coupled.rows(e.mode, *columns)
-        guards = np.concatenate([rows[:, 0], e.guards[len(rows) :] @ powered])
-        return field, guards, e.inverse @ np.abs(layer[sliding])
-
-    def angles(self, mode: str, x: Array, surface: int) -> Array | None:
-        """L_F1 h and L_F2 h relative to their rounding; None if sliding is regular all the same."""
-        if self.coupled.continuous[surface]:
-            return None
-        none, result = np.zeros(self.coupled.count), []
-        for side in (1.0, -1.0):
-            held = self.coupled.held(mode)
-            held[surface] = side
-            marks = self.coupled.yardsticks(x, held, none, self._p)
-            if self.coupled.scaled[surface] and marks.slope[surface, surface]:
-                return None
-            scale = rounding_scale(marks.layer_gradient[surface], x, self._options.size)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                result.append(marks.layer[surface] / scale)
-        return np.array(result)
-
-    def rates(
-        self, mode: str, x: Array, active: Sequence[int]
-    ) -> tuple[Array, Array, Array] | None:
-        """Rates of the active surfaces as a + M lambda, and their scales of rounding."""
-        coupled, first = self.coupled, self._system.surface_count
-        own = [i for i in active if i < first]
-        borne = any(first + j in active for i in own for j in coupled.carriers[i])
-        if not coupled.affine or borne or any(coupled.continuous[i] for i in own):
-            return None
-        held = coupled.held(mode)
-        held[list(active)] = 0.0
-        marks = coupled.yardsticks(x, held, np.zeros(coupled.count), self._p)
-        if any(marks.factors[i] == 0.0 for i in active):
-            return None
-        turn = np.where(np.arange(coupled.count) < first, 1.0, -1.0)  # reactions open contacts
-        slope = turn[:, None] * marks.slope * marks.factors
-        scales = rounding_scale(marks.layer_gradient, x, self._options.size)
-        if not np.all(np.isfinite(marks.layer)):
-            return None
-        chosen = list(active)
-        return (turn * marks.layer)[chosen], slope[np.ix_(chosen, chosen)], scales[chosen]
-
-    def solutions(self, mode: str, x: Array, stable_only: bool = True) -> list[Array]:
-        """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
-        return sliding_multipliers(self.coupled, mode, x, self._p, stable_only)
-
-    def spirals_in(self, mode: str, x: Array, surfaces: Sequence[int]) -> bool:
-        """Whether orbits of the plane run round the point where two surfaces meet, and towards it."""
-        return spirals_in(self._system, x, self.coupled.held(mode), self._p, surfaces)
-
-    def improve(self, mode: str, x: Array, unknowns: Array) -> Array:
-        """Correct multipliers that were advanced by a step."""
-        if not self.coupled.sliding(mode):
-            return unknowns
-        better = newton_multipliers(self.coupled, mode, x, unknowns, self._p, 2)
-        return unknowns if better is None else better
-
-
 def powers(h: float, count: int) -> Array:
     """Return h^0, h^1, ... (count,)."""
     return np.asarray(h ** np.arange(count), float)
-
-
-def _inverse(matrix: Array) -> Array:
-    try:
-        return np.asarray(np.linalg.inv(matrix), float)
-    except np.linalg.LinAlgError:
-        return np.full_like(matrix, np.nan)

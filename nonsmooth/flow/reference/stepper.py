@@ -38,6 +38,7 @@ from ..facts import (
     WRONG,
 )
 from ..options import Options
+from .laws_of_sets import slip_root
 from .modes import Expansion, Modes, powers
 from .polynomial import first_crossing, first_root, passed, side_before
 
@@ -106,6 +107,8 @@ class Stepper:
             small = ~known | (guard_allowed > RESOLVED * np.abs(e.guards[:, 0]))
             for g in e.guards[small]:  # elsewhere the bound above is the stronger one
                 h = _resolved(np.abs(g), h)
+        if e.directions.size:
+            h = min(h, _bound(e.directions, np.array([SAFETY * self.rtol]), self.order))
         return h
 
     def leading(self, e: Expansion, row: int, known_zeros: int) -> tuple[int, float]:
@@ -177,7 +180,10 @@ class Stepper:
             if value == 0.0:
                 return None
             c = e.guards[row, k:]
-        return first_root(c.tolist(), h) if c.size else None
+        dt = first_root(c.tolist(), h) if c.size else None
+        if dt and guard.kind == "slip":  # squares lose digits where friction's limit is small
+            return slip_root(e, self.system.sets, guard.index, dt, h)
+        return dt
 
     @staticmethod
     def advance(e: Expansion, dt: float) -> Array:

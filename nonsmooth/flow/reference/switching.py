@@ -20,6 +20,7 @@ from ...model import Array, complementarity
 from .. import messages
 from ..facts import TANGENT, VANISHES
 from ..status import Status
+from .laws_of_sets import Frozen, bounded_multipliers
 from .modes import Expansion, Modes
 from .stepper import Stepper
 
@@ -60,6 +61,7 @@ def decide(
     active: Sequence[int],
     known: Known,
     layer: tuple[float, int] | None = None,
+    kept: Array | None = None,
 ) -> Decision:
     """Choose the motion that continues from a point of the surfaces ``active``.
 
@@ -77,20 +79,27 @@ def decide(
     layer : (float, {-1, 1}), optional
         With hidden dynamics and one active surface: where its multiplier comes from and which way
         it moves through the layer lambda in [-1, 1].
+    kept : ndarray (m,), optional
+        Unknowns up to here: h of sets that were just left.
     """
     if not active:
-        return Decision(Continuation(mode, {}, True, np.zeros(len(mode))))
+        carried = stepper.modes.solutions(mode, x, True, kept) if stepper.system.sets else []
+        return Decision(Continuation(mode, {}, True, *(carried or [np.zeros(len(mode))])))
     first = stepper.system.surface_count  # of the contacts
     contacts = [i - first for i in active if i >= first]
     if len(active) == 1 and not contacts and is_two_fold(stepper.modes, mode, x, active[0]):
         return Decision(None, Status.NON_UNIQUE, messages.two_fold(active[0]))
-    letters = _by_rates(stepper, x, mode, active, known)
+    if any(i in stepper.system.set_of for i in active):
+        letters = _of_sets(stepper, x, mode, active, known, kept)
+    else:
+        letters = _by_rates(stepper, x, mode, active, known)
     if isinstance(letters, Decision):
         return letters
+    units = stepper.system.set_of
     found = [
         c
-        for m in _spelled(mode, active, letters)
-        for c in _continuations(stepper, x, m, active, known)
+        for m in _spelled(mode, active, letters, units)
+        for c in _continuations(stepper, x, m, active, known, kept)
     ]
     strict = [c for c in found if c.strict]
     if layer is not None and stepper.system.hidden and len(active) == 1:
@@ -98,7 +107,10 @@ def decide(
     if len(strict) == 1 or (not strict and len(found) == 1):
         return Decision((strict or found)[0])
     if len(strict) > 1:
-        return Decision(None, Status.NON_UNIQUE, messages.ambiguous([c.mode for c in strict]))
+        modes = [stepper.system.spelled(c.mode) for c in strict]
+        if len(set(modes)) == 1:
+            return Decision(None, Status.NON_UNIQUE, messages.several_directions(len(modes)))
+        return Decision(None, Status.NON_UNIQUE, messages.ambiguous(modes))
     resting = [c for c in found if "s" in c.mode or "c" in c.mode]
     if resting:
         return Decision(resting[0])
@@ -108,8 +120,16 @@ def decide(
     if len(active) == 2 and stepper.modes.spirals_in(mode, x, active):
         return _held_there(stepper, x, mode, active)
     if len(active) > 1:
-        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+        return Decision(
+            None, Status.INTERSECTION, messages.no_stable_motion(_entries(stepper, active))
+        )
     return Decision(None, Status.NON_UNIQUE, messages.degenerate())
+
+
+def _entries(stepper: Stepper, active: Sequence[int]) -> list[int]:
+    """Numbers of the surfaces and sets to which switching functions belong."""
+    entries = stepper.system.entries
+    return [k for k, members in enumerate(entries) if any(i in active for i in members)]
 
 
 def _held_there(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) -> Decision:
@@ -117,7 +137,9 @@ def _held_there(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) ->
     letters = "".join("s" if i in active else letter for i, letter in enumerate(mode))
     found = stepper.modes.solutions(letters, x, stable_only=False)
     if len(found) != 1:
-        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+        return Decision(
+            None, Status.INTERSECTION, messages.no_stable_motion(_entries(stepper, active))
+        )
     return Decision(Continuation(letters, {}, True, found[0]))
 
 
@@ -149,7 +171,9 @@ def _by_rates(
             return _too_many(active)
         lam = found[0] if found else None
     if lam is None:
-        return Decision(None, Status.INTERSECTION, messages.no_stable_motion(active))
+        return Decision(
+            None, Status.INTERSECTION, messages.no_stable_motion(_entries(stepper, active))
+        )
     rates = a + m @ lam
     clear_rate = np.abs(rates) > VANISHES * (scales + np.abs(m).sum(axis=1))
     room = np.where(np.array(active) < first, 1.0 - np.abs(lam), lam)
@@ -166,6 +190,46 @@ def _by_rates(
     return undecided
 
 
+def _of_sets(
+    stepper: Stepper,
+    x: Array,
+    mode: str,
+    active: Sequence[int],
+    known: Known,
+    kept: Array | None,
+) -> dict[int, str] | Decision:
+    """Letters that are possible where sets of codimension two and more are met: those that hold are
+    found together where friction is monotone; what is at its limit is undecided."""
+    system = stepper.system
+    undecided = {
+        i: "sl" if i in system.set_of else "+-s" if i < system.surface_count else "oc"
+        for i in active
+    }
+    own = [i for i in active if i in system.set_of]
+    law = stepper.modes.frozen(mode, x, own, kept)
+    if law is None or not np.all(np.isfinite(law.m)):
+        return undecided
+    first = [i for i in own if i == system.set_of[i][0]]
+    places = {i: [own.index(j) for j in system.set_of[i]] for i in first}
+    for i, where in places.items():
+        if Frozen(law.a[where], law.m[np.ix_(where, where)]).indefinite:
+            message = messages.indefinite(system.surface_names[i])
+            return Decision(None, Status.NON_UNIQUE, message)
+    leaving = {j for kind, j, _ in known if kind == "slip"}
+    lam = bounded_multipliers(law, [len(where) for where in places.values()])
+    if len(own) == len(active) and lam is not None:
+        rates = law.a - law.m @ lam
+        for i, where in places.items():
+            room = 1.0 - float(np.linalg.norm(lam[where]))
+            size = float(np.abs(law.a[where]).sum() + np.abs(law.m[where]).sum())
+            moves = float(np.linalg.norm(rates[where])) > 1e-9 * size
+            letter = "s" if room > 1e-9 else "l" if moves else "sl"
+            for j in system.set_of[i] if i not in leaving else ():
+                undecided[j] = letter
+    choices = {i: undecided[i] for i in active if i not in own or i in first}
+    return undecided if _choices(choices) <= _TRIED else _too_many(active)
+
+
 def _choices(letters: Mapping[int, str]) -> int:
     """Number of the modes that are possible."""
     return math.prod(len(possible) for possible in letters.values())
@@ -175,18 +239,30 @@ def _too_many(active: Sequence[int]) -> Decision:
     return Decision(None, Status.NON_UNIQUE, messages.possibly_several(active))
 
 
-def _spelled(mode: str, active: Sequence[int], letters: dict[int, str]) -> Iterable[str]:
-    for choice in product(*(letters[i] for i in active)):
+def _spelled(
+    mode: str,
+    active: Sequence[int],
+    letters: dict[int, str],
+    sets: Mapping[int, tuple[int, ...]],
+) -> Iterable[str]:
+    units = list(dict.fromkeys(sets.get(i, (i,)) for i in active))
+    for choice in product(*(letters[unit[0]] for unit in units)):
         candidate = list(mode)
-        for i, letter in zip(active, choice, strict=True):
-            candidate[i] = letter
+        for unit, letter in zip(units, choice, strict=True):
+            for i in unit:
+                candidate[i] = letter
         yield "".join(candidate)
 
 
 def _continuations(
-    stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
+    stepper: Stepper,
+    x: Array,
+    mode: str,
+    active: Sequence[int],
+    known: Known,
+    kept: Array | None,
 ) -> Iterable[Continuation]:
-    for unknowns in stepper.modes.solutions(mode, x):
+    for unknowns in stepper.modes.solutions(mode, x, True, kept):
         continuation = _continuation(stepper, x, unknowns, mode, active, known)
         if continuation is not None:
             yield continuation
@@ -202,10 +278,12 @@ def _continuation(
     first = stepper.system.surface_count
     for row, guard in enumerate(stepper.guards(mode)):
         contact = guard.kind in ("impact", "release")
+        if guard.kind == "near" and mode[guard.index] == "s":
+            continue  # ends steps only
         if guard.kind in ("stop", "reset") or guard.index + first * contact not in active:
             continue
         zeros = known.get((guard.kind, guard.index, guard.side), 0)
-        zeros = max(zeros, {"surface": 1, "impact": 2}.get(guard.kind, 0))
+        zeros = max(zeros, {"surface": 1, "near": 1, "impact": 2}.get(guard.kind, 0))
         k, value = stepper.leading(e, row, zeros)
         if value < 0.0:
             return None

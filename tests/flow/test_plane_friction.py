@@ -1,0 +1,245 @@
+"""Friction in the plane, by vector multipliers: states, times and itineraries of reference cases in 24 digits;
+directions of slip however small; rotations and mirrors; dense output; what is refused."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+from . import plane_friction as plane
+
+ENGINES = ["reference", "auto"]
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("name", plane.CASES)
+def test_reference_cases_to_rounding(name, engine):
+    case = plane.CASES[name]
+    run, begun = plane.run_of(case, 1e-13, engine=engine)
+    assert run.status.complete
+    assert run.itinerary.replace(" ", "") == case["itinerary"]
+    of_state, of_times = plane.errors(case, run, begun)
+    assert of_state < 1e-13
+    assert of_times < 2e-13
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-8, 1e-10, 1e-12])
+@pytest.mark.parametrize("name", ["oblique-roll-rotated-1", "three-rolls", "elliptical-friction"])
+def test_errors_follow_the_tolerance(name, tol):
+    case = plane.CASES[name]
+    run, begun = plane.run_of(case, tol)
+    assert run.itinerary.replace(" ", "") == case["itinerary"]
+    assert max(plane.errors(case, run, begun)) < 100 * tol
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("tol", [1e-6, 1e-7, 1e-9, 1e-11])
+@pytest.mark.parametrize("name", plane.CASES)
+def test_errors_of_all_cases_follow_the_tolerance(name, tol):
+    case = plane.CASES[name]
+    run, begun = plane.run_of(case, tol)
+    assert run.itinerary.replace(" ", "") == case["itinerary"]
+    assert max(plane.errors(case, run, begun)) < 100 * tol
+
+
+def _ball(v, w, tol=1e-14, p=None, **options):
+    p = p or {"mu": 0.3, "d1": 0.1, "d2": 0.1, "eta": 0.5, "G": 1e-4, "k": 0.4}
+    start = [0.0, 0.0, *v, *w, 0.0, -1.0]
+    return ns.simulate(plane.ball(**options), start, 20.0, parameters=p, tol=tol)
+
+
+@pytest.mark.parametrize("angle", [0.5, 2.1, 4.0])
+@pytest.mark.parametrize("mirror", [1.0, -1.0])
+def test_rotations_and_mirrors_do_not_matter(angle, mirror):
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, -s], [s, c]]) @ np.diag([1.0, mirror])
+    v, w = np.array([1.0, 0.2]), np.array([0.3, 0.5])
+    one, two = _ball(v, w), _ball(turn @ v, turn @ w)
+    assert one.itinerary == two.itinerary == "* s *"
+    assert np.abs(np.diff([[e.t for e in run.events] for run in (one, two)], axis=0)).max() < 1e-13
+    turned = np.concatenate([*[turn @ one.x[-1, i : i + 2] for i in (0, 2, 4)], one.x[-1, 6:]])
+    assert np.abs(two.x[-1] - turned).max() < 4e-15
+
+
+@pytest.mark.parametrize("offset", [1e-3, 1e-5, 1e-7, -1e-8])
+def test_direction_of_slip_however_small(offset):
+    # On a line the motion is planar: slip stays on it. Rolling ends just before lift-off, so that slip at
+    # lift-off is quadratic in the offset: below 1e-17 for the smallest.
+    line = np.array([np.cos(0.7), np.sin(0.7)])
+    w = 0.5505198964669  # its lift-off slip is about zero
+    p = {"mu": 0.3, "d1": 0.1, "d2": 0.1, "eta": 0.5, "G": 1e-4, "k": 0.4}
+    start = [0.0, 0.0, *0.2 * line, *(0.2 + w + offset) * line, 0.0, -1.0]
+    run = ns.simulate(plane.ball(slip_as_state=True), start, 20.0, parameters=p, tol=1e-14)
+    h = run.x[-1, 4:6]
+    assert run.itinerary == "* s *"
+    assert np.linalg.norm(h) < 10 * offset**2
+    assert abs(h @ [-line[1], line[0]]) < 1e-5 * np.linalg.norm(h)
+    assert np.sign(h @ line) == np.sign(offset)
+
+
+def test_a_sharp_turn_is_no_crossing():
+    case = plane.CASES["sharp-turn-1e-9"]
+    run, _ = plane.run_of(case, 1e-13)
+    h = run.x[:, 2:4] + run.x[:, 4:6]
+    assert run.itinerary == "*"
+    assert np.linalg.norm(h, axis=1).min() < 1e-9
+    slip = [float(v) for v in case["slip"]]
+    assert np.abs(h[-1] - slip).max() < 1e-13
+
+
+@pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
+def test_dense_output_to_the_tolerance(tol):
+    case = plane.CASES["near-boundary-arrival"]
+    run, begun = plane.run_of(case, tol)
+    fine, _ = plane.run_of(case, 1e-14)
+    t = np.concatenate([np.linspace(begun, 2.956, 301), 2.5913 + np.logspace(-4, -16, 25)])
+    assert np.abs(run(t) - fine(t)).max() < 30 * tol
+
+
+def test_several_sets_and_a_surface():
+    # Two pucks of known stopping times v/mu, and an oscillator with a kick that starts one puck again.
+    x = plane.columns(*"a1 a2 v1 v2 b1 b2 w1 w2 z zd".split())
+    one, two = (ca.vertcat(*plane.columns(f"{n}1", f"{n}2")) for n in "lm")
+    lam, mu = plane.columns("lam", "mu")
+    system = ns.FilippovSystem(
+        x,
+        field=[
+            *(x[2], x[3], -mu * one[0], -mu * one[1], x[6], x[7], -0.3 * two[0], -0.3 * two[1]),
+            *(x[9], -x[8] - 0.2 * lam),
+        ],
+        surfaces=[ca.vertcat(x[2], x[3]), x[9], ca.vertcat(x[6], x[7])],
+        multipliers=[one, lam, two],
+        parameters={mu: 0.5},
+        resets=[ns.Reset(x[8] + 1.0, [*x[:2], 0.3, 0.4, *x[4:]], direction=-1, name="kick")],
+    )
+    run = ns.simulate(system, [0, 0, 0.6, 0.8, 0, 0, 0.3, 0.4, 2.0, 0.0], 6.0, tol=1e-12)
+    first, second, kick, _, last = run.events[:5]
+    assert run.itinerary == "*-* *-s s-s *-s *+s s+s"
+    assert [e.name for e in run.events[:5]] == ["h2", "h0", "kick", "h1", "h0"]
+    assert first.t == pytest.approx(0.5 / 0.3, abs=1e-11)
+    assert second.t == pytest.approx(1.0 / 0.5, abs=1e-11)
+    assert kick.t == pytest.approx(np.arccos(-1.2 / 1.8), abs=1e-11)  # z = 0.2 + 1.8 cos t
+    assert last.t == pytest.approx(kick.t + 1.0, abs=1e-11)
+    travelled = (0.6 + 0.3 * 0.5) * np.array([1.0, 0.0]) + (0.8 + 0.4 * 0.5) * np.array([0.0, 1.0])
+    assert run.x[-1, :2] == pytest.approx(travelled, abs=1e-11)
+
+
+@pytest.mark.parametrize("both", [True, False])
+def test_two_sets_are_met_at_one_time(both):
+    # Two equal pucks stop at once; coupled by a spring of no force they stay at rest.
+    v, w = plane.columns("v1", "v2"), plane.columns("w1", "w2")
+    one, two = (ca.vertcat(*plane.columns(f"{n}1", f"{n}2")) for n in "lm")
+    field = [-0.5 * one[0], -0.5 * one[1], -0.5 * two[0], -0.5 * two[1]]
+    system = ns.FilippovSystem(
+        [*v, *w], field=field, surfaces=[ca.vertcat(*v), ca.vertcat(*w)], multipliers=[one, two]
+    )
+    start = [0.6, 0.8, -0.8, 0.6] if both else [0.0, 0.0, -0.8, 0.6]
+    run = ns.simulate(system, start, 3.0)
+    assert run.itinerary.split()[-1] == "ss" and set(run.itinerary[:2]) <= set("*s")
+    assert run.events[-2].t == pytest.approx(2.0, abs=1e-12)
+    assert not run.x[-1].any()
+
+
+def _puck(**more):
+    x, v = plane.columns("x1", "x2"), plane.columns("v1", "v2")
+    lam, (mu, pull) = ca.vertcat(*plane.columns("l1", "l2")), plane.columns("mu", "pull")
+    return ns.FilippovSystem(
+        [*x, *v],
+        field=[*v, pull - mu * lam[0], -mu * lam[1]],
+        surfaces=[ca.vertcat(*v)],
+        multipliers=[lam],
+        parameters={mu: 0.5, pull: 0.0},
+        **more,
+    )
+
+
+def test_no_friction_is_allowed():
+    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"mu": 0.0, "pull": 1.0})
+    assert run.status == ns.Status.REACHED_END and run.itinerary == "*"
+    assert run.x[-1] == pytest.approx([2.0, 0.0, 2.0, 0.0], abs=1e-12)
+    run = ns.simulate(_puck(), [0, 0, 1, 0], 2.0, parameters={"mu": 0.0, "pull": -1.0})
+    assert run.x[-1] == pytest.approx([0.0, 0.0, -1.0, 0.0], abs=1e-12)
+
+
+def test_friction_that_pushes_has_no_unique_future():
+    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"mu": -0.5})
+    assert run.status == ns.Status.NON_UNIQUE
+    assert "negative direction" in run.message
+    moving = ns.simulate(_puck(), [0, 0, 3, 4], 2.0, parameters={"mu": -0.5})
+    assert moving.x[-1, 2:] == pytest.approx([3.6, 4.8], abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("pull", "itinerary", "speed"), [(0.3, "s", 0.0), (0.6, "*", 0.2), (-0.6, "*", -0.2)]
+)
+def test_a_start_on_the_set_sticks_or_leaves(pull, itinerary, speed):
+    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": pull})
+    assert run.itinerary == itinerary
+    assert run.x[-1, 2] == pytest.approx(speed, abs=1e-12)
+
+
+def test_a_mode_to_start_in():
+    run = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": 0.6}, start_mode="*")
+    assert run.itinerary == "*"
+    refused = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": 0.6}, start_mode="s")
+    assert refused.status == ns.Status.NON_UNIQUE
+    with pytest.raises(ns.DefinitionError, match=r"\* s for a set"):
+        ns.simulate(_puck(), [0, 0, 0, 0], 2.0, start_mode="+")
+
+
+def test_ensembles_and_sections_meet_sets():
+    starts = np.array([[0, 0, 0.6, 0.8], [0, 0, 0, 0], [0, 0, np.nan, 0]])
+    many = ns.ensemble(_puck(), starts, 3.0, at_event=("entry", 1))
+    assert many.itinerary.tolist() == ["* s", "s", ""]
+    assert many.event_t[0] == pytest.approx(2.0, abs=1e-11)
+    assert many.status[2] == ns.Status.NOT_FINITE
+    run = ns.simulate(_puck(), starts[0], 3.0, at=ns.Section("h0", count=1))
+    assert run.status == ns.Status.STOPPED and run.sample_t[0] == pytest.approx(2.0, abs=1e-11)
+
+
+def test_runs_are_saved_with_their_system(tmp_path):
+    run = ns.simulate(_puck(), [0, 0, 0.6, 0.8], 3.0)
+    run.save(tmp_path / "run")
+    again = ns.load(tmp_path / "run")
+    assert again.system == run.system and again.itinerary == run.itinerary
+    assert np.array_equal(again(1.7), run(1.7))
+    assert repr(again.system).startswith(
+        "FilippovSystem(4 states: x1, x2, v1, v2; set of codimension 2"
+    )
+
+
+def test_what_is_no_set_is_refused():
+    v = plane.columns("v1", "v2", "v3", "v4")
+    l1, l2 = plane.columns("l1", "l2")
+    pair = ca.vertcat(v[0], v[1])
+    for surfaces, multipliers, message in [
+        ([pair], [l1], r"\[2\], received \[1\]"),
+        ([v[0]], [ca.vertcat(l1, l2)], r"\[1\], received \[2\]"),
+        ([ca.vertcat(*v)], [ca.SX.sym("l", 4)], "at most 3 switching functions"),
+        ([ca.SX.zeros(2, 2)], [ca.vertcat(l1, l2)], "received a matrix"),
+    ]:
+        with pytest.raises(ns.DefinitionError, match=message):
+            ns.FilippovSystem(v, field=[0] * 4, surfaces=surfaces, multipliers=multipliers)
+    with pytest.raises(ns.DefinitionError, match="all of its components together"):
+        ns.FilippovSystem(
+            v,
+            field=[l1 * l2, 0, 0, 0],
+            surfaces=[pair],
+            multipliers=[ca.vertcat(l1, l2)],
+        )
+
+
+@pytest.mark.parametrize(
+    "question",
+    [
+        lambda system: ns.sliding_field(system, [0, 0, 0, 0]),
+        lambda system: ns.two_fold(system, [0, 0, 0, 0]),
+        lambda system: ns.regularise(system, 1e-3),
+        lambda system: ns.find_fold(system, near=[0, 0, 0, 0]),
+        lambda system: ns.sliding_branches(system, [0, 0, 0, 0]),
+    ],
+)
+def test_what_knows_surfaces_only_says_so(question):
+    with pytest.raises(ns.DefinitionError, match="multipliers are scalars"):
+        question(_puck())

@@ -49,11 +49,10 @@ class FilippovSystem(Structure):
     field : sequence of n expressions, optional
         The right-hand side in states, parameters, time and multipliers.
     multipliers : SX symbol or sequence of them, optional
-        One for each surface; a vector of symbols for each set.
+        One for each surface; a vector for each set.
     surfaces : sequence of expressions, optional
-        Switching functions, one for each multiplier (``surface`` also takes one). An entry that is a
-        vector h of two or three is one set h = 0, off which its multiplier is h/|h| and on which it is
-        of at most length 1: Coulomb friction in the plane.
+        Switching functions, one for each multiplier (``surface`` also takes one). A vector h of two or
+        three is one set h = 0: its multiplier is h/|h| off it and |lambda| <= 1 on it.
     parameters : mapping or sequence, optional
         Symbols with their default values; None, or a bare sequence of symbols, means no default.
     time : SX symbol, optional
@@ -268,8 +267,7 @@ class FilippovSystem(Structure):
         if found.states.numel() != self.extended_dimension:
             raise DefinitionError(
                 f"mode_field: expected a mode whose field is explicit, received {mode!r}. On several "
-                "surfaces, or where a multiplier enters nonlinearly, only an equation for the "
-                "multipliers is known: use sliding_branches for their values at a point."
+                "surfaces, or with a nonlinear multiplier, there is only an equation: sliding_branches."
             )
         return found.field
 

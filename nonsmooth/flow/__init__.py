@@ -19,6 +19,7 @@ The contract of events, the same in every engine (``tests/flow/test_contract.py`
    on from the side where it was to the other.
 """
 
+from .drawn import Grid, RandomStarts
 from .ensemble import ensemble
 from .follow import follow
 from .reference.polynomial import first_crossing, first_root
@@ -33,6 +34,8 @@ from .work import Work
 __all__ = [
     "Ensemble",
     "Event",
+    "Grid",
+    "RandomStarts",
     "Section",
     "Segment",
     "Status",

@@ -13,6 +13,7 @@ import hashlib
 import io
 import json
 import os
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -42,8 +43,8 @@ class Checkpoint:
         A folder; made if it is not there.
     problem : str
         Hash of everything the results depend on.
-    chunk : int
-        Size of a chunk, unless the folder has one.
+    chunk : callable
+        Returns the size of a chunk, if the folder has none.
 
     Raises
     ------
@@ -51,8 +52,8 @@ class Checkpoint:
         The folder belongs to another problem, is no checkpoint, is damaged or cannot be written.
     """
 
-    def __init__(self, path: str | os.PathLike[str], problem: str, chunk: int):
-        self.folder, self.problem, self.chunk = Path(path), problem, chunk
+    def __init__(self, path: str | os.PathLike[str], problem: str, chunk: Callable[[], int]):
+        self.folder, self.problem = Path(path), problem
         head = self.folder / "problem.json"
         try:
             if os.path.lexists(head):
@@ -64,7 +65,8 @@ class Checkpoint:
                     f"{self.folder}, which holds something else. Choose another path."
                 )
             self.folder.mkdir(parents=True, exist_ok=True)
-            files.replace(head, json.dumps(_sealed(self._head(chunk))).encode())
+            self.chunk = chunk()
+            files.replace(head, json.dumps(_sealed(self._head(self.chunk))).encode())
         except (OSError, ValueError) as error:
             if isinstance(error, OptionError):
                 raise
@@ -118,7 +120,7 @@ class Checkpoint:
         like : Chunk
             Has arrays as the chunk's must be; what is in them does not matter.
         """
-        expected = _arrays(like)
+        expected = chunk_arrays(like)
         most = sum(a.nbytes + 2 * _HEADER for a in expected.values()) + _WORDS
         data = files.read(self._file(number), most)
         if data is None:
@@ -141,7 +143,7 @@ class Checkpoint:
         OptionError
             It cannot be written; those that were finished before are kept.
         """
-        arrays, memory = _arrays(chunk), io.BytesIO()
+        arrays, memory = chunk_arrays(chunk), io.BytesIO()
         words = np.frombuffer(json.dumps(chunk.words).encode(), np.uint8)
         seal = np.frombuffer(self._seal(number, chunk.words, arrays), np.uint8)
         parts: dict[str, Any] = {**arrays, "words": words, "seal": seal}
@@ -168,7 +170,8 @@ def _sealed(content: dict[str, Any]) -> dict[str, Any]:
     return {**content, "seal": hashlib.sha256(text).hexdigest()}
 
 
-def _arrays(chunk: Chunk) -> dict[str, NDArray[Any]]:
+def chunk_arrays(chunk: Chunk) -> dict[str, NDArray[Any]]:
+    """Return all numbers of a chunk, by name."""
     return {**chunk.arrays(), "totals": chunk.totals}
 
 

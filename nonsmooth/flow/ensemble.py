@@ -14,13 +14,15 @@ from .chunks import Job
 from .compiled.codegen import supports_lanes
 from .compiled.engine import engine_for
 from .compiled.tape import library, tape_for
+from .drawn import Drawn
 from .facts import KINDS
 from .options import Options
-from .results import Collected, Ensemble
+from .results import Chunk, Collected, Ensemble
 from .select import compiled_or_none, use_compiled
 from .starts import Starts
+from .stored import Stored
 from .view import read_view, sectioned
-from .work import Work, run_all
+from .work import Work, run_all, size_of_chunk
 
 #: Fewer trajectories than this are not worth compiling the engine that runs several in step.
 _FEW = 64
@@ -28,7 +30,7 @@ _FEW = 64
 
 def ensemble(
     system: FilippovSystem,
-    x0: ArrayLike,
+    x0: ArrayLike | Drawn,
     t_end: float,
     *,
     t_start: float = 0.0,
@@ -52,7 +54,7 @@ def ensemble(
     ----------
     system : FilippovSystem
         The system the question is about.
-    x0 : array_like (..., n)
+    x0 : array_like (..., n), Grid or RandomStarts
         Starts. Those that are not finite get the status NOT_FINITE; the others go on.
     t_end : float
         Time at which every run ends, unless something ends it before.
@@ -121,11 +123,21 @@ def ensemble(
     several = lanes and t_end > t_start
     chosen = _engine(system, options, engine, starts.count, several)
     job = Job(system, options, number, view.times, view.room, chosen)
-    saved = work.checkpoint_of(lambda: _problem(system, starts, job))
-    names, keeps = system.state_names, number is not None
-    results = Collected(system.dimension, starts.shape, keeps, view.room, names)
-    run_all(job, starts, results, work, saved)
-    return results.ensemble()
+    return _run(job, starts, work)
+
+
+def _run(job: Job, starts: Starts, work: Work) -> Ensemble:
+    system, count = starts.system, starts.count
+    size = lambda: work.chunk or size_of_chunk(job, starts, work.workers)
+    saved = work.saved(lambda: _problem(system, starts, job), size)
+    arrays, codes = None, None
+    if isinstance(saved, Stored):
+        arrays = saved.arrays(Chunk.empty(0, system.dimension, job.at is not None, job.room), count)
+        codes = saved.codes(count)
+    names, keeps = system.state_names, job.at is not None
+    results = Collected(system.dimension, starts.shape, keeps, job.room, names, arrays)
+    run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved)
+    return results.ensemble(codes)
 
 
 def _work(work: Any) -> Work:

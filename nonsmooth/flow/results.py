@@ -168,8 +168,10 @@ class Ensemble(Savable):
         return tables.ensemble_set(self)
 
     def __repr__(self) -> str:
-        found, number = np.unique(self.status, return_counts=True)
-        counts = ", ".join(f"{Status(int(s))} {k}" for s, k in zip(found, number, strict=True))
+        flat, size = self.status.reshape(-1), 1 << 22
+        pieces = [flat[k : k + size] for k in range(0, len(flat), size)]
+        number = {s: sum(int(np.count_nonzero(piece == s)) for piece in pieces) for s in Status}
+        counts = ", ".join(f"{s} {k}" for s, k in number.items() if k)
         return (
             f"Ensemble(shape {self.t.shape}, {self.x.shape[-1]} states, "
             f"{len(self.itineraries)} itineraries; {counts})"
@@ -191,6 +193,8 @@ class Collected:
         Samples kept of each trajectory.
     names : tuple of str
         Of the states.
+    arrays : Chunk, optional
+        Where the results go; new arrays in memory unless given.
     """
 
     def __init__(
@@ -200,10 +204,12 @@ class Collected:
         at: bool,
         room: int | None = None,
         names: tuple[str, ...] = (),
+        arrays: Chunk | None = None,
     ):
         self.shape, self.names = shape, names
-        self.all = Chunk.empty(math.prod(shape), dimension, at, room)
+        self.all = Chunk.empty(math.prod(shape), dimension, at, room) if arrays is None else arrays
         self._words: dict[str, int] = {}
+        self._parts: list[tuple[int, int, NDArray[np.int32]]] = []
 
     def put(self, first: int, chunk: Chunk) -> None:
         """Take a chunk that begins with trajectory ``first``; its arrays may be a part of these."""
@@ -212,18 +218,17 @@ class Collected:
             if array.base is not whole[name]:
                 whole[name][first : first + len(array)] = array
         numbers = [self._words.setdefault(w, len(self._words)) for w in chunk.words]
-        if numbers != list(range(len(numbers))):
-            codes = self.all.itinerary[first : first + len(chunk.t)]
-            codes[:] = np.array(numbers, np.int32)[codes]
+        self._parts.append((first, first + len(chunk.t), np.array(numbers, np.int32)))
 
-    def ensemble(self) -> Ensemble:
-        """Return the results, with the itineraries sorted."""
-        words, code, every = sorted(self._words), self.all.itinerary, self.all
-        if words != list(self._words):
-            order = np.empty(len(words), np.int32)
-            for k, word in enumerate(words):
-                order[self._words[word]] = k
-            code = order[code]
+    def ensemble(self, codes: NDArray[np.int32] | None = None) -> Ensemble:
+        """Return the results, with the itineraries sorted and their numbers in ``codes``."""
+        words, every = sorted(self._words), self.all
+        place = np.empty(len(words), np.int32)
+        for k, word in enumerate(words):
+            place[self._words[word]] = k
+        code = np.empty(len(every.t), np.int32) if codes is None else codes
+        for first, last, numbers in self._parts:
+            code[first:last] = place[numbers][every.itinerary[first:last]]
         n, shape = every.x.shape[1], self.shape
         return Ensemble(
             x=every.x.reshape(*shape, n),
@@ -234,7 +239,11 @@ class Collected:
             events={kind: every.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
             event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
             event_t=None if every.at_t is None else every.at_t.reshape(shape),
-            sample_x=None if every.sample_x is None else every.sample_x.reshape(*shape, -1, n),
-            sample_t=None if every.sample_t is None else every.sample_t.reshape(*shape, -1),
+            sample_x=None
+            if every.sample_x is None
+            else every.sample_x.reshape(*shape, *every.sample_x.shape[1:]),
+            sample_t=None
+            if every.sample_t is None
+            else every.sample_t.reshape(*shape, *every.sample_t.shape[1:]),
             state_names=self.names,
         )

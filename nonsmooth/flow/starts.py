@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, OptionError, PointError, Surfaces, explain
+from .drawn import Drawn, Index, part_of
 from .facts import ON_SURFACE
 from .options import Options
 from .reference.modes import rounding_scale
@@ -22,7 +23,7 @@ class Starts:
     Parameters
     ----------
     system : FilippovSystem
-    x0 : array_like (..., n)
+    x0 : array_like (..., n), Grid or RandomStarts
     parameters : mapping or None
         Numbers, or arrays that broadcast with the starts.
     t_start : float
@@ -35,18 +36,19 @@ class Starts:
     def __init__(
         self,
         system: FilippovSystem,
-        x0: ArrayLike,
+        x0: ArrayLike | Drawn,
         parameters: Mapping[Any, ArrayLike] | None,
         t_start: float,
     ):
         self.system, self.t_start = system, t_start
-        self.x0 = _numbers(x0, "x0")
-        if self.x0.ndim == 0 or self.x0.shape[-1] != system.dimension:
+        self.x0 = x0 if isinstance(x0, Drawn) else _numbers(x0, "x0")
+        own = (*x0.shape, x0.dimension) if isinstance(x0, Drawn) else np.shape(self.x0)
+        if own == () or own[-1] != system.dimension:
             raise PointError(
                 explain(
                     "x0",
                     expected=f"shape (..., {system.dimension}) for the states {system.state_names}",
-                    received=f"shape {self.x0.shape}",
+                    received=f"shape {own}",
                     advice="States are on the last axis.",
                 )
             )
@@ -56,7 +58,7 @@ class Starts:
         sample = {k: _sample(v) for k, v in arrays.items()}
         self.p = system.parameter_vector(sample)
         self.varied = {system.parameter_names.index(k): v for k, v in arrays.items() if v.ndim > 0}
-        shapes = [self.x0.shape[:-1], *[v.shape for v in self.varied.values()]]
+        shapes = [own[:-1], *[v.shape for v in self.varied.values()]]
         try:
             self.shape = np.broadcast_shapes(*shapes)
         except ValueError as error:
@@ -67,12 +69,15 @@ class Starts:
 
     def digest(self) -> str:
         """Return a hash of all numbers."""
-        code = hashlib.sha256(repr((self.shape, self.x0.shape)).encode())
-        code.update(np.ascontiguousarray(self.x0).tobytes())
+        code = hashlib.sha256(repr((self.shape, np.shape(self.x0))).encode())
+        if isinstance(self.x0, Drawn):
+            code.update(repr(self.x0.state()).encode())
+        else:
+            code.update(np.ascontiguousarray(self.x0).data)
         code.update(self.p.tobytes())
         for column, values in sorted(self.varied.items()):
             code.update(repr((column, values.shape)).encode())
-            code.update(np.ascontiguousarray(values).tobytes())
+            code.update(np.ascontiguousarray(values).data)
         return code.hexdigest()
 
     def every_parameter(self) -> Array:
@@ -81,15 +86,22 @@ class Starts:
 
     def part(self, first: int, last: int) -> tuple[Array, Array]:
         """Extended starts and parameters of the trajectories first to last - 1."""
+        return self.rows(slice(first, last))
+
+    def rows(self, which: slice | Index) -> tuple[Array, Array]:
+        """Extended starts and parameters of some trajectories, by their numbers."""
         n = self.system.dimension
-        x = _rows(self.x0, self.shape, first, last, n)
+        if isinstance(self.x0, Drawn):
+            x = part_of(self.x0, self.shape, _numbered(which))
+        else:
+            x = _rows(self.x0, self.shape, which, n)
         if self.system.time_dependent:
-            x = np.concatenate([x, np.full((last - first, 1), self.t_start)], axis=1)
+            x = np.concatenate([x, np.full((len(x), 1), self.t_start)], axis=1)
         if not self.varied:
             return x, self.p
-        p = np.tile(self.p, (last - first, 1))
+        p = np.tile(self.p, (len(x), 1))
         for column, values in self.varied.items():
-            p[:, column] = _rows(values[..., None], self.shape, first, last, 1)[:, 0]
+            p[:, column] = _rows(values[..., None], self.shape, which, 1)[:, 0]
         return x, p
 
 
@@ -120,12 +132,16 @@ def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Opti
         )
 
 
-def _rows(values: Array, shape: tuple[int, ...], first: int, last: int, n: int) -> Array:
-    """Rows first to last - 1 of values broadcast to ``(*shape, n)``, which is never made."""
+def _numbered(which: slice | Index) -> Index:
+    return np.arange(which.start, which.stop) if isinstance(which, slice) else which
+
+
+def _rows(values: Array, shape: tuple[int, ...], which: slice | Index, n: int) -> Array:
+    """Some rows of values broadcast to ``(*shape, n)``, which is never made."""
     if values.shape == (*shape, n):
-        return values.reshape(-1, n)[first:last]
-    where = np.unravel_index(np.arange(first, last), shape) if shape else ()
-    return np.broadcast_to(values, (*shape, n))[where]
+        return values.reshape(-1, n)[which]
+    index = np.unravel_index(_numbered(which), shape) if shape else ()
+    return np.broadcast_to(values, (*shape, n))[index]
 
 
 def _numbers(value: ArrayLike, what: str) -> Array:

@@ -5,10 +5,13 @@ from __future__ import annotations
 import math
 import os
 import threading
+import time
 from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
+
+import numpy as np
 
 from ..model import Array, OptionError, explain
 from .checkpoint import Checkpoint
@@ -16,9 +19,17 @@ from .chunks import Job, run_chunk, shipped
 from .progress import progress_bar
 from .results import Chunk, Collected
 from .starts import Starts
+from .stored import Stored
 
 #: Chunks under way at once with an executor.
 _IN_FLIGHT = 64
+
+#: How long a chunk should take, a run of several that is worth more than one chunk, and one that tells
+#: how long they take (seconds).
+_SECONDS, _WORTH, _PROBE = 1.0, 0.02, 0.002
+
+#: Trajectories in a chunk: at least so many where they are short, at most so many.
+_LEAST, _LARGEST = 256, 1 << 18
 
 
 @dataclass(frozen=True)
@@ -32,12 +43,16 @@ class Work:
     executor : concurrent.futures.Executor, optional
         Runs the chunks instead: processes, or ``dask.distributed.Client(...).get_executor()``.
     chunk : int, optional
-        Trajectories in one piece of work.
+        Trajectories in one piece of work; a few are timed to choose it unless given.
     progress : bool, optional
         A bar for runs of some seconds on a terminal; nothing in logs.
     checkpoint : path, optional
         A folder for finished chunks. A later call with the same problem goes on from there, with
         bit-identical results; a checkpoint of another problem is refused.
+    store : path, optional
+        A folder for the results themselves: arrays (``x.npy``, ...) that are mapped into memory,
+        written as chunks are finished. It is a checkpoint too. Results of any size need no memory;
+        starts need none as a :class:`Grid` or :class:`RandomStarts`.
 
     Raises
     ------
@@ -55,14 +70,20 @@ class Work:
 
     threads: int | None = None
     executor: Executor | None = None
-    chunk: int = 16384
+    chunk: int | None = None
     progress: bool = True
     checkpoint: str | os.PathLike[str] | None = None
+    store: str | os.PathLike[str] | None = None
 
     def __post_init__(self) -> None:
-        _positive("chunk", self.chunk)
+        _positive("chunk", 1 if self.chunk is None else self.chunk)
         _positive("threads", 1 if self.threads is None else self.threads)
-        _require_path(self.checkpoint)
+        _require_path("checkpoint", self.checkpoint)
+        _require_path("store", self.store)
+        if self.checkpoint is not None and self.store is not None:
+            raise OptionError(
+                "checkpoint, store: expected one of them, received both. A store is a checkpoint too."
+            )
         if self.executor is not None and not isinstance(self.executor, Executor):
             raise OptionError(
                 explain(
@@ -73,16 +94,28 @@ class Work:
                 )
             )
 
-    def checkpoint_of(self, problem: Callable[[], str]) -> Checkpoint | None:
-        """Return the checkpoint of a problem, given as what makes its hash, if there is to be one.
+    def saved(self, problem: Callable[[], str], size: Callable[[], int]) -> Checkpoint | None:
+        """Return where chunks are kept, if they are to be.
+
+        Parameters
+        ----------
+        problem : callable
+            Returns the hash of what the results depend on.
+        size : callable
+            Returns the size of a chunk, if nothing kept says it.
 
         Raises
         ------
         OptionError
         """
-        if self.checkpoint is None:
-            return None
-        return Checkpoint(self.checkpoint, problem(), self.chunk)
+        if self.store is not None:
+            return Stored(self.store, problem(), size)
+        return None if self.checkpoint is None else Checkpoint(self.checkpoint, problem(), size)
+
+    @property
+    def workers(self) -> int:
+        """How many chunks run at once, as far as is known here."""
+        return (self.threads or _processors()) if self.executor is None else _IN_FLIGHT
 
 
 def _positive(name: str, value: int) -> None:
@@ -90,22 +123,22 @@ def _positive(name: str, value: int) -> None:
         raise OptionError(f"{name}: expected a positive integer, received {value!r}.")
 
 
-def _require_path(value: object) -> None:
+def _require_path(name: str, value: object) -> None:
     if value is not None and not (isinstance(value, (str, os.PathLike)) and str(value)):
         raise OptionError(
             explain(
-                "checkpoint",
+                name,
                 expected="the path of a folder",
                 received=f"{value!r} ({type(value).__name__})",
-                advice='For example checkpoint="sweep".',
+                advice=f'For example {name}="sweep".',
             )
         )
 
 
 def run_all(
-    job: Job, starts: Starts, results: Collected, work: Work, saved: Checkpoint | None
+    job: Job, starts: Starts, results: Collected, work: Work, size: int, saved: Checkpoint | None
 ) -> None:
-    """Run all trajectories, chunk by chunk, except those that a checkpoint has.
+    """Run all trajectories, chunk by chunk, except those that are kept.
 
     Parameters
     ----------
@@ -114,9 +147,11 @@ def run_all(
     results : Collected
         Filled.
     work : Work
+    size : int
+        Of a chunk.
     saved : Checkpoint or None
+        Where finished chunks are kept.
     """
-    size = work.chunk if saved is None else saved.chunk
     bar = progress_bar(starts.count, work.progress)
     missing = []
     for number in range(math.ceil(starts.count / size)):
@@ -134,12 +169,39 @@ def run_all(
     try:
         with closing(_chunks(job, pieces, workers, work.executor)) as finished:
             for number, chunk in finished:
+                results.put(number * size, chunk)
                 if saved is not None:
                     saved.save(number, chunk)
-                results.put(number * size, chunk)
                 bar.update(len(chunk.t))
     finally:
         bar.close()
+
+
+def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
+    """Trajectories that take about as long as one chunk should; a few of them are run to know.
+
+    Parameters
+    ----------
+    job : Job
+    starts : Starts
+    workers : int
+    """
+    count, k, spent = starts.count, 1, 0.0
+    if not count:
+        return 1
+    while True:
+        x, p = starts.rows(np.linspace(0, count - 1, k).astype(np.int64))
+        began = time.perf_counter()
+        run_chunk(job, x, p)
+        spent = time.perf_counter() - began
+        if spent > _PROBE or 64 * k > count:
+            break
+        k *= 8
+    every = max(spent / k, 1e-9)
+    if count * every < _WORTH:
+        return max(count, 1)
+    size = min(_SECONDS / every, count / (4 * workers), _LARGEST)
+    return max(math.ceil(size), min(_LEAST, math.ceil(count / workers)) if every < 1e-3 else 1)
 
 
 #: The number of a chunk, its starts and parameters, the arrays for its results.

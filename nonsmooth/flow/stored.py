@@ -1,0 +1,124 @@
+"""Results of an ensemble in a folder of arrays instead of memory: a checkpoint that is its own result.
+
+Each array of results is a file of NumPy's (``x.npy``, ``t.npy``, ...) that is mapped into memory, so
+that its rows are written as their chunk is finished and read when they are looked at. Beside them is
+what a checkpoint has, ``problem.json`` and a file for each finished chunk, with its words and the
+seal over its rows.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..model import OptionError, explain
+from . import files
+from .checkpoint import Checkpoint, chunk_arrays
+from .results import Chunk
+
+
+class Stored(Checkpoint):
+    """Chunks whose rows are in mapped arrays.
+
+    Parameters
+    ----------
+    path : path-like
+        A folder; made if it is not there.
+    problem : str
+        Hash of everything the results depend on.
+    chunk : callable
+        Returns the size of a chunk, if the folder has none.
+
+    Raises
+    ------
+    OptionError
+    """
+
+    def __init__(self, path: str | os.PathLike[str], problem: str, chunk: Callable[[], int]):
+        super().__init__(path, f"stored {problem}", chunk)
+
+    def arrays(self, like: Chunk, count: int) -> Chunk:
+        """Return arrays of ``count`` rows in the folder, of the types that the arrays of a chunk have.
+
+        Raises
+        ------
+        OptionError
+            A file is no such array, or cannot be made.
+        """
+        mapped: dict[str, Any] = {
+            name: self._map(name, (count, *array.shape[1:]), array.dtype)
+            for name, array in like.arrays().items()
+        }
+        return replace(like, **mapped)
+
+    def codes(self, count: int) -> NDArray[np.int32]:
+        """Return the array for the itineraries' numbers over all chunks."""
+        return self._map("itinerary_code", (count,), np.dtype(np.int32))
+
+    def _map(self, name: str, shape: tuple[int, ...], dtype: np.dtype[Any]) -> NDArray[Any]:
+        path = self.folder / f"{name}.npy"
+        if not math.prod(shape):
+            return np.empty(shape, dtype)  # nothing can be mapped
+        try:
+            if not os.path.lexists(path):
+                _make(path, shape, dtype)
+            if path.is_symlink() or not path.is_file():
+                raise ValueError("it is no file")
+            array = np.load(path, mmap_mode="r+", allow_pickle=False)
+            if array.shape != shape or array.dtype != dtype:
+                raise ValueError(f"an array of shape {array.shape} and type {array.dtype}")
+        except (OSError, ValueError) as error:
+            raise OptionError(
+                explain(
+                    "store",
+                    expected=f"an array of shape {shape} and type {dtype} in {path}",
+                    received=str(error),
+                    advice=f"Make room, choose another path, or delete {path.name}: what was in it is "
+                    "computed again.",
+                )
+            ) from error
+        return np.asarray(array)
+
+    def load(self, number: int, like: Chunk) -> Chunk | None:
+        """Return a finished chunk, whose rows are those of ``like``, or None."""
+        data = files.read(self._file(number), 1 << 30)
+        try:
+            content = json.loads(data or b"")
+            words, totals = content["words"], np.array(content["totals"], np.int64)
+            found = replace(like, words=words, totals=totals)
+            whole = content["seal"] == self._seal(number, words, chunk_arrays(found)).hex()
+            return found if whole else None
+        except Exception:  # whatever a damaged file drives the reader to
+            return None
+
+    def save(self, number: int, chunk: Chunk) -> None:
+        """Note that a chunk is finished, whose rows are in the arrays.
+
+        Raises
+        ------
+        OptionError
+        """
+        seal = self._seal(number, chunk.words, chunk_arrays(chunk)).hex()
+        content = {"words": chunk.words, "totals": chunk.totals.tolist(), "seal": seal}
+        try:
+            files.replace(self._file(number), json.dumps(content).encode())
+        except OSError as error:
+            raise self._unusable(error) from error
+
+    def _file(self, number: int) -> Path:
+        return self.folder / f"chunk-{number:08d}.json"
+
+
+def _make(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
+    """A file of zeros that takes room on the disk as it is written, there whole or not at all."""
+    part = path.with_name(f"{files.PART}{path.name}")
+    np.lib.format.open_memmap(part, mode="w+", dtype=dtype, shape=shape)
+    os.replace(part, path)

@@ -103,10 +103,11 @@ class RandomStarts:
     Parameters
     ----------
     count : int
+        Number of starts.
     low, high : array_like (n,)
         Corners of the box; equal numbers hold a state.
     seed : int, optional
-        From 0 to 2^64 - 1.
+        Which random starts: from 0 to 2^64 - 1.
 
     Attributes
     ----------

@@ -22,13 +22,14 @@ _FLAGS = (
 
 #: Run in the page: what is wider than the window, pictures that are broken, controls without a name.
 _OVERFLOW = """
-const wide = document.documentElement.scrollWidth - window.innerWidth;
+const [width] = arguments; // of the window: a phone shows a page that is too wide at a smaller scale
+const wide = document.documentElement.scrollWidth - width;
 if (wide <= 0) return [];
 const hidden = (e) => { for (; e; e = e.parentElement) {
   const s = getComputedStyle(e); if (s.overflowX !== 'visible' || s.position === 'fixed') return true;
 } return false; };
 const found = [...document.body.querySelectorAll('*')].filter(
-  (e) => e.getBoundingClientRect().right > window.innerWidth + 0.5 && !hidden(e.parentElement));
+  (e) => e.getBoundingClientRect().right > width + 0.5 && !hidden(e.parentElement));
 const name = (e) => e.tagName + (e.id ? '#' + e.id : '') + ' ' + (e.getAttribute('class') || '');
 return [wide + ' px', ...found.slice(0, 6).map((e) => name(e) + ': ' + e.textContent.trim().slice(0, 60))];
 """
@@ -78,6 +79,7 @@ class Browser:
         service = Service(executable_path=shutil.which("chromedriver"))
         self.driver = webdriver.Chrome(options=options, service=service)
         self.driver.set_script_timeout(120)
+        self.width = 0
         self.complaints: list[str] = []
         self.requests: list[str] = []
 
@@ -85,6 +87,7 @@ class Browser:
         """Open a file at a width in pixels; a phone's width comes with touch and its pixel ratio."""
         self._drain()
         self.complaints, self.requests = [], []
+        self.width = width
         phone = width < 600
         size = dict(width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone)
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
@@ -115,7 +118,7 @@ class Browser:
             u for u in self.requests if not u.startswith(("file:", "data:", "about:", "blob:"))
         ]
         found = {
-            "wider than the window": self.driver.execute_script(_OVERFLOW),
+            "wider than the window": self.driver.execute_script(_OVERFLOW, self.width),
             "broken picture": self.driver.execute_script(_BROKEN),
             "console": self.complaints,
             "request to elsewhere": elsewhere,

@@ -85,13 +85,13 @@ class Browser:
 
     def open(self, path: Path, width: int = 1366, height: int = 900, hash: str = "") -> None:
         """Open a file at a width in pixels; a phone's width comes with touch and its pixel ratio."""
+        self.driver.get("about:blank")  # a changed hash alone would not load the page
         self._drain()
         self.complaints, self.requests = [], []
         self.width = width
         phone = width < 600
         size = dict(width=width, height=height, deviceScaleFactor=2 if phone else 1, mobile=phone)
         self.driver.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", size)
-        self.driver.get("about:blank")  # a changed hash alone would not load the page
         self.driver.get(path.resolve().as_uri() + (f"#{hash}" if hash else ""))
         self._drain()
 

@@ -15,6 +15,7 @@ import bounce
 import nonsmooth as ns
 from nonsmooth.flow.status import ADVICE
 from nonsmooth.local.two_folds.classification import TABLE
+from tests.browser import WIDTHS
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -161,19 +162,26 @@ def test_readme_shows_the_measured_table():
 # The built site ------------------------------------------------------------------------------------
 
 
-@pytest.mark.slow
-def test_built_site_loads_nothing_from_elsewhere_and_everything_it_loads_is_there(tmp_path):
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    """The folder of the built site."""
     pytest.importorskip("material", reason="the site is built with the docs extra")
     pytest.importorskip("mkdocstrings", reason="the site is built with the docs extra")
-    site = tmp_path / "site"
+    folder = tmp_path_factory.mktemp("docs") / "site"
     build = subprocess.run(
-        [sys.executable, "-m", "mkdocs", "--quiet", "build", "--strict", "--site-dir", str(site)],
+        [sys.executable, "-m", "mkdocs", "--quiet", "build", "--strict", "--site-dir", str(folder)],
         cwd=ROOT,
         env={**os.environ, "NO_MKDOCS_2_WARNING": "1"},
         capture_output=True,
         text=True,
     )
     assert build.returncode == 0, build.stderr[-3000:]
+    yield folder
+    shutil.rmtree(folder)
+
+
+@pytest.mark.slow
+def test_built_site_loads_nothing_from_elsewhere_and_everything_it_loads_is_there(site):
     pages = sorted(site.rglob("*.html"))
     assert len(pages) > 15
     for page in pages:
@@ -192,4 +200,39 @@ def test_built_site_loads_nothing_from_elsewhere_and_everything_it_loads_is_ther
     for style in site.rglob("*.css"):
         assert not re.search(r"url\(\s*['\"]?(?:https?:)?//", style.read_text(encoding="utf-8"))
     assert {p.stem for p in (site / "gallery").glob("*.svg")} == set(generate.GALLERY)
-    shutil.rmtree(site)
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+@pytest.mark.parametrize("width", WIDTHS)
+def test_every_page_fits_the_window_and_complains_of_nothing(browser, site, width):
+    wrong = {}
+    pages = [page for page in sorted(site.rglob("*.html")) if page.name != "404.html"]
+    assert {"explore/two_folds.html", "explore/bounce.html", "index.html"} <= {
+        page.relative_to(site).as_posix() for page in pages
+    }
+    for page in pages:
+        browser.open(page, width)
+        if faults := browser.faults():
+            wrong[page.relative_to(site).as_posix()] = faults
+    assert wrong == {}
+
+
+SEARCH = """
+const field = document.querySelector("input[name=query]");
+field.focus();
+field.value = "diabolo";
+field.dispatchEvent(new Event("input", {bubbles: true}));
+field.dispatchEvent(new KeyboardEvent("keyup", {bubbles: true}));
+const found = () => [...document.querySelectorAll(".md-search-result__item a")].map((a) => a.href);
+for (let k = 0; k < 200 && !found().length; k++) await new Promise((go) => setTimeout(go, 50));
+return found();
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.browser
+def test_search_works_from_files(browser, site):
+    browser.open(site / "index.html")
+    assert any("two_folds" in href for href in browser.run(SEARCH))
+    assert browser.faults() == {}

@@ -13,8 +13,18 @@
     VI: "visible, invisible",
     IV: "invisible, visible",
   };
-  const say = (name) =>
-    name.replaceAll("Delta", "Δ").replaceAll("nu1", "ν₁").replaceAll("nu2", "ν₂");
+  const LETTERS = {
+    Delta: "Δ",
+    nu1: "ν₁",
+    nu2: "ν₂",
+    "kappa_-": "κ₋",
+    "kappa_+": "κ₊",
+    Da: "Dₐ",
+    Dr: "Dᵣ",
+  };
+  /** The words of the table with the letters of the pictures. */
+  const say = (words) =>
+    words.replace(/Delta|nu[12]|kappa_[-+]|\bD[ar]\b/g, (name) => LETTERS[name]);
 
   const map = new Page.Plane(byId("map"), { x: [-REACH, REACH], y: [-REACH, REACH] });
   const portrait = new Page.Plane(byId("portrait"), { x: [-1, 1], y: [-1, 1] });
@@ -381,7 +391,7 @@
       }[kind];
       entries.push([
         stroke(`line-${kind}`),
-        kind === "rest" ? words : `${words}, λ = ${text(value)}`,
+        kind === "rest" ? words : `${words}, κ = ${text(value)}`,
       ]);
     }
     if (f.slopes.some((m) => m < 0))
@@ -421,7 +431,7 @@
     byId("label").textContent = `${boundary ? "On a boundary: " : "Class "}${label}`;
     byId("determinism").textContent = boundary
       ? `The classes ${found.between.join(", ")} meet here and leading order does not decide between them; higher derivatives do.`
-      : found.row.determinism;
+      : say(found.row.determinism);
     const names = found.boundaries.map(say).join(", ");
     byId("meets").textContent =
       names && !boundary ? `On ${names}, which leaves the class unchanged.` : "";
@@ -429,7 +439,7 @@
       values.length ? values.map((v) => text(v, 6)).join(" and ") : "complex: no eigenlines";
     const facts = {
       σ: `(${f.sigma.map((s) => (s > 0 ? "+1" : "−1")).join(", ")})`,
-      eigenvalues: pair(f.eigenvalues),
+      "eigenvalues κ": pair(f.eigenvalues),
       "slopes z₃/z₂": pair(f.slopes),
       canards: many(found.canards),
       "faux canards": many(found.fauxCanards),

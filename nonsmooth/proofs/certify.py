@@ -172,8 +172,18 @@ def prove_subject(subject: Subject, zero: Zero, width: float, max_bits: int = 10
     proof, _ = _one(replace(subject, start=start), width, max_bits)
     if not proof.exists:
         return None
-    found = [between(Fraction(a), Fraction(b)) for a, b in proof.record["point"]]
-    return proof if all(b.contains(v) for b, v in zip(zero.box, found, strict=True)) else None
+    with precision(2 * max_bits):
+        point, box = (
+            [between(Fraction(a), Fraction(b)) for a, b in proof.record[key]]
+            for key in ("point", "box")
+        )
+        # Where one is in the other's box of uniqueness, they are one zero.
+        same = _all_in(point, zero.box) or _all_in(zero.point, box)
+    return proof if same else None
+
+
+def _all_in(point: Sequence[arb], box: Sequence[arb]) -> bool:
+    return all(b.contains(v) for b, v in zip(box, point, strict=True))
 
 
 def _wide(subject: Subject) -> bool:

@@ -26,6 +26,10 @@ from .subject import Subject
 Kind = Literal["two-fold", "fold", "equilibrium", "pseudo-equilibrium"]
 
 
+#: Wider boxes overflow.
+_WIDEST = Fraction(10) ** 300
+
+
 def prove_all(
     system: FilippovSystem,
     box: Sequence[Any],
@@ -126,11 +130,11 @@ def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> l
         what = f"box of {name!r}"
         if isinstance(value, (tuple, list, np.ndarray)):
             ends = [exact(v, numbers, what) for v in value]
-            if len(ends) != 2 or not ends[0] < ends[1]:
+            if len(ends) != 2 or not 0 < ends[1] - ends[0] < _WIDEST:
                 raise OptionError(
                     explain(
                         what,
-                        expected="(low, high) with low < high, both finite",
+                        expected="(low, high) with low < high, both finite, less than 1e300 apart",
                         received=repr(value),
                         advice="A number instead of a pair holds the state.",
                     )

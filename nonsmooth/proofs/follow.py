@@ -17,7 +17,7 @@ from .flint import arb, arb_mat, ctx
 from .krawczyk import identity
 from .modes import Modes
 from .motion import Mode
-from .proof import UnprovenError
+from .proof import DigitsError, UnprovenError
 from .roots import Polynomial, UnsureError, first_zero, narrowed
 from .series import horner
 from .steps import Step, at, growth, orthogonal
@@ -119,8 +119,10 @@ class Follower:
                 rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (self.order + 1)
                 if rest <= 8 * tolerance:
                     tops = mode.watched_series(top, self.p)
-                    coarse = _coarse(guards, tops, h, tolerance)
-                    if not coarse or shorter == _SHORTER:
+                    if not all(v[-1].is_finite() for v in tops):
+                        h /= 2
+                        continue
+                    if shorter == _SHORTER or not _coarse(guards, tops, h, tolerance):
                         break
                     shorter += 1
                     h *= 0.6
@@ -135,7 +137,7 @@ class Follower:
                 "defined there, or the set is too wide)"
             )
         if min(h, natural) < self.smallest:
-            raise UnprovenError(
+            raise DigitsError(
                 f"steps become too small at t = {float(self.t.mid()):.9g} (a singularity is near)"
             )
         if wide > 0:

@@ -16,7 +16,7 @@ from .flint import arb, ctx
 from .journey import Journey, Met
 from .modes import Modes
 from .orbit_proof import OrbitProof, ProvenEvent
-from .proof import UnprovenError
+from .proof import DigitsError, UnprovenError
 
 
 class Begin(NamedTuple):
@@ -105,8 +105,8 @@ def certify_orbit(
     while True:
         with precision(bits):
             end = enclosed([(duration, duration)])[0]
-            result = _run(modes, Begin(start, ranges), end, max_steps)
-        if result.proven or not points or 2 * bits > max_bits:
+            result, digits = _run(modes, Begin(start, ranges), end, max_steps)
+        if result.proven or not (points and digits) or 2 * bits > max_bits:
             return result
         bits *= 2
 
@@ -142,9 +142,9 @@ def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> 
     return result
 
 
-def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> OrbitProof:
-    """Follow until the end, a stop, or something undecided."""
-    follower, why, status = None, "", ""
+def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> tuple[OrbitProof, bool]:
+    """Follow until the end, a stop, or something undecided, and whether more digits may decide it."""
+    follower, why, status, digits = None, "", "", False
     moving = [r for r in begin.ranges if r[0] < r[1]]
     x = enclosed([*begin.start, *moving])
     try:
@@ -154,17 +154,17 @@ def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> OrbitProof:
         follower.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
         while not status:
             if follower.steps >= max_steps:
-                raise UnprovenError(f"more than {max_steps} steps")
+                raise DigitsError(f"more than {max_steps} steps")
             met = follower.travel(t_end)
             if met is not None and met.kind == "stop":
                 status = met.watch.name
             elif met is None and not (t_end - follower.t) > 0:
                 status = "end"
     except UnprovenError as error:
-        why = str(error)
+        why, digits = str(error), not isinstance(error, DigitsError)
     except KeyboardInterrupt:
         why = "interrupted"
-    return _result(modes, follower, begin, x, status, why)
+    return _result(modes, follower, begin, x, status, why), digits
 
 
 def _result(

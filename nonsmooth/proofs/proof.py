@@ -23,6 +23,10 @@ class UnprovenError(NonsmoothError, RuntimeError):
     """No proof was found; the message says what stood in the way and where."""
 
 
+class DigitsError(UnprovenError):
+    """What stood in the way does not go with more digits."""
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Proof:
     """A theorem about one special point, or what is left open of it.

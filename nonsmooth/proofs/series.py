@@ -27,6 +27,11 @@ def length(count: int) -> Iterator[None]:
         ctx.cap = old
 
 
+def _unknown() -> arb_series:
+    """A series of which nothing is known, not even that it is one."""
+    return arb_series([arb.nan()] * ctx.cap)
+
+
 def _one() -> arb_series:
     return arb_series([1])
 
@@ -118,8 +123,15 @@ class Series:
         return self.inputs[vector][position]
 
     def apply(self, op: str, args: Sequence[arb_series]) -> arb_series:
-        """Enclose an operation's series."""
-        return _APPLY[op](*args)
+        """Enclose an operation's series; no coefficient is known where the value is not."""
+        if all(a[0].is_finite() for a in args):
+            try:
+                found = _APPLY[op](*args)
+            except (ValueError, ZeroDivisionError):  # a denominator or radicand that may be zero
+                return _unknown()
+            if found[0].is_finite():
+                return found
+        return _unknown()
 
 
 def coefficients(

@@ -156,3 +156,34 @@ def test_a_start_on_the_surface_is_told_exactly():
     assert orbit.itinerary == "+ s"
     undecided = ns.certify_orbit(s, [("0.29", "0.31"), "3/100"], t_end=1, numbers="written")
     assert not undecided.proven and "undecided" in undecided.why
+
+
+def test_a_guard_is_not_followed_over_its_jump():
+    """atan2 jumps where the orbit crosses the negative axis; Taylor series know nothing beyond."""
+    angle = ns.FilippovSystem(
+        [x, v], field=[0 * x, -1], stops=[ns.Stop(ca.atan2(v, x), -1, "angle")]
+    )
+    orbit = ns.certify_orbit(angle, [-1, 0.5], t_end=1)
+    assert not orbit.proven and float(orbit.t.high) < 0.5
+    pole = ns.FilippovSystem([x], field=[1], stops=[ns.Stop(1 / x - 0.25, 1, "pole")])
+    orbit = ns.certify_orbit(pole, [-1], t_end=2)
+    assert not orbit.proven and float(orbit.t.high) < 1
+    field = ns.FilippovSystem([x, v], field=[ca.atan2(v, x) / 1024, -1])
+    orbit = ns.certify_orbit(field, [-1, 0.5], t_end=1, max_steps=40)
+    assert not orbit.proven and float(orbit.t.high) < 0.5
+
+
+def test_an_interrupt_ends_the_proof_with_what_was_proven(monkeypatch):
+    s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
+    journey = ns.proofs.orbits.Journey
+    travel, calls = journey.travel, []
+
+    def interrupted(self, t_end):
+        calls.append(1)
+        if len(calls) == 2:
+            raise KeyboardInterrupt
+        return travel(self, t_end)
+
+    monkeypatch.setattr(journey, "travel", interrupted)
+    orbit = ns.certify_orbit(s, [0, 0], t_end=3)
+    assert len(calls) == 2 and orbit.why == "interrupted" and not orbit.proven

@@ -62,7 +62,7 @@ def certify(
     max_bits : int, optional
         Where to give up raising the precision.
     max_pieces : int, optional
-        How often intervals of parameters may be divided.
+        How many pieces the intervals of parameters and held states may be divided into.
 
     Returns
     -------
@@ -119,22 +119,16 @@ def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> 
             todo.popleft()
         )  # the largest: what is undecided does not use up the pieces of the rest
         proof, start = _one(one, width, max_bits)
-        wide = [k for k, (a, b) in enumerate(one.parameters) if a < b]
         if (
             proof.proven
-            or not wide
+            or not _wide(one)
             or len(todo) + len(done) + 2 > max_pieces
             or failed > max_pieces
         ):
             done.append(proof)
             continue
         failed += 1
-        sizes = [(b - a) / (1 + abs(a + b)) for a, b in one.parameters]
-        k = max(wide, key=lambda j: sizes[j])
-        low, high = one.parameters[k]
-        for part in ((low, (low + high) / 2), ((low + high) / 2, high)):
-            ends = [part if j == k else v for j, v in enumerate(one.parameters)]
-            todo.append(replace(one, parameters=ends, start=start))
+        todo += one.halves(start)
     return done
 
 
@@ -193,7 +187,7 @@ def _wide(subject: Subject) -> bool:
 def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits: int) -> Proof:
     kind, names = subject.question.kind, subject.parameter_names
     ranges = [given(*pair) for pair in subject.parameters]
-    parameters = dict(zip(names, ranges, strict=True))
+    parameters = dict(zip(names, ranges, strict=True)) | subject.wide_held
     condition = f"For {intervals(parameters)}: " if parameters else ""
     if best is None or not best[1].here:
         why = (
@@ -264,7 +258,11 @@ def where(subject: Subject) -> str:
     described = subject.question.described
     free = {i for vector, i in subject.unknowns if vector == 0}
     names = [*described.system.state_names, "t"]
-    held = [intervals({names[i]: given(*v)}) for i, v in enumerate(subject.values) if i not in free]
+    held = [
+        intervals({names[i]: given(*v)})
+        for i, v in enumerate(subject.values)
+        if i not in free and v[0] == v[1]
+    ]
     text = f" with {', '.join(held)}" if held else ""
     if described.system.surface_count > 1:
         text += f" in mode {described.mode!r}"
@@ -280,7 +278,7 @@ def _together(subject: Subject, pieces: list[Proof]) -> Proof:
     """One statement of all pieces."""
     kind, names = subject.question.kind, subject.parameter_names
     whole_range = [given(*pair) for pair in subject.parameters]
-    parameters = dict(zip(names, whole_range, strict=True))
+    parameters = dict(zip(names, whole_range, strict=True)) | subject.wide_held
     proven = all(p.proven for p in pieces)
     exists = all(p.exists for p in pieces)
     labels = list(dict.fromkeys(p.label for p in pieces if p.proven))
@@ -291,7 +289,8 @@ def _together(subject: Subject, pieces: list[Proof]) -> Proof:
         groups.append(f"{label} on {count} of {len(pieces)} pieces")
     missing = [p for p in pieces if not p.proven]
     lines = [f"On {intervals(p.parameters)}: {p.statement.splitlines()[0]}" for p in missing[:3]]
-    size = "on each the box of its piece contains exactly one"
+    each = "each" if exists else "each that is named"
+    size = f"on {each} the box of its piece contains exactly one"
     statement = paragraph(
         f"{head}. For {intervals(parameters)}, divided into {len(pieces)} pieces, {size} {kind}: "
         f"{'; '.join(groups) or 'none proven'}.",

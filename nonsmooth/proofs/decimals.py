@@ -21,22 +21,17 @@ def enclosure(a: arb) -> Enclosure:
 
 
 def given(low: Fraction, high: Fraction) -> Enclosure:
-    """Write an interval as it was given: finite decimals exactly, others rounded outward."""
-    places = [_places_of_exact(v) for v in (low, high)]
-    if None not in places:
-        a, b = (rounded(v, n or 0, 0) for v, n in zip((low, high), places, strict=True))
-        return Enclosure(a, b)
-    return Enclosure(rounded(low, 60, -1), rounded(high, 60, 1))
+    """Write an interval exactly as it was given: decimals where they end, else fractions."""
+    return Enclosure(_exactly(low), _exactly(high))
 
 
-def _places_of_exact(value: Fraction) -> int | None:
-    """Decimals that a fraction needs; None if they do not end."""
+def _exactly(value: Fraction) -> str:
     rest, twos, fives = value.denominator, 0, 0
     while rest % 2 == 0:
         rest, twos = rest // 2, twos + 1
     while rest % 5 == 0:
         rest, fives = rest // 5, fives + 1
-    return max(twos, fives) if rest == 1 else None
+    return rounded(value, max(twos, fives), 0) if rest == 1 else str(value)
 
 
 def inner(box: arb, core: arb) -> Enclosure:

@@ -16,7 +16,8 @@ class Enclosure:
     Attributes
     ----------
     low, high : str
-        Decimals; the number is in the closed interval between them.
+        Decimals; the number is in the closed interval between them. Ends that were given as
+        fractions without finite decimals stay fractions, ``"5/7"``.
 
     Examples
     --------

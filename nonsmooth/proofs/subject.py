@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import Any
 
@@ -12,10 +12,13 @@ import numpy as np
 from ..local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ..local.search import unknowns
 from ..model import FilippovSystem, OptionError, explain
-from .arithmetic import Numbers, exact
+from .arithmetic import Numbers, exact, radius
+from .decimals import given as given_range
 from .described import Described, enclosed, parameter_ranges
+from .enclosure import Enclosure
 from .equations import Equations, plane
 from .flint import arb
+from .krawczyk import inverse
 from .questions import QUESTIONS, Question
 
 
@@ -52,6 +55,56 @@ class Subject:
     def parameter_names(self) -> tuple[str, ...]:
         return self.question.described.system.parameter_names
 
+    @property
+    def held(self) -> list[int]:
+        """Extended states that are no unknowns."""
+        free = {i for vector, i in self.unknowns if vector == 0}
+        return [i for i in range(len(self.values)) if i not in free]
+
+    @property
+    def wide_held(self) -> dict[str, Enclosure]:
+        """Ranges of the states that are held, where they are no points."""
+        names = [*self.question.described.system.state_names, "t"]
+        return {
+            names[i]: given_range(*self.values[i])
+            for i in self.held
+            if self.values[i][0] < self.values[i][1]
+        }
+
+    @property
+    def ranges(self) -> list[tuple[Fraction, Fraction]]:
+        """For which the theorem is: parameters, then the states that are held."""
+        return [*self.parameters, *(self.values[i] for i in self.held)]
+
+    def over(self, ranges: Sequence[tuple[Fraction, Fraction]]) -> Subject:
+        """The same question for other parameters and held states."""
+        count, values = len(self.parameters), list(self.values)
+        for i, pair in zip(self.held, ranges[count:], strict=True):
+            values[i] = pair
+        return replace(self, parameters=list(ranges[:count]), values=values)
+
+    def halves(self, start: list[float]) -> list[Subject]:
+        """The same question over both halves of the range that matters most."""
+        wide = [k for k, (a, b) in enumerate(self.ranges) if a < b]
+        k = max(wide, key=lambda k: self._influence(k, start))
+        low, high = self.ranges[k]
+        middle = (low + high) / 2
+        parts = ((low, middle), (middle, high))
+        changed = [[p if j == k else v for j, v in enumerate(self.ranges)] for p in parts]
+        return [replace(self.over(ranges), start=start) for ranges in changed]
+
+    def _influence(self, k: int, start: list[float]) -> float:
+        """How much one range alone moves and turns the equations, seen by the inverse Jacobian."""
+        middles = [((a + b) / 2,) * 2 for a, b in self.ranges]
+        alone = [self.ranges[k] if j == k else v for j, v in enumerate(middles)]
+        at = [arb(v) for v in start]
+        _, jacobian = self.over(middles).equations().with_jacobian(at)
+        matrix = inverse(jacobian)
+        values, slopes = self.over(alone).equations().with_jacobian(at)
+        if matrix is None:
+            return radius_of([*values.entries(), *slopes.entries()])
+        return radius_of([*(matrix * values).entries(), *(matrix * slopes).entries()])
+
     def equations(self) -> Equations:
         """The square system with enclosures of what is held."""
         tape = self.question.described.tape
@@ -60,6 +113,11 @@ class Subject:
         held = [enclosed(self.values), enclosed(self.parameters)]
         held.append([arb(0)] * len(self.question.further))
         return Equations(tape, nodes, self.unknowns, self.names, held, self.numbers)
+
+
+def radius_of(values: Sequence[arb]) -> float:
+    """Sum of radii."""
+    return sum(map(radius, values))
 
 
 def subject_of(

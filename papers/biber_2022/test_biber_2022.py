@@ -48,6 +48,7 @@ VERDICTS = {
     "proven-nu-product": "corrected",
     "proven-class": "agrees",
     "proven-slip-reversal": "agrees",
+    "proven-canard": "agrees",
 }
 
 

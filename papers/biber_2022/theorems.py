@@ -136,10 +136,10 @@ def rolling_ball() -> tuple[ns.FilippovSystem, dict[str, str]]:
     data = kv_pert_data()
     numbers = {k: str(v) for k, v in data["parameters"].items()}
     x0, _, y0, w0, _ = data["trajectories"]["A_exact"]["p0"]
-    names = ["k", "mu", "d1", "d2", "eta", "G", "X0", "Y0", "W0"]
-    values = ["5/7", *(numbers[n] for n in names[1:6]), x0, y0, w0]
+    names = ["k", "d1", "d2", "eta", "G", "X0", "Y0", "W0"]
+    values = ["5/7", *(numbers[n] for n in names[1:5]), x0, y0, w0]
     p = dict(zip(names, map(ca.SX.sym, names), strict=True))
-    k, mu, d1, d2, eta, g, x, y, w = p.values()
+    k, d1, d2, eta, g, x, y, w = p.values()
     t, v = ca.SX.sym("t"), ca.SX.sym("V")
     lift, deep = _oscillation(t, y + g, w, d2, ca.SX(1))
     shift, speed = _oscillation(t, x, v, k * d1 * eta, k * eta**2)

@@ -227,7 +227,21 @@ def test_held_states_may_be_intervals():
     )
     fold = ns.find_two_fold(system, near=[0, 0.1, -0.1, 0.5], hold=["q"])
     proof = ns.certify(fold, hold={"q": (0.25, 0.75)})
-    assert proof.proven and "with q in [0.25, 0.75]" in str(proof).replace("\n ", "")
+    assert proof.proven and "For q in [0.25, 0.75]" in str(proof).replace("\n ", "")
     assert 0.25 in proof.point["y"] and 0.75 in proof.point["y"]
     with pytest.raises(ns.OptionError, match="hold of 'q'"):
         ns.certify(fold, hold={"q": (0.75, 0.25)})
+
+
+def test_ranges_of_held_states_are_divided_too():
+    q = ca.SX.sym("q")
+    system = ns.FilippovSystem([x, y, z, q], surface=x, above=[-y, 1, -q, 0], below=[z, -1, 1, 0])
+    fold = ns.find_two_fold(system, near=[0, 0.1, -0.1, 2.0], hold=["q"])
+    proof = ns.certify(fold, hold={"q": ("0.3", "3.1")}, max_pieces=24)
+    assert not proof.proven and len(proof.pieces) > 4
+    for piece in proof.pieces:
+        low, high = piece.parameters["q"].ends
+        if piece.proven:
+            assert piece.label == ("II-C" if low > 1 else "II-F")
+        else:
+            assert low <= 1 <= high

@@ -17,7 +17,7 @@ PYTEST := $(BIN)/python -m pytest --quiet -n 2 --dist loadfile
 help: ## list the verbs
 	@awk -F ':.*## ' '/^[a-z]+:.*## / { printf "  make %-10s %s\n", $$1, $$2 }' Makefile
 
-reproduce: .venv/.test ## every number and figure of the papers, into build/
+reproduce: .venv/.test ## one paper reproduced and four models after papers, into build/
 	@$(BIN)/python -m papers
 
 test: .venv/.test ## the tests, without the slow ones
@@ -29,7 +29,8 @@ check: lint ## everything that must hold before a release: lint, then all tests
 bench: .venv/.bench ## measured speeds, beside the peers
 	@$(BIN)/python -m benchmarks
 
-docs: .venv/.docs ## the documentation, into build/docs/, with the reports that `make reproduce` wrote
+docs: .venv/.docs .venv/.test ## the documentation, into build/docs/, with the reports of the papers
+	@test -f build/welander_1982/report.html || $(BIN)/python -m papers
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs --quiet build --strict
 	@echo "docs: build/docs/index.html"
 

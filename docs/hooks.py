@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 DOCS = Path(__file__).parent
-sys.path.insert(0, str(DOCS))
+sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 
 import api  # noqa: E402  (neighbours; docs is not a package)
 import elsewhere  # noqa: E402
@@ -21,6 +21,8 @@ import generate  # noqa: E402
 import notebooks  # noqa: E402
 import typeset  # noqa: E402
 from mkdocs.structure.files import File, Files  # noqa: E402
+
+from papers import mathematics  # noqa: E402
 
 PICTURES = DOCS.parent / "build" / "gallery"
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
@@ -65,6 +67,8 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
     return generate.fill(markdown)
 
 
-def on_page_content(html: str, **_: Any) -> str:
+def on_page_content(html: str, page: Any, **_: Any) -> str:
     """Take Sphinx's roles out of docstrings, typeset formulas, label the cells of tables."""
+    if page.file.src_uri.startswith("papers/"):  # their tables are plain text, for terminals too
+        html = mathematics.typeset_page(html)
     return typeset.labelled(typeset.mathematics(_ROLE.sub("", html)))

@@ -1,1 +1,5 @@
-"""Reproductions of published papers, one folder each, on the public names of the library."""
+"""One paper reproduced and four models after papers, one folder each, on the library's public names.
+
+Only ``biber_2022`` was read, so only it is called a reproduction. The statements of the others are
+quoted from memory, and each row of their tables says so.
+"""

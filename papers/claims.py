@@ -6,9 +6,13 @@ from dataclasses import asdict, dataclass
 from typing import Any
 
 AGREES = "agrees"
+HOLDS = "holds"  # a statement known from memory, which cannot agree with a text that was not read
 CORRECTED = "corrected"
 NOT_CHECKABLE = "not checkable"
 ADDED = "added here"  # not stated by the paper, as far as recalled
+
+#: Where a statement comes from.
+READ, MEMORY, HERE = "read in the paper", "known from memory", "computed here"
 
 
 @dataclass(frozen=True)
@@ -40,13 +44,14 @@ class Claim:
     ----------
     id : str
     place : str
-        Section and equation label; ``from memory`` where the paper was not at hand.
+        Section and equation; beginning with ``known from memory`` or ``computed here`` where the paper
+        was not at hand.
     statement : str
         What the paper states.
     value : str
         What this code finds.
     verdict : str
-        ``agrees``, ``corrected``, ``not checkable`` or ``added here``.
+        ``agrees``, ``corrected``, ``holds``, ``not checkable`` or ``added here``.
     how : str
         How it was computed.
     checks : tuple of Check
@@ -63,6 +68,16 @@ class Claim:
     how: str
     checks: tuple[Check, ...]
     errata: tuple[int, ...] = ()
+
+    @property
+    def basis(self) -> str:
+        """Where the statement comes from: read in the paper, known from memory, or computed here."""
+        return next((b for b in (MEMORY, HERE) if self.place.startswith(b)), READ)
+
+    @property
+    def where(self) -> str:
+        """The place without what is said by :attr:`basis`."""
+        return self.place.removeprefix(self.basis).removeprefix(": ")
 
     @property
     def holds(self) -> bool:

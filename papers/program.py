@@ -93,12 +93,11 @@ def reproduce(paper: Paper, arguments: Sequence[str] | None = None) -> int:
     steps: list[Step] = [("claim", compute) for compute in paper.claims]
     steps += [("figure", lambda p=p: save(p, folder)) for p in paper.pictures]  # type: ignore[misc]
     claims: list[Claim] = run(steps).get("claim", [])
-    introduction = f"{report.CLAIMS_INTRODUCTION} {paper.note}"
     written = report.Report(
         paper.title,
         f"{paper.source} {paper.note}",
         report.verdicts(claims),
-        [report.claims_section(claims, introduction)],
+        [report.claims_section(claims)],
         paper.pictures,
         {"note": paper.note, "claims": [c.as_dict() for c in claims]},
     )

@@ -13,12 +13,18 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .claims import Claim
+from .claims import READ, Claim
+from .mathematics import typeset
 from .pictures import Picture
 
 CLAIM_HEADER = ("claim", "where", "the paper", "computed here", "verdict", "erratum", "how")
+MODEL_HEADER = ("claim", "basis", "where", "statement", "computed here", "verdict", "how")
 CLAIMS_INTRODUCTION = (
     "What the paper states and what computing it gives. A row holds only if all of its checks do."
+)
+MODEL_INTRODUCTION = (
+    "What is said of the model and what computing it gives. The basis of a statement is what we know "
+    "from memory of the paper, or this computation. A row holds only if all of its checks do."
 )
 _SYMBOLS = {"|": r"\|", "\n": " "}
 
@@ -69,8 +75,17 @@ def claims_text(claims: Sequence[Claim], width: int = 100) -> str:
     return "\n".join(lines)
 
 
+def was_read(claims: Sequence[Claim]) -> bool:
+    """Whether the statements are a paper's own, and not from memory or of this computation."""
+    return all(c.basis == READ for c in claims)
+
+
 def verdicts(claims: Sequence[Claim]) -> str:
-    """How many claims there are of each verdict."""
+    """How many claims there are of each verdict, or of each basis where the paper was not read."""
+    if not was_read(claims):
+        counts = Counter(c.basis for c in claims)
+        parts = ", ".join(f"{n} {basis}" for basis, n in counts.items())
+        return f"{len(claims)} statements: {parts}; {sum(c.holds for c in claims)} hold"
     counts = Counter(c.verdict for c in claims)
     return f"{len(claims)} claims: " + ", ".join(f"{n} {v}" for v, n in counts.items())
 
@@ -90,17 +105,25 @@ def _escape(text: str) -> str:
     return text
 
 
-def claims_section(claims: Sequence[Claim], introduction: str = CLAIMS_INTRODUCTION) -> Section:
+def claims_section(claims: Sequence[Claim], introduction: str = "") -> Section:
     """Return the table of the claims."""
+    if not was_read(claims):
+        rows = [[c.id, c.basis, c.where, c.statement, c.value, c.verdict, c.how] for c in claims]
+        return Section("Statements", introduction or MODEL_INTRODUCTION, MODEL_HEADER, rows)
     rows = [
         [c.id, c.place, c.statement, c.value, c.verdict, numbers(c.errata), c.how] for c in claims
     ]
     kept = [_kept(row, claims, 5) for row in rows]
-    return Section("Claims", introduction, _kept(CLAIM_HEADER, claims, 5), kept)
+    return Section(
+        "Claims", introduction or CLAIMS_INTRODUCTION, _kept(CLAIM_HEADER, claims, 5), kept
+    )
 
 
 def readme_table(claims: Sequence[Claim]) -> str:
     """Return the claims table of README.md: nothing in it depends on rounding."""
+    if not was_read(claims):
+        rows = [[c.id, c.basis, c.where, c.statement, c.verdict] for c in claims]
+        return table(("claim", "basis", "where", "statement", "verdict"), rows)
     header = ("claim", "where", "the paper", "verdict", "erratum")
     rows = [[c.id, c.place, c.statement, c.verdict, numbers(c.errata)] for c in claims]
     return table(_kept(header, claims, 4), [_kept(row, claims, 4) for row in rows])
@@ -120,6 +143,8 @@ class Report:
     pictures : sequence of Picture
     data : mapping
         For ``claims.json``.
+    opening : sequence of (str, sequence of str)
+        What a reader should know first: headings with their items.
     """
 
     title: str
@@ -128,43 +153,50 @@ class Report:
     sections: list[Section]
     pictures: Sequence[Picture]
     data: Mapping[str, Any]
+    opening: Sequence[tuple[str, Sequence[str]]] = ()
 
     def markdown(self) -> str:
         """The report as Markdown; figures by relative links."""
         text = [f"# {self.title}", self.source, self.summary + "."]
-        for part in self.sections:
-            if part.rows:
-                text += [f"## {part.title}", part.introduction, table(part.header, part.rows)]
+        for title, items in self.opening:
+            text += [f"## {title}", "\n".join(f"- {item}" for item in items)]
         text.append("## Figures")
         for p in self.pictures:
             text += [f"### {p.label}", f"![{p.label}]({p.name}.png)", p.caption]
+        for part in self.sections:
+            if part.rows:
+                text += [f"## {part.title}", part.introduction, table(part.header, part.rows)]
         return "\n\n".join(text) + "\n"
 
     def page(self, folder: Path) -> str:
-        """The report as one HTML page with embedded figures."""
+        """The report as one HTML page with embedded figures: opening, figures, tables."""
         title = html.escape(self.title)
         out = [
             "<!doctype html><html lang='en'><head><meta charset='utf-8'>"
+            "<meta name='viewport' content='width=device-width, initial-scale=1'>"
             f"<title>{title}</title><style>{_STYLE}</style></head><body>",
             f"<h1>{title}</h1><p>{html.escape(self.source)}</p>"
             f"<p><b>{html.escape(self.summary)}.</b></p>",
         ]
+        for heading, items in self.opening:
+            listed = "".join(f"<li>{typeset(item)}</li>" for item in items)
+            out.append(f"<h2>{html.escape(heading)}</h2><ul>{listed}</ul>")
+        out += self._figures(folder)
         for part in self.sections:
-            if not part.rows:
-                continue
-            out.append(f"<h2>{part.title}</h2><p>{html.escape(part.introduction)}</p><table><tr>")
-            out += [f"<th>{html.escape(h)}</th>" for h in part.header]
-            out += [f"</tr><tr>{''.join(map(_cell, row))}" for row in part.rows]
-            out.append("</tr></table>")
-        out.append("<h2>Figures</h2><div class='grid'>")
+            if part.rows:
+                out.append(_table(part))
+        return "\n".join([*out, "</body></html>"]) + "\n"
+
+    def _figures(self, folder: Path) -> list[str]:
+        out = ["<h2>Figures</h2><div class='grid'>"]
         for p in self.pictures:
             image = base64.b64encode((folder / f"{p.name}.png").read_bytes()).decode()
             out.append(
                 f"<figure><img alt='{html.escape(p.label)}' src='data:image/png;base64,{image}'>"
-                f"<figcaption><b>{html.escape(p.label)}.</b> {html.escape(p.caption)}</figcaption>"
+                f"<figcaption><b>{html.escape(p.label)}.</b> {typeset(p.caption)}</figcaption>"
                 "</figure>"
             )
-        return "\n".join([*out, "</div></body></html>"]) + "\n"
+        return [*out, "</div>"]
 
     def write(self, folder: Path) -> list[Path]:
         """Write claims.md/.csv/.json, report.md and report.html; the figures must be there.
@@ -187,18 +219,38 @@ class Report:
         return [folder / name for name in (*files, "claims.csv")]
 
 
-def _cell(text: str) -> str:
-    marked = text in ("agrees", "corrected", "confirmed", "no")
+def _table(part: Section) -> str:
+    head = "".join(f"<th>{html.escape(h)}</th>" for h in part.header)
+    rows = (
+        "<tr>" + "".join(_cell(text, name) for text, name in zip(row, part.header, strict=True))
+        for row in part.rows
+    )
+    body = "</tr>".join(rows)
+    return (
+        f"<h2>{part.title}</h2><p>{typeset(part.introduction)}</p>"
+        f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tr></tbody></table>"
+    )
+
+
+def _cell(text: str, column: str) -> str:
+    marked = text in ("agrees", "corrected", "confirmed", "holds", "no")
     name = f" class='{text}'" if marked else ""
-    return f"<td{name}>{html.escape(text)}</td>"
+    return f"<td{name} data-label='{html.escape(column)}'>{typeset(text)}</td>"
 
 
 _STYLE = """
-body{font:15px/1.5 system-ui,sans-serif;max-width:76rem;margin:2rem auto;padding:0 1rem;color:#111}
+body{font:15px/1.5 system-ui,sans-serif;max-width:76rem;margin:2rem auto;padding:0 1rem;color:#111;
+overflow-wrap:break-word}
+math{font-family:"STIX Two Math","Latin Modern Math","Cambria Math",math,serif;font-size:1.05em}
 table{border-collapse:collapse;width:100%;font-size:13px}
 th,td{border-bottom:1px solid #ccc;padding:.35rem .5rem;text-align:left;vertical-align:top}
 th{position:sticky;top:0;background:#f4f4f4}
+li,figcaption{overflow-wrap:anywhere}li{max-width:52rem;margin:.3rem 0}
 figure{margin:1.5rem 0}figure img{max-width:100%;height:auto}figcaption{max-width:48rem}
-.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(26rem,1fr));gap:1rem}
-td.corrected,td.no{color:#a33b00;font-weight:600}td.agrees,td.confirmed{color:#005a8c}
+.grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(26rem,100%),1fr));gap:1rem}
+td.corrected,td.no{color:#a33b00;font-weight:600}td.agrees,td.confirmed,td.holds{color:#005a8c}
+@media(max-width:44rem){thead{position:absolute;width:1px;height:1px;overflow:hidden;
+clip-path:inset(50%)}table,tbody,tr,td{display:block}tr{border-top:2px solid #ccc;padding:.3rem 0}
+td{border:0;padding:.15rem 0;overflow-x:auto}td:empty{display:none}
+td::before{content:attr(data-label)": ";color:#666;font-weight:400}}
 """

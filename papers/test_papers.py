@@ -14,7 +14,7 @@ import pytest
 
 from papers import __main__ as everything
 from papers import program
-from papers.claims import Check
+from papers.claims import ADDED, HERE, HOLDS, MEMORY, NOT_CHECKABLE, Check
 from papers.report import readme_table
 
 FOLDER = Path(__file__).parent
@@ -75,7 +75,15 @@ def test_what_is_quoted_from_memory_says_so(computed):
     paper, claims, _ = computed
     text = (FOLDER / paper.name / "README.md").read_text(encoding="utf-8")
     assert "memory" in paper.note and "from memory" in text
-    assert all("memory" in c.place or "here" in c.place for c in claims)
+    assert {c.basis for c in claims} <= {MEMORY, HERE}
+    assert {c.verdict for c in claims} <= {HOLDS, ADDED, NOT_CHECKABLE}
+
+
+def test_only_what_was_read_is_called_reproduced():
+    for name, paper in PAPERS.items():
+        text = (FOLDER / name / "README.md").read_text(encoding="utf-8")
+        assert paper.title.startswith("After ") and text.startswith("# After ")
+        assert "reproduced" not in paper.title and "no reproduction" in text
 
 
 @pytest.mark.parametrize(
@@ -108,7 +116,7 @@ def test_program_writes_tables_and_a_self_contained_page(tmp_path, monkeypatch, 
     monkeypatch.setattr(module, "PAPER", short)
     assert everything.main([name, "--out", str(tmp_path)]) == 0
     printed = capsys.readouterr().out
-    assert "2 claims" in printed
+    assert "2 statements" in printed
     folder = tmp_path / name
     assert len(list(csv.reader((folder / "claims.csv").open(encoding="utf-8")))) == 3
     assert "memory" in json.loads((folder / "claims.json").read_text())["note"]

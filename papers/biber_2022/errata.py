@@ -45,6 +45,30 @@ ALL: tuple[Callable[[], Erratum], ...] = (
     further.limit_of_compliance,
 )
 
+#: Errata that change what the paper states in words, with what a reader should take instead.
+CONCLUSIONS = {
+    18: "At the two-fold of the ball nu1 nu2 is exactly 1, not a little below: both fields coincide "
+    "there, because friction vanishes with the load. The conclusion drawn from it stands: "
+    "rolling passes through the two-fold along one orbit only.",
+    19: "The two-fold is visible only under a condition, which stiff tangential surfaces and Hertzian "
+    "laws with little gravity break. Where it does not hold, no rolling orbit reaches it.",
+    20: "The dividing surface separates forward from reverse slip. It does not separate topspin from "
+    "backspin: a ball may leave in reverse slip with backspin.",
+    12: "Rolling can end in compression too, where the tangential surface is stiff.",
+    13: "It is compliance along the ground that makes the ball lift off slipping, not compliance "
+    "across it.",
+    14: "A ball without spin and damping retraces its path only if there is no friction.",
+    24: "nu1 nu2 = 1 holds for every compliance, not only in the rigid limit, and the nonsmooth "
+    "diabolo belongs to invisible two-folds, so not to this ball.",
+    3: "d2 < 1 is sufficient for lift-off and not necessary.",
+}
+
+#: Errata of formulas and numbers that one would compute with.
+FORMULAS = (2, 4, 6, 7, 9, 10, 11, 15, 17, 21, 23, 28)
+
+#: Slips of print: what is meant is clear from the text, and nothing is computed from what is printed.
+SLIPS = (1, 5, 8, 16, 22, 25, 26, 27, 29)
+
 
 @cache
 def erratum(number: int) -> Erratum:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
 
 from .. import report
 from ..claims import Claim
 from ..pictures import Picture
 from ..report import Section, numbers
+from . import errata as all_errata
+from .places import equation, readable
 from .records import Equation, Erratum
 from .table import Row
 
@@ -40,24 +43,71 @@ def summary(
 def erratum_rows(errata: Sequence[Erratum]) -> list[list[str]]:
     """Cells of the errata table."""
     return [
-        [str(e.number), e.place, e.printed, e.correct, e.verdict, "; ".join(map(str, e.checks))]
+        [
+            str(e.number),
+            readable(e.place),
+            e.printed,
+            e.correct,
+            e.verdict,
+            "; ".join(map(str, e.checks)),
+        ]
         for e in errata
     ]
 
 
-def equation_rows(equations: Sequence[Equation]) -> list[list[str]]:
-    """Cells of the equations table."""
+def equation_rows(equations: Sequence[Equation], shown: Sequence[Erratum] = ()) -> list[list[str]]:
+    """Cells of the equations table; evidence that the errata show is not repeated."""
+    before = {str(check) for e in shown for check in e.checks}
     return [
         [
             str(e.number),
-            e.label,
+            equation(e.label),
             e.content,
             e.verdict,
             numbers(e.errata),
-            "; ".join(map(str, e.checks)),
+            _evidence(e, before),
         ]
         for e in equations
     ]
+
+
+def _evidence(e: Equation, before: set[str]) -> str:
+    own = [str(check) for check in e.checks if str(check) not in before]
+    if len(own) < len(e.checks):
+        own.append(f"see erratum {numbers(e.errata)}" if e.errata else "see the errata")
+    return "; ".join(own)
+
+
+def opening(errata: Sequence[Erratum]) -> list[tuple[str, list[str]]]:
+    """What a reader should know first: what stands, what changes, what is only a slip of print."""
+    known = {e.number: e for e in errata}
+
+    def brief(numbers: Sequence[int]) -> list[str]:
+        return [
+            readable(f"Erratum {n}, {e.place}: printed {e.printed}; correct {e.correct}.")
+            for n, e in ((n, known[n]) for n in numbers if n in known)
+        ]
+
+    changes = [f"{text} (Erratum {n}.)" for n, text in all_errata.CONCLUSIONS.items() if n in known]
+    return [
+        ("What stands", list(STANDS)),
+        ("Errata that change a statement", changes),
+        ("Errata that change a formula or a number", brief(all_errata.FORMULAS)),
+        ("Slips of print", brief(all_errata.SLIPS)),
+    ]
+
+
+#: What of the paper holds as it is.
+STANDS = (
+    "A ball that rolls during the bounce lifts off slipping, but for a set of landings of codimension "
+    "one: rolling lift-off is a two-fold, and a single rolling orbit reaches it.",
+    "Compliance and damping along the ground let the slip reverse; rigid laws do not.",
+    "A surface of codimension one divides the landings that leave in forward slip from those that "
+    "leave in reverse. It has a second part, which the paper does not mention, where the ball slips "
+    "throughout.",
+    "Not checked: the measurements, which are not public, and the parameters of Fig. 10, which are not "
+    "printed.",
+)
 
 
 def table_rows(rows: Sequence[Row]) -> list[list[str]]:
@@ -83,8 +133,9 @@ def build(
     pictures: Sequence[Picture],
 ) -> report.Report:
     """Put the report together."""
+    places = [replace(c, place=readable(c.place)) for c in claims]
     sections = [
-        report.claims_section(claims),
+        report.claims_section(places),
         Section(
             "Errata",
             "Each is derived again by code: identities in exact rational arithmetic with free "
@@ -94,12 +145,13 @@ def build(
         ),
         Section(
             "Displayed equations",
-            "All of them in order of appearance, unnumbered ones included.",
+            "All of them in order of appearance, unnumbered ones included. Numbers in brackets are those of the "
+            "source on arXiv (2208.11685) when it is compiled.",
             EQUATION_HEADER,
-            equation_rows(equations),
+            equation_rows(equations, errata),
         ),
         Section(
-            "Table ics",
+            "Table 1",
             "The dimensionless entries recomputed from the dimensional ones: velocity over the "
             "radius 21.35 mm in 1/s, and rad/s. Agree: within the roundings, for one radius near it.",
             TABLE_HEADER,
@@ -112,4 +164,6 @@ def build(
         "equations": [e.as_dict() for e in equations],
     }
     line = summary(claims, errata, equations)
-    return report.Report(TITLE, SOURCE, line, sections, pictures, data)
+    pictures = [replace(p, label=readable(p.label), caption=readable(p.caption)) for p in pictures]
+    sections = [replace(s, rows=[[readable(c) for c in row] for row in s.rows]) for s in sections]
+    return report.Report(TITLE, SOURCE, line, sections, pictures, data, opening(errata))

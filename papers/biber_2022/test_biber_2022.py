@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import csv
+import dataclasses
+import itertools
 import json
 from fractions import Fraction
 from pathlib import Path
@@ -12,7 +14,7 @@ import numpy as np
 import pytest
 
 from papers.biber_2022 import __main__ as program
-from papers.biber_2022 import equations, errata, figures, results, table, theorems
+from papers.biber_2022 import equations, errata, figures, places, report, results, table, theorems
 from papers.biber_2022.errata_general import fold_of
 from papers.biber_2022.exact import evaluate, identical
 from papers.biber_2022.model import LAWS, linear
@@ -80,7 +82,8 @@ def test_every_equation_check_holds():
 def test_readme_shows_the_computed_claims(claims):
     text = (FOLDER / "README.md").read_text(encoding="utf-8")
     shown = text.split("in the tests -->\n")[1].split("\n<!-- end of claims -->")[0]
-    assert shown == readme_table(claims)
+    read = [dataclasses.replace(c, place=places.readable(c.place)) for c in claims]
+    assert shown == readme_table(read)
 
 
 # Numbers against values that this code did not make ------------------------------------------
@@ -195,3 +198,41 @@ def test_figures_are_drawn_with_labels(picture):
     texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
     assert any(t.get_text() for t in texts)
     assert picture.caption
+
+
+# Places and the opening page ---------------------------------------------------------------------
+
+
+def test_numbers_of_equations_are_in_the_order_of_the_paper():
+    labels = [compute().label for compute in equations.ALL]
+    shown = [label for label in labels if label in places.EQUATIONS]
+    assert len(shown) > 25
+    numbers = [places.EQUATIONS[label] for label in shown]
+    assert numbers == sorted(numbers) and len(set(numbers)) == len(numbers)
+    # an equation between two labelled ones has a number between theirs: none is skipped or doubled
+    starred = {"case I", "case II", "case III"}
+    positions = [k for k, label in enumerate(labels) if label in places.EQUATIONS]
+    for before, after in itertools.pairwise(positions):
+        between = sum(label not in starred for label in labels[before:after])
+        assert places.EQUATIONS[labels[after]] - places.EQUATIONS[labels[before]] <= between
+
+
+def test_every_erratum_is_of_one_weight():
+    weights = [*errata.CONCLUSIONS, *errata.FORMULAS, *errata.SLIPS]
+    assert sorted(weights) == list(range(1, len(errata.ALL) + 1))
+
+
+def test_the_report_opens_with_what_changes_and_shows_evidence_once():
+    found = [errata.erratum(n) for n in range(1, len(errata.ALL) + 1)]
+    shown = [compute() for compute in equations.ALL]
+    written = report.build([], found, shown, [], [])
+    assert [title for title, _ in written.opening][1:] == [
+        "Errata that change a statement",
+        "Errata that change a formula or a number",
+        "Slips of print",
+    ]
+    assert sum(len(items) for _, items in written.opening[1:]) == len(found)
+    text = written.markdown()
+    for e in found:
+        assert all(text.count(str(check)) <= 1 for check in e.checks if len(str(check)) > 60)
+    assert not [label for label in places.EQUATIONS if f"({label})" in text and "_" in label]

@@ -1,4 +1,4 @@
-"""Reproduce the paper: ``python -m papers.colombo_jeffrey_2011 [--out FOLDER]``."""
+"""Follow the model after the paper: ``python -m papers.colombo_jeffrey_2011 [--out FOLDER]``."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from . import figures, results
 
 PAPER = Paper(
     name="colombo_jeffrey_2011",
-    title="Colombo & Jeffrey (2011), reproduced",
+    title="After Colombo & Jeffrey (2011): two-folds of every kind, and recurrence",
     source="A. Colombo and M. R. Jeffrey, Nondeterministic chaos, and the two-fold singularity in "
     "piecewise smooth flows, SIAM J. Appl. Dyn. Syst. 10 (2011) 423-451.",
-    note="Statements and notation are quoted from memory; the paper was not at hand. The recurrent "
+    note="Statements and notation are quoted from memory; the paper was not at hand, so this is a model after it and no reproduction of it. The recurrent "
     "system is an example of our own.",
     claims=results.ALL,
     pictures=figures.PICTURES,

@@ -11,7 +11,7 @@ import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import AGREES, NOT_CHECKABLE, Check, Claim, close
+from ..claims import HOLDS, NOT_CHECKABLE, Check, Claim, close
 from .model import (
     CALM,
     CLASSES,
@@ -49,10 +49,10 @@ def kinds() -> Claim:
     expected = ["visible", "invisible", "visible-invisible", "visible-invisible"]
     return Claim(
         "three-kinds",
-        "from memory: abstract",
+        "known from memory: abstract",
         "two-folds are generic in three dimensions, and of three kinds: visible, invisible and mixed",
         "the signs sigma of L11 and L22 tell them apart: (+, -), (-, +), and both alike",
-        AGREES,
+        HOLDS,
         "second Lie derivatives at the two-fold of four normal forms",
         (Check(f"kinds {list(found.values())}", list(found.values()) == expected),),
     )
@@ -64,11 +64,11 @@ def portraits() -> Claim:
     text = ", ".join(f"{name} {a}/{r}" for name, (a, r) in found.items())
     return Claim(
         "sliding-portraits",
-        "from memory: local dynamics of all two-folds",
+        "known from memory: local dynamics of all two-folds",
         "the sliding flow is a saddle, a node or a focus of a linear flow whose direction is reversed "
         "in repelling sliding; this gives all portraits",
         f"orbits of {RING} that reach the two-fold, from attracting and from repelling sliding: {text}",
-        AGREES,
+        HOLDS,
         "simulation of a ring of starts in each region, for one two-fold of each class",
         tuple(
             Check(f"{n}: {found[n]} (expected {COUNTS[n]})", found[n] == COUNTS[n]) for n in COUNTS
@@ -97,11 +97,11 @@ def canards() -> Claim:
         checks.append(close(f"{name}: slope by formula", label.into.low, slope, 1e-12))
     return Claim(
         "single-canards",
-        "from memory: saddles",
+        "known from memory: saddles",
         "where the sliding flow is a saddle, a single orbit passes from attracting to repelling sliding",
         f"visible two-fold of class VV-C1: slope {visible:.6f}, neighbours leave to different sides; "
         f"mixed one of class mix-S: {mixed:.6f}",
-        AGREES,
+        HOLDS,
         "simulation of the orbit on the eigenline and .001 beside it",
         tuple(checks),
     )
@@ -119,13 +119,13 @@ def severed() -> Claim:
     gap = float(np.linalg.norm(np.ptp(onward(0.5), axis=0)))
     return Claim(
         "severed-link",
-        "from memory: abstract",
+        "known from memory: abstract",
         "where the flow passes through the two-fold it is unique in neither forward nor backward time: "
         "the causal link between inward and outward dynamics is severed",
         f"class II-C: {past} of {RING} sliding orbits arrive in finite time, {worst:.0e} from the "
         "formula; from there orbits slide on for any while and leave up or down: "
         f"{gap:.2f} apart at t = .5",
-        AGREES,
+        HOLDS,
         "simulation, which stops at the two-fold with NON_UNIQUE; funnel of the continuations",
         (
             Check(f"{past} of {RING} arrive", past == RING),
@@ -144,12 +144,12 @@ def open_sets() -> Claim:
     found = {name: kinds_[name] for name in names}
     return Claim(
         "open-sets",
-        "from memory: invisible and mixed two-folds",
+        "known from memory: invisible and mixed two-folds",
         "an open set of orbits enters the singularity at an invisible two-fold with nu1 nu2 > 1, and "
         "at a mixed one; at a visible one only single orbits do",
         f"orbits of an open set arrive in the classes {names}: all of attracting sliding in II-C, a "
         f"sector in mix-C ({arrivals(CLASSES['mix-C'])} of {RING})",
-        AGREES,
+        HOLDS,
         "rings of sliding orbits; slopes by formula",
         (Check(f"{found}", found == expected),),
     )
@@ -164,14 +164,14 @@ def recurrence() -> Claim:
     fold = ns.find_two_fold(recurrent(), [0.0, 0.01, 0.01])
     return Claim(
         "recurrence",
-        "from memory: abstract",
+        "known from memory: abstract",
         "in one scenario this occurs recurrently: the flow makes repeated, but nonperiodic, excursions "
         "from the singularity",
         f"{returned} of {len(taken)} excursions of the system x > 0: (-y, 1, nu1 + x), x < 0: "
         f"(z, nu2, 1), nu1 = nu2 = {RECURRENT} come back to the two-fold ({fold.label}), after "
         f"{times.min():.1f} to {times.max():.1f}, having been {sizes.min():.2f} to {sizes.max():.2f} "
         "high. The system is ours; the paper's was not at hand",
-        AGREES,
+        HOLDS,
         "each excursion leaves repelling sliding at a point and to a side drawn by chance",
         (
             Check(f"class {fold.label}", fold.label == "II-C"),
@@ -191,11 +191,11 @@ def memoryless() -> Claim:
     correlation = float(np.corrcoef(sizes[:-1], sizes[1:])[0, 1])
     return Claim(
         "no-memory",
-        "from memory: abstract",
+        "known from memory: abstract",
         "path and amplitude of an excursion are not determined by previous excursions",
         f"all {len(taken)} excursions end in the same point, to {spread:.0e}, so none can determine the "
         "next; amplitudes depend on where and to which side repelling sliding is left",
-        AGREES,
+        HOLDS,
         f"last states of the excursions (correlation of successive amplitudes {correlation:.2f}, by "
         "construction)",
         (
@@ -226,10 +226,10 @@ def robust() -> Claim:
                 counts.append(run.status is ns.Status.NON_UNIQUE)
     return Claim(
         "robust",
-        "from memory: abstract",
+        "known from memory: abstract",
         "this behaviour is robust",
         f"{sum(counts)} of {len(counts)} excursions return for three other sets of nu1, nu2, c",
-        AGREES,
+        HOLDS,
         "simulation",
         (Check(f"{sum(counts)} of {len(counts)}", all(counts)),),
     )
@@ -248,12 +248,12 @@ def eliminated() -> Claim:
     fold = ns.find_two_fold(recurrent(), [0.0, 0.01, 0.01], parameters=values)
     return Claim(
         "eliminated",
-        "from memory: abstract",
+        "known from memory: abstract",
         "the chaotic behaviour can be eliminated by varying a single parameter, the angular jump of the "
         "field across the two-fold",
         f"at nu1 = nu2 = {CALM}, nu1 nu2 < 1, {reached} of {len(ends)} sliding orbits reach the two-fold "
         f"({fold.label}); they slide away",
-        AGREES,
+        HOLDS,
         "the same system with nu1 nu2 on the other side of 1",
         (
             Check(f"class {fold.label}", fold.label == "II-F"),
@@ -267,7 +267,7 @@ def properties_of_chaos() -> Claim:
     """What is not checked."""
     return Claim(
         "properties-of-chaos",
-        "from memory: abstract",
+        "known from memory: abstract",
         "the flow has many of the properties associated with chaos",
         "the paper's definitions were not at hand; excursions of many sizes follow from one state",
         NOT_CHECKABLE,

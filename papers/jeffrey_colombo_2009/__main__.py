@@ -1,4 +1,4 @@
-"""Reproduce the paper: ``python -m papers.jeffrey_colombo_2009 [--out FOLDER]``."""
+"""Follow the model after the paper: ``python -m papers.jeffrey_colombo_2009 [--out FOLDER]``."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from . import figures, results
 
 PAPER = Paper(
     name="jeffrey_colombo_2009",
-    title="Jeffrey & Colombo (2009), reproduced",
+    title="After Jeffrey & Colombo (2009): the invisible two-fold",
     source="M. R. Jeffrey and A. Colombo, The two-fold singularity of discontinuous vector fields, "
     "SIAM J. Appl. Dyn. Syst. 8 (2009) 624-640.",
-    note="Statements and notation are quoted from memory; the paper was not at hand.",
+    note="Statements and notation are quoted from memory; the paper was not at hand, so this is a model after it and no reproduction of it.",
     claims=results.ALL,
     pictures=figures.PICTURES,
 )

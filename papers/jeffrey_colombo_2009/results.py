@@ -12,7 +12,7 @@ import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import AGREES, Check, Claim, close
+from ..claims import HOLDS, Check, Claim, close
 from .model import (
     AFTER,
     AT,
@@ -66,10 +66,10 @@ def normal_form() -> Claim:
     )
     return Claim(
         "normal-form",
-        "from memory: the normal form",
+        "known from memory: the normal form",
         "near a generic invisible two-fold the flow is (-y, 1, V+) for x > 0 and (z, V-, 1) for x < 0",
         "nonsmooth's normal form with sigma = (-1, +1), nu = (V+, V-)",
-        AGREES,
+        HOLDS,
         "find_two_fold on the normal form: nu comes from second Lie derivatives",
         checks,
     )
@@ -93,11 +93,11 @@ def return_map() -> Claim:
         checks.append(close("error of the eigenvalues", gap, 0, 1e-8))
     return Claim(
         "return-map",
-        "from memory: crossing orbits",
+        "known from memory: crossing orbits",
         "successive crossings are a composition of two involutions, linear in the normal form",
         "[[4 V+ V- - 1, -2 V-], [2 V+, -1]]: determinant 1, eigenvalues "
         "(sqrt(V+ V-) +- sqrt(V+ V- - 1))^2, on the unit circle exactly if 0 <= V+ V- <= 1",
-        AGREES,
+        HOLDS,
         "two simulated orbits give the matrix; formula for matrix and eigenvalues",
         tuple(checks),
     )
@@ -111,13 +111,13 @@ def single_quantity() -> Claim:
     positive = reached((2.0, 1.0))
     return Claim(
         "single-quantity",
-        "from memory: abstract",
+        "known from memory: abstract",
         "the local dynamics depends on a single quantity, the jump in direction of the field "
         "through the singularity",
         "the product V+ V- decides, together with the signs: V+ V- = .9 gives "
         f"{counts[0]} flights for three pairs of negative V; V+ V- = 2 lets all sliding orbits reach "
         f"the two-fold if V < 0 and {positive} of {RING} if V > 0",
-        AGREES,
+        HOLDS,
         "simulation of fans of crossing orbits and rings of sliding orbits",
         (
             Check(f"most flights {counts} at V+ V- = .9", counts == [9, 9, 9]),
@@ -133,11 +133,11 @@ def crossings() -> Claim:
     text = ", ".join(f"{v[0] * v[1]:.2f}: {n}" for v, n, _ in found)
     return Claim(
         "number-of-crossings",
-        "from memory: the case V+ V- < 1",
+        "known from memory: the case V+ V- < 1",
         "for V+, V- < 0 and V+ V- < 1 every orbit crosses a finite number of times, without bound as "
         "V+ V- -> 1, and then slides",
         f"at most ceil(pi/arccos sqrt(V+ V-)) - 1 flights; V+ V- and flights: {text}",
-        AGREES,
+        HOLDS,
         "18 orbits for each pair, over eight decades of starting slopes",
         tuple(
             Check(
@@ -155,11 +155,11 @@ def repelling_before() -> Claim:
     label = ns.two_folds.classify_two_fold(SIGMA, BEFORE)
     return Claim(
         "initially-repelling",
-        "from memory: abstract",
+        "known from memory: abstract",
         "the singularity is initially repelling",
         f"for V+ V- < 1 none of {RING} sliding orbits reaches it; exactly one leaves it into the "
         f"attracting region (class {label.label})",
-        AGREES,
+        HOLDS,
         "ring of sliding orbits; class by the decision table",
         (
             Check(f"{counts} reach it", counts == [0, 0]),
@@ -186,12 +186,12 @@ def bifurcation() -> Claim:
     label = ns.two_folds.classify_two_fold(SIGMA, AT).label
     return Claim(
         "diabolo-bifurcation",
-        "from memory: abstract",
+        "known from memory: abstract",
         "at a bifurcation the singularity becomes the apex of a pair of parabolic invariant surfaces",
         "at V+ V- = 1 for V+, V- < 0: invariant lines abs(z/y) = abs(V+) (1 -+ sqrt(1 - 1/(V+ V-))) of "
         f"the return map; at V = {AFTER}: {low:.6f} (orbits grow, factor {grow:.6f}) and {high:.6f} "
         f"(shrink, factor {shrink:.6f}). x is quadratic in (y, z) on the arcs through them",
-        AGREES,
+        HOLDS,
         "the lines from the formula put through both flights",
         (
             Check(f"no lines at {none}", len(none) == 2),
@@ -215,12 +215,12 @@ def parabolic() -> Claim:
     jump = (-float(y), float(z))  # x' on arriving from above and on leaving downwards
     return Claim(
         "smooth-but-for-an-edge",
-        "from memory: abstract",
+        "known from memory: abstract",
         "the surfaces are smooth except where they intersect the discontinuity surface",
         f"height of the arc over (-r, {high:.4f} r): {heights[0]:.6f} r^2 for r = 1, .1, .01; at the "
         f"edge x' jumps from {jump[0]:.4f} to {jump[1]:.4f} and (y', z') from (1, {AFTER[0]:g}) to "
         f"({AFTER[1]:g}, 1)",
-        AGREES,
+        HOLDS,
         "simulation of three arcs; both fields at the landing",
         (
             Check(f"heights over r^2: {heights}", max(abs(h - 0.5) for h in heights) < 1e-9),
@@ -241,12 +241,12 @@ def attraction() -> Claim:
     count = reached(AFTER)
     return Claim(
         "attraction-and-repulsion",
-        "from memory: abstract",
+        "known from memory: abstract",
         "they divide local space into regions of attraction to, and repulsion from, the singularity",
         f"crossing orbits with abs(z/y) > {high:.4f} make 1 to {max(map(flights, attracted))} flights, "
         "slide, and reach the singularity in finite time; the others cross ever further away. All "
         f"{count} of {RING} sliding orbits reach it",
-        AGREES,
+        HOLDS,
         "simulation on both sides of the line, and of a ring of sliding orbits",
         (
             Check(f"{sum(ends)} of {len(ends)} inside end at the singularity", all(ends)),
@@ -267,11 +267,11 @@ def accumulation() -> Claim:
     ratios = times[2:] / times[:-2]
     return Claim(
         "accumulation-time",
-        "from memory: orbits on the surfaces",
+        "known from memory: orbits on the surfaces",
         "orbits on the inner surface cross infinitely often while they fall into the singularity",
         f"from (0, -1, {high:.4f}) they end at t = {estimate:.9f}; formula "
         f"2 (1 + 2 abs(V+) - r+)/(1 - 1/mu) = {formula:.12f}",
-        AGREES,
+        HOLDS,
         "simulation, which stops with ACCUMULATION and the estimated limit; geometric series",
         (
             Check(f"status {r.status.name}", r.status is ns.Status.ACCUMULATION),
@@ -294,14 +294,14 @@ def determinacy() -> Claim:
     spread = float(np.linalg.norm(np.ptp(onward(0.5), axis=0)))
     return Claim(
         "determinacy-breaking",
-        "from memory: discussion",
+        "known from memory: discussion",
         "orbits of an open set reach the singularity in finite time, and their evolution after it is "
         "not determined by the vector field",
         f"{stopped} of {RING} arrive, at times that agree with -(1, 1) M^-1 z to {worst:.0e}; from "
         f"there canards slide into repelling sliding and leave it up or down at any time: a funnel of "
         f"{len(onward.trajectories)} of them is {spread:.2f} wide at t = .5. The abstract of 2009 "
         "states attraction; the loss of determinacy is the point of the paper of 2011",
-        AGREES,
+        HOLDS,
         "ring of sliding orbits; funnel of the continuations",
         (
             Check(f"{stopped} of {RING} stop as NON_UNIQUE", stopped == RING),

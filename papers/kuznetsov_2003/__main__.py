@@ -1,4 +1,4 @@
-"""Reproduce the paper: ``python -m papers.kuznetsov_2003 [--out FOLDER]``."""
+"""Follow the model after the paper: ``python -m papers.kuznetsov_2003 [--out FOLDER]``."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from . import figures, results
 
 PAPER = Paper(
     name="kuznetsov_2003",
-    title="The harvest model of Kuznetsov, Rinaldi & Gragnani (2003), reproduced",
+    title="After Kuznetsov, Rinaldi & Gragnani (2003): a harvested predator",
     source="Yu. A. Kuznetsov, S. Rinaldi and A. Gragnani, One-parameter bifurcations in planar Filippov "
     "systems, Int. J. Bifurcation Chaos 13 (2003) 2157-2188.",
-    note="Statements and parameters are quoted from memory; the paper was not at hand.",
+    note="Statements and parameters are quoted from memory; the paper was not at hand, so this is a model after it and no reproduction of it.",
     claims=results.ALL,
     pictures=figures.PICTURES,
 )

@@ -9,7 +9,7 @@ import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import ADDED, AGREES, Check, Claim, close
+from ..claims import ADDED, HOLDS, Check, Claim, close
 from .model import (
     BOUNDARY_FOCUS,
     BOUNDARY_NODE,
@@ -47,11 +47,11 @@ def folds() -> Claim:
     outside = [_kind([x, 0.9], 0.9) for x in (0.02, 0.9)]
     return Claim(
         "sliding-segment",
-        "from memory: the harvest model",
+        "known from memory: the harvest model",
         "sliding on x2 = alpha between the points where psi = d and psi = d + E",
         f"attracting sliding for {free.point[0]:.6f} < x1 < {harvested.point[0]:.6f}, whatever alpha; "
         "crossing outside",
-        AGREES,
+        HOLDS,
         "find_fold; b d/(a - d) and b (d + E)/(a - d - E); classify",
         (
             close("fold of the free field", free.point[0], _reference("fold of F2"), 1e-14),
@@ -83,12 +83,12 @@ def pseudo() -> Claim:
             checks.append(Check(found.kind, found.kind == "pseudo-saddle"))
     return Claim(
         "pseudo-equilibria",
-        "from memory: the harvest model",
+        "known from memory: the harvest model",
         "up to two pseudo-equilibria",
         "(1 - x1)(b + x1) = a alpha: a stable pseudo-node for "
         f"{BOUNDARY_NODE:.6f} < alpha < {SADDLE_NODE:.6f} and a pseudo-saddle for "
         f"{BOUNDARY_FOCUS:.6f} < alpha < {SADDLE_NODE:.6f}",
-        AGREES,
+        HOLDS,
         "find_pseudo_equilibrium; the quadratic equation",
         tuple(checks),
     )
@@ -108,13 +108,13 @@ def boundary_focus() -> Claim:
     beyond = found.evidence["landing"] / found.evidence["pseudo"]
     return Claim(
         "boundary-focus",
-        "from memory: the harvest model",
+        "known from memory: the harvest model",
         "a boundary focus",
         f"at alpha = {alpha:.12f} an unstable focus of the free field: class {found.label}, nonsmooth "
         "fold. Above it the focus is real and with it appears a pseudo-saddle; the orbit from the "
         f"fold lands {beyond:.4f} times as far from the fold as the pseudo-saddle is, so there is no "
         "small sliding cycle",
-        AGREES,
+        HOLDS,
         "find_boundary_equilibrium, classify",
         (
             close("alpha", alpha, _reference("boundary focus"), 1e-12),
@@ -166,11 +166,11 @@ def boundary_node() -> Claim:
     )
     return Claim(
         "boundary-node",
-        "from memory: the harvest model",
+        "known from memory: the harvest model",
         "a boundary node",
         f"at alpha = {alpha:.12f} a stable node of the harvested field: class {found.label}, "
         "persistence. It turns into the stable pseudo-node",
-        AGREES,
+        HOLDS,
         "find_boundary_equilibrium, classify; equilibria .02 to either side",
         (
             close("alpha", alpha, _reference("boundary node"), 1e-12),
@@ -199,12 +199,12 @@ def saddle_node() -> Claim:
     counts = [len(pseudo_equilibria(SADDLE_NODE + d)) for d in (-1e-3, 1e-3)]
     return Claim(
         "pseudo-saddle-node",
-        "from memory: the harvest model",
+        "known from memory: the harvest model",
         "a pseudo-saddle-node",
         f"at alpha = (1 + b)^2/(4 a) = {SADDLE_NODE:.12f}, x1 = (1 - b)/2: pseudo-saddle and "
         f"pseudo-node merge; second derivative of the sliding speed "
         f"{found.evidence['second derivative of g']:.6f}",
-        AGREES,
+        HOLDS,
         "classify at the point; number of pseudo-equilibria .001 to either side",
         (
             close("alpha", SADDLE_NODE, _reference("pseudo-saddle-node"), 1e-14),
@@ -248,12 +248,12 @@ def sliding_cycles() -> Claim:
     spread = float(np.ptp(entries))
     return Claim(
         "sliding-cycles",
-        "from memory: the harvest model",
+        "known from memory: the harvest model",
         "stable sliding cycles",
         "through the fold of the free field, periods "
         + ", ".join(f"{p:.4f} at alpha = {a:g}" for a, p in zip(levels, periods, strict=True))
         + "; orbits merge with them in finite time, so their multiplier is 0",
-        AGREES,
+        HOLDS,
         "simulation from the fold and, at alpha = 1.2, from three other starts",
         (
             Check(f"periods {np.round(periods, 4).tolist()}", bool(np.all(np.isfinite(periods)))),

@@ -1,4 +1,4 @@
-"""Reproduce the paper: ``python -m papers.welander_1982 [--out FOLDER]``."""
+"""Follow the model after the paper: ``python -m papers.welander_1982 [--out FOLDER]``."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from . import figures, results
 
 PAPER = Paper(
     name="welander_1982",
-    title="Welander's ocean box (1982), reproduced",
+    title="After Welander (1982): the ocean box",
     source="P. Welander, A simple heat-salt oscillator, Dyn. Atmos. Oceans 6 (1982) 233-242, in the "
     "nonsmooth form of the later literature (J. Leifeld, 2016).",
-    note="Statements and parameters are quoted from memory; the paper was not at hand.",
+    note="Statements and parameters are quoted from memory; the paper was not at hand, so this is a model after it and no reproduction of it.",
     claims=results.ALL,
     pictures=figures.PICTURES,
 )

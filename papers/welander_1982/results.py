@@ -9,7 +9,7 @@ import numpy as np
 
 import nonsmooth as ns
 
-from ..claims import ADDED, AGREES, Check, Claim, close
+from ..claims import ADDED, HOLDS, Check, Claim, close
 from .model import (
     BOUNDARY_MIXED,
     BOUNDARY_RESTING,
@@ -46,11 +46,11 @@ def oscillation() -> Claim:
     spread = float(np.abs(np.array(ends) - temperature).max())
     return Claim(
         "oscillation",
-        "from memory: abstract",
+        "known from memory: abstract",
         "a simple heat-salt oscillator: for steady forcing the box oscillates by itself",
         f"at eps = -.01 a stable crossing cycle, period {period:.10f}, multiplier {multiplier:.7f}; "
         "resting and mixed phase alternate",
-        AGREES,
+        HOLDS,
         "Newton's method on the return map; orbits from three starts",
         (
             close("period", period, _reference("period"), 1e-9),
@@ -71,11 +71,11 @@ def resting_equilibrium() -> Claim:
     pseudo = ns.find_pseudo_equilibrium(SYSTEM, [0.99, 0.97], parameters=at(0.18))
     return Claim(
         "boundary-equilibrium-resting",
-        "from memory: nonsmooth form in the later literature",
+        "known from memory: nonsmooth form in the later literature",
         "for a high threshold the box rests",
         f"the resting equilibrium (1, 1) is real for eps > .2 and reaches the surface at eps = {eps:.12g}: "
         f"class {found.label}, persistence; for eps < .2 a stable pseudo-node takes its place",
-        AGREES,
+        HOLDS,
         "find_boundary_equilibrium, classify; equilibria .02 to either side",
         (
             close("eps", eps, _reference("boundary equilibrium, k = 0"), 1e-12),
@@ -102,11 +102,11 @@ def sliding_equilibrium() -> Claim:
     spread = max(float(np.abs(e - found.point).max()) for e in ends)
     return Claim(
         "pseudo-equilibrium",
-        "from memory: nonsmooth form in the later literature",
+        "known from memory: nonsmooth form in the later literature",
         "between threshold 0 and the resting state the box comes to a balance on the surface",
         f"at eps = .05 a {found.kind} at T = {found.point[0]:.12f} with the mixing on for a share "
         f"{1 - found.alpha:.4f} of the time; orbits from three starts end there",
-        AGREES,
+        HOLDS,
         "find_pseudo_equilibrium; simulation",
         (
             close("T", found.point[0], _reference("pseudo-equilibrium T"), 1e-12),
@@ -158,13 +158,13 @@ def pseudo_hopf() -> Claim:
     calm = simulate(np.array([0.7, 0.6]), 0.002, 20.0).itinerary
     return Claim(
         "onset",
-        "from memory: nonsmooth form in the later literature",
+        "known from memory: nonsmooth form in the later literature",
         "a nonsmooth Hopf bifurcation, supercritical: a stable cycle is born as the equilibrium on the "
         "surface loses stability",
         f"at eps = 0 a fold-fold of class {found.label} at ({FOLD_FOLD[0]:g}, {FOLD_FOLD[1]:g}), a stable "
         f"fused focus (pseudo-Hopf); for eps < 0 the cycle spans {sizes[1]:.4f} sqrt(-eps) in T; for "
         "eps > 0 orbits end in sliding",
-        AGREES,
+        HOLDS,
         "classify; simulation at eps = -1e-4 and -1e-6, and .002",
         (
             Check(f"class {found.label}", found.label == "II2"),
@@ -189,13 +189,13 @@ def mixed_equilibrium() -> Claim:
     virtual = ns.find_equilibrium(SYSTEM, MIXED, side="+", parameters=at(eps + 1e-3))
     return Claim(
         "boundary-equilibrium-mixed",
-        "from memory: nonsmooth form in the later literature",
+        "known from memory: nonsmooth form in the later literature",
         "for a low threshold the box mixes all the time",
         f"the mixed equilibrium (1/6, 1/11) reaches the surface at eps = {eps:.12f} = -7/165. The surface "
         f"next to it repels: class {found.label} of the time-reversed system, nonsmooth fold: for lower "
         "eps the stable node is real, with a pseudo-saddle in repelling sliding; for higher eps both are "
         "gone and the box oscillates",
-        AGREES,
+        HOLDS,
         "find_boundary_equilibrium, classify; equilibria .001 to either side",
         (
             close("eps", eps, -7 / 165, 1e-14),
@@ -229,13 +229,13 @@ def homoclinic() -> Claim:
     slowest = float(np.log(10) / 5.5)
     return Claim(
         "homoclinic",
-        "from memory: J. Leifeld's study of the nonsmooth model",
+        "known from memory: J. Leifeld's study of the nonsmooth model",
         "a boundary collision that is at the same time a homoclinic bifurcation",
         "the orbit that leaves the boundary equilibrium into the resting phase comes back to it "
         f"(within {gap:.0e} after t = 4.5); the period of the cycle grows by {steps[0]:.4f}, then "
         f"{steps[1]:.4f}, for each factor 10 in the distance from -7/165, towards ln(10)/5.5 = "
         f"{slowest:.4f}",
-        AGREES,
+        HOLDS,
         "simulation from the boundary equilibrium; periods at three distances",
         (
             Check(f"itinerary {run.itinerary[:3]!r}", run.itinerary.startswith("- +")),

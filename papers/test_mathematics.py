@@ -1,0 +1,72 @@
+"""Formulas in plain text become MathML; words, labels and numbers of a text stay as they are."""
+
+from __future__ import annotations
+
+import re
+import xml.etree.ElementTree as ElementTree
+
+import pytest
+
+from papers.mathematics import typeset, typeset_page
+
+
+def seen(text: str) -> str:
+    """What a reader sees, formulas in brackets."""
+    made = typeset(text).replace("</math><wbr><math>", "")
+    return re.sub(r"<[^>]+>", "", made.replace("<math>", "[").replace("</math>", "]"))
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        ("the product nu1 nu2 is 1", "the product [ν1ν2] is 1"),
+        ("r ~ exp(-pi d/2)", "[r∼exp(−πd/2)]"),
+        ("(F1.grad)^2 H at s", "[(F1·∇)2H] at s"),
+        ("abs(X' A_X) < mu Y'", "[|X′AX|&lt;μY′]"),
+        ("true as eta -> 0; else not", "true as [η→0]; else not"),
+        ("error 2.2e-16 at mu = .3", "error 2.2e-16 at [μ=.3]"),
+        ("|H_F| = 5.4e-05", "[|HF|=5.4×10−5]"),
+        ("dLambda_N/dY < 0", "[dΛN/dY&lt;0]"),
+        ("dv_N/dt = lambda_N - g", "[dvN/dt=λN−g]"),
+        ("lambda~ of the force", "[λ~] of the force"),
+    ],
+)
+def test_formulas(text, expected):
+    assert seen(text) == expected
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "a class of its own, mix-0 or VV-C1",
+        "12 of 12 starts behave as stated",
+        "find_boundary_equilibrium, classify",
+        "Sec. 2.2, case I",
+        "",
+        "- a list - with dashes",
+    ],
+)
+def test_words_stay(text):
+    assert typeset(text) == text
+
+
+def test_it_is_well_formed_and_keeps_its_order():
+    text = "nu1 nu2 = 1 + (20/7) (d_X' upsilon X')/(d_Y' Lambda_N Y') g eps^3 + O(eps^4) < 1 & more"
+    made = typeset(text)
+    ElementTree.fromstring(f"<p>{made}</p>".replace("<wbr>", "<wbr/>"))
+    assert made.count("<math>") > 2  # a long formula may be broken
+    assert made.index("ν") < made.index("<mfrac>") < made.index("υ") < made.index("Λ")
+    assert made.endswith("&amp; more")
+
+
+def test_unbalanced_brackets_lose_nothing():
+    made = typeset("sign(u_x' < 0)) = sign(x'")
+    ElementTree.fromstring(f"<p>{made}</p>")
+    assert made.count(">(</mo>") + made.count(">)</mo>") == 4
+
+
+def test_pages_keep_their_tags_code_and_links():
+    page = "<p title='a = b'>mu = 3 <code>mu = 3</code> <a href='x'>mu = 3</a></p>"
+    made = typeset_page(page)
+    assert made.count("<math>") == 1
+    assert "<code>mu = 3</code> <a href='x'>mu = 3</a>" in made and "title='a = b'" in made

@@ -35,6 +35,7 @@ GALLERY = (
     "funnel",
     "stick_slip",
     "leine",
+    "plane_friction",
     "harvest",
     "basins",
     "wells",
@@ -143,6 +144,9 @@ def regions() -> str:
         ns.Region.TANGENT_BELOW: "$L_2 = 0$",
         ns.Region.TWO_FOLD: "$L_1 = L_2 = 0$",
         ns.Region.MIXED: "on an intersection of surfaces",
+        ns.Region.SLIDING: "$|M^{-1} a| < 1$, on a set",
+        ns.Region.CROSSING: "$|M^{-1} a| > 1$, on a set",
+        ns.Region.BOUNDARY: "$|M^{-1} a| = 1$, on a set",
     }
     return table(
         ("where", "region", "name"), ((when[r], str(r), f"`Region.{r.name}`") for r in ns.Region)

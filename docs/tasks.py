@@ -64,7 +64,7 @@ TASKS = {
         "steps in time.",
         "nonsmooth",
         "classify region Region alpha sliding_field sliding_branches fold fold_fold two_fold "
-        "boundary_equilibrium intersection intersection_range",
+        "boundary_equilibrium intersection intersection_range limit_directions",
     ),
     "search": _task(
         "Find special points",

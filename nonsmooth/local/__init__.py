@@ -21,6 +21,7 @@ from .pseudo_equilibrium import PseudoEquilibrium
 from .regions import Region, alpha, region, sliding_field
 from .search import find_all
 from .two_fold import TwoFold
+from .vector_sets import LimitDirection, limit_directions
 
 __all__ = [
     "BoundaryBifurcation",
@@ -30,6 +31,7 @@ __all__ = [
     "Fold",
     "FoldFold",
     "Intersection",
+    "LimitDirection",
     "LocalObject",
     "PseudoEquilibrium",
     "Region",
@@ -48,6 +50,7 @@ __all__ = [
     "fold_fold",
     "intersection",
     "intersection_range",
+    "limit_directions",
     "region",
     "sliding_branches",
     "sliding_field",

@@ -7,10 +7,21 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, FilippovSystem, Parameters, PointError, call, explain, motion
+from ..model import (
+    Array,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    call,
+    explain,
+    motion,
+    require_system,
+)
+from ..model.frozen import Frozen
 from .checks import positive
 from .numbers import Numbers
 from .place import TOLERANCE, on_surface, place
+from .vector_sets import law_at
 
 
 class Region(Enum):
@@ -30,6 +41,9 @@ class Region(Enum):
     TANGENT_BELOW = "tangency of the field below"  # L2 = 0
     TWO_FOLD = "tangency of both fields"  # L1 = L2 = 0
     MIXED = "sliding that neither attracts nor repels"  # on several surfaces only
+    SLIDING = "sliding"  # of a set of codimension two or three: |M^-1 a| < 1
+    CROSSING = "crossing"  # |M^-1 a| > 1
+    BOUNDARY = "boundary of sliding"  # |M^-1 a| = 1
 
     def __str__(self) -> str:
         return self.value
@@ -37,7 +51,7 @@ class Region(Enum):
     @property
     def sliding(self) -> bool:
         """Whether the point is in a sliding region, attracting or repelling."""
-        return self in (Region.ATTRACTING, Region.REPELLING)
+        return self in (Region.ATTRACTING, Region.REPELLING, Region.SLIDING)
 
 
 def region_of(numbers: Numbers, tol: float) -> Region:
@@ -62,7 +76,11 @@ def region(
     mode: str | None = None,
     tol: float = TOLERANCE,
 ) -> Region:
-    """Region of the switching surface in which a point lies.
+    """Region of the switching surface, or of a set of codimension two or three, in which a point lies.
+
+    On a set h = 0 with a vector multiplier h' = a - M lambda: ``SLIDING`` where |M^-1 a| < 1, so that
+    lambda = M^-1 a keeps the motion on it; ``CROSSING`` where |M^-1 a| > 1 (see
+    :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M has a negative direction.
 
     Parameters
     ----------
@@ -75,7 +93,7 @@ def region(
     t : float, optional
         Time, where the system depends on it.
     surface : int, optional
-        Index of the surface.
+        Number of the surface or set.
     mode : str, optional
         With several surfaces, one letter each: the sides of the others. By default the signs of
         their functions at the point.
@@ -101,8 +119,29 @@ def region(
     >>> [str(region(s, [x0, 0.0])) for x0 in (0.2, -0.5, 0.4)]
     ['attracting sliding', 'crossing up', 'tangency of the field below']
     """
+    require_system(system, sets=True)
+    if system.sets and _is_set(system, surface):
+        tol = positive(tol, "tol")
+        return _region_of_set(law_at(system, point, parameters, t, surface, mode, tol), tol)
     where, x = place(system, point, parameters, t, surface, mode)
     return region_of(on_surface(where, x, positive(tol, "tol")), tol)
+
+
+def _is_set(system: FilippovSystem, surface: int) -> bool:
+    members = system.entries[surface] if surface in range(len(system.entries)) else ()
+    return members in system.sets
+
+
+def _region_of_set(law: Frozen, tol: float) -> Region:
+    """Where sliding along a set is possible, and whether it attracts."""
+    if not law.definite:
+        size = float(np.abs(law.m).max())
+        if law.indefinite or size == 0.0:
+            return Region.MIXED if law.indefinite else Region.CROSSING
+    needed = float(np.linalg.norm(np.linalg.solve(law.m, law.a)))
+    if abs(needed - 1.0) <= tol:
+        return Region.BOUNDARY
+    return Region.SLIDING if needed < 1.0 else Region.CROSSING
 
 
 def _refuse_crossing(numbers: Numbers, found: Region, what: str) -> None:

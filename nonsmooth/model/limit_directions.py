@@ -49,7 +49,7 @@ def limit_directions_of(a: Array, m: Array) -> list[tuple[float, Array]]:
     else:
         found = _of_roots(_secular(a, m), a, m)
     found.sort(key=lambda pair: -pair[0])
-    return [(s * size, u) for s, u in found]
+    return [(s * size, u + 0.0) for s, u in found]
 
 
 def leaving_direction(a: Array, m: Array) -> tuple[float, Array]:

@@ -33,6 +33,15 @@ from .planar import (
     scalar_sliding,
     spiral_oscillator,
 )
+from .plane_friction import (
+    block_on_belt,
+    block_on_disc,
+    block_on_incline,
+    cue_ball,
+    pivoting_disc,
+    shaken_block,
+    turntable,
+)
 from .problem import Problem, Reference
 from .several_surfaces import ambiguous_exit, glass_loop, hidden_dynamics, two_relay_spiral
 from .two_folds import TWO_FOLDS, two_fold
@@ -44,9 +53,13 @@ __all__ = [
     "Reference",
     "ambiguous_exit",
     "belt_oscillator",
+    "block_on_belt",
+    "block_on_disc",
+    "block_on_incline",
     "bouncing_ball",
     "buck_converter",
     "by_name",
+    "cue_ball",
     "dry_friction",
     "forced_dry_friction",
     "glass_loop",
@@ -57,14 +70,17 @@ __all__ = [
     "leine_stick_slip",
     "multi_sliding_relay",
     "piecewise_cycle",
+    "pivoting_disc",
     "planar_relay",
     "pseudo_hopf",
     "scalar_repelling",
     "scalar_sliding",
+    "shaken_block",
     "simplest_walker",
     "spiral_oscillator",
     "state_dependent_jump",
     "stick_slip_exponential",
+    "turntable",
     "two_fold",
     "two_relay_spiral",
     "welander_box",
@@ -96,6 +112,13 @@ _FUNCTIONS: tuple[Callable[[], Problem], ...] = (
     belt_oscillator,
     simplest_walker,
     buck_converter,
+    block_on_incline,
+    block_on_belt,
+    block_on_disc,
+    cue_ball,
+    turntable,
+    pivoting_disc,
+    shaken_block,
 )
 
 #: Every problem by name, in the order of the catalogue.

@@ -77,6 +77,14 @@ def test_funnel_begins_where_the_canard_meets_the_two_fold():
     assert {d.side for d in found["futures"].departures} == {"+", "-", "s"}
 
 
+def test_limit_directions_of_plane_friction():
+    found = ran("plane_friction")
+    assert [d.rate for d in found["directions"]] == pytest.approx([-0.4, -1.6], abs=1e-12)
+    x, y = np.meshgrid(found["loads"], found["loads"])
+    inside = np.abs(x) ** (2 / 3) + np.abs(y) ** (2 / 3) < found["width"] ** (2 / 3)
+    assert np.array_equal(found["counts"], np.where(inside, 4, 2))
+
+
 def test_stick_slip_period():
     found = ran("stick_slip")
     assert found["period"] == pytest.approx(PERIOD, abs=1e-9)

@@ -4,6 +4,8 @@ directions of slip however small; rotations and mirrors; dense output; what is r
 import casadi as ca
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import nonsmooth as ns
 
@@ -243,3 +245,19 @@ def test_what_is_no_set_is_refused():
 def test_what_knows_surfaces_only_says_so(question):
     with pytest.raises(ns.DefinitionError, match="multipliers are scalars"):
         question(_puck())
+
+
+_LANDINGS = st.tuples(*[st.floats(-1.5, 1.5) for _ in range(4)])
+
+
+@given(_LANDINGS, _LANDINGS, st.sampled_from([0.1, 0.6]), st.sampled_from([0.5, 1.5]))
+@settings(max_examples=12, deadline=None)
+def test_friction_brings_two_motions_closer(one, two, mu, eta):
+    # |dV|^2 + k |dW|^2 + eta^2 |dX|^2 never rises: the rate of change is -4 d1 eta |dV|^2 + 2 dF.dh, and
+    # friction is monotone. So the future is unique.
+    p = {"mu": mu, "d1": 0.1, "d2": 0.1, "eta": eta, "G": 1e-4, "k": 0.4}
+    runs = [_ball(s[:2], s[2:], tol=1e-12, p=p) for s in (one, two)]
+    t = np.linspace(0.0, runs[0].t[-1], 60)
+    dx, dv, dw, _ = np.split(runs[0](t) - runs[1](t), 4, axis=1)
+    distance = (dv**2).sum(axis=1) + 0.4 * (dw**2).sum(axis=1) + eta**2 * (dx**2).sum(axis=1)
+    assert np.diff(distance).max() < 1e-9

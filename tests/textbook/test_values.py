@@ -626,6 +626,89 @@ def stick(problem, reference):
     return next(leg.duration for leg in orbit_for(problem, reference).legs if leg.mode == "s")
 
 
+@check("block_on_incline", "rest (t)")
+@check("block_on_disc", "sticks (t)")
+@check("cue_ball", "rolls (t)")
+@check("pivoting_disc", "rest (t)")
+def entry_time(problem, reference):
+    (entry,) = events(run_of(problem.name), "entry")
+    return entry.t
+
+
+@check("block_on_incline", "rest (x1, x2)")
+@check("block_on_belt", "end (x1, x2)")
+@check("block_on_disc", "end (x1, x2)")
+def last_place(problem, reference):
+    return run_of(problem.name).x[-1, :2]
+
+
+@check("block_on_belt", "carried away (x1, x2, t)")
+def carried_away(problem, reference):
+    (entry,) = events(run_of(problem.name), "entry")
+    return (*entry.x[:2], entry.t)
+
+
+@check("block_on_belt", "halfway (x1, x2)")
+def halfway(problem, reference):
+    return run_of(problem.name)(2.0)[:2]
+
+
+@check("block_on_disc", "friction on the disc")
+def edge_of_riding(problem, reference):
+    def rides(r):
+        run = problem.run({"x1": r, "v1": 0.0, "v2": r}, t_end=1e-3)
+        return 1.0 if run.itinerary == "s" else -1.0
+
+    return brentq(rides, 0.3, 0.7, xtol=1e-10)
+
+
+@check("cue_ball", "rolls (x1, x2)")
+def start_of_rolling(problem, reference):
+    return events(run_of(problem.name), "entry")[0].x[:2]
+
+
+@check("cue_ball", "rolls (v1, v2)")
+def rolling(problem, reference):
+    return run_of(problem.name).x[-1, 2:4]
+
+
+@check("turntable", "period")
+def circle(problem, reference):
+    run = run_of(problem.name)
+    start, guess = np.array(problem.start), reference.value
+    return brentq(lambda t: (run(t) - start)[0], guess - 0.5, guess + 0.5, xtol=1e-14)
+
+
+@check("turntable", "opposite point (x1, x2)")
+def opposite(problem, reference):
+    return run_of(problem.name)(problem["period"].value / 2)[:2]
+
+
+@check("pivoting_disc", "rest (x1, x2, phi)")
+def disc_at_rest(problem, reference):
+    return run_of(problem.name).x[-1, :3]
+
+
+@check("shaken_block", "speed in the end")
+def shaken_speed(problem, reference):
+    return np.linalg.norm(run_of(problem.name).x[-1, 2:])
+
+
+@check("shaken_block", "slip in the end")
+def shaken_slip(problem, reference):
+    run, angle = run_of(problem.name), 2.0 * problem.t_end
+    return np.linalg.norm(run.x[-1, 2:] - [math.cos(angle), math.sin(angle)])
+
+
+@check("shaken_block", "least friction that holds")
+def friction_that_holds(problem, reference):
+    def holds(mu_g):
+        run = problem.run({"v1": 1.0, "mu_g": mu_g}, t_end=1e-3)
+        return 1.0 if run.itinerary == "s" else -1.0
+
+    return brentq(holds, 1.5, 2.5, xtol=1e-10)
+
+
 ALL = [(name, r) for name, make in textbook.PROBLEMS.items() for r in make().references]
 
 

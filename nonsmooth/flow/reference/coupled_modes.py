@@ -8,11 +8,12 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...model import Array, Coupled, FilippovSystem, Guard, Yardsticks, coupled_of
+from ...model.frozen import Frozen, frozen
 from ...model.layer import spirals_in
 from ...model.multiplier_series import MultiplierSeries, set_values
 from ...model.multipliers import newton_multipliers, sliding_multipliers
 from ..options import Options
-from .laws_of_sets import Frozen, frozen, unknowns_of_sets
+from .laws_of_sets import unknowns_of_sets
 from .modes import Expansion, Modes, SeparateModes, powers, rounding_scale, tolerances
 
 

@@ -13,9 +13,9 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
+from ...model.frozen import Frozen
 from ..facts import SAFETY
 from ..options import Options
-from .laws_of_sets import Frozen
 
 
 @dataclass(frozen=True)

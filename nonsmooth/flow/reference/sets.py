@@ -13,9 +13,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Array, FilippovSystem, Guard, multiplier_enters
+from ...model.frozen import field_at, frozen
 from ...model.multiplier_series import unit
 from ..facts import EPSILON, LEFT, REACHED, VANISHES
-from .laws_of_sets import field_at, frozen
 from .modes import rounding_scale, tolerances
 
 if TYPE_CHECKING:

@@ -17,10 +17,11 @@ from itertools import product
 import numpy as np
 
 from ...model import Array, complementarity
+from ...model.frozen import Frozen
 from .. import messages
 from ..facts import TANGENT, VANISHES
 from ..status import Status
-from .laws_of_sets import Frozen, bounded_multipliers
+from .laws_of_sets import bounded_multipliers
 from .modes import Expansion, Modes
 from .stepper import Stepper
 

@@ -161,18 +161,22 @@ def stretches(run: Trajectory) -> list[Stretch]:
     DegenerateError
         Impacts that accumulate; two events at one instant of which neither causes the other.
     """
-    system, p = run.system, np.array(list(run.parameters.values()), float)
-    p = system.parameter_vector(run.parameters)
+    system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
+    known: dict[tuple[str, ...], Leg] = {}
     for group in _instants(run.events):
         first, last = group[0], group[-1]
         _require_countable(group)
-        leg = leg_of(system, first, p)
         x_end = _extended(system, first.x, first.t)
-        further = [leg_of(system, e, p) for e in group[1:] if e.kind not in ("end", "stop")]
-        if further:
-            leg = replace(leg, further=_caused(system, leg, further, x_end, p, first.t))
+        if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):  # told by its words
+            key = (first.mode_before, first.name, first.kind, first.mode_after)
+            leg = known.get(key) or known.setdefault(key, leg_of(system, first, p))
+        else:
+            leg = leg_of(system, first, p)
+            further = [leg_of(system, e, p) for e in group[1:] if e.kind not in ("end", "stop")]
+            if further:
+                leg = replace(leg, further=_caused(system, leg, further, x_end, p, first.t))
         after = _extended(system, last.x_after, last.t)
         result.append(Stretch(leg, t, first.t - t, x, x_end, after))
         t, x = last.t, after
@@ -180,7 +184,11 @@ def stretches(run: Trajectory) -> list[Stretch]:
 
 
 def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
-    return np.append(x, t) if system.time_dependent else np.array(x)
+    if not system.time_dependent:
+        return np.array(x)
+    extended = np.empty(len(x) + 1)
+    extended[:-1], extended[-1] = x, t
+    return extended
 
 
 def _instants(events: Sequence[Event]) -> list[list[Event]]:

@@ -12,15 +12,18 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..flow.trajectory import Trajectory
 from ..model import Array, ConvergenceError
 from .collocation import collocated
+from .flight import Flight, Flights
 from .guards import described, watch
 from .legs import Flown, Stretch, fly, stretches
-from .saltation import Saltation, saltation
+from .saltation import Saltation, saltation, saltations
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,6 +81,53 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     system = run.system
     p = system.parameter_vector(run.parameters)
     parts = stretches(run)
+    try:
+        flight = Flights(system, [part.leg for part in parts], chosen)(
+            np.array([part.start for part in parts]),
+            np.array([part.duration for part in parts]),
+            p,
+        )
+    except ConvergenceError:
+        return _one_by_one(run, parts, p, chosen)
+    return _together(parts, flight)
+
+
+def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
+    """Legs that were flown together, with the saltation of their events."""
+    n = flight.after.shape[1]
+    after = np.roll(flight.before[:, :n], -1, axis=0)
+    carried = (flight.after_state @ flight.rate[:, :, None])[:, :, 0]
+    ends: NDArray[Any] = ~np.all(np.isfinite(after), axis=1)
+    ends[-1] = True
+    after[ends] = carried[ends]
+    events = np.array([bool(part.leg.name) for part in parts])
+    found = saltations(flight, after, lambda k: _at(parts[k]), events)
+    rows = zip(
+        parts,
+        flight.flown,
+        events.tolist(),
+        found.matrix,
+        found.by_parameters,
+        found.time_by_state,
+        found.time_by_parameters,
+        found.angle.tolist(),
+        flight.sizes,
+        strict=True,
+    )
+    return [
+        Passage(part, flown, Saltation(s[:, :k], sp, t[:k], tp, angle) if event else None)
+        for part, flown, event, s, sp, t, tp, angle, k in rows
+    ]
+
+
+def _at(part: Stretch) -> str:
+    return f"{part.leg.name!r} at t = {part.t + part.duration:.10g}"
+
+
+def _one_by_one(
+    run: Trajectory, parts: Sequence[Stretch], p: Array, chosen: tuple[int, ...]
+) -> list[Passage]:
+    """Legs of which some have no Taylor series at an end."""
     result: list[Passage] = []
     for k, part in enumerate(parts):
         flown = _flown(run, part, p, chosen)
@@ -116,8 +166,7 @@ def saltation_after(
         after = field.rate.copied(start, p)[0][:n, 0]
         if not np.all(np.isfinite(after)):
             after = at.after_state @ flown.rate
-    name = part.leg.name
-    return saltation(at, flown.rate, after, f"{name!r} at t = {part.t + part.duration:.10g}")
+    return saltation(at, flown.rate, after, _at(part))
 
 
 @dataclass(frozen=True, eq=False, repr=False)

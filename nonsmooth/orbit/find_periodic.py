@@ -154,15 +154,16 @@ def _primitive(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
     for k in range(1, count // 2 + 1):
         if count % k or (problem.symmetry is not None and count // k % 2 == 0):
             continue
+        apart = starts[k : 2 * k, :n] @ problem.wrap[:n, :n].T - starts[:k, :n]
+        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / np.abs(durations).sum()
+        if not max(np.abs(apart / size).max(), later) < _SAME:
+            continue
         legs = problem.legs[:k]
         following = legs if problem.symmetry is None else [mirrored(problem, leg) for leg in legs]
         if any(problem.legs[i] != (legs, following)[i // k % 2][i % k] for i in range(count)):
             continue
         once = replace(problem, legs=legs, periods=round(2 * problem.periods * k / count) / 2)
-        apart = starts[k : 2 * k, :n] @ once.wrap[:n, :n].T - starts[:k, :n]
-        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / np.abs(durations).sum()
-        if max(np.abs(apart / size).max(), later) < _SAME:
-            return once, once.pack(starts[:k], durations[:k])
+        return once, once.pack(starts[:k], durations[:k])
     return problem, u
 
 

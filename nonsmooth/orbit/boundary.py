@@ -309,6 +309,8 @@ class BoundaryProblem:
         for i in range(count):
             own, time = slice(i * n, (i + 1) * n), count * n + i
             following = slice(0, n) if i + 1 == count else slice((i + 1) * n, (i + 2) * n)
+            if jacobian[time, time] == 0.0:
+                raise np.linalg.LinAlgError(f"leg {i + 1}: its event is grazed")
             slope = jacobian[time, own] / jacobian[time, time]
             level = right[time] / jacobian[time, time]
             ahead = -np.diag(jacobian[own, following])  # a diagonal block, but for one leg

@@ -62,6 +62,11 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
     """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border.
 
     Columns and rows may be scaled.
+
+    Raises
+    ------
+    numpy.linalg.LinAlgError
+        An event is grazed to all digits.
     """
     count, n, m = len(problem.legs), problem.dimension, problem.size
     k = len(matrix) - m
@@ -76,6 +81,8 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
     for i in range(count):
         own, time = slice(i * n, (i + 1) * n), count * n + i
         row = matrix[time]
+        if row[time] == 0.0:  # the leg's event is grazed
+            raise np.linalg.LinAlgError(f"leg {i + 1}: its event does not determine its duration")
         pivots *= float(row[time] / np.linalg.norm(row))
         b = -(row[own] @ a) / row[time]
         b[n:] -= row[m:] / row[time]

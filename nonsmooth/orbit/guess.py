@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -126,7 +126,25 @@ def start_of(
         return _from_word(system, x, itinerary, forcing, mirror, p)
     hint = forcing(p)[0] if forcing else None if period is None else float(period)
     found = _simulated(system, x, mirror, hint, forcing is not None, p)
-    return _from_recurrence(system, found, forcing, mirror, p)
+    start = _from_recurrence(system, found, forcing, mirror, p)
+    return start if forcing is None or mirror is not None else _nearest(start, x, forcing(p)[0])
+
+
+def _nearest(start: Start, x: Array, span: float) -> Start:
+    """Of the whole periods at which an orbit without an event may begin, the one nearest to ``x``."""
+    problem, p = start.problem, start.p
+    if problem.legs[-1].name or problem.periods < 2:
+        return start
+    (y,), (duration,) = problem.split(start.unknowns)
+    n, found = problem.system.dimension, list[Array]()
+    there = fly(problem.system, problem.legs[0], x, -float(x[-1]) % span, p).end[:n]
+    for _ in range(round(problem.periods)):
+        found.append(y.copy())
+        y = fly(problem.system, problem.legs[0], y, span, p).end[: n + 1].copy()
+        y[-1] = found[0][-1]
+    best = min(found, key=lambda state: float(np.abs(state[:n] - there).max()))
+    phased = replace(problem, reference=best)
+    return Start(phased, phased.pack(best, np.array([duration])), p)
 
 
 def _by_name(parameters: Parameters | None) -> dict[str, Any]:
@@ -171,7 +189,9 @@ def _problem(
         phase = np.zeros(system.extended_dimension)
         if system.time_dependent:  # from time 0, which is the same phase of every forcing period
             assert forcing is not None
-            wait = forcing(p)[0] - starts[0, -1]
+            span = forcing(p)[0]
+            wait = -starts[0, -1] % span
+            wait = 0.0 if wait > span * (1.0 - 1e-12) else wait
             starts = fly(system, legs[0], starts[0], wait, p).end[None, : starts.shape[1]].copy()
             starts[0, -1] = 0.0
             phase[-1] = 1.0

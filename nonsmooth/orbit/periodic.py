@@ -60,12 +60,15 @@ class Margin:
         In the units of what it measures; zero at the change.
     relative : float
         Relative to the period, to the size of the orbit, or to a right angle.
+    t : float
+        Of the event or of the nearest approach: of the forcing, or since the start of the orbit.
     """
 
     leg: int
     what: str
     value: float
     relative: float
+    t: float
 
 
 class OrbitDerivative(NamedTuple):
@@ -327,20 +330,21 @@ def _margins(orbit: PeriodicOrbit) -> list[Margin]:
     size = problem.scales(orbit.unknowns)[: problem.dimension]  # units of the states do not matter
     result: list[Margin] = []
     for i, leg in enumerate(problem.legs):
-        duration = float(at.durations[i])
+        duration, begins = float(at.durations[i]), orbit.legs[i].t
+        ends = begins + duration
         verb = "slides" if "s" in leg.mode else "lasts"
         if leg.name:
-            result.append(Margin(i, f"{verb} for", duration, duration / orbit.period))
+            result.append(Margin(i, f"{verb} for", duration, duration / orbit.period, ends))
             gradient, rate = at.events[i].gradient[: size.size], at.flown[i].rate[: size.size]
             length = float(np.linalg.norm(gradient * size) * np.linalg.norm(rate / size)) or 1.0
             angle = float(at.events[i].gradient @ at.flown[i].rate) / length
-            result.append(Margin(i, f"meets {leg.name} at the angle", angle, angle))
+            result.append(Margin(i, f"meets {leg.name} at the angle", angle, angle, ends))
         if duration <= 0.0:
             continue
         for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
             what = f"keeps {described(near.guard)} at its nearest by"
             relative = near.distance / float(np.abs(size[: orbit.system.dimension]).max())
-            result.append(Margin(i, what, near.distance, relative))
+            result.append(Margin(i, what, near.distance, relative, begins + near.t))
     return result
 
 

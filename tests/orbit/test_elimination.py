@@ -51,3 +51,14 @@ def test_the_determinant_changes_its_sign_with_that_of_the_whole_matrix():
             small = eliminated(problem, matrix, np.zeros(len(matrix)))
             ratios.append(sign * np.sign(small.determinant()))
         assert len(set(ratios)) == 1
+
+
+def test_an_event_that_is_grazed_to_all_digits_is_no_pivot():
+    orbit = ns.periodic_orbit(relay(), ns.simulate(relay(), [0.0, -0.001, -0.02], t_end=40.0))
+    problem, at = orbit.problem, orbit.evaluation
+    count, n = len(problem.legs), problem.dimension
+    matrix = at.jacobian.copy()
+    matrix[count * n + 3, count * n + 3] = 0.0
+    for solve in (problem.solve, lambda m, r: eliminated(problem, m, r)):
+        with pytest.raises(np.linalg.LinAlgError, match="leg 4"):
+            solve(matrix, at.residual)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import html
 import warnings
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -185,6 +186,11 @@ class Shot:
         states = states.reshape(-1, states.shape[-1]).T
         values = np.array(list(self.model.values.values()))[:, None]
         return [r.reshape(times.shape) for r in ns.call(function, states, values)]
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the bounce: its lift-off, then the run."""
+        text = html.escape(repr(self))
+        return f"<div><b>{text}</b></div>{self.trajectory._repr_html_()}"
 
     def __repr__(self) -> str:
         end = self.lift_off

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array
+from ..model.cards import card
 from . import tables
 from .facts import KINDS
 from .saving import Savable
@@ -167,15 +168,29 @@ class Ensemble(Savable):
         """
         return tables.ensemble_set(self)
 
+    def _repr_html_(self) -> str:
+        """How a notebook shows the runs: how many, and how they ended."""
+        shape = " x ".join(map(str, self.t.shape))
+        rows = (
+            ("runs", shape),
+            ("states", ", ".join(self.state_names)),
+            ("itineraries", len(self.itineraries)),
+            ("ends", self._ends()),
+        )
+        return card("Ensemble", rows)
+
     def __repr__(self) -> str:
+        return (
+            f"Ensemble(shape {self.t.shape}, {self.x.shape[-1]} states, "
+            f"{len(self.itineraries)} itineraries; {self._ends()})"
+        )
+
+    def _ends(self) -> str:
+        """How many runs ended in which status, counted in pieces."""
         flat, size = self.status.reshape(-1), 1 << 22
         pieces = [flat[k : k + size] for k in range(0, len(flat), size)]
         number = {s: sum(int(np.count_nonzero(piece == s)) for piece in pieces) for s in Status}
-        counts = ", ".join(f"{s} {k}" for s, k in number.items() if k)
-        return (
-            f"Ensemble(shape {self.t.shape}, {self.x.shape[-1]} states, "
-            f"{len(self.itineraries)} itineraries; {counts})"
-        )
+        return ", ".join(f"{s} {k}" for s, k in number.items() if k)
 
 
 class Collected:

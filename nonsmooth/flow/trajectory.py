@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, PointError, real_array
+from ..model.cards import card, lines
 from . import tables
 from .saving import Savable, savable
 from .status import Status
@@ -207,6 +208,20 @@ class Trajectory(Savable):
             xarray is not installed.
         """
         return tables.trajectory_set(self)
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the run: why it ended, its modes, its states over time."""
+        rows = (
+            ("time", f"{self.t[0]:g} to {self.t[-1]:g}, {len(self.events)} events"),
+            ("itinerary", _shorten(self.itinerary)),
+            ("status", self.status),
+            ("message", "" if self.status.complete else self.message),
+        )
+        times = np.linspace(self.t[0], self.t[-1], 240)
+        states = self(times) if self.t[-1] > self.t[0] else self.x[:1]
+        return card(
+            "Trajectory", rows, lines(times[: len(states)], states, self.system.state_names)
+        )
 
     def __repr__(self) -> str:
         return (

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..model import Array, FilippovSystem, PointError
+from ..model.cards import card, quadrants
 from .checks import positive
 from .coordinates import Chart
 from .describe import two_fold_in_words
@@ -154,6 +155,17 @@ class TwoFold:
 
     def __str__(self) -> str:
         return two_fold_in_words(self)
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the two-fold: its class, its numbers, and what follows from them."""
+        real = [float(s.real) for s in self.slopes if abs(s.imag) < 1e-12 * (1 + abs(s.real))]
+        rows = (
+            ("point", np.array2string(self.point, precision=6)),
+            ("sigma, nu", f"{self.sigma}, ({self.nu[0]:.6g}, {self.nu[1]:.6g})"),
+            ("canards", f"{self.canards:g}, faux {self.faux_canards:g}"),
+        )
+        words = card("", [("", self.classification.determinism)])
+        return card(f"{self.kind} two-fold, class {self.label}", rows, quadrants(real)) + words
 
     def __repr__(self) -> str:
         return f"TwoFold({self.label}, {self.kind}, point={self.point.tolist()})"

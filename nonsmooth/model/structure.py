@@ -8,6 +8,7 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
+from .cards import card
 from .errors import DefinitionError, explain
 from .form import Definition
 from .found_switches import LiftedSwitch
@@ -31,6 +32,20 @@ class Structure:
         self.state_names = tuple(names["states"])
         self.parameter_names = tuple(names["parameters"])
         self._extended_states = definition.extended_states
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the system: states, fields of one surface, surfaces, parameters."""
+        rows: list[tuple[str, object]] = [("states", ", ".join(self.state_names))]
+        single = len(self.entries) == 1 and not self.sets
+        for mode, where in (("+", "above"), ("-", "below")) if single else ():
+            rows.append((f"field {where}", self.field(mode)))
+        surfaces = listed(self.definition.surfaces)
+        rows += [(f"surface h{k}", function) for k, function in enumerate(surfaces)]
+        rows += [("parameters", ", ".join(self.parameter_names))]
+        rows += [("stops", ", ".join(n for n, _ in self.stops))]
+        rows += [("resets", ", ".join(n for n, _ in self.resets))]
+        rows += [("impacts", ", ".join(self.impacts))]
+        return card("FilippovSystem", rows)
 
     def __repr__(self) -> str:
         parts = [

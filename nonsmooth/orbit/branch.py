@@ -14,6 +14,7 @@ from ..model import (
     explain,
     real,
 )
+from ..model.cards import card
 from .continuation import Point
 
 
@@ -193,6 +194,15 @@ class Branch:
             f"Branch of {len(self)} points, {self.parameter} from {low:.10g} to {high:.10g}, "
             f"ends {self.ends[0]} and {self.ends[1]}, {len(self.events)} events\n" + self.table()
         )
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the branch: its range, its ends, its events."""
+        rows = [
+            (self.parameter, f"{self.values.min():.10g} to {self.values.max():.10g}"),
+            ("ends", f"{self.ends[0]} and {self.ends[1]}"),
+            *((f"{e.parameter:.10g}", f"{e.kind}; {e.far_side}") for e in self.events),
+        ]
+        return card(f"Branch of {len(self)} points", rows)
 
     def __repr__(self) -> str:
         kinds = ", ".join(f"{e.kind} {e.parameter:.6g}" for e in self.events)

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..flow.fixed import flow_for
 from ..flow.trajectory import Trajectory
 from ..model import Array, FilippovSystem, ParameterError, Surfaces
+from ..model.cards import card, circle
 from ..model.variational import variational_field
 from .boundary import BoundaryProblem, Evaluation
 from .guards import change_fault, described, watch
@@ -274,6 +275,17 @@ class PeriodicOrbit:
             lines.append(f"  nearest change: leg {near.leg + 1} {near.what} {near.value:.6g}")
         lines += [f"  virtual: {fault}" for fault in self.faults]
         return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the orbit: its period, its legs, its multipliers."""
+        rows = (
+            ("period", f"{self.period:.12g}"),
+            ("itinerary", self.itinerary),
+            ("stability", self.stability),
+            ("multipliers", ", ".join(_number(m) for m in self.multipliers)),
+            ("virtual", "; ".join(self.faults)),
+        )
+        return card("PeriodicOrbit", rows, circle(self.multipliers))
 
     def __repr__(self) -> str:
         return f"PeriodicOrbit(period {self.period:.10g}, {len(self.legs)} legs, {self.stability})"

@@ -170,8 +170,13 @@ class BoundaryProblem:
             A leg cannot be flown.
         """
         starts, durations = self.split(u)
-        count, n, size, columns = len(self.legs), self.dimension, self.size, list(chosen)
-        flight = self._flights(chosen)(starts, durations, p, tol)
+        columns = list(chosen)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+            return self._assembled(self._flights(chosen)(starts, durations, p, tol), u, p, columns)
+
+    def _assembled(self, flight: Flight, u: Array, p: Array, columns: list[int]) -> Evaluation:
+        starts, durations = self.split(u)
+        count, n, size = len(self.legs), self.dimension, self.size
         after, by_end = flight.after, flight.after_state
         by_p = by_end @ flight.by_parameters + flight.after_parameters[:, :, columns]
         if self.symmetry is not None:

@@ -20,10 +20,11 @@ from ..model import (
     NonsmoothError,
     Parameters,
     require_system,
+    whole,
 )
 from .boundary import BoundaryProblem, Evaluation
 from .edits import mirrored
-from .guess import Itinerary, mirror_of, start_of
+from .guess import Itinerary, Start, mirror_of, start_of
 from .legs import Leg, fly, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 
@@ -32,6 +33,9 @@ _TOLERANCE = 1e-10
 
 #: Steps below this, relative to the orbit, are rounding.
 _ROUNDING = 1e-14
+
+#: A period below this part of the guess is that of a point.
+_POINT = 1e-9
 
 #: Legs far from the orbit are flown with local errors up to this.
 _COARSE = 1e-8
@@ -126,6 +130,7 @@ def periodic_orbit(
     'asymptotically stable'
     """
     require_system(system)
+    max_iterations = whole(max_iterations, "max_iterations")
     mirror = mirror_of(system, symmetry)
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     solver = _Solver(start.problem, start.p)
@@ -133,6 +138,7 @@ def periodic_orbit(
     problem, once = _primitive(start.problem, u, start.p)
     if problem is not start.problem:
         u, at = _Solver(problem, start.p).solve(once, max_iterations)
+    _require_motion(at, start)
     faults = tuple(faults_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
     _require_simple(orbit)
@@ -331,6 +337,21 @@ class _Solver:
             residual=size,
             point=u,
         )
+
+
+def _require_motion(at: Evaluation, start: Start) -> None:
+    """Refuse a point: every equilibrium solves the equations of an orbit of no duration."""
+    guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
+    period = float(np.abs(at.durations).sum())
+    if period > _POINT * guess:
+        return
+    n = start.problem.system.dimension
+    raise ConvergenceError(
+        f"periodic orbit: expected a period near {guess:.6g}, received {period:.2g}: Newton's method "
+        f"shrank the orbit to a point, {at.starts[0, :n].tolist()}. It is an equilibrium, or a point "
+        "where legs vanish: start closer to the orbit.",
+        point=at.starts[0, :n],
+    )
 
 
 def _require_simple(orbit: PeriodicOrbit) -> None:

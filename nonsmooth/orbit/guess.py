@@ -42,6 +42,9 @@ _LONGEST = 200.0
 #: A run that comes back as near as this, relative to its size, is not simulated further.
 _GOOD = 0.02
 
+#: Fields that differ by this part after a period have another one.
+_OTHER = 1e-6
+
 #: A state that may be one after a reset is left by this part of that time.
 _LATER = 0.05
 
@@ -99,6 +102,23 @@ def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
     return Forcing(system, period)
 
 
+def _span(forcing: Forcing | None, p: Array) -> float | None:
+    """The forcing period at some parameters."""
+    if forcing is None:
+        return None
+    span = forcing(p)[0]
+    if not (math.isfinite(span) and span > 0.0):
+        raise OptionError(
+            explain(
+                "period",
+                expected="a positive time",
+                received=f"{span:.6g}",
+                advice="It is the period of the forcing, as a number or an expression in parameters.",
+            )
+        )
+    return span
+
+
 def start_of(
     system: FilippovSystem,
     guess: Any,
@@ -114,17 +134,17 @@ def start_of(
         given = {**guess.parameters, **_by_name(parameters)}
         p = system.parameter_vector(given)
         forcing = _forcing(system, period)
-        span = forcing(p)[0] if forcing else None
-        found = recurrence(guess, symmetry=mirror, period=span, first=False)
+        found = recurrence(guess, symmetry=mirror, period=_span(forcing, p), first=False)
         if found is None or found.distance > CLOSE:
             raise refused(guess, found)
         return _from_recurrence(system, found, forcing, mirror, p)
     p = system.parameter_vector(parameters)
     forcing = _forcing(system, period)
+    span = _span(forcing, p)
     x = system.extended_point(real_array(guess, "guess"), t_start)
     if itinerary is not None:
         return _from_word(system, x, itinerary, forcing, mirror, p)
-    hint = forcing(p)[0] if forcing else None if period is None else float(period)
+    hint = span if forcing else None if period is None else float(period)
     found = _simulated(system, x, mirror, hint, forcing is not None, p)
     start = _from_recurrence(system, found, forcing, mirror, p)
     return start if forcing is None or mirror is not None else _nearest(start, x, forcing(p)[0])
@@ -174,6 +194,37 @@ def _from_recurrence(
     return _problem(system, legs, starts, durations, found.periods, forcing, mirror, p)
 
 
+def _require_period(
+    system: FilippovSystem,
+    legs: Sequence[Leg],
+    starts: Array,
+    durations: Array,
+    span: float,
+    p: Array,
+) -> None:
+    """Refuse a period after which the fields are not what they were.
+
+    A field may jump where a leg begins; so it counts what is within.
+    """
+    for leg, x, duration in zip(legs, starts, durations, strict=True):
+        field = leg.field(system)
+        y = flow_for(plain_field(system, leg.mode), field.states_at(x, p), p, 0.5 * float(duration))
+        later = y.copy()
+        later[system.dimension] += span
+        here, there = (field.rate.copied(z, p)[0][:, 0] for z in (y, later))
+        miss = float(np.abs(here - there).max())
+        if miss > _OTHER * float(np.abs(here).max()):
+            raise OptionError(
+                explain(
+                    "period",
+                    expected="a time after which the field is the same again",
+                    received=f"{span:.10g}, after which it differs by {miss:.2g} in mode {leg.mode!r} "
+                    f"at {y[: system.dimension].tolist()}",
+                    advice="Give the period of the forcing, or leave it out.",
+                )
+            )
+
+
 def _problem(
     system: FilippovSystem,
     legs: tuple[Leg, ...],
@@ -185,6 +236,8 @@ def _problem(
     p: Array,
 ) -> Start:
     phase = reference = None
+    if forcing is not None:
+        _require_period(system, legs, starts, durations, forcing(p)[0], p)
     if not legs[-1].name:
         phase = np.zeros(system.extended_dimension)
         if system.time_dependent:  # from time 0, which is the same phase of every forcing period

@@ -122,6 +122,24 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
         if kind == "impact" and _closed(system, mode, impacts.index(name)):
             kind = "release"
         return Leg(mode, name, kind)
+    leg = _told(system, mode, following, [*resets, *stops, *impacts])
+    names = [*resets, *stops, *impacts, leg.name]
+    if name not in ("", leg.name):
+        raise OptionError(
+            explain(
+                "itinerary",
+                expected=f"an event among {list(dict.fromkeys(names))} to end the leg in "
+                f"mode {mode!r} that {following!r} follows",
+                received=repr(name),
+                advice="Correct the name, or leave it out.",
+            )
+        )
+    return leg
+
+
+def _told(system: FilippovSystem, mode: str, following: str, named: list[str]) -> Leg:
+    """The leg that the letters of two modes tell."""
+    resets, impacts = [n for n, _ in system.resets], list(system.impacts)
     changed = [i for i, (a, b) in enumerate(zip(mode, following, strict=False)) if a != b]
     if not changed and len(resets) + len(impacts) == 1:
         return Leg(mode, (resets + impacts)[0], "reset" if resets else "impact")
@@ -133,7 +151,7 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
                 received=f"{mode!r} followed by {following!r}, where "
                 + ("no letter changes" if not changed else f"{len(changed)} letters change"),
                 advice="Give the event's name: itinerary=[(mode, event), ...], with an event of "
-                f"{[*resets, *stops, *impacts]} or of a surface.",
+                f"{named} or of a surface.",
             )
         )
     (i,) = changed

@@ -15,7 +15,9 @@ def problems():
     yield ns.periodic_orbit(system, run, symmetry="odd")
     system = forced_friction()
     yield ns.periodic_orbit(system, ns.simulate(system, [1.5, 0.0], 100.0))
-    yield ns.periodic_orbit(walker(), [0.2003, -0.1998, 0.4006, -0.0158], itinerary=[("", "reset")])
+    yield ns.periodic_orbit(
+        walker(), [0.2003, -0.1998, 0.4006, -0.0158], itinerary=[("", "heelstrike")]
+    )
 
 
 @pytest.mark.parametrize("borders", [1, 2])

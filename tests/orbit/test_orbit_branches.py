@@ -131,7 +131,7 @@ def test_grazing_sliding_that_leads_to_chaos():
 def test_the_walker_doubles_its_step_and_the_new_gait_is_found():
     """Garcia, Chatterjee, Ruina & Coleman 1998: period two from about 0.015 on."""
     system, state = walker(), [0.2003, -0.1998, 0.4006, -0.0158]
-    orbit = ns.periodic_orbit(system, state, itinerary=[("", "reset")])
+    orbit = ns.periodic_orbit(system, state, itinerary=[("", "heelstrike")])
     (event,) = ns.continue_orbit(orbit, "gamma", bounds=(0.008, 0.018)).events
     assert event.kind == "period doubling" and abs(event.parameter - 0.0151) < 5e-5
     double = ns.continue_orbit(event, "gamma", bounds=(0.0149, 0.0165))
@@ -140,7 +140,7 @@ def test_the_walker_doubles_its_step_and_the_new_gait_is_found():
     steps = [leg.duration for leg in orbit.legs]
     assert abs(steps[0] - steps[1]) > 1e-2
     again = ns.periodic_orbit(
-        system, orbit.start, itinerary=[("", "reset")] * 2, parameters={"gamma": 0.016}
+        system, orbit.start, itinerary=[("", "heelstrike")] * 2, parameters={"gamma": 0.016}
     )
     assert abs(again.period - orbit.period) < 1e-11
 

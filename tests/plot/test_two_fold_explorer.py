@@ -10,7 +10,7 @@ import nonsmooth as ns
 from nonsmooth.__main__ import main
 from nonsmooth.local.two_folds.flights import has_diabolo
 from nonsmooth.local.two_folds.reduced_flow import eigenlines, orbit, sectors
-from nonsmooth.plot.two_fold_atlas import CASES, SIGMA
+from nonsmooth.plot.two_fold_atlas import CASES, REACH, SIGMA
 from tests.browser import WIDTHS
 
 two_folds = ns.two_folds
@@ -230,12 +230,15 @@ def test_the_point_is_dragged(browser, page, width):
 
     browser.open(page, width, hash="folds=VV&nu=0,0")
     dot = browser.driver.find_element(By.CSS_SELECTOR, ".handle .dot")
-    scale = browser.run("return document.getElementById('map').getBoundingClientRect().width / 440")
-    by = 100 * scale
+    frame = browser.run(
+        "const {width, height} = document.querySelector('#map .frame').getBoundingClientRect();"
+        "return [width, height]"
+    )
+    by = int(frame[0] / 4)
     ActionChains(browser.driver).click_and_hold(dot).move_by_offset(by, -by).release().perform()
     nu = [float(v) for v in shown(browser)["hash"].partition("nu=")[2].split(",")]
-    units = 6 / (440 - 14 - 58), 6 / (440 - 14 - 48)  # of nu a pixel
-    assert nu == pytest.approx([100 * units[0], 100 * units[1]], abs=0.05)
+    units = [2 * REACH / side for side in frame]  # of nu a pixel
+    assert nu == pytest.approx([by * units[0], by * units[1]], abs=0.05)
     assert shown(browser)["label"] == "Class VV-F"
 
 

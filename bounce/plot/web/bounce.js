@@ -33,12 +33,21 @@
     "+": "slips forward",
     "-": "slips in reverse",
     s: "rolls",
-    F: "feels no friction yet",
+    F: "feels no friction at first",
   };
 
-  const map = new Page.Plane(byId("map"), { x: [-REACH[0], REACH[0]], y: [-REACH[1], REACH[1]] });
-  const cone = new Page.Plane(byId("cone"), { x: [-1, 1], y: [0, 1] });
-  const slip = new Page.Plane(byId("slip"), { x: [0, 1], y: [-1, 1], height: 330 });
+  let outcomes = null; // the map that is shown
+  const redraw = () => {
+    if (outcomes) drawMap(outcomes);
+    draw();
+  };
+  const map = new Page.Plane(byId("map"), {
+    x: [-REACH[0], REACH[0]],
+    y: [-REACH[1], REACH[1]],
+    redraw,
+  });
+  const cone = new Page.Plane(byId("cone"), { x: [-1, 1], y: [0, 1], redraw });
+  const slip = new Page.Plane(byId("slip"), { x: [0, 1], y: [-1, 1], aspect: 0.78, redraw });
 
   const surface = () => {
     const { mu, eta, d1, d2, G, inertia, load } = state;
@@ -152,7 +161,7 @@
         );
       const words = { "+": "S+", "-": "S−", s: "R", F: "F" }[mode];
       const wide = slip.at([b, 0])[0] - slip.at([a, 0])[0];
-      const look = { class: `name word-${NAMES[mode]}` };
+      const look = { class: "name" };
       if (wide > 26) parts.push(slip.label([(a + b) / 2, slip.y[1]], words, look, [0, 18]));
     });
     parts.push(
@@ -168,9 +177,44 @@
     for (const { mode, points } of all) {
       parts.push(slip.path(points.map(read), { class: `phase phase-${NAMES[mode]}` }));
     }
-    slip.layer.replaceChildren(...parts);
+    slip.layer.replaceChildren(...parts, ...enlarged(all, high - low));
     slip.over.replaceChildren(...marks(slip, all, read));
     slip.ticks("time", "slip H = Ẋ + Ω");
+  }
+
+  /** The last slip in a frame of its own, where it is too small to be seen beside the first. */
+  function enlarged(all, range) {
+    const { mode, points } = all.at(-1);
+    const most = Math.max(...points.map((p) => Math.abs(p.slip)));
+    if (all.length < 2 || mode === "s" || most > 0.06 * range || most === 0) return [];
+    const { left, top, width, height } = slip.box;
+    const box = { x: left + 0.5 * width, y: top + 34, width: 0.46 * width, height: 0.36 * height };
+    const [start, end] = [points[0].t, points.at(-1).t];
+    const at = (p) => [
+      box.x + box.width * (0.08 + (0.84 * (p.t - start)) / (end - start || 1)),
+      box.y + box.height * (0.5 - (0.4 * p.slip) / most),
+    ];
+    const pixels = points.map((p) =>
+      at(p)
+        .map((v) => v.toFixed(1))
+        .join(" "),
+    );
+    const words = `the end, slip to ${text(points.at(-1).slip, 2)}`;
+    const middle = {
+      x: box.x + box.width / 2,
+      y: box.y + box.height + 15,
+      "text-anchor": "middle",
+    };
+    return [
+      svg("rect", { ...box, class: "inset" }),
+      svg("path", { d: `M${box.x} ${box.y + box.height / 2}h${box.width}`, class: "zero" }),
+      svg("path", {
+        d: `M${pixels.join("L")}`,
+        fill: "none",
+        class: `phase end phase-${NAMES[mode]}`,
+      }),
+      svg("text", middle, words),
+    ];
   }
 
   // words --------------------------------------------------------------------------------------
@@ -239,13 +283,22 @@
     const linear = parts.map((c) => (c <= 0.03928 ? c / 12.92 : ((c + 0.055) / 1.055) ** 2.4));
     return 0.2126 * linear[0] + 0.7152 * linear[1] + 0.0722 * linear[2];
   };
-  const spare = {};
-  const colourOf = (name) => {
-    const own = given.colours[name] || spare[name];
-    if (own) return own;
-    spare[name] = given.more[Object.keys(spare).length % given.more.length];
-    return spare[name];
-  };
+  const spare = {}; // colours of itineraries without one of their own, kept while sliders move
+  const bare = (name) => name.replace(/^F /, ""); // a map has all landings with F, or none
+  const colourOf = (name) => given.colours[bare(name)] || spare[bare(name)];
+
+  /** Give the regions of a map colours; those that share one by chance get others. */
+  function assign(regions) {
+    const used = new Set(Object.values(given.colours));
+    for (const name of regions.map(bare)) {
+      if (given.colours[name]) continue;
+      if (!spare[name] || used.has(spare[name])) {
+        const free = given.more.find((colour) => !used.has(colour));
+        spare[name] = free || given.more[Object.keys(spare).length % given.more.length];
+      }
+      used.add(spare[name]);
+    }
+  }
 
   function picture(outcomes) {
     const { count, code, regions } = outcomes;
@@ -266,7 +319,10 @@
     return canvas.toDataURL();
   }
 
-  function drawMap(outcomes) {
+  function drawMap(shown) {
+    outcomes = shown;
+    const shares = Maps.shares(shown);
+    assign(shares.map(({ name }) => name));
     const [left, top] = map.at([-REACH[0], REACH[1]]);
     const [right, bottom] = map.at([REACH[0], -REACH[1]]);
     const box = {
@@ -283,13 +339,13 @@
     const rooms = Maps.rooms(outcomes);
     const names = [];
     const small = [];
-    for (const { code, name, share } of Maps.shares(outcomes)) {
-      const { room, xdot, omega } = rooms[code];
+    for (const { code, name, share } of shares) {
       const words = name.replaceAll("-", "−");
-      if (room > (0.022 + 0.006 * name.length) * outcomes.count) {
+      const place = Maps.label(outcomes, code, rooms[code], (8 * words.length) / map.box.width);
+      if (place && rooms[code].room > 0.03 * outcomes.count) {
         const fill = luminance(colourOf(name)) < 0.2 ? "#ffffff" : "#000000";
         const label = map.label(
-          [xdot, omega],
+          place,
           words,
           { class: "region-name", style: `fill: ${fill}` },
           [0, 4],
@@ -372,7 +428,7 @@
   byId("reset").addEventListener("click", () => set({ ...given.start }));
 
   let mapped = "";
-  const refresh = Page.eachFrame(() => {
+  function draw() {
     const key = JSON.stringify([surface(), state.ydot]);
     if (key !== mapped) startMap();
     mapped = key;
@@ -393,7 +449,9 @@
     for (const radio of radios) radio.checked = radio.value === state.load;
     ball.value = state.inertia;
     document.documentElement.dataset.ready = "yes";
-  });
+  }
+
+  const refresh = Page.eachFrame(draw);
 
   function read() {
     const asked = Page.address();

@@ -116,6 +116,21 @@ const Maps = (() => {
     return best;
   }
 
+  /** Middle of a region where a label as wide as a share of the map stays inside it; null if none. */
+  function label(map, code, { xdot, omega }, share) {
+    const n = map.count;
+    const j = map.omega.indexOf(omega);
+    const at = map.xdot.indexOf(xdot);
+    const row = map.code.slice(j * n, (j + 1) * n);
+    let [first, last] = [at, at];
+    while (first > 0 && row[first - 1] === code) first--;
+    while (last < n - 1 && row[last + 1] === code) last++;
+    if (last - first + 1 < share * n) return null;
+    const half = Math.ceil((share * n) / 2);
+    const middle = Math.min(Math.max(at, first + half), last - half);
+    return [map.xdot[Math.min(Math.max(middle, 0), n - 1)], omega];
+  }
+
   /** Where a curve crosses the edge between two cells, found once: the point, and the kind of the arc. */
   function crossing(map, found, a, b, tolerance) {
     const name = a < b ? `${a} ${b}` : `${b} ${a}`;
@@ -202,5 +217,5 @@ const Maps = (() => {
     return parts.filter((part) => part.points.length > 1);
   }
 
-  return { empty, compute, divide, curve, shares, rooms };
+  return { empty, compute, divide, curve, shares, rooms, label };
 })();

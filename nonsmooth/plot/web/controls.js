@@ -30,25 +30,48 @@ const Page = (() => {
 
   let clips = 0;
 
-  /** A frame in an SVG element with linear axes; what is drawn in `layer` is clipped to it. */
+  /**
+   * A frame in an SVG element with linear axes; what is drawn in `under` and `layer` is clipped to it.
+   * Its unit is a pixel of the page at every width, so that words have one size; `redraw` is called
+   * when the width has changed.
+   */
   class Plane {
-    constructor(element, { x, y, width = 440, height = 440, margin = [14, 14, 48, 58] }) {
+    constructor(element, { x, y, aspect = 1, margin = [14, 14, 46, 56], redraw = () => {} }) {
       this.element = element;
+      this.aspect = aspect;
       this.margin = margin;
-      [this.width, this.height] = [width, height];
-      element.setAttribute("viewBox", `0 0 ${width} ${height}`);
       const id = `clip-${++clips}`;
-      const [top, right, bottom, left] = margin;
-      this.box = { left, top, width: width - left - right, height: height - top - bottom };
-      const area = { x: left, y: top, width: this.box.width, height: this.box.height };
-      const clip = svg("clipPath", { id }, svg("rect", area));
+      this.hole = svg("rect");
+      this.frame = svg("rect", { class: "frame" });
       this.under = svg("g", { "clip-path": `url(#${id})` });
       this.layer = svg("g", { "clip-path": `url(#${id})` });
       this.axes = svg("g", { class: "axes" });
       this.over = svg("g");
-      const frame = svg("rect", { ...area, class: "frame" });
-      element.replaceChildren(clip, this.under, this.layer, frame, this.axes, this.over);
+      const clip = svg("clipPath", { id }, this.hole);
+      element.replaceChildren(clip, this.under, this.layer, this.frame, this.axes, this.over);
       this.limits(x, y);
+      this.fit();
+      new ResizeObserver(() => {
+        if (Math.abs(element.clientWidth - this.width) > 1) {
+          this.fit();
+          redraw();
+        }
+      }).observe(element);
+    }
+
+    /** Take the width that the element has. */
+    fit() {
+      this.width = Math.max(this.element.clientWidth, 200);
+      this.height = Math.round(this.aspect * this.width);
+      this.element.setAttribute("viewBox", `0 0 ${this.width} ${this.height}`);
+      const [top, right, bottom, left] = this.margin;
+      const [width, height] = [this.width - left - right, this.height - top - bottom];
+      this.box = { left, top, width, height };
+      for (const rect of [this.hole, this.frame]) {
+        for (const [name, value] of Object.entries({ x: left, y: top, width, height })) {
+          rect.setAttribute(name, value);
+        }
+      }
     }
 
     /** Set the ranges of both axes. */

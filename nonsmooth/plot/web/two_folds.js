@@ -26,8 +26,13 @@
   const say = (words) =>
     words.replace(/Delta|nu[12]|kappa_[-+]|\bD[ar]\b/g, (name) => LETTERS[name]);
 
-  const map = new Page.Plane(byId("map"), { x: [-REACH, REACH], y: [-REACH, REACH] });
-  const portrait = new Page.Plane(byId("portrait"), { x: [-1, 1], y: [-1, 1] });
+  let drawn = "";
+  const redraw = () => {
+    drawn = "";
+    draw();
+  };
+  const map = new Page.Plane(byId("map"), { x: [-REACH, REACH], y: [-REACH, REACH], redraw });
+  const portrait = new Page.Plane(byId("portrait"), { x: [-1, 1], y: [-1, 1], redraw });
   const clamp = (v) => Math.min(Math.max(v, -REACH), REACH);
 
   function set(changes) {
@@ -495,8 +500,7 @@
     if (cases.value !== "") set({ folds: chosen[1], nu: [...chosen[2]] });
   });
 
-  let drawn = "";
-  const refresh = Page.eachFrame(() => {
+  function draw() {
     const f = TwoFolds.flow(state.folds, state.nu);
     if (drawn !== state.folds) drawMap();
     drawn = state.folds;
@@ -510,7 +514,9 @@
     );
     cases.value = here >= 0 ? here : "";
     document.documentElement.dataset.ready = "yes";
-  });
+  }
+
+  const refresh = Page.eachFrame(draw);
 
   function read() {
     const { folds, nu } = Page.address();

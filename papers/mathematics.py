@@ -116,7 +116,10 @@ def _run(words: list[str]) -> str:
 
 
 def _parts(text: str) -> list[str]:
-    """Cut a long formula before its outer relations and signs: browsers do not break a formula."""
+    """Cut a long formula before its outer relations and signs, and in a number of very many digits.
+
+    Browsers do not break a formula.
+    """
     if len(text) <= _LONG:
         return [text]
     depth, cuts = 0, [0]
@@ -125,6 +128,9 @@ def _parts(text: str) -> list[str]:
         outer = depth == 0 and text[k - 1 : k] == " " and text[k + 1 : k + 2] == " "
         if outer and letter in "=<>+-~" and k - cuts[-1] > _SHORT:
             cuts.append(k)
+    for digits in re.finditer(r"\d{25,}", text):  # of a number proven to many
+        cuts += range(digits.start() + 15, digits.end() - 5, 15)
+    cuts.sort()
     return [text[a:b] for a, b in zip(cuts, [*cuts[1:], len(text)], strict=True)]
 
 

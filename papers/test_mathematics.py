@@ -70,3 +70,11 @@ def test_pages_keep_their_tags_code_and_links():
     made = typeset_page(page)
     assert made.count("<math>") == 1
     assert "<code>mu = 3</code> <a href='x'>mu = 3</a>" in made and "title='a = b'" in made
+
+
+def test_a_number_of_very_many_digits_can_be_broken():
+    digits = "160312829551350695582723492917747382636"
+    made = typeset(f"X' = -.{digits}")
+    pieces = re.findall(r"<mn>([\d.]*)</mn>", made)
+    assert "".join(pieces).strip(".") == digits and max(map(len, pieces)) <= 20
+    assert made.count("<wbr>") >= 2

@@ -22,6 +22,7 @@ from nonsmooth.local.two_folds.classification import TABLE
 DOCS = Path(__file__).parent
 sys.path.append(str(DOCS))  # docs is not a package
 
+from animations import animations  # noqa: E402
 from elsewhere import measured  # noqa: E402
 from markdown_table import first_line, table  # noqa: E402
 
@@ -201,6 +202,7 @@ PARTS: dict[str, Callable[[], str]] = {
     for f in (
         decision_table,
         meanings,
+        animations,
         measured,
         examples_of_classes,
         status_table,

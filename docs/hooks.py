@@ -15,6 +15,7 @@ from typing import Any
 DOCS = Path(__file__).parent
 sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 
+import animations  # noqa: E402
 import api  # noqa: E402  (neighbours; docs is not a package)
 import elsewhere  # noqa: E402
 import generate  # noqa: E402
@@ -46,6 +47,9 @@ def on_files(files: Files, config: Any) -> Files:
         figure = generate.run_example(name)["figure"]
         figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
         files.append(File.generated(config, f"gallery/{name}.svg", abs_src_path=str(path)))
+    for animation in animations.ANIMATIONS:
+        for path in animations.write(animation, PICTURES):
+            files.append(File.generated(config, f"gallery/{path.name}", abs_src_path=str(path)))
     for page in sorted(DOCS.glob("tutorial_*.md")):
         done = notebooks.run(page.read_text(encoding="utf-8"), page.stem)
         for uri, content in notebooks.files(done, page.stem).items():

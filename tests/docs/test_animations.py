@@ -1,0 +1,38 @@
+"""Moving pictures have as many moments as asked for, move, and end with a still of the last one."""
+
+import importlib.util
+import itertools
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+Image = pytest.importorskip("PIL.Image")
+
+DOCS = Path(__file__).parents[2] / "docs"
+_spec = importlib.util.spec_from_file_location("docs_animations", DOCS / "animations.py")
+animations = importlib.util.module_from_spec(_spec)
+sys.modules[_spec.name] = animations  # dataclasses look their module up
+_spec.loader.exec_module(animations)
+
+
+@pytest.mark.parametrize("animation", animations.ANIMATIONS, ids=lambda a: a.name)
+def test_it_moves_and_ends_with_a_still(animation, tmp_path):
+    moving, still = animations.write(animation, tmp_path, count=3)
+    with Image.open(moving) as image:
+        assert image.n_frames == 3
+        shown = []
+        for k in range(3):
+            image.seek(k)
+            shown.append(np.asarray(image.convert("RGB"), float))
+    assert all(np.abs(a - b).max() > 100 for a, b in itertools.pairwise(shown))
+    with Image.open(still) as last:
+        assert np.abs(np.asarray(last, float) - shown[-1]).mean() < 5  # WebP loses a little
+
+
+def test_the_page_asks_for_files_that_are_written():
+    text = animations.animations()
+    for animation in animations.ANIMATIONS:
+        assert f'src="gallery/{animation.name}.webp"' in text
+        assert f'srcset="gallery/{animation.name}.png"' in text

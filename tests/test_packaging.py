@@ -1,4 +1,4 @@
-"""The long description of the package works away from the repository, with and without its address."""
+"""What is published works away from the repository: the long description, and the paper's references."""
 
 import importlib.util
 import re
@@ -46,3 +46,19 @@ def test_links_of_the_project():
     assert hatch_build.urls("") == {}
     assert hatch_build.urls(ADDRESS)["Issues"] == f"{ADDRESS}/issues"
     assert all(u.startswith(ADDRESS) for u in hatch_build.urls(ADDRESS).values())
+
+
+def test_the_paper_cites_what_it_lists_and_lists_what_it_cites():
+    text = (ROOT / "joss" / "paper.md").read_text(encoding="utf-8")
+    listed = re.findall(
+        r"^@\w+\{(\w+),", (ROOT / "joss" / "paper.bib").read_text("utf-8"), re.MULTILINE
+    )
+    body = text.split("---\n", 2)[2]
+    cited = re.findall(r"@([A-Za-z]+\d{4})", body)
+    assert set(cited) == set(listed) and len(listed) == len(set(listed))
+    assert 400 < len(body.split()) < 1000  # what the journal asks for
+
+
+def test_citations_agree_on_the_paper_that_was_read():
+    for path in ("joss/paper.bib", "CITATION.cff", "papers/biber_2022/README.md"):
+        assert "2208.11685" in (ROOT / path).read_text(encoding="utf-8")

@@ -19,6 +19,8 @@ from ..local.checks import positive
 from ..model import Array, ConvergenceError, DefinitionError, OptionError, explain, whole
 from .branch import BranchEnd, BranchEvent
 from .branch_curves import BranchCurve, check_bounds, end_of
+from .connection_curves import ConnectionCurve, event_of
+from .connections import Connection
 from .continuation import Arc, Curve, Point, Secant, Zero, directions, trace
 
 _NAMES = {
@@ -81,7 +83,7 @@ class BifurcationCurve:
     points: tuple[Array, ...]
     special: tuple[CodimensionTwo, ...]
     ends: tuple[BranchEnd, BranchEnd]
-    curve: EventCurve
+    curve: EventCurve | ConnectionCurve
 
     def solution(self, k: int) -> Any:
         """The equilibrium or orbit at a point of the curve."""
@@ -190,7 +192,7 @@ class EventCurve(Curve):
 
 
 def continue_bifurcation(
-    event: BranchEvent,
+    event: BranchEvent | Connection,
     parameters: Sequence[str],
     *,
     bounds: Sequence[Sequence[float]],
@@ -201,8 +203,8 @@ def continue_bifurcation(
 
     Parameters
     ----------
-    event : BranchEvent
-        An entry of ``Branch.events``.
+    event : BranchEvent or Connection
+        An entry of ``Branch.events``, or a homoclinic orbit.
     parameters : two str
         Names; others keep their values at the event.
     bounds : two (low, high)
@@ -216,7 +218,7 @@ def continue_bifurcation(
     -------
     BifurcationCurve
         With the points of codimension two on it: a second event at the same time, cusps of folds,
-        and what changes the class of a boundary equilibrium.
+        what changes the class of a boundary equilibrium, neutral saddles of homoclinic orbits.
 
     Raises
     ------
@@ -237,6 +239,8 @@ def continue_bifurcation(
     >>> [point.kind for point in curve.special], abs(curve.special[0].values).max().round(6)
     (['cusp'], np.float64(0.0))
     """
+    if isinstance(event, Connection):
+        event = event_of(event)
     names, widths, limits = _checked(event, parameters, bounds)
     positive(step, "step")
     whole(max_points, "max_points", least=2)
@@ -244,16 +248,17 @@ def continue_bifurcation(
     free = tuple(system.parameter_names.index(name) for name in names)
     assert event.point is not None
     base, start = event.curve.freed(event.point.u, free, widths)
-    curve = EventCurve(base, event.test, start)
+    connected = isinstance(base, ConnectionCurve)  # the equations of which are codimension one
+    curve = base if connected else EventCurve(base, event.test, start)
     k = start.size - 2
-    across = directions(base, start)[0]
-    start = _on_curve(curve, start, across, event.kind)
+    start = _on_curve(curve, start, event.kind)
     halves: list[Arc] = []
     tangent = directions(curve, start)[0]
     for way in (-tangent, tangent):
         if halves and halves[0].end in ("closed", "interrupted"):
             break
-        curve.secant.forget()
+        if isinstance(curve, EventCurve):
+            curve.secant.forget()
         ends = [(k + i, low, high) for i, (low, high) in enumerate(limits)]
         halves.append(trace(curve, [start], way, step=step, most=max_points, bounds=ends))
     points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
@@ -303,7 +308,7 @@ def _checked(
     return (names[0], names[1]), np.array([high - low for low, high in limits]), limits
 
 
-def _on_curve(curve: EventCurve, start: Array, across: Array, kind: str) -> Array:
+def _on_curve(curve: Curve, start: Array, kind: str) -> Array:
     """The event as a point of the curve, to rounding."""
     _, jacobian = curve.scaled(start / curve.scale)
     found = curve.correct(start, np.linalg.svd(jacobian)[2][-1])
@@ -321,7 +326,7 @@ def _on_curve(curve: EventCurve, start: Array, across: Array, kind: str) -> Arra
     return found
 
 
-def _special(curve: EventCurve, zero: Zero, k: int) -> CodimensionTwo:
+def _special(curve: EventCurve | ConnectionCurve, zero: Zero, k: int) -> CodimensionTwo:
     own, other = (curve.base.named(name, zero.point.u) for name in (curve.name, zero.name))
     kind = _NAMES.get(frozenset({own, other}), other)
     if kind == other and zero.name in curve.base.tests(zero.point):

@@ -46,6 +46,10 @@ class BranchCurve(Curve):
         """
         raise NotImplementedError
 
+    def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
+        """What the end of a branch is, where more than that it ends can be said."""
+        return None
+
     def restart(self, u: Array) -> None:
         """Prepare to be followed from a point of it."""
 
@@ -232,6 +236,11 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         found = [known[id(zero)] for zero in arc.zeros]
         half.events += [event for event in found if event is not None]
         half.end = end_of(arc)
+        if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL):
+            last = at.ending(arc.points[-1].u, half.end)
+            if last is not None:
+                half.events.append(last)
+                half.end = BranchEnd.PERIOD_DIVERGES
     return half
 
 

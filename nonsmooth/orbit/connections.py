@@ -1,35 +1,19 @@
-"""Connections: orbits that leave a pseudo-saddle along the surface and come back to it.
-
-In the plane the unstable manifold of a pseudo-saddle on attracting sliding is the surface itself. It leads
-to a visible fold, from where the orbit flies and, at one value of a parameter, lands on the pseudo-saddle
-in finite time: a homoclinic orbit of codimension one with regular equations and no asymptotics. For the
-legs i = 1 .. N of the flight, the fold point x_1, the pseudo-saddle P with its weight alpha and the
-parameter mu,
-
-    h(x_1) = 0,  L_i(x_1) = 0,  phi_i(x_i, T_i) = x_(i+1),  h(x_(i+1)) = 0,  phi_N(x_N, T_N) = P,
-    h(P) = 0,  (1 - alpha) F1(P) + alpha F2(P) = 0.
-
-Source: Kuznetsov, Rinaldi & Gragnani 2003, "One-parameter bifurcations in planar Filippov systems".
-"""
+"""Homoclinic orbits: the verb that finds them, and what it returns."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..flow.simulate import simulate
 from ..flow.trajectory import Trajectory
-from ..local.folds import find_fold
-from ..local.newton import converge
-from ..local.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
+from ..local import Equilibrium, PseudoEquilibrium
+from ..local.newton import Equations, converge, solve
 from ..model import (
     Array,
     ConvergenceError,
-    DegenerateError,
     FilippovSystem,
     NonsmoothError,
     OptionError,
@@ -38,125 +22,162 @@ from ..model import (
     explain,
     require_system,
 )
-from ..model.event_maps import event_map, surface_map
-from ..model.variational import variational_field
-from .guards import watch
-from .legs import Leg, fly, stretches
+from .loop_guesses import Departure, departures, saddle_at
+from .loops import Loop
 from .orbit_run import orbit_run
 from .periodic import OrbitLeg, named
+from .pseudo_saddle_loops import PseudoSaddleLoop, flight_to
+from .saddle_loops import SaddleLoop
 
-#: A flight that is to become homoclinic lands within this part of its size from the pseudo-saddle.
-_CLOSE = 0.5
+#: By so much the end of an orbit comes closer to the saddle at a time, and at least.
+_CLOSER, _SLOWLY = 4.0, 1.2
+
+#: An orbit that ends within this part of its size from the saddle will do where it comes no closer.
+_ENOUGH = 1e-3
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Connection:
-    """A homoclinic orbit to a pseudo-saddle.
+    """A homoclinic orbit to a saddle, a pseudo-saddle or a saddle-focus.
 
     Attributes
     ----------
     system : FilippovSystem
-        The system that has the connection.
     parameter : str
-        Name of the parameter that was varied.
+        That was varied.
     value : float
         Of that parameter at the connection.
     parameters : dict of str to float
         All of them there.
-    pseudo_saddle : PseudoEquilibrium
+    saddle : Equilibrium or PseudoEquilibrium
         There.
-    side : str
-        On which the flight begins, ``"+"`` or ``"-"``.
-    fold : ndarray (n,)
-        Where the orbit leaves the surface.
     legs : tuple of OrbitLeg
-        Of the flight.
+        Of the orbit. One that approaches the saddle for ever begins and ends close to it.
     iterations : int
-        Iterations that Newton's method took; 0 where nothing was searched.
+        Evaluations of the equations.
     residual : float
-        What is left of the equations at the point.
     faults : tuple of str
         What its guards contradict; empty unless it is virtual.
+    loop : Loop
+        Its equations, and
+    unknowns : ndarray
+        what solves them: from these ``continue_bifurcation`` starts.
     """
 
     system: FilippovSystem
     parameter: str
     value: float
     parameters: dict[str, float]
-    pseudo_saddle: PseudoEquilibrium
-    side: str
-    fold: Array
+    saddle: Equilibrium | PseudoEquilibrium
     legs: tuple[OrbitLeg, ...]
     iterations: int
     residual: float
-    faults: tuple[str, ...] = ()
+    faults: tuple[str, ...]
+    loop: Loop
+    unknowns: Array
+
+    @property
+    def itinerary(self) -> str:
+        """Modes of the legs in order, separated by blanks."""
+        return " ".join(leg.mode or "o" for leg in self.legs)
+
+    @property
+    def fold(self) -> Array | None:
+        """Where the orbit first leaves the surface; None if it does not slide before."""
+        first = next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
+        finite = isinstance(self.loop, PseudoSaddleLoop)
+        return self.legs[first].start if first or finite else None
+
+    @property
+    def side(self) -> str:
+        """Mode of the first leg that does not slide."""
+        return next((leg.mode for leg in self.legs if "s" not in leg.mode), self.legs[0].mode)
 
     @property
     def flight(self) -> float:
-        """Time from the fold to the pseudo-saddle."""
-        return float(sum(leg.duration for leg in self.legs))
+        """Time from where it leaves the surface, or the neighbourhood of the saddle, to its end."""
+        first = next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
+        return float(sum(leg.duration for leg in self.legs[first:]))
 
     @property
     def eigenvalue(self) -> float:
-        """Of the sliding flow at the pseudo-saddle: periods of nearby orbits diverge as
-        -ln|mu - mu*|/eigenvalue."""
-        return float(self.pseudo_saddle.eigenvalues[0].real)
+        """The leading unstable one: periods of nearby orbits diverge as -ln|mu - mu*|/eigenvalue."""
+        real = np.real(self.saddle.eigenvalues)
+        return float(real[real > 0].min())
+
+    @property
+    def saddle_quantity(self) -> float:
+        """Sum of the leading stable and unstable eigenvalues; where negative the orbit that is born is
+        stable. Minus infinity where the orbit comes to the saddle in finite time."""
+        real = np.real(self.saddle.eigenvalues)
+        stable = real[real < 0]
+        return self.eigenvalue + float(stable.max()) if stable.size else -np.inf
 
     @cached_property
     def trajectory(self) -> Trajectory:
-        """The flight as a run."""
-        return orbit_run(self.system, self.parameters, self.legs)
+        """The legs as a run."""
+        return orbit_run(self.system, self.parameters, self.loop.pieces(self.unknowns))
 
     def __str__(self) -> str:
         virtual = f" (virtual: {self.faults[0]})" if self.faults else ""
-        return (
-            f"Homoclinic orbit to a pseudo-saddle at {self.parameter} = {self.value:.13g}{virtual}\n"
-            f"  pseudo-saddle {self.pseudo_saddle.point.tolist()}, sliding eigenvalue "
-            f"{self.eigenvalue:.6g}\n  leaves the surface at {self.fold.tolist()} to {self.side!r} and "
-            f"lands after {self.flight:.6g}"
-        )
+        kind = "pseudo-saddle" if isinstance(self.saddle, PseudoEquilibrium) else self.saddle.kind
+        at = f"at {self.parameter} = {self.value:.13g}{virtual}"
+        lines = [f"Homoclinic orbit to a {kind} {at}, itinerary {self.itinerary!r}"]
+        values = ", ".join(f"{v:.6g}" for v in self.saddle.eigenvalues)
+        lines.append(f"  {kind} {self.saddle.point.tolist()}, eigenvalues {values}")
+        if self.fold is not None:
+            lines.append(f"  leaves the surface at {self.fold.tolist()} to {self.side!r}")
+        return "\n".join(lines)
 
     def __repr__(self) -> str:
-        return f"Connection({self.parameter} = {self.value:.10g}, flight {self.flight:.6g})"
+        return f"Connection({self.parameter} = {self.value:.10g}, {self.itinerary!r})"
 
 
 def find_homoclinic(
     system: FilippovSystem,
-    pseudo_saddle: PseudoEquilibrium | ArrayLike,
+    saddle: Equilibrium | PseudoEquilibrium | ArrayLike,
     parameter: str,
     *,
     guess: float | None = None,
     parameters: Parameters | None = None,
     max_iterations: int = 30,
 ) -> Connection:
-    """Find the parameter at which an orbit is homoclinic to a pseudo-saddle of a planar system.
+    """Find the parameter at which an orbit is homoclinic to a saddle or pseudo-saddle.
 
     Parameters
     ----------
     system : FilippovSystem
-        Two states, one surface, no explicit time.
-    pseudo_saddle : PseudoEquilibrium or array_like (2,)
-        At the guess, or a point near it.
+        Without explicit time. The orbit may cross, slide and be reset on its way.
+    saddle : Equilibrium, PseudoEquilibrium or array_like (n,)
+        At the guess, or a point near it. A saddle of one mode, on the surface or off it; of a planar
+        pseudo-saddle the surface is the unstable manifold.
     parameter : str
         That is varied.
     guess : float, optional
-        Its value to start from; by default that of ``parameters``.
+        Its value to start from; by default that of ``parameters``. There an orbit of the unstable
+        manifold should come back to within half of its size.
     parameters : mapping, optional
         Values that replace defaults.
     max_iterations : int, optional
-        Newton's method gives up after this many.
 
     Returns
     -------
     Connection
+        Of codimension one. ``continue_bifurcation`` follows it as two parameters vary.
 
     Raises
     ------
     ConvergenceError
-        No visible fold from which an orbit lands near the pseudo-saddle, or Newton's method fails.
+        No orbit that comes back, or Newton's method fails.
     DegenerateError
-        The point is no pseudo-saddle.
+        The point is no saddle.
     OptionError, ParameterError, PointError, DefinitionError
+
+    Notes
+    -----
+    An orbit that lands on a planar pseudo-saddle does so in finite time, with regular equations. Others
+    begin and end close to the saddle in its eigenspaces; how close is chosen so that the error of the
+    parameter is that of rounding.
 
     Examples
     --------
@@ -170,8 +191,24 @@ def find_homoclinic(
     >>> found = ns.find_homoclinic(system, [-1.4, 0.0], "c")
     >>> f"{found.value:.13f}", f"{found.flight:.13f}"
     ('-0.5862126010325', '5.2426089986980')
+
+    The saddle of a pendulum-like oscillator whose friction is balanced:
+
+    >>> mu = ca.SX.sym("mu")
+    >>> smooth = ns.FilippovSystem([x, y], field=[y, x - x**3 + mu * y], parameters={mu: 0.01})
+    >>> bool(abs(ns.find_homoclinic(smooth, [0.0, 0.0], "mu").value) < 1e-12)
+    True
     """
-    _require_planar(system)
+    require_system(system)
+    if system.coupled or system.time_dependent:
+        raise OptionError(
+            explain(
+                "system",
+                expected="an autonomous one with linear multipliers",
+                received=repr(system),
+                advice="The saddle of a system that depends on time is a periodic orbit.",
+            )
+        )
     names = system.parameter_names
     if parameter not in names:
         raise ParameterError(
@@ -180,200 +217,114 @@ def find_homoclinic(
     given = {str(k): v for k, v in (parameters or {}).items()}
     if guess is not None:
         given[parameter] = guess
-    p = system.parameter_vector(given)
-    near = pseudo_saddle.point if isinstance(pseudo_saddle, PseudoEquilibrium) else pseudo_saddle
-    saddle = find_pseudo_equilibrium(system, near, parameters=named(system, p))
-    _require_saddle(saddle)
-    side, legs, starts, durations = _flight(system, saddle, p)
-    equations = _Equations(system, side, legs, names.index(parameter), p)
-    u = equations.pack(starts, durations, saddle.point, saddle.alpha, p[equations.index])
-    try:
-        root = converge(equations, u, tol=1e-12, max_iterations=max_iterations)
-    except ConvergenceError as error:
-        raise _failed(parameter, equations, str(error)) from error
-    if root is None:
-        raise _failed(parameter, equations, "")
-    return _connection(equations, root, parameter)
-
-
-def _require_planar(system: FilippovSystem) -> None:
-    require_system(system)
-    if system.dimension != 2 or system.coupled or system.time_dependent or not system.surface_count:
-        raise OptionError(
-            explain(
-                "system",
-                expected="a planar autonomous one with one surface and a linear multiplier",
-                received=repr(system),
-                advice="In more dimensions the unstable manifold of a pseudo-saddle is no longer the "
-                "surface: follow a bundle of orbits from it.",
-            )
-        )
-
-
-def _require_saddle(saddle: PseudoEquilibrium) -> None:
-    if saddle.kind != "pseudo-saddle" or saddle.status != "real":
-        raise DegenerateError(
-            f"pseudo_saddle: expected a real pseudo-saddle, received a {saddle}. Its orbits leave it "
-            "along the surface or not at all: choose another point or parameter."
-        )
-
-
-def _flight(
-    system: FilippovSystem, saddle: PseudoEquilibrium, p: Array
-) -> tuple[str, list[Leg], list[Array], list[float]]:
-    """The flight from a visible fold that lands nearest to the pseudo-saddle."""
-    values, best = named(system, p), None
-    told: list[str] = []
-    for side in "+-":
+    p, index = system.parameter_vector(given), names.index(parameter)
+    mode, at = saddle_at(system, saddle, p)
+    if isinstance(at, PseudoEquilibrium) and system.dimension == 2:
+        side, legs, starts, durations = flight_to(system, at, p)
+        loop = PseudoSaddleLoop(system, legs, (index,), p, side)
+        u = _solved(loop, loop.pack(starts, durations, at), parameter, max_iterations)
+        return connection_of(loop, u, parameter)
+    reasons = list[str]()
+    for start in departures(system, mode, at.point, p):
         try:
-            fold = find_fold(system, saddle.point, side=side, parameters=values)  # type: ignore[arg-type]
-        except NonsmoothError as error:
-            told.append(f"side {side!r}: {error}")
-            continue
-        if fold.kind != "visible":
-            told.append(f"side {side!r}: its fold at {fold.point.tolist()} is not visible")
-            continue
-        size = float(np.linalg.norm(fold.point - saddle.point)) or 1.0
-        for k in range(9):
-            run = simulate(
-                system, fold.point, 4.0**k, parameters=values, start_mode=side, tol=1e-12
-            )
-            if any(e.kind == "entry" for e in run.events):
-                break
-        flown = []
-        for part in stretches(run):
-            flown.append(part)
-            if part.leg.kind == "entry":
-                break
-        if flown[-1].leg.kind != "entry":
-            told.append(f"side {side!r}: the orbit of the fold does not land")
-            continue
-        miss = float(np.linalg.norm(flown[-1].end - saddle.point)) / size
-        if miss > _CLOSE:
-            told.append(
-                f"side {side!r}: the orbit lands {miss:.2g} of the distance to the fold away"
-            )
-        elif best is None or miss < best[0]:
-            starts, times = [f.start for f in flown], [f.duration for f in flown]
-            best = (miss, side, [f.leg for f in flown], starts, times)
-    if best is None:
-        raise ConvergenceError(
-            f"homoclinic orbit: expected a visible fold whose orbit lands near the pseudo-saddle "
-            f"{saddle.point.tolist()}, received none ({'; '.join(told)}). Give a better guess of the "
-            "parameter.",
-            point=saddle.point,
-        )
-    return best[1:]
-
-
-class _Equations:
-    """The equations of a homoclinic orbit, with their Jacobian."""
-
-    def __init__(
-        self, system: FilippovSystem, side: str, legs: Sequence[Leg], index: int, p: Array
-    ):
-        self.system, self.side, self.legs, self.index, self.p = system, side, legs, index, p
-        self.iterations, self.residual = 0, np.nan
-        name = "L_F1 h" if side == "+" else "L_F2 h"
-        self._fold = (surface_map(system, 0), event_map(system, "s", name))
-        self._fields = [variational_field(system, mode).linear for mode in "+-"]
-
-    def pack(
-        self,
-        starts: Sequence[Array],
-        durations: Sequence[float],
-        at: Array,
-        alpha: float,
-        mu: float,
-    ) -> Array:
-        """Unknowns: starts, durations, pseudo-saddle, alpha, parameter."""
-        return np.concatenate([np.ravel(starts), durations, at, [alpha, mu]])
-
-    def split(self, u: Array) -> tuple[Array, Array, Array, float, Array]:
-        """Starts (N, n), durations (N,), pseudo-saddle (n,), alpha, all parameters."""
-        count, n = len(self.legs), self.system.dimension
-        p = self.p.copy()
-        p[self.index] = u[-1]
-        starts, rest = u[: count * n].reshape(count, n), u[count * n :]
-        return starts, rest[:count], rest[count : count + n], float(rest[count + n]), p
-
-    def __call__(self, u: Array) -> tuple[Array, Array]:
-        """Values and Jacobian."""
-        starts, durations, at, alpha, p = self.split(u)
-        count, n, mu = len(self.legs), self.system.dimension, self.index
-        values, jacobian = np.zeros(u.size), np.zeros((u.size, u.size))
-        for row, condition in enumerate(self._fold):
-            e = condition(starts[0], p)
-            values[row], jacobian[row, :n], jacobian[row, -1] = (
-                e.value,
-                e.gradient,
-                e.by_parameters[mu],
-            )
-        row, place = 2, count * (n + 1)
-        for i, leg in enumerate(self.legs):
-            part = fly(self.system, leg, starts[i], float(durations[i]), p, (mu,))
-            own, time, rows = slice(i * n, (i + 1) * n), count * n + i, slice(row, row + n)
-            last = i + 1 == count
-            following = slice(place, place + n) if last else slice((i + 1) * n, (i + 2) * n)
-            values[rows] = part.end - (at if last else starts[i + 1])
-            jacobian[rows, own], jacobian[rows, time] = part.by_start, part.rate
-            jacobian[rows, following] = -np.eye(n)
-            jacobian[rows, -1] = part.by_parameters[:, 0]
-            row += n
-            if not last:
-                e = leg.at_end(self.system, part.end, p)
-                values[row] = e.value
-                jacobian[row, own] = e.gradient @ part.by_start
-                jacobian[row, time] = e.gradient @ part.rate
-                jacobian[row, -1] = e.gradient @ part.by_parameters[:, 0] + e.by_parameters[mu]
-                row += 1
-        e = surface_map(self.system, 0)(at, p)
-        values[row], jacobian[row, -1] = e.value, e.by_parameters[mu]
-        jacobian[row, place : place + n] = e.gradient
-        (f1, x1, p1), (f2, x2, p2) = (f.copied(at, p) for f in self._fields)
-        rows = slice(row + 1, row + 1 + n)
-        values[rows] = ((1 - alpha) * f1 + alpha * f2)[:, 0]
-        jacobian[rows, place : place + n] = (1 - alpha) * x1 + alpha * x2
-        jacobian[rows, place + n] = (f2 - f1)[:, 0]
-        jacobian[rows, -1] = ((1 - alpha) * p1 + alpha * p2)[:, mu]
-        self.iterations += 1
-        self.residual = float(np.abs(values).max())
-        return values, jacobian
-
-
-def _failed(parameter: str, equations: _Equations, reason: str) -> ConvergenceError:
-    return ConvergenceError(
-        f"homoclinic orbit: expected Newton's method to converge in {parameter!r}, received none after "
-        f"{equations.iterations} steps, residual {equations.residual:.2g}. {reason} Give a better guess.",
-        residual=equations.residual,
+            return _by_projections(system, mode, start, p, index, parameter, max_iterations)
+        except ConvergenceError as error:
+            reasons.append(str(error))
+    raise ConvergenceError(
+        f"homoclinic orbit: expected an orbit of the unstable manifold of {at.point.tolist()} that "
+        f"comes back to it, received none ({reasons[0] if reasons else 'none comes near'}). Give a "
+        "better guess of the parameter.",
+        point=at.point,
     )
 
 
-def _connection(equations: _Equations, u: Array, parameter: str) -> Connection:
-    system = equations.system
-    starts, durations, at, _, p = equations.split(u)
-    values, _ = equations(u)
-    legs, faults, t = list[OrbitLeg](), list[str](), 0.0
-    for k, (leg, x, duration) in enumerate(zip(equations.legs, starts, durations, strict=True)):
-        legs.append(OrbitLeg(leg.mode, x, t, float(duration), leg.name, leg.kind))
-        t += float(duration)
-        if duration <= 0.0:
-            faults.append(f"leg {k + 1} ({leg.mode}) has the duration {duration:.3g}")
-        else:
-            seen = watch(system, leg.mode, x, float(duration), p).faults
-            faults += [f"leg {k + 1} ({leg.mode}): {fault}" for fault in seen]
-    saddle = find_pseudo_equilibrium(system, at, parameters=named(system, p))
-    _require_saddle(saddle)
+def _by_projections(
+    system: FilippovSystem,
+    mode: str,
+    start: Departure,
+    p: Array,
+    index: int,
+    parameter: str,
+    max_iterations: int,
+) -> Connection:
+    """The orbit that ends where the guess comes nearest, then closer and closer to the saddle."""
+    far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
+    loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)
+    u = np.concatenate([np.ravel(start.starts), start.durations, [p[index]]])
+    u = _solved(loop, u, parameter, max_iterations, damped=True)
+    target, factor = loop.target() * start.size, _CLOSER
+    while far > target:
+        closer = max(target, far / factor)
+        wait = np.log(far / closer) / -loop.reference.leading(True)
+        longer, guess = loop.prolonged(u, wait, closer)
+        try:
+            u = _solved(longer, guess, parameter, max_iterations)
+            loop, far, factor = longer, closer, _CLOSER
+        except ConvergenceError:
+            factor **= 0.5
+            if factor < _SLOWLY:
+                if far > _ENOUGH * start.size:
+                    raise
+                break
+    return connection_of(loop, u, parameter)
+
+
+def _guarded(equations: Equations) -> Equations:
+    """Equations that are not finite where an orbit cannot be flown."""
+
+    def guarded(v: Array) -> tuple[Array, Array]:
+        try:
+            return equations(v)
+        except NonsmoothError:
+            return np.full(v.size, np.nan), np.full((v.size, v.size), np.nan)
+
+    return guarded
+
+
+def _solved(
+    loop: Loop, u: Array, parameter: str, max_iterations: int, damped: bool = False
+) -> Array:
+    scales = loop.scales(u)
+
+    def equations(v: Array) -> tuple[Array, Array]:
+        with np.errstate(all="ignore"):  # a trial may fly too far
+            values, jacobian = loop.equations(v * scales)
+        return values, jacobian * scales
+
+    reason, root = "", None
+    try:
+        root = converge(equations, u / scales, tol=1e-13, max_iterations=max_iterations)
+    except ConvergenceError as error:
+        reason = f" {error}"
+    if root is None and damped:
+        try:
+            what = "homoclinic orbit"
+            root = solve(_guarded(equations), u / scales, tol=1e-10, max_iterations=60, what=what).x
+        except NonsmoothError as error:
+            reason = f" {error}"
+    if root is None or not np.abs(root - u / scales).max() < 10.0:
+        raise ConvergenceError(
+            f"homoclinic orbit: expected Newton's method to converge in {parameter!r}, received none "
+            f"after {loop.iterations} steps.{reason} Give a better guess.",
+            point=u,
+        )
+    return np.asarray(root * scales)
+
+
+def connection_of(loop: Loop, u: Array, parameter: str) -> Connection:
+    """What a solution of the equations is."""
+    legs, faults = loop.described(u)
+    p = loop.parameters_at(u)
     return Connection(
-        system=system,
+        system=loop.system,
         parameter=parameter,
-        value=float(u[-1]),
-        parameters=named(system, p),
-        pseudo_saddle=saddle,
-        side=equations.side,
-        fold=starts[0],
-        legs=tuple(legs),
-        iterations=equations.iterations,
-        residual=float(np.abs(values).max()),
-        faults=tuple(faults),
+        value=float(p[loop.free[-1]]),
+        parameters=named(loop.system, p),
+        saddle=loop.saddle(u),
+        legs=legs,
+        iterations=loop.iterations,
+        residual=float(np.abs(loop.equations(u)[0]).max()),
+        faults=faults,
+        loop=loop,
+        unknowns=u,
     )

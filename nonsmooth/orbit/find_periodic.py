@@ -49,6 +49,9 @@ _SAME = 1e-7
 #: An orbit without an event is asked whether it goes round up to so many times.
 _MOST_ROUNDS = 60
 
+#: What moves by no more than this part of its size rests.
+_STILL = 1e-6
+
 #: No leg may grow to so many times the guess of the whole orbit.
 _LONGEST = 10.0
 
@@ -277,7 +280,10 @@ class _Solver:
                 return self._moved(u, step, at, exact)
             if size <= _ROUNDING:
                 break
-            there = self.problem.evaluate(u + step, self.p)
+            try:
+                there = self.problem.evaluate(u + step, self.p)
+            except (ConvergenceError, DegenerateError):
+                break
             self.iterations += 1
             if not np.abs(there.residual).max() < np.abs(at.residual).max():
                 break
@@ -340,17 +346,19 @@ class _Solver:
 
 
 def _require_motion(at: Evaluation, start: Start) -> None:
-    """Refuse a point: every equilibrium solves the equations of an orbit of no duration."""
+    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
     guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
-    period = float(np.abs(at.durations).sum())
-    if period > _POINT * guess:
+    period, x = float(np.abs(at.durations).sum()), at.starts[0]
+    way = float(np.abs(at.flown[0].rate).max()) * period
+    rests = not start.problem.legs[-1].name and not start.problem.system.time_dependent
+    if period > _POINT * guess and not (rests and way <= _STILL * max(1.0, np.abs(x).max())):
         return
     n = start.problem.system.dimension
     raise ConvergenceError(
         f"periodic orbit: expected a period near {guess:.6g}, received {period:.2g}: Newton's method "
-        f"shrank the orbit to a point, {at.starts[0, :n].tolist()}. It is an equilibrium, or a point "
+        f"shrank the orbit to a point, {x[:n].tolist()}. It is an equilibrium, or a point "
         "where legs vanish: start closer to the orbit.",
-        point=at.starts[0, :n],
+        point=x[:n],
     )
 
 

@@ -37,7 +37,8 @@ def continue_orbit(
     ----------
     orbit : PeriodicOrbit or BranchEvent
         Where to start; at a period doubling, pitchfork or branch point the other branch is followed
-        (from a period doubling one way only: the other half has the same orbits, a round later).
+        (from a period doubling one way only: the other half has the same orbits, a round later), at a
+        Hopf point of equilibria the orbits around it.
     parameter : str
         Name of the parameter that varies.
     bounds : (float, float)

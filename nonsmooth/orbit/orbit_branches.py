@@ -18,9 +18,10 @@ from ..local.newton import converge
 from ..local.read_only import ReadOnly
 from ..model import Array, NonsmoothError
 from .boundary import BoundaryProblem, Evaluation
-from .branch import BranchEvent, FarSide
+from .branch import BranchEnd, BranchEvent, FarSide
 from .branch_curves import BranchCurve
 from .conditions import Condition, condition_row, conditions_of, is_smooth
+from .connection_curves import homoclinic_end
 from .continuation import Departure, Point, Zero
 from .edits import Edited, edited, kind_of
 from .elimination import applies, eliminated
@@ -176,12 +177,21 @@ class OrbitCurve(BranchCurve):
     def out(self, u: Array) -> str:
         """The period diverges where it is long and grows without the parameter changing."""
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
-        period = float(u[durations].sum())
-        if period <= self.longest:
-            return ""
+        return "period diverges" if u[durations].sum() > self.longest and self._steep(u) else ""
+
+    def _steep(self, u: Array) -> bool:
+        """Whether the period grows by far more than it would over the bounds of the parameter."""
+        durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         tangent = np.linalg.svd(self.equations(u)[1] * self.scale)[2][-1] * self.scale
         growth = abs(float(tangent[durations].sum())) * float(self.widths[-1])
-        return "period diverges" if growth > _STEEP * period * abs(float(tangent[-1])) else ""
+        return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
+
+    def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
+        """The homoclinic orbit where the period diverges, or would if rounding allowed it."""
+        if end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u):
+            return None
+        name = self.system.parameter_names[self.free[-1]]
+        return homoclinic_end(self.describe(u), name, float(self.widths[-1]))
 
     def faults(self, u: Array) -> list[str]:
         """What the guards contradict."""

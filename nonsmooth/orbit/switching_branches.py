@@ -1,4 +1,4 @@
-"""From a period doubling, pitchfork or branch point to the branch that crosses there."""
+"""From a period doubling, pitchfork, branch or Hopf point to the branch that crosses or begins there."""
 
 from __future__ import annotations
 
@@ -6,15 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
+from ..local import Equilibrium, PseudoEquilibrium
 from ..model import Array, ConvergenceError, DefinitionError, explain
+from ..model.variational import variational_field
+from .boundary import BoundaryProblem
 from .branch import BranchEvent
 from .continuation import other_direction
 from .edits import mirrored
+from .legs import Leg
 from .multipliers import leg_maps
 from .orbit_branches import OrbitCurve
 
 #: Distances from the event at which the new branch is looked for, relative to the orbit.
 _AWAY = (1e-3, 1e-2, 3e-2)
+
+#: An orbit this many times as long as the small one at a Hopf point is near a homoclinic orbit.
+_LONG = 10.0
 
 
 def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
@@ -27,11 +34,14 @@ def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, lis
     ------
     DefinitionError, ConvergenceError
     """
+    if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
+        return _around(event, free)
     if event.kind not in ("period doubling", "pitchfork", "branch point"):
         raise DefinitionError(
             explain(
                 "orbit",
-                expected="a period doubling, pitchfork or branch point to switch branches at",
+                expected="a period doubling, pitchfork or branch point to switch branches at, or a "
+                "Hopf point of equilibria",
                 received=repr(event),
                 advice="Continue event.orbit, or continue_bifurcation the event.",
             )
@@ -56,6 +66,48 @@ def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, lis
             advice="Perhaps the crossing branch is vertical or the event is degenerate.",
         )
     )
+
+
+def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
+    """The small orbits around an equilibrium at its Hopf point."""
+    assert event.point is not None
+    system, at, n = event.curve.system, event.solution, event.curve.n
+    p, mode = event.curve.parameters_at(event.point.u), _mode_of(at)
+    slope = np.asarray(variational_field(system, mode).linear.copied(at.point, p)[1], float)
+    values, vectors = np.linalg.eig(slope)
+    turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
+    if not turning.size:
+        raise DefinitionError(
+            f"orbit: expected a Hopf point, received {event!r}, a neutral saddle."
+        )
+    k = turning[np.argmin(np.abs(values[turning].real))]
+    across, period = vectors[:, k].real, 2 * np.pi / float(values[k].imag)
+    across = across / np.linalg.norm(across)
+    phase = slope @ across
+    problem = BoundaryProblem(
+        system,
+        (Leg(mode),),
+        phase=phase / np.linalg.norm(phase),
+        reference=at.point.copy(),
+    )
+    u = np.concatenate([at.point, [period], p[list(free)]])
+    curve = OrbitCurve(problem, p, free, np.ones(1), u[: n + 1], np.inf)
+    size = event.curve.scale[:n]
+    curve.scale[: n + 1] = np.append(size, period)
+    way = np.concatenate([across / np.linalg.norm(across), np.zeros(2)])
+    for away in _AWAY:
+        found = curve.correct(u + away * way * curve.scale, way)
+        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
+            curve.longest = _LONG * period
+            return curve, [u, found]
+    raise ConvergenceError(
+        f"Hopf: expected small orbits around {at.point.tolist()}, received no convergence. Perhaps the "
+        "point is degenerate: the pair of eigenvalues does not cross the axis."
+    )
+
+
+def _mode_of(at: Equilibrium | PseudoEquilibrium) -> str:
+    return at.side if isinstance(at, Equilibrium) else at.mode
 
 
 def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:

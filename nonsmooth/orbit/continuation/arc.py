@@ -169,7 +169,13 @@ class _Tracing:
 
     def _accept(self, last: Point, new: Point) -> None:
         found = zeros_between(self.curve, last, new)
-        bound = self._bound(last, new)
+        passed = any(not low <= new.u[k] <= high for k, low, high in self.bounds)
+        bound = self._bound(last, new) if passed else None
+        if passed and bound is None:  # too far to solve for the point at the bound
+            self.size *= 0.5
+            if self.size < self.smallest:
+                self.arc.end = "bound"
+            return
         if bound is not None:
             new, self.arc.end = bound, "bound"
             found = [zero for zero in found if zero.point.arclength <= new.arclength]

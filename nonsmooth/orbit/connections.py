@@ -43,6 +43,7 @@ class Connection:
     Attributes
     ----------
     system : FilippovSystem
+        Whose orbit it is.
     parameter : str
         That was varied.
     value : float
@@ -56,6 +57,7 @@ class Connection:
     iterations : int
         Evaluations of the equations.
     residual : float
+        Largest entry of the equations.
     faults : tuple of str
         What its guards contradict; empty unless it is virtual.
     loop : Loop
@@ -159,6 +161,7 @@ def find_homoclinic(
     parameters : mapping, optional
         Values that replace defaults.
     max_iterations : int, optional
+        Newton's method gives up after this many steps.
 
     Returns
     -------

@@ -23,10 +23,10 @@ from ..model import (
     whole,
 )
 from .boundary import BoundaryProblem, Evaluation
-from .edits import mirrored
 from .guess import Itinerary, Start, mirror_of, start_of
-from .legs import Leg, fly, leg_name
+from .legs import Leg, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
+from .rounds import once_round
 
 #: Newton's method ends when the next step would be below this, relative to the orbit.
 _TOLERANCE = 1e-10
@@ -42,12 +42,6 @@ _COARSE = 1e-8
 
 #: Steps below this, relative to the orbit, change its derivatives by rounding.
 _FINAL = 1e-13
-
-#: Starts of legs that are as near as this, relative to the orbit, are one.
-_SAME = 1e-7
-
-#: An orbit without an event is asked whether it goes round up to so many times.
-_MOST_ROUNDS = 60
 
 #: What moves by no more than this part of its size rests.
 _STILL = 1e-6
@@ -138,7 +132,7 @@ def periodic_orbit(
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     solver = _Solver(start.problem, start.p)
     u, at = solver.solve(start.unknowns, max_iterations)
-    problem, once = _primitive(start.problem, u, start.p)
+    problem, once = once_round(start.problem, u, start.p)
     if problem is not start.problem:
         u, at = _Solver(problem, start.p).solve(once, max_iterations)
     _require_motion(at, start)
@@ -148,52 +142,6 @@ def periodic_orbit(
     if faults and not virtual:
         raise _virtual(orbit)
     return orbit
-
-
-def _primitive(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
-    """The orbit once, where the legs go round it several times.
-
-    The half of a symmetric orbit goes round an odd number of times.
-    """
-    starts, durations = problem.split(u)
-    count, n = len(problem.legs), problem.system.dimension
-    if not problem.legs[-1].name:
-        return _primitive_leg(problem, starts[0], float(durations[0]), p)
-    size = problem.scales(u)[:n]
-    for k in range(1, count // 2 + 1):
-        if count % k or (problem.symmetry is not None and count // k % 2 == 0):
-            continue
-        apart = starts[k : 2 * k, :n] @ problem.wrap[:n, :n].T - starts[:k, :n]
-        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / np.abs(durations).sum()
-        if not max(np.abs(apart / size).max(), later) < _SAME:
-            continue
-        legs = problem.legs[:k]
-        following = legs if problem.symmetry is None else [mirrored(problem, leg) for leg in legs]
-        if any(problem.legs[i] != (legs, following)[i // k % 2][i % k] for i in range(count)):
-            continue
-        once = replace(problem, legs=legs, periods=round(2 * problem.periods * k / count) / 2)
-        return once, once.pack(starts[:k], durations[:k])
-    return problem, u
-
-
-def _primitive_leg(
-    problem: BoundaryProblem, x: Array, duration: float, p: Array
-) -> tuple[BoundaryProblem, Array]:
-    """The same for an orbit without an event."""
-    n, half = problem.system.dimension, problem.symmetry is not None
-    size = np.abs(x[:n]).max() or 1.0
-    rounds = round(2 * problem.periods) if half else round(problem.periods)
-    most = rounds if problem.forcing is not None else _MOST_ROUNDS
-    for k in range(most, 1, -1):
-        if (half and k % 2 == 0) or (problem.forcing is not None and rounds % k):
-            continue
-        there = (
-            problem.wrap[:n, :n] @ fly(problem.system, problem.legs[0], x, duration / k, p).end[:n]
-        )
-        if np.abs(there - x[:n]).max() < _SAME * size:
-            once = replace(problem, periods=problem.periods / k)
-            return once, once.pack(x, np.array([duration / k]))
-    return problem, problem.pack(x, np.array([duration]))
 
 
 class _Solver:

@@ -12,7 +12,15 @@ from ..flow.trajectory import Trajectory
 from ..local import Equilibrium, PseudoEquilibrium
 from ..local.equilibria import find_equilibrium
 from ..local.pseudo_equilibria import find_pseudo_equilibrium
-from ..model import Array, DegenerateError, FilippovSystem, NonsmoothError, Surfaces, real_array
+from ..model import (
+    Array,
+    DegenerateError,
+    FilippovSystem,
+    NonsmoothError,
+    PointError,
+    Surfaces,
+    real_array,
+)
 from .legs import Leg, Stretch, stretches
 from .periodic import named
 from .saddle_loops import NEAR, Spectrum, equilibrium_of, spectrum_of
@@ -71,11 +79,13 @@ def saddle_at(
         near = np.asarray(saddle.point, float)
     else:
         near = real_array(saddle, "saddle")
-        system.evaluate(system.surface_function(0), near, None) if system.surface_count else None
+        if near.shape != (system.dimension,):
+            raise PointError(
+                f"saddle: expected {system.dimension} numbers, received shape {near.shape}."
+            )
     given, told = named(system, p), list[str]()
     if system.surface_count == 0:
-        at = equilibrium_of(system, "", near, p)
-        found.append(("", _smooth(system, at, p)))
+        found.append(("", _smooth(system, equilibrium_of(system, "", near, p), p)))
     elif not isinstance(saddle, Equilibrium):
         try:
             pseudo = find_pseudo_equilibrium(system, near, parameters=given)

@@ -123,7 +123,7 @@ def spectrum_of(
             f"saddle: its eigenspaces turned too far at {x.tolist()}."
         ) from error
     values = values[np.argsort(np.abs(values))[held:]]
-    return Spectrum(x, values, stable, unstable, rows[0], rows[1])
+    return Spectrum(x, values, stable, unstable, np.asarray(rows[0]), np.asarray(rows[1]))
 
 
 def _real_basis(values: Array, vectors: Array, sign: float) -> Array:
@@ -185,8 +185,8 @@ class SaddleLoop(Loop):
         point = self.spectrum(p).point
         other = SaddleLoop(self.system, legs, self.free, p, self.mode, point, self.near, far, held)
         other.iterations = self.iterations
-        parts = [starts.ravel(), last, durations, [wait], u[-len(self.free) :]]
-        return other, np.concatenate(parts)
+        chain = [starts.ravel(), last[: self.system.dimension], durations]
+        return other, np.concatenate([*chain, np.array([wait]), u[-len(self.free) :]])
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         n, k, p = self.system.dimension, len(self.free), self.parameters_at(u)
@@ -261,11 +261,10 @@ class SaddleLoop(Loop):
         h = np.inf
         if self.system.surface_count == 1:
             h = surface_map(self.system, 0)(here.point, p).value
-        side = "-" if h < 0 else "+"
         kind = "saddle" if not np.any(values.imag) else "saddle-focus"
         return Equilibrium(
             here.point,
-            side,
+            "-" if h < 0 else "+",
             "real",
             kind,
             values,
@@ -273,5 +272,5 @@ class SaddleLoop(Loop):
             margin,
             0.0,
             0.0,
-            0,  # type: ignore[arg-type]
+            0,
         )

@@ -1,0 +1,64 @@
+"""Orbits whose legs go round several times, and the same orbits once."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..model import Array
+from .boundary import BoundaryProblem
+from .edits import mirrored
+from .legs import fly
+
+#: An orbit without an event is asked whether it goes round up to so many times.
+_MOST_ROUNDS = 60
+
+#: Starts of legs that are as near as this, relative to the orbit, are one.
+_SAME = 1e-7
+
+
+def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
+    """The orbit once, where the legs go round it several times.
+
+    The half of a symmetric orbit goes round an odd number of times.
+    """
+    starts, durations = problem.split(u)
+    count, n = len(problem.legs), problem.system.dimension
+    if not problem.legs[-1].name:
+        return _leg_once(problem, starts[0], float(durations[0]), p)
+    size = problem.scales(u)[:n]
+    for k in range(1, count // 2 + 1):
+        if count % k or (problem.symmetry is not None and count // k % 2 == 0):
+            continue
+        apart = starts[k : 2 * k, :n] @ problem.wrap[:n, :n].T - starts[:k, :n]
+        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / np.abs(durations).sum()
+        if not max(np.abs(apart / size).max(), later) < _SAME:
+            continue
+        legs = problem.legs[:k]
+        following = legs if problem.symmetry is None else [mirrored(problem, leg) for leg in legs]
+        if any(problem.legs[i] != (legs, following)[i // k % 2][i % k] for i in range(count)):
+            continue
+        once = replace(problem, legs=legs, periods=round(2 * problem.periods * k / count) / 2)
+        return once, once.pack(starts[:k], durations[:k])
+    return problem, u
+
+
+def _leg_once(
+    problem: BoundaryProblem, x: Array, duration: float, p: Array
+) -> tuple[BoundaryProblem, Array]:
+    """The same for an orbit without an event."""
+    n, half = problem.system.dimension, problem.symmetry is not None
+    size = np.abs(x[:n]).max() or 1.0
+    rounds = round(2 * problem.periods) if half else round(problem.periods)
+    most = rounds if problem.forcing is not None else _MOST_ROUNDS
+    for k in range(most, 1, -1):
+        if (half and k % 2 == 0) or (problem.forcing is not None and rounds % k):
+            continue
+        there = (
+            problem.wrap[:n, :n] @ fly(problem.system, problem.legs[0], x, duration / k, p).end[:n]
+        )
+        if np.abs(there - x[:n]).max() < _SAME * size:
+            once = replace(problem, periods=problem.periods / k)
+            return once, once.pack(x, np.array([duration / k]))
+    return problem, problem.pack(x, np.array([duration]))

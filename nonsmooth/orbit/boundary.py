@@ -352,10 +352,12 @@ class BoundaryProblem:
             ]
             seen = np.vstack([starts, *inside])
         size = np.abs(seen).max(axis=0)
-        if self.system.time_dependent:
-            size[-1] = span
-        largest = max(float(size.max()), 1e-300)
-        size[~(size > 1e-6 * largest)] = largest
+        states = size[: self.system.dimension]  # the time has units of its own
+        largest = max(float(states.max()), 1e-300)
+        if self.system.time_dependent and largest < 1e-9 * span:  # all legs begin at zero
+            largest = span
+        states[~(states > 1e-6 * largest)] = largest
+        size[self.system.dimension :] = span
         result = np.empty(self.size)
         result[: starts.size].reshape(starts.shape)[:] = size
         result[starts.size :] = span

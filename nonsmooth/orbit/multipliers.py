@@ -116,12 +116,15 @@ def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
     count, n = len(problem.legs), problem.dimension
-    maps = leg_maps(problem, at)
-    basis = _kept(problem, at, p)
+    # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
+    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+    maps = leg_maps(problem, at) * (units / units[:, None])
+    flown = at.flight.by_start[:, :n] * (units / units[:, None])
+    basis = _kept(problem, at, p, units)
     bases: list[Array] = [np.eye(n)] * count
     for _ in range(2):
         for i in range(count):
-            size = float(np.linalg.norm(at.flown[i].by_start @ basis)) if basis.size else 0.0
+            size = float(np.linalg.norm(flown[i] @ basis)) if basis.size else 0.0
             basis = _range(maps[i] @ basis, size)
             bases[(i + 1) % count] = basis
     first = min(range(count), key=lambda i: bases[i].shape[1])
@@ -132,12 +135,12 @@ def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     return product
 
 
-def _kept(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
-    """Directions that remain on the surfaces on which the orbit slides all the time."""
+def _kept(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> Array:
+    """Directions that remain on the surfaces on which the orbit slides all the time, in given units."""
     if not problem.kept:
         return np.eye(problem.dimension)
     rows = [surface_map(problem.system, i)(at.starts[0], p).gradient for i in problem.kept]
-    return np.asarray(np.linalg.svd(np.array(rows))[2][len(rows) :].T)
+    return np.asarray(np.linalg.svd(np.array(rows) * units)[2][len(rows) :].T)
 
 
 def _range(matrix: Array, size: float) -> Array:

@@ -25,7 +25,16 @@ from ..contact.model import NO_GRAVITY, ContactModel
 from ..errors import EnergyWarning, LandingError
 from ..parameters import LIMITS, numbers
 from ..shot.energy import advice, gains
-from ..shot.touch_down import INSTANT, Rise, instant_later, leaving, onto_zero_load, rise, surfaced
+from ..shot.touch_down import (
+    INSTANT,
+    Rise,
+    instant_later,
+    leaving,
+    onto_zero_load,
+    rests,
+    rise,
+    surfaced,
+)
 from .results import BounceStatus, LiftOffs
 
 Array = NDArray[np.float64]
@@ -227,6 +236,9 @@ class Batch:
             words += [*runs.itineraries, *(f"F {word}" for word in runs.itineraries)]
             if work.checkpoint is not None:  # the second part, if any, has its own
                 work = replace(work, checkpoint=f"{os.fspath(work.checkpoint)}-weightless")
+        start = np.stack([self._rows(self.given[n]) for n in ("x", "xdot", "y", "ydot")], axis=-1)
+        stay = (self.status == BounceStatus.LIFTED_OFF) & rests(self.states, start)
+        self.status[stay] = BounceStatus.NO_LIFT_OFF
         self._look_at_energy(options["tol"])
         failed = self.status != BounceStatus.LIFTED_OFF
         self.states[failed], self.time[failed], code[failed] = np.nan, np.nan, -1

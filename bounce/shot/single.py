@@ -18,7 +18,7 @@ from ..contact.model import ContactModel
 from ..errors import EnergyWarning, LandingError, LiftOffError, ModelError
 from ..parameters import Parametrised, number
 from .energy import advice, gains
-from .touch_down import approach, no_lift_off
+from .touch_down import approach, no_lift_off, rests
 
 Array = NDArray[np.float64]
 
@@ -272,8 +272,7 @@ def simulate(
     x0 = [landing.x, landing.xdot, landing.y, landing.ydot, landing.omega, *further]
     before, start = approach(blueprint, model.values, x0, tol, limit)
     run = _contact(blueprint, model.values, before, start, tol, limit)
-    if run.status is not ns.Status.STOPPED:
-        raise LiftOffError(no_lift_off(run, limit), run)
+    _require_lift_off(run, np.array(x0), limit)
     end = dict(zip(run.system.state_names, run.x[-1].tolist(), strict=True))
     lift_off = State(**{name: end[name] for name in State._fields})
     if landing.y == 0.0 and lift_off.ydot > -landing.ydot:
@@ -281,6 +280,19 @@ def simulate(
         if gains(blueprint, np.array(x0)[:, None], run.x[-1][:, None], p, tol)[0]:
             warnings.warn(advice(model, 1, 1), EnergyWarning, stacklevel=2)
     return Shot(model, landing, lift_off, float(run.t[-1]), run, before, tol)
+
+
+def _require_lift_off(run: ns.Trajectory, start: Array, limit: float) -> None:
+    """Refuse a contact that did not end, or whose load ended because the ball came to rest."""
+    if run.status is not ns.Status.STOPPED:
+        raise LiftOffError(no_lift_off(run, limit), run)
+    if rests(run.x[-1], start):
+        raise LiftOffError(
+            f"lift-off: expected before t_max = {limit:g}, received a ball at rest in the ground, y = "
+            f"{run.x[-1, 2]:.6g}, whose load is zero but for rounding. It lands too slowly, or the "
+            "surface damps too much.",
+            run,
+        )
 
 
 def _contact(

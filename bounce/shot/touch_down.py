@@ -30,6 +30,8 @@ _AHEAD = 1e-17 * 4.0 ** np.arange(25)
 _SHORT = int(np.searchsorted(_AHEAD, INSTANT))
 #: A ball this near to y = 0 that moves up is back at the surface.
 _SURFACE = 1e-9
+#: A ball that is slower than this, relative to how it came and how deep it is, has come to rest.
+_REST = 1e-12
 
 
 class Rise(NamedTuple):
@@ -104,6 +106,15 @@ def leaving(states: Array) -> NDArray[np.bool_]:
 def surfaced(states: Array) -> NDArray[np.bool_]:
     """Whether the phase of balls (..., n) ended at y = 0, before there was any load."""
     return np.asarray((states[..., 2] > -_SURFACE) & (states[..., 3] > 0.0))
+
+
+def rests(states: Array, start: Array) -> NDArray[np.bool_]:
+    """Whether balls (..., n) whose load ended only rest: what is left of it is rounding.
+
+    Where the load is less gravity and damping is strong, it falls to zero as the ball comes to rest.
+    """
+    size = np.maximum(np.abs(states[..., 2]), np.abs(start[..., [2, 3]]).max(axis=-1))
+    return np.asarray(np.abs(states[..., 3]) <= _REST * size)
 
 
 def onto_zero_load(blueprint: ContactModel, x: Array, p: Array) -> Array:

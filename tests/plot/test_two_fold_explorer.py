@@ -223,6 +223,15 @@ def test_keys_move_the_point_and_everything_follows(browser, page):
 
 
 @pytest.mark.browser
+def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
+    for words in ("folds=toString&nu=a,b", "folds=XX&nu=1", "nu=NaN,1", "%E0%A4%A"):
+        browser.open(page, hash=words)
+        assert shown(browser)["label"] == "Class II-C" and browser.faults() == {}
+    browser.open(page, hash="folds=II&nu=1e9,-1e9")  # as far as the map goes
+    assert shown(browser)["say"] == "ν₁ = 3, ν₂ = −3"
+
+
+@pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_point_is_dragged(browser, page, width):
     from selenium.webdriver.common.action_chains import ActionChains

@@ -459,7 +459,7 @@
       const value = Number(asked[key]);
       if (asked[key] && Number.isFinite(value)) state[key] = Math.min(Math.max(value, min), max);
     }
-    if (asked.load in LOADS) state.load = asked.load;
+    if (Object.hasOwn(LOADS, asked.load ?? "")) state.load = asked.load;
     const inertia = BALLS.map((one) => one[1]).find(
       (one) => Math.abs(one - Number(asked.inertia)) < 1e-6,
     );

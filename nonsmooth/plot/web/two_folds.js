@@ -521,7 +521,7 @@
   function read() {
     const { folds, nu } = Page.address();
     const values = (nu || "").split(",").map(Number);
-    if (folds in TwoFolds.SIGMA) state.folds = folds;
+    if (Object.hasOwn(TwoFolds.SIGMA, folds ?? "")) state.folds = folds;
     if (nu && values.length === 2 && values.every(Number.isFinite)) state.nu = values.map(clamp);
     refresh();
   }

@@ -277,6 +277,15 @@ def test_keys_and_fields_move_everything(browser, page):
 
 
 @pytest.mark.browser
+def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
+    for words in ("mu=abc&eta=&xdot=NaN", "load=toString&inertia=7", "%E0%A4%A&=&"):
+        browser.open(page, hash=words)
+        assert browser.run(SHOWN)["verdict"] == "S+ R S−" and browser.faults() == {}
+    browser.open(page, hash="mu=0&eta=0&xdot=1e9&omega=-1e9&ydot=5")  # as far as the sliders go
+    assert browser.run(SHOWN)["say"] == "speed 3, spin −6"
+
+
+@pytest.mark.browser
 def test_a_ball_that_stays_is_said_in_words(browser, page):
     browser.open(page, hash="d2=1&G=0.5&ydot=-0.1")
     seen = browser.run(SHOWN)

@@ -134,3 +134,19 @@ def test_power_laws_of_the_net_load_begin_without_friction(model):
     assert none.itinerary == "+ s -"
     gap, finer = (np.abs(np.array(s.lift_off) - none.lift_off).max() for s in (shot, small))
     assert finer < 0.1 * gap
+
+
+@pytest.mark.parametrize("omega", [0.2, -3.0])
+def test_a_ball_that_comes_to_rest_does_not_lift_off(omega):
+    """At critical damping, with the load less gravity: lift-off at 2 - G/(G + ydot) if -ydot > G, else rest."""
+    heavy = bounce.KelvinVoigt(mu=MU, d1=0.1, d2=1.0, eta=0.5, G=0.16, load="net")
+    slow = [-0.01, -0.05, -0.1, -0.159]
+    fast = np.array([-0.2, -0.5, -1.0])
+    for ydot in slow:
+        with pytest.raises(bounce.LiftOffError, match=r"ball (at|came to) rest"):
+            bounce.simulate(heavy, 0.1, ydot, omega)
+    many = bounce.lift_off(heavy, 0.1, [*slow, *fast], omega)
+    assert many.status.tolist() == [bounce.BounceStatus.NO_LIFT_OFF] * 4 + [0] * 3
+    assert many.time[4:] == pytest.approx(2 - 0.16 / (0.16 + fast), rel=1e-8)
+    for ydot, time in zip(fast, many.time[4:], strict=True):
+        assert bounce.simulate(heavy, 0.1, ydot, omega).time == pytest.approx(time, rel=1e-8)

@@ -176,8 +176,9 @@ def gallery() -> str:
     for name in GALLERY:
         title, text, source = described(name)
         program = "\n".join("    " + line if line else "" for line in source.splitlines())
+        picture = f"gallery/{name}.svg"
         parts.append(
-            f"## {title}\n\n{text}\n\n![{title}](gallery/{name}.svg)\n\n"
+            f"## {title}\n\n{text}\n\n[![{title}]({picture})]({picture}){{ title='Enlarge' }}\n\n"
             f'??? example "The program: `docs/examples/{name}.py`"\n\n'
             f"    ```python\n{program}\n    ```\n"
         )

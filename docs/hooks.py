@@ -26,6 +26,9 @@ from mkdocs.structure.files import File, Files  # noqa: E402
 from papers import mathematics  # noqa: E402
 
 PICTURES = DOCS.parent / "build" / "gallery"
+#: A list of exceptions in brackets, and a dash before a description that is not there.
+_LISTED = re.compile(r"(?<=<code>)\(((?:<a [^>]*>\w+</a>(?:, )?)+)\)(?=</code>)")
+_NOTHING = re.compile(r"\s*–\s*<div class=\"doc-md-description\">\s*</div>")
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
 
 
@@ -73,6 +76,9 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 
 def on_page_content(html: str, page: Any, **_: Any) -> str:
     """Take Sphinx's roles out of docstrings, typeset formulas, label the cells of tables."""
+    if page.file.src_uri.startswith("api/"):
+        html = _LISTED.sub(lambda found: found[1].replace(", <a", "</code>, <code><a"), html)
+        html = _NOTHING.sub("", html)
     if page.file.src_uri.startswith("papers/"):  # their tables are plain text, for terminals too
         html = mathematics.typeset_page(html)
     return typeset.labelled(typeset.mathematics(_ROLE.sub("", html)))

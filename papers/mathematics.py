@@ -116,7 +116,7 @@ def _run(words: list[str]) -> str:
 
 
 def _parts(text: str) -> list[str]:
-    """Cut a long formula before its outer relations and signs, and in a number of very many digits.
+    """Cut a long formula at outer relations, signs and commas, and in a number of many digits.
 
     Browsers do not break a formula.
     """
@@ -128,6 +128,8 @@ def _parts(text: str) -> list[str]:
         outer = depth == 0 and text[k - 1 : k] == " " and text[k + 1 : k + 2] == " "
         if outer and letter in "=<>+-~" and k - cuts[-1] > _SHORT:
             cuts.append(k)
+        elif depth == 0 and letter in ",;" and k + 1 - cuts[-1] > _SHORT:
+            cuts.append(k + 1)
     for digits in re.finditer(r"\d{25,}", text):  # of a number proven to many
         cuts += range(digits.start() + 15, digits.end() - 5, 15)
     cuts.sort()

@@ -243,9 +243,9 @@ body{font:15px/1.5 system-ui,sans-serif;max-width:76rem;margin:2rem auto;padding
 overflow-wrap:break-word}
 math{font-family:"STIX Two Math","Latin Modern Math","Cambria Math",math,serif;font-size:1.05em}
 table{border-collapse:collapse;width:100%;font-size:13px}
-th,td{border-bottom:1px solid #ccc;padding:.35rem .5rem;text-align:left;vertical-align:top}
+th,td{border-bottom:1px solid #ccc;padding:.35rem .5rem;text-align:left;vertical-align:top;min-width:4.5em}
 th{position:sticky;top:0;background:#f4f4f4}
-li,figcaption{overflow-wrap:anywhere}li{max-width:52rem;margin:.3rem 0}
+li,figcaption,td{overflow-wrap:anywhere}li{max-width:52rem;margin:.3rem 0}
 figure{margin:1.5rem 0}figure img{max-width:100%;height:auto}figcaption{max-width:48rem}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(26rem,100%),1fr));gap:1rem}
 td.corrected,td.no{color:#a33b00;font-weight:600}td.agrees,td.confirmed,td.holds{color:#005a8c}

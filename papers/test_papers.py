@@ -121,6 +121,7 @@ def test_program_writes_tables_and_a_self_contained_page(tmp_path, monkeypatch, 
     assert len(list(csv.reader((folder / "claims.csv").open(encoding="utf-8")))) == 3
     assert "memory" in json.loads((folder / "claims.json").read_text())["note"]
     page = (folder / "report.html").read_text(encoding="utf-8")
+    assert "name='viewport'" in page and page.index("<h2>Figures") < page.index("<table>")
     assert page.count("data:image/png;base64,") == 1 and not re.search("https?:", page)
 
 

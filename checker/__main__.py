@@ -1,4 +1,4 @@
-"""Check proofs that ``Proof.save`` wrote, with nothing but Python's whole numbers and fractions.
+"""Check proofs that ``save`` wrote, with nothing but Python's whole numbers and fractions.
 
     python checker proof.json
 
@@ -10,9 +10,13 @@ from __future__ import annotations
 
 import json
 import sys
+from collections.abc import Callable
+from typing import Any
 
 from claims import check
 from intervals import CheckError
+from lists import check_cover, check_list
+from orbits import check_orbit
 
 
 def main(arguments: list[str]) -> int:
@@ -23,15 +27,33 @@ def main(arguments: list[str]) -> int:
     failed = 0
     for name in arguments:
         with open(name, encoding="utf-8") as file:
-            records = json.load(file)["proofs"]
-        for k, record in enumerate(records):
+            text = json.load(file)
+        for k, (work, given) in enumerate(claimed(text)):
             try:
-                words = "checked: " + check(record) if record else "NOT CHECKED: there is no proof"
-            except (CheckError, KeyError, IndexError, ValueError) as error:
+                words = f"checked: {work(given)}"
+            except (CheckError, KeyError, IndexError, ValueError, TypeError) as error:
                 words = f"NOT CHECKED: {error!r}"
             failed += not words.startswith("checked")
             print(f"{name}[{k}]: {words}")
     return int(failed > 0)
+
+
+def claimed(text: dict[str, Any]) -> list[tuple[Callable[[Any], str], Any]]:
+    """What a file claims, each with what checks it."""
+    work: list[tuple[Callable[[Any], str], Any]] = [(_point, r) for r in text.get("proofs", [])]
+    if "ranges" in text:
+        work.append((lambda t: check_cover(t["ranges"], t["proofs"]), text))
+    if "list" in text:
+        work.append((check_list, text["list"]))
+    if "orbit" in text:
+        work.append((check_orbit, text["orbit"]))
+    return work
+
+
+def _point(record: dict[str, Any]) -> str:
+    if not record:
+        raise CheckError("there is no proof")
+    return check(record)
 
 
 if __name__ == "__main__":

@@ -7,7 +7,9 @@ from typing import Any
 
 from graphs import D, run
 from intervals import CheckError, Iv, whole
+from points import equilibrium, pseudo_equilibrium
 from polynomials import is_multiple
+from series import along_field
 
 FORMAT = "nonsmooth proof 1"
 Matrix = list[list[Iv]]
@@ -42,6 +44,18 @@ class Equations:
         values = run(self.graph, x, self.p, more)
         return Local(self, values, more)
 
+    def is_cusp(self, u: list[Iv]) -> bool:
+        """Whether h rises or falls with the third power of time along the field, exactly."""
+        side = ("above", "below")["+-".index(self.record["side"])]
+        states = [Iv.of(*pair) for pair in self.record["held"]]
+        for (vector, i), value in zip(self.unknowns, u, strict=True):
+            if vector == 0:
+                states[i] = value
+        c = along_field(
+            self.graph, self.graph[side], self.graph["surface"], states, [d.v for d in self.p]
+        )
+        return c[2].zero and c[3].sign() != 0
+
     def system(self, u: list[Iv]) -> tuple[list[Iv], Matrix]:
         """Values and Jacobian of the square system."""
         at = self.local(u)
@@ -71,6 +85,7 @@ class Local:
         self.h = self._full(values[graph["surface"]])
         self.fields = [[self._full(values[k]) for k in graph[s]] for s in ("above", "below")]
         self.factor = [self._full(values[k]) for k in graph.get("direction", [])]
+        self.positive = [self._full(values[k]) for k in graph["positive"]]
 
     def _full(self, d: D) -> D:
         zero = [whole(0)] * self.size
@@ -181,8 +196,26 @@ def check(record: dict[str, Any]) -> str:
             raise CheckError(f"the fold is not proven to be {label}")
         words += f"; {label}"
     elif label:
-        words += f"; that it is a {label} is not checked here"
+        _kind(equations, record, point)
+        words += f"; {label}"
+    if any(v.v.sign() <= 0 for v in equations.local(point).positive):
+        raise CheckError("it is not proven to be on the sides of the mode")
     return words
+
+
+def _kind(equations: Equations, record: dict[str, Any], point: list[Iv]) -> None:
+    """Check that a point of rest, or a cusp, is what is claimed."""
+    at, label = equations.local(point), record["claims"]["label"]
+    if record["kind"] == "equilibrium":
+        found = equilibrium(at, "+-".index(record["side"]))
+    elif record["kind"] == "pseudo-equilibrium":
+        found = pseudo_equilibrium(at)
+    elif record["kind"] == "fold" and label == "cusp":
+        found = "cusp" if equations.is_cusp(point) else "no cusp"
+    else:
+        raise CheckError(f"the label {label!r} is not known")
+    if found != label:
+        raise CheckError(f"it is claimed to be a {label}, and found to be a {found}")
 
 
 def _point(equations: Equations, record: dict[str, Any], box: list[Iv]) -> tuple[list[Iv], bool]:

@@ -159,14 +159,14 @@ def _atan2(y: D, x: D) -> D:
     return linear(quarter, apply("atan", [apply("div", [x, y])]), -1)
 
 
-def run(graph: dict[str, Any], x: list[D], p: list[D], u: list[D]) -> list[D]:
-    """Values of all nodes."""
+def run(graph: dict[str, Any], *inputs: list[D]) -> list[D]:
+    """Values of all nodes, for vectors of states, parameters, further unknowns, ..."""
     values: list[D] = []
     for op, *rest in graph["nodes"]:
         if op == "const":
             values.append(D(Iv.of(rest[0])))
         elif op == "input":
-            values.append((x, p, u)[rest[0]][rest[1]])
+            values.append(inputs[rest[0]][rest[1]])
         elif op == "power":
             a, n = values[rest[0]], rest[1]
             f = (

@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
 
 from .enclosure import Enclosure
 from .proof import Proof, intervals
@@ -48,6 +51,8 @@ class Census:
         Pieces looked at.
     statement : str
         The theorem, or what is missing to it, in one sentence.
+    record : mapping
+        Everything that an independent program needs; see ``save``.
     """
 
     kind: str
@@ -57,6 +62,17 @@ class Census:
     undecided: tuple[Undecided, ...]
     boxes: int
     statement: str
+    record: Mapping[str, Any] = field(default_factory=dict)
+
+    def save(self, path: str | Path) -> None:
+        """Write the list as JSON, so that ``python checker FILE`` can check that it is complete.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to write it.
+        """
+        Path(path).write_text(json.dumps({"list": self.record}, indent=1), encoding="utf-8")
 
     def __str__(self) -> str:
         return self.statement

@@ -314,6 +314,6 @@ def _together(subject: Subject, pieces: list[Proof]) -> Proof:
         hulls(values),
         parameters,
         bits,
-        {},
+        {"ranges": [[str(v) for v in pair] for pair in subject.ranges]},
         tuple(pieces),
     )

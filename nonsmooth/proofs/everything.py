@@ -18,8 +18,10 @@ from .decimals import given
 from .described import Described, parameter_ranges
 from .enclosure import Enclosure
 from .flint import arb
+from .krawczyk import Zero
 from .proof import Proof, intervals, paragraph
-from .questions import QUESTIONS, Question
+from .questions import QUESTIONS, Question, Verdict
+from .record import asked, record_of
 from .subdivide import Search, clusters
 from .subject import Subject
 
@@ -181,11 +183,12 @@ def _subject(
 def _census(
     subject: Subject, search: Search, bounds: list[tuple[Fraction, Fraction]], width: float
 ) -> Census:
-    zeros, edge, left = [], [], []
+    zeros, edge, left, others = [], [], [], []
     for found in search.zeros:
         place = _place(found.point, bounds)
         counts = subject.question.counts(search.equations.inputs(found.point))
         if place == "outside" or counts is False:
+            others.append(_of_another(subject, search, found))
             continue
         proof = prove_subject(subject, found, width)
         if proof is None or counts is None:
@@ -204,7 +207,21 @@ def _census(
     complete = not left and not edge
     statement = _words(subject, search, bounds, zeros, edge, left, complete)
     kind = subject.question.kind
-    return Census(kind, complete, tuple(zeros), tuple(edge), tuple(left), search.boxes, statement)
+    record = {
+        "complete": complete,
+        "question": asked(subject),
+        "bounds": [[str(v) for v in pair] for pair in bounds],
+        "zeros": [p.record for p in zeros],
+        "others": others,
+    }
+    found_all = tuple(zeros), tuple(edge), tuple(left)
+    return Census(kind, complete, *found_all, search.boxes, statement, record)
+
+
+def _of_another(subject: Subject, search: Search, found: Zero) -> dict[str, Any]:
+    """The record of a zero that is outside the box, or of another status than was asked for."""
+    nothing = Verdict("", subject.question.kind, facts={"label": "", "coincident": False})
+    return record_of(subject, search.equations, found, nothing, 128)
 
 
 def _place(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) -> str:

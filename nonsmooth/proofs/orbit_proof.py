@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 from .enclosure import Enclosure
 from .proof import intervals, listed, paragraph
@@ -65,6 +68,10 @@ class OrbitProof:
         Steps taken, and bits of the arithmetic.
     numbers : {"stored", "written"}
         How the constants of the system were read: as doubles or as decimals.
+    first, duration : str
+        The mode at the start, and the time that was asked for, exactly.
+    system : FilippovSystem
+        Whose orbit it is.
     """
 
     proven: bool
@@ -79,6 +86,37 @@ class OrbitProof:
     steps: int
     bits: int
     numbers: str
+    first: str = ""
+    duration: str = ""
+    system: Any = None
+
+    def save(self, path: str | Path) -> None:
+        """Write the proof as JSON, so that ``python checker FILE`` can follow the orbit again.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to write it.
+        """
+        from .record import motion_of  # needs python-flint, which whoever has a proof has
+
+        both = lambda values: [[v.low, v.high] for v in values.values()]
+        events = [
+            {"t": [e.t.low, e.t.high], "x": both(e.x)}
+            | {k: getattr(e, k) for k in ("kind", "name", "before", "after")}
+            for e in self.events
+        ]
+        record = motion_of(self.system, self.numbers) | {  # type: ignore[arg-type]
+            "proven": self.proven,
+            "status": self.status,
+            "first": self.first,
+            "duration": self.duration,
+            "start": both(self.start),
+            "parameters": both(self.parameters),
+            "events": events,
+            "end": both(self.end),
+        }
+        Path(path).write_text(json.dumps({"orbit": record}, indent=1), encoding="utf-8")
 
     def __repr__(self) -> str:
         return f"OrbitProof({self.itinerary!r}, {self.status})"

@@ -24,6 +24,7 @@ class Begin(NamedTuple):
 
     start: list[tuple[Fraction, Fraction]]
     ranges: list[tuple[Fraction, Fraction]]
+    duration: Fraction
 
 
 def certify_orbit(
@@ -105,7 +106,7 @@ def certify_orbit(
     while True:
         with precision(bits):
             end = enclosed([(duration, duration)])[0]
-            result, digits = _run(modes, Begin(start, ranges), end, max_steps)
+            result, digits = _run(modes, Begin(start, ranges, duration), end, max_steps)
         if result.proven or not (points and digits) or 2 * bits > max_bits:
             return result
         bits *= 2
@@ -191,6 +192,9 @@ def _result(
         steps=follower.steps if follower else 0,
         bits=int(ctx.prec),
         numbers=modes.numbers,
+        first=modes_met[0] if modes_met else "",
+        duration=str(begin.duration),
+        system=system,
     )
 
 

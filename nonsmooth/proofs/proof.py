@@ -87,7 +87,10 @@ class Proof:
         one that proved it and needs nothing but Python.
         """
         records = [p.record for p in self.pieces] or [self.record]
-        Path(path).write_text(json.dumps({"proofs": records}, indent=1), encoding="utf-8")
+        text: dict[str, Any] = {"proofs": records}
+        if self.pieces:  # which are to cover the whole
+            text["ranges"] = self.record["ranges"]
+        Path(path).write_text(json.dumps(text, indent=1), encoding="utf-8")
 
 
 def paragraph(first: str, *lines: str) -> str:

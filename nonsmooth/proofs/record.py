@@ -5,7 +5,9 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from .arithmetic import ends, exact, fraction
+from ..model import FilippovSystem
+from .arithmetic import Numbers, ends, exact, fraction
+from .described import Written
 from .flint import arb
 from .tape import Program
 
@@ -30,25 +32,59 @@ def graph_of(question: Any, coincident: bool) -> dict[str, Any]:
     """
     described = question.described
     rows = [[described.h], *described.fields]
+    elsewhere = [node for _, node in described.elsewhere]
+    rows += [elsewhere]
     difference = question.difference if coincident else None
     if difference is not None:
         rows += [[difference.factor], difference.direction]
     program = Program(described.tape, rows)
+    nodes = _instructions(program, question.numbers)
+    (surface,), above, below, positive, *more = program.rows
+    graph = {"nodes": nodes, "surface": surface, "above": above, "below": below}
+    graph |= {"positive": positive}  # other sides and open gaps
+    if more:  # F1 - F2 = factor direction
+        graph |= {"factor": more[0][0], "direction": more[1]}
+    return graph
+
+
+def _instructions(program: Program, numbers: Numbers) -> list[list[Any]]:
     nodes: list[list[Any]] = []
     for node in program.nodes:
         if node.op == "const":
-            nodes.append(["const", text(exact(node.payload, question.numbers))])
+            nodes.append(["const", text(exact(node.payload, numbers))])
         elif node.op == "input":
             nodes.append(["input", *node.place])
         elif node.op == "power":
             nodes.append(["power", node.args[0], node.payload])
         else:
             nodes.append([node.op, *node.args])
-    (surface,), above, below, *more = program.rows
-    graph = {"nodes": nodes, "surface": surface, "above": above, "below": below}
-    if more:  # F1 - F2 = factor direction
-        graph |= {"factor": more[0][0], "direction": more[1]}
-    return graph
+    return nodes
+
+
+def motion_of(system: FilippovSystem, numbers: Numbers) -> dict[str, Any]:
+    """A system as instructions: surfaces, field, guards, maps, gaps and restitutions.
+
+    Inputs of vector 3 are multipliers, of vector 4 reactions.
+    """
+    written, d = Written(system), system.definition
+    tape = written.tape
+    lam = [tape.symbol(3, i) for i in range(d.multipliers.numel())]
+    reactions = [tape.symbol(4, i) for i in range(d.reactions.numel())]
+    field = written.field(lam, reactions)
+    one = lambda e: written.insert([e])[0] if e.numel() else []
+    maps = [one(d.maps[:, k]) for k in range(len(system.resets))]
+    rows = [one(d.surfaces), field, one(d.guards), one(d.gaps), one(d.restitutions), *maps]
+    program = Program(tape, rows)
+    names = ("surfaces", "field", "guards", "gaps", "restitutions")
+    *found, maps = *program.rows[:5], program.rows[5:]
+    graph = dict(zip(names, found, strict=True)) | {"maps": maps}
+    return {
+        "format": "nonsmooth orbit 1",
+        "graph": graph | {"nodes": _instructions(program, numbers)},
+        "stops": [list(s) for s in system.stops],
+        "resets": [list(r) for r in system.resets],
+        "impacts": list(system.impacts),
+    }
 
 
 def asked(subject: Any, coincident: bool = False) -> dict[str, Any]:

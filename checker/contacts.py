@@ -1,0 +1,180 @@
+"""Filippov's logic on surfaces, and jumps at resets and impacts, from values and derivatives."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+from graphs import D, run
+from intervals import CheckError, Iv, whole
+
+
+class Place:
+    """Questions about a point of a recorded system."""
+
+    def __init__(self, record: dict[str, Any], p: list[Iv]):
+        self.graph, self.p = record["graph"], p
+        self.count = len(self.graph["surfaces"])
+        self.contacts = len(record["impacts"])
+        ends = [("stop", *s) for s in record["stops"]] + [("reset", *r) for r in record["resets"]]
+        ends += [("impact", name, -1) for name in record["impacts"]]
+        nodes = [*self.graph["guards"], *self.graph["gaps"]]
+        self.ends = [(*e, node) for e, node in zip(ends, nodes, strict=True)]
+        self.stops = len(record["stops"])
+        self.began: int | None = None
+
+    def surfaces_of(self, word: str) -> str:
+        """The letters of the surfaces."""
+        return word[: self.count]
+
+    def _at(self, x: list[Iv], lam: list[Iv], further: bool = False) -> list[D]:
+        """Values with derivatives by the states, and then by multipliers and reactions."""
+        n, more = len(x), (len(lam) + self.contacts) * further
+        size = n + more
+        unit = [[whole(int(i == j)) for j in range(size)] for i in range(size)]
+        zero = [[whole(0)] * size for _ in range(size)]
+        states = [D(v, unit[i], zero) for i, v in enumerate(x)]
+        signs = [D(v, unit[n + i], zero) if further else D(v) for i, v in enumerate(lam)]
+        none = [
+            D(whole(0), unit[n + len(lam) + i], zero) if further else D(whole(0))
+            for i in range(self.contacts)
+        ]
+        values = run(self.graph, states, [D(v) for v in self.p], [], signs, none)
+        empty = [whole(0)] * size
+        return [v if v.g else D(v.v, empty, zero) for v in values]
+
+    def heights(self, x: list[Iv]) -> list[Iv]:
+        values = self._at(x, [whole(0)] * self.count)
+        return [values[k].v for k in self.graph["surfaces"]]
+
+    def word(self, x: list[Iv]) -> str:
+        """The mode of a point off all surfaces."""
+        signs = [h.sign() for h in self.heights(x)]
+        if not all(signs):
+            raise CheckError("the side of a surface is undecided")
+        return "".join("+" if s > 0 else "-" for s in signs) + "o" * self.contacts
+
+    def start(self, x: list[Iv], exact: list[list[str]], parameters: list[list[str]]) -> str:
+        """The mode of the start, which may lie on one surface exactly."""
+        signs = [h.sign() for h in self.heights(x)]
+        on = [j for j, s in enumerate(signs) if not s]
+        if not on:
+            return self.word(x)
+        values = _rational(self.graph, exact, parameters)
+        if len(on) > 1 or values[self.graph["surfaces"][on[0]]] != 0:
+            raise CheckError("the side of a surface at the start is undecided")
+        word = "".join({1: "+", -1: "-", 0: "?"}[s] for s in signs) + "o" * self.contacts
+        self.began = on[0]
+        return self._beyond(x, word, on[0])[0]
+
+    def rates(self, x: list[Iv], word: str, surface: int) -> tuple[Iv, Iv]:
+        """L1 and L2 at a surface."""
+        found = []
+        for s in (1, -1):
+            lam = [1 if w == "+" else -1 for w in self.surfaces_of(word)]
+            lam[surface] = s
+            values = self._at(x, [whole(v) for v in lam])
+            normal = values[self.graph["surfaces"][surface]].g
+            total = whole(0)
+            for g, k in zip(normal, self.graph["field"], strict=True):
+                total = total + g * values[k].v
+            found.append(total)
+        return found[0], found[1]
+
+    def _beyond(self, x: list[Iv], word: str, j: int) -> tuple[str, int]:
+        signs = tuple(v.sign() for v in self.rates(x, word, j))
+        letters = {(-1, 1): ("s", 0), (1, 1): ("+", 1), (-1, -1): ("-", 1)}
+        if signs not in letters:
+            raise CheckError("what follows at a surface is undecided")
+        letter, zeros = letters[signs]
+        return word[:j] + letter + word[j + 1 :], zeros
+
+    def switched(
+        self, x: list[Iv], word: str, guard: str, j: int, direction: int
+    ) -> tuple[str, int, str]:
+        """The mode after a surface was met or left, zeros of its function, and the event's kind."""
+        if guard == "exit":
+            l1, l2 = self.rates(x, word, j)
+            if (l2 if direction > 0 else -l1).sign() <= 0:
+                raise CheckError("the other field at an exit is undecided")
+            return word[:j] + ("+" if direction > 0 else "-") + word[j + 1 :], 2, "exit"
+        if "s" in word:
+            raise CheckError("a surface that is met while another slides is not checked here")
+        after, zeros = self._beyond(x, word, j)
+        return after, zeros, "entry" if after[j] == "s" else "crossing"
+
+    def jumped(self, x: list[Iv], index: int) -> tuple[list[Iv], bool]:
+        """The state after a reset or an impact, and whether its function is zero there exactly."""
+        kind, _, _, node = self.ends[index]
+        if kind == "reset":
+            rows = self.graph["maps"][index - self.stops]
+            values = self._at(x, [whole(0)] * self.count)
+            new = [values[k].v for k in rows] + x[len(rows) :]
+            moved = [i for i, k in enumerate(rows) if self.graph["nodes"][k] != ["input", 0, i]]
+            return new, all(values[node].g[i].zero for i in moved)
+        new, moved = self._struck(x, index - len(self.ends) + self.contacts)
+        values = self._at(x, [whole(0)] * self.count)
+        return new, all(values[node].g[i].zero for i in moved)
+
+    def _struck(self, x: list[Iv], contact: int) -> tuple[list[Iv], list[int]]:
+        """Newton's law, and which states the impulse moves; friction is not known here."""
+        n, graph = len(x), self.graph
+        values = self._at(x, [whole(0)] * self.count, further=True)
+        gap, f = values[graph["gaps"][contact]], [values[k] for k in graph["field"]]
+        reaction = n + self.count + contact
+        column = [v.g[reaction] for v in f]
+        if any(not v.zero for d in f for v in d.H[reaction][n:]):
+            raise CheckError("an impulse that a multiplier enters is not checked here")
+        rate, effect = whole(0), whole(0)
+        for j in range(n):
+            rate = rate + gap.g[j] * f[j].v
+        for i in range(n):
+            slope = whole(0)
+            for j in range(n):
+                slope = slope + gap.H[i][j] * f[j].v + gap.g[j] * f[j].g[i]
+            effect = effect + slope * column[i]
+        e = values[graph["restitutions"][contact]].v
+        impulse = -((whole(1) + e) * rate) / effect
+        if impulse.sign() <= 0:
+            raise CheckError("an impulse is not proven to push")
+        moved = [i for i, c in enumerate(column) if not c.zero]
+        return [v + impulse * c for v, c in zip(x, column, strict=True)], moved
+
+
+def _rational(
+    graph: dict[str, Any], start: list[list[str]], parameters: list[list[str]]
+) -> list[Fraction | None]:
+    """Exact values of nodes, None where they are not known to be rational."""
+    inputs = [[Fraction(a) for a, _ in start], [Fraction(a) for a, _ in parameters]]
+    values: list[Fraction | None] = []
+    for op, *rest in graph["nodes"]:
+        if op == "const":
+            values.append(Fraction(rest[0]))
+        elif op == "input":
+            values.append(inputs[rest[0]][rest[1]] if rest[0] < 2 else None)
+        elif op == "power":
+            a = values[rest[0]]
+            values.append(None if a is None else a ** rest[1])
+        else:
+            values.append(_exactly(op, [values[k] for k in rest]))
+    return values
+
+
+def _exactly(op: str, args: list[Fraction | None]) -> Fraction | None:
+    known = [a for a in args if a is not None]
+    if len(known) < len(args):
+        return None
+    if op in ("add", "sub"):
+        return known[0] + (known[1] if op == "add" else -known[1])
+    if op == "mul":
+        return known[0] * known[1]
+    if op in ("div", "inv"):
+        below = known[-1]
+        return None if below == 0 else (known[0] if op == "div" else Fraction(1)) / below
+    return (
+        {"neg": lambda a: -a, "twice": lambda a: 2 * a, "sq": lambda a: a * a}.get(
+            op, lambda a: None
+        )(known[0])
+        if known
+        else None
+    )

@@ -16,6 +16,9 @@ from ..model import Array, FilippovSystem, reversed_system
 #: Steps between looks at the length of an orbit, and of all of it.
 _CHUNK, _LONGEST = 16, 20_000
 
+#: A chunk that is so many times as long as the orbit is to be is cut.
+_FAR = 4.0
+
 #: An orbit that grows by less than this part of its length in a chunk has come to rest.
 _RESTS = 1e-7
 
@@ -82,30 +85,40 @@ class Follower:
         """The orbit as a run (of the reversed system, if backward), and why it ends."""
         system = self.system if self.ahead else reversed_system(self.system)
         pieces, x, t, grown, end = list[Trajectory](), start, 0.0, 0.0, "length"
+        span = 1e9
         while grown < self.length:
             part = simulate(
                 system,
                 x,
-                t + 1e9,
+                t + span,
                 t_start=t,
                 parameters=self.parameters,
                 tol=self.tol,
                 start_mode=mode,
                 max_steps=_CHUNK,
             )
+            far = float(lengths(part)[1][-1]) if len(part.steps) else 0.0
+            if not far <= _FAR * self.length:  # steps of a simple field are as long as one likes
+                span = (
+                    (self.length / far) ** 0.125 * float(part.t[-1] - t)
+                    if far < np.inf
+                    else span / 8
+                )
+                continue
             if not len(part.steps):
                 if not pieces:
                     return None
                 end = str(part.status)
                 break
             pieces.append(part)
-            more = float(lengths(part)[1][-1])
+            more, ended = far, part.status is Status.REACHED_END
             grown += more
             slides = _slides(part) if not self.ahead and (mode is None or "s" not in mode) else None
-            if slides is not None or part.status is not Status.TOO_MANY_STEPS:
+            if slides is not None or not (ended or part.status is Status.TOO_MANY_STEPS):
                 end = "sliding" if slides is not None else str(part.status)
                 break
-            if more < _RESTS * self.length or len(pieces) * _CHUNK >= _LONGEST:
+            span = 4.0 * span if ended else span
+            if (more < _RESTS * self.length and not ended) or len(pieces) * _CHUNK >= _LONGEST:
                 end = "rest" if more < _RESTS * self.length else str(part.status)
                 break
             x, t, mode = part.x[-1], float(part.t[-1]), part.events[-1].mode_after

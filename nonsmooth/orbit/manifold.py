@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from ..flow.saving import Savable
 from ..local import Equilibrium, Fold, FoldFold, PseudoEquilibrium
 from ..local.regions import Region
+from ..local.two_fold import TwoFold
 from ..model import (
     Array,
     DegenerateError,
@@ -27,6 +28,8 @@ from ..model import (
 )
 from .arcs import Arc, Follower, lengths
 from .bundles import bundle, triangles
+from .manifold_seeds import canard_curve, orbit_seeds
+from .periodic import PeriodicOrbit
 
 #: Seeds are so far from the point, as a part of the length: the error is the square of it.
 _NEAR = 1e-6
@@ -82,7 +85,7 @@ class Manifold(Savable):
 
 def manifold(
     system: FilippovSystem,
-    of: Equilibrium | PseudoEquilibrium | Fold | FoldFold,
+    of: Equilibrium | PseudoEquilibrium | Fold | FoldFold | TwoFold | PeriodicOrbit,
     *,
     stable: bool = True,
     length: float,
@@ -97,9 +100,13 @@ def manifold(
     ----------
     system : FilippovSystem
         Without explicit time. A stable manifold is followed backward: without resets and impacts.
-    of : Equilibrium, PseudoEquilibrium, Fold or FoldFold
-        From ``find_equilibrium``, ``find_pseudo_equilibrium``, ``fold``, ``fold_fold``. Of a visible
-        fold in the plane: the orbits that come to it, or leave it.
+    of : Equilibrium, PseudoEquilibrium, Fold, FoldFold, TwoFold or PeriodicOrbit
+        From ``find_equilibrium``, ``find_pseudo_equilibrium``, ``fold``, ``fold_fold``,
+        ``find_two_fold``, ``periodic_orbit``. Of a visible fold in the plane: the orbits that come to
+        it, or leave it. Of a two-fold of three states: the orbits that come to its one canard, the
+        dividing surface of those that pass it on either side (or those that leave the canard). Of a
+        periodic orbit of three states: the surface of one multiplier inside the unit circle, or one
+        outside.
     stable : bool, optional
         Whether orbits that come to the point are asked for (True) or those that leave it.
     length : float
@@ -147,19 +154,23 @@ def manifold(
         raise OptionError(
             f"system: expected one without explicit time, received {system!r}. Its saddles move."
         )
-    if not isinstance(of, (Equilibrium, PseudoEquilibrium, Fold, FoldFold)):
+    known = (Equilibrium, PseudoEquilibrium, Fold, FoldFold, TwoFold, PeriodicOrbit)
+    if not isinstance(of, known):
         raise OptionError(
             explain(
                 "of",
-                expected="an Equilibrium, a PseudoEquilibrium, a Fold or a FoldFold",
+                expected="an Equilibrium, a PseudoEquilibrium, a Fold, a FoldFold, a TwoFold or a "
+                "PeriodicOrbit",
                 received=f"{of!r}",
-                advice="Find it with find_equilibrium, find_pseudo_equilibrium or fold.",
+                advice="Find it with find_equilibrium, find_pseudo_equilibrium, find_two_fold, fold or "
+                "periodic_orbit.",
             )
         )
     length = real(length, "length", expected="a positive number", low=np.finfo(float).tiny)
     if spacing is not None:
         spacing = real(spacing, "spacing", expected="a positive number", low=np.finfo(float).tiny)
-    p = dict(zip(system.parameter_names, system.parameter_vector(parameters).tolist(), strict=True))
+    given = of.parameters | dict(parameters or {}) if isinstance(of, PeriodicOrbit) else parameters
+    p = dict(zip(system.parameter_names, system.parameter_vector(given).tolist(), strict=True))
     follower = Follower(system, p, not stable, length, spacing or length / 100, tol)
     return _Grower(follower, of, stable, whole(max_orbits, "max_orbits")).grow()
 
@@ -169,13 +180,19 @@ class _Grower:
 
     def __init__(self, follower: Follower, of: Any, stable: bool, most: int):
         self.follower, self.of, self.stable, self.most = follower, of, stable, most
-        self.system, self.point = follower.system, np.asarray(of.point, float)
+        self.system = follower.system
+        self.point = np.asarray(of.start if isinstance(of, PeriodicOrbit) else of.point, float)
         self.step = _NEAR * follower.length
         self.rates, self.node = np.ones(1), False  # of the eigenspace: two real eigenvalues
 
     def grow(self) -> Manifold:
         if isinstance(self.of, (Fold, FoldFold)):
             return self._curves([self._leave(mode) for mode in "+-"])
+        if isinstance(self.of, TwoFold):
+            return self._of_two_fold()
+        if isinstance(self.of, PeriodicOrbit):
+            seeds = orbit_seeds(self.of, self.follower, self.stable)
+            return self._joined([self._surface(seed, False) for seed in seeds])
         if isinstance(self.of, Equilibrium):
             return self._of_equilibrium()
         return self._of_pseudo_equilibrium()
@@ -283,7 +300,18 @@ class _Grower:
 
     def _sheets(self, direction: Array, sides: list[str]) -> Manifold:
         """A surface of the orbits of both fields that end on the curve that slides to the point."""
-        curve = self._sliding_curve(direction)
+        return self._from_curve(self._sliding_curve(direction), sides)
+
+    def _of_two_fold(self) -> Manifold:
+        """The orbits of both fields that end on the canard, or leave it."""
+        if self.system.dimension != 3 or self.system.surface_count != 1:
+            raise DegenerateError(
+                f"of: expected a two-fold of three states on one surface, received {self.system!r}. The "
+                "orbits that come to its canards are no surface."
+            )
+        return self._from_curve(canard_curve(self.of, self.follower, self.stable), ["+", "-"])
+
+    def _from_curve(self, curve: Callable[[float], Array], sides: list[str]) -> Manifold:
         parts = []
         for mode in sides:
 
@@ -291,14 +319,18 @@ class _Grower:
                 return self.follower.arc(curve(u), mode)
 
             parts.append(self._surface(seed, False))
-        offset = len(parts[0].points)
+        return self._joined(parts)
+
+    def _joined(self, parts: list[Manifold]) -> Manifold:
+        """Several surfaces as one."""
+        offsets = np.cumsum([0, *[len(part.points) for part in parts]])
         return Manifold(
             self.stable,
             self.point,
             2,
             [arc for part in parts for arc in part.arcs],
             np.concatenate([part.points for part in parts]),
-            np.concatenate([parts[0].triangles, parts[1].triangles + offset]),
+            np.concatenate([p.triangles + k for p, k in zip(parts, offsets, strict=False)]),
             all(part.complete for part in parts),
         )
 

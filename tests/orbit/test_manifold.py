@@ -158,3 +158,105 @@ def test_what_has_no_manifold_is_refused():
     )
     with pytest.raises(ns.DefinitionError, match="system: expected one without resets"):
         ns.manifold(kicked, ns.find_equilibrium(kicked, [0.1, 0.1], side="-"), length=1.0)
+
+
+# periodic orbits and two-folds ----------------------------------------------------------------------
+
+X, Y, Z = (ca.SX.sym(s) for s in ("X", "Y", "Z"))
+R = ca.sqrt(X * X + Y * Y)
+
+
+def test_the_surface_of_a_saddle_cycle_is_its_closed_form():
+    """rho' = -rho + z^2 and z' = z/5 about the circle of radius 1: rho = z^2/1.4 leaves it."""
+    g = 1 - R + Z * Z
+    system = ns.FilippovSystem([X, Y, Z], field=[-Y + X * g / R, X + Y * g / R, 0.2 * Z])
+    cycle = ns.periodic_orbit(system, [1.0, 0.0, 0.0], period=2 * np.pi)
+    found = ns.manifold(system, cycle, stable=False, length=14.0, spacing=0.3)
+    u, v, w = found.points.T
+    assert np.abs(np.hypot(u, v) - 1 - w * w / 1.4).max() < 1e-10
+    assert w.max() > 0.8 and w.min() < -0.8  # both sheets
+    corners = found.points[found.triangles]
+    assert np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max() < 2.5 * 0.3
+    inside = ns.manifold(system, cycle, stable=True, length=2.0, spacing=0.3, max_orbits=32)
+    assert np.abs(inside.points[:, 2]).max() == 0.0
+    assert np.hypot(*inside.points[:, :2].T).min() < 0.8
+
+
+def test_a_cycle_through_a_switch_keeps_its_cylinder():
+    """What leaves along z grows by exp(0.6 pi) a round, at different rates on the two sides."""
+    g = 1 - R
+    fields = [[-Y + X * g / R, X + Y * g / R, rate * Z] for rate in (0.2, 0.4)]
+    system = ns.FilippovSystem([X, Y, Z], surface=Y, above=fields[0], below=fields[1])
+    cycle = ns.periodic_orbit(system, [1.0, 0.1, 0.0], itinerary="+ -")
+    assert abs(cycle.multipliers[1] - np.exp(0.6 * np.pi)) < 1e-11
+    found = ns.manifold(system, cycle, stable=False, length=10.0, spacing=0.3)
+    assert np.abs(np.hypot(*found.points[:, :2].T) - 1).max() < 1e-9
+    assert np.abs(found.points[:, 2]).max() > 0.8
+
+
+def test_a_negative_multiplier_has_a_moebius_band():
+    c, s = X / R, Y / R
+    onto = ca.vertcat(ca.horzcat((1 + c) / 2, s / 2), ca.horzcat(s / 2, (1 - c) / 2))
+    away = ca.vertcat(R - 1, Z)
+    along = onto @ away
+    f = 0.15 * along - 0.7 * (away - along) + 0.5 * ca.vertcat(-Z, R - 1)
+    system = ns.FilippovSystem([X, Y, Z], field=[-Y + X * f[0] / R, X + Y * f[0] / R, f[1]])
+    cycle = ns.periodic_orbit(system, [1.0, 0.0, 0.0], period=2 * np.pi)
+    assert abs(cycle.multipliers[1] + np.exp(0.3 * np.pi)) < 1e-11
+    found = ns.manifold(system, cycle, stable=False, length=9.0, spacing=0.2)
+    count = 0
+    for arc in found.arcs:  # up to where the band is as wide as the circle
+        u, v, w = arc.points.T
+        width, half = np.hypot(np.hypot(u, v) - 1, w), np.arctan2(v, u) / 2
+        across = -np.sin(half) * (np.hypot(u, v) - 1) + np.cos(half) * w
+        first = int(np.argmax(np.append(width, 1.0) > 0.6))
+        assert np.abs(across[:first]).max(initial=0.0) < 1e-10
+        count += first
+    assert count > 300
+
+
+def passing() -> ns.FilippovSystem:
+    """Two visible folds; sliding is (y, z)' = [[-0.3, 1], [1, 0.5]] (y, z) but for a factor."""
+    return ns.FilippovSystem([X, Y, Z], surface=X, above=[Y, 1, 0.5], below=[Z, 0.3, -1.0])
+
+
+def test_the_surface_that_divides_orbits_passing_a_two_fold():
+    system = passing()
+    fold = ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
+    found = ns.manifold(system, fold, length=1.0, spacing=0.1)
+    slope = 0.4 - np.sqrt(1.16)  # of the eigenvector of 0.1 - sqrt(1.16)
+    for arc in found.arcs:
+        start, t = arc.points[0], arc.t
+        assert abs(start[2] - slope * start[1]) < 1e-7 and abs(start[0]) < 1e-12
+        height, bend = (start[1], 1.0) if arc.itinerary[0] == "+" else (start[2], -1.0)
+        assert np.abs(arc.points[:, 0] - height * t - bend * t * t / 2).max() < 1e-9
+    # a second method: beside it orbits slide and leave to either side, on it they come to s
+    arc = found.arcs[len(found.arcs) // 4]
+    middle = arc.points[len(arc.points) // 2]
+    ends = [
+        ns.simulate(system, middle + np.array([0.0, d, 0.0]), 9.0).itinerary for d in (-1e-4, 1e-4)
+    ]
+    assert ends == ["+ s -", "+ s +"]
+    assert len(found.triangles) > 100 and len(found.arcs) > 20
+
+
+def test_what_leaves_a_canard_is_a_surface_too():
+    system = passing()
+    fold = ns.find_two_fold(system, near=[0.0, 0.01, 0.01])
+    found = ns.manifold(system, fold, stable=False, length=1.0, spacing=0.2)
+    slope = 0.4 - np.sqrt(1.16)
+    assert all(abs(a.points[0, 2] - slope * a.points[0, 1]) < 1e-7 for a in found.arcs)
+    assert all(a.t[-1] > 0 and a.points[0, 1] >= 0 for a in found.arcs)
+
+
+def test_orbits_and_two_folds_without_a_surface_are_refused():
+    relaxing = ns.FilippovSystem([X, Y], field=[Y, (1 - X * X) * Y - X])
+    cycle = ns.periodic_orbit(relaxing, ns.simulate(relaxing, [2.0, 0.0], 40.0))
+    with pytest.raises(ns.DegenerateError, match="three dimensions with one stable multiplier"):
+        ns.manifold(relaxing, cycle, length=1.0)
+    teixeira = ns.FilippovSystem(
+        [X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1 + 0.1 * Y]
+    )
+    fold = ns.find_two_fold(teixeira, near=[0.0, 0.1, -0.1])
+    with pytest.raises(ns.DegenerateError, match="infinitely many"):
+        ns.manifold(teixeira, fold, length=1.0)

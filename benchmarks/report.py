@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from . import theorems
+from . import orbits, theorems
 
 #: What the project asks of itself, and whether more or less is better.
 TARGETS = {
@@ -33,6 +33,7 @@ TARGETS = {
     "proof: a linear bounce (s)": (0.05, "at most"),
     "proof: all 100 two-folds of a box (s)": (10.0, "at most"),
     "wrong or missing theorems": (0, "at most"),
+    **orbits.TARGETS,
     "wrong itineraries, random starts": (0, "at most"),
     "wrong itineraries, within 1e-9 of a boundary": (0, "at most"),
 }
@@ -66,6 +67,7 @@ def figures(results: dict[str, Any]) -> dict[str, float]:
             found[f"proof: {name} (s)"] = timing["median"]
     if "theorems" in results:
         found["wrong or missing theorems"] = theorems.wrong(results["theorems"])
+    found |= orbits.figures(results.get("orbits", {}))
     return found | _startup(results) | _itineraries(results)
 
 
@@ -312,6 +314,7 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "two-folds": _folds,
     "proofs": _proofs,
     "theorems": theorems.markdown,
+    "orbits": lambda section: orbits.markdown(section, table),
     "correctness": _correct,
 }
 

@@ -138,7 +138,7 @@ SHOOTING = {
     ),
     "R1": Shooting(
         "relay",
-        lambda x, tol: _relay(x, tol, most=0.02),  # without a limit it misses the shortest slide
+        lambda x, tol: _relay(x, tol, most=2e-3),  # longer steps miss the shortest slide
         np.array([0.0, 1.0, 2.57]),
         lambda z: np.array([0.0, 1.0, z[0]]),
         (2,),

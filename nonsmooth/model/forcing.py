@@ -17,13 +17,17 @@ class Forcing:
     ----------
     system : FilippovSystem
     period : SX or float
+    found : bool, optional
+        Whether it was read off the system, which then has it.
 
     Attributes
     ----------
     expression : SX
+    found : bool
     """
 
-    def __init__(self, system: FilippovSystem, period: ca.SX | float):
+    def __init__(self, system: FilippovSystem, period: ca.SX | float, found: bool = False):
+        self.found = found
         self.expression = ca.SX(period)
         p = system.parameter_symbols
         outputs = [ca.densify(e) for e in (self.expression, ca.jacobian(self.expression, p))]

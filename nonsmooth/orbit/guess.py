@@ -98,7 +98,7 @@ def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
                     advice="Give period=2*pi/w.",
                 )
             )
-        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / found[0]))
+        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / found[0], True))
     return Forcing(system, period)
 
 
@@ -236,7 +236,7 @@ def _problem(
     p: Array,
 ) -> Start:
     phase = reference = None
-    if forcing is not None:
+    if forcing is not None and not forcing.found:
         _require_period(system, legs, starts, durations, forcing(p)[0], p)
     if not legs[-1].name:
         phase = np.zeros(system.extended_dimension)

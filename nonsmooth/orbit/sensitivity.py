@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -199,9 +199,15 @@ def vjp(
     """
     system, n = _require_run(run).system, run.system.dimension
     row = real_array(cotangent, "cotangent")
-    if row.shape != (n,):
+    if row.shape != (n,) or not np.all(np.isfinite(row)):
+        received = f"shape {row.shape}" if row.shape != (n,) else str(row.tolist())
         raise PointError(
-            explain("cotangent", expected=f"{n} numbers", received=str(row.shape), advice="")
+            explain(
+                "cotangent",
+                expected=f"{n} numbers, finite ones",
+                received=received,
+                advice="It is the derivative of something by the final state.",
+            )
         )
     chosen = tuple(system.parameter_names.index(name) for name in _names(run, wrt))
     parts = passages(run, chosen)
@@ -329,6 +335,10 @@ def _require_run(run: Trajectory) -> Trajectory:
 
 def _names(run: Trajectory, wrt: str | Sequence[str]) -> tuple[str, ...]:
     known, names = run.system.parameter_names, list[str]()
+    if not isinstance(wrt, Iterable):
+        raise ParameterError(
+            f"wrt: expected 'x0', 'parameters' or names among {list(known)}, received {wrt!r}."
+        )
     for name in [wrt] if isinstance(wrt, str) else list(wrt):
         if name == "parameters":
             names += [n for n in known if n not in names]

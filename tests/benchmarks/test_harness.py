@@ -16,6 +16,7 @@ from benchmarks import (
     chain,
     correctness,
     measure,
+    orbits,
     ours,
     problems,
     proofs,
@@ -24,7 +25,13 @@ from benchmarks import (
     theorems,
     two_folds,
 )
-from benchmarks.peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
+from benchmarks.peers import (
+    diffrax_modes,
+    heyoka_callbacks,
+    heyoka_modes,
+    scipy_dop853,
+    scipy_shooting,
+)
 
 NAMES = ("linear", "nonlinear")
 
@@ -167,3 +174,42 @@ def test_a_chain_is_the_same_for_siconos_and_us(monkeypatch):
     found = chain.run(True, 2, 5.0, "reference")
     assert found["same itinerary"] and found["nonsmooth"]["rows"][0]["error"] < 1e-9
     assert chain.VARIABLE in report.chain(found)
+
+
+@pytest.mark.parametrize("name", orbits.CASES)
+def test_orbits_of_library_and_peer_are_those_of_the_reference(name):
+    case = orbits.CASES[name]()
+    ours = orbits.errors(case, *_orbit(case.solve()))
+    assert ours["orbit"] < 1e-14 and ours["multipliers"] < 1e-11
+    if name != "R1":  # the peer takes half a second
+        theirs = orbits.errors(case, *scipy_shooting.solve(name, 1e-9, whole=False))
+        assert 1e-13 < theirs["orbit"] < 1e-7 and theirs["multipliers"] < 0.02
+
+
+def _orbit(orbit):
+    half = 2 if orbit.symmetric else 1
+    return orbit.start, orbit.period / half, orbit.half_multipliers
+
+
+def test_figures_of_orbits_are_ratios_of_medians():
+    fast, slow = {"median": 1e-3, "low": 1e-3, "high": 2e-3}, {"median": 0.2, "low": 0.1, "high": 1}
+    miss = {"orbit": 1e-9, "multipliers": 1e-6}
+    section = {
+        "orbits": {
+            "W1": {
+                "nonsmooth": {"seconds": fast, **miss},
+                "scipy DOP853, every state, 1e-13": {"seconds": slow, **miss},
+            }
+        },
+        "iterations": {"W1": {"step": fast, "period": fast}},
+        "branches": {"forced friction, four legs": {"legs": 4, "points": 30, **slow}},
+        "gradients": {"relay, 15 events": {"run": fast, "gradient": fast}},
+        "leg": {"apart": 0.0, "solvers": {"nonsmooth": {**fast, "to compile": 0.0}}},
+    }
+    found = orbits.figures(section)
+    assert found["orbit W1: times scipy, every state"] == pytest.approx(200)
+    assert found["branch of four legs: points a second"] == pytest.approx(150)
+    assert set(found) <= set(orbits.TARGETS)
+    assert "| W1 | scipy DOP853, every state, 1e-13 | 200 |" in orbits.markdown(
+        section, report.table
+    )

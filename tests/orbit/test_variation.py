@@ -280,6 +280,10 @@ def test_bad_input_is_refused_in_words() -> None:
         ns.sensitivity("run")  # type: ignore[arg-type]
     with pytest.raises(ns.PointError, match="2 numbers"):
         ns.vjp(run, [1.0, 2.0, 3.0])
+    with pytest.raises(ns.PointError, match=r"2 numbers, finite ones, received \[nan"):
+        ns.vjp(run, [np.nan, 2.0])
+    with pytest.raises(ns.ParameterError, match="received 3"):
+        ns.sensitivity(run, wrt=3)  # type: ignore[arg-type]
     with pytest.raises(ns.DefinitionError):
         ns.gradient(run, ca.SX.sym("stranger"))
     assert ns.sensitivity(run, wrt="r").dx_dp.shape == (2, 1)

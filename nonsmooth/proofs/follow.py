@@ -240,6 +240,11 @@ class Follower:
     def _advance(self, made: Step, hit: tuple[int, arb] | None, t_end: arb) -> int | None:
         mode = self.now
         time = arb(made.h) if hit is None else hit[1]
+        if hit is not None and not self.t + time <= t_end:
+            name = mode.watches[hit[0]].name
+            raise UnprovenError(
+                f"whether {name} is met before the end is undecided: at t in {(self.t + time).str(8)}"
+            )
         if hit is None and (t_end - self.t) <= made.h:
             time = t_end - self.t  # the end itself, also where it is no double
         if hit is None:

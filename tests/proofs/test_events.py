@@ -156,3 +156,11 @@ def test_a_jump_keeps_a_block_on_its_belt_where_it_leaves_the_surface_alone():
     orbit = ns.certify_orbit(belt, [0, "0.25", 1, 0], t_end="1.75")
     assert orbit.proven and orbit.itinerary == "so"
     assert holds(orbit.end["x"], mpmath.mpf("0.4375"))
+
+
+def test_an_event_that_some_orbits_meet_after_the_end_is_not_claimed():
+    """Starts from -0.4 to -0.1: back to -1 at 0, which is met again after 1, from 1.1 to 1.4."""
+    clock = ns.FilippovSystem([x], field=[1], resets=[ns.Reset(x, [-1], 1, "tick")])
+    for end, proven, ticks in (("1.05", True, 1), ("1.3", False, 1), ("1.5", True, 2)):
+        orbit = ns.certify_orbit(clock, [("-0.4", "-0.1")], t_end=end)
+        assert orbit.proven == proven and len(orbit.events) == ticks, orbit

@@ -184,7 +184,9 @@ class Scaling:
     time : float
         T in seconds: the inverse of the natural frequency of the normal spring.
     convention : {"length", "speed"}
-        Which of the two consistent scalings (see the module's text).
+        Which of the two consistent scalings, with the radius R: ``"length"`` measures lengths in R, so
+        speeds in R/T and spins in 1/T; ``"speed"`` measures speeds in R/(1 s), so spins in rad/s and
+        lengths in R T/(1 s).
 
     Examples
     --------

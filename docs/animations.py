@@ -129,7 +129,7 @@ ANIMATIONS = (
 )
 
 
-def write(animation: Animation, folder: Path, count: int = 60) -> list[Path]:
+def write(animation: Animation, folder: Path, count: int = 40) -> list[Path]:
     """Write the moving picture as WebP and its last moment as PNG.
 
     Returns
@@ -139,7 +139,7 @@ def write(animation: Animation, folder: Path, count: int = 60) -> list[Path]:
     images = [_image(figure) for figure in animation.frames(count)]
     folder.mkdir(parents=True, exist_ok=True)
     moving, still = (folder / f"{animation.name}.{kind}" for kind in ("webp", "png"))
-    durations = [70] * (len(images) - 1) + [1500]
+    durations = [100] * (len(images) - 1) + [1500]
     images[0].save(moving, save_all=True, append_images=images[1:], duration=durations, loop=0)
     images[-1].save(still)
     return [moving, still]

@@ -10,6 +10,7 @@ import nonsmooth as ns
 from nonsmooth.__main__ import main
 from nonsmooth.local.two_folds.flights import has_diabolo
 from nonsmooth.local.two_folds.reduced_flow import eigenlines, orbit, sectors
+from nonsmooth.plot.offline_page import WEB
 from nonsmooth.plot.two_fold_atlas import CASES, REACH, SIGMA
 from tests.browser import WIDTHS
 
@@ -251,6 +252,40 @@ def test_the_point_is_dragged(browser, page, width):
     assert shown(browser)["label"] == "Class VV-F"
 
 
+FINGER = """
+const at = (id) => document.querySelector(id).getBoundingClientRect();
+const [dot, frame] = [at("#map .handle .dot"), at("#map .frame")];
+return [dot.x + dot.width / 2, dot.y + dot.height / 2, frame.width];
+"""
+
+
+@pytest.mark.browser
+def test_a_finger_drags_the_point_and_beside_it_scrolls_the_page(browser, page):
+    def touch(kind, *points):
+        where = [dict(x=x, y=y) for x, y in points]
+        options = dict(type=f"touch{kind}", touchPoints=where)
+        browser.driver.execute_cdp_cmd("Input.dispatchTouchEvent", options)
+
+    def swipe(start, by):
+        touch("Start", start)
+        for k in range(1, 9):
+            touch("Move", (start[0] + by[0] * k / 8, start[1] + by[1] * k / 8))
+        touch("End")
+
+    def numbers():
+        return [float(v) for v in shown(browser)["hash"].partition("nu=")[2].split(",")]
+
+    browser.open(page, 390, hash="folds=VV&nu=0,0")
+    browser.run("document.getElementById('map').scrollIntoView({block: 'center'})")
+    x, y, width = browser.run(FINGER)
+    swipe((x, y), (60, 0))
+    assert numbers() == pytest.approx([60 * 6 / width, 0], abs=0.1)
+    moved, before = numbers(), browser.run("return window.scrollY")
+    swipe((x - 90, y + 80), (0, -60))
+    assert numbers() == moved
+    assert browser.run("return window.scrollY") > before
+
+
 @pytest.mark.browser
 def test_dark_palette_is_respected(browser, page):
     ground = "return getComputedStyle(document.body).backgroundColor.match(/\\d+/g).map(Number)"
@@ -260,6 +295,33 @@ def test_dark_palette_is_respected(browser, page):
         browser.open(page)
         light[scheme] = sum(browser.run(ground)) / 3
     assert light["light"] > 230 and light["dark"] < 60
+
+
+def luminance(colour):
+    """Relative luminance of WCAG 2.1."""
+    parts = np.array([int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)])
+    linear = np.where(parts <= 0.03928, parts / 12.92, ((parts + 0.055) / 1.055) ** 2.4)
+    return float(linear @ (0.2126, 0.7152, 0.0722))
+
+
+def contrast(one, other):
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+@pytest.mark.parametrize("palette", [0, 1], ids=["light", "dark"])
+def test_words_and_lines_stand_out_from_what_is_behind_them(palette):
+    text = (WEB / "page.css").read_text(encoding="utf-8")
+    root = re.findall(r":root \{(.*?)\}", text, re.DOTALL)[palette]
+    colours = dict(re.findall(r"--([\w-]+): (#\w{6});", root))
+    for word in ("ink", "soft", "accent"):
+        assert contrast(colours[word], colours["ground"]) >= 4.5
+        assert contrast(colours[word], colours["panel"]) >= 4.5
+    tints = [colours[f"tint-{where}"] for where in ("crossing", "attracting", "repelling")]
+    for line in ("above", "below", "canard", "faux", "ink"):
+        assert min(contrast(colours[line], tint) for tint in tints) >= 3.0, line
+    for where in ("attracting", "repelling"):
+        assert contrast(colours[where], colours[f"tint-{where}"]) >= 3.0
 
 
 def test_page_loads_nothing_and_says_so_to_the_browser(page):

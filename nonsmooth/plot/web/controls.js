@@ -214,6 +214,8 @@ const Page = (() => {
     plane.element.addEventListener("pointermove", (event) => {
       if (held) set(clamp(plane.underPointer(event)));
     });
+    // touch-action is not heeded inside SVG everywhere: a finger on the point must not scroll
+    handle.addEventListener("touchstart", (event) => event.preventDefault(), { passive: false });
     plane.element.addEventListener("click", (event) => {
       if (!handle.contains(event.target)) set(clamp(plane.underPointer(event)));
     });

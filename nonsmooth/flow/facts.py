@@ -87,6 +87,10 @@ AT_ONCE = 40  # events at one instant
 REACHED = 0.1
 LEFT = 1e-6
 
+#: Coefficients of a series grow as the inverse time to a set to their order: it is reached before they
+#: are larger than this.
+OVERFLOW = 1e280
+
 #: Kinds of events, by number in ensembles and in C.
 KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
 

@@ -127,11 +127,8 @@ class Coupled:
 
     def heights_at(self, x: Array, p: Array) -> Array:
         """Switching functions and gaps (m,) at an extended state."""
-        return self._heights.copied(x, p)[0].ravel()
-
-    @cached_property
-    def _heights(self) -> Evaluator:
-        return Evaluator(self.system.function("heights", lambda: [self.heights]))
+        build = lambda: Evaluator(self.system.function("heights", lambda: [self.heights]))
+        return self.system.cached("heights at", build).copied(x, p)[0].ravel()
 
     def sliding(self, mode: str) -> list[int]:
         """Surfaces that slide and contacts that are closed, with multipliers that are unknown."""
@@ -171,11 +168,12 @@ class Coupled:
         return (*result, *[Guard("branch", first, 0, "stability of sliding")] * branches)
 
     def _guards_of_set(self, i: int, letter: str) -> list[Guard]:
-        """Those of the set that begins with a switching function; none with the others."""
+        """Those of the set that begins with a switching function."""
         if i != self.system.set_of[i][0] or letter == "i":
             return []
-        kinds = ["near"] if letter != "s" else ["slip", *["near"] * self.scaled[i]]
-        return [Guard(kind, i, 0, self.system.surface_names[i]) for kind in kinds]
+        near = [Guard("near", i, 0, name := self.system.surface_names[i])]
+        slip = Guard("slip", i, 0, f"lambda{name[1:]}")
+        return [slip, *near * self.scaled[i]] if letter == "s" else near
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:

@@ -71,8 +71,9 @@ class Direction:
                 self.radius = largest * float(np.linalg.norm(h / largest))
             own, root = self.h, self._root
             own[:, k] = h / self.radius
-            square = float((own[:, : k + 1] * own[:, k::-1]).sum())
-            root[k] = 0.5 * (square - root[1:k] @ root[k - 1 : 0 : -1]) if k else 1.0
+            # Along a line the products are those of the root, exactly so along an axis.
+            curved = sum(_inner(row, k) for row in own) - _inner(root, k)
+            root[k] = float(own[:, 0] @ own[:, k]) + 0.5 * curved if k else 1.0
             self.u[:, k] = own[:, k] - self.u[:, :k] @ root[k:0:-1]
         return self.u[:, k]
 
@@ -176,7 +177,7 @@ class MultiplierSeries:
                 u, g = self.held[own, 0], rates[own]
                 size = np.abs(u) @ (np.abs(g) + np.abs(self._rates[own]).sum(axis=1))
                 rate = float(u @ g)
-                radius[1] = rate if rate > _STILL * size else 0.0
+                radius[1] = rate if abs(rate) > _STILL * size else 0.0
             return
         slides, n = len(self.sliding), self._rates.shape[1]
         rows = [*self.sliding, *[i for own in self._leaving for i in own]]
@@ -233,6 +234,11 @@ class MultiplierSeries:
         pairs = zip(coupled.system.sets, self.limits, strict=True)
         off = self._off
         return np.array([off[s].radius if s in off else abs(limit[0]) for s, limit in pairs])
+
+
+def _inner(row: Array, k: int) -> float:
+    """Coefficient k of a square, without its first and last products."""
+    return float(row[1:k] @ row[k - 1 : 0 : -1]) if k > 1 else 0.0
 
 
 def product(a: Array, b: Array) -> Array:

@@ -261,3 +261,26 @@ def test_friction_brings_two_motions_closer(one, two, mu, eta):
     dx, dv, dw, _ = np.split(runs[0](t) - runs[1](t), 4, axis=1)
     distance = (dv**2).sum(axis=1) + 0.4 * (dw**2).sum(axis=1) + eta**2 * (dx**2).sum(axis=1)
     assert np.diff(distance).max() < 1e-9
+
+
+@pytest.mark.parametrize(
+    ("v", "w", "itinerary"),
+    [
+        # |h| falls to where the series' coefficients are too large for numbers before it is rounding
+        (
+            (-2.2179224628908987, -1.0571153941954394),
+            (-0.2217284807232749, 0.7005197913250095),
+            "* s *",
+        ),
+        # and begins there
+        (
+            (-0.05658483122083673, -0.01184761529368745),
+            (0.0565848312208363, 0.0118476152937),
+            "s *",
+        ),
+    ],
+)
+def test_a_slip_next_to_rounding_is_none(v, w, itinerary):
+    p = {"mu": 1.4326846432846805, "d1": 0.23, "d2": 0.26, "eta": 0.0868, "G": 1e-3, "k": 0.6}
+    run = _ball(v, w, tol=1e-14, p=p)
+    assert run.status == ns.Status.STOPPED and run.itinerary == itinerary

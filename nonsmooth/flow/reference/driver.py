@@ -374,8 +374,9 @@ class Driver(Bookkeeping):
         scale = rounding_scale(np.abs(gradient), self.x, self.options.size)
         near = {i for i in range(self.system.surface_count) if abs(h[i]) <= ON_SURFACE * scale[i]}
         for members in self.system.sets:
-            if not near.issuperset(members) or mode[members[0]] in "bli":
-                near -= {*members}
+            near -= {*members}
+            if mode[members[0]] not in "bli" and sets.met(self, mode, members, h):
+                near |= {*members}
         near |= {i for i, c in enumerate(mode) if c in "sc"}
         return sorted(near | certain | set(impacts.resting(self)))
 

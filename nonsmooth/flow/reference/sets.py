@@ -15,11 +15,14 @@ import numpy as np
 from ...model import Array, FilippovSystem, Guard, multiplier_enters
 from ...model.frozen import field_at, frozen
 from ...model.multiplier_series import unit
-from ..facts import EPSILON, LEFT, REACHED, VANISHES
+from ..facts import EPSILON, LEFT, OVERFLOW, REACHED, VANISHES
 from .modes import rounding_scale, tolerances
 
 if TYPE_CHECKING:
     from .driver import Driver
+
+#: Only where |h| is this much of its terms its time to zero is asked for.
+CLOSE = 1e-8
 
 
 # reaching ------------------------------------------------------------------------------------------
@@ -37,9 +40,10 @@ def near(driver: Driver, guard: Guard) -> None:
     r = float(np.linalg.norm(h))
     at_floor = r <= VANISHES * scale
     hits = law.attracts
+    dt = law.time_left(h) if hits else law.straight(h)
+    at_floor = at_floor or dt < shortest(driver)
     if not hits and not at_floor:
         return
-    dt = law.time_left(h) if hits else law.straight(h)
     if not (0.0 < dt < np.inf):
         if not (hits and at_floor):
             return
@@ -65,6 +69,22 @@ def near(driver: Driver, guard: Guard) -> None:
     driver.x = driver.surfaces.project(driver.x, p, active)
     driver.record.correct(driver.x)
     driver.go_on(active, {}, before, guard.name)
+
+
+def shortest(driver: Driver) -> float:
+    """Time to a set below which coefficients of series are too large for numbers."""
+    return float(OVERFLOW ** (-1.0 / driver.options.order))
+
+
+def met(driver: Driver, mode: str, members: tuple[int, ...], h: Array) -> bool:
+    """Whether a state is on a set, or as close as no series can begin."""
+    own = list(members)
+    r, scale = float(np.linalg.norm(h[own])), scale_of(driver, own)
+    if r <= VANISHES * scale or r > CLOSE * scale:
+        return r <= VANISHES * scale
+    law = frozen(driver.coupled, mode, driver.x, driver.unknowns, driver.p, own)
+    speed = float(np.linalg.norm(law.a) + np.linalg.norm(law.m))
+    return r < shortest(driver) * speed
 
 
 def idle(system: FilippovSystem, p: Array) -> set[tuple[int, ...]]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from .claims import READ, Claim
+from .claims import NOT_CHECKABLE, READ, Claim
 from .mathematics import typeset
 from .pictures import Picture
 
@@ -85,7 +85,11 @@ def verdicts(claims: Sequence[Claim]) -> str:
     if not was_read(claims):
         counts = Counter(c.basis for c in claims)
         parts = ", ".join(f"{n} {basis}" for basis, n in counts.items())
-        return f"{len(claims)} statements: {parts}; {sum(c.holds for c in claims)} hold"
+        ends = Counter(
+            NOT_CHECKABLE if c.verdict == NOT_CHECKABLE else "hold" for c in claims if c.holds
+        )
+        results = ", ".join(f"{n} {end}" for end, n in ends.items())
+        return f"{len(claims)} statements: {parts}; {results}"
     counts = Counter(c.verdict for c in claims)
     return f"{len(claims)} claims: " + ", ".join(f"{n} {v}" for v, n in counts.items())
 

@@ -200,10 +200,10 @@
         .join(" "),
     );
     const words = `the end, slip to ${text(points.at(-1).slip, 2)}`;
-    const middle = {
-      x: box.x + box.width / 2,
+    const below = {
+      x: box.x + box.width,
       y: box.y + box.height + 15,
-      "text-anchor": "middle",
+      "text-anchor": "end",
     };
     return [
       svg("rect", { ...box, class: "inset" }),
@@ -213,7 +213,7 @@
         fill: "none",
         class: `phase end phase-${NAMES[mode]}`,
       }),
-      svg("text", middle, words),
+      svg("text", below, words),
     ];
   }
 

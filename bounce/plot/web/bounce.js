@@ -204,6 +204,7 @@
       x: box.x + box.width,
       y: box.y + box.height + 15,
       "text-anchor": "end",
+      class: "halo",
     };
     return [
       svg("rect", { ...box, class: "inset" }),

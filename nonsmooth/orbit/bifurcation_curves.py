@@ -33,6 +33,16 @@ _NAMES = {
 }
 
 
+_DEGENERATE = (
+    "two-fold",
+    "a second touch",
+    "touch of higher order",
+    "fold with contact",
+    "period doubling with contact",
+    "cusp with the other sliding bifurcation",
+)
+
+
 @dataclass(frozen=True, eq=False)
 class CodimensionTwo:
     """A point of codimension two on a curve of bifurcations.
@@ -168,6 +178,9 @@ class EventCurve(Curve):
         tangent = self.base.turned(point.u, point.tangent)
         return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
 
+    def ends(self, name: str) -> bool:
+        return self.base.ends_curve(name)
+
     def tests(self, point: Point) -> Mapping[str, float]:
         """Other events that happen at the same time, and what degenerates."""
         u = point.u
@@ -177,8 +190,10 @@ class EventCurve(Curve):
             found["cusp"] = self._quadratic(u)
         else:
             found["fold"] = float(np.linalg.det(self._square(u)))
-        found.update(self.base.codimension_two(self.name, u))
-        return found
+        further = self.base.codimension_two(self.name, u)
+        if "two-fold" in further:  # the event before is tangent there too
+            found = {k: v for k, v in found.items() if not k.startswith("transversality")}
+        return found | dict(further)
 
     def _quadratic(self, u: Array) -> float:
         """Quadratic coefficient of a fold, by the change of the Jacobian along its null vector."""
@@ -268,7 +283,7 @@ def continue_bifurcation(
         parameters=names,
         values=np.array([u[k:] for u in points]),
         points=tuple(points),
-        special=tuple(_special(curve, zero, k) for zero in zeros),
+        special=tuple(_special(curve, zero, k, event.kind) for zero in zeros),
         ends=(end_of(halves[0]), end_of(halves[-1])),
         curve=curve,
     )
@@ -326,10 +341,12 @@ def _on_curve(curve: Curve, start: Array, kind: str) -> Array:
     return found
 
 
-def _special(curve: EventCurve | ConnectionCurve, zero: Zero, k: int) -> CodimensionTwo:
+def _special(curve: EventCurve | ConnectionCurve, zero: Zero, k: int, event: str) -> CodimensionTwo:
     own, other = (curve.base.named(name, zero.point.u) for name in (curve.name, zero.name))
     kind = _NAMES.get(frozenset({own, other}), other)
-    if kind == other and zero.name in curve.base.tests(zero.point):
+    if zero.name in _DEGENERATE:
+        kind = f"{event} with {other}"
+    elif kind == other and zero.name in curve.base.tests(zero.point):
         kind = f"{own} with {other}"
     if kind == "fold-Hopf" and curve.base.double_zero(zero.point.u):
         kind = "Bogdanov-Takens"

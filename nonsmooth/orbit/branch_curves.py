@@ -65,6 +65,10 @@ class BranchCurve(Curve):
         """Further functions whose zeros on a curve of events are of codimension two."""
         return {}
 
+    def ends_curve(self, name: str) -> bool:
+        """Whether a curve of events ends at a point of codimension two."""
+        return False
+
     def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
         """A test and its derivatives by the unknowns, where few of them matter; else None."""
         return None

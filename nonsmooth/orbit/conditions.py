@@ -16,7 +16,7 @@ import numpy as np
 from ..model import Array, Evaluator, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .boundary import BoundaryProblem, Evaluation
-from .guards import watch
+from .guards import Approach, watch
 from .legs import Leg
 from .multipliers import return_map
 
@@ -89,9 +89,9 @@ def condition_row(
         if condition.what == "start":
             before = problem.legs[i - 1]
             rows = _at_start(problem.system, i, problem.legs[i], before, x, q)
-        else:
-            rows = _interior(problem.system, i, problem.legs[i], x, duration, q)
-        return dict((test.name, v) for test, v in rows).get(condition.name, np.nan)
+            return dict((test.name, v) for test, v in rows).get(condition.name, np.nan)
+        values = minima(problem.system, problem.legs[i], condition, x, duration, q)
+        return min(values, key=abs, default=np.nan)  # the one that touches, not the least
 
     row, x = np.zeros(count + len(free)), starts[i]
     sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
@@ -199,10 +199,25 @@ def _interior(
         return []
     least: dict[Guard, float] = {}
     for near in watch(system, leg.mode, x, duration, p).approaches:
-        sign = -near.guard.side if near.guard.kind in ("stop", "reset") else 1
-        value = (sign or 1) * near.value
+        value = _signed(near)
         least[near.guard] = min(value, least.get(near.guard, np.inf))
     return [(Condition("interior", i, guard), value) for guard, value in least.items()]
+
+
+def _signed(near: Approach) -> float:
+    """A guard's extremum, positive as long as it is not passed."""
+    sign = -near.guard.side if near.guard.kind in ("stop", "reset") else 1
+    return (sign or 1) * near.value
+
+
+def minima(
+    system: FilippovSystem, leg: Leg, condition: Condition, x: Array, duration: float, p: Array
+) -> list[float]:
+    """Values of the guard of an interior condition at all its minima inside a leg."""
+    if duration <= 0.0:
+        return []
+    seen = watch(system, leg.mode, x, duration, p).approaches
+    return [_signed(near) for near in seen if near.guard == condition.guard]
 
 
 def touching(

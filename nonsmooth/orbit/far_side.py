@@ -84,7 +84,7 @@ def contact_maps(
     t = touching(system, leg, guard, x, duration, p)
     first = fly(system, leg, x, t, p)
     y = first.end[:n]
-    own, other, second = _contact(problem, leg, guard.index, guard.side, y, p)
+    own, other, second = contact_at(problem, leg, guard.index, guard.side, y, p)
     section = second["gradient of L1"]
     across = np.eye(n) - np.outer(own, section) / float(section @ own)
     maps = leg_maps(problem, at)
@@ -106,7 +106,7 @@ def contact_maps(
     return outside, outside @ contact
 
 
-def _contact(
+def contact_at(
     problem: BoundaryProblem, leg: Leg, surface: int, side: int, y: Array, p: Array
 ) -> tuple[Array, Array, dict[str, Any]]:
     """The field of a leg and the one across its surface at a point, and second Lie derivatives."""

@@ -20,6 +20,7 @@ from ..model import Array, NonsmoothError
 from .boundary import BoundaryProblem, Evaluation
 from .branch import BranchEnd, BranchEvent, FarSide
 from .branch_curves import BranchCurve
+from .codimension_two import ENDS, degenerate
 from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .connection_curves import homoclinic_end
 from .continuation import Departure, Point, Zero
@@ -212,6 +213,13 @@ class OrbitCurve(BranchCurve):
             return None
         p, unknowns = self.parameters_at(u), u[: self.problem.size]
         return condition_row(self.problem, unknowns, p, self.free, self.known[test])
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        at, p = self.evaluation(u), self.parameters_at(u)
+        return degenerate(self.problem, self.known.get(name), name, at, p)
+
+    def ends_curve(self, name: str) -> bool:
+        return name in ENDS
 
     def named(self, test: str, u: Array) -> str:
         if is_smooth(test) or test not in self.known:

@@ -1,11 +1,12 @@
-"""Bifurcations of equilibria in two parameters lie on curves known in closed form, and so do their
-points of codimension two."""
+"""Bifurcations in two parameters, of equilibria and of orbits, lie on curves known in closed form, and so do
+their points of codimension two."""
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import impact_oscillator, table
 
 x, y, z, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b"))
 BOX = [(-1, 1), (-1.5, 1)]
@@ -118,3 +119,71 @@ def test_bad_input(takens, change, error, words):
     given = {"event": takens.events[0], "parameters": ("a", "b"), "bounds": BOX} | change
     with pytest.raises(error, match=words):
         ns.continue_bifurcation(given.pop("event"), given.pop("parameters"), **given)
+
+
+# periodic orbits ------------------------------------------------------------------------------------
+
+
+def test_a_ball_on_a_table_folds_and_doubles_on_closed_forms():
+    """Holmes 1982: A = pi k and A^2 = (pi k)^2 + (2 (1 + r^2)/(1 + r)^2)^2 with k = (1 - r)/(1 + r)."""
+    orbit = ns.periodic_orbit(table(), [0.26, 3.1], t_start=0.64, itinerary=[("", "reset")])
+    for event in ns.continue_orbit(orbit, "A", bounds=(0.3, 1.2)).events:
+        curve = ns.continue_bifurcation(event, ("A", "r"), bounds=[(0.1, 2), (0.5, 0.9)])
+        A, r = curve.values.T
+        fold = np.pi * (1 - r) / (1 + r)
+        wanted = fold if event.kind == "fold" else np.hypot(fold, 2 * (1 + r * r) / (1 + r) ** 2)
+        assert np.abs(A - wanted).max() < 1e-11 and len(curve) > 10
+        assert curve.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+
+
+def test_grazing_of_a_wall_is_a_resonance_curve():
+    w, z = 0.8, 0.05
+    system = impact_oscillator()
+    at = {"F": 0.35}
+    rest = ns.simulate(system, [0, 0], 300, parameters=at).x[-1]
+    run = ns.simulate(system, rest, 360, t_start=300, parameters=at)
+    orbit = ns.periodic_orbit(system, run, parameters=at)
+    (event,) = ns.continue_orbit(orbit, "F", bounds=(0.33, 0.4)).events
+    curve = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)])
+    F, z = curve.values.T
+    assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
+
+
+def test_strong_resonances_on_a_curve_of_neimark_sacker_points():
+    """x' = (a + i b) x at the origin of a forced plane: the angle is 2 pi b."""
+    t, b = ca.SX.sym("t"), ca.SX.sym("b")
+    pull = (x * x + y * y) * (1 + 0.5 * ca.cos(t))
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[a * x - b * y - x * pull, b * x + a * y - y * pull],
+        time=t,
+        parameters={a: -0.1, b: 0.2},
+    )
+    orbit = ns.periodic_orbit(system, [0.001, 0.001], period=2 * np.pi)
+    (event,) = ns.continue_orbit(orbit, "a", bounds=(-0.2, 0.2)).events
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=[(-0.2, 0.2), (0.12, 0.45)])
+    assert np.abs(curve.values[:, 0]).max() < 1e-12
+    found = {point.kind: point.values[1] for point in curve.special}
+    assert set(found) == {"1:4 resonance", "1:3 resonance"}
+    assert abs(found["1:4 resonance"] - 1 / 4) < 1e-11
+    assert abs(found["1:3 resonance"] - 1 / 3) < 1e-11
+
+
+def test_a_grazing_meets_a_two_fold():
+    """A circle touches the surface x = -d, on which the other field pulls with u - y: up to u = 0."""
+    d, u = ca.SX.sym("d"), ca.SX.sym("u")
+    r = ca.sqrt(x * x + y * y)
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=x + d,
+        above=[x * (1 - r) - y, y * (1 - r) + x],
+        below=[u - y, 1],
+        parameters={d: 1.2, u: 0.4},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.9, 0.0], 40.0))
+    (event,) = ns.continue_orbit(orbit, "d", bounds=(0.99, 1.3)).events
+    curve = ns.continue_bifurcation(event, ("d", "u"), bounds=[(0.5, 1.5), (-0.4, 0.6)])
+    assert np.abs(curve.values[:, 0] - 1).max() < 1e-12
+    (special,) = curve.special
+    assert special.kind == "grazing-sliding with two-fold"
+    assert np.abs(special.values - [1, 0]).max() < 1e-11

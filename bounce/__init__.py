@@ -36,6 +36,7 @@ from .contact.models import (
     NormalKelvinVoigt,
     Tsuji,
 )
+from .contact.space import Contact3D
 from .errors import EnergyWarning, LandingError, LiftOffError, ModelError, UnknownNameError
 from .maps.dividing import DividingCurve, critical_eta, dividing_curve
 from .maps.dividing_surface import DividingSurface, dividing_surface
@@ -46,6 +47,7 @@ from .maps.results import BounceStatus, LiftOffs
 from .shot.certify import BounceProof, certify
 from .shot.sensitivity import Sensitivity, sensitivity
 from .shot.single import Shot, State, simulate
+from .shot.space import Shot3D, State3D
 from .units import BALLS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
@@ -56,6 +58,7 @@ __all__ = [
     "Ball",
     "BounceProof",
     "BounceStatus",
+    "Contact3D",
     "ContactModel",
     "Coulomb",
     "Dahl",
@@ -83,7 +86,9 @@ __all__ = [
     "Scaling",
     "Sensitivity",
     "Shot",
+    "Shot3D",
     "State",
+    "State3D",
     "Stribeck",
     "Tsuji",
     "UnknownNameError",

@@ -115,7 +115,7 @@ TASKS = {
         "One bounce",
         "From touch-down to lift-off: slip, rolling, forces, and derivatives of the lift-off.",
         "bounce",
-        "simulate Shot shot.Phase shot.Forces State BounceStatus sensitivity Sensitivity certify "
+        "simulate Shot Shot3D shot.Phase shot.Forces State State3D BounceStatus sensitivity Sensitivity certify "
         "BounceProof",
     ),
     "bounce_models": _task(
@@ -123,7 +123,7 @@ TASKS = {
         "A contact model is a normal and a tangential force; friction is one of the laws below. "
         "[Write your own contact model](../contact_model.md) shows how.",
         "bounce",
-        "ContactModel KelvinVoigt NormalKelvinVoigt DepthDampedKelvinVoigt Hertz HuntCrossley Tsuji "
+        "ContactModel Contact3D KelvinVoigt NormalKelvinVoigt DepthDampedKelvinVoigt Hertz HuntCrossley Tsuji "
         "KuwabaraKono Maxwell GeneralisedContact contact.Conditions contact.Condition FrictionLaw "
         "Coulomb Stribeck ExponentialDecay Viscous LuGre Dahl",
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol
 
@@ -23,6 +23,7 @@ class Surface(Protocol):
     """What the equations ask of a contact model; ``ContactModel`` says what each thing means."""
 
     extra_states: ClassVar[Mapping[str, float]]
+    vector_states: ClassVar[tuple[str, ...]]
     values: dict[str, float]
     friction: FrictionLaw
 
@@ -40,6 +41,14 @@ class Surface(Protocol):
 
     def stored_energy(self, s: Names, p: Names) -> Any: ...
 
+
+class Blueprint(Protocol):
+    """What equations of motion are derived from: a contact model, in the plane or in 3-D."""
+
+    values: dict[str, float]
+
+    def derived(self) -> Equations: ...
+
     def __hash__(self) -> int: ...
 
 
@@ -52,35 +61,45 @@ class Equations:
         States: the ball's five, then the model's, then the friction law's.
     start : dict
         Values of the further states at touch-down.
+    centre, velocity : tuple of int
+        Which states are the place of the centre, and which are its rates.
+    along_the_ground : frozenset of str
+        The states of the motion along the ground and of the spin.
+    steps_off_a_root : bool
+        Whether a run cannot begin where the load is zero as a power is.
     """
+
+    steps_off_a_root = False
+    centre: tuple[int, ...] = (0, 2)
+    velocity: tuple[int, ...] = (1, 3)
+    along_the_ground = frozenset({"x", "xdot", "omega"})
 
     def __init__(self, model: Surface):
         self.model = model
-        further = {**model.extra_states, **model.friction.extra_states}
-        who = type(model).__name__
-        self.start = {
-            name: number(value, f"{who}: extra_states: {name}", ModelError)
-            for name, value in further.items()
-        }
-        self.names = (*STATES, *self.start)
-        if len(set(self.names)) < len(self.names):
-            raise ModelError(
-                f"{type(model).__name__}: extra_states: expected names other than {STATES} and those "
-                f"of the friction law, received {self.names}."
-            )
-        self.x = {name: ca.SX.sym(name) for name in self.names}
-        self.p = {name: ca.SX.sym(name) for name in model.values}
-        clash = sorted(set(self.x) & set(self.p))
-        if clash:
-            raise ModelError(
-                f"{type(model).__name__}: expected states and parameters with different names, "
-                f"received {clash} as both."
-            )
+        self._symbols(STATES, further_states(model), model.values)
         self.contact_speed = self.x["xdot"] + self.x["omega"]
         self._slip, self._sign = ca.SX.sym("slip"), ca.SX.sym("sign")
         self.s = Names("state", {**self.x, "slip": self._slip})
         self.q = Names("parameter", self.p)
         self._forces()
+
+    def _symbols(
+        self, own: tuple[str, ...], start: dict[str, float], parameters: Iterable[str]
+    ) -> None:
+        who = type(self.model).__name__
+        self.start, self.names = start, (*own, *start)
+        if len(set(self.names)) < len(self.names):
+            raise ModelError(
+                f"{who}: extra_states: expected names other than {own} and those of the friction law, "
+                f"received {self.names}."
+            )
+        self.x = {name: ca.SX.sym(name) for name in self.names}
+        self.p = {name: ca.SX.sym(name) for name in parameters}
+        clash = sorted(set(self.x) & set(self.p))
+        if clash:
+            raise ModelError(
+                f"{who}: expected states and parameters with different names, received {clash} as both."
+            )
 
     def _forces(self) -> None:
         model, s, q = self.model, self.s, self.q
@@ -120,7 +139,7 @@ class Equations:
     def _scalar(self, what: str, value: Any) -> ca.SX:
         try:
             result = ca.SX(value)
-            if result.shape == (1, 1) and not _has_nan(result):
+            if result.shape == (1, 1) and not has_nan(result):
                 return ca.densify(result)
             received = f"shape {result.shape}" if result.shape != (1, 1) else f"{result}"
         except (TypeError, ValueError, NotImplementedError):
@@ -206,13 +225,40 @@ class Equations:
 
     # functions ---------------------------------------------------------------------------------
 
+    def kinetic_along(self) -> ca.SX:
+        """Kinetic energy per mass of the motion along the ground and of the spin."""
+        return 0.5 * (self.s.xdot**2 + self.q.inertia * self.s.omega**2)
+
+    def height(self) -> tuple[ca.SX, ca.SX]:
+        """Scaled gravity times the height of the place along the ground, and over it."""
+        return (
+            self.q.G * ca.sin(self.q.slope) * self.s.x,
+            self.q.G * ca.cos(self.q.slope) * self.s.y,
+        )
+
+    def energies(self) -> ca.Function:
+        """Return (states, parameters) -> the two energies of :func:`energy_function`."""
+        climbed, over = self.height()
+        along, normal = self.kinetic_along() + climbed, 0.5 * self.s.ydot**2 + over
+        apart = not self.inputs(self.normal) & self.along_the_ground
+        return self.function([along + normal, normal if apart else along + normal])
+
     def function(self, outputs: list[ca.SX]) -> ca.Function:
         """Return the function (states, parameters) -> outputs."""
         x, p = ca.vertcat(*self.x.values()), ca.vertcat(*self.p.values())
         return ca.Function("outputs", [x, p], outputs)
 
 
-def _has_nan(expression: ca.SX) -> bool:
+def further_states(model: Surface) -> dict[str, float]:
+    """Return the states of a model and its friction law besides the ball's, at touch-down."""
+    who = type(model).__name__
+    return {
+        name: number(value, f"{who}: extra_states: {name}", ModelError)
+        for name, value in {**model.extra_states, **model.friction.extra_states}.items()
+    }
+
+
+def has_nan(expression: ca.SX) -> bool:
     """Whether a constant in it is NaN, as ``math.sin`` of a symbol is."""
     tape = ca.Function("tape", ca.symvar(expression), [expression])
     return any(
@@ -222,25 +268,25 @@ def _has_nan(expression: ca.SX) -> bool:
 
 
 @lru_cache(maxsize=64)
-def equations(blueprint: Surface) -> Equations:
+def equations(blueprint: Blueprint) -> Equations:
     """Return the equations of a blueprint (see ``ContactModel.blueprint``)."""
-    return Equations(blueprint)
+    return blueprint.derived()
 
 
 @lru_cache(maxsize=64)
-def contact_system(blueprint: Surface) -> ns.FilippovSystem:
+def contact_system(blueprint: Blueprint) -> ns.FilippovSystem:
     """Return the contact phase of a blueprint; parameters have no defaults."""
     return equations(blueprint).build()
 
 
 @lru_cache(maxsize=64)
-def free_system(blueprint: Surface) -> ns.FilippovSystem:
+def free_system(blueprint: Blueprint) -> ns.FilippovSystem:
     """Return the frictionless phase of a blueprint; parameters have no defaults."""
     return equations(blueprint).build_free()
 
 
 @lru_cache(maxsize=64)
-def forces_function(blueprint: Surface) -> ca.Function:
+def forces_function(blueprint: Blueprint) -> ca.Function:
     """Return (states, parameters) -> load, and friction in forward slip, reverse slip and rolling."""
     eq, system = equations(blueprint), contact_system(blueprint)
     spin = STATES.index("omega")
@@ -249,28 +295,23 @@ def forces_function(blueprint: Surface) -> ca.Function:
 
 
 @lru_cache(maxsize=64)
-def load_inputs(blueprint: Surface) -> frozenset[str]:
+def load_inputs(blueprint: Blueprint) -> frozenset[str]:
     """Return the states and parameters on which the time of the first load depends."""
     eq = equations(blueprint)
     return eq.inputs(eq.lift_off)
 
 
 @lru_cache(maxsize=64)
-def energy_function(blueprint: Surface) -> ca.Function:
+def energy_function(blueprint: Blueprint) -> ca.Function:
     """Return (states, parameters) -> energy per mass, of the ball and of its motion along y.
 
     Kinetic and gravitational; of the ball twice where its motion along y depends on the other.
     """
-    eq = equations(blueprint)
-    s, q = eq.s, eq.q
-    along = 0.5 * (s.xdot**2 + q.inertia * s.omega**2) + q.G * ca.sin(q.slope) * s.x
-    normal = 0.5 * s.ydot**2 + q.G * ca.cos(q.slope) * s.y
-    apart = not eq.inputs(eq.normal) & {"x", "xdot", "omega"}
-    return eq.function([along + normal, normal if apart else along + normal])
+    return equations(blueprint).energies()
 
 
 @lru_cache(maxsize=64)
-def touch_down_function(blueprint: Surface) -> ca.Function:
+def touch_down_function(blueprint: Blueprint) -> ca.Function:
     """Return (states, parameters) -> lift-off function, its rate, field without friction, its rate."""
     eq, system = equations(blueprint), free_system(blueprint)
     field = system.field("")

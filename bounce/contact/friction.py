@@ -29,6 +29,8 @@ class FrictionLaw(Parametrised, ABC):
     """
 
     extra_states: ClassVar[Mapping[str, float]] = {}
+    #: Those of ``extra_states`` that have a component along each direction of the ground in 3-D.
+    vector_states: ClassVar[tuple[str, ...]] = ()
 
     @abstractmethod
     def coefficient(self, s: Names, p: Names) -> Expression:
@@ -37,6 +39,16 @@ class FrictionLaw(Parametrised, ABC):
     def traction(self, s: Names, p: Names, sign: Expression) -> Expression:
         """Return the tangential force per unit of load where sgn(H) is ``sign``."""
         return -sign * self.coefficient(s, p)
+
+    def vector_traction(
+        self, s: Names, p: Names, direction: Expression, coefficient: Expression
+    ) -> Expression:
+        """Return the tangential force per unit of load of a set-valued law in 3-D.
+
+        ``direction`` is the slip's, or inside its ball while rolling; ``coefficient`` that of the
+        contact model.
+        """
+        return -coefficient * direction
 
     def extra_rates(self, s: Names, p: Names, sign: Expression) -> dict[str, Expression]:
         """Return the rates of ``extra_states`` where sgn(H) is ``sign``."""
@@ -80,7 +92,7 @@ class Stribeck(FrictionLaw):
     limits = dict(mu_kinetic="> 0", stribeck_speed="> 0")
 
     def coefficient(self, s: Names, p: Names) -> Expression:
-        return p.mu_kinetic + (p.mu - p.mu_kinetic) * ca.exp(-((s.slip / p.stribeck_speed) ** 2))
+        return p.mu_kinetic + (p.mu - p.mu_kinetic) * ca.exp(-(s.slip**2) / p.stribeck_speed**2)
 
 
 class ExponentialDecay(FrictionLaw):
@@ -115,6 +127,12 @@ class Viscous(FrictionLaw):
 
     def coefficient(self, s: Names, p: Names) -> Expression:
         return p.mu + p.viscosity * s.slip
+
+    def vector_traction(
+        self, s: Names, p: Names, direction: Expression, coefficient: Expression
+    ) -> Expression:
+        """Return the force with its viscous part in the slip itself, which is smooth at zero."""
+        return -(p.mu * direction + p.viscosity * (s.xdot + s.omega))
 
 
 class LuGre(FrictionLaw):
@@ -152,9 +170,10 @@ class LuGre(FrictionLaw):
         stribeck_speed="> 0",
     )
     extra_states = dict(bristle=0.0)
+    vector_states = ("bristle",)
 
     def coefficient(self, s: Names, p: Names) -> Expression:
-        return p.mu_kinetic + (p.mu - p.mu_kinetic) * ca.exp(-((s.slip / p.stribeck_speed) ** 2))
+        return p.mu_kinetic + (p.mu - p.mu_kinetic) * ca.exp(-(s.slip**2) / p.stribeck_speed**2)
 
     def extra_rates(self, s: Names, p: Names, sign: Expression) -> dict[str, Expression]:
         """Return the bristle's rate."""
@@ -182,6 +201,7 @@ class Dahl(FrictionLaw):
     parameters = dict(bristle_stiffness=None)
     limits = dict(mu="> 0", bristle_stiffness="> 0")
     extra_states = dict(bristle=0.0)
+    vector_states = ("bristle",)
 
     def coefficient(self, s: Names, p: Names) -> Expression:
         return p.mu

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
-from typing import Any, ClassVar, Literal, Self
+from typing import TYPE_CHECKING, Any, ClassVar, Literal, Self
 
 import casadi as ca
 
@@ -12,8 +12,11 @@ import nonsmooth as ns
 
 from ..errors import ModelError
 from ..parameters import Names, Parametrised
-from .equations import equations
+from .equations import Equations, equations
 from .friction import Coulomb, FrictionLaw
+
+if TYPE_CHECKING:
+    from .space import Contact3D
 
 Expression = Any
 LoadConvention = Literal["contact", "net"]
@@ -96,6 +99,8 @@ class ContactModel(Parametrised, ABC):
         mu=">= 0", G=">= 0", inertia="in (0, 1]", slope="in (-pi/2, pi/2)"
     )
     extra_states: ClassVar[Mapping[str, float]] = {}
+    #: Those of ``extra_states`` that have a component along each direction of the ground in 3-D.
+    vector_states: ClassVar[tuple[str, ...]] = ()
 
     convention: LoadConvention
     friction: FrictionLaw
@@ -208,6 +213,47 @@ class ContactModel(Parametrised, ABC):
         copy._set("friction", law)
         copy._set("values", dict.fromkeys(self.values, 0.0))
         return copy
+
+    def derived(self) -> Equations:
+        """Return its equations of motion in the plane; :func:`equations` keeps those of blueprints."""
+        return Equations(self)
+
+    def in_3d(
+        self,
+        *,
+        side_slope: float = 0.0,
+        friction_ratio: float | None = None,
+        grain: float | None = None,
+        drilling_radius: float | None = None,
+    ) -> Contact3D:
+        """Return the surface with both directions along the ground, for landings with side spin.
+
+        Parameters
+        ----------
+        side_slope, friction_ratio, grain, drilling_radius : float, optional
+            As :class:`Contact3D` takes them.
+
+        Returns
+        -------
+        Contact3D
+
+        Examples
+        --------
+        >>> import bounce
+        >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+        >>> shot = bounce.simulate(turf.in_3d(), [1.0, 0.0], -1.0, [0.2, 0.1])
+        >>> shot.itinerary
+        '* s *'
+        """
+        from .space import Contact3D
+
+        return Contact3D(
+            self,
+            side_slope=side_slope,
+            friction_ratio=friction_ratio,
+            grain=grain,
+            drilling_radius=drilling_radius,
+        )
 
     def _structure(self) -> tuple[Any, ...]:
         return (self.convention, self.friction._structure(), type(self.friction))

@@ -35,7 +35,7 @@ class _LinearTangential(ContactModel):
 
     def stored_energy(self, s: Names, p: Names) -> Expression:
         """Elastic energy of both springs."""
-        return 0.5 * p.eta**2 * s.x**2 + self._normal_energy(s, p)
+        return 0.5 * p.eta**2 * ca.sumsqr(s.x) + self._normal_energy(s, p)
 
 
 class KelvinVoigt(_LinearTangential):

@@ -157,7 +157,7 @@ class Batch:
             root, short, later, longest = self._rise(part.blueprint)
             going = self._going(part)
             over, later = (root | short) & going, later & going
-            self.states[over] = instant_later(self.states[over])
+            self.states[over] = instant_later(part.blueprint, self.states[over])
             for step in np.unique(longest[later]):
                 rows = np.flatnonzero(later & (longest == step))
                 self._fall(part.blueprint, rows, float(step), t_max, options)

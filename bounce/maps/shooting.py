@@ -84,7 +84,7 @@ class Shooting:
         """Time and state at which contact begins, from u = (xdot, omega) at touch-down."""
         extra = list(self.equations.start.values())
         start = [0.0, float(u[0]), 0.0, self.ydot, float(u[1]), *extra]
-        run, state = approach(self.blueprint, self.model.values, start, self.tol, self.t_max)
+        run, _, state = approach(self.blueprint, self.model.values, start, self.tol, self.t_max)
         return 0.0 if run is None else float(run.t[-1]), np.array(state)
 
     # with the itinerary fixed -------------------------------------------------------------------

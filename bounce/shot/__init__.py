@@ -1,5 +1,5 @@
 """One bounce: from touch-down to lift-off, and its derivatives."""
 
-from .single import Forces, Phase
+from .record import Forces, Phase
 
 __all__ = ["Forces", "Phase"]

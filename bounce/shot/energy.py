@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..contact.equations import energy_function
+from ..contact.equations import Blueprint, energy_function
 from ..contact.model import ContactModel
 
 Array = NDArray[np.float64]
@@ -22,13 +22,13 @@ _TOLERANCES = 1e3
 
 
 def gains(
-    blueprint: ContactModel, landing: Array, lift_off: Array, p: Array, tol: float
+    blueprint: Blueprint, landing: Array, lift_off: Array, p: Array, tol: float
 ) -> NDArray[np.bool_]:
     """Whether balls gained energy beyond the tolerance.
 
     Parameters
     ----------
-    blueprint : ContactModel
+    blueprint : ContactModel or Contact3D
     landing, lift_off : ndarray (n, m)
         States at touch-down, with y = 0, and at lift-off, in columns.
     p : ndarray (k, m)

@@ -15,8 +15,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..contact.equations import free_system, touch_down_function
-from ..contact.model import ContactModel
+from ..contact.equations import Blueprint, equations, free_system, touch_down_function
 from ..errors import LandingError, LiftOffError
 
 Array = NDArray[np.float64]
@@ -41,7 +40,7 @@ class Rise(NamedTuple):
     ----------
     root : ndarray of bool (m,)
         At once, from a zero at which there is no Taylor series, such as a power law's. A lone run
-        can begin on it; arrays step off it.
+        in the plane can begin on it; arrays and runs in 3-D step off it.
     short : ndarray of bool (m,)
         Within an instant, which is stepped over.
     later : ndarray of bool (m,)
@@ -56,12 +55,12 @@ class Rise(NamedTuple):
     longest: Array
 
 
-def rise(blueprint: ContactModel, x: Array, p: Array) -> Rise:
+def rise(blueprint: Blueprint, x: Array, p: Array) -> Rise:
     """Look ahead along the motion without friction.
 
     Parameters
     ----------
-    blueprint : ContactModel
+    blueprint : ContactModel or Contact3D
     x : ndarray (n, m)
         States at touch-down, in columns.
     p : ndarray (k, m)
@@ -91,10 +90,10 @@ def rise(blueprint: ContactModel, x: Array, p: Array) -> Rise:
     return Rise(root, short, (first > 0) & ~zero & ~short, longest)
 
 
-def instant_later(states: Array) -> Array:
+def instant_later(blueprint: Blueprint, states: Array) -> Array:
     """Return states (..., n) an instant later; the speeds change by less than rounding in it."""
-    later = np.array(states)
-    later[..., [0, 2]] += INSTANT * later[..., [1, 3]]
+    eq, later = equations(blueprint), np.array(states)
+    later[..., eq.centre] += INSTANT * later[..., eq.velocity]
     return later
 
 
@@ -117,14 +116,14 @@ def rests(states: Array, start: Array) -> NDArray[np.bool_]:
     return np.asarray(np.abs(states[..., 3]) <= _REST * size)
 
 
-def onto_zero_load(blueprint: ContactModel, x: Array, p: Array) -> Array:
+def onto_zero_load(blueprint: Blueprint, x: Array, p: Array) -> Array:
     """Move along the motion until the load is zero to rounding, not to the tolerance of the run.
 
     A ball that rolls at once must not see the negative load of an instant before.
 
     Parameters
     ----------
-    blueprint : ContactModel
+    blueprint : ContactModel or Contact3D
     x, p : ndarray (n, m), (k, m)
         States and parameters, in columns.
 
@@ -139,17 +138,17 @@ def onto_zero_load(blueprint: ContactModel, x: Array, p: Array) -> Array:
 
 
 def approach(
-    blueprint: ContactModel,
+    blueprint: Blueprint,
     parameters: dict[str, float],
     start: list[float],
     tol: float,
     t_max: float,
-) -> tuple[ns.Trajectory | None, list[float]]:
+) -> tuple[ns.Trajectory | None, float, list[float]]:
     """Follow one ball without friction until the load is positive.
 
     Parameters
     ----------
-    blueprint : ContactModel
+    blueprint : ContactModel or Contact3D
     parameters : dict
     start : list of float (n,)
         State at touch-down.
@@ -159,19 +158,23 @@ def approach(
     -------
     run : nonsmooth.Trajectory or None
         None if the load is positive at once.
-    start : list of float
-        State in which the contact with friction begins.
+    t_start, start : float, list of float
+        Time and state in which the contact with friction begins.
 
     Raises
     ------
     LandingError, LiftOffError
     """
     x, p = np.array(start)[:, None], np.array(list(parameters.values()))[:, None]
-    if _finite_load(blueprint, x, p) > 0.0:
-        return None, start
-    _, short, later, longest = rise(blueprint, x, p)
-    if not later[0]:
-        return None, (instant_later(x[:, 0]) if short[0] else x[:, 0]).tolist()
+    positive = _finite_load(blueprint, x, p) > 0.0
+    if positive and not equations(blueprint).steps_off_a_root:
+        return None, 0.0, start
+    root, short, later, longest = rise(blueprint, x, p)
+    if root[0] and equations(blueprint).steps_off_a_root:
+        return None, INSTANT, instant_later(blueprint, x[:, 0]).tolist()
+    if positive or not later[0]:
+        off = short[0] and not positive
+        return None, 0.0, (instant_later(blueprint, x[:, 0]) if off else x[:, 0]).tolist()
     if leaving(x[:, 0]):
         raise LandingError(
             f"load: expected a positive load in a ball that moves up in the ground, received y = "
@@ -188,10 +191,11 @@ def approach(
             f"at y = 0 at t = {run.t[-1]:.6g}. It passes through the surface without pressing on it.",
             run,
         )
-    return run, onto_zero_load(blueprint, run.x[-1][:, None], p)[:, 0].tolist()
+    onto = onto_zero_load(blueprint, run.x[-1][:, None], p)[:, 0].tolist()
+    return run, float(run.t[-1]), onto
 
 
-def _finite_load(blueprint: ContactModel, x: Array, p: Array) -> float:
+def _finite_load(blueprint: Blueprint, x: Array, p: Array) -> float:
     """The load at touch-down; forces that are not finite are refused."""
     load, _, field, _ = (v.ravel() for v in ns.call(touch_down_function(blueprint), x, p))
     if not (np.isfinite(load[0]) and np.all(np.isfinite(field))):

@@ -11,7 +11,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..model import Array, FilippovSystem
-from .compiled.engine import engine_for
+from .compiled.lanes import lanes_for
 from .compiled.tape import tape_for
 from .facts import HAND_OVER, KINDS
 from .options import Options
@@ -25,7 +25,7 @@ from .view import sampled
 _REFERENCE = threading.Lock()
 
 
-ENGINES = ("reference", "tape", "scalar", "lanes")
+ENGINES = ("reference", "tape", "lanes")
 
 
 @dataclass(frozen=True)
@@ -44,8 +44,8 @@ class Job:
     room : int or None
         Samples kept of each.
     engine : str
-        One of ``ENGINES``: the reference driver, the interpreter, or a program generated for the
-        system that runs one trajectory at a time or several in step.
+        One of ``ENGINES``: the reference driver, the driver in C, or a program generated for the system
+        that runs several trajectories in step.
     """
 
     system: FilippovSystem | bytes
@@ -88,8 +88,6 @@ def run_chunk(
     else:
         _run_compiled(job, system, start, p, chunk, stop, times)
     handed = bool(np.any(chunk.status == HAND_OVER))
-    if handed and job.engine in ("scalar", "lanes"):
-        _run_rest(job, system, start, p, chunk, stop, times)
     rest = np.flatnonzero(chunk.status == HAND_OVER)
     words = dict(enumerate(chunk.words))
     for i in rest.tolist():
@@ -112,38 +110,14 @@ def _run_compiled(
     stop: Callable[[], bool],
     times: Array | None,
 ) -> None:
-    if job.engine == "tape":
+    if job.engine == "lanes":
+        lanes = lanes_for(system, job.options)
+        assert lanes is not None
+        lanes.run_many(x, p, job.options, job.at, out, stop)
+    else:
         tape = tape_for(system, job.options)
         assert tape is not None
         tape.run_many(x, p, job.options, job.at, out, stop, times)
-    else:
-        generated = engine_for(system, job.options)
-        assert generated is not None
-        lanes = job.engine == "lanes"
-        generated.run_many(x, p, job.options, job.at, lanes, out, stop, times)
-
-
-def _run_rest(
-    job: Job,
-    system: FilippovSystem,
-    x: Array,
-    p: Array,
-    out: Chunk,
-    stop: Callable[[], bool],
-    times: Array | None,
-) -> None:
-    """Give what the generated programs hand over, sliding on several surfaces, to the interpreter."""
-    tape = tape_for(system, job.options)
-    if tape is None:
-        return
-    rest = np.flatnonzero(out.status == HAND_OVER)
-    own = lambda a: a if a is None or a.ndim == 1 else a[rest]
-    chunk = Chunk.empty(len(rest), system.dimension, job.at is not None, job.room)
-    tape.run_many(x[rest], own(p), job.options, job.at, chunk, stop, own(times))
-    for name, array in chunk.arrays().items():
-        out.arrays()[name][rest] = array
-    out.itinerary[rest] += len(out.words)
-    out.words += chunk.words
 
 
 def _refuse(chunk: Chunk, system: FilippovSystem, x: Array, options: Options) -> None:

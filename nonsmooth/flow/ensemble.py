@@ -11,8 +11,7 @@ from numpy.typing import ArrayLike
 
 from ..model import FilippovSystem, OptionError, explain, require_system
 from .chunks import Job
-from .compiled.codegen import supports_lanes
-from .compiled.engine import engine_for
+from .compiled.lanes import lanes_for
 from .compiled.tape import library, tape_for
 from .drawn import Drawn
 from .facts import KINDS
@@ -119,9 +118,8 @@ def ensemble(
             "at: expected count= with a section at events in an ensemble, received none. It says how "
             "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
         )
-    lanes = supports_lanes(system) and start_mode is None and view.room is None
-    several = lanes and t_end > t_start
-    chosen = _engine(system, options, engine, starts.count, several)
+    step = view.room is None and t_end > t_start
+    chosen = _engine(system, options, engine, starts.count, step)
     job = Job(system, options, number, view.times, view.room, chosen)
     return _run(job, starts, work)
 
@@ -153,21 +151,20 @@ def _work(work: Any) -> Work:
     return work or Work()
 
 
-def _engine(system: FilippovSystem, options: Options, engine: str, count: int, lanes: bool) -> str:
+def _engine(system: FilippovSystem, options: Options, engine: str, count: int, step: bool) -> str:
     """Which of ``chunks.ENGINES`` runs; few trajectories are not worth generating a program.
 
     It is compiled here, so that all chunks run the same one.
     """
-    fast, tape = engine_for(system, options), tape_for(system, options)
-    if not use_compiled(engine, fast is not None or tape is not None):
+    lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
+    if not use_compiled(engine, tape is not None) or tape is None:
         return "reference"
-    few = count < _FEW
-    if tape is not None and (fast is None or (few and engine == "auto")):
-        return "tape" if compiled_or_none(engine, library, library) is not None else "reference"
-    assert fast is not None
-    lanes = lanes and not few
-    found = compiled_or_none(engine, fast, lambda: fast.lanes if lanes else fast.scalar)
-    return "reference" if found is None else ("lanes" if lanes else "scalar")
+    if lanes is not None and count >= _FEW:
+        found = compiled_or_none(engine, lanes, lambda: lanes.library)
+        return "reference" if found is None else "lanes"
+    work = tape.compile if engine == "compiled" else library
+    done = compiled_or_none(engine, library, lambda: (work(), True))
+    return "reference" if done is None else "tape"
 
 
 def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:

@@ -48,8 +48,8 @@ def use_compiled(engine: str, supported: bool = True) -> bool:
     if not supported:
         if engine == "compiled":
             raise OptionError(
-                "engine: expected 'auto' or 'reference' for a system with this many surfaces, "
-                "received 'compiled'. It has too many modes to compile."
+                "engine: expected 'auto' or 'reference' for a system whose multipliers do not enter "
+                "linearly, received 'compiled'. Only the reference driver serves it."
             )
         return False
     try:

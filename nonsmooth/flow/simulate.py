@@ -12,7 +12,6 @@ from numpy.typing import ArrayLike
 from ..model import Array, FilippovSystem, Parameters, require_system
 from .compiled.arrays import Run
 from .compiled.convert import trajectory
-from .compiled.engine import engine_for
 from .compiled.tape import library, tape_for
 from .facts import HAND_OVER
 from .options import Options
@@ -20,12 +19,8 @@ from .reference.driver import Driver
 from .section import Section, Times
 from .select import compiled_or_none, use_compiled
 from .starts import require_start_mode
-from .status import Status
 from .trajectory import Trajectory
 from .view import read_view, sampled, sectioned
-
-#: Steps of the interpreter after which a run counts as long: a program is generated for it.
-_LONG = 20_000
 
 
 def simulate(
@@ -78,9 +73,10 @@ def simulate(
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
     engine : {"auto", "reference", "compiled"}
-        Which driver runs. ``"auto"`` takes the interpreter in C, which is compiled once on a machine
-        and serves every system at once, and for runs of more than 20,000 steps a program generated for
-        the system; without a compiler it says so, once, and takes the reference driver in Python.
+        Which driver runs. ``"auto"`` takes the driver in C, which is compiled once on a machine and
+        serves every system at once; long runs go on, with the same bits, in a program that a compiler
+        makes for the system meanwhile. ``"compiled"`` waits for that program. Without a compiler
+        ``"auto"`` says so, once, and takes the reference driver in Python.
 
     Returns
     -------
@@ -143,24 +139,17 @@ def _looked_at(run: Trajectory, options: Options, times: Times | None, p: Array)
 
 
 def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: str) -> Trajectory:
-    """Choose the engine: the interpreter is there at once, a long run is worth a compiler.
-
-    The choice depends on the problem alone, never on what happens to be cached, so that the same
-    call gives the same bits.
-    """
-    generated, tape = engine_for(system, options), tape_for(system, options)
-    if not use_compiled(engine, generated is not None or tape is not None):
+    """Choose the engine, by the problem alone, so that the same call gives the same bits."""
+    tape = tape_for(system, options)
+    if not use_compiled(engine, tape is not None) or tape is None:
         return Driver(system, x, p, options).run()
-    if tape is not None and (generated is None or engine == "auto"):
-        steps = options.max_steps if generated is None else min(_LONG, options.max_steps)
-        run = compiled_or_none(engine, library, lambda: tape.run(x, p, options, steps))
-        if run is None or run.status != Status.TOO_MANY_STEPS or steps == options.max_steps:
-            return _converted(system, x, p, options, run)
-    fast = generated
-    run = compiled_or_none(engine, fast, lambda: fast.run(x, p, options)) if fast else None
-    if run is not None and run.status == HAND_OVER and tape is not None:
-        run = tape.run(x, p, options)  # sliding on several surfaces
-    return _converted(system, x, p, options, run)
+
+    def work() -> Run:
+        if engine == "compiled":
+            tape.compile()
+        return tape.run(x, p, options)
+
+    return _converted(system, x, p, options, compiled_or_none(engine, library, work))
 
 
 def _converted(

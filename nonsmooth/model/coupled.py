@@ -27,6 +27,7 @@ from .factors import with_factors
 from .graph import depends_on, instructions
 from .identity import vanish_on
 from .jets import Expansion
+from .linearity import linearity
 from .multiplier_series import MultiplierSeries, unit
 from .numbers import Numbers
 from .rules import lower, touched
@@ -76,10 +77,8 @@ class Coupled:
         self.slope = ca.jacobian(self.layer, every)
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
-        #: Whether field, layer and guards are affine in states and multipliers together.
-        everything = ca.vertcat(field, self.layer, heights, stops)
-        smooth = not any(self.scaled) and not system.sets
-        self.linear = smooth and bool(ca.is_linear(everything, self.moving))
+        guards, smooth = ca.vertcat(heights, stops), not system.sets
+        self.linearity = linearity(field, self.layer, guards, factor, x, every, smooth)
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)

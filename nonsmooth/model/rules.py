@@ -249,9 +249,14 @@ _EXPANSIONS: dict[str, Callable[..., int]] = {
 
 def touched(rules: Sequence[Rule], states: int) -> list[int]:
     """Return the rules that inputs of the moving vector enter that come after the states."""
-    entered = [False] * len(rules)
+    return [j for j, yes in enumerate(entered(rules, lambda k: k >= states)) if yes]
+
+
+def entered(rules: Sequence[Rule], wanted: Callable[[int], bool]) -> list[bool]:
+    """Return whether each rule is entered by some of the inputs of the moving vector."""
+    found = [False] * len(rules)
     for _ in range(2):  # a sine and its cosine refer to each other
         for j, rule in enumerate(rules):
-            own = rule.place[0] == 0 and rule.place[1] >= states
-            entered[j] = entered[j] or own or any(entered[a] for a in rule.args)
-    return [j for j, yes in enumerate(entered) if yes]
+            own = rule.place[0] == 0 and wanted(rule.place[1])
+            found[j] = found[j] or own or any(found[a] for a in rule.args)
+    return found

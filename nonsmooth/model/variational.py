@@ -138,7 +138,7 @@ class VariationalField:
     @cached_property
     def series(self) -> Series:
         """The Taylor rules of the whole field."""
-        return series_of([self.states, self.parameters], [self.field], self.states.numel())
+        return series_of([self.states, self.parameters], [self.field])
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
@@ -317,7 +317,7 @@ class PlainField:
     def series(self) -> Series:
         """The Taylor rules of the field."""
         m = self.motion
-        return series_of([m.states, m.system.parameter_symbols], [m.field], self.entries)
+        return series_of([m.states, m.system.parameter_symbols], [m.field])
 
 
 def plain_field(system: FilippovSystem, mode: str) -> PlainField:
@@ -339,7 +339,7 @@ class GuardedField(PlainField):
         """The Taylor rules of the field and of the guards."""
         m = self.motion
         inputs = [m.states, m.system.parameter_symbols]
-        return series_of(inputs, [m.field, m.functions], self.entries)
+        return series_of(inputs, [m.field, m.functions])
 
     @cached_property
     def jets(self) -> Evaluator:

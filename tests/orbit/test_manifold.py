@@ -62,8 +62,9 @@ def test_the_homoclinic_orbit_leaves_by_the_fold_and_ends_at_the_pseudo_saddle()
     apart = np.linalg.norm(above.points - [values["x_fold"], 0.0], axis=1)
     near = int(np.argmin(apart))
     assert above.t[near] == pytest.approx(-values["flight"], abs=2e-3)
-    # between the points beside the fold the orbit is a parabola that touches y = 0 there
-    part = above.points[near - 3 : near + 4]
+    # Before the fold the orbit is a parabola that touches y = 0 there; whether it passes or is caught
+    # is for rounding to say.
+    part = above.points[near - 10 : near - 1]
     touch = np.polynomial.Polynomial.fit(part[:, 0] - values["x_fold"], part[:, 1], 4)
     assert abs(touch(0.0)) < 1e-10 and abs(touch.deriv()(0.0)) < 1e-7
     slide = ns.manifold(system, saddle, stable=False, length=1.0)

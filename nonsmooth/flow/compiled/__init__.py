@@ -1,16 +1,16 @@
-"""The compiled engines: the interpreter of any system, and programs generated for one."""
+"""The compiled engines: the interpreter of any system, programs generated for one, and lanes."""
 
 from .arrays import Run
 from .build import CompilerError, find_compiler
-from .engine import Engine, engine_for
+from .lanes import Lanes, lanes_for
 from .tape import TapeEngine, tape_for
 
 __all__ = [
     "CompilerError",
-    "Engine",
+    "Lanes",
     "Run",
     "TapeEngine",
-    "engine_for",
     "find_compiler",
+    "lanes_for",
     "tape_for",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ctypes
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -19,9 +20,6 @@ from .build import CompilerError
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 BURST = 4096
-
-#: Room of the first and of the largest arrays of a dense run, in steps.
-FIRST_STEPS, MOST_STEPS = 64, 16384
 
 _D, _I32, _I64 = ctypes.c_double, ctypes.c_int32, ctypes.c_int64
 _POINTER = ctypes.c_void_p
@@ -73,14 +71,24 @@ _OUTPUT_ARRAYS = {
 }
 
 
+#: What there is several of, and room for at first; arrays of larger runs grow from there.
+_FIRST = {"step": 64, "point": 128, "event": 64}
+
+#: How rooms grow: pages that are not written cost nothing, so by much as long as they are small (bytes).
+_SMALL, _MUCH, _LITTLE = 1 << 26, 16, 2
+
+#: Rooms of all kinds that C asks for before a step.
+_NEEDED = {"step": 2, "point": 4, "event": 4}
+
+
 class Output:
-    """Arrays of a dense run with room for some steps.
+    """Arrays of a dense run, in a block of memory for each of steps, points and events.
 
     Parameters
     ----------
     n : int
         Extended dimension.
-    order, steps : int
+    order : int
     """
 
     class Structure(ctypes.Structure):
@@ -92,26 +100,56 @@ class Output:
             *[(name, _POINTER) for name in _OUTPUT_ARRAYS],
         ]
 
-    def __init__(self, n: int, order: int, steps: int):
-        self.steps = steps
-        rooms = {"step": steps, "point": 3 * steps, "event": 2 * steps}
+    def __init__(self, n: int, order: int):
         shapes: dict[str, tuple[int, ...]] = {
             "coefficients": (n, order + 1),
-            "point_x": (n,),
-            "event_x": (n,),
-            "event_after_x": (n,),
+            **dict.fromkeys(("point_x", "event_x", "event_after_x"), (n,)),
         }
-        self.arrays: dict[str, NDArray[Any]] = {
-            name: np.empty((rooms[room], *shapes.get(name, ())), dtype)
-            for name, (dtype, room) in _OUTPUT_ARRAYS.items()
-        }
-        addresses = [a.ctypes.data for a in self.arrays.values()]
-        self.pointer = ctypes.byref(self.Structure(0, 0, 0, *rooms.values(), *addresses))
+        self._shapes = {name: shapes.get(name, ()) for name in _OUTPUT_ARRAYS}
+        self._rooms, self._blocks = dict(_FIRST), dict[str, NDArray[np.uint8]]()
+        self._offsets: dict[str, int] = {}
+        for kind in _FIRST:
+            self._blocks[kind] = self._block(kind)
+        self._point_to((0, 0, 0))
+
+    def _block(self, kind: str) -> NDArray[np.uint8]:
+        """Room for all arrays of a kind, those of floats first."""
+        used, room = 0, self._rooms[kind]
+        for name, (dtype, own) in _OUTPUT_ARRAYS.items():
+            if own == kind:
+                self._offsets[name] = used
+                used += room * math.prod(self._shapes[name]) * (8 if dtype is float else 4)
+        return np.empty(used, np.uint8)
+
+    def _point_to(self, counts: Sequence[int]) -> None:
+        first = {kind: block.ctypes.data for kind, block in self._blocks.items()}
+        places = [first[kind] + self._offsets[name] for name, (_, kind) in _OUTPUT_ARRAYS.items()]
+        structure = self.Structure(*counts, *self._rooms.values(), *places)
+        self.pointer = ctypes.byref(structure)
+
+    def grow(self, counts: NDArray[np.int64]) -> None:
+        """Make room where there is little, with the same content."""
+        written, sizes = self.filled(counts), dict(zip(_FIRST, counts.tolist(), strict=True))
+        for kind, size in sizes.items():
+            if size + _NEEDED[kind] <= self._rooms[kind]:
+                continue
+            small = _MUCH * self._blocks[kind].nbytes < _SMALL
+            self._rooms[kind] *= _MUCH if small else _LITTLE
+            self._blocks[kind] = self._block(kind)
+            for name, (_, own) in _OUTPUT_ARRAYS.items():
+                if own == kind:
+                    self._array(name, size)[:] = written[name]
+        self._point_to(counts.tolist())
 
     def filled(self, counts: NDArray[np.int64]) -> dict[str, NDArray[Any]]:
         """Return the parts that were written: steps, points and events."""
-        sizes = dict(zip(("step", "point", "event"), counts.tolist(), strict=True))
-        return {name: a[: sizes[_OUTPUT_ARRAYS[name][1]]] for name, a in self.arrays.items()}
+        sizes = dict(zip(_FIRST, counts.tolist(), strict=True))
+        return {name: self._array(name, sizes[kind]) for name, (_, kind) in _OUTPUT_ARRAYS.items()}
+
+    def _array(self, name: str, size: int) -> NDArray[Any]:
+        dtype, kind = _OUTPUT_ARRAYS[name]
+        shape = (size, *self._shapes[name])
+        return np.ndarray(shape, dtype, self._blocks[kind].data, self._offsets[name])
 
 
 @dataclass
@@ -171,9 +209,9 @@ class Run:
     event_guards: NDArray[np.int32]
 
     @classmethod
-    def joined(
+    def of(
         cls,
-        parts: Sequence[dict[str, NDArray[Any]]],
+        whole: dict[str, NDArray[Any]],
         n: int,
         numbers: Array,
         counts: NDArray[np.int64],
@@ -183,9 +221,7 @@ class Run:
         active: list[int],
         several: list[str],
     ) -> Run:
-        """Put the parts of a run together, and what the driver says of its end."""
-        join = np.concatenate if len(parts) > 1 else lambda pieces: pieces[0]
-        whole = {name: join([part[name] for part in parts]) for name in _OUTPUT_ARRAYS}
+        """Put together what a run wrote, and what the driver says of its end."""
         return cls(
             status=int(counts[0]),
             reason=int(counts[1]),

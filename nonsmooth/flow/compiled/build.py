@@ -10,10 +10,13 @@ from __future__ import annotations
 
 import ctypes
 import hashlib
+import os
 import shlex
+import signal
 import subprocess
 import sys
 import tempfile
+from collections.abc import Sequence
 from pathlib import Path
 
 from .. import files
@@ -32,6 +35,7 @@ from .compilers import (
 from .store import cache_directory, is_intact, sealed, usable_folder
 
 __all__ = [
+    "Compilation",
     "CompilerError",
     "build",
     "cache_directory",
@@ -45,14 +49,74 @@ __all__ = [
 _QUIET = 1.0
 
 
-def library_key(source: str, command: Command) -> str:
+class Compilation:
+    """How a compiler runs, and a way to stop it.
+
+    Parameters
+    ----------
+    quiet : bool
+        Beside the work, without a word; an interrupt at the terminal does not reach it.
+    """
+
+    def __init__(self, quiet: bool = False) -> None:
+        self.quiet, self.stopped = quiet, False
+        self._process: subprocess.Popen[str] | None = None
+
+    def stop(self) -> None:
+        """End the compiler that runs, and let none begin."""
+        self.stopped, process = True, self._process
+        if process is not None and process.poll() is None:
+            try:
+                os.killpg(process.pid, signal.SIGKILL)
+            except (OSError, AttributeError):
+                process.kill()
+
+    def call(self, command: list[str]) -> str:
+        """Compilation a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
+        if self.stopped:
+            return "stopped"
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+                start_new_session=self.quiet,
+            )
+        except (OSError, ValueError) as error:
+            return str(error)
+        self._process = process
+        with process:
+            try:
+                if self.stopped:
+                    self.stop()
+                errors = process.communicate()[1] if self.quiet else _finished(process)
+            except BaseException:
+                process.kill()
+                raise
+        if not process.returncode:
+            return ""
+        return errors.strip() or f"exit status {process.returncode} and no word about why"
+
+
+def library_key(source: str, command: Command, flags: Sequence[str] = ()) -> str:
     """Content hash of a build."""
-    parts = (source, " ".join(FLAGS), version(command), processor(), sys.platform)
+    parts = (source, " ".join([*FLAGS, *flags]), version(command), processor(), sys.platform)
     return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
 
 
-def build(source: str) -> ctypes.CDLL:
+def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None) -> ctypes.CDLL:
     """Load the library of a C source, compiled unless the cache has it.
+
+    Parameters
+    ----------
+    source : str
+    flags : sequence of str, optional
+        For the compiler, besides the usual ones.
+    run : Compilation, optional
+        How it runs.
 
     Raises
     ------
@@ -65,7 +129,7 @@ def build(source: str) -> ctypes.CDLL:
     failures: list[CompilerError] = []
     for command in commands:
         try:
-            library = _library(source, command, usable_folder())
+            library = _library(source, command, usable_folder(), flags, run or Compilation())
         except CompilerError as error:
             failures.append(error)
             continue
@@ -75,15 +139,17 @@ def build(source: str) -> ctypes.CDLL:
     raise failures[0]
 
 
-def _library(source: str, command: Command, folder: Path) -> ctypes.CDLL:
-    key = library_key(source, command)
+def _library(
+    source: str, command: Command, folder: Path, flags: Sequence[str], run: Compilation
+) -> ctypes.CDLL:
+    key = library_key(source, command, flags)
     library = folder / f"{key}.so"
     if is_intact(library):
         try:
             return _loaded(library, key)
         except OSError:
             pass  # what it was built for is gone since: once more
-    compile_library(source, command, library)
+    compile_library(source, command, library, flags, run)
     try:
         return _loaded(library, key)
     except OSError as error:
@@ -108,7 +174,13 @@ def _loaded(library: Path, key: str) -> ctypes.CDLL:
     return loaded
 
 
-def compile_library(source: str, command: Command, library: Path) -> None:
+def compile_library(
+    source: str,
+    command: Command,
+    library: Path,
+    flags: Sequence[str] = (),
+    run: Compilation | None = None,
+) -> None:
     """Put the library of a source into its place, which has its key as name.
 
     Raises
@@ -117,7 +189,7 @@ def compile_library(source: str, command: Command, library: Path) -> None:
         The compiler failed, or there is no room.
     """
     try:
-        _compile(source, command, library)
+        _compile(source, command, flags, library, run or Compilation())
     except OSError as error:
         raise CompilerError(
             f"cache: expected to write {library}, received {error}. Make room, or set "
@@ -125,15 +197,19 @@ def compile_library(source: str, command: Command, library: Path) -> None:
         ) from error
 
 
-def _compile(source: str, command: Command, library: Path) -> None:
+def _compile(
+    source: str, command: Command, flags: Sequence[str], library: Path, run: Compilation
+) -> None:
     with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as work:
         text, output = Path(work) / "engine.c", Path(work) / "engine.so"
         key = f'const char nonsmooth_key[] = "{library.stem}";\n'
         text.write_text(f"{source}\n{key}", encoding="utf-8")
-        call = [*command, *FLAGS, str(text), "-o", str(output), "-lm"]
-        failure = _run(call)
+        call = [*command, *FLAGS, *flags, str(text), "-o", str(output), "-lm"]
+        failure = run.call(call)
         if not failure and not output.is_file():
             failure = "no error, but no library either"
+        if run.stopped:
+            raise CompilerError("compiler: stopped, because the program ends.")
         if failure:
             kept = library.with_suffix(".c")
             files.replace(kept, source.encode())
@@ -143,30 +219,6 @@ def _compile(source: str, command: Command, library: Path) -> None:
                 f"compiler: {shlex.join(command)} failed ({failure.splitlines()[0][:200]}).",
             )
         files.replace(library, sealed(library.name, output.read_bytes()))
-
-
-def _run(call: list[str]) -> str:
-    """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
-    try:
-        process = subprocess.Popen(
-            call,
-            stdin=subprocess.DEVNULL,
-            stdout=subprocess.DEVNULL,
-            stderr=subprocess.PIPE,
-            text=True,
-            errors="replace",
-        )
-    except (OSError, ValueError) as error:
-        return str(error)
-    with process:
-        try:
-            errors = _finished(process)
-        except BaseException:
-            process.kill()
-            raise
-    if not process.returncode:
-        return ""
-    return errors.strip() or f"exit status {process.returncode} and no word about why"
 
 
 def _finished(process: subprocess.Popen[str]) -> str:

@@ -1,48 +1,53 @@
-"""The C source of an engine: tables and generated functions of a system, then a fixed driver.
+"""The C sources of the engines: what Python and C share, then fixed texts, then what is generated.
 
-``scalar_source`` serves every system whose modes have at most one sliding surface; ``lanes_source``
-those of one surface without resets, eight trajectories in step.
+``interpreter_source`` knows no system; ``special_source`` is the same driver with the programs of one
+system written out; ``lanes_source`` serves systems of one surface without resets, several trajectories in
+step.
 """
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from importlib import resources
 
-from ...model import FilippovSystem, motion
-from ...model.printing.programs import is_flat, lanes_program, modes_program
+from ...model import Coupled, FilippovSystem, motion
+from ...model.printing.programs import is_flat, lanes_program
+from ...model.printing.special import (
+    MOST_PRODUCTS,
+    products,
+    special_series,
+    special_sizes,
+    special_values,
+)
+from ...model.printing.tape import OPERATIONS, TAPE_RULES, Tape
 from .. import facts
 from ..status import Status
 
-#: More modes than this (four surfaces) compile for too long: the reference driver serves them.
-MAX_MODES = 20
+#: Orders of the series are below this, for arrays on the stack.
+MOST_ORDER = 48
 
-_SCALAR_TYPE = """
-typedef double T;
-#define BC(v) (v)
-#define FUNCTION static void
-"""
-
-_SCALAR_FUNCTIONS = (
-    "sqrt exp log sin cos tan asin acos atan sinh cosh tanh asinh acosh atanh atan2 pow erf hypot "
-    "expm1 log1p"
-).split()
+#: The driver in C, in the order in which it is read: one text.
+_FILES = (
+    *(
+        "programs.h",
+        "linear.h",
+        "state.c",
+        "modes.c",
+        "jets.c",
+        "stepper.c",
+        "surfaces.c",
+        "record.c",
+    ),
+    *("switching.c", "contacts.c", "driver.c", "memory.c", "entry.c"),
+)
 
 
 @lru_cache(maxsize=32)
 def driver_text(name: str) -> str:
     """Return one of the files in C beside this module."""
     return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
-
-
-def supports_scalar(system: FilippovSystem) -> bool:
-    """Whether the scalar engine can be generated for a system."""
-    if (
-        any(system.nonlinear) or system.impacts or system.sets
-    ):  # hidden dynamics has multipliers as states: the reference driver's
-        return False
-    return system.surface_count < 8 and len(system.modes) <= MAX_MODES
 
 
 def supports_lanes(system: FilippovSystem) -> bool:
@@ -52,23 +57,58 @@ def supports_lanes(system: FilippovSystem) -> bool:
     )
 
 
-def scalar_source(system: FilippovSystem, order: int) -> str:
-    """C source of the engine for one trajectory at a time."""
-    calls = "".join(f"#define {f.upper()}_ {f}\n" for f in _SCALAR_FUNCTIONS)
-    calls += "#define ERFINV_ ns_erfinv\n"
-    return "".join(
-        [
-            facts_header(),
-            _sizes(system, order),
-            driver_text("common.h"),
-            _SCALAR_TYPE,
-            calls,
-            modes_program(system, order),
-            _mode_tables(system),
-            _dispatch(system),
-            driver_text("scalar.c"),
-        ]
+def supports_special(tape: Tape, order: int) -> bool:
+    """Whether a compiler can be expected to make a program of a system."""
+    return products(tape, order) <= MOST_PRODUCTS
+
+
+def interpreter_source() -> str:
+    """C of the interpreter, which knows no system."""
+    driver = _driver(f"#define P {MOST_ORDER}\n", "", "")
+    flows = [driver_text("interpreter/flow.c"), _extended("programs.h", "flow.c")]
+    return "".join([driver, *flows, driver_text("interpreter/fixed.c")])
+
+
+def special_source(tape: Tape, coupled: Coupled, order: int) -> str:
+    """C of the same driver with the programs of one system written out.
+
+    Parameters
+    ----------
+    tape : Tape
+    coupled : Coupled
+        The system.
+    order : int
+    """
+    sizes = special_sizes(coupled.system, order)
+    return _driver(sizes, special_values(tape), special_series(tape, coupled, order))
+
+
+def _extended(*files: str) -> str:
+    """Functions of some files once more, under other names, on long doubles."""
+    text = "".join(driver_text(f"interpreter/{name}") for name in files)
+    text = re.sub(r"typedef struct \{[^}]*\} (Values|Series|Field);", "", text)
+    text = re.sub(r"\bdouble\b", "long double", text)
+    names = {
+        "Flow",
+        *re.findall(r"^(?:static|OUTSIDE) (?:inline )?[\w ]+?[ *](\w+)\(", text, re.MULTILINE),
+    }
+    defined = "".join(f"#define {name} {name}_extended\n" for name in sorted(names))
+    undone = "".join(f"#undef {name}\n" for name in sorted(names))
+    plain = "#undef MULADD\n#define MULADD(a, b, c) ((a) * (b) + (c))\n"
+    return f"#include <tgmath.h>\n{plain}{defined}{text}{undone}"
+
+
+def _driver(sizes: str, values: str, series: str) -> str:
+    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
+    head = "".join(
+        f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
+        for prefix, names in enumerations
     )
+    parts = [facts_header(), sizes, "#define MODES 1000000\n", head, driver_text("common.h")]
+    for name in _FILES:
+        parts.append(driver_text(f"interpreter/{name}"))
+        parts += [values] if name == "programs.h" else [series] if name == "jets.c" else []
+    return "".join(parts)
 
 
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
@@ -128,72 +168,16 @@ def _table(name: str, values: Sequence[int]) -> str:
 
 
 def _sizes(system: FilippovSystem, order: int) -> str:
-    guards = [len(motion(system, mode).guards) for mode in system.modes]
     sizes = {
         "N": system.extended_dimension,
         "ND": system.dimension,
         "P": order,
         "M": system.surface_count,
         "MODES": len(system.modes),
-        "NG": max(guards),
         "TIMED": int(system.time_dependent),
     }
     return "".join(f"#define {name} {value}\n" for name, value in sizes.items())
 
 
-def _mode_tables(system: FilippovSystem) -> str:
-    signs = [system.parse_mode(mode) for mode in system.modes]
-    digit = {1: 0, -1: 1, 0: 2}
-    numbers = {sum(3**i * digit[c] for i, c in enumerate(s)): k for k, s in enumerate(signs)}
-    by_code = [numbers.get(c, -1) for c in range(3**system.surface_count)]
-    motions = [motion(system, mode) for mode in system.modes]
-    width = max(1, max(len(m.guards) for m in motions))
-    rows = []
-    for m in motions:
-        row = [f"{{{facts.GUARDS.index(g.kind)}, {g.index}, {g.side}}}" for g in m.guards]
-        rows.append("{" + ", ".join(row + ["{0, 0, 0}"] * (width - len(row))) + "}")
-    letters = ", ".join("{" + (", ".join(map(str, s)) or "0") + "}" for s in signs)
-    return (
-        f"static const int LETTER[MODES][M1] = {{{letters}}};\n"
-        f"static const int MODE_OF[] = {{{', '.join(map(str, by_code))}}};\n"
-        f"static const int CANCELLED[MODES] = {{{_list(int(m.regular) for m in motions)}}};\n"
-        f"static const int AFFINE[MODES] = {{{_list(int(m.affine) for m in motions)}}};\n"
-        f"static const int GUARDS[MODES] = {{{_list(len(m.guards) for m in motions)}}};\n"
-        f"static const int GUARD[MODES][NG1][3] = {{{', '.join(rows)}}};\n"
-    )
-
-
 def _list(values: Iterable[int]) -> str:
     return ", ".join(str(v) for v in values)
-
-
-def _dispatch(system: FilippovSystem) -> str:
-    modes = range(len(system.modes))
-    jets = "\n".join(f"    case {k}: jet_{k}(x, q, c, g); break;" for k in modes)
-    values = "\n".join(
-        f"    case {k}: guard_values_{k}(x, q, value, gradient); break;" for k in modes
-    )
-    checks = "\n".join(
-        f"    case {k}: values_{k}(x, q, f, g); break;"
-        for k, mode in enumerate(system.modes)
-        if not motion(system, mode).affine
-    )
-    maps = "\n".join(
-        f"    case {j}: reset_map_{j}(x, q, y); break;" for j in range(len(system.resets))
-    )
-    text = (
-        "static void jet(int mode, const double *x, const double *q, double *c, double *g) {\n"
-        f"  switch (mode) {{\n{jets}\n  }}\n}}\n"
-        "static void guard_values(int mode, const double *x, const double *q, double *value,\n"
-        f"                         double *gradient) {{\n  switch (mode) {{\n{values}\n  }}\n}}\n"
-        "static void values(int mode, const double *x, const double *q, double *f, double *g) {\n"
-        f"  (void)x; (void)q; (void)f; (void)g;\n  switch (mode) {{\n{checks}\n  }}\n}}\n"
-        "static void reset_map(int index, const double *x, const double *q, double *y) {\n"
-        f"  (void)x; (void)q; (void)y;\n  switch (index) {{\n{maps}\n  }}\n}}\n"
-    )
-    if not system.surface_count:
-        text += (
-            "static void surface_values(const double *x, const double *q, double *h, double *g) "
-            "{ (void)x; (void)q; (void)h; (void)g; }\n"
-        )
-    return text

@@ -1,17 +1,14 @@
-/* What both drivers share: limits, operations on double, first root of a polynomial.
+/* What the driver and the lanes share: limits, operations on double, first root of a polynomial.
  *
  * The generated text defines before this file: the facts of nonsmooth/flow/facts.py under their names in
- * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); N
- * states with time, ND without, P order, M surfaces, NG guards of a mode at most, TIMED whether time is a
- * state.
+ * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); P the
+ * order or more, MODES a number of modes or more.
  */
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
 
-#define M1 (M > 0 ? M : 1)
-#define NG1 (NG > 0 ? NG : 1)
 typedef struct {
   double t_end, rtol, atol, max_step;
   int64_t max_steps, max_events;
@@ -43,6 +40,26 @@ typedef struct {
 int64_t options_size(void) { return sizeof(Options); }
 int64_t batch_size(void) { return sizeof(Batch); }
 
+/* a * b + c rounded once where the processor does that at once. Drivers are compiled without contraction: what
+ * is fused is written so, and the same text gives the same bits whatever surrounds it. */
+#if defined(__FMA__) || defined(__ARM_FEATURE_FMA) || defined(__FP_FAST_FMA)
+#define MULADD(a, b, c) __builtin_fma(a, b, c)
+#else
+#define MULADD(a, b, c) ((a) * (b) + (c))
+#endif
+
+/* Functions that compilers do not look into. */
+#define OUTSIDE __attribute__((noinline, noclone, const))
+
+/* Loops of a length that is known where a program is generated. */
+#ifdef GENERATED
+#define UNROLLED _Pragma("GCC unroll 64")
+#define ALWAYS_INLINE static inline __attribute__((always_inline))
+#else
+#define UNROLLED
+#define ALWAYS_INLINE static
+#endif
+
 /* As fmax and fmin where b is a number, without the calls. */
 static inline double larger(double a, double b) { return a > b ? a : b; }
 static inline double smaller(double a, double b) { return a < b ? a : b; }
@@ -70,9 +87,18 @@ static double ns_erfinv(double y) {
 
 static double horner(const double *c, int n, double x, double *slope) {
   double f = c[n], d = 0;
-  for (int k = n - 1; k >= 0; k--) { d = d * x + f; f = f * x + c[k]; }
+  UNROLLED for (int k = n - 1; k >= 0; k--) { d = MULADD(d, x, f); f = MULADD(f, x, c[k]); }
   *slope = d;
   return f;
+}
+
+/* Even and odd terms apart: two short chains. */
+static inline double value_at(const double *c, int n, double x) {
+  double z = x * x, even = c[n - n % 2], odd = c[n - 1 + n % 2], slope;
+  if (!(z < INFINITY)) return horner(c, n, x, &slope);
+  UNROLLED for (int k = n - n % 2 - 2; k >= 0; k -= 2) even = MULADD(even, z, c[k]);
+  UNROLLED for (int k = n - 3 + n % 2; k >= 1; k -= 2) odd = MULADD(odd, z, c[k]);
+  return MULADD(x, odd, even);
 }
 
 /* Newton's steps near a root that rounding in Bernstein form has put a little late. */
@@ -145,8 +171,8 @@ static inline double rest_of(const double *c, int n, double h) {
   double even = 0, odd = 0, z = h * h;
   int k = n;
   if (k % 2) { odd = fabs(c[k]); k--; }
-  for (; k >= 2; k -= 2) { even = even * z + fabs(c[k]); odd = odd * z + fabs(c[k - 1]); }
-  return odd * h + even * z;
+  UNROLLED for (; k >= 2; k -= 2) { even = MULADD(even, z, fabs(c[k])); odd = MULADD(odd, z, fabs(c[k - 1])); }
+  return MULADD(odd, h, even * z);
 }
 
 /* Bound of the magnitudes of all roots (Fujiwara 1916), with a margin for rounding. */

@@ -16,7 +16,7 @@ from ...model import NonsmoothError, explain
 #: No -ffast-math: reassociation and assumed finiteness give wrong itineraries.
 FLAGS = (
     "-O2 -march=native -std=gnu11 -fPIC -shared -fno-math-errno -fno-trapping-math "
-    "-ffp-contract=fast -w"
+    "-ffp-contract=off -w"
 ).split()
 
 ADVICE = (

@@ -4,10 +4,11 @@
  * lanes at once: expansion, step size, roots, projection, the decision at a surface where both
  * fields are clearly transversal. Whatever is rare (tangency, repelling sliding, ties, accumulating
  * events, limits, points that are not finite) is handed over: the trajectory gets the status
- * HAND_OVER and runs again from its start in the scalar driver. No lane's result depends on its
+ * HAND_OVER and runs again from its start in the interpreter. No lane's result depends on its
  * neighbours.
  *
- * The generated text defines, besides what common.h asks for: W, SLOTS guards (surface or exit to +,
+ * The generated text defines, besides what common.h asks for: N states with time, ND without, M surfaces,
+ * TIMED whether time is a state, W, SLOTS guards (surface or exit to +,
  * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding), CANCELLED,
  * CURVED, prepare(p, q), jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values;
  * ROW[ROWS] of the field and SLOT[GUARDS] are not affine, and check_values gives them.
@@ -322,31 +323,32 @@ INLINE void screen(const T *a, I *none, I *one, I *unresolved, T *end) {
 }
 
 /* Even and odd parts separately: two short chains instead of a long one. */
-INLINE T value_at(const T *a, int n, T s, T z) {
+INLINE T values_at(const T *a, int n, T s, T z) {
   T even = a[n - (n & 1)], odd = a[n - 1 + (n & 1)];
   UNROLL for (int k = n - (n & 1) - 2; k >= 0; k -= 2) even = even * z + a[k];
   UNROLL for (int k = n - 1 + (n & 1) - 2; k >= 1; k -= 2) odd = odd * z + a[k];
   return even + s * odd;
 }
 
-/* The Taylor coefficients f[0] to f[3] at s of a polynomial of degree n: a[0] to a[n - 1], and the top. */
+/* The Taylor coefficients f[0] to f[2] at s of a polynomial of degree n: a[0] to a[n - 1], and the top. Its even
+ * and odd parts are expanded in s^2, in chains of half the length. */
 INLINE void expand(const T *a, int n, T top, T s, T *f) {
-  f[0] = top;
-  f[1] = f[2] = f[3] = BC(0);
-  UNROLL for (int k = n - 1; k >= 0; k--) {
-    f[3] = f[3] * s + f[2];
-    f[2] = f[2] * s + f[1];
-    f[1] = f[1] * s + f[0];
-    f[0] = f[0] * s + a[k];
+  T z = s * s, even[3] = {BC(0), BC(0), BC(0)}, odd[3] = {BC(0), BC(0), BC(0)};
+  UNROLL for (int k = n; k >= 0; k--) {
+    T *part = k % 2 ? odd : even, c = k == n ? top : a[k];
+    part[2] = part[2] * z + part[1];
+    part[1] = part[1] * z + part[0];
+    part[0] = part[0] * z + c;
   }
+  f[0] = even[0] + s * odd[0];
+  f[1] = odd[0] + 2.0 * (z * odd[1] + s * even[1]);
+  f[2] = (even[1] + 4.0 * (z * even[2])) + s * (3.0 * odd[1] + 4.0 * (z * odd[2]));
 }
-
-INLINE T halley(const T *f) { return f[0] * f[1] / (f[1] * f[1] - f[0] * f[2]); }
 
 /* Where a step of Halley's iteration leaves less than rounding: its error is step^3 times the difference
  * of (f2/f1)^2 and f3/f1. The size of the step alone says nothing beside another root. */
-INLINE I converged(const T *f, T step) {
-  T bent = step * f[2], error = ABS(step) * (bent * bent + ABS(step * step * f[3] * f[1]));
+INLINE I converged(const T *f, T third, T step) {
+  T bent = step * f[2], error = ABS(step) * (bent * bent + ABS(step * step * third * f[1]));
   return (ABS(step) <= 2e-6) & (I)(error <= 1e-16 * (f[1] * f[1]));
 }
 
@@ -354,22 +356,24 @@ INLINE I converged(const T *f, T step) {
  * not move any more. It starts from the root of a parabola with the same end, improved once on a
  * polynomial of degree MODEL with the same end: one full iteration is then enough as a rule. */
 INLINE T polish(const T *a, T end, I active, T *slope) {
-  T lo = BC(0), hi = BC(1), f[4], top = end;
+  T lo = BC(0), hi = BC(1), f[3], top = end;
   T disc = a[1] * a[1] - 4.0 * a[0] * (end - a[0] - a[1]);
-  T s = 2.0 * a[0] / (SQRT_(MAX(disc, BC(0))) - a[1]);
+  T s = 2.0 * a[0] * QUICK_INVERSE(QUICK_ROOT(MAX(disc, BC(1e-300))) - a[1]);
   s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
   UNROLL for (int k = 0; k < MODEL; k++) top -= a[k];
   expand(a, MODEL, top, s, f);
-  T better = s - halley(f);
+  T better = s - f[0] * f[1] * QUICK_INVERSE(f[1] * f[1] - f[0] * f[2]);
   s = SELECT((better > 0) & (better <= 1), better, s);
+  /* A bound of the third coefficient at s by the magnitudes of the first terms; the others are smaller. */
+  T third = ABS(a[3]) + s * (4.0 * ABS(a[4]) + s * (10.0 * ABS(a[5]) + s * (20.0 * ABS(a[6]))));
   for (int it = 0; it < 60; it++) {
     expand(a, P, a[P], s, f);
-    T step = halley(f), next = s - step;
+    T step = f[0] * f[1] / (f[1] * f[1] - f[0] * f[2]), next = s - step;
     I positive = f[0] > 0;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);
     I held = (next >= lo - 4 * EPSILON) & (next <= hi + 4 * EPSILON); /* or it goes to another root */
-    I small = (converged(f, step) & held) | (I)(hi - lo <= 4 * EPSILON);
+    I small = (converged(f, third, step) & held) | (I)(hi - lo <= 4 * EPSILON);
     I inside = (next > lo) & (next < hi);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
@@ -405,7 +409,7 @@ INLINE void drop_zeros(const Lanes *s, T *a) {
   }
 }
 
-/* Shorten steps until the series of all guards converge within them, as in the scalar driver. */
+/* Shorten steps until the series of all guards converge within them, as in the interpreter. */
 static __attribute__((noinline)) void resolve_steps(const Lanes *s, T g[S1][P + 1], I which, T *h) {
   for (int j = 0; j < SLOTS; j++) {
     I active = which;
@@ -519,7 +523,7 @@ INLINE void polish_guards(Guards *v, T margin) {
       v->root[j] = SELECT(mine[j], s, v->root[j]);
       v->slope[j] = SELECT(mine[j], d, v->slope[j]);
       v->one[j] &= ~mine[j];
-      if (any(v->one[j])) v->one[j] &= ~(I)(value_at(v->a[j], P, later, later * later) > 0);
+      if (any(v->one[j])) v->one[j] &= ~(I)(values_at(v->a[j], P, later, later * later) > 0);
       all |= v->one[j];
     }
   }
@@ -564,7 +568,7 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *
 
 /* Events --------------------------------------------------------------------------------------- */
 
-/* Zeno: ever shorter intervals are left to the scalar driver, which knows their limit. */
+/* Zeno: ever shorter intervals are left to the interpreter, which knows their limit. */
 INLINE I watch_intervals(Lanes *s, I which) {
   T interval = s->t - s->last_event;
   I shorter = which & (interval < SHRINKS * s->shortest);
@@ -588,7 +592,7 @@ INLINE void count(Lanes *s, Work *w, int kind, I which) {
 
 #if M > 0
 /* Lanes that met the surface or an end of sliding change their mode; ``slope`` is that of the guard
- * over the step. The lanes that need the scalar driver are returned. */
+ * over the step. The lanes that need the interpreter are returned. */
 INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   T value[2], scale[2];
   lie(s, value, scale);
@@ -665,7 +669,7 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
 }
 #endif
 
-/* Lanes whose step is left to the scalar driver: it would be held back, or its defect is too large. */
+/* Lanes whose step is left to the interpreter: it would be held back, or its defect is too large. */
 INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], const T *allowed,
                    const T *of_guards, T by_series, T h, T dt, const T *end) {
   I wrong = {0};

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import ctypes
-import re
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, replace
@@ -14,14 +13,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, Coupled, FilippovSystem, Guard, coupled_of
-from ...model.printing.tape import OPERATIONS, TAPE_RULES, Entries, Series, Tape, Values, tape_of
+from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..facts import FULL, RUNNING
 from ..options import Options
 from ..results import Chunk, Stopped
 from .arrays import (
     BURST,
-    FIRST_STEPS,
-    MOST_STEPS,
     BatchStructure,
     OptionsStructure,
     Output,
@@ -32,17 +29,9 @@ from .arrays import (
     require_size,
     words_of,
 )
+from .background import Background
 from .build import build
-from .codegen import driver_text, facts_header
-
-#: Largest order of the series, for arrays on the stack.
-_MOST_ORDER = 48
-
-#: The driver in C, in the order in which it is read: one text.
-_FILES = (
-    *("programs.h", "linear.h", "state.c", "modes.c", "stepper.c", "surfaces.c", "record.c"),
-    *("switching.c", "contacts.c", "driver.c", "memory.c", "entry.c", "flow.c"),
-)
+from .codegen import MOST_ORDER, interpreter_source, special_source, supports_special
 
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
@@ -51,8 +40,10 @@ class ValuesStructure(ctypes.Structure):
     """A graph as C reads it."""
 
     _fields_ = [
-        *[(name, _I32) for name in ("size", "still_count", "moving_count", "output_count")],
-        *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "output", "constant")],
+        *[(name, _I32) for name in ("size", "still_count", "moving_count", "free_count")],
+        *[(name, _I32) for name in ("output_count", "pad")],
+        *[(name, _POINTER) for name in ("op", "a", "b", "still", "moving", "free", "output")],
+        ("constant", _POINTER),
     ]
 
 
@@ -60,10 +51,10 @@ class SeriesStructure(ctypes.Structure):
     """Rules of series as C reads them."""
 
     _fields_ = [
-        *[(name, _I32) for name in ("size", "still_count", "moving_count", "late_count")],
-        *[(name, _I32) for name in ("free_count", "output_count")],
-        *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "late")],
-        *[(name, _POINTER) for name in ("free", "output", "first", "second")],
+        *[(name, _I32) for name in ("size", "still_count", "moving_count", "later_count")],
+        *[(name, _I32) for name in ("late_count", "output_count")],
+        *[(name, _POINTER) for name in ("rule", "a", "b", "c", "op", "still", "moving", "later")],
+        *[(name, _POINTER) for name in ("late", "output", "first", "second")],
     ]
 
 
@@ -81,10 +72,13 @@ class _System(ctypes.Structure):
         *[(name, _I32) for name in ("n", "dimension", "timed", "m", "c", "parameters")],
         *[(name, _I32) for name in ("stops", "resets", "order", "slope_outputs")],
         ("series", SeriesStructure),
+        ("free", SeriesStructure),
         *[(name, ValuesStructure) for name in _VALUES],
         *[(name, _Entries) for name in _ENTRIES],
         *[(name, _POINTER) for name in (*_TABLES, "slope_output", "slope_moves")],
-        *[(name, _I32) for name in ("linear", "pad")],
+        *[(name, _I32) for name in ("linear", "linear_free")],
+        *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards")],
+        *[(name, _I32) for name in ("affine", "pad")],
     ]
 
 
@@ -96,15 +90,10 @@ def library() -> ctypes.CDLL:
     ------
     CompilerError
     """
-    enumerations = [("OP", OPERATIONS), ("RULE", TAPE_RULES)]
-    head = "".join(
-        f"enum {{ {', '.join(f'{prefix}_{name}' for name in names)} }};\n"
-        for prefix, names in enumerations
-    )
-    sizes = f"#define P {_MOST_ORDER}\n#define MODES 1000000\n#define M 1\n#define NG 1\n"
-    texts = [driver_text("common.h"), *[driver_text(f"interpreter/{name}") for name in _FILES]]
-    texts += [_extended("programs.h", "flow.c"), driver_text("interpreter/fixed.c")]
-    made = build("".join([facts_header(), sizes, head, *texts]))
+    return _declared(build(interpreter_source()))
+
+
+def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     require_size(made.options_size, OptionsStructure)
     require_size(made.batch_size, BatchStructure)
     require_size(made.system_size, _System)
@@ -123,34 +112,20 @@ def library() -> ctypes.CDLL:
     return made
 
 
-def _extended(*files: str) -> str:
-    """Functions of some files once more, under other names, on long doubles."""
-    text = "".join(driver_text(f"interpreter/{name}") for name in files)
-    text = re.sub(r"typedef struct \{[^}]*\} (Values|Series|Field);", "", text)
-    text = re.sub(r"\bdouble\b", "long double", text)
-    names = {"Flow", *re.findall(r"^static (?:inline )?[\w ]+?[ *](\w+)\(", text, re.MULTILINE)}
-    defined = "".join(f"#define {name} {name}_extended\n" for name in sorted(names))
-    undone = "".join(f"#undef {name}\n" for name in sorted(names))
-    return f"#include <tgmath.h>\n{defined}{text}{undone}"
-
-
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
-    """Return the interpreter with a system at the options' tolerance, or None where it has none: its
-    multipliers must enter linearly."""
+    """Return the interpreter with a system at the options' tolerance, or None where it has none: hidden
+    dynamics, and impacts with multipliers that enter in products."""
     order = options.order
-    if (
-        system.sets
-        or any(system.nonlinear)
-        or order >= _MOST_ORDER
-        or not coupled_of(system).affine
-    ):
+    if system.sets or any(system.nonlinear) or order >= MOST_ORDER:
+        return None
+    if system.impacts and not coupled_of(system).affine:
         return None
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 
 
 def series_structure(s: Series, kept: list[NDArray[Any]]) -> SeriesStructure:
     """Rules as C reads them; what it points to is added to ``kept``."""
-    lists = (s.still, s.moving, s.late, s.free, s.outputs)
+    lists = (s.still, s.moving, s.later, s.late, s.outputs)
     arrays = (s.rule, s.a, s.b, s.c, s.op, *lists, s.first, s.second)
     kept += arrays
     return SeriesStructure(len(s.rule), *map(len, lists), *[a.ctypes.data for a in arrays])
@@ -158,14 +133,21 @@ def series_structure(s: Series, kept: list[NDArray[Any]]) -> SeriesStructure:
 
 def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
     """A graph as C reads it; what it points to is added to ``kept``."""
-    arrays = (v.op, v.a, v.b, v.still, v.moving, v.outputs, v.constant)
+    arrays = (v.op, v.a, v.b, v.still, v.moving, v.free, v.outputs, v.constant)
     kept += arrays
-    sizes = (len(v.op), len(v.still), len(v.moving), len(v.outputs))
+    sizes = (len(v.op), len(v.still), len(v.moving), len(v.free), len(v.outputs), 0)
     return ValuesStructure(*sizes, *[a.ctypes.data for a in arrays])
 
 
+#: Steps of a system, in all its runs, after which a program is generated for it.
+_LONG = 20_000
+
+
 class TapeEngine:
-    """The interpreter with one system at one order.
+    """The driver in C with one system at one order.
+
+    The interpreter runs it at once. Long runs go on, from a step to the next, in a program generated for
+    the system, which a compiler makes meanwhile: the same operations, so the same bits.
 
     Parameters
     ----------
@@ -180,6 +162,29 @@ class TapeEngine:
         self.guards = lru_cache(maxsize=4096)(self._guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
+        self._steps, self._special = 0, None
+        if supports_special(tape, order):
+            source = lambda: special_source(tape, self.coupled, order)
+            self._special = Background(source, _declared)
+
+    def compile(self) -> None:
+        """Wait for the program generated for the system; very large ones have none.
+
+        Raises
+        ------
+        CompilerError
+        """
+        library()
+        if self._special is not None:
+            self._special.wait()
+
+    def _driver(self, steps: int) -> ctypes.CDLL:
+        """The library to go on with, after some more steps."""
+        self._steps += steps
+        if self._special is None or self._steps < _LONG:
+            return (self._special and self._special.library()) or library()
+        self._special.start()
+        return self._special.library() or library()
 
     def _structure(self, coupled: Coupled, tape: Tape) -> _System:
         system, m, c = self.system, self.system.surface_count, len(self.system.impacts)
@@ -195,7 +200,10 @@ class TapeEngine:
             order=self.order,
             slope_outputs=tape.slope_outputs,
             series=series_structure(tape.series, self._kept),
-            linear=int(coupled.linear),
+            free=series_structure(tape.free, self._kept),
+            affine=int(coupled.affine),
+            linear=int(coupled.linearity.everywhere),
+            linear_free=int(coupled.linearity.free),
         )
         for name in _VALUES:
             setattr(made, name, values_structure(getattr(tape, name), self._kept))
@@ -213,6 +221,9 @@ class TapeEngine:
             "component": tape.component,
             "slope_output": tape.slope_output,
             "slope_moves": tape.slope_moves,
+            "bent": coupled.linearity.bent_rows,
+            "bent_free": coupled.linearity.bent_free_rows,
+            "bent_guards": coupled.linearity.bent_guards,
         }
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
@@ -235,37 +246,29 @@ class TapeEngine:
 
     # one trajectory ----------------------------------------------------------------------------
 
-    def run(self, x: Array, p: Array, options: Options, max_steps: int | None = None) -> Run:
-        """Run one trajectory from an extended start, dense output kept.
-
-        ``max_steps`` is a limit besides that of the options.
-        """
-        n = self.system.extended_dimension
-        output = Output(n, self.order, FIRST_STEPS)
+    def run(self, x: Array, p: Array, options: Options) -> Run:
+        """Run one trajectory from an extended start, dense output kept."""
+        output = Output(self.system.extended_dimension, self.order)
         x, p = np.array(x, float), np.append(np.array(p, float), 0.0)
         start = self._start_mode(options)
-        parts: list[dict[str, NDArray[Any]]] = []
         with self._table() as table, self._state(table) as state:
-            limits = options_of(self.system, options, dense=True)
-            limits.max_steps = min(
-                limits.max_steps, limits.max_steps if max_steps is None else max_steps
-            )
-            c_options = ctypes.byref(limits)
+            c_options = ctypes.byref(options_of(self.system, options, dense=True))
             given = (address(x), address(p), address(start))
             library().run_begin(state, c_options, output.pointer, *given, options.t_start)
+            driver, bursts = self._driver(0), 0
             while True:
-                status = RUNNING
-                while status == RUNNING:  # Python hears Ctrl-C between the calls
-                    status = library().run_continue(state, BURST)
+                # Python hears Ctrl-C between the calls.
+                while (status := driver.run_continue(state, BURST)) == RUNNING:
+                    driver, bursts = self._driver(BURST), bursts + BURST
                 numbers, counts, active, several = self._read(state)
-                parts.append(output.filled(counts[7:10]))
                 if status != FULL:
                     break
-                output = Output(n, self.order, min(4 * output.steps, MOST_STEPS))
+                output.grow(counts[7:10])
                 library().run_resume(state, output.pointer)
+            self._steps += int(counts[5]) - bursts
             modes, words = self._words(table, [int(counts[4])])
-        return Run.joined(
-            parts,
+        return Run.of(
+            output.filled(counts[7:10]),
             self.system.dimension,
             numbers=numbers,
             counts=counts,
@@ -347,9 +350,12 @@ class TapeEngine:
         c_options = options_of(self.system, options, dense=False, at=at)
         with self._table() as table, self._state(table) as state:
             call = (state, address(done), ctypes.byref(batch), ctypes.byref(c_options))
-            while library().run_many(*call, address(start), BURST):
+            driver, bursts = self._driver(0), 0
+            while driver.run_many(*call, address(start), BURST):
+                driver, bursts = self._driver(BURST), bursts + BURST
                 if stop():
                     raise Stopped
+            self._steps += int(chunk.totals[0]) - bursts
             used = np.flatnonzero(np.bincount(chunk.itinerary)).tolist()
             chunk.rename(self._words(table, used)[1])
         return chunk

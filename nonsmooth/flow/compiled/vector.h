@@ -55,17 +55,32 @@ INLINE int any(I m) { return bits(m) != 0; }
 INLINE T LOG2(T a) {
   I b = (I)a;
   T e = __builtin_convertvector((b >> 52) - 1023, T);
-  T m = (T)((b & 0xfffffffffffffLL) | 0x3ff0000000000000LL) - 1.5;
-  return e + (0.5849625007 + m * (0.9617966939 + m * (-0.3205988980 + m * (0.1424883991
-         + m * (-0.0712441996 + m * (0.0379969064 - m * 0.0211093925))))));
+  T m = (T)((b & 0xfffffffffffffLL) | 0x3ff0000000000000LL) - 1.5, z = m * m;
+  T high = (0.1424883991 * m - 0.3205988980) + z * ((0.0379969064 * m - 0.0712441996) - 0.0211093925 * z);
+  return (e + (0.5849625007 + 0.9617966939 * m)) + z * high;
 }
 INLINE T EXP2(T a) {
   T k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;
-  T y = 1.0 + f * (1.0 + f * (0.5 + f * (0.16666666666 + f * (0.0416666666 + f * 0.0083333333))));
+  T z = f * f, y = (1.0 + f) + z * ((0.5 + 0.16666666666 * f) + z * (0.0416666666 + 0.0083333333 * f));
   return y * (T)((__builtin_convertvector(k, I) + 1023) << 52);
 }
+#if defined(__AVX512F__) && W == 8 && !defined(__clang__)
+INLINE T ROUGH_INVERSE(T a) { return (T)__builtin_ia32_rcp14pd512_mask(a, BC(0), -1); }
+/* To some 1e-8, NaN at the ends of the range: for iterations that correct themselves. */
+INLINE T QUICK_INVERSE(T a) {
+  T y = ROUGH_INVERSE(a);
+  return y * (2.0 - a * y);
+}
+INLINE T QUICK_ROOT(T a) {
+  T y = (T)__builtin_ia32_rsqrt14pd512_mask(a, BC(0), -1), root = a * y;
+  return root * (1.5 - 0.5 * (root * y));
+}
+#else
 INLINE T ROUGH_INVERSE(T a) {
   T y = (T)(0x7fde6238da3c2118LL - (I)a);
   y = y * (2.0 - a * y);
   return y * (2.0 - a * y);
 }
+INLINE T QUICK_INVERSE(T a) { return 1.0 / a; }
+INLINE T QUICK_ROOT(T a) { return SQRT_(a); }
+#endif

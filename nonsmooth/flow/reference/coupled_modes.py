@@ -54,7 +54,8 @@ class CoupledModes:
 
     def affine(self, mode: str) -> bool:
         """Whether field and guards are affine in the states."""
-        return self.coupled.linear
+        free, linearity = all(self._system.parse_letters(mode)), self.coupled.linearity
+        return linearity.free if free else linearity.everywhere
 
     def expand(self, mode: str, x: Array, unknowns: Array) -> Expansion:
         """Jets at an extended state, with the multipliers of what slides."""

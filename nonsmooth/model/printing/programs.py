@@ -1,42 +1,12 @@
-"""The functions of a system that a compiled driver calls, as two C programs.
-
-``modes_program``: every mode by itself, for one trajectory at a time.
-``lanes_program``: the modes of one surface blended, for several trajectories in step.
-"""
+"""The functions of a system that the lanes call, as a C program: the modes of one surface blended."""
 
 from __future__ import annotations
 
 import casadi as ca
 
-from ..jets import taylor
-from ..motion import motion
 from ..system import FilippovSystem
 from .blend import Blend, blended_jet
 from .ccode import Program
-
-
-def modes_program(system: FilippovSystem, order: int) -> str:
-    """C of ``jet_k``, ``guard_values_k`` for mode k, ``surface_values`` and ``reset_map_j``.
-
-    ``values_k`` are the field and the guards, for modes that are not affine.
-
-    Arrays are row by row: states (N, order+1), guards (m, order+1), gradients (m, N).
-    """
-    x, p = system.extended_states, system.parameter_symbols
-    program = Program(x, p)
-    for k, mode in enumerate(system.modes):
-        m = motion(system, mode)
-        states, guards = taylor(m.field, m.functions, x, p, order)
-        program.add(f"jet_{k}", c=states, g=guards)
-        program.add(f"guard_values_{k}", value=m.functions, gradient=_gradient(m.functions, x))
-        if not m.affine:
-            program.add(f"values_{k}", f=m.field, g=m.functions)
-    if system.surface_count:
-        h = _surfaces(system)
-        program.add("surface_values", h=h, gradient=_gradient(h, x))
-    for j in range(len(system.resets)):
-        program.add(f"reset_map_{j}", y=system.definition.maps[:, j])
-    return program.text()
 
 
 def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Blend]:

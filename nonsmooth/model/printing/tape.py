@@ -6,7 +6,7 @@ a system, in any mode (``model.coupled``). Generation is linear in the graph.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import cast
 
@@ -18,15 +18,15 @@ from ..coupled import Coupled
 from ..economy import economise
 from ..graph import depends_on, instructions
 from ..numbers import BINARY, UNARY
-from ..rules import RULES, Rule, lower, touched
+from ..rules import RULES, Rule, entered, lower
 from ..values import Array
 
 Integers = NDArray[np.int32]
 
-#: Operations and rules by number, as in the C enumerations. ``scale`` and ``over`` are products with and
-#: quotients by what does not move.
+#: Operations and rules by number, as in the C enumerations. Where one argument does not move, sums are
+#: ``shift``, differences ``lower`` and ``below`` it, products ``scale``, quotients ``over`` and ``under`` it.
 OPERATIONS = ("const", "input", *UNARY, *BINARY)
-TAPE_RULES = (*RULES, "scale", "over")
+TAPE_RULES = (*RULES, "shift", "lower", "below", "scale", "over", "under")
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ class Values:
         Values of constants.
     still, moving : ndarray of int32
         Nodes that are evaluated once for given parameters, and at every point; each in order.
+    free : ndarray of int32
+        Those of the latter that suffice where nothing slides.
     outputs : ndarray of int32
         Nodes of the outputs.
     """
@@ -51,6 +53,7 @@ class Values:
     constant: Array
     still: Integers
     moving: Integers
+    free: Integers
     outputs: Integers
 
 
@@ -64,9 +67,9 @@ class Series:
         Rule, its arguments (vector and position of an input in a and b), its operation.
     first, second : ndarray
         Its numbers.
-    still, moving, late, free : ndarray of int32
-        Rules that are known once the parameters are, those advanced order by order, those of them
-        that multipliers enter, and those that suffice where nothing slides.
+    still, moving, later, late : ndarray of int32
+        Rules that are known once the parameters are, those of which a first coefficient is needed, of
+        which further ones are, and those of the last that unknown multipliers enter.
     outputs : ndarray of int32
     """
 
@@ -79,8 +82,8 @@ class Series:
     second: Array
     still: Integers
     moving: Integers
+    later: Integers
     late: Integers
-    free: Integers
     outputs: Integers
 
 
@@ -97,6 +100,7 @@ class Tape:
     """What the driver in C reads of a system; see ``System`` in ``flow/compiled/interpreter/state.c``."""
 
     series: Series
+    free: Series
     point: Values
     surfaces: Values
     maps: Values
@@ -132,9 +136,11 @@ def tape_of(coupled: Coupled) -> Tape:
     column = _sparse(coupled.columns_of_field)
     output, moves, slopes = _moving_slopes(coupled)
     point = [coupled.layer, coupled.factors, *[nonzeros for nonzeros, _ in matrices]]
+    series, free = _series_of_modes(coupled, slopes)
     return Tape(
-        series=series_of([coupled.moving, p], [*coupled.outputs, slopes], x.numel(), (0, 2, 4)),
-        point=values_of([coupled.moving, p], point),
+        series=series,
+        free=free,
+        point=values_of([coupled.moving, p], point, (4, 5)),
         surfaces=values_of([x, p], [kept, surface_gradient[0]]),
         maps=values_of([x, p], [d.maps]),
         restitution=values_of([x, p], [d.restitutions]),
@@ -153,8 +159,11 @@ def tape_of(coupled: Coupled) -> Tape:
     )
 
 
-def values_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Values:
-    """Write expressions in two vectors of symbols, of which the first moves."""
+def values_of(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], free: Sequence[int] = ()
+) -> Values:
+    """Write expressions in two vectors of symbols, of which the first moves; ``free`` are the numbers of
+    the outputs that are asked for where nothing slides."""
     nodes, rows = instructions(inputs, outputs)
     moving = depends_on(nodes, [True, False])
     number = {op: k for k, op in enumerate(OPERATIONS)}
@@ -174,39 +183,75 @@ def values_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Values:
         constant=constant,
         still=_where(moving, False),
         moving=_where(moving, True),
+        free=_reached([node.args for node in nodes], moving, [j for k in free for j in rows[k]]),
         outputs=_integers([j for row in rows for j in row]),
     )
 
 
-def series_of(
-    inputs: Sequence[ca.SX],
-    outputs: Sequence[ca.SX],
-    states: int,
-    free: Sequence[int] = (),
-) -> Series:
-    """Write the Taylor rules of expressions in two vectors, of which the first moves.
+def series_of(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> Series:
+    """Write the Taylor rules of expressions in two vectors, of which the first moves."""
+    rules, rows = _rules_of(inputs, outputs)
+    return _series(rules, rows, range(len(rows)), lambda _: True, lambda _: False)
 
-    Parameters
-    ----------
-    states : int
-        So many of its entries are states; the others are multipliers.
-    free : sequence of int, optional
-        Outputs that are asked for where nothing slides.
-    """
+
+def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
+    """Rules of all that a mode needs: in any, and in one where nothing slides. They are numbered alike."""
+    n, m = coupled.system.extended_dimension, coupled.system.surface_count
+    inputs = [coupled.moving, coupled.system.parameter_symbols]
+    rules, rows = _rules_of(inputs, [*coupled.outputs, slopes])
+    held = {n + i for i in range(m) if coupled.scaled[i]}
+    every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n)
+    return every, _series(rules, rows, (0, 2, 4), lambda k: k < n, lambda _: False)
+
+
+def _rules_of(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
+) -> tuple[list[Rule], list[list[int]]]:
+    """Rules of expressions, and the numbers of those of each output."""
     outputs = [ca.densify(o) for o in outputs]
     nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
     rules, place = lower(nodes, depends_on(nodes, [True, False]))
+    return rules, [[place[j] for j in row] for row in rows]
+
+
+def _series(
+    rules: Sequence[Rule],
+    rows: Sequence[Sequence[int]],
+    wanted: Sequence[int],
+    moves: Callable[[int], bool],
+    unknown: Callable[[int], bool],
+) -> Series:
+    """Rules as the interpreter reads them.
+
+    Parameters
+    ----------
+    wanted : sequence of int
+        Numbers of the outputs that are asked for.
+    moves, unknown : callable
+        Whether an entry of the first vector of inputs moves in time, and is an unknown multiplier.
+    """
     still = [_is_still(rule) for rule in rules]
+    moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
     operations = {op: k for k, op in enumerate(OPERATIONS)}
     args, first, second, names = np.zeros((len(rules), 3), np.int32), [], [], []
     for j, rule in enumerate(rules):
-        name, own = _specialised(rule, still)
+        name, own = _specialised(rule, moving)
         names.append(TAPE_RULES.index(name))
         args[j, : len(own)] = own
         numbers = (*rule.numbers, 0.0, 0.0)
         first.append(numbers[0])
         second.append(numbers[1])
-    late = touched(rules, states)
+    roots = [j for k in wanted for j in rows[k]]
+    arguments = [rule.args if rule.rule != "input" else () for rule in rules]
+    change = [not s for s in still]
+    reached = _reached(arguments, change, roots)
+    # What does not move has later coefficients, zeros, only where they are read.
+    read = [
+        *roots,
+        *(a for j in reached.tolist() if rules[j].rule == "atan2" for a in rules[j].args),
+    ]
+    zeros = _reached(arguments, change, [j for j in read if not moving[j]])
+    needed = {*zeros.tolist(), *(j for j in reached.tolist() if moving[j])}
     return Series(
         rule=_integers(names),
         a=_integers(args[:, 0]),
@@ -216,21 +261,23 @@ def series_of(
         first=np.array(first),
         second=np.array(second),
         still=_where(still, True),
-        moving=_where(still, False),
-        late=_integers([j for j in late if not still[j]]),
-        free=_reached(rules, still, [place[j] for k in free for j in rows[k]]),
-        outputs=_integers([place[j] for row in rows for j in row]),
+        moving=reached,
+        later=_integers(sorted(needed)),
+        late=_integers(sorted(j for j in needed if late[j])),
+        outputs=_integers([j for row in rows for j in row]),
     )
 
 
-def _reached(rules: Sequence[Rule], still: Sequence[bool], roots: Sequence[int]) -> Integers:
-    """Rules that some follow from, in order, without those that are still."""
+def _reached(
+    arguments: Sequence[Sequence[int]], wanted: Sequence[bool], roots: Sequence[int]
+) -> Integers:
+    """What some nodes follow from, in order, as far as it is wanted."""
     found, pending = set[int](), list(roots)
     while pending:
         j = pending.pop()
-        if j not in found and not still[j]:
+        if j not in found and wanted[j]:
             found.add(j)
-            pending += rules[j].args
+            pending += arguments[j]
     return _integers(sorted(found))
 
 
@@ -238,16 +285,22 @@ def _is_still(rule: Rule) -> bool:
     return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.place[0] == 1)
 
 
-def _specialised(rule: Rule, still: Sequence[bool]) -> tuple[str, tuple[int, ...]]:
-    """Name and arguments of a rule: products with what is still need no convolution."""
+#: Name of a rule where its first, or its second, argument does not move; whether they change places.
+_SPECIAL = {
+    "add": (("shift", True), ("shift", False)),
+    "sub": (("below", False), ("lower", False)),
+    "mul": (("scale", True), ("scale", False)),
+    "div": (("under", False), ("over", False)),
+}
+
+
+def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ...]]:
+    """Name and arguments of a rule: with what does not move nothing is convolved."""
     if rule.rule == "input":
         return rule.rule, rule.place
-    if rule.rule == "mul" and still[rule.args[1]]:
-        return "scale", rule.args
-    if rule.rule == "mul" and still[rule.args[0]]:
-        return "scale", (rule.args[1], rule.args[0])
-    if rule.rule == "div" and still[rule.args[1]]:
-        return "over", rule.args
+    for k, (name, turned) in enumerate(_SPECIAL.get(rule.rule, ())):
+        if not moving[rule.args[k]] and moving[rule.args[1 - k]]:
+            return name, rule.args[::-1] if turned else rule.args
     return rule.rule, rule.args
 
 

@@ -1,4 +1,4 @@
-"""The compiled engine and the reference driver agree to rounding, whatever the system."""
+"""The compiled engines and the reference driver agree to rounding, whatever the system."""
 
 import platform
 
@@ -9,10 +9,10 @@ from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
 import nonsmooth.flow.compiled.build as build_module
-import nonsmooth.flow.compiled.engine as engine_module
+import nonsmooth.flow.compiled.lanes as lanes_module
 import nonsmooth.textbook as textbook
-from nonsmooth.flow.compiled import engine_for, find_compiler, tape_for
-from nonsmooth.flow.compiled.codegen import lanes_source, scalar_source, supports_lanes
+from nonsmooth.flow.compiled import find_compiler, lanes_for, tape_for
+from nonsmooth.flow.compiled.codegen import lanes_source
 from nonsmooth.flow.facts import HAND_OVER, KINDS
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.reference.driver import Driver
@@ -26,9 +26,9 @@ def reference(system, x, p, options):
     return Driver(system, x.copy(), p, options).run()
 
 
-def simulate_arrays(system, x, p, options, engine=engine_for):
-    """Run a compiled engine; None where the reference driver must repeat the run."""
-    compiled = engine(system, options)
+def simulate_arrays(system, x, p, options):
+    """Run the driver in C; None where the reference driver must repeat the run."""
+    compiled = tape_for(system, options)
     run = compiled.run(x, p, options) if compiled is not None else None
     return None if run is None or run.status == HAND_OVER else run
 
@@ -37,14 +37,13 @@ def agree(system, start, options, parameters=None, tolerance=1e-12):
     """Assert that engines agree; returns the status."""
     x, p = system.extended_point(start, options.t_start), system.parameter_vector(parameters)
     expected = reference(system, x, p, options)
-    for engine in (engine_for, tape_for):
-        run = simulate_arrays(system, x, p, options, engine)
-        if run is None:
-            return None
-        # The interpreter has multipliers as series also on one surface: its steps may be others.
-        alike = engine is engine_for
-        same_run(run, expected, tolerance if alike else tolerance + 100 * options.rtol, alike)
-    if supports_lanes(system):
+    run = simulate_arrays(system, x, p, options)
+    if run is None:
+        return None
+    # It has multipliers as series, the reference driver only on several surfaces: steps may be others.
+    alike = system.coupled
+    same_run(run, expected, tolerance if alike else tolerance + 100 * options.rtol, alike)
+    if lanes_for(system, options) is not None:
         scale = 1.0 + np.abs(expected.x).max() + np.abs(expected.t).max()
         lanes_agree(system, x, p, options, expected, tolerance * scale)
     return expected.status
@@ -69,11 +68,15 @@ def same_run(run, expected, tolerance, same_steps):
     np.testing.assert_allclose(run.event_t, times, rtol=0, atol=tolerance * scale)
 
 
+def both(system, options):
+    """The lanes, and the driver for one trajectory at a time."""
+    return lanes_for(system, options), tape_for(system, options)
+
+
 def lanes_agree(system, x, p, options, expected, tolerance):
-    engine = engine_for(system, options)
-    chunk = engine.run_many(np.tile(x, (11, 1)), p, options, None, True)
-    assert set(chunk.status) <= {expected.status, HAND_OVER}
-    for k in np.flatnonzero(chunk.status != HAND_OVER):
+    chunk = lanes_for(system, options).run_many(np.tile(x, (11, 1)), p, options, None)
+    for k in range(11):
+        assert chunk.status[k] == expected.status
         assert chunk.words[chunk.itinerary[k]] == expected.itinerary
         np.testing.assert_allclose(chunk.x[k], expected.x[-1], rtol=0, atol=tolerance)
         np.testing.assert_allclose(chunk.t[k], expected.t[-1], rtol=0, atol=tolerance)
@@ -198,7 +201,7 @@ def test_functions_in_parts(size, monkeypatch):
     monkeypatch.setattr(ccode, "_WHOLE", 2 * size)
     monkeypatch.setattr(ccode, "_PART", size)
     system = every_operation()
-    assert "jet_0_part1(" in scalar_source(system, 6) and "jet_part1(" in lanes_source(system, 6, 8)
+    assert "jet_part1(" in lanes_source(system, 6, 8)
     assert (
         agree(system, [0.4, 0.9], Options(t_end=3.0, rtol=1e-3, atol=1e-3), None, 1e-9) is not None
     )
@@ -241,8 +244,8 @@ def test_curved_surface_keeps_the_slider_on_it():
     run = simulate_arrays(system, np.array([1.0, 0.0]), np.zeros(0), options)
     assert run is not None and run.itinerary == "s"
     assert np.abs(run.x[:, 0] ** 2 + run.x[:, 1] ** 2 - 1).max() < 1e-14
-    chunk = engine_for(system, options).run_many(
-        np.tile([1.0, 0.0], (9, 1)), np.zeros(0), options, None, True
+    chunk = lanes_for(system, options).run_many(
+        np.tile([1.0, 0.0], (9, 1)), np.zeros(0), options, None
     )
     assert np.abs((chunk.x**2).sum(1) - 1).max() < 1e-14
     np.testing.assert_allclose(chunk.x[:, 0], np.cos(1000.0), atol=1e-9)
@@ -256,9 +259,8 @@ def test_itineraries_of_any_length_in_lanes(t_end):
         [x], field=[ca.cos(2 * t)], multipliers=lam, surface=ca.sin(2 * t + 0.1 * x), time=t
     )
     starts = np.column_stack([np.linspace(-0.5, 0.5, 20), np.zeros(20)])
-    engine, p = engine_for(system, Options(t_end=t_end)), system.parameter_vector()
-    options = Options(t_end=t_end)
-    lanes, scalar = (engine.run_many(starts, p, options, None, flag) for flag in (True, False))
+    options, p = Options(t_end=t_end), system.parameter_vector()
+    lanes, scalar = (of.run_many(starts, p, options, None) for of in both(system, options))
     words = [lanes.words[k].split() for k in lanes.itinerary]
     assert words == [scalar.words[k].split() for k in scalar.itinerary]
     assert min(map(len, words)) > 0.6 * t_end
@@ -296,10 +298,9 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
     p = system.parameter_vector()
     with monkeypatch.context() as patch:
         patch.setattr(build_module, "FLAGS", [*build_module.FLAGS, *flags.split()])
-        patch.setattr(engine_module, "lane_width", lambda: width)
-        engine = engine_module.Engine(system, 10)
-        chunk = engine.run_many(starts, p, options, None, True)
-    expected = engine_module.Engine(system, 10).run_many(starts, p, options, None, False)
+        patch.setattr(lanes_module, "lane_width", lambda: width)
+        chunk = lanes_module.Lanes(system, 10).run_many(starts, p, options, None)
+    expected = tape_for(system, options).run_many(starts, p, options, None)
     np.testing.assert_allclose(chunk.x, expected.x, rtol=0, atol=1e-8)
     assert [chunk.words[k] for k in chunk.itinerary] == [
         expected.words[k] for k in expected.itinerary
@@ -324,8 +325,8 @@ def test_roots_with_others_beside_them(v0, a0, kind, t_end):
     for _ in range(60):  # Newton from beyond the root of a function that falls ever faster
         slope = v0 + a0 * times - times**2 / 2
         times -= (heights + v0 * times + a0 * times**2 / 2 - times**3 / 6) / slope
-    for lanes in (True, False):
-        chunk = engine_for(system, options).run_many(starts, np.zeros(0), options, at, lanes)
+    for engine in both(system, options):
+        chunk = engine.run_many(starts, np.zeros(0), options, at)
         assert np.abs(chunk.at_t - times).max() < 1e-15 * t_end
     for k in range(0, 128, 16):
         event = reference(system, starts[k], np.zeros(0), options).events[0]
@@ -355,8 +356,8 @@ def test_roots_just_outside_the_step_are_not_taken(outside):
     system = FilippovSystem([y, v, a, j], field=[v, a, j, 0], stops=[Stop(y, -1)])
     starts, inside = cubics(outside)
     options = Options(t_end=1.0)
-    for lanes in (True, False):
-        chunk = engine_for(system, options).run_many(starts, np.zeros(0), options, None, lanes)
+    for engine in both(system, options):
+        chunk = engine.run_many(starts, np.zeros(0), options, None)
         np.testing.assert_allclose(chunk.t, inside, rtol=0, atol=1e-8)
 
 
@@ -370,8 +371,6 @@ def test_pairs_early_in_a_long_step_are_seen(start, t_end, expected):
     options = Options(t_end=t_end)
     x = np.array(start)
     assert reference(system, x, np.zeros(0), options).t[-1] == pytest.approx(expected, rel=1e-12)
-    for lanes in (True, False):
-        chunk = engine_for(system, options).run_many(
-            np.tile(x, (9, 1)), np.zeros(0), options, None, lanes
-        )
+    for engine in both(system, options):
+        chunk = engine.run_many(np.tile(x, (9, 1)), np.zeros(0), options, None)
         np.testing.assert_allclose(chunk.t, expected, rtol=1e-12)

@@ -4,22 +4,25 @@
  * numbers of its enumerations. What does not move (constants, parameters) is computed once a run.
  */
 
-/* Values of a graph: node j is op[j] of nodes a[j] and b[j]; inputs have a vector and a position there. */
+/* Values of a graph: node j is op[j] of nodes a[j] and b[j]; inputs have a vector and a position there.
+ * ``free`` suffice where nothing slides. */
 typedef struct {
-  int32_t size, still_count, moving_count, output_count;
-  const int32_t *op, *a, *b, *still, *moving, *output;
+  int32_t size, still_count, moving_count, free_count, output_count, pad;
+  const int32_t *op, *a, *b, *still, *moving, *free, *output;
   const double *constant;
 } Values;
 
-/* Power series by rules (nonsmooth/model/rules.py), order by order. ``late`` are those that multipliers
- * enter, which follow from the equations of the same order; ``free`` suffice where nothing slides. */
+/* Power series by rules (nonsmooth/model/rules.py), order by order. Those of ``moving`` have a coefficient
+ * zero, those of ``later`` further ones; ``late`` are those of them that unknown multipliers enter, which
+ * follow from the equations of the same order. */
 typedef struct {
-  int32_t size, still_count, moving_count, late_count, free_count, output_count;
-  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *late, *free, *output;
+  int32_t size, still_count, moving_count, later_count, late_count, output_count;
+  const int32_t *rule, *a, *b, *c, *op, *still, *moving, *later, *late, *output;
   const double *first, *second;
 } Series;
 
-static double operate(int op, double x, double y) {
+/* Not inlined: the same code whoever calls, which no compiler replaces by other arithmetic. */
+OUTSIDE double operate(int op, double x, double y) {
   switch (op) {
     case OP_assign: return x;
     case OP_neg: return -x;
@@ -94,46 +97,69 @@ static void values_prepare(const Values *t, const double *p, double *w) {
 static void values_run(const Values *t, const double *x, const double *p, double *w) {
   values_nodes(t, t->moving, t->moving_count, x, p, w);
 }
+static void values_free(const Values *t, const double *x, const double *p, double *w) {
+  values_nodes(t, t->free, t->free_count, x, p, w);
+}
 
-/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. */
+/* Sums of u_i v_(k-i) and of i u_i v_(k-i), i from first to last, in four chains. Generated programs
+ * (nonsmooth/model/printing/recurrences.py) have each of these recurrences with the same operations. */
 static inline double convolve(const double *u, const double *v, int k, int first, int last) {
-  double a = 0, b = 0, c = 0, d = 0;
-  int i = first;
-  v += k;
-  for (; i + 3 <= last; i += 4) {
-    a += u[i] * v[-i];
-    b += u[i + 1] * v[-i - 1];
-    c += u[i + 2] * v[-i - 2];
-    d += u[i + 3] * v[-i - 3];
+  int count = last - first + 1, i = 4;
+  if (count <= 0) return 0;
+  u += first;
+  v += k - first;
+  double a = u[0] * v[0], b, c, d;
+  if (count == 1) return a;
+  b = u[1] * v[-1];
+  if (count == 2) return a + b;
+  c = u[2] * v[-2];
+  if (count == 3) return (a + b) + c;
+  d = u[3] * v[-3];
+  for (; i + 3 < count; i += 4) {
+    a = MULADD(u[i], v[-i], a);
+    b = MULADD(u[i + 1], v[-i - 1], b);
+    c = MULADD(u[i + 2], v[-i - 2], c);
+    d = MULADD(u[i + 3], v[-i - 3], d);
   }
-  if (i <= last) a += u[i] * v[-i];
-  if (i + 1 <= last) b += u[i + 1] * v[-i - 1];
-  if (i + 2 <= last) c += u[i + 2] * v[-i - 2];
+  if (i < count) a = MULADD(u[i], v[-i], a);
+  if (i + 1 < count) b = MULADD(u[i + 1], v[-i - 1], b);
+  if (i + 2 < count) c = MULADD(u[i + 2], v[-i - 2], c);
   return (a + b) + (c + d);
 }
 static inline double weigh(const double *u, const double *v, int k, int first, int last) {
-  double a = 0, b = 0, c = 0, d = 0;
-  int i = first;
+  int count = last - first + 1, i = 4;
+  if (count <= 0) return 0;
   double x = first;
-  v += k;
-  for (; i + 3 <= last; i += 4, x += 4) {
-    a += x * u[i] * v[-i];
-    b += (x + 1) * u[i + 1] * v[-i - 1];
-    c += (x + 2) * u[i + 2] * v[-i - 2];
-    d += (x + 3) * u[i + 3] * v[-i - 3];
+  u += first;
+  v += k - first;
+  double a = x * u[0] * v[0], b, c, d;
+  if (count == 1) return a;
+  b = (x + 1) * u[1] * v[-1];
+  if (count == 2) return a + b;
+  c = (x + 2) * u[2] * v[-2];
+  if (count == 3) return (a + b) + c;
+  d = (x + 3) * u[3] * v[-3];
+  for (; i + 3 < count; i += 4) {
+    a = MULADD((x + i) * u[i], v[-i], a);
+    b = MULADD((x + i + 1) * u[i + 1], v[-i - 1], b);
+    c = MULADD((x + i + 2) * u[i + 2], v[-i - 2], c);
+    d = MULADD((x + i + 3) * u[i + 3], v[-i - 3], d);
   }
-  if (i <= last) a += x * u[i] * v[-i];
-  if (i + 1 <= last) b += (x + 1) * u[i + 1] * v[-i - 1];
-  if (i + 2 <= last) c += (x + 2) * u[i + 2] * v[-i - 2];
+  if (i < count) a = MULADD((x + i) * u[i], v[-i], a);
+  if (i + 1 < count) b = MULADD((x + i + 1) * u[i + 1], v[-i - 1], b);
+  if (i + 2 < count) c = MULADD((x + i + 2) * u[i + 2], v[-i - 2], c);
   return (a + b) + (c + d);
 }
 
 /* A coefficient that is zero stays so, whatever it is divided by: a square root of zero at rest. */
-static inline double over(double a, double b) { return a == 0 ? 0 : a / b; }
+static inline double over(double a, double b) { return a == 0 ? 0 : a * (1.0 / b); }
+
+/* The same with the reciprocal of b. */
+static inline double divided(double a, double reciprocal) { return a == 0 ? 0 : a * reciprocal; }
 
 static double power_coefficient(const double *u, const double *w, double exponent, int k) {
-  double sum = 0;
-  for (int j = 0; j < k; j++) sum += (exponent * (k - j) - j) * (u[k - j] * w[j]);
+  double sum = exponent * k * (u[k] * w[0]);
+  for (int j = 1; j < k; j++) sum = MULADD(exponent * (k - j) - j, u[k - j] * w[j], sum);
   return over(sum, u[0]) * (1.0 / k);
 }
 
@@ -147,7 +173,10 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
     switch (t->rule[j]) {
       case RULE_input: w[k] = x[t->b[j]]; break;
       case RULE_add: w[k] = u[k] + v[k]; break;
+      case RULE_shift: w[k] = k ? u[k] : u[0] + v[0]; break;
       case RULE_sub: w[k] = u[k] - v[k]; break;
+      case RULE_lower: w[k] = k ? u[k] : u[0] - v[0]; break;
+      case RULE_below: w[k] = k ? -v[k] : u[0] - v[0]; break;
       case RULE_neg: w[k] = -u[k]; break;
       case RULE_twice: w[k] = u[k] + u[k]; break;
       case RULE_scale: w[k] = u[k] * v[0]; break;
@@ -155,13 +184,14 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
       case RULE_mul: w[k] = convolve(u, v, k, 0, k); break;
       case RULE_sq: {
         double half = 2 * convolve(u, u, k, 0, (k + 1) / 2 - 1);
-        w[k] = k % 2 ? half : half + u[k / 2] * u[k / 2];
+        w[k] = k % 2 ? half : k ? MULADD(u[k / 2], u[k / 2], half) : u[0] * u[0];
         break;
       }
       case RULE_div: w[k] = over(u[k] - convolve(w, v, k, 0, k - 1), v[0]); break;
+      case RULE_under: w[k] = over(k ? -convolve(w, v, k, 0, k - 1) : u[0], v[0]); break;
       case RULE_sqrt: w[k] = k ? over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]) : sqrt(u[0]); break;
-      case RULE_power: w[k] = k ? power_coefficient(u, w, v[0], k) : pow(u[0], v[0]); break;
-      case RULE_affine: w[k] = (k ? 0 : t->first[j]) + t->second[j] * u[k]; break;
+      case RULE_power: w[k] = k ? power_coefficient(u, w, v[0], k) : operate(OP_pow, u[0], v[0]); break;
+      case RULE_affine: w[k] = k ? t->second[j] * u[k] : MULADD(t->second[j], u[0], t->first[j]); break;
       case RULE_integral:
         w[k] = k ? t->first[j] / k * weigh(u, v, k, 1, k) : operate(t->op[j], u[0], 0);
         break;
@@ -171,7 +201,7 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
         break;
       case RULE_atan2: {
         const double *r = s + (int64_t)t->c[j] * stride;
-        if (k == 0) { w[0] = atan2(u[0], v[0]); break; }
+        if (k == 0) { w[0] = operate(OP_atan2, u[0], v[0]); break; }
         double top = weigh(u, v, k, 1, k) - weigh(v, u, k, 1, k) - weigh(w, r, k, 1, k - 1);
         w[k] = over(top, r[0]) * (1.0 / k);
         break;

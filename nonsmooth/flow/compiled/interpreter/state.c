@@ -8,6 +8,31 @@
 #define TRIED 256 /* modes that are tried one by one, where the rates do not decide */
 #define FEW 3 /* surfaces of which all modes are tried where no matrix is known to have one solution */
 #define SEVERAL 16 /* modes that can continue, for the message */
+
+/* Sizes: constants in a program generated for one system. */
+#ifdef GENERATED
+#define n_of(r) STATES
+#define dimension_of(r) DIMENSION
+#define timed_of(r) TIMED
+#define m_of(r) SURFACES
+#define c_of(r) CONTACTS
+#define width_of(r) (SURFACES + CONTACTS)
+#define stops_of(r) STOPS
+#define resets_of(r) RESETS
+#define order_of(r) P
+#define stride_of(r) (P + 1)
+#else
+#define n_of(r) ((r)->n)
+#define dimension_of(r) ((r)->s->dimension)
+#define timed_of(r) ((r)->s->timed)
+#define m_of(r) ((r)->m)
+#define c_of(r) ((r)->c)
+#define width_of(r) ((r)->width)
+#define stops_of(r) ((r)->s->stops)
+#define resets_of(r) ((r)->s->resets)
+#define order_of(r) ((r)->order)
+#define stride_of(r) ((r)->stride)
+#endif
 #define TINY 2.2250738585072014e-308
 
 /* Entries of a sparse matrix in the order of a program's outputs. */
@@ -16,6 +41,7 @@ typedef struct { int32_t count, pad; const int32_t *row, *column; } Entries;
 typedef struct {
   int32_t n, dimension, timed, m, c, parameters, stops, resets, order, slope_outputs;
   Series series;      /* field, layer, surfaces and gaps, factors, stops and resets, slope_outputs slopes */
+  Series free;        /* the same rules where nothing slides: field, surfaces and gaps, stops and resets */
   Values point;       /* layer, factors, entries of slope, gradients of layer, surfaces and gaps, stops, factors */
   Values surfaces;    /* surfaces, gaps, rates of gaps; entries of their gradients */
   Values maps;        /* states after each reset */
@@ -24,19 +50,23 @@ typedef struct {
   Entries slope, layer_gradient, height_gradient, stop_gradient, factor_gradient, surface_gradient, column;
   const int32_t *stop_direction, *reset_direction, *continuous, *scaled, *carries, *component;
   const int32_t *slope_output, *slope_moves; /* (m + c, m + c): output of the series or -1; whether it moves */
-  int32_t linear, pad;
+  int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
+  const int32_t *bent, *bent_free, *bent_guards; /* field's rows in any mode, where nothing slides; surfaces and
+                                                  * gaps, stops and resets: 0 if affine, nothing to be checked */
+  int32_t affine, pad; /* whether all unknowns enter linearly together */
 } System;
 
 /* The guards of a mode, and what slides in it. */
 typedef struct {
   int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts */
-  int32_t rows, slides, mode, branches;
-  int32_t *sliding, *kind, *index, *side;
+  int32_t rows, slides, mode, branches, is_free; /* free: no letter is 0 */
+  int32_t *sliding, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
 } Layout;
 
 typedef struct {
   Layout l;
-  int finite;
+  int finite, scaled, steepened; /* whether scale and steep are known */
+  int64_t stamp; /* of the values of the program ``point`` */
   double *states, *guards, *series, *allowed, *of_guards, *scale, *steep, *inverse;
 } Expansion;
 
@@ -46,7 +76,7 @@ typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Cont
 /* Modes met, by number: their letters. */
 typedef struct { Tree tree; int32_t width, count, room; int8_t *letter; int32_t *bucket, buckets; } Table;
 
-/* What a run writes, when dense: steps, points and events, emptied by the caller when full. */
+/* What a run writes, when dense: steps, points and events, into arrays that the caller makes larger when full. */
 typedef struct {
   int64_t steps, points, events, step_room, point_room, event_room;
   double *start, *coefficients, *point_t, *point_x, *event_t, *event_x, *event_after_x;
@@ -77,7 +107,7 @@ typedef struct {
   Expansion e, trial;
   Continuation chosen, one, first, rest, found;
   Output out;
-  int64_t hits, kept, room; /* of the section; samples kept, in row of the results */
+  int64_t stamp, hits, kept, room; /* of the section; samples kept, in row of the results */
   const double *times;
   double *sample_t, *sample_x;
   /* programs' values, inputs, yardsticks */

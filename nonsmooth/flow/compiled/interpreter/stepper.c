@@ -1,10 +1,28 @@
 /* Numbers: nonsmooth/flow/reference/stepper.py ------------------------------------------------------- */
 
+/* Binary logarithm and exponential to 1e-4: enough for a step size, a hundredth of libm's cost. */
+static inline double rough_log2(double a) {
+  union { double d; int64_t i; } u = {a};
+  double e = (double)((u.i >> 52) - 1023);
+  u.i = (u.i & 0xfffffffffffffLL) | 0x3ff0000000000000LL;
+  double m = u.d - 1.5;
+  double z = m * m, low = MULADD(m, 0.9617966939, 0.5849625007), high = MULADD(m, 0.0379969064, -0.0712441996);
+  high = MULADD(z, MULADD(z, -0.0211093925, high), MULADD(m, 0.1424883991, -0.3205988980));
+  return e + MULADD(z, high, low);
+}
+static inline double rough_exp2(double a) {
+  double k = (a + 6755399441055744.0) - 6755399441055744.0, f = (a - k) * 0.6931471805599453;
+  union { double d; int64_t i; } u;
+  u.i = ((int64_t)k + 1023) << 52;
+  double z = f * f, high = MULADD(z, MULADD(f, 0.0083333333, 0.0416666666), MULADD(f, 0.16666666666, 0.5));
+  return u.d * MULADD(z, high, 1 + f);
+}
+
 static double bound(double last, double before, int order) {
-  double h = INFINITY;
-  if (last > 0) h = pow(last, -1.0 / order);
-  if (before > 0) h = smaller(pow(before, -1.0 / (order - 1)), h);
-  return h;
+  double log_h = INFINITY;
+  if (last > 1e-300) log_h = rough_log2(smaller(last, 1e300)) * (-1.0 / order);
+  if (before > 1e-300) log_h = smaller(rough_log2(smaller(before, 1e300)) * (-1.0 / (order - 1)), log_h);
+  return log_h < INFINITY ? rough_exp2(log_h) : INFINITY;
 }
 
 /* Shorten a step until a guard's series converges within it. */
@@ -21,9 +39,9 @@ static double resolve(const double *g, int order, double h) {
 }
 
 static double step_size(const Run *r, const Expansion *e) {
-  int order = r->order, stride = r->stride;
+  int order = order_of(r), stride = stride_of(r);
   double last = 0, before = 0;
-  for (int i = 0; i < r->s->dimension; i++) {
+  for (int i = 0; i < dimension_of(r); i++) {
     const double *c = e->states + (int64_t)i * stride;
     last = larger(fabs(c[order]) / e->allowed[i], last);
     before = larger(fabs(c[order - 1]) / e->allowed[i], before);
@@ -44,13 +62,16 @@ static double step_size(const Run *r, const Expansion *e) {
   return h;
 }
 
+/* Whether field and guards are affine, so that no step needs to be checked. */
+static int is_linear(const Run *r, const Expansion *e) { return e->l.is_free ? r->s->linear_free : r->s->linear; }
+
 /* A length beyond which the step h that the series allows may not see what comes. */
 static double safe_length(const Run *r, const Expansion *e, double h) {
-  if (r->s->linear) return INFINITY;
+  if (is_linear(r, e)) return INFINITY;
   if (e->l.mode == r->length_mode) return h > GROWTH * r->length ? r->length : INFINITY;
   double natural = INFINITY;
-  for (int i = 0; i < r->n; i++) {
-    const double *c = e->states + (int64_t)i * r->stride;
+  for (int i = 0; i < n_of(r); i++) {
+    const double *c = e->states + (int64_t)i * stride_of(r);
     natural = smaller((fabs(c[0]) + r->size) / fabs(c[1]), natural);
   }
   return h > FAR * natural ? FIRST * natural : INFINITY;
@@ -58,9 +79,9 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
 
 /* Field (n), errors of the multipliers that slide, and guards at a state and multipliers. */
 static void sampled(Run *r, const Expansion *e, const double *x, const double *lam, double *found) {
-  int n = r->n, w = r->width, stride = r->stride, slides = e->l.slides;
+  int n = n_of(r), w = width_of(r), stride = stride_of(r), slides = e->l.slides;
   set_inputs(r, x, held_of(r, e->l.letter), lam);
-  advance_series(r, &e->l, 0);
+  first_values(r, e->l.is_free);
   for (int i = 0; i < n; i++) *found++ = row_of(r, i)[0];
   for (int i = 0; i < slides; i++, found++) {
     *found = 0;
@@ -69,37 +90,43 @@ static void sampled(Run *r, const Expansion *e, const double *x, const double *l
       if (a != 0) *found += a * fabs(row_of(r, n + e->l.sliding[j])[0]);
     }
   }
+  if (!e->l.bent_count) return;
   double *g = r->work, *now = g + (int64_t)e->l.rows * stride;
   for (int i = 0; i < w; i++) now[(int64_t)i * stride] = lam[i];
   guard_rows(r, &e->l, now, 1, g);
-  for (int j = 0; j < e->l.rows - e->l.branches; j++) *found++ = g[(int64_t)j * stride];
+  for (int q = 0; q < e->l.bent_count; q++) *found++ = g[(int64_t)e->l.bent[q] * stride];
 }
 
 /* Whether field and guards at a time of the step are those of the polynomials. */
 static int agrees(Run *r, const Expansion *e, double time, double dt) {
-  int n = r->n, w = r->width, order = r->order, stride = r->stride, slides = e->l.slides;
-  int guards = e->l.rows - e->l.branches, all = n + slides + guards;
-  double *x = r->vector, *lam = x + n, *slope = lam + w, ignored;
+  int n = n_of(r), w = width_of(r), order = order_of(r), stride = stride_of(r), slides = e->l.slides;
+  int guards = e->l.bent_count, all = n + slides + guards;
+  double *x = r->vector, *lam = x + n, ignored;
   double *found = r->sample, *noise = found + all, *moved = noise + all;
-  for (int i = 0; i < n; i++) x[i] = horner(e->states + (int64_t)i * stride, order, time, &slope[i]);
-  for (int i = 0; i < w; i++) lam[i] = horner(e->series + (int64_t)i * stride, order, time, &ignored);
+  const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
+  for (int i = 0; i < n; i++) x[i] = value_at(e->states + (int64_t)i * stride, order, time);
+  for (int i = 0; i < w; i++) lam[i] = e->l.is_free ? 0 : value_at(e->series + (int64_t)i * stride, order, time);
   sampled(r, e, x, lam, found);
-  memset(noise, 0, sizeof(double) * all);
   for (int again = 0; again < 2; again++) {
     int near = 1;
-    for (int i = 0; near && i < n; i++)
-      near = fabs(found[i] - slope[i]) * dt
-             <= WRONG * e->allowed[i] + dt * (VANISHES * fabs(slope[i]) + noise[i]);
+    for (int i = 0; near && i < n; i++) {
+      double slope, noisy = again ? noise[i] : 0;
+      if (!bent[i]) continue;
+      horner(e->states + (int64_t)i * stride, order, time, &slope);
+      near = fabs(found[i] - slope) * dt <= WRONG * e->allowed[i] + dt * (VANISHES * fabs(slope) + noisy);
+    }
     for (int i = n; near && i < n + slides; i++)
-      near = found[i] <= WRONG * SAFETY * r->o.rtol + VANISHES + noise[i];
-    for (int j = 0; near && j < guards; j++) {
+      near = found[i] <= WRONG * SAFETY * r->o.rtol + VANISHES + (again ? noise[i] : 0);
+    for (int q = 0; near && q < guards; q++) {
+      int j = e->l.bent[q];
       const double *c = e->guards + (int64_t)j * stride;
       double of_guard = e->of_guards[j] + SAFETY * r->o.rtol * fabs(c[0]);
-      double miss = fabs(found[n + slides + j] - horner(c, order, time, &ignored));
-      near = miss <= WRONG * of_guard + VANISHES * e->scale[j] + noise[n + slides + j];
+      double miss = fabs(found[n + slides + q] - value_at(c, order, time));
+      near = miss <= WRONG * of_guard + VANISHES * e->scale[j] + (again ? noise[n + slides + q] : 0);
     }
     if (near) return 1;
     /* What rounding in the states, and in the time, makes of it: far from zero more than a tolerance. */
+    if (!again) memset(noise, 0, sizeof(double) * all);
     for (int k = 0; k < n && !again; k++) {
       double kept = x[k];
       if (kept == 0) continue;
@@ -114,9 +141,10 @@ static int agrees(Run *r, const Expansion *e, double time, double dt) {
 
 /* dt where the polynomials agree at the part ``end`` of a step and at points inside, else half of the
  * first point where they do not. */
-static double verified(Run *r, const Expansion *e, double dt, double end, double safe) {
+static double verified(Run *r, Expansion *e, double dt, double end, double safe) {
   double low = isinf(safe) ? dt : 0.5 * dt;
-  if (r->s->linear) return dt;
+  if (is_linear(r, e)) return dt;
+  if (e->l.bent_count) scales(r, e);
   while (low > safe) low *= 0.5;
   for (; low < dt; low *= 2)
     for (int k = 0; k < OCTAVE; k++) {
@@ -131,33 +159,34 @@ static double verified(Run *r, const Expansion *e, double dt, double end, double
 }
 
 /* First coefficient of a guard that is not zero to rounding; order + 1 if there is none. */
-static int leading(const Run *r, const Expansion *e, int row, int zeros, double *value) {
-  const double *g = e->guards + (int64_t)row * r->stride;
-  for (int k = zeros; k <= r->order; k++) {
-    double noise = e->scale[row];
-    if (k) {
+static int leading(Run *r, Expansion *e, int row, int zeros, double *value) {
+  const double *g = e->guards + (int64_t)row * stride_of(r);
+  for (int k = zeros; k <= order_of(r); k++) {
+    double noise;
+    if (k == 0) noise = scales(r, e)[row];
+    else {
       double speed = 0;
-      for (int i = 0; i < r->n; i++) speed = larger(fabs(e->states[(int64_t)i * r->stride + k]), speed);
-      noise = e->steep[row] * speed * (k + 1);
+      for (int i = 0; i < n_of(r); i++) speed = larger(fabs(e->states[(int64_t)i * stride_of(r) + k]), speed);
+      noise = steepness(r, e)[row] * speed * (k + 1);
     }
     if (fabs(g[k]) > VANISHES * noise) { *value = g[k]; return k; }
   }
   *value = 0;
-  return r->order + 1;
+  return order_of(r) + 1;
 }
 
-static double guard_root(const Run *r, const Expansion *e, int row, int drop, double h) {
-  const double *g = e->guards + (int64_t)row * r->stride, *c = g + drop;
+static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
+  const double *g = e->guards + (int64_t)row * stride_of(r), *c = g + drop;
   int kind = e->l.kind[row];
-  if (drop > r->order) return -1;
-  if (kind == STOP_GUARD || kind == RESET_GUARD) return first_crossing(c, r->order - drop, h, e->l.side[row]);
+  if (drop > order_of(r)) return -1;
+  if (kind == STOP_GUARD || kind == RESET_GUARD) return first_crossing(c, order_of(r) - drop, h, e->l.side[row]);
   if (c[0] <= 0) {
     double value;
     drop = leading(r, e, row, drop, &value);
     if (value == 0) return -1;
     c = g + drop;
   }
-  return first_root(c, r->order - drop, h);
+  return first_root(c, order_of(r) - drop, h);
 }
 
 /* How far rounding in a guard moves its root; nothing where it has no slope. */
@@ -169,27 +198,27 @@ static double blur(const double *c, int order, double dt) {
 }
 
 static int32_t *side_of(const Run *r, const Layout *l, int row) {
-  return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? r->s->stops : 0);
+  return r->side + l->index[row] + (l->kind[row] == RESET_GUARD ? stops_of(r) : 0);
 }
 
-static void note_sides(Run *r, const Expansion *e, double dt) {
+static void note_sides(Run *r, Expansion *e, double dt) {
   for (int j = 0; j < e->l.rows; j++) {
     if (e->l.kind[j] != STOP_GUARD && e->l.kind[j] != RESET_GUARD) continue;
-    const double *g = e->guards + (int64_t)j * r->stride;
-    *side_of(r, &e->l, j) = side_before(g, r->order, dt, ON_SURFACE * e->scale[j]);
+    const double *g = e->guards + (int64_t)j * stride_of(r);
+    *side_of(r, &e->l, j) = side_before(g, order_of(r), dt, ON_SURFACE * scales(r, e)[j]);
   }
 }
 
 /* Row of the earliest guard to end the mode within h, and the time; -1 if none. */
-static int first_hit(const Run *r, const Expansion *e, double h, double *dt) {
+static int first_hit(Run *r, Expansion *e, double h, double *dt) {
   double *time = r->work;
   int first = -1, found = 0, rows = e->l.rows;
   for (int j = 0; j < rows; j++) {
     int kind = e->l.kind[j], at_once = 0;
-    const double *g = e->guards + (int64_t)j * r->stride;
+    const double *g = e->guards + (int64_t)j * stride_of(r);
     if ((kind == STOP_GUARD || kind == RESET_GUARD) && !r->drop[j]) {
       int side = *side_of(r, &e->l, j);
-      at_once = side && passed(g, r->order, side, e->l.side[j]);
+      at_once = side && passed(g, order_of(r), side, e->l.side[j]);
     }
     time[j] = at_once ? 0 : guard_root(r, e, j, r->drop[j], h);
     if (time[j] < 0) continue;
@@ -199,9 +228,9 @@ static int first_hit(const Run *r, const Expansion *e, double h, double *dt) {
   int best = first;
   if (found > 1) {
     double near = time[first] + TIE * larger(fabs(r->t), 1)
-                  + blur(e->guards + (int64_t)first * r->stride, r->order, time[first]);
+                  + blur(e->guards + (int64_t)first * stride_of(r), order_of(r), time[first]);
     for (int j = 0; j < rows; j++) {
-      if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * r->stride, r->order, time[j])) continue;
+      if (time[j] < 0 || time[j] > near + blur(e->guards + (int64_t)j * stride_of(r), order_of(r), time[j])) continue;
       int rank = PRIORITY[e->l.kind[j]], best_rank = PRIORITY[e->l.kind[best]];
       if (rank < best_rank || (rank == best_rank && time[j] < time[best])) best = j;
     }

@@ -1,0 +1,216 @@
+/* Series of a mode: nonsmooth/model/coupled.py ---------------------------------------------------------- */
+
+static const double *row_of(const Run *r, int output) {
+  return r->series + (int64_t)r->s->series.output[output] * stride_of(r);
+}
+
+static const double *slope_row(const Run *r, int i, int j) {
+  static const double zero[P + 1];
+  int output = r->s->slope_output[i * width_of(r) + j];
+  return output < 0 ? zero : row_of(r, n_of(r) + 3 * width_of(r) + stops_of(r) + resets_of(r) + output);
+}
+
+/* The slope of one multiplier, determinant and trace of that of two, or its diagonal, turned to begin
+ * positive. */
+static void branch_rows(const Run *r, const Layout *l, int count, double *g) {
+  int stride = stride_of(r), row = 0;
+  if (is_pair(r, l)) {
+    int i = l->sliding[0], j = l->sliding[1];
+    const double *a = slope_row(r, i, i), *b = slope_row(r, i, j), *c = slope_row(r, j, i), *d = slope_row(r, j, j);
+    for (int k = 0; k < count; k++) {
+      g[k] = convolve(a, d, k, 0, k) - convolve(b, c, k, 0, k);
+      g[stride + k] = a[k] + d[k];
+    }
+    row = 2;
+  } else {
+    for (int i = 0; i < l->slides; i++)
+      if (r->s->slope_moves[l->sliding[i] * (width_of(r) + 1)])
+        memcpy(g + (int64_t)row++ * stride, slope_row(r, l->sliding[i], l->sliding[i]), sizeof(double) * count);
+  }
+  for (int j = 0; j < row; j++) {
+    double *own = g + (int64_t)j * stride, turn = 1;
+    for (int k = 0; k < count; k++) if (own[k] != 0) { turn = ns_sign(own[k]); break; }
+    for (int k = 0; k < count; k++) own[k] *= turn;
+  }
+}
+
+/* Guards from the series (or, with count 1, values) of what they are made of. */
+ALWAYS_INLINE void guard_rows(Run *r, const Layout *l, const double *series, int count, double *guards) {
+  const System *s = r->s;
+  int w = width_of(r), n = n_of(r), stride = stride_of(r);
+  for (int row = 0; row < l->rows; row++) {
+    int kind = l->kind[row], i = l->index[row], side = l->side[row];
+    double *g = guards + (int64_t)row * stride;
+    if (kind == SURFACE_GUARD || kind == IMPACT_GUARD) {
+      const double *h = row_of(r, n + w + i + (kind == IMPACT_GUARD ? m_of(r) : 0));
+      UNROLLED for (int k = 0; k < count; k++) g[k] = side * h[k];
+    } else if (kind == RELEASE_GUARD) {
+      memcpy(g, series + (int64_t)(m_of(r) + i) * stride, sizeof(double) * count);
+    } else if (kind == EXIT_GUARD && is_idle(r, l->letter, i)) {
+      const double *layer = row_of(r, n + i);
+      UNROLLED for (int k = 0; k < count; k++) g[k] = -side * layer[k];
+    } else if (kind == EXIT_GUARD) {
+      const double *factor = row_of(r, n + 2 * w + i), *lam = series + (int64_t)i * stride;
+      double turn = 1;
+      for (int k = 0; k < count; k++) if (factor[k] != 0) { turn = ns_sign(factor[k]); break; }
+      UNROLLED for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
+    } else if (kind == BRANCH_GUARD) {
+      branch_rows(r, l, count, g);
+      break;
+    } else {
+      const double *stop = row_of(r, n + 3 * w + i + (kind == RESET_GUARD ? stops_of(r) : 0));
+      memcpy(g, stop, sizeof(double) * count);
+    }
+  }
+}
+
+/* Coefficients k of the multipliers that slide keep those of the layer's rates at zero. */
+static void follow_layer(Run *r, Expansion *e, int k, const int32_t *start) {
+  int slides = e->l.slides;
+  for (int i = 0; i < slides; i++) {
+    double sum = 0;
+    for (int q = start[i]; q < start[i + 1]; q++) {
+      int j = start[slides + 1 + q];
+      sum += e->inverse[i * slides + j] * row_of(r, n_of(r) + e->l.sliding[j])[k];
+    }
+    e->series[(int64_t)e->l.sliding[i] * stride_of(r) + k] = -sum;
+  }
+}
+
+#ifndef GENERATED
+/* Coefficient k of states and multipliers as the inputs of the series. */
+static void inputs_of(Run *r, const Expansion *e, int k) {
+  double *x = r->vector, *lam = x + n_of(r);
+  for (int i = 0; i < n_of(r); i++) x[i] = e->states[(int64_t)i * stride_of(r) + k];
+  for (int i = 0; i < width_of(r); i++) lam[i] = e->series[(int64_t)i * stride_of(r) + k];
+  set_inputs(r, x, k ? r->none : r->held, lam);
+}
+
+static void next_states(Run *r, Expansion *e, int k) {
+  double part = 1.0 / (k + 1);
+  for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride_of(r) + k + 1] = row_of(r, i)[k] * part;
+}
+
+/* Coefficients of all that a mode needs in which something slides; ``start`` are places in the inverse. */
+static void sliding_series(Run *r, Expansion *e, const int32_t *start) {
+  const Series *t = &r->s->series;
+  int order = order_of(r), stride = stride_of(r);
+  for (int k = 0; k <= order; k++) {
+    inputs_of(r, e, k);
+    if (k == 0) series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+    else {
+      series_rules(t, t->later, t->later_count, k, stride, r->input, r->series);
+      if (e->l.slides) {
+        follow_layer(r, e, k, start);
+        inputs_of(r, e, k);
+        series_rules(t, t->late, t->late_count, k, stride, r->input, r->series);
+      }
+    }
+    if (k < order) next_states(r, e, k);
+  }
+}
+
+/* The same where nothing slides. */
+static void free_series(Run *r, Expansion *e) {
+  const Series *t = &r->s->free;
+  int n = n_of(r), order = order_of(r), stride = stride_of(r);
+  inputs_of(r, e, 0);
+  series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+  next_states(r, e, 0);
+  memset(r->input + n, 0, sizeof(double) * 2 * width_of(r));
+  for (int k = 1; k <= order; k++) {
+    for (int i = 0; i < n; i++) r->input[i] = e->states[(int64_t)i * stride + k];
+    series_rules(t, t->later, t->later_count, k, stride, r->input, r->series);
+    if (k < order) next_states(r, e, k);
+  }
+}
+
+/* First coefficients, values, from r->input. */
+static void first_values(Run *r, int is_free) {
+  const Series *t = is_free ? &r->s->free : &r->s->series;
+  series_rules(t, t->moving, t->moving_count, 0, stride_of(r), r->input, r->series);
+}
+#else
+static void sliding_series(Run *r, Expansion *e, const int32_t *start);
+static void free_series(Run *r, Expansion *e);
+static void first_values(Run *r, int is_free);
+#endif
+
+static void jets(Run *r, Expansion *e) {
+  int slides = e->l.slides;
+  int32_t *start = r->sparse, *column = start + slides + 1, count = 0;
+  if (e->l.is_free) free_series(r, e);
+  else {
+    for (int i = 0; i < slides; i++) {
+      start[i] = count;
+      for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
+    }
+    start[slides] = count;
+    sliding_series(r, e, start);
+  }
+  guard_rows(r, &e->l, e->series, order_of(r) + 1, e->guards);
+}
+
+/* A coefficient that is not finite makes all later ones so, or is the first: the field, which is not used
+ * again where a logarithm's argument is negative. */
+static int is_finite(const Run *r, const Expansion *e) {
+  int order = order_of(r), stride = stride_of(r);
+  double one = 0, two = 0, three = 0;
+  for (int i = 0; i < n_of(r); i++) {
+    const double *c = e->states + (int64_t)i * stride;
+    one += 0 * c[order]; two += 0 * c[order - 1]; three += 0 * c[1];
+  }
+  for (int j = 0; j < e->l.rows; j++) {
+    const double *g = e->guards + (int64_t)j * stride;
+    one += 0 * g[order]; two += 0 * g[order - 1]; three += 0 * g[0];
+  }
+  return one + two + three == 0;
+}
+
+/* Jets of a mode at x, with the multipliers of what slides; inverses of the layer's slope. */
+static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
+  int w = width_of(r), stride = stride_of(r);
+  lay_out(r, letter, &e->l);
+  weigh_point(r, e, x, unknowns);
+  int slides = e->l.slides;
+  for (int i = 0; i < slides; i++)
+    for (int j = 0; j < slides; j++)
+      r->work[i * slides + j] = r->slope[e->l.sliding[i] * w + e->l.sliding[j]];
+  if (slides) invert(r->work, slides, e->inverse);
+  if (!e->l.is_free) memset(e->series, 0, sizeof(double) * w * stride);
+  else for (int i = 0; i < w; i++) e->series[(int64_t)i * stride] = 0;
+  for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride] = x[i];
+  for (int i = 0; i < slides; i++) e->series[(int64_t)e->l.sliding[i] * stride] = unknowns[e->l.sliding[i]];
+  for (int i = 0; i < n_of(r); i++)
+    e->allowed[i] = i < dimension_of(r) ? SAFETY * (r->o.atol + r->o.rtol * fabs(x[i])) : 0;
+  guard_sums(r, e, e->allowed, 0, e->of_guards);
+  e->scaled = e->steepened = 0;
+  jets(r, e);
+  e->finite = is_finite(r, e);
+}
+
+/* Whether the multipliers of a mode are the only ones: those that enter in products may have several values. */
+static int is_known(const Run *r, const Layout *l) { return r->s->affine || l->slides < 2; }
+
+/* Multipliers that keep the sliding surfaces of a mode: one step of Newton's method, since they enter
+ * linearly, and one against rounding. 0 where there are none. */
+static int improve(Run *r, const Layout *l, const double *x, double *unknowns, int steps) {
+  int w = width_of(r), slides = l->slides;
+  for (int iteration = 0; slides && iteration < steps; iteration++) {
+    double largest = 0, most = 0;
+    yardsticks(r, x, held_of(r, l->letter), unknowns);
+    double *a = r->work, *b = a + slides * slides;
+    for (int i = 0; i < slides; i++) {
+      for (int j = 0; j < slides; j++) a[i * slides + j] = r->slope[l->sliding[i] * w + l->sliding[j]];
+      b[i] = layer_of(r, l->sliding[i]);
+    }
+    if (!solve(a, b, slides)) return 0;
+    for (int i = 0; i < slides; i++) {
+      unknowns[l->sliding[i]] -= b[i];
+      largest = larger(fabs(b[i]), largest);
+    }
+    for (int i = 0; i < w; i++) most = larger(fabs(unknowns[i]), most);
+    if (largest <= 1e-16 * (1 + most)) break;
+  }
+  return 1;
+}

@@ -174,6 +174,8 @@ class TapeEngine:
         ------
         CompilerError
         """
+        if self._special is not None:
+            self._special.start()  # beside the interpreter, where that is not there yet
         library()
         if self._special is not None:
             self._special.wait()

@@ -117,7 +117,9 @@ class Lanes:
         for name, array in chunk.arrays().items():
             out.arrays()[name][rest] = array
         out.itinerary[rest] += len(out.words)
-        out.words += chunk.words
+        words = [*out.words, *chunk.words]
+        used = np.flatnonzero(np.bincount(out.itinerary)).tolist()
+        out.rename({code: words[code] for code in used})
         out.totals[:2] += chunk.totals[:2]
 
 

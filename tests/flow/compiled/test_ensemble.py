@@ -371,3 +371,15 @@ def test_arguments_of_another_kind_are_refused(arguments, message):
     given = {"system": FilippovSystem([x], surface=x, above=[-1], below=[1]), **arguments}
     with pytest.raises(NonsmoothError, match=message):
         ensemble(x0=[[1.0]], t_end=1.0, **given)
+
+
+def test_what_lanes_hand_over_has_no_itineraries_of_its_own():
+    """Starts on the surface at a fold are handed over; their neighbours are not."""
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    system = FilippovSystem([x, v], surface=v, above=[v, -x - 0.4], below=[v, -x + 0.4])
+    starts = np.stack([np.linspace(-2.0, 2.0, 401), np.zeros(401)], axis=1)
+    starts[::4, 1] = np.linspace(-1.0, 1.0, 101)
+    many = ensemble(system, starts, 20.0)
+    assert len(set(many.itineraries)) == len(many.itineraries) and "" not in many.itineraries
+    single = [simulate(system, start, 20.0).itinerary for start in starts[::40]]
+    assert many.itinerary[::40].tolist() == single

@@ -122,8 +122,8 @@ def test_a_few_random_systems():
 @pytest.mark.slow
 @pytest.mark.parametrize("n", [2, 3, 4, 5])
 def test_10000_random_systems(n):
-    tolerances = {1: 1e-4, 2: 1e-7, 3: 1e-12}
-    assert sum(of_size(Size(n, m), 600, tol) for m, tol in tolerances.items()) > 50_000
+    tolerances = {1: 1e-10, 2: 1e-6, 3: 1e-3}
+    assert sum(of_size(Size(n, m), 600, tol) for m, tol in tolerances.items()) > 20_000
     made, options = every_operation(), Options(t_end=5.0, max_steps=500, **LOOSE)
     many(tape_for(made, options), *draws_of_operations(700, n), options)
 

@@ -22,12 +22,15 @@ from nonsmooth.plot.style import (
     GREY,
     ORANGE,
     PURPLE,
+    TINT_ATTRACTING,
+    TINT_REPELLING,
     VERMILLION,
     arrow,
     arrowhead,
     halo,
     line,
     marker,
+    write,
 )
 
 __all__ = [
@@ -43,6 +46,8 @@ __all__ = [
     "GREY",
     "ORANGE",
     "PURPLE",
+    "TINT_ATTRACTING",
+    "TINT_REPELLING",
     "VERMILLION",
     "arrow",
     "arrowhead",
@@ -52,14 +57,16 @@ __all__ = [
     "marker",
     "new_figure",
     "settings",
+    "write",
 ]
 
 _PRINT = {
-    "font.size": 10.0,
-    "axes.titlesize": 10.5,
-    "legend.fontsize": 9.0,
-    "xtick.labelsize": 9.0,
-    "ytick.labelsize": 9.0,
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 9.0,
+    "legend.fontsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
     "xtick.direction": "out",
     "ytick.direction": "out",
     "pdf.fonttype": 42,
@@ -73,7 +80,7 @@ def settings() -> Iterator[None]:
         yield
 
 
-def new_figure(width: float = 6.0, height: float = 4.5) -> Figure:
+def new_figure(width: float, height: float) -> Figure:
     """Return an empty figure (inches) that pyplot does not keep."""
     return style.new_figure((width, height))
 

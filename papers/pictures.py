@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from matplotlib.figure import Figure
+from matplotlib.text import Text
+from mpl_toolkits.mplot3d.art3d import Text3D
 
 
 @dataclass(frozen=True)
@@ -43,3 +45,52 @@ def save(picture: Picture, folder: Path) -> list[Path]:
             path, dpi=150, metadata={"CreationDate": None} if path.suffix == ".pdf" else None
         )
     return paths
+
+
+#: The width of a page in inches, and the smallest text in points, of print.
+PAGE, SMALLEST = 7.0, 8.0
+
+
+def faults(figure: Figure) -> list[str]:
+    """What would not do in print: the width, and texts that are too small or cut off.
+
+    Parameters
+    ----------
+    figure : matplotlib Figure
+
+    Returns
+    -------
+    list of str
+        A sentence for each fault.
+    """
+    width, found = figure.get_figwidth(), list[str]()
+    if width > PAGE:
+        found.append(f"it is {width:g} inches wide, more than the {PAGE:g} of a page.")
+    figure.draw_without_rendering()
+    paper = figure.bbox.padded(1.0)  # pixel
+    for text in _texts(figure):
+        if text.get_fontsize() < SMALLEST - 0.01:
+            found.append(f"{text.get_text()!r} is in {text.get_fontsize():g} point.")
+        box = text.get_window_extent()
+        clipped = text.get_clip_on() and text.axes is not None and not text.axes.bbox.overlaps(box)
+        in_space = isinstance(text, Text3D)  # whose place is known only while it is drawn
+        if not (clipped or in_space or (paper.contains(*box.p0) and paper.contains(*box.p1))):
+            found.append(f"{text.get_text()!r} is cut off.")
+    return found
+
+
+def _texts(figure: Figure) -> list[Text]:
+    """All texts that are seen."""
+    unseen = set[int]()
+    for axes in figure.axes:
+        if not (axes.get_visible() and axes.axison):
+            frame = [axes.xaxis, axes.yaxis, *([axes.zaxis] if hasattr(axes, "zaxis") else [])]
+            unseen |= {id(text) for axis in frame for text in axis.findobj(Text)}
+        for axis in (axes.xaxis, axes.yaxis, *([axes.zaxis] if hasattr(axes, "zaxis") else [])):
+            low, high = sorted(axis.get_view_interval())
+            outside = [t for t in axis.get_major_ticks() if not low <= t.get_loc() <= high]
+            outside += [t for t in axis.get_minor_ticks() if not low <= t.get_loc() <= high]
+            unseen |= {id(text) for tick in outside for text in tick.findobj(Text)}
+    texts = [text for text in figure.findobj(Text) if isinstance(text, Text)]
+    shown = [text for text in texts if text.get_visible() and text.get_text().strip()]
+    return [text for text in shown if id(text) not in unseen]

@@ -13,8 +13,9 @@ from pathlib import Path
 import pytest
 
 from papers import __main__ as everything
-from papers import program
+from papers import look, program
 from papers.claims import ADDED, HERE, HOLDS, MEMORY, NOT_CHECKABLE, Check
+from papers.pictures import faults
 from papers.report import readme_table
 
 FOLDER = Path(__file__).parent
@@ -94,11 +95,26 @@ def test_only_what_was_read_is_called_reproduced():
     ],
     ids=[f"{n}-{p.name}" for n, p in PICTURES],
 )
-def test_figures_are_drawn_with_labels(name, picture):
+def test_figures_are_fit_for_print(name, picture):
     figure = picture.draw()
     texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
     assert any(t.get_text() for t in texts)
     assert picture.caption
+    with look.settings():
+        assert faults(figure) == []
+
+
+def test_faults_of_print_are_found():
+    with look.settings():
+        figure = look.new_figure(7.5, 3.0)
+        axes = figure.add_subplot()
+        axes.plot([0, 1], [0, 1])
+        axes.text(0.5, 0.5, "small", fontsize=6)
+        figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
+        axes.text(5.0, 0.5, "outside", clip_on=True)
+        found = " ".join(faults(figure))
+    assert "7.5 inches wide" in found and "'small' is in 6 point" in found
+    assert "right side' is cut off" in found and "outside" not in found
 
 
 def test_all_folders_are_listed():

@@ -315,7 +315,8 @@ def _name(found: Special) -> str:
 
 
 def _look(found: Special) -> tuple[str, str]:
-    """Marker and fill of a special point: full where visible, stable or a saddle."""
+    """Marker and fill of a special point: full where visible or stable, and equilibria that are saddles;
+    a pseudo-saddle is on a thick line, on which a black one would be lost."""
     name = _name(found)
-    full = name.startswith(("visible", "stable")) or name.endswith("saddle")
+    full = name.startswith(("visible", "stable")) or name == "saddle"
     return _MARKERS[name.rpartition(" ")[2]], style.BLACK if full else "white"

@@ -48,12 +48,13 @@ _TITLES = {
     "VI": "visible-invisible (VI)",
     "IV": "invisible-visible (IV)",
 }
-#: Tint and hatch of each class; hatches tell them apart in grey.
-_FILLS = {
-    "VV-C1": ("#DCEBF5", ""),
+#: Tint and hatch of each class: pink for canards, green for faux canards, blue for one of each, grey
+#: for none; stronger and hatched where there are infinitely many, so that grey tells it too.
+FILLS = {
+    "VV-C1": ("#F9E6EF", ""),
     "VV-F": ("#B7E0D0", ".."),
     "II-C": ("#F0C9DF", "//"),
-    "II-F": ("#DCEBF5", ""),
+    "II-F": ("#E4F3EC", ""),
     "mix-0": ("#F4F4F4", ""),
     "mix-S": ("#DCEBF5", ""),
     "mix-C": ("#F0C9DF", "//"),
@@ -266,7 +267,7 @@ def areas(kind: str) -> list[tuple[str, Array]]:
 def _fill(ax: Axes, kind: str) -> None:
     """Tint each class."""
     for label, polygon in areas(kind):
-        tint, hatch = _FILLS[label]
+        tint, hatch = FILLS[label]
         patch = Polygon(
             polygon, facecolor=tint, edgecolor="#6A6A6A", hatch=hatch, linewidth=0, zorder=0
         )
@@ -314,7 +315,7 @@ def _hyperbolas(ax: Axes, kind: str) -> list[Line2D]:
             handles += [handle] if k == 0 else []
             at = curve[np.argmin(np.abs(curve[:, 0] - curve[:, 1] - (0.9 - 0.45 * k)))]
             style.write(
-                ax, at, f"{n}", fontsize=7, color=style.BLUE, zorder=3, path_effects=style.halo(2.5)
+                ax, at, f"{n}", fontsize=8, color=style.BLUE, zorder=3, path_effects=style.halo(2.5)
             )
         for line in ([[0, -REACH], [0, REACH]], [[-REACH, 0], [REACH, 0]]):
             handle = _stroke(

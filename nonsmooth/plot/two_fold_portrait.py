@@ -41,7 +41,7 @@ def two_fold(
     fold: object,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.4, 5.2),
+    size: tuple[float, float] = (7.0, 5.0),
     orbits: int = 7,
     legend: bool = True,
     title: str | None = None,

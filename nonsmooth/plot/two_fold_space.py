@@ -42,7 +42,7 @@ def two_fold_3d(
     fold: object,
     *,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.4, 4.4),
+    size: tuple[float, float] = (7.0, 4.2),
     azimuth: float | None = None,
     elevation: float = 37.0,
     legend: bool = True,

@@ -62,7 +62,7 @@ def kv_pert_cone() -> Figure:
         axes.set_xlabel(r"friction $\Lambda_T \times 10^{4}$")
         axes.set_ylabel(r"load $\Lambda_N \times 10^{4}$")
         inset.set(xlim=(-0.04, 0.04), ylim=(0, 0.115), xticks=[-0.03, 0, 0.03], yticks=[0, 0.1])
-        inset.tick_params(labelsize=7.5)
+        inset.tick_params(labelsize=8)
         inset.set_title("from the start", fontsize=8.5)
     return figure
 

@@ -69,6 +69,7 @@ def trajectories() -> Figure:
                 )
         roll = np.array([(0.0, -0.67), (0.0, r)])
         axes.plot(*roll.T, color=look.BLACK, linewidth=2.4, zorder=3)
+        look.arrowhead(axes, roll, 0.62, look.BLACK, mutation_scale=15, zorder=8)
         axes.text(0.07, 0.3, "roll", va="center", path_effects=look.halo(), zorder=6)
         axes.axhline(0, color="0.5", linewidth=0.8, zorder=0)
         axes.axvline(0, color="0.5", linewidth=0.8, zorder=0)
@@ -118,7 +119,7 @@ def experiment_ranges() -> Figure:
         "omega0": r"$\omega_0$ (rad/s)",
     }
     with look.settings():
-        figure = look.new_figure(8.2, 4.0)
+        figure = look.new_figure(7.0, 3.6)
         for axes, (a, b) in zip(figure.subplots(1, 2), pairs, strict=True):
             for surface, (color, style, hatch) in styles.items():
                 box = ranges(surface)
@@ -158,11 +159,10 @@ def experiment_ranges() -> Figure:
             axes.autoscale_view()
             axes.spines[["top", "right"]].set_visible(False)
         axes.annotate(
-            "top as printed in rpm\n(erratum 23)",
+            "top if the spin is in rpm,\nas printed",
             (900, 130),
             ha="center",
             va="bottom",
-            fontsize=9,
             path_effects=look.halo(),
         )
         figure.legend(*axes.get_legend_handles_labels(), loc="outside upper center", ncols=2)
@@ -215,7 +215,7 @@ def _scatter(axes: Axes, surface: str) -> None:
 def tangential_velocity() -> Figure:
     """Figure tangential_vel_experiments, as predictions over the published ranges."""
     with look.settings():
-        figure = look.new_figure(8.6, 4.4)
+        figure = look.new_figure(7.0, 3.9)
         panels = figure.subplots(1, 2)
         for axes, surface in zip(panels, FITS, strict=True):
             _scatter(axes, surface)

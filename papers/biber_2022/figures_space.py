@@ -161,7 +161,7 @@ class Scene:
 def geometries() -> Figure:
     """Figure geometries: what a bounce can do, in the ball's own normal form."""
     with look.settings():
-        figure, axes = look.canvas(7.2, 5.6)
+        figure, axes = look.canvas(7.0, 5.4)
         scene = Scene(axes, 1.25)
         axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
         scene.surface()
@@ -174,6 +174,8 @@ def geometries() -> Figure:
             ("(d)", (-0.3, 0.62, 1.2), (0.1, -0.08)),
         ):
             scene.run(start)
+            foot = project(np.array([[0.0, *start[1:]], start])).T
+            axes.plot(*foot, color=look.GREY, linewidth=0.9, linestyle=look.DOTS, zorder=TEXT - 0.1)
             x, y = project(np.array(start))
             axes.plot(x, y, "o", color="black", markersize=5, zorder=TEXT)
             axes.text(
@@ -224,7 +226,7 @@ def two_fold_visible() -> Figure:
     flow = fold_of("linear")
     (_, _), (n1, n2) = flow.sigma, flow.nu
     with look.settings():
-        figure, axes = look.canvas(7.2, 5.4)
+        figure, axes = look.canvas(7.0, 5.3)
         scene = Scene(axes, 1.25)
         axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
         scene.surface()

@@ -13,11 +13,13 @@ import casadi as ca
 import numpy as np
 import pytest
 
+from papers import look
 from papers.biber_2022 import __main__ as program
 from papers.biber_2022 import equations, errata, figures, places, report, results, table, theorems
 from papers.biber_2022.errata_general import fold_of
 from papers.biber_2022.exact import evaluate, identical
 from papers.biber_2022.model import LAWS, linear
+from papers.pictures import faults
 from papers.report import readme_table
 
 FOLDER = Path(__file__).parent
@@ -193,11 +195,13 @@ def test_a_failed_check_is_reported(tmp_path, monkeypatch, capsys):
 
 
 @pytest.mark.parametrize("picture", figures.PICTURES, ids=lambda p: p.name)
-def test_figures_are_drawn_with_labels(picture):
+def test_figures_are_fit_for_print(picture):
     figure = picture.draw()
     texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
     assert any(t.get_text() for t in texts)
     assert picture.caption
+    with look.settings():
+        assert faults(figure) == []
 
 
 # Places and the opening page ---------------------------------------------------------------------

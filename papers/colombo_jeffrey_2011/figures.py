@@ -8,8 +8,10 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 
 import nonsmooth as ns
+from nonsmooth.plot.two_fold_atlas import FILLS
 
 from .. import look
 from ..pictures import Picture
@@ -34,12 +36,17 @@ def _legend() -> list[Line2D | Patch]:
 def _portraits(names: tuple[str, ...]) -> Callable[[], Figure]:
     def draw() -> Figure:
         with look.settings():
-            figure = look.new_figure(4.1 * len(names) + 0.4, 5.2)
-            for ax, name in zip(figure.subplots(1, len(names)), names, strict=True):
+            rows = (len(names) + 1) // 2
+            figure = look.new_figure(7.0, 3.2 * rows + (0.9 if len(names) % 2 == 0 else 0.2))
+            axes = figure.subplots(rows, 2).ravel()
+            for ax, name in zip(axes, names, strict=False):
                 ns.plot.two_fold(CLASSES[name], ax=ax, legend=False)
                 ax.set(xlabel="$y$", ylabel="$z$")
-            columns = 4 if len(names) > 2 else 3
-            figure.legend(handles=_legend(), loc="outside lower center", ncols=columns)
+            if len(names) % 2:
+                axes[-1].set_axis_off()
+                axes[-1].legend(handles=_legend(), loc="center")
+            else:
+                figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
         return figure
 
     return draw
@@ -49,72 +56,103 @@ def space() -> Figure:
     """One two-fold of each kind, with the flow on both sides."""
     names = ("VV-C1", "II-F", "II-C", "mix-C")
     with look.settings():
-        figure = look.new_figure(10.4, 7.6)
+        figure = look.new_figure(7.0, 5.8)
         for ax, name in zip(figure.subplots(2, 2).ravel(), names, strict=True):
             ns.plot.two_fold_3d(CLASSES[name], ax=ax, legend=False)
-        figure.legend(handles=_legend()[:6], loc="outside lower center", ncols=6)
+        figure.legend(handles=_legend()[:6], loc="outside lower center", ncols=3)
     return figure
 
 
 def maps() -> Figure:
     """Classes over the plane of nu1 and nu2, for each kind."""
     with look.settings():
-        figure = look.new_figure(14.0, 6.4)
-        for ax, kind in zip(figure.subplots(1, 3), ("VV", "II", "VI"), strict=True):
+        figure = look.new_figure(7.0, 8.6)
+        axes = figure.subplots(2, 2).ravel()
+        for ax, kind in zip(axes, ("VV", "II", "VI"), strict=False):
             ns.plot.two_fold_map(kind, ax=ax)
+        handles = [
+            Patch(facecolor=FILLS["VV-C1"][0], label="one canard"),
+            Patch(facecolor=FILLS["II-C"][0], hatch="//", label="infinitely many canards"),
+            Patch(facecolor=FILLS["II-F"][0], label="one faux canard"),
+            Patch(facecolor=FILLS["VV-F"][0], hatch="..", label="infinitely many faux canards"),
+            Patch(facecolor=FILLS["mix-S"][0], label="one canard, one faux canard"),
+            Patch(facecolor=FILLS["mix-0"][0], label="none"),
+        ]
+        axes[3].set_axis_off()
+        axes[3].legend(handles=handles, loc="center")
     return figure
 
 
 def funnel() -> Figure:
     """Excursions from the singularity and back, in space."""
     with look.settings():
-        figure = look.new_figure(8.0, 6.2)
-        ax = figure.add_subplot(projection="3d")
-        for k, (e, color) in enumerate(
-            zip(
-                excursions()[:5],
-                (look.ABOVE, look.BLUE, look.GREEN, look.PURPLE, look.ORANGE),
-                strict=True,
-            )
-        ):
+        figure = look.new_figure(7.0, 4.6)
+        # Axes in space are square: taller than the figure, so that they are as wide.
+        figure.set_layout_engine("none")
+        place = (0, 0.53 - 3.5 / 4.6, 1, 7 / 4.6)
+        ax = figure.add_axes(place, projection="3d", computed_zorder=False)
+        kinds = ((1, look.TINT_ATTRACTING, "$D_a$"), (-1, look.TINT_REPELLING, "$D_r$"))
+        for sign, tint, name in kinds:
+            corners = sign * np.array([[0, 0, 0], [1, 0, 0], [1, 0.8, 0], [0, 0.8, 0]])
+            ax.add_collection3d(Poly3DCollection([corners], facecolor=tint, zorder=1))
+            ax.text(0.88 * sign, 0.62 * sign, 0, name, fontsize=11, zorder=7)
+        edge = np.array([[-1, -1, 1, 1, -1], [-0.8, 0.8, 0.8, -0.8, -0.8]])
+        ax.plot(*edge, [0] * 5, color=look.GREY, linewidth=0.8, zorder=1)
+        ax.plot([0, 0], [-0.8, 0.8], [0, 0], color=look.ABOVE, linestyle=look.DASHED, zorder=2)
+        ax.plot([-1, 1], [0, 0], [0, 0], color=look.BELOW, linestyle=look.DASHED, zorder=2)
+        for e, color in zip(excursions()[1:3], (look.BLACK, look.CANARD), strict=True):
             t = np.linspace(0, e.trajectory.t[-1], 3000)
             x, y, z = np.vstack([slid_from(tuple(e.start)), e.trajectory(t)]).T
-            ax.plot(y, z, x, color=color, linewidth=1.3, label=f"excursion {k + 1}")
-        ax.plot([0], [0], [0], "o", color="black", markersize=6)
-        ax.set(xlabel="$y$", ylabel="$z$", zlabel="$x$")
-        ax.view_init(elev=20, azim=-55)
-        ax.set_box_aspect((1, 1, 0.75))
-        ax.legend(loc="upper left")
+            for side, order, width in ((-1, 0, 0.8), (1, 4, 1.5)):
+                shown = [np.where(side * x >= -1e-9, c, np.nan) for c in (y, z, x)]
+                ax.plot(*shown, color=color, linewidth=width, zorder=order)
+        ax.plot([0], [0], [0], "o", color="black", markersize=5, zorder=6)
+        ax.set_axis_off()
+        ax.view_init(elev=17, azim=-62)
+        ax.set_box_aspect((1.3, 1, 0.72), zoom=1.35)
+        handles = [
+            look.line(look.BLACK, "an excursion, thin below the surface"),
+            look.line(look.CANARD, "another excursion"),
+            look.line(look.ABOVE, "fold of $x > 0$", dashes=look.DASHED),
+            look.line(look.BELOW, "fold of $x < 0$", dashes=look.DASHED),
+        ]
+        figure.legend(handles=handles, loc="lower center", ncols=2)
     return figure
 
 
 def series() -> Figure:
     """One solution: excursion after excursion, each drawn by chance at the singularity."""
     with look.settings():
-        figure = look.new_figure(9.6, 4.8)
+        figure = look.new_figure(7.0, 4.0)
         top, bottom = figure.subplots(2, 1, height_ratios=(2, 1))
         now, amplitudes = 0.0, []
         for e in excursions():
             t = np.linspace(0, e.trajectory.t[-1], 1200)
             if now < 150:
                 top.plot(now + t, e.trajectory(t)[:, 0], color=look.BLACK, linewidth=0.9)
+                for piece in e.trajectory.segments:
+                    if piece.mode == "s":
+                        top.axvspan(
+                            now + piece.t_start, now + piece.t_end, color=look.TINT_ATTRACTING
+                        )
                 top.plot(now, 0, "o", color=look.VERMILLION, markersize=4)
             now += e.trajectory.t[-1]
             amplitudes.append(e.amplitude)
-        top.set(xlabel="time", ylabel="$x$", xlim=(0, 150), ylim=(-0.6, 1.45))
+        top.set(xlabel="time", ylabel="$x$", xlim=(0, 150), ylim=(-0.6, 1.5))
         bottom.plot(np.arange(1, len(amplitudes) + 1), amplitudes, "o", color=look.BLUE, ms=4)
-        bottom.set(xlabel="excursion", ylabel="largest $x$", ylim=(0, None))
+        bottom.set(xlabel="excursion", ylabel="largest $x$", ylim=(0, 1.4))
         handles = [
-            Line2D([], [], color=look.VERMILLION, marker="o", ls="none", label="at the two-fold")
+            Line2D([], [], color=look.VERMILLION, marker="o", ls="none", label="at the two-fold"),
+            Patch(facecolor=look.TINT_ATTRACTING, label="sliding"),
         ]
-        top.legend(handles=handles, loc="upper right")
+        top.legend(handles=handles, loc="lower right", bbox_to_anchor=(1, 1), ncols=2)
     return figure
 
 
 def surface() -> Figure:
     """Sliding portraits of the recurrent system on both sides of the bifurcation."""
     with look.settings():
-        figure = look.new_figure(12.4, 5.0)
+        figure = look.new_figure(7.0, 4.2)
         left, right = figure.subplots(1, 2)
         for ax, nu in ((left, RECURRENT), (right, CALM)):
             ns.plot.sliding_portrait(
@@ -122,10 +160,19 @@ def surface() -> Figure:
                 (-0.5, 0.5, -0.5, 0.5),
                 parameters={"nu1": nu, "nu2": nu},
                 ax=ax,
-                legend=ax is right,
+                legend=False,
                 title=rf"$\nu_1 = \nu_2$ = {nu:g}".replace("-", "−"),
             )
             ax.set_aspect("equal")
+        handles = [
+            Patch(facecolor=look.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
+            Patch(facecolor=look.TINT_REPELLING, label="$D_r$: repelling sliding"),
+            look.line(look.ABOVE, "invisible fold of $x > 0$", 2.2, look.DASHED),
+            look.line(look.BELOW, "invisible fold of $x < 0$", 2.2, look.DASHED),
+            look.line(look.CANARD, "canard", 2.4),
+            look.line(look.GREEN, "faux canard", 2.4, look.DASHED),
+        ]
+        figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 

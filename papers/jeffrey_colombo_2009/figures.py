@@ -32,7 +32,7 @@ from .results import COUNTS
 
 _CASES = (("a", BEFORE, "$V^+V^- < 1$"), ("b", AT, "$V^+V^- = 1$"), ("c", AFTER, "$V^+V^- > 1$"))
 _FINITE: V = (-0.75, -1.0)  # at most 5 flights
-_COLORS = ("#FFFFFF", "#DCEBF5", "#A9CCE3", "#6FA8CF", "#3C7FB1", "#1B4F72")
+_COLORS = ("#E3E3E3", "#DCEBF5", "#A9CCE3", "#6FA8CF", "#3C7FB1", "#1B4F72")
 
 
 def _numbers(v: V) -> str:
@@ -42,8 +42,9 @@ def _numbers(v: V) -> str:
 def space() -> Figure:
     """Flow on both sides of the surface, before, at and after the bifurcation."""
     with look.settings():
-        figure = look.new_figure(13.0, 4.0)
-        for ax, (letter, v, words) in zip(figure.subplots(1, 3), _CASES, strict=True):
+        figure = look.new_figure(7.0, 5.4)
+        *axes, key = figure.subplots(2, 2).ravel()
+        for ax, (letter, v, words) in zip(axes, _CASES, strict=True):
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
             ns.plot.two_fold_3d((SIGMA, v), ax=ax, legend=False, title=title)
         handles = [
@@ -55,15 +56,17 @@ def space() -> Figure:
             Patch(color=look.CANARD, alpha=0.2, label="diabolo: orbits fall in"),
             Patch(color=look.GREEN, alpha=0.2, label="diabolo: orbits come out"),
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=7)
+        key.set_axis_off()
+        key.legend(handles=handles, loc="center")
     return figure
 
 
 def sliding() -> Figure:
     """Sliding portraits before, at and after the bifurcation."""
     with look.settings():
-        figure = look.new_figure(13.0, 5.0)
-        for ax, (letter, v, words) in zip(figure.subplots(1, 3), _CASES, strict=True):
+        figure = look.new_figure(7.0, 6.6)
+        *axes, key = figure.subplots(2, 2).ravel()
+        for ax, (letter, v, words) in zip(axes, _CASES, strict=True):
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
             ns.plot.two_fold((SIGMA, v), ax=ax, legend=False, title=title)
             ax.set(xlabel="$y$", ylabel="$z$")
@@ -77,58 +80,73 @@ def sliding() -> Figure:
             look.line(look.CANARD, "diabolo: orbits fall in", dashes=look.DASH_DOT),
             look.line(look.GREEN, "diabolo: orbits come out", dashes=look.DOTS),
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=4)
+        key.set_axis_off()
+        key.legend(handles=handles, loc="center")
     return figure
 
 
 def _arcs(start: Array, above: bool) -> tuple[Array, Array, Array]:
-    """Surface of the arcs over or under the segment from 0 to ``start``, as large as the frame."""
-    flight = ns.two_folds.flight_above if above else ns.two_folds.flight_below
-    reach = max(np.abs(start).max(), np.abs(flight(start, AFTER)).max())
-    size, share = np.meshgrid(np.linspace(0.0, 1.0 / reach, 25), np.linspace(0.0, 1.0, 25))
-    y, z = size * start[0], size * start[1]
+    """Surface of the arcs from the ray through ``start``, scaled so that its edges cross the axis of the
+    diabolo at right angles: along and across that axis, and x."""
+    share = np.linspace(0.0, 1.0, 81)
+    y, z = start
+    t = -2 * (y if above else z) * share
     if above:
-        t = -2 * y * share
-        return -y * t - t**2 / 2, y + t, z + AFTER[0] * t
-    t = -2 * z * share
-    return z * t + t**2 / 2, y + AFTER[1] * t, z + t
+        arc = _turned(-y * t - t**2 / 2, y + t, z + AFTER[0] * t)
+    else:
+        arc = _turned(z * t + t**2 / 2, y + AFTER[1] * t, z + t)
+    size = np.linspace(0.0, 1.0, 25)[:, None] / np.abs(arc[0])
+    return size * arc[0], size * arc[1], size**2 * arc[2]
+
+
+def _turned(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
+    """Coordinates with y = z as the first axis, along which the two surfaces open."""
+    return (y + z) / math.sqrt(2), (z - y) / math.sqrt(2), x
 
 
 def diabolo() -> Figure:
     """The pair of invariant surfaces with an orbit on the one whose orbits fall in."""
     low, high = ns.two_folds.diabolo_slopes(AFTER)
     with look.settings():
-        figure = look.new_figure(7.6, 6.2)
-        ax = figure.add_subplot(projection="3d", computed_zorder=False)
-        for slope, color in ((high, look.CANARD), (low, look.GREEN)):
+        figure = look.new_figure(7.0, 3.4)
+        # Axes in space are square: taller than the figure, so that they are as wide.
+        figure.set_layout_engine("none")
+        place = (0, 0.57 - 3.5 / 3.4, 1, 7 / 3.4)
+        ax = figure.add_axes(place, projection="3d", computed_zorder=False)
+        plane = 0.8 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]).T
+        ax.plot(*_turned(np.zeros(5), *plane), color=look.GREY, linewidth=0.8, zorder=1)
+        for y, z in (([-0.8, 0.8], [0, 0]), ([0, 0], [-0.8, 0.8])):
+            fold = _turned(np.zeros(2), np.array(y), np.array(z))
+            ax.plot(*fold, color=look.GREY, linewidth=0.8, zorder=1, linestyle=look.DASHED)
+        for slope, color in ((low, look.ORANGE), (high, look.BLUE)):
             up = np.array([-1.0, slope])
-            for start, above in ((up, True), (ns.two_folds.flight_above(up, AFTER), False)):
-                x, y, z = _arcs(start, above)
-                ax.plot_surface(y, z, x, color=color, alpha=0.3, linewidth=0, zorder=2)
-                for edge in (0, -1):
-                    ax.plot(y[edge], z[edge], x[edge], color=color, linewidth=1.6, zorder=3)
-        orbit = run(AFTER, (-1.0 / high, 1.0), 3.828427 / high)
+            for above in (False, True):
+                surface = _arcs(up if above else ns.two_folds.flight_above(up, AFTER), above)
+                ax.plot_surface(*surface, color=color, alpha=0.25, linewidth=0, zorder=2 + above)
+                for ring in (-1, 16, 8):
+                    ax.plot(*(c[ring] for c in surface), color=color, linewidth=1.0, zorder=4)
+                ax.plot(*(c[:, 0] for c in surface), color=color, linewidth=1.8, zorder=4)
+        size = math.sqrt(2) / (high - 1)  # begins where the surface is cut off
+        orbit = run(AFTER, (-size, size * high), 3.828427 * size)
         t = orbit.t[-1] * (1 - np.concatenate([[0], np.geomspace(1e-4, 1, 800)])[::-1])
         x, y, z = orbit(t).T
-        for side, color in ((1, look.ABOVE), (-1, look.BELOW)):
-            shown = np.where(side * x >= 0, [y, z, x], np.nan)
+        for side, color in ((1, look.ABOVE), (-1, look.BLACK)):
+            shown = [np.where(side * x >= 0, c, np.nan) for c in _turned(x, y, z)]
             ax.plot(*shown, color=color, linewidth=2.0, zorder=5)
-        ax.plot([0], [0], [0], "o", color="black", markersize=6, zorder=6)
-        plane = np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]).T
-        ax.plot(*plane, [0] * 5, color=look.GREY, linewidth=0.8, zorder=1)
-        for line in ([[-1, 1], [0, 0]], [[0, 0], [-1, 1]]):
-            ax.plot(*line, [0, 0], color=look.GREY, linewidth=0.8, zorder=1, linestyle=look.DASHED)
-        ax.set(xlabel="$y$", ylabel="$z$", zlabel="$x$", xlim=(-1, 1), ylim=(-1, 1))
-        ax.view_init(elev=24, azim=28)
-        ax.set_box_aspect((1, 1, 0.6))
+        ax.plot([0], [0], [0], "o", color="black", markersize=5, zorder=6)
+        for at, words in (((1.25, 0.2, 0), "$D_a$"), ((-1.25, -0.2, 0), "$D_r$")):
+            ax.text(*at, words, ha="center", fontsize=10, zorder=7, path_effects=look.halo())
+        ax.set_axis_off()
+        ax.view_init(elev=16, azim=-78)
+        ax.set_box_aspect((2, 1.4, 0.62), zoom=1.38)
         handles = [
-            Patch(color=look.CANARD, alpha=0.4, label="surface on which orbits fall in"),
-            Patch(color=look.GREEN, alpha=0.4, label="surface on which orbits come out"),
+            Patch(color=look.BLUE, alpha=0.4, label="orbits fall in"),
+            Patch(color=look.ORANGE, alpha=0.4, label="orbits come out"),
             look.line(look.ABOVE, "an orbit, $x > 0$"),
-            look.line(look.BELOW, "the same orbit, $x < 0$"),
-            look.line(look.GREY, "folds, on $x = 0$", 0.8, look.DASHED),
+            look.line(look.BLACK, "the same orbit, $x < 0$"),
+            look.line(look.GREY, "surface $x = 0$ and its folds", 0.8, look.DASHED),
         ]
-        ax.legend(handles=handles, loc="upper left")
+        figure.legend(handles=handles, loc="lower center", ncols=3)
     return figure
 
 
@@ -143,7 +161,7 @@ def _flights_by_slope(v: V, count: int = 90) -> tuple[Array, list[int]]:
 def regions() -> Figure:
     """Crossing regions by the number of flights before sliding."""
     with look.settings():
-        figure = look.new_figure(9.6, 4.6)
+        figure = look.new_figure(7.0, 3.4)
         axes = figure.subplots(1, 2)
         for ax, v in zip(axes, (_FINITE, AFTER), strict=True):
             for turn in (1, -1):
@@ -159,7 +177,7 @@ def regions() -> Figure:
         bar = figure.colorbar(
             ScalarMappable(BoundaryNorm(np.arange(-0.5, 6), 6), scale), ax=axes, shrink=0.85
         )
-        bar.set_ticks(range(6), labels=["never", "1", "2", "3", "4", "5 or more"])
+        bar.set_ticks(range(6), labels=["none", "1", "2", "3", "4", "5 or more"])
         bar.set_label("flights before it slides")
     return figure
 
@@ -169,9 +187,12 @@ def _dress(ax: Axes, v: V) -> None:
     for x, y in (([-1, 1], [0, 0]), ([0, 0], [-1, 1])):
         ax.plot(x, y, color="black", linewidth=1.6, linestyle=look.DASHED)
     if v[0] * v[1] > 1:
-        for slope, color in zip(
-            ns.two_folds.diabolo_slopes(v), (look.GREEN, look.CANARD), strict=True
-        ):
+        names = (
+            (look.GREEN, "orbits come out", (-0.52, 0.38)),
+            (look.CANARD, "fall in", (-0.42, 0.8)),
+        )
+        for slope, (color, words, place) in zip(ns.two_folds.diabolo_slopes(v), names, strict=True):
+            look.write(ax, place, words, color=color, path_effects=look.halo(), rotation=0)
             start = np.array([-1.0, slope])
             for z in (start, ns.two_folds.flight_above(start, v)):
                 ax.plot(*np.array([0 * z, z / np.abs(z).max()]).T, color=color, linewidth=2.2)
@@ -184,7 +205,7 @@ def _dress(ax: Axes, v: V) -> None:
 def crossings() -> Figure:
     """Largest number of flights against V+ V-."""
     with look.settings():
-        figure = look.new_figure(6.2, 4.2)
+        figure = look.new_figure(3.4, 2.7)
         ax = figure.add_subplot()
         away = np.geomspace(1, 2e-3, 4000)[1:]
         ax.plot(away, [formula_for_flights(1 - a) for a in away], color=look.BLACK, lw=1.2)
@@ -206,7 +227,7 @@ def crossings() -> Figure:
 def eigenvalues() -> Figure:
     """Eigenvalues of the return map against V+ V-."""
     with look.settings():
-        figure = look.new_figure(9.2, 4.2)
+        figure = look.new_figure(7.0, 3.2)
         left, right = figure.subplots(1, 2)
         circle = np.linspace(0, 2 * math.pi, 200)
         left.plot(np.cos(circle), np.sin(circle), color=look.GREY, linewidth=0.8)

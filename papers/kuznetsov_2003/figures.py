@@ -49,15 +49,16 @@ def _legend() -> list[Line2D]:
         look.marker("o", "stable equilibrium"),
         look.marker("o", "unstable equilibrium", "white"),
         look.marker("s", "stable pseudo-node"),
-        look.marker("X", "pseudo-saddle"),
+        look.marker("X", "pseudo-saddle", "white"),
     ]
 
 
 def _around(levels: tuple[float, float, float], boxes: Callable[[float], Box], x1: float) -> Figure:
     """Portraits before, at and after a bifurcation, which happens at x1."""
     with look.settings():
-        figure = look.new_figure(13.0, 4.9)
-        for ax, alpha in zip(figure.subplots(1, 3), levels, strict=True):
+        figure = look.new_figure(7.0, 6.2)
+        *axes, key = figure.subplots(2, 2).ravel()
+        for ax, alpha in zip(axes, levels, strict=True):
             ns.plot.phase_portrait(
                 SYSTEM,
                 boxes(alpha),
@@ -68,9 +69,10 @@ def _around(levels: tuple[float, float, float], boxes: Callable[[float], Box], x
                 t_end=150.0,
             )
             ax.set(xlabel="$x_1$", ylabel="$x_2$")
-        figure.axes[1].plot(x1, levels[1], "*", **_STAR, zorder=9)
+        axes[1].plot(x1, levels[1], "*", **_STAR, zorder=9)
         star = Line2D([], [], ls="none", marker="*", **_STAR, label="the bifurcation")
-        figure.legend(handles=[*_legend(), star], loc="outside lower center", ncols=6)
+        key.set_axis_off()
+        key.legend(handles=[*_legend(), star], loc="center")
     return figure
 
 
@@ -99,7 +101,7 @@ def saddle_node() -> Figure:
 def whole() -> Figure:
     """The whole plane in four regimes."""
     with look.settings():
-        figure = look.new_figure(11.5, 8.4)
+        figure = look.new_figure(7.0, 6.6)
         for ax, alpha in zip(figure.subplots(2, 2).ravel(), (0.75, 0.88, 1.05, 1.3), strict=True):
             ns.plot.phase_portrait(
                 SYSTEM,
@@ -111,29 +113,35 @@ def whole() -> Figure:
                 t_end=150.0,
             )
             ax.set(xlabel="$x_1$", ylabel="$x_2$")
-        figure.legend(handles=_legend(), loc="outside lower center", ncols=5)
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
     return figure
 
 
 def cycles() -> Figure:
     """Sliding cycles for several thresholds."""
     with look.settings():
-        figure = look.new_figure(7.0, 5.2)
+        figure = look.new_figure(7.0, 4.6)
         ax = figure.add_subplot()
-        colors = (look.BLUE, look.GREEN, look.ORANGE, look.VERMILLION)
-        for alpha, color in zip((1.2, 1.5, 2.0, 2.3), colors, strict=True):
+        for alpha in (1.2, 1.5, 2.0, 2.3):
             run = run_from_fold(alpha, period(alpha))
-            t = np.linspace(0, run.t[-1], 1500)
-            ax.plot(*run(t).T, color=color, linewidth=1.4, label=f"$\\alpha$ = {alpha:g}")
-            ax.plot([FREE_FOLD, landing(alpha)[1]], [alpha, alpha], color=color, linewidth=3.2)
+            curve = run(np.linspace(0, run.t[-1], 1500))
+            ax.plot(*curve.T, color=look.BLUE, linewidth=1.2)
+            look.arrowhead(ax, curve, 0.3, look.BLUE)
+            end = landing(alpha)[1]
+            ax.plot([FREE_FOLD, end], [alpha, alpha], color=look.BLACK, linewidth=3.0)
+            ax.text(FREE_FOLD + 0.03, alpha - 0.09, f"$\\alpha$ = {alpha:g}")
         top, curve = free_cycle()
-        ax.plot(
-            *curve.T, color=look.BLACK, linewidth=1.2, linestyle=look.DASHED, label="no harvest"
-        )
-        ax.plot(FREE_FOLD, top, "D", color=look.BLACK, markersize=5)
+        ax.plot(*curve.T, color=look.VERMILLION, linewidth=1.4, linestyle=look.DASHED)
+        look.arrowhead(ax, curve, 0.4, look.VERMILLION)
+        ax.plot(FREE_FOLD, top, "D", color=look.VERMILLION, markersize=5)
         ax.axvline(FREE_FOLD, color=look.GREY, linewidth=0.7, linestyle=look.DOTS)
         ax.set(xlabel="$x_1$", ylabel="$x_2$", xlim=(0, 1), ylim=(0, 2.6))
-        ax.legend(loc="upper right", title="thick: sliding")
+        handles = [
+            look.line(look.BLUE, "sliding cycle", 1.2),
+            look.line(look.BLACK, "its sliding part", 3.0),
+            look.line(look.VERMILLION, "cycle without harvest", 1.4, look.DASHED),
+        ]
+        ax.legend(handles=handles, loc="upper right")
     return figure
 
 
@@ -141,7 +149,7 @@ def diagram() -> Figure:
     """Everything on the threshold against alpha, and the period of the sliding cycle."""
     top, _ = free_cycle()
     with look.settings():
-        figure = look.new_figure(8.6, 7.0)
+        figure = look.new_figure(7.0, 6.2)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for x, visible in ((FREE_FOLD, BOUNDARY_FOCUS), (HARVESTED_FOLD, BOUNDARY_NODE)):
             # the free fold is visible above its threshold, the harvested one below its own
@@ -155,7 +163,8 @@ def diagram() -> Figure:
             roots = [pseudo_equilibria(a) for a in levels]
             points = [r[which] if r else np.nan for r in roots]
             upper.plot(levels, points, color=look.BLACK, linestyle=dashes, linewidth=1.6)
-        levels = np.linspace(BOUNDARY_FOCUS + 1e-3, top - 1e-6, 90)
+        ends = top - np.geomspace(0.1, 1e-6, 20)  # where it ends as a square root does
+        levels = np.concatenate([np.linspace(BOUNDARY_FOCUS + 1e-3, top - 0.11, 80), ends])
         landings = np.array([landing(float(a))[1] for a in levels])
         born = sliding_homoclinic()
         upper.plot(
@@ -165,7 +174,7 @@ def diagram() -> Figure:
             levels[levels >= born], landings[levels >= born], color=look.GREEN, linewidth=1.8
         )
         _bifurcations(upper, lower, top)
-        later = [born + 2e-6, born + 2e-5, *np.linspace(SADDLE_NODE, top - 1e-3, 45)]
+        later = [*(born + np.geomspace(2e-6, 0.3, 30)), *np.linspace(born + 0.32, top - 1e-3, 25)]
         lower.plot(
             later, [period(float(a), 2500.0) for a in later], color=look.GREEN, linewidth=1.8
         )

@@ -14,14 +14,13 @@ from ..pictures import Picture
 from .model import (
     BOUNDARY_MIXED,
     BOUNDARY_RESTING,
+    DENSITY,
     FOLD_FOLD,
     MERGING,
     MIXED,
     RESTING,
-    SYSTEM,
     A,
     Array,
-    at,
     cycle,
     point,
     simulate,
@@ -43,20 +42,22 @@ def _cycle_points(eps: float) -> tuple[Array, Array, Array]:
 def portraits() -> Figure:
     """Portraits for six thresholds."""
     with look.settings():
-        figure = look.new_figure(13.0, 9.0)
+        figure = look.new_figure(7.0, 5.8)
         for ax, eps in zip(figure.subplots(2, 3).ravel(), _LEVELS, strict=True):
             ns.plot.phase_portrait(
-                SYSTEM,
-                (0.0, 1.12, 0.0, 1.12),
-                parameters=at(eps),
+                DENSITY,
+                (0.0, 1.12, -0.12, 0.26),
+                parameters={"eps": eps},
                 ax=ax,
                 legend=False,
                 t_end=8.0,
                 title=rf"$\varepsilon$ = {eps:g}".replace("-", "−"),
             )
             if BOUNDARY_MIXED < eps < 0:
-                ax.plot(*_cycle_points(eps)[1].T, color=look.PURPLE, linewidth=2.6, zorder=5)
-            ax.set(xlabel="$T$", ylabel="$S$")
+                temperature, salinity = _cycle_points(eps)[1].T
+                loop = (temperature, salinity - A * temperature)
+                ax.plot(*loop, color=look.PURPLE, linewidth=2.6, zorder=5)
+            ax.set(xlabel="$T$", ylabel="$S - aT$")
         handles = [
             look.line(look.BLACK, "sliding, attracting", 3.4),
             look.line(look.ORANGE, "sliding, repelling", 3.4, look.DASHED),
@@ -69,9 +70,9 @@ def portraits() -> Figure:
             look.marker("o", "stable equilibrium"),
             look.marker("s", "stable pseudo-node"),
             look.marker("s", "unstable pseudo-node", "white"),
-            look.marker("X", "pseudo-saddle"),
+            look.marker("X", "pseudo-saddle", "white"),
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=6)
+        figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
 
 
@@ -80,7 +81,7 @@ def oscillation() -> Figure:
     eps = -0.01
     t, x, mixing = _cycle_points(eps)
     with look.settings():
-        figure = look.new_figure(8.6, 5.0)
+        figure = look.new_figure(7.0, 4.2)
         top, bottom = figure.subplots(2, 1, sharex=True)
         for k in range(3):
             now = t + k * t[-1]
@@ -105,7 +106,7 @@ def oscillation() -> Figure:
 def diagram() -> Figure:
     """Equilibria, pseudo-equilibria and the cycle against the threshold; the period."""
     with look.settings():
-        figure = look.new_figure(8.8, 7.0)
+        figure = look.new_figure(7.0, 5.8)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for low, high, color, dashes in (
             (MIXED[0], MERGING, look.BLACK, look.DASHED),
@@ -117,7 +118,7 @@ def diagram() -> Figure:
         upper.plot([-0.08, BOUNDARY_MIXED], [MIXED[0]] * 2, color=look.ABOVE, linewidth=2.2)
         upper.plot([BOUNDARY_RESTING, 0.25], [RESTING[0]] * 2, color=look.BELOW, linewidth=2.2)
         levels = np.concatenate(
-            [BOUNDARY_MIXED + np.geomspace(1e-7, 1e-2, 14), -np.geomspace(0.032, 1e-5, 26)]
+            [BOUNDARY_MIXED + np.geomspace(1e-7, 1e-2, 30), -np.geomspace(0.032, 1e-5, 26)]
         )
         extremes = np.array([_extremes(float(eps)) for eps in levels])
         upper.fill_between(levels, *extremes[:, :2].T, color=look.PURPLE, alpha=0.15, linewidth=0)
@@ -128,6 +129,12 @@ def diagram() -> Figure:
         for value in (BOUNDARY_MIXED, 0.0, BOUNDARY_RESTING):
             for ax in (upper, lower):
                 ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTS)
+        for value, words in (
+            (BOUNDARY_MIXED, "mixed equilibrium\nmeets the threshold"),
+            (0.0, "fused focus"),
+            (BOUNDARY_RESTING, "resting equilibrium\nmeets the threshold"),
+        ):
+            upper.text(value, 1.12, words, ha="center", va="bottom")
         upper.set(ylabel="$T$", xlim=(-0.08, 0.25), ylim=(0, 1.1))
         lower.set(xlabel=r"$\varepsilon$", ylabel="period", ylim=(0, None))
         handles = [

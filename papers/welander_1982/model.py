@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from functools import cache
 
+import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
@@ -22,6 +23,23 @@ Array = NDArray[np.float64]
 PROBLEM = ns.textbook.welander_box()
 SYSTEM = PROBLEM.system
 A, B, K = (PROBLEM.parameters[name] for name in ("a", "b", "k"))
+
+
+def _over_density() -> ns.FilippovSystem:
+    """The box with the density S - a T in place of S, in which its cycle is no sliver."""
+    t, density, eps = (ca.SX.sym(name) for name in ("T", "density", "eps"))
+    s = density + A * t
+    fields = []
+    for k in (K, 0.0):  # mixing where the water above is denser than the threshold
+        warming = 1 - t - k * t
+        fields.append([warming, B * (1 - s) - k * s - A * warming])
+    above, below = fields
+    return ns.FilippovSystem(
+        [t, density], surface=density - eps, above=above, below=below, parameters={eps: 0.0}
+    )
+
+
+DENSITY = _over_density()
 
 #: Equilibria of the fields, and the thresholds at which they are on the surface.
 MIXED = np.array([1 / (1 + K), B / (B + K)])

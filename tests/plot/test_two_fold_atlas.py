@@ -10,7 +10,7 @@ from numpy.testing import assert_allclose
 
 import nonsmooth as ns
 from nonsmooth.local.two_folds import classify_two_fold, max_flights
-from nonsmooth.plot.two_fold_atlas import CASES, areas
+from nonsmooth.plot.two_fold_atlas import CASES, FILLS, areas
 
 SIGMA = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
 
@@ -28,6 +28,15 @@ def test_every_class_and_every_boundary_has_its_case():
             assert boundary in [
                 b.name.replace("Delta", "Δ").replace("nu", "ν") for b in found.boundaries
             ]
+
+
+def test_a_fill_means_the_same_canards_wherever_it_is():
+    meant = {}
+    for name, fill in FILLS.items():
+        found = classify_two_fold(*CASES[name])
+        meant.setdefault(fill, set()).add((found.canards, found.faux_canards))
+    assert all(len(canards) == 1 for canards in meant.values())
+    assert len({min(c) for c in map(sorted, meant.values())}) == len(meant) == 6
 
 
 @pytest.mark.parametrize("kind", SIGMA)

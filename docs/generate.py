@@ -38,6 +38,7 @@ GALLERY = (
     "leine",
     "plane_friction",
     "harvest",
+    "buck",
     "basins",
     "wells",
     "friction_cone",

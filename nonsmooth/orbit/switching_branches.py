@@ -97,9 +97,12 @@ def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list
     way = np.concatenate([across / np.linalg.norm(across), np.zeros(2)])
     for away in _AWAY:
         found = curve.correct(u + away * way * curve.scale, way)
-        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
+        first = curve.correct(u + 0.01 * away * way * curve.scale, way)
+        if found is None or first is None:
+            continue
+        if np.abs((found - u) / curve.scale).max() < 10 * away:
             curve.longest = _LONG * period
-            return curve, [u, found]
+            return curve, [first, found]  # an orbit of no size has no direction
     raise ConvergenceError(
         f"Hopf: expected small orbits around {at.point.tolist()}, received no convergence. Perhaps the "
         "point is degenerate: the pair of eigenvalues does not cross the axis."

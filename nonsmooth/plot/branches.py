@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 
 from ..local import Equilibrium
 from ..model import Array, DefinitionError, OptionError, explain
-from ..orbit import BifurcationCurve, Branch, PeriodicOrbit
+from ..orbit import BifurcationCurve, Branch, BranchEvent, Connection, PeriodicOrbit
 from . import style
 
 #: Marker and fill of each kind of event; shape tells them apart without colour.
@@ -32,6 +32,7 @@ MARKERS = {
     "adding-sliding": ("<", style.PURPLE),
     "impact grazing": ("v", style.VERMILLION),
     "corner": ("d", "white"),
+    "homoclinic": ("*", style.BLACK),
 }
 _OTHER = ("X", "white")
 _CURVES = (
@@ -111,7 +112,7 @@ def branch(
                 looks[name] = style.line(look["color"], name, look["linewidth"], look["linestyle"])
             for event in one.events:
                 shape, fill = MARKERS.get(event.kind, _OTHER)
-                height = measure(event.solution)
+                height = measure(_beside(one, event))
                 axes.plot(
                     event.parameter,
                     height,
@@ -128,6 +129,13 @@ def branch(
         if legend:
             axes.legend(handles=list(looks.values()), loc="best")
     return figure
+
+
+def _beside(one: Branch, event: BranchEvent) -> Any:
+    """The solution at an event; at a homoclinic orbit the last one of the branch."""
+    if not isinstance(event.solution, Connection):
+        return event.solution
+    return one.solutions[int(np.argmin(np.abs(one.values - event.parameter)))]
 
 
 def _branches(found: Any) -> list[Branch]:

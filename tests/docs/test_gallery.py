@@ -161,3 +161,30 @@ def test_wells_are_divided_where_the_closed_form_says():
     beyond = (xs > truth + 0.1) & (xs < 3.2)
     assert len(set(row[(xs > 0.2) & (xs < truth - 0.1)])) == 1
     assert set(row[beyond]).isdisjoint(row[(xs > 0.2) & (xs < truth - 0.1)])
+
+
+def test_buck_converter_doubles_where_its_closed_form_flows_say():
+    """The first from the textbook's reference; at the second a multiplier -1 by differences of runs."""
+    found = ran("buck")
+    assert found["doublings"][0] == pytest.approx(24.51657282856337870174, abs=1e-10)
+    event = found["branches"][1].events[0]
+    legs = event.orbit.legs
+    start = next(
+        legs[(k + 1) % len(legs)] for k, leg in enumerate(legs) if leg.event == "clock"
+    ).start
+
+    def after(change):
+        run = found["ns"].simulate(
+            found["system"],
+            [*(start[:2] + change), 0.0],
+            8.1e-4,
+            parameters={"E": event.parameter},
+            tol=1e-12,
+            at=found["ns"].Section("clock", after=True, count=2),
+        )
+        return run.sample_x[-1, :2]
+
+    step = 1e-6 * np.eye(2)
+    slope = np.column_stack([(after(d) - after(-d)) / 2e-6 for d in step])
+    assert np.abs(np.linalg.eigvals(slope) + 1).min() < 1e-5
+    assert len(found["doublings"]) == 3 and np.all(np.diff(found["doublings"]) > 0)

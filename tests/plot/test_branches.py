@@ -62,6 +62,29 @@ def test_orbits_are_drawn_by_their_largest_state_or_as_one_asks(relay):
     assert set(np.concatenate([line.get_ydata() for line in lengths.lines])) == {2, 4}
 
 
+def test_a_branch_from_hopf_to_homoclinic_is_drawn_to_its_ends():
+    d, u = ca.SX.sym("d"), ca.SX.sym("u")
+    r = ca.sqrt(x * x + y * y)
+    above = [x * (1 - r) - y, y * (1 - r) + x]
+    touching = ns.FilippovSystem(
+        [x, y], surface=x + d, above=above, below=[0.4 - y, 1], parameters={d: 1.2}
+    )
+    orbit = ns.periodic_orbit(touching, ns.simulate(touching, [0.9, 0.0], 40.0))
+    branch = ns.continue_orbit(orbit, "d", bounds=(0.8, 1.3))
+    assert [event.kind for event in branch.events] == ["homoclinic", "grazing-sliding"]
+    markers = [line for line in ns.plot.branch(branch).axes[0].lines if line.get_marker() == "*"]
+    assert_allclose(markers[0].get_xdata(), branch.events[0].parameter)
+    size = x * x + y * y
+    small = ns.FilippovSystem(
+        [x, y], field=[u * x - y - x * size, x + u * y - y * size], parameters={u: 0.3}
+    )
+    cycle = ns.periodic_orbit(small, ns.simulate(small, [0.5, 0.0], 60.0))
+    branch = ns.continue_orbit(cycle, "u", bounds=(-0.5, 0.5))
+    assert branch.events[0].kind == "Hopf" and np.all(np.isfinite(branch.values))
+    ns.plot.branch(branch, against="x")
+    assert not any("unstable" in orbit.stability for orbit in branch.orbits)
+
+
 def test_curves_in_two_parameters_with_their_special_points(takens):
     curves = [ns.continue_bifurcation(e, ("a", "b"), bounds=BOX) for e in takens.events]
     ax = ns.plot.bifurcation_curves(curves).axes[0]

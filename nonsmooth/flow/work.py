@@ -187,8 +187,8 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
     workers : int
     """
     count, k, spent = starts.count, 1, 0.0
-    if not count:
-        return 1
+    if count < 2:
+        return 1  # nothing to divide
     while True:
         x, p = starts.rows(np.linspace(0, count - 1, k).astype(np.int64))
         began = time.perf_counter()

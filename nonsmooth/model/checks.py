@@ -125,6 +125,6 @@ def require_system(value: Any, sets: bool = False) -> None:
                 expected="one whose multipliers are scalars, here",
                 received=repr(value),
                 advice="Vector multipliers, sets of codimension two and three, are known to simulate, "
-                "ensemble, region and limit_directions.",
+                "ensemble, sensitivity, region and limit_directions.",
             )
         )

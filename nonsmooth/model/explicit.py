@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import casadi as ca
 
+from .checks import require_system
 from .coupled import coupled_of
 from .motion import Motion, motion
 from .switches import Guard, Guarded
@@ -122,6 +123,7 @@ def explicit(system: FilippovSystem, mode: str) -> Motion:
     >>> explicit(system, "c").field, explicit(system, "o").field
     (SX([v, 0]), SX([v, -9.81]))
     """
+    require_system(system)
     if not system.coupled:
         return motion(system, mode)
 

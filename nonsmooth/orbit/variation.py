@@ -217,6 +217,8 @@ class Sensitivity:
 
     @cached_property
     def _nearest(self) -> tuple[float, str]:
+        if self.run.system.sets:  # not looked for
+            return math.inf, ""
         return clearance(self.run)
 
     def __repr__(self) -> str:

@@ -20,11 +20,11 @@ from dataclasses import dataclass
 from functools import lru_cache
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 
 from ..flow.trajectory import Event, Segment, Trajectory
-from ..model import Array, DefinitionError, DegenerateError, Evaluator, FilippovSystem, explain
+from ..model import Array, DefinitionError, DegenerateError, FilippovSystem, explain
+from ..model.layer import layer_evaluator
 from .variation import Sensitivity
 
 #: Nodes of the collocation on each step.
@@ -86,19 +86,7 @@ class Variation:
         self.system, self.p, self.chosen = system, p, list(chosen)
         self._m = system.surface_count
 
-        def build() -> Evaluator:
-            x, q = system.extended_states, system.parameter_symbols
-            lam = ca.SX.sym("lambda", self._m)
-            f, h = system.field_with(lam), ca.vertcat(system.definition.surfaces)
-            g = ca.mtimes(ca.jacobian(h, x), f)
-            outputs = [f, *(ca.jacobian(f, v) for v in (x, lam, q)), h]
-            outputs += [ca.jacobian(h, v) for v in (x, q)]
-            outputs += [g, *(ca.jacobian(g, v) for v in (x, lam, q))]
-            dense = [ca.densify(e) for e in outputs]
-            function = ca.Function("variation", [ca.vertcat(x, lam), q], dense, {"cse": True})
-            return Evaluator(function)
-
-        self._evaluate: Evaluator = system.cached("variation of sets", build)
+        self._evaluate = layer_evaluator(system)
 
     def at(self, x: Array, lam: Array) -> _At:
         """Evaluate at an extended state and multipliers."""

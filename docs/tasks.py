@@ -56,7 +56,7 @@ TASKS = {
         "Arrays of starts or of parameters, in threads, on a cluster, with checkpoints; and which "
         "attractor each start goes to.",
         "nonsmooth",
-        "ensemble Ensemble Grid RandomStarts Work basins Basins",
+        "ensemble Ensemble Grid RandomStarts Work basins orbit.Basins",
     ),
     "points": _task(
         "Ask what a point is",
@@ -79,30 +79,30 @@ TASKS = {
         "An orbit that closes, stable or not, with its itinerary, its period and its multipliers; "
         "and the successive returns of any orbit to a section.",
         "nonsmooth",
-        "periodic_orbit PeriodicOrbit poincare PoincareOrbit FixedItinerary",
+        "periodic_orbit PeriodicOrbit poincare orbit.PoincareOrbit FixedItinerary",
     ),
     "derivatives": _task(
         "Differentiate a run",
         "How the end of a run changes with its start and its parameters, through crossings, sliding "
         "and jumps; and the mean rates of that over a long time.",
         "nonsmooth",
-        "sensitivity Sensitivity gradient Gradient vjp saltation_matrix lyapunov_spectrum "
-        "LyapunovSpectrum",
+        "sensitivity Sensitivity gradient orbit.Gradient vjp saltation_matrix lyapunov_spectrum "
+        "orbit.LyapunovSpectrum",
     ),
     "branches": _task(
         "Vary a parameter",
         "Orbits and equilibria followed as a parameter varies, the events on the way, and their curves "
         "in two parameters. [Branches and bifurcations](../branches.md) shows them at work.",
         "nonsmooth",
-        "continue_orbit continue_equilibrium Branch BranchEvent FarSide BranchEnd continue_bifurcation "
-        "BifurcationCurve CodimensionTwo find_homoclinic Connection",
+        "continue_orbit continue_equilibrium orbit.Branch orbit.BranchEvent orbit.FarSide BranchEnd "
+        "continue_bifurcation orbit.BifurcationCurve orbit.CodimensionTwo find_homoclinic orbit.Connection",
     ),
     "futures": _task(
         "Follow sets of orbits",
         "Every future of a point whose future is not unique, and the orbits that come to a special "
         "point or leave it.",
         "nonsmooth",
-        "funnel Funnel manifold Manifold",
+        "funnel orbit.Funnel manifold orbit.Manifold",
     ),
     "proofs": _task(
         "Prove",

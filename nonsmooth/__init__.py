@@ -20,15 +20,16 @@ is the sequence of modes. States are on the last axis, float64. Every run ends i
 never guesses where the future is not unique. Every error derives from NonsmoothError.
 
 Here are the verbs, the nouns and the errors. The algebra of two-folds, which needs no system, is in
-``two_folds``; the types that questions about a point return are in ``local``; curves of any
-equations are followed by ``continuation``; pictures are in ``plot`` and named systems with their closed-form answers in ``textbook``.
+``two_folds``; the types that questions about a point return are in ``local``, those that questions about
+orbits return in ``orbit``; curves of any equations are followed by ``continuation``; pictures are in
+``plot`` and named systems with their closed-form answers in ``textbook``.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import local
+from . import local, orbit
 from .flow import (
     Ensemble,
     Event,
@@ -87,21 +88,9 @@ from .model import (
     regularise,
 )
 from .orbit import (
-    Basins,
-    BifurcationCurve,
-    Branch,
     BranchEnd,
-    BranchEvent,
-    CodimensionTwo,
-    Connection,
-    FarSide,
     FixedItinerary,
-    Funnel,
-    Gradient,
-    LyapunovSpectrum,
-    Manifold,
     PeriodicOrbit,
-    PoincareOrbit,
     Sensitivity,
     TraceError,
     VirtualOrbitError,
@@ -153,30 +142,19 @@ _OF_PROOFS = (
 __version__ = "0.1.0.dev0"
 
 __all__ = [
-    "Basins",
-    "BifurcationCurve",
-    "Branch",
     "BranchEnd",
-    "BranchEvent",
     "Census",
     "Clock",
-    "CodimensionTwo",
-    "Connection",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
     "Enclosure",
     "Ensemble",
     "Event",
-    "FarSide",
     "FilippovSystem",
     "FixedItinerary",
-    "Funnel",
-    "Gradient",
     "Grid",
     "Impact",
-    "LyapunovSpectrum",
-    "Manifold",
     "MissingError",
     "NonsmoothError",
     "NotSmoothError",
@@ -184,7 +162,6 @@ __all__ = [
     "OrbitProof",
     "ParameterError",
     "PeriodicOrbit",
-    "PoincareOrbit",
     "PointError",
     "Proof",
     "RandomStarts",
@@ -234,6 +211,7 @@ __all__ = [
     "local",
     "lyapunov_spectrum",
     "manifold",
+    "orbit",
     "periodic_orbit",
     "plot",
     "poincare",

@@ -18,7 +18,7 @@ import numpy as np
 from ..local.checks import positive
 from ..model import Array, ConvergenceError, DefinitionError, OptionError, explain, whole
 from .branch import BranchEnd, BranchEvent
-from .branch_curves import BranchCurve, check_bounds, end_of
+from .branch_curves import BranchCurve, check_bounds, end_of, progress_bar
 from .connection_curves import ConnectionCurve, event_of
 from .connections import Connection
 from .continuation import Arc, Curve, Point, Secant, Zero, directions, trace
@@ -213,6 +213,7 @@ def continue_bifurcation(
     bounds: Sequence[Sequence[float]],
     step: float = 0.02,
     max_points: int = 2000,
+    progress: bool = False,
 ) -> BifurcationCurve:
     """Follow a bifurcation as two parameters vary.
 
@@ -228,6 +229,8 @@ def continue_bifurcation(
         Largest step where the curve bends, relative to the widths of the bounds.
     max_points : int, optional
         To each side.
+    progress : bool, optional
+        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
 
     Returns
     -------
@@ -268,14 +271,26 @@ def continue_bifurcation(
     k = start.size - 2
     start = _on_curve(curve, start, event.kind)
     halves: list[Arc] = []
-    tangent = directions(curve, start)[0]
+    tangent, bar = directions(curve, start)[0], progress_bar(progress)
     for way in (-tangent, tangent):
         if halves and halves[0].end in ("closed", "interrupted"):
             break
         if isinstance(curve, EventCurve):
             curve.secant.forget()
         ends = [(k + i, low, high) for i, (low, high) in enumerate(limits)]
-        halves.append(trace(curve, [start], way, step=step, most=max_points, bounds=ends))
+        halves.append(
+            trace(
+                curve,
+                [start],
+                way,
+                step=step,
+                most=max_points,
+                bounds=ends,
+                report=None if bar is None else lambda _: bar.update(),
+            )
+        )
+    if bar is not None:
+        bar.close()
     points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
     zeros = [*reversed(halves[0].zeros), *(halves[1].zeros if len(halves) > 1 else ())]
     return BifurcationCurve(

@@ -150,7 +150,7 @@ def follow_branch(
 
     With ``away`` one way only, from an event.
     """
-    bar = _bar(progress)
+    bar = progress_bar(progress)
 
     def report(point: Point) -> None:
         if bar is not None:
@@ -172,7 +172,8 @@ def follow_branch(
     return _joined(name, *halves)
 
 
-def _bar(progress: bool) -> Any:
+def progress_bar(progress: bool) -> Any:
+    """A bar that counts points, shown after a second; None if it is not asked for."""
     if not progress:
         return None
     from tqdm import tqdm  # here: it is not needed to import the library

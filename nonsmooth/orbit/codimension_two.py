@@ -83,7 +83,11 @@ def _touches(
     normal = guard.side * surface_map(problem.system, guard.index)(y, p).gradient
     found["two-fold"] = float(normal[: other.size] @ other)
     found["touch of higher order"] = guard.side * float(second["L11"])
-    numbers = contact_numbers(problem, condition, at, p)
+    with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole
+        try:
+            numbers = contact_numbers(problem, condition, at, p)
+        except np.linalg.LinAlgError:
+            return found
     found["fold with contact"] = numbers["det(I - A_i)"]
     found["period doubling with contact"] = numbers["det(I + A_i)"]
     return {key: value for key, value in found.items() if np.isfinite(value)}

@@ -19,7 +19,7 @@ from .boundary import BoundaryProblem, Evaluation
 from .branch import FarSide
 from .conditions import Condition, touching
 from .legs import Leg, fly
-from .multipliers import leg_maps
+from .multipliers import leg_maps, return_map
 
 _SMOOTH = "persistence: the derivative of the return map is continuous"
 _VERDICTS = {
@@ -54,6 +54,12 @@ def far_side(
     if kind == "grazing-sliding" and test.what == "interior" and test.guard is not None:
         numbers = contact_numbers(problem, test, at, p)
         return FarSide(word, _verdict(numbers), ReadOnly(numbers))
+    if kind == "impact grazing" and test.what == "interior":
+        values = np.linalg.eigvals(return_map(problem, at))
+        leading = complex(values[np.argmax(np.abs(values))])
+        # of the orbit that does not touch: by it the bifurcations beyond are ordered (Nordmark 1991)
+        numbers = {"leading multiplier": abs(leading), "its angle": float(np.angle(leading))}
+        return FarSide(word, _VERDICTS[kind], ReadOnly(numbers))
     return FarSide(word, _VERDICTS.get(kind, ""))
 
 

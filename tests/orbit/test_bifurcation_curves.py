@@ -136,7 +136,7 @@ def test_a_ball_on_a_table_folds_and_doubles_on_closed_forms():
         assert curve.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
 
 
-def test_grazing_of_a_wall_is_a_resonance_curve():
+def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(monkeypatch):
     w, z = 0.8, 0.05
     system = impact_oscillator()
     at = {"F": 0.35}
@@ -146,6 +146,17 @@ def test_grazing_of_a_wall_is_a_resonance_curve():
     (event,) = ns.continue_orbit(orbit, "F", bounds=(0.33, 0.4)).events
     curve = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)])
     F, z = curve.values.T
+    evaluate, calls = type(orbit.problem).evaluate, [0]
+
+    def interrupted(*args, **more):
+        calls[0] += 1
+        if calls[0] == 40:
+            raise KeyboardInterrupt
+        return evaluate(*args, **more)
+
+    monkeypatch.setattr(type(orbit.problem), "evaluate", interrupted)
+    cut = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)], progress=True)
+    assert ns.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
     assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
 
 

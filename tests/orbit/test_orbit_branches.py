@@ -172,6 +172,10 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
     assert event.kind == "impact grazing"
     assert abs(event.parameter - np.hypot(1 - w * w, 2 * z * w)) < 1e-12
     assert "square root" in event.far_side.verdict
+    free = 2 * np.pi / w  # the orbit without an impact decays as exp(-z t), turning
+    assert abs(event.coefficients["leading multiplier"] - np.exp(-z * free)) < 1e-11
+    turn = np.angle(np.exp(1j * np.sqrt(1 - z * z) * free))
+    assert abs(abs(event.coefficients["its angle"]) - abs(turn)) < 1e-9
     assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
     assert "asymptotically stable" in branch[0.34].stability
     assert "unstable" in branch[0.45].stability and branch[0.45].legs[0].event == "impact"

@@ -77,6 +77,8 @@ def _touches(
         found["a second touch"] = min(values[1:])
     if guard.kind != "surface":
         return found
+    if problem.system.surface_count > 1:
+        return found  # the map of a touch is known for one surface
     t = touching(problem.system, leg, guard, x, duration, p)
     y = fly(problem.system, leg, x, t, p).end[: problem.dimension]
     _, other, second = contact_at(problem, leg, guard.index, guard.side, y, p)

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ..local.read_only import ReadOnly
-from ..model import Array
+from ..model import Array, NonsmoothError
 from ..model.event_maps import surface_map
 from .boundary import BoundaryProblem, Evaluation
 from .branch import FarSide
@@ -52,7 +52,10 @@ def far_side(
         The other itinerary.
     """
     if kind == "grazing-sliding" and test.what == "interior" and test.guard is not None:
-        numbers = contact_numbers(problem, test, at, p)
+        try:
+            numbers = contact_numbers(problem, test, at, p)
+        except NonsmoothError:
+            return FarSide(word, "not classified: the map of a touch is known for one surface")
         return FarSide(word, _verdict(numbers), ReadOnly(numbers))
     if kind == "impact grazing" and test.what == "interior":
         values = np.linalg.eigvals(return_map(problem, at))

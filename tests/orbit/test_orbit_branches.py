@@ -301,3 +301,24 @@ def test_three_equal_thirds_of_a_forcing_period_are_no_shorter_orbit():
     system = ns.FilippovSystem([x], surface=x, above=[drive - 1], below=[drive + 1], time=t)
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.1], 125.0), period=2 * np.pi)
     assert len(orbit.legs) == 12 and abs(orbit.period - 2 * np.pi) < 1e-12
+
+
+def test_a_corner_of_two_surfaces_is_passed_and_a_touch_of_one_is_named():
+    x, v, t, k, l1, l2 = symbols("x v t k l1 l2")
+    system = ns.FilippovSystem(
+        [x, v],
+        surfaces=[x - 1, v - k],
+        multipliers=[l1, l2],
+        field=[v, -x - 0.2 * v + ca.cos(t) - 0.1 * l1 - 0.15 * l2],
+        time=t,
+        parameters={k: 3.0},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.0], 200.0))
+    branch = ns.continue_orbit(orbit, "k", bounds=(3.0, 6.5))
+    assert kinds(branch) == ["corner", "crossing-sliding", "switching-sliding", "grazing-sliding"]
+    corner, event = branch.events[0], branch.events[-1]
+    states = corner.orbit.evaluation.starts[:, :2] - [1.0, corner.parameter]
+    assert np.abs(states).max(axis=1).min() < 1e-9  # both surfaces at one time
+    assert [len(branch[corner.parameter + d].legs) for d in (-0.05, 0.05)] == [4, 4]
+    top = event.orbit.trajectory(np.linspace(*event.orbit.trajectory.t[[0, -1]], 4001))[:, 1].max()
+    assert abs(top - event.parameter) < 1e-5 and "not classified" in event.far_side.verdict

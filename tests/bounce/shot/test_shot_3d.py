@@ -129,8 +129,8 @@ MODELS = [
 def test_every_model_has_a_form_in_3d(model):
     """On a line through the ground it is the planar model, to the tolerance."""
     e = rotation(0.7)[:, 0]
-    plane = bounce.simulate(model, 0.3, -1.0, 0.1, tol=1e-10)
-    space = bounce.simulate(model, 0.3 * e, -1.0, 0.1 * e, tol=1e-10)
+    plane = bounce.simulate(model, 0.3, -1.0, 0.1, tol=1e-12)
+    space = bounce.simulate(model, 0.3 * e, -1.0, 0.1 * e, tol=1e-12)
     assert space.slip == pytest.approx(plane.slip * e, abs=1e-9)
     assert space.lift_off.xdot == pytest.approx(plane.lift_off.xdot * e, abs=1e-9)
     assert space.time == pytest.approx(plane.time, abs=1e-9)

@@ -8,6 +8,10 @@ from __future__ import annotations
 
 import sys
 
+from ..model.multiplier_series import FALL, LIMIT_FALL
+
+__all__ = ["FALL", "LIMIT_FALL"]  # and all below
+
 EPSILON = sys.float_info.epsilon
 
 #: Local errors add up over a run; a twentieth keeps the global error near the tolerance.

@@ -53,8 +53,8 @@ def linearity(
     return Linearity(
         everywhere=smooth and bool(ca.is_linear(ca.vertcat(field, layer, guards, factors), every)),
         free=smooth and bool(ca.is_linear(ca.vertcat(field, guards), x)),
-        bent_rows=_bent(field, every),
-        bent_free_rows=_bent(field, x),
+        bent_rows=_bent(field, every) if smooth else [True] * field.numel(),
+        bent_free_rows=_bent(field, x) if smooth else [True] * field.numel(),
         bent_guards=_bent(guards, x),
     )
 

@@ -303,7 +303,7 @@ def options_of(
 def _named(system: FilippovSystem, hits: Hits | None) -> NDArray[np.int8]:
     """Whether the guards of each kind have a name that is looked for."""
     names = {
-        "surface": [f"h{i}" for i in range(system.surface_count)],
+        **dict.fromkeys(("surface", "near"), system.surface_names),
         "stop": [name for name, _ in system.stops],
         "reset": [name for name, _ in system.resets],
         "impact": system.impacts,

@@ -30,17 +30,9 @@ MOST_ORDER = 48
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
-    *(
-        "programs.h",
-        "linear.h",
-        "state.c",
-        "modes.c",
-        "jets.c",
-        "stepper.c",
-        "surfaces.c",
-        "record.c",
-    ),
-    *("switching.c", "contacts.c", "driver.c", "memory.c", "entry.c"),
+    *("programs.h", "linear.h", "state.c", "modes.c", "jets.c", "sets.c", "stepper.c"),
+    *("surfaces.c", "record.c", "switching.c", "contacts.c", "approach.c", "driver.c"),
+    *("memory.c", "entry.c"),
 )
 
 

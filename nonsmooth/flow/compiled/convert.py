@@ -33,9 +33,9 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     """
     status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
-    events = _events(run)
+    events = _events(system, run)
     if status is not Status.STOPPED:
-        letters = modes[run.mode]
+        letters = system.spelled(modes[run.mode])
         events.append(Event("end", float(run.t[-1]), run.x[-1], letters, letters, str(status)))
     return Trajectory(
         system=system,
@@ -43,7 +43,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
         t=run.t,
         x=run.x,
         events=events,
-        segments=_segments(run),
+        segments=_segments(system, run),
         status=status,
         message=f"{_message(system, options, run)} {ADVICE[status]}",
         accumulation_time=limit if status is Status.ACCUMULATION else None,
@@ -51,7 +51,7 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
     )
 
 
-def _events(run: Run) -> list[Event]:
+def _events(system: FilippovSystem, run: Run) -> list[Event]:
     modes, found = run.letters, []
     for k, kind in enumerate(run.event_kinds):
         before, after = modes[run.event_before[k]], modes[run.event_after[k]]
@@ -59,6 +59,7 @@ def _events(run: Run) -> list[Event]:
         name = run.guards(before)[row].name if row >= 0 else _closed(run, before, after)
         t = float(run.event_t[k])
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
+        before, after = system.spelled(before), system.spelled(after)
         found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1]))
     return found
 
@@ -70,16 +71,16 @@ def _closed(run: Run, before: str, after: str) -> str:
     return " and ".join(g.name for g in closed if g.name not in opened)
 
 
-def _segments(run: Run) -> list[Segment]:
+def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
     """Stretches of steps in one mode; a run without a step has its one mode."""
-    t_last = float(run.t[-1])
+    t_last, shown = float(run.t[-1]), [system.spelled(letters) for letters in run.letters]
     if not len(run.modes):
-        return [Segment(run.letters[run.mode], t_last, t_last, 0, 0)]
+        return [Segment(shown[run.mode], t_last, t_last, 0, 0)]
     changes = np.flatnonzero(np.diff(run.modes)) + 1
     bounds = [0, *changes.tolist(), len(run.modes)]
     ends = [*(float(run.starts[k]) for k in changes), t_last]
     return [
-        Segment(run.letters[run.modes[a]], float(run.starts[a]), end, a, b)
+        Segment(shown[run.modes[a]], float(run.starts[a]), end, a, b)
         for a, b, end in zip(bounds[:-1], bounds[1:], ends, strict=True)
     ]
 

@@ -78,7 +78,9 @@ class _System(ctypes.Structure):
         *[(name, _POINTER) for name in (*_TABLES, "slope_output", "slope_moves")],
         *[(name, _I32) for name in ("linear", "linear_free")],
         *[(name, _POINTER) for name in ("bent", "bent_free", "bent_guards")],
-        *[(name, _I32) for name in ("affine", "pad")],
+        *[(name, _I32) for name in ("affine", "sets")],
+        *[(name, _POINTER) for name in ("set_first", "set_size", "set_of", "early", "early_free")],
+        *[(name, _I32) for name in ("early_count", "early_free_count")],
     ]
 
 
@@ -112,11 +114,16 @@ def _declared(made: ctypes.CDLL) -> ctypes.CDLL:
     return made
 
 
+def _place(system: FilippovSystem, i: int) -> int:
+    """Number of the set of a switching function, -1 for a surface."""
+    return system.sets.index(system.set_of[i]) if i in system.set_of else -1
+
+
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     """Return the interpreter with a system at the options' tolerance, or None where it has none: hidden
     dynamics, and impacts with multipliers that enter in products."""
     order = options.order
-    if system.sets or any(system.nonlinear) or order >= MOST_ORDER:
+    if any(system.nonlinear) or order >= MOST_ORDER:
         return None
     if system.impacts and not coupled_of(system).affine:
         return None
@@ -226,7 +233,14 @@ class TapeEngine:
             "bent": coupled.linearity.bent_rows,
             "bent_free": coupled.linearity.bent_free_rows,
             "bent_guards": coupled.linearity.bent_guards,
+            "set_first": [members[0] for members in system.sets],
+            "set_size": [len(members) for members in system.sets],
+            "set_of": [_place(system, i) for i in range(m)],
+            "early": tape.series.early,
+            "early_free": tape.free.early,
         }
+        made.sets = len(system.sets)
+        made.early_count, made.early_free_count = len(tape.series.early), len(tape.free.early)
         for name, values in tables.items():
             setattr(made, name, self._at(np.array([*values, 0], np.int32)))
         return made
@@ -320,11 +334,13 @@ class TapeEngine:
         letters = np.empty((count, max(width, 1)), np.int8)
         made.table_read(table, address(parent), address(mode), address(letters))
         modes = [self._spelled(row) for row in letters[:, :width].tolist()]
-        return modes, words_of(parent, mode, modes, nodes)
+        spelled = [self.system.spelled(letters) for letters in modes]
+        return modes, words_of(parent, mode, spelled, nodes)
 
     def _spelled(self, signs: list[int]) -> str:
+        """Letters of all switching functions and contacts; see ``interpreter/sets.c`` for those of sets."""
         m = self.system.surface_count
-        surfaces = ("s+-"[sign] for sign in signs[:m])
+        surfaces = ("-s+*bll"[sign + 1] for sign in signs[:m])
         return "".join([*surfaces, *("o" if sign else "c" for sign in signs[m:])])
 
     # many trajectories -------------------------------------------------------------------------

@@ -41,6 +41,7 @@ def special_sizes(system: FilippovSystem, order: int) -> str:
         "CONTACTS": len(system.impacts),
         "STOPS": len(system.stops),
         "RESETS": len(system.resets),
+        "SETS": len(system.sets),
     }
     return "#define GENERATED\n" + "".join(f"#define {k} {v}\n" for k, v in sizes.items())
 
@@ -87,6 +88,8 @@ def special_series(tape: Tape, coupled: Coupled, order: int) -> str:
 def _checked(coupled: Coupled, free: bool) -> list[bool]:
     """Which outputs of the series (field, layer, heights, factors, stops) a step is checked with."""
     found, width = coupled.linearity, coupled.count
+    if coupled.system.sets:  # their guards are made of heights and factors
+        return [True] * sum(output.numel() for output in coupled.outputs)
     heights, stops = found.bent_guards[:width], found.bent_guards[width:]
     if free:
         return [*found.bent_free_rows, *[False] * width, *heights, *[False] * width, *stops]

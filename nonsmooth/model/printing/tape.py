@@ -70,6 +70,8 @@ class Series:
     still, moving, later, late : ndarray of int32
         Rules that are known once the parameters are, those of which a first coefficient is needed, of
         which further ones are, and those of the last that unknown multipliers enter.
+    early : ndarray of int32
+        Those of ``later`` that are not in ``late``.
     outputs : ndarray of int32
     """
 
@@ -84,6 +86,7 @@ class Series:
     moving: Integers
     later: Integers
     late: Integers
+    early: Integers
     outputs: Integers
 
 
@@ -199,9 +202,12 @@ def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
     inputs = [coupled.moving, coupled.system.parameter_symbols]
     rules, rows = _rules_of(inputs, [*coupled.outputs, slopes])
-    held = {n + i for i in range(m) if coupled.scaled[i]}
+    of_sets = {n + i for i in coupled.system.set_of}
+    held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
     every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n)
-    return every, _series(rules, rows, (0, 2, 4), lambda k: k < n, lambda _: False)
+    free = (0, 1, 2, 4) if of_sets else (0, 2, 4)
+    follow = lambda k: k in of_sets
+    return every, _series(rules, rows, free, lambda k: k < n or follow(k), follow)
 
 
 def _rules_of(
@@ -264,6 +270,7 @@ def _series(
         moving=reached,
         later=_integers(sorted(needed)),
         late=_integers(sorted(j for j in needed if late[j])),
+        early=_integers(sorted(j for j in needed if not late[j])),
         outputs=_integers([j for row in rows for j in row]),
     )
 

@@ -10,13 +10,30 @@ static int change_kind(const Run *r, int before, int after) {
   return slides > 0 ? ENTRY : slides < 0 ? EXIT : CROSSING;
 }
 
+/* Whether another mode is the present one for those who look at it: close to a set or far from it is the same. */
+static int is_alike(const Run *r, const int8_t *letter) {
+  if (!sets_of(r)) return 0;
+  for (int i = 0; i < width_of(r); i++)
+    if (letter[i] != (r->letter[i] == LEFT_BEHIND ? OFF : r->letter[i]) && letter[i] != r->letter[i]) return 0;
+  return 1;
+}
+
 static void adopt(Run *r, const Continuation *c) {
+  int alike = is_alike(r, c->letter);
   memcpy(r->letter, c->letter, width_of(r));
   memcpy(r->drop, c->drop, sizeof(int32_t) * r->guards);
   memcpy(r->unknowns, c->unknowns, sizeof(double) * width_of(r));
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
-  enter_segment(r, r->mode);
+  if (alike) return;
+  int shown = r->mode;
+  if (sets_of(r) && shown == r->shown) { /* a set is passed again: another stretch, of the same letters */
+    int8_t *letter = (int8_t *)r->heights_of;
+    for (int i = 0; i < width_of(r); i++) letter[i] = r->letter[i] == LEAVING ? LEAVING_AGAIN : r->letter[i];
+    shown = mode_number(r->table, letter);
+  }
+  r->shown = shown;
+  enter_segment(r, shown);
 }
 
 /* Adopt the mode that continues; 0 where there is none or more than one. */
@@ -26,7 +43,7 @@ static int choose(Run *r, const int8_t *letter, const Known *known, int known_co
   } else {
     memcpy(r->chosen.letter, letter, width_of(r));
     memset(r->chosen.drop, 0, sizeof(int32_t) * r->guards);
-    memset(r->chosen.unknowns, 0, sizeof(double) * width_of(r));
+    keep_carried(r, letter, r->chosen.unknowns);
   }
   adopt(r, &r->chosen);
   return 1;
@@ -37,7 +54,7 @@ static int letters_of(Run *r, int8_t *letter) {
   if (!width_of(r)) return 1;
   const double *h = surface_values(r, r->x);
   int finite = finite_all(h, m_of(r) + 2 * c_of(r));
-  for (int i = 0; i < width_of(r); i++) letter[i] = i >= m_of(r) || h[i] > 0 ? 1 : -1;
+  for (int i = 0; i < width_of(r); i++) letter[i] = set_of(r, i) >= 0 ? OFF : i >= m_of(r) || h[i] > 0 ? 1 : -1;
   return finite;
 }
 
@@ -149,6 +166,7 @@ static void begin(Run *r, const int8_t *start_mode) {
   lay_out(r, r->letter, &r->now);
   r->mode = r->now.mode;
   if (!finite) { finish(r, NOT_FINITE, SURFACE, 0); return; }
+  if (sets_of(r) && (start_mode || without_friction(r))) { finish(r, HAND_OVER, NO_REASON, 0); return; }
   active_surfaces(r, -1, r->letter);
   if (r->status == RUNNING) {
     int surfaces = 0;
@@ -161,6 +179,7 @@ static void begin(Run *r, const int8_t *start_mode) {
       choose(r, r->start, 0, 0);
     }
   }
+  r->shown = r->mode;
   enter_segment(r, r->mode);
   strike_due(r);
   arm(r, -1);
@@ -289,19 +308,25 @@ static void serve(Run *r, int row) {
   } else if (kind == RESET_GUARD) reset(r, row);
   else if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
+  else if (kind == NEAR_GUARD) near_set(r, row);
   else {
     Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
+    if (kind == SLIP_GUARD) {
+      known[0] = (Known){SLIP_GUARD, index, 0, 1};
+      known[1] = (Known){NEAR_GUARD, index, 0, 2};
+    }
     active_surfaces(r, index, r->letter);
     if (r->status != RUNNING) return;
     int kept = 0; /* contacts among them keep their gaps */
     for (int i = 0; i < r->active_count; i++) r->involved[kept++] = r->active[i];
     project(r, r->involved, kept);
     renote(r);
-    if (kind != SURFACE_GUARD) watch_two_fold(r);
+    if (kind == SLIP_GUARD) {}
+    else if (kind != SURFACE_GUARD) watch_two_fold(r);
     else if (!is_on(r, index)) finish(r, NON_UNIQUE, MULTIPLE_ZERO, index);
     if (r->status != RUNNING) return;
     memcpy(r->start, r->letter, width_of(r));
-    if (choose(r, r->start, known, kind == EXIT_GUARD ? 2 : 0) && r->mode != before)
+    if (choose(r, r->start, known, kind == EXIT_GUARD || kind == SLIP_GUARD ? 2 : 0) && r->mode != before)
       event(r, change_kind(r, before, r->mode), before, row, r->x);
   }
 }
@@ -315,7 +340,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
   if (r->o.dense) {
     int64_t k = r->out.steps++;
     r->out.start[k] = r->t;
-    r->out.step_mode[k] = r->mode;
+    r->out.step_mode[k] = shown_mode(r);
     memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
   }
   if (r->times) sample_step(r, e, dt);
@@ -326,12 +351,13 @@ static int advance(Run *r, const Expansion *e, double dt) {
   if (timed_of(r)) r->x[n - 1] = r->t;
   kept = kept_by(r, r->letter, r->involved);
   project(r, r->involved, kept);
-  if (e->l.slides) {
+  if (e->l.slides || sets_of(r)) {
     double *ahead = r->lam;
     for (int i = 0; i < width_of(r); i++) ahead[i] = value_at(e->series + (int64_t)i * stride, order_of(r), dt);
     memcpy(r->unknowns, ahead, sizeof(double) * width_of(r));
     improve(r, &r->now, r->x, r->unknowns, 2);
   }
+  if (sets_of(r)) after_step(r);
   memset(r->drop, 0, sizeof(int32_t) * r->guards);
   note(r);
   return 1;

@@ -54,6 +54,8 @@ ALWAYS_INLINE void guard_rows(Run *r, const Layout *l, const double *series, int
       double turn = 1;
       for (int k = 0; k < count; k++) if (factor[k] != 0) { turn = ns_sign(factor[k]); break; }
       UNROLLED for (int k = 0; k < count; k++) g[k] = turn * (factor[k] - side * lam[k]);
+    } else if (kind == NEAR_GUARD || kind == SLIP_GUARD) {
+      set_row(r, l, row, series, count, g);
     } else if (kind == BRANCH_GUARD) {
       branch_rows(r, l, count, g);
       break;
@@ -139,14 +141,16 @@ static void first_values(Run *r, int is_free);
 static void jets(Run *r, Expansion *e) {
   int slides = e->l.slides;
   int32_t *start = r->sparse, *column = start + slides + 1, count = 0;
-  if (e->l.is_free) free_series(r, e);
+  r->expansion = e;
+  if (e->l.is_free && !sets_of(r)) free_series(r, e);
   else {
     for (int i = 0; i < slides; i++) {
       start[i] = count;
       for (int j = 0; j < slides; j++) if (e->inverse[i * slides + j] != 0) column[count++] = j;
     }
     start[slides] = count;
-    sliding_series(r, e, start);
+    if (sets_of(r)) set_series(r, e, start); else sliding_series(r, e, start);
+    if (sets_of(r)) measure_limits(r, e);
   }
   guard_rows(r, &e->l, e->series, order_of(r) + 1, e->guards);
 }
@@ -171,21 +175,27 @@ static int is_finite(const Run *r, const Expansion *e) {
 static void expand(Run *r, const int8_t *letter, const double *x, const double *unknowns, Expansion *e) {
   int w = width_of(r), stride = stride_of(r);
   lay_out(r, letter, &e->l);
+  aim(r, letter, x, unknowns);
   weigh_point(r, e, x, unknowns);
   int slides = e->l.slides;
   for (int i = 0; i < slides; i++)
     for (int j = 0; j < slides; j++)
       r->work[i * slides + j] = r->slope[e->l.sliding[i] * w + e->l.sliding[j]];
   if (slides) invert(r->work, slides, e->inverse);
-  if (!e->l.is_free) memset(e->series, 0, sizeof(double) * w * stride);
+  if (!e->l.is_free || sets_of(r)) memset(e->series, 0, sizeof(double) * w * stride);
   else for (int i = 0; i < w; i++) e->series[(int64_t)i * stride] = 0;
   for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride] = x[i];
   for (int i = 0; i < slides; i++) e->series[(int64_t)e->l.sliding[i] * stride] = unknowns[e->l.sliding[i]];
   for (int i = 0; i < n_of(r); i++)
     e->allowed[i] = i < dimension_of(r) ? SAFETY * (r->o.atol + r->o.rtol * fabs(x[i])) : 0;
-  guard_sums(r, e, e->allowed, 0, e->of_guards);
+  if (sets_of(r)) begin_sets(r, e, unknowns);
+  else guard_sums(r, e, e->allowed, 0, e->of_guards);
   e->scaled = e->steepened = 0;
   jets(r, e);
+  if (sets_of(r)) { /* |h| is known now */
+    weigh_again(r, e);
+    guard_sums(r, e, e->allowed, 0, e->of_guards);
+  }
   e->finite = is_finite(r, e);
 }
 
@@ -198,6 +208,7 @@ static int improve(Run *r, const Layout *l, const double *x, double *unknowns, i
   int w = width_of(r), slides = l->slides;
   for (int iteration = 0; slides && iteration < steps; iteration++) {
     double largest = 0, most = 0;
+    aim(r, l->letter, x, unknowns);
     yardsticks(r, x, held_of(r, l->letter), unknowns);
     double *a = r->work, *b = a + slides * slides;
     for (int i = 0; i < slides; i++) {

@@ -21,7 +21,8 @@ static size_t place_layout(Layout *l, char *base, size_t used, int width, int gu
   return used;
 }
 
-static size_t place_expansion(Expansion *e, char *base, size_t used, int n, int width, int guards, int stride) {
+static size_t place_expansion(Expansion *e, char *base, size_t used, int n, int width, int guards, int stride,
+                              int sets) {
   used = place_layout(&e->l, base, used, width, guards);
   e->states = DOUBLES(n * stride);
   e->guards = DOUBLES(guards * stride);
@@ -31,6 +32,15 @@ static size_t place_expansion(Expansion *e, char *base, size_t used, int n, int 
   e->scale = DOUBLES(guards);
   e->steep = DOUBLES(guards);
   e->inverse = DOUBLES(width * width);
+  if (sets) {
+    e->lambda = DOUBLES(width * stride);
+    e->apart = DOUBLES(width * stride);
+    e->root = DOUBLES(sets * stride);
+    e->rates = DOUBLES(sets * (stride + 1));
+    e->slopes = DOUBLES(width * width);
+    e->radius = DOUBLES(sets);
+    e->per_radius = DOUBLES(sets);
+  }
   return used;
 }
 
@@ -46,8 +56,8 @@ static size_t place_run(Run *r, char *base) {
   int n = n_of(r), w = width_of(r), c = c_of(r), all = m_of(r) + 2 * c, g = r->guards, stride = stride_of(r);
   size_t used = 0, square = (size_t)w * w, rows = (size_t)(g + w) * stride;
   used = place_layout(&r->now, base, used, w, g);
-  used = place_expansion(&r->e, base, used, n, w, g, stride);
-  used = place_expansion(&r->trial, base, used, n, w, g, stride);
+  used = place_expansion(&r->e, base, used, n, w, g, stride, s->sets);
+  used = place_expansion(&r->trial, base, used, n, w, g, stride, s->sets);
   Continuation *each[] = {&r->chosen, &r->one, &r->first, &r->rest, &r->found};
   for (int i = 0; i < 5; i++) used = place_continuation(each[i], base, used, w, g);
   r->letter = LETTERS(w);
@@ -83,5 +93,10 @@ static size_t place_run(Run *r, char *base) {
   r->small = DOUBLES(4 * w + s->stops + s->resets);
   r->pending = INTEGERS(6 * w + 2 * all);
   r->sparse = INTEGERS(square + 2 * w + 1);
+  r->direction = DOUBLES(w);
+  r->later = DOUBLES(w);
+  r->heights_of = DOUBLES(w);
+  r->aside = DOUBLES(2 * n);
+  r->moving = LETTERS(w);
   return used;
 }

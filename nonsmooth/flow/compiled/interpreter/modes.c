@@ -35,9 +35,10 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
   l->is_free = 1;
   l->mode = mode_number(r->table, letter);
   for (int i = 0; i < width_of(r); i++) {
-    l->is_free &= letter[i] != 0;
+    l->is_free &= letter[i] != 0 && letter[i] != LEAVING;
     if (letter[i] == 0 && !is_idle(r, letter, i)) l->sliding[l->slides++] = i;
     if (i >= m_of(r)) add_row(l, letter[i] ? IMPACT_GUARD : RELEASE_GUARD, i - m_of(r), letter[i]);
+    else if (set_of(r, i) >= 0) lay_out_set(r, l, i);
     else if (letter[i]) add_row(l, SURFACE_GUARD, i, letter[i]);
     else { add_row(l, EXIT_GUARD, i, 1); add_row(l, EXIT_GUARD, i, -1); }
   }
@@ -60,9 +61,12 @@ static void lay_out(const Run *r, const int8_t *letter, Layout *l) {
 
 /* Letters as the multipliers that are known: +1 and -1, 0 for what slides, open and closed contacts. */
 static const double *held_of(Run *r, const int8_t *letter) {
-  for (int i = 0; i < width_of(r); i++) r->held[i] = i < m_of(r) ? letter[i] : 0;
+  for (int i = 0; i < width_of(r); i++) r->held[i] = i >= m_of(r) ? 0 : letter[i] > 1 ? r->direction[i] : letter[i];
   return r->held;
 }
+
+/* Whether a switching function is of a set off which the mode is. */
+static int is_moving(const Run *r, int i) { return sets_of(r) && r->moving[i]; }
 
 /* The moving inputs: states, lambda and reactions, then nu. */
 static void set_inputs(Run *r, const double *x, const double *held, const double *unknowns) {
@@ -70,9 +74,9 @@ static void set_inputs(Run *r, const double *x, const double *held, const double
   memcpy(in, x, sizeof(double) * n_of(r));
   in += n_of(r);
   for (int i = 0; i < width_of(r); i++)
-    in[i] = held[i] + (i < m_of(r) && r->s->scaled[i] ? 0 : unknowns[i]);
+    in[i] = held[i] + (i < m_of(r) && (r->s->scaled[i] || is_moving(r, i)) ? 0 : unknowns[i]);
   in += width_of(r);
-  for (int i = 0; i < m_of(r); i++) if (r->s->scaled[i]) *in++ = unknowns[i];
+  for (int i = 0; i < m_of(r); i++) if (r->s->scaled[i]) *in++ = is_moving(r, i) ? 0 : unknowns[i];
 }
 
 static double out_of(const Values *t, const double *w, int k) { return w[t->output[k]]; }
@@ -157,11 +161,12 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
     else if (kind == RELEASE_GUARD) result[row] = layer[m_of(r) + index];
     else if (kind == STOP_GUARD) result[row] = stop[index];
     else if (kind == RESET_GUARD) result[row] = stop[stops_of(r) + index];
+    else if (kind == NEAR_GUARD || kind == SLIP_GUARD) result[row] = set_sum(r, e, row, height, layer, factor);
     else result[row] = worst;
   }
 }
 
-/* The values that an expansion's yardsticks are made of. */
+/* The values that an expansion's yardsticks are made of; its sets are aimed at. */
 static void weigh_point(Run *r, Expansion *e, const double *x, const double *unknowns) {
   if (e->l.is_free) {
     set_inputs(r, x, held_of(r, e->l.letter), unknowns);
@@ -177,6 +182,7 @@ static void weigh_again(Run *r, Expansion *e) {
   if (e->stamp == r->stamp) return;
   for (int i = 0; i < n_of(r); i++) x[i] = e->states[(int64_t)i * stride_of(r)];
   for (int i = 0; i < width_of(r); i++) unknowns[i] = e->series[(int64_t)i * stride_of(r)];
+  aim_again(r, e);
   weigh_point(r, e, x, unknowns);
 }
 

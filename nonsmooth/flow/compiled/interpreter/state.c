@@ -19,6 +19,7 @@
 #define width_of(r) (SURFACES + CONTACTS)
 #define stops_of(r) STOPS
 #define resets_of(r) RESETS
+#define sets_of(r) SETS
 #define order_of(r) P
 #define stride_of(r) (P + 1)
 #else
@@ -30,6 +31,7 @@
 #define width_of(r) ((r)->width)
 #define stops_of(r) ((r)->s->stops)
 #define resets_of(r) ((r)->s->resets)
+#define sets_of(r) ((r)->s->sets)
 #define order_of(r) ((r)->order)
 #define stride_of(r) ((r)->stride)
 #endif
@@ -53,12 +55,16 @@ typedef struct {
   int32_t linear, linear_free; /* whether field and guards are affine: in any mode, where nothing slides */
   const int32_t *bent, *bent_free, *bent_guards; /* field's rows in any mode, where nothing slides; surfaces and
                                                   * gaps, stops and resets: 0 if affine, nothing to be checked */
-  int32_t affine, pad; /* whether all unknowns enter linearly together */
+  int32_t affine; /* whether all unknowns enter linearly together */
+  int32_t sets; /* of codimension two and more */
+  const int32_t *set_first, *set_size, *set_of; /* by set; the set of each switching function or -1 */
+  const int32_t *early, *early_free; /* later rules of ``series`` and ``free`` that multipliers do not enter */
+  int32_t early_count, early_free_count;
 } System;
 
 /* The guards of a mode, and what slides in it. */
 typedef struct {
-  int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts */
+  int8_t *letter; /* +1, -1, 0 for each surface; +1, 0 for open and closed contacts; see sets.c */
   int32_t rows, slides, mode, branches, is_free; /* free: no letter is 0 */
   int32_t *sliding, *kind, *index, *side, *bent, bent_count; /* bent: guards that a step is checked with */
 } Layout;
@@ -68,7 +74,12 @@ typedef struct {
   int finite, scaled, steepened; /* whether scale and steep are known */
   int64_t stamp; /* of the values of the program ``point`` */
   double *states, *guards, *series, *allowed, *of_guards, *scale, *steep, *inverse;
+  /* of sets: multipliers, h in units of |h|, its root, distances when leaving, slopes then, |h| at the start */
+  double *lambda, *apart, *root, *rates, *slopes, *radius, *per_radius;
 } Expansion;
+
+/* Letters of a set: off it, its first step away from it, h carried along after that. */
+enum { OFF = 2, LEFT_BEHIND = 3, LEAVING = 4, LEAVING_AGAIN = 5 };
 
 /* A mode that can continue, and the zeros of its guards. */
 typedef struct { int8_t *letter; int32_t strict, *drop; double *unknowns; } Continuation;
@@ -114,8 +125,28 @@ typedef struct {
   double *series, *point, *heights, *maps, *restitution, *columns, *input, *held, *none, *slope, *vector, *sample;
   double *before, *at_work, *work, *gradient_row, *rates, *lam, *matrix, *small;
   int32_t *pending, *sparse, *involved;
+  /* of sets: multipliers, whether they move, room; the mode that is shown, the expansion that guards are made of */
+  double *direction, *later, *aside, *heights_of;
+  int8_t *moving;
+  int32_t shown;
+  const Expansion *expansion;
   void *arena;
 } Run;
+
+static int set_of(const Run *r, int i);
+static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns);
+static void aim_again(Run *r, const Expansion *e);
+static void lay_out_set(const Run *r, Layout *l, int i);
+static double set_sum(Run *r, const Expansion *e, int row, const double *height, const double *layer,
+                      const double *factor);
+static void set_row(Run *r, const Layout *l, int row, const double *series, int count, double *g);
+static void set_series(Run *r, Expansion *e, const int32_t *start);
+static void begin_sets(Run *r, Expansion *e, const double *unknowns);
+static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before);
+static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h);
+static int meets_sets(const Run *r);
+static void measure_limits(Run *r, Expansion *e);
+static void keep_carried(const Run *r, const int8_t *letter, double *unknowns);
 
 static void finish(Run *r, int status, int reason, int where) {
   if (r->status == RUNNING) { r->status = status; r->reason = reason; r->where = where; }

@@ -53,6 +53,7 @@ static double step_size(const Run *r, const Expansion *e) {
     last = larger(fabs(g[order]) / a, last);
     before = larger(fabs(g[order - 1]) / a, before);
   }
+  if (sets_of(r)) direction_bounds(r, e, &last, &before);
   double h = bound(last, before, order);
   for (int j = 0; j < e->l.rows; j++) {
     const double *g = e->guards + (int64_t)j * stride;
@@ -80,6 +81,8 @@ static double safe_length(const Run *r, const Expansion *e, double h) {
 /* Field (n), errors of the multipliers that slide, and guards at a state and multipliers. */
 static void sampled(Run *r, const Expansion *e, const double *x, const double *lam, double *found) {
   int n = n_of(r), w = width_of(r), stride = stride_of(r), slides = e->l.slides;
+  aim(r, e->l.letter, x, lam);
+  r->expansion = e;
   set_inputs(r, x, held_of(r, e->l.letter), lam);
   first_values(r, e->l.is_free);
   for (int i = 0; i < n; i++) *found++ = row_of(r, i)[0];
@@ -105,7 +108,7 @@ static int agrees(Run *r, const Expansion *e, double time, double dt) {
   double *found = r->sample, *noise = found + all, *moved = noise + all;
   const int32_t *bent = e->l.is_free ? r->s->bent_free : r->s->bent;
   for (int i = 0; i < n; i++) x[i] = value_at(e->states + (int64_t)i * stride, order, time);
-  for (int i = 0; i < w; i++) lam[i] = e->l.is_free ? 0 : value_at(e->series + (int64_t)i * stride, order, time);
+  for (int i = 0; i < w; i++) lam[i] = e->l.is_free && !sets_of(r) ? 0 : value_at(e->series + (int64_t)i * stride, order, time);
   sampled(r, e, x, lam, found);
   for (int again = 0; again < 2; again++) {
     int near = 1;
@@ -186,7 +189,8 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
     if (value == 0) return -1;
     c = g + drop;
   }
-  return first_root(c, order_of(r) - drop, h);
+  double dt = first_root(c, order_of(r) - drop, h);
+  return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }
 
 /* How far rounding in a guard moves its root; nothing where it has no slope. */

@@ -19,7 +19,7 @@ static const double *surface_scales(Run *r, const double *x) {
 
 /* Least-norm Newton steps of the states (not the time) onto functions that are kept at zero: the rows are
  * made orthogonal one after the other, those that can overlap (a dependent row drops out). */
-static void project(Run *r, const int32_t *which, int count) {
+static void project_to(Run *r, const int32_t *which, int count, const double *level) {
   const Entries *g = &r->s->surface_gradient;
   int all = m_of(r) + 2 * c_of(r), nd = dimension_of(r);
   double *rows = r->gradient_row, *size = rows + (int64_t)all * n_of(r), *residual = size + all;
@@ -28,7 +28,7 @@ static void project(Run *r, const int32_t *which, int count) {
     const double *h = surface_values(r, r->x);
     int32_t *place = r->pending, *kept = place + all;
     for (int i = 0; i < all; i++) place[i] = -1;
-    for (int i = 0; i < count; i++) { place[which[i]] = i; any |= h[which[i]] != 0; }
+    for (int i = 0; i < count; i++) { place[which[i]] = i; any |= h[which[i]] != (level ? level[i] : 0); }
     if (!any) break;
     memset(rows, 0, sizeof(double) * count * n_of(r));
     for (int q = 0; q < g->count; q++)
@@ -37,7 +37,7 @@ static void project(Run *r, const int32_t *which, int count) {
     for (int i = 0; i < count; i++) {
       double *row = rows + (int64_t)i * n_of(r), full = 0;
       for (int l = 0; l < nd; l++) full += row[l] * row[l];
-      residual[i] = h[which[i]];
+      residual[i] = h[which[i]] - (level ? level[i] : 0);
       for (int j = 0; j < k; j++) {
         int other = kept[j];
         if (r->s->component[which[other]] != r->s->component[which[i]]) continue;
@@ -59,6 +59,8 @@ static void project(Run *r, const int32_t *which, int count) {
     }
   }
 }
+
+static void project(Run *r, const int32_t *which, int count) { project_to(r, which, count, 0); }
 
 /* Functions that a mode keeps at zero: surfaces, gaps and their rates. */
 static int kept_by(const Run *r, const int8_t *letter, int32_t *which) {
@@ -84,6 +86,8 @@ static const double *gaps(Run *r, const double *x) {
 
 /* Surfaces through the present state, to rounding, and contacts at rest; those that slide in a mode and the
  * ``certain`` one (or -1). The run ends where a gap is negative. */
+static int is_met(Run *r, const int8_t *letter, int set, const double *h, const double *scales_of);
+
 static void active_surfaces(Run *r, int certain, const int8_t *letter) {
   r->active_count = 0;
   if (!width_of(r)) return;
@@ -93,9 +97,17 @@ static void active_surfaces(Run *r, int certain, const int8_t *letter) {
     double gap = h[m_of(r) + j];
     if (gap < 0 && !(fabs(gap) <= ON_SURFACE * scale[m_of(r) + j])) finish(r, INCONSISTENT, BEHIND, j);
   }
+  int met = 0;
   for (int i = 0; i < width_of(r); i++) {
     int rests = fabs(h[i]) <= ON_SURFACE * scale[i];
     if (i >= m_of(r)) rests &= fabs(h[i + c_of(r)]) <= ON_SURFACE * scale[i + c_of(r)];
-    if (rests || letter[i] == 0 || i == certain) r->active[r->active_count++] = i;
+    int s = set_of(r, i), sure = i == certain;
+    if (s >= 0) {
+      int f = r->s->set_first[s];
+      if (i == f) met = letter[f] <= OFF && is_met(r, letter, s, h, scale);
+      rests = met;
+      sure = certain >= f && certain < f + r->s->set_size[s];
+    }
+    if (rests || letter[i] == 0 || sure) r->active[r->active_count++] = i;
   }
 }

@@ -4,6 +4,7 @@
 static int is_two_fold(Run *r, const int8_t *letter, int surface, double tolerance) {
   if (r->s->continuous[surface]) return 0;
   double *near = r->vector + n_of(r) + width_of(r); /* not where inputs are put together */
+  aim(r, letter, r->x, r->unknowns);
   for (int i = 0; i < n_of(r); i++) near[i] = r->size + fabs(r->x[i]);
   for (int side = 1; side >= -1; side -= 2) {
     held_of(r, letter);
@@ -24,6 +25,7 @@ static int rates(Run *r, const int8_t *letter) {
   int k = r->active_count, w = width_of(r);
   double *a = r->matrix, *m = a + k, *scale = m + (int64_t)k * k, *near = r->vector + n_of(r) + w;
   if (!r->s->affine) return 0;
+  aim(r, letter, r->x, r->unknowns);
   held_of(r, letter);
   for (int i = 0; i < k; i++) {
     int own = r->active[i];
@@ -137,12 +139,12 @@ static int is_stable(Run *r, const Layout *l) {
 static int continuation(Run *r, const int8_t *letter, const Known *known, int known_count, Continuation *result) {
   Expansion *e = &r->trial;
   lay_out(r, letter, &e->l);
-  memset(result->unknowns, 0, sizeof(double) * width_of(r));
+  if (!meets_sets(r)) keep_carried(r, letter, result->unknowns); /* else they are given */
   if (e->l.slides) {
     if (!is_known(r, &e->l)) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
     if (!improve(r, &e->l, r->x, result->unknowns, 1)) return 0;
     yardsticks(r, r->x, held_of(r, letter), result->unknowns);
-    int stable = is_stable(r, &e->l);
+    int stable = meets_sets(r) ? 1 : is_stable(r, &e->l); /* M of sets is definite where they are decided */
     if (stable < 0) { finish(r, HAND_OVER, NO_REASON, 0); return 0; }
     if (!stable) return 0;
   }
@@ -154,12 +156,13 @@ static int continuation(Run *r, const int8_t *letter, const Known *known, int kn
   for (int row = 0; row < e->l.rows; row++) {
     int kind = e->l.kind[row], index = e->l.index[row], of = index, active = 0, zeros = 0;
     if (kind == STOP_GUARD || kind == RESET_GUARD) continue;
+    if (kind == NEAR_GUARD && letter[index] == 0) continue; /* ends steps only */
     if (kind == IMPACT_GUARD || kind == RELEASE_GUARD) of += m_of(r);
     for (int i = 0; i < r->active_count; i++) active |= r->active[i] == of;
     if (!active) continue;
     for (int i = 0; i < known_count; i++)
       if (known[i].kind == kind && known[i].index == index && known[i].side == e->l.side[row]) zeros = known[i].zeros;
-    if (kind == SURFACE_GUARD && zeros < 1) zeros = 1;
+    if ((kind == SURFACE_GUARD || kind == NEAR_GUARD) && zeros < 1) zeros = 1;
     if (kind == IMPACT_GUARD && zeros < 2) zeros = 2;
     double value;
     int k = leading(r, e, row, zeros, &value);
@@ -191,11 +194,14 @@ static int no_motion(Run *r, int contacts) {
   return 0;
 }
 
+static int decide_sets(Run *r, const int8_t *letter, const Known *known, int known_count);
+
 /* Choose, as r->chosen, the motion that continues from a point of the active surfaces; 0 if the run ends.
  * ``letter`` has those of the other surfaces. */
 static int decide(Run *r, const int8_t *letter, const Known *known, int known_count) {
   int k = r->active_count, contacts = 0, strict = 0, found = 0, resting = 0, total = 1;
   int8_t *possible = (int8_t *)r->lam + sizeof(double) * width_of(r), *trial = possible + width_of(r);
+  if (meets_sets(r)) return decide_sets(r, letter, known, known_count);
   for (int i = 0; i < k; i++) contacts |= r->active[i] >= m_of(r);
   if (k == 1 && !contacts && is_two_fold(r, letter, r->active[0], 0)) {
     finish(r, NON_UNIQUE, TWO_FOLD, r->active[0]);

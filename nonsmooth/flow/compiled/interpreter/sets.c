@@ -1,0 +1,329 @@
+/* Sets of codimension two and more: nonsmooth/model/{multiplier_series,frozen}.py,
+ * nonsmooth/flow/reference/{sets,laws_of_sets}.py. Their switching functions stand side by side; each has the
+ * letter of its set: 0 on it, OFF, and for what comes after leaving it LEFT_BEHIND (h is carried along) and
+ * LEAVING (its first step). */
+
+static double length_of(const double *h, int k) {
+  double most = 0, sum = 0;
+  for (int i = 0; i < k; i++) most = larger(fabs(h[i]), most);
+  for (int i = 0; i < k; i++) sum += (h[i] / most) * (h[i] / most);
+  return most * sqrt(sum);
+}
+
+static double unit_of(const double *h, int k, double *u) {
+  double r = length_of(h, k);
+  for (int i = 0; i < k; i++) u[i] = h[i] / r;
+  return r;
+}
+
+static int first_of(const Run *r, int set) { return r->s->set_first[set]; }
+static int size_of(const Run *r, int set) { return r->s->set_size[set]; }
+static int set_of(const Run *r, int i) { return sets_of(r) && i < m_of(r) ? r->s->set_of[i] : -1; }
+
+/* Multipliers of the sets at a state; ``unknowns`` are h of those left behind, and directions of those that are
+ * being left. */
+static void aim(Run *r, const int8_t *letter, const double *x, const double *unknowns) {
+  const double *h = 0;
+  for (int s = 0; s < sets_of(r); s++) {
+    int f = first_of(r, s), k = size_of(r, s);
+    double *u = r->direction + f;
+    for (int i = f; i < f + k; i++) r->moving[i] = letter[f] > 1;
+    if (letter[f] < OFF) { for (int i = 0; i < k; i++) u[i] = 0; continue; }
+    if (letter[f] != OFF) { unit_of(unknowns + f, k, u); continue; }
+    if (!h) {
+      run_surfaces(&r->s->surfaces, x, r->p, r->heights);
+      h = r->heights_of;
+      for (int i = 0; i < m_of(r); i++) r->heights_of[i] = out_of(&r->s->surfaces, r->heights, i);
+    }
+    unit_of(h + f, k, u);
+  }
+}
+
+/* As the expansion began. */
+static void aim_again(Run *r, const Expansion *e) {
+  for (int i = 0; sets_of(r) && i < m_of(r); i++) {
+    r->moving[i] = e->l.letter[i] > 1;
+    r->direction[i] = set_of(r, i) < 0 ? 0 : e->lambda[(int64_t)i * stride_of(r)];
+  }
+}
+
+/* Series ------------------------------------------------------------------------------------------- */
+
+/* Coefficient k of h/|h| from that of h, both in units of |h| at the start. */
+static void push_direction(Run *r, Expansion *e, int set, int k, const double *h, int apart) {
+  int f = first_of(r, set), size = size_of(r, set), stride = stride_of(r);
+  double *root = e->root + (int64_t)set * stride, square = 0, curved = 0;
+  if (k == 0) {
+    double first[3];
+    for (int i = 0; i < size; i++) first[i] = h[(int64_t)i * apart];
+    e->radius[set] = length_of(first, size);
+    e->per_radius[set] = 1 / e->radius[set];
+  }
+  for (int i = 0; i < size; i++) {
+    double *own = e->apart + (int64_t)(f + i) * stride;
+    own[k] = h[(int64_t)i * apart] * e->per_radius[set];
+    square += own[0] * own[k];
+    if (k > 1) curved += convolve(own, own, k, 1, k - 1);
+  }
+  /* Along a line curved is that of the root, exactly so along an axis. */
+  root[k] = k > 1 ? square + 0.5 * (curved - convolve(root, root, k, 1, k - 1)) : k ? square : 1;
+  for (int i = 0; i < size; i++) {
+    double *u = e->lambda + (int64_t)(f + i) * stride;
+    u[k] = e->apart[(int64_t)(f + i) * stride + k] - convolve(u, root, k, 0, k - 1);
+  }
+}
+
+/* Coefficients k of the sets off which the mode is. */
+static void follow_sets(Run *r, Expansion *e, int k) {
+  int stride = stride_of(r);
+  for (int s = 0; s < sets_of(r); s++) {
+    int f = first_of(r, s), size = size_of(r, s), letter = e->l.letter[f];
+    if (letter == LEFT_BEHIND) push_direction(r, e, s, k, e->series + (int64_t)f * stride + k, stride);
+    else if (letter == OFF) {
+      double h[3];
+      for (int i = 0; i < size; i++) h[i] = row_of(r, n_of(r) + width_of(r) + f + i)[k];
+      push_direction(r, e, s, k, h, 1);
+    }
+  }
+}
+
+/* Coefficients k of directions in which sets are left and k + 1 of the distances, with those of what slides. */
+static void leave_sets(Run *r, Expansion *e, int k) {
+  int slides = e->l.slides, n = 0, sets = 0, stride = stride_of(r), w = width_of(r);
+  int32_t *which = r->pending;
+  for (int i = 0; i < slides; i++) which[n++] = e->l.sliding[i];
+  for (int s = 0; s < sets_of(r); s++) {
+    int f = first_of(r, s), size = size_of(r, s);
+    if (e->l.letter[f] != LEAVING) continue;
+    double *radius = e->rates + (int64_t)s * (stride + 1);
+    if (k == 0) {
+      double rate = 0, terms = 0;
+      for (int i = 0; i < size; i++) {
+        double u = e->lambda[(int64_t)(f + i) * stride], g = row_of(r, n_of(r) + f + i)[0], sum = fabs(g);
+        for (int j = f; j < f + size; j++) sum += fabs(e->slopes[(f + i) * w + j]);
+        rate += u * g;
+        terms += fabs(u) * sum;
+      }
+      radius[0] = 0;
+      radius[1] = fabs(rate) > VANISHES * terms ? rate : 0;
+      e->radius[s] = 0;
+      continue;
+    }
+    for (int i = f; i < f + size; i++) which[n++] = i;
+    sets++;
+  }
+  if (k == 0) return;
+  int all = n + sets, at = slides, column = n;
+  double *a = r->work, *b = a + (int64_t)all * all;
+  memset(a, 0, sizeof(double) * all * all);
+  for (int i = 0; i < n; i++) {
+    b[i] = -row_of(r, n_of(r) + which[i])[k];
+    for (int j = 0; j < n; j++) a[i * all + j] = e->slopes[which[i] * w + which[j]];
+  }
+  for (int s = 0; s < sets_of(r); s++) {
+    int f = first_of(r, s), size = size_of(r, s);
+    if (e->l.letter[f] != LEAVING) continue;
+    const double *radius = e->rates + (int64_t)s * (stride + 1);
+    b[column] = 0;
+    for (int i = 0; i < size; i++) {
+      const double *u = e->lambda + (int64_t)(f + i) * stride;
+      double sum = 0;
+      for (int j = 1; j < k; j++) sum += u[j] * radius[k + 1 - j];
+      b[at + i] += (k + 1) * sum;
+      a[(at + i) * all + at + i] -= (k + 1) * radius[1];
+      a[(at + i) * all + column] = -(k + 1) * u[0];
+      a[column * all + at + i] = u[0];
+      b[column] -= 0.5 * (k > 1 ? convolve(u, u, k, 1, k - 1) : 0);
+    }
+    at += size;
+    column++;
+  }
+  if (!solve(a, b, all)) for (int i = 0; i < all; i++) b[i] = NAN;
+  for (int i = 0; i < slides; i++) e->series[(int64_t)which[i] * stride + k] = b[i];
+  for (int i = slides; i < n; i++) e->lambda[(int64_t)which[i] * stride + k] = b[i];
+  for (int s = 0, j = n; s < sets_of(r); s++)
+    if (e->l.letter[first_of(r, s)] == LEAVING) e->rates[(int64_t)s * (stride + 1) + k + 1] = b[j++];
+}
+
+/* Coefficients k + 1 of h that is carried along. */
+static void close_sets(Run *r, Expansion *e, int k) {
+  int stride = stride_of(r);
+  for (int s = 0; k < order_of(r) && s < sets_of(r); s++) {
+    int f = first_of(r, s), letter = e->l.letter[f];
+    if (letter != LEFT_BEHIND && letter != LEAVING) continue;
+    for (int i = f; i < f + size_of(r, s); i++) {
+      double *h = e->series + (int64_t)i * stride;
+      if (letter == LEFT_BEHIND) { h[k + 1] = row_of(r, n_of(r) + i)[k] / (k + 1); continue; }
+      const double *radius = e->rates + (int64_t)s * (stride + 1), *u = e->lambda + (int64_t)i * stride;
+      double sum = 0;
+      for (int j = 0; j <= k; j++) sum += u[j] * radius[k + 1 - j];
+      h[k + 1] = sum;
+    }
+  }
+}
+
+/* Coefficients k of states and multipliers as the inputs of the series. */
+static void inputs_of_sets(Run *r, const Expansion *e, int k) {
+  double *x = r->vector, *lam = x + n_of(r);
+  for (int i = 0; i < n_of(r); i++) x[i] = e->states[(int64_t)i * stride_of(r) + k];
+  for (int i = 0; i < width_of(r); i++) lam[i] = e->series[(int64_t)i * stride_of(r) + k];
+  const double *held = r->held;
+  if (k) {
+    for (int i = 0; i < width_of(r); i++) r->later[i] = 0;
+    for (int i = 0; i < m_of(r); i++) if (r->moving[i]) r->later[i] = e->lambda[(int64_t)i * stride_of(r) + k];
+    held = r->later;
+  }
+  set_inputs(r, x, held, lam);
+}
+
+/* Coefficients of all that a mode needs. */
+static void set_series(Run *r, Expansion *e, const int32_t *start) {
+  const Series *t = e->l.is_free ? &r->s->free : &r->s->series;
+  const int32_t *early = e->l.is_free ? r->s->early_free : r->s->early;
+  int early_count = e->l.is_free ? r->s->early_free_count : r->s->early_count;
+  int order = order_of(r), stride = stride_of(r), leaving = 0;
+  for (int s = 0; s < sets_of(r); s++) leaving |= e->l.letter[first_of(r, s)] == LEAVING;
+  memset(e->lambda, 0, sizeof(double) * width_of(r) * stride); /* the first guess of each order is zero */
+  for (int i = 0; i < m_of(r); i++) e->lambda[(int64_t)i * stride] = r->direction[i];
+  for (int k = 0; k <= order; k++) {
+    inputs_of_sets(r, e, k);
+    if (k == 0) series_rules(t, t->moving, t->moving_count, 0, stride, r->input, r->series);
+    else series_rules(t, early, early_count, k, stride, r->input, r->series);
+    follow_sets(r, e, k);
+    if (k) {
+      inputs_of_sets(r, e, k);
+      series_rules(t, t->late, t->late_count, k, stride, r->input, r->series);
+    }
+    if (leaving) leave_sets(r, e, k);
+    else if (k && e->l.slides) follow_layer(r, e, k, start);
+    if (k && (leaving || e->l.slides)) {
+      inputs_of_sets(r, e, k);
+      series_rules(t, t->late, t->late_count, k, stride, r->input, r->series);
+    }
+    close_sets(r, e, k);
+    if (k < order)
+      for (int i = 0; i < n_of(r); i++) e->states[(int64_t)i * stride + k + 1] = row_of(r, i)[k] * (1.0 / (k + 1));
+  }
+}
+
+/* What the expansion of a mode begins with, besides the states: h that is carried, derivatives of the rates by
+ * the multipliers. */
+static void begin_sets(Run *r, Expansion *e, const double *unknowns) {
+  int w = width_of(r), leaving = 0;
+  for (int i = 0; i < m_of(r); i++) {
+    if (e->l.letter[i] == LEFT_BEHIND) e->series[(int64_t)i * stride_of(r)] = unknowns[i];
+    leaving |= e->l.letter[i] == LEAVING;
+  }
+  if (!leaving) return;
+  for (int i = 0; i < w; i++)
+    for (int j = 0; j < w; j++)
+      e->slopes[i * w + j] = r->slope[i * w + j] * (j < m_of(r) && e->l.letter[j] == LEAVING ? factor_of(r, j) : 1);
+}
+
+/* Guards: NEAR, how far |h| (or on a set friction's limit) has fallen; SLIP, how far friction can rise. */
+static void set_row(Run *r, const Layout *l, int row, const double *series, int count, double *g) {
+  int i = l->index[row], s = set_of(r, i), size = size_of(r, s), stride = stride_of(r), letter = l->letter[i];
+  const double *factor = row_of(r, n_of(r) + 2 * width_of(r) + i), *radius = r->expansion->radius;
+  if (letter == LEAVING) {
+    if (count > 1) memcpy(g, r->expansion->rates + (int64_t)s * (stride + 1), sizeof(double) * count);
+    else {
+      double h[3];
+      for (int j = 0; j < size; j++) h[j] = series[(int64_t)(i + j) * stride];
+      g[0] = length_of(h, size);
+    }
+    return;
+  }
+  double per = radius[s] > 0 ? 1 / radius[s] : 0;
+  for (int k = 0; k < count; k++) {
+    double sum = 0;
+    if (l->kind[row] == SLIP_GUARD) {
+      sum = convolve(factor, factor, k, 0, k);
+      for (int j = i; j < i + size; j++) {
+        const double *nu = series + (int64_t)j * stride;
+        sum -= convolve(nu, nu, k, 0, k);
+      }
+    } else if (letter == 0) {
+      sum = per > 0 ? convolve(factor, factor, k, 0, k) * per * per : 0;
+      if (k == 0) sum = per > 0 ? sum - LIMIT_FALL * LIMIT_FALL : 1;
+    } else {
+      for (int j = i; j < i + size; j++) {
+        const double *h = letter == OFF ? row_of(r, n_of(r) + width_of(r) + j) : series + (int64_t)j * stride;
+        if (k == 0) sum += (h[0] * per) * (h[0] * per);
+        else sum += convolve(h, h, k, 0, k) * per * per;
+      }
+      if (k == 0) sum -= FALL * FALL;
+    }
+    g[k] = sum;
+  }
+}
+
+/* Yardsticks of these guards, from those of switching functions, multipliers and factors. */
+static double set_sum(Run *r, const Expansion *e, int row, const double *height, const double *layer,
+                      const double *factor) {
+  int i = e->l.index[row], size = size_of(r, set_of(r, i)), letter = e->l.letter[i];
+  double sum = 0, radius = e->radius[set_of(r, i)];
+  for (int j = i; j < i + size; j++) sum += height[j];
+  if (letter == LEAVING) return sum;
+  if (letter != 0) return radius > 0 ? 2 * sum / radius : INFINITY;
+  double n = fabs(factor_of(r, i));
+  if (e->l.kind[row] == NEAR_GUARD) return n > 0 ? 2 * factor[i] / n : INFINITY;
+  sum = 0;
+  for (int j = i; j < i + size; j++) sum += (fabs(e->series[(int64_t)j * stride_of(r)]) + n) * layer[j];
+  return 2 * sum;
+}
+
+/* The rows of a set in a layout. */
+static void lay_out_set(const Run *r, Layout *l, int i) {
+  if (i != r->s->set_first[r->s->set_of[i]]) return;
+  l->kind[l->rows] = l->letter[i] ? NEAR_GUARD : SLIP_GUARD;
+  l->index[l->rows] = i; l->side[l->rows++] = 0;
+  if (l->letter[i] || !r->s->scaled[i]) return;
+  l->kind[l->rows] = NEAR_GUARD;
+  l->index[l->rows] = i; l->side[l->rows++] = 0;
+}
+
+/* Largest coefficients, in units of the tolerance, of what has to be known to a relative tolerance. */
+static void direction_bounds(const Run *r, const Expansion *e, double *last, double *before) {
+  int order = order_of(r), stride = stride_of(r);
+  double per = 1 / (SAFETY * r->o.rtol);
+  for (int i = 0; i < m_of(r); i++) {
+    int letter = e->l.letter[i];
+    if (letter != LEFT_BEHIND && letter != LEAVING) continue;
+    const double *u = e->lambda + (int64_t)i * stride, *h = e->apart + (int64_t)i * stride;
+    *last = larger(fabs(u[order]) * per, *last);
+    *before = larger(fabs(u[order - 1]) * per, *before);
+    if (letter == LEAVING) continue;
+    *last = larger(fabs(h[order]) * per, *last);
+    *before = larger(fabs(h[order - 1]) * per, *before);
+  }
+}
+
+/* Time at which |nu| = |n|, from that at which their squares are equal to rounding. */
+static double slip_root(const Run *r, const Expansion *e, int row, double dt, double h) {
+  int i = e->l.index[row], size = size_of(r, set_of(r, i)), order = order_of(r);
+  double root = dt;
+  for (int again = 0; again < 3; again++) {
+    double nu[3], rate[3], of_n, n = horner(row_of(r, n_of(r) + 2 * width_of(r) + i), order, root, &of_n), along = 0;
+    for (int j = 0; j < size; j++) nu[j] = horner(e->series + (int64_t)(i + j) * stride_of(r), order, root, &rate[j]);
+    double length = length_of(nu, size);
+    if (!(length > 0) || n == 0) return dt;
+    for (int j = 0; j < size; j++) along += nu[j] * rate[j];
+    double slope = ns_sign(n) * of_n - along / length;
+    if (!(slope < 0)) return dt;
+    root = smaller(larger(root - (fabs(n) - length) / slope, 0), h);
+  }
+  return fabs(root - dt) <= 1e-6 * h ? root : dt;
+}
+
+/* Friction's limit at the start of a step on a set. */
+static void measure_limits(Run *r, Expansion *e) {
+  for (int s = 0; s < sets_of(r); s++) {
+    int f = first_of(r, s);
+    if (e->l.letter[f] == 0) e->radius[s] = fabs(row_of(r, n_of(r) + 2 * width_of(r) + f)[0]);
+  }
+}
+
+/* Unknowns of a mode that are known: h of sets left behind. */
+static void keep_carried(const Run *r, const int8_t *letter, double *unknowns) {
+  for (int i = 0; i < width_of(r); i++) unknowns[i] = i < m_of(r) && letter[i] == LEFT_BEHIND ? r->unknowns[i] : 0;
+}

@@ -10,6 +10,7 @@ from typing import Any
 from ..local.read_only import ReadOnly
 from ..model import (
     Array,
+    NonsmoothError,
     PointError,
     explain,
     real,
@@ -111,6 +112,14 @@ class BranchEvent:
         return f"BranchEvent({self.kind!r}, {self.parameter:.10g}, {self.far_side})"
 
 
+def _beside(curve: Any, u: Array, wanted: float) -> list[Any]:
+    """The solution next to an event, if the itinerary beyond it holds."""
+    try:
+        return [curve.solution_at(u, wanted)]
+    except NonsmoothError:
+        return []
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class Branch:
     """Solutions as a parameter varies.
@@ -161,7 +170,10 @@ class Branch:
         for k in range(len(self) - 1):
             (curve, a), (other, b) = self.nodes[k], self.nodes[k + 1]
             va, vb = curve.value(a.u), other.value(b.u)
-            if curve is not other or not min(va, vb) <= wanted <= max(va, vb) or va == vb:
+            if not min(va, vb) <= wanted <= max(va, vb) or va == vb:
+                continue
+            if curve is not other:  # beside an event, in the itinerary that begins there
+                found += [] if wanted in (va, vb) else _beside(other, b.u, wanted)
                 continue
             if wanted == va and k and self.nodes[k - 1][0] is curve:
                 continue  # found as the end of the step before

@@ -189,25 +189,3 @@ def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str
                 "multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with "
                 "h = a - b)."
             )
-
-
-#: Operations whose value can reach the end of its domain along a smooth motion.
-_ROOTS = {"sqrt", "hypot", "asin", "acos", "acosh"}
-
-
-def has_branch_points(inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]) -> bool:
-    """Whether an expression has roots or powers other than natural ones.
-
-    A solution may reach their branch point without its series showing it: x' = -sqrt(x) is solved by
-    x = (a - t/2)^2, which is a polynomial, but no solution beyond t = 2 a.
-    """
-    nodes, _ = instructions(inputs, outputs)
-    for node in nodes:
-        if node.op in _ROOTS:
-            return True
-        if node.op in ("pow", "constpow"):
-            exponent = nodes[node.args[1]]
-            a = exponent.payload if exponent.op == "const" else None
-            if not (isinstance(a, float) and a.is_integer()):
-                return True
-    return False

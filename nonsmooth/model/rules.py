@@ -88,7 +88,7 @@ def lower(nodes: Sequence[Node], moving: Sequence[bool]) -> tuple[list[Rule], li
     """
     lowering = _Lowering()
     for node, moves in zip(nodes, moving, strict=True):
-        lowering.add(node, moves, nodes, moving)
+        lowering.add(node, moves, moving)
     return lowering.rules, lowering.place
 
 
@@ -100,7 +100,7 @@ class _Lowering:
         self.place: list[int] = []
         self._pairs: dict[tuple[str, int], int] = {}
 
-    def add(self, node: Node, moves: bool, nodes: Sequence[Node], moving: Sequence[bool]) -> None:
+    def add(self, node: Node, moves: bool, moving: Sequence[bool]) -> None:
         args = tuple(self.place[a] for a in node.args)
         if node.op == "const":
             number = self._new("constant", numbers=(cast("float", node.payload),))
@@ -109,7 +109,7 @@ class _Lowering:
         elif not moves:
             number = self._new("apply", *args, operation=node.op)
         elif node.op in ("pow", "constpow"):
-            number = self._power(args, nodes[node.args[1]], moving[node.args[1]])
+            number = self._power(args, moving[node.args[1]])
         else:
             rule = _EXPANSIONS.get(node.op)
             if rule is None:
@@ -138,26 +138,12 @@ class _Lowering:
         return self._new("quotient", u, g, operation=op, numbers=(sign,))
 
     # powers
-    def _power(self, args: tuple[int, ...], exponent: Node, moves: bool) -> int:
-        """u^v; natural powers by squaring, so that u = 0 is a regular point."""
+    def _power(self, args: tuple[int, ...], moves: bool) -> int:
+        """u^v; CasADi itself writes natural powers as products, so that u = 0 is a regular point."""
         u, v = args
         if moves:
             return self._exp(self._new("mul", v, self._log(u)))
-        a = cast("float", exponent.payload) if exponent.op == "const" else 0.5
-        if a.is_integer() and 0 < abs(a) <= 64:
-            power = self._natural_power(u, int(abs(a)))
-            return power if a > 0 else self._inv(power)
         return self._new("power", u, v)
-
-    def _natural_power(self, u: int, n: int) -> int:
-        result = -1
-        while True:
-            if n & 1:
-                result = u if result < 0 else self._new("mul", result, u)
-            n >>= 1
-            if not n:
-                return result
-            u = self._new("sq", u)
 
     def _inv(self, v: int) -> int:
         return self._new("div", self._constant(1.0), v)

@@ -67,3 +67,34 @@ def test_a_power_law_is_followed_from_its_singular_point():
     system = ns.FilippovSystem([x, y], field=[y, -x * ca.sqrt(x)])
     run = ns.follow(system, [0.0, 1.0], 10.0, mode="", until=[y], tol=1e-12)
     assert run.x[-1, 0] == pytest.approx(1.25**0.4, abs=1e-10)
+
+
+def test_sliding_along_a_corner_is_followed_with_both_multipliers():
+    """x1' = -s1 + x3/2, x2' = -s2 + x3/4, x3' = 1 + s1 s2/2: x3 = 4 tan(t/4) along the corner."""
+    q, kap = ca.SX.sym("q"), ca.SX.sym("kap")
+    system = ns.FilippovSystem(
+        [x, y, q],
+        field=[-lam + q / 2, -kap + q / 4, 1 + lam * kap / 2],
+        multipliers=[lam, kap],
+        surfaces=[x, y],
+    )
+    run = ns.follow(system, [0.0, 0.0, 0.0], 1.5, mode="ss", watch=[q - 1], tol=1e-12)
+    assert run.x[-1, 2] == pytest.approx(4 * np.tan(1.5 / 4), abs=1e-10)
+    (met,) = [e for e in run.events if e.kind == "zero" and e.name == "f0"]
+    assert met.t == pytest.approx(4 * np.arctan(0.25), abs=1e-10)
+    back = ns.follow(system, run.x[-1], 0.0, t_start=1.5, mode="ss", tol=1e-12)
+    np.testing.assert_allclose(back.x[-1], 0.0, atol=1e-10)
+
+
+def test_a_field_that_ends_or_is_nowhere_defined_ends_the_run():
+    root = ns.FilippovSystem([x, y], field=[ca.sqrt(y), -1])
+    run = ns.follow(root, [0.0, -1.0], 1.0, mode="")
+    assert run.status is ns.Status.NOT_FINITE
+    assert "(0, -1)" in run.message
+    assert ns.follow(root, [0.0, 0.0], -1.0, mode="").status is ns.Status.NOT_FINITE
+
+
+def test_a_run_has_no_more_steps_than_were_allowed():
+    run = ns.follow(PENDULUM, [1.0, 0.5], 100.0, mode="+", max_steps=3)
+    assert run.status is ns.Status.TOO_MANY_STEPS
+    assert len(run.steps) == 3

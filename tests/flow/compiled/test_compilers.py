@@ -1,6 +1,8 @@
 """A compiler that exists but fails is told once; the next one, or the reference driver, does the work."""
 
+import importlib.util
 import os
+import platform
 import shutil
 import stat
 import subprocess
@@ -10,6 +12,7 @@ import textwrap
 import pytest
 
 from nonsmooth.flow.compiled import build as build_module
+from nonsmooth.flow.compiled import compilers as compilers_module
 from nonsmooth.flow.compiled.build import CompilerError, build, find_compiler
 from nonsmooth.flow.compiled.compilers import compilers
 from nonsmooth.flow.warn import CompilerWarning, warn_once
@@ -182,3 +185,40 @@ def test_a_full_disk_is_told(monkeypatch):
     monkeypatch.setattr(build_module.files, "replace", full)
     with pytest.raises(CompilerError, match="No space left"):
         build(SOURCE)
+
+
+def test_the_wheel_of_zig_is_the_last_compiler_and_known_by_its_file(monkeypatch, tmp_path):
+    wheel = tmp_path / "ziglang" / "__init__.py"
+    wheel.parent.mkdir()
+    wheel.write_text("")
+    real = importlib.util.find_spec
+
+    def found(name, *args):
+        spec = importlib.util.spec_from_file_location("ziglang", wheel)
+        return spec if name == "ziglang" else real(name, *args)
+
+    monkeypatch.setattr(compilers_module.importlib.util, "find_spec", found)
+    compilers_module._located.cache_clear()
+    compilers_module.version.cache_clear()
+    last = compilers()[-1]
+    before = compilers_module.version(last)
+    assert last == (sys.executable, "-m", "ziglang", "cc")
+    assert str(wheel) in before
+    wheel.write_text("__version__ = '2'\n")
+    compilers_module.version.cache_clear()
+    assert compilers_module.version(last) != before
+    compilers_module._located.cache_clear()
+    compilers_module.version.cache_clear()
+
+
+def test_a_compiler_or_processor_of_which_nothing_is_known_still_has_a_name(monkeypatch):
+    assert compilers_module.version(("/nowhere/cc",)) == "/nowhere/cc"
+
+    def unreadable(self, **options):
+        raise OSError(2, "No such file")
+
+    compilers_module.processor.cache_clear()
+    monkeypatch.setattr(compilers_module.Path, "read_text", unreadable)
+    name = compilers_module.processor()
+    compilers_module.processor.cache_clear()
+    assert name.split()[0] == platform.machine()

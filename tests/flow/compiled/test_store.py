@@ -284,3 +284,104 @@ def test_a_user_without_an_entry_in_passwd(tmp_path):
     )
     assert done.returncode == 0, done.stderr
     assert not os.path.exists(done.stdout.strip())  # it went with the process
+
+
+def test_the_folder_of_a_mac_is_the_one_its_rules_name(monkeypatch, tmp_path):
+    monkeypatch.delenv("NONSMOOTH_CACHE", raising=False)
+    monkeypatch.setattr(sys, "platform", "darwin")
+    monkeypatch.setenv("HOME", str(tmp_path))
+    assert store.cache_directory() == tmp_path / "Library" / "Caches" / "nonsmooth"
+
+
+def test_a_folder_above_that_belongs_to_another_user_is_told(cache, tmp_path, monkeypatch):
+    real, foreign = os.lstat, os.lstat(tmp_path).st_ino
+
+    def lstat(path, **options):
+        facts = real(path, **options)
+        if facts.st_ino != foreign:
+            return facts
+        return os.stat_result([*facts[:4], 12345, *facts[5:]])
+
+    monkeypatch.setattr(os, "lstat", lstat)
+    with pytest.warns(CompilerWarning, match=r"above .*: it belongs to user 12345"):
+        assert build(SOURCE).answer() == 42
+
+
+@pytest.mark.parametrize(
+    ("name", "members", "primary", "private"),
+    [
+        ("ann", [], 100, True),
+        ("ann", ["ann"], 100, True),
+        ("ann", ["ann", "bob"], 100, False),
+        ("staff", [], 100, False),
+        ("ann", [], 20, False),
+        (None, [], 100, False),
+    ],
+)
+def test_a_group_is_private_if_it_is_named_after_its_only_member(
+    name, members, primary, private, cache, tmp_path, monkeypatch
+):
+    """The folder above may be written by group 100; the user is ann."""
+    import grp
+    import pwd
+
+    def group(number):
+        if name is None:
+            raise KeyError(number)
+        return grp.struct_group((name, "x", number, members))
+
+    def user(number):
+        return pwd.struct_passwd(("ann", "x", number, primary, "", "/", ""))
+
+    monkeypatch.setattr(grp, "getgrgid", group)
+    monkeypatch.setattr(pwd, "getpwuid", user)
+    above, real = tmp_path / "above", os.lstat
+    above.mkdir()
+    above.chmod(0o775)
+    inode = os.lstat(above).st_ino
+
+    def lstat(path, **options):
+        facts = real(path, **options)
+        if facts.st_ino != inode:
+            return facts
+        return os.stat_result([*facts[:5], 100, *facts[6:]])
+
+    monkeypatch.setenv("NONSMOOTH_CACHE", str(above / "cache"))
+    monkeypatch.setattr(os, "lstat", lstat)
+    if private:
+        assert store.usable_folder() == above / "cache"
+    else:
+        with pytest.warns(CompilerWarning, match="others can write it"):
+            assert store.usable_folder() != above / "cache"
+
+
+def test_a_disk_that_takes_no_file_leaves_a_folder_for_the_process(cache, monkeypatch):
+    def full(**options):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr(store.tempfile, "TemporaryFile", full)
+    with pytest.warns(CompilerWarning, match="No space left on device"):
+        assert store.usable_folder() != cache
+
+
+def test_without_any_place_for_files_the_error_says_what_to_set(cache, monkeypatch):
+    def none(**options):
+        raise OSError(30, "Read-only file system")
+
+    monkeypatch.setattr(store.tempfile, "TemporaryFile", none)
+    monkeypatch.setattr(store.tempfile, "mkdtemp", none)
+    store._own_folder.cache_clear()
+    with (
+        pytest.warns(CompilerWarning),
+        pytest.raises(store.CompilerError, match=r"Read-only file system.*Set TMPDIR"),
+    ):
+        store.usable_folder()
+
+
+def test_the_folder_of_the_process_is_removed_by_it_and_not_by_its_children(tmp_path):
+    folder = tmp_path / "own"
+    folder.mkdir()
+    store._remove(folder, os.getpid() + 1)
+    assert folder.is_dir()
+    store._remove(folder, os.getpid())
+    assert not folder.exists()

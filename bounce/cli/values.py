@@ -98,6 +98,7 @@ def quantity(kind: str) -> Callable[[str], Quantity]:
             fail(text, f"a {kind} such as 1 or {example} (units: {units})")
         return Quantity(number(found[1]), found[2], kind)
 
+    read.__name__ = kind  # what argparse calls it where the number is not finite
     return read
 
 

@@ -351,3 +351,26 @@ def test_words():
     futures = ns.funnel(SGN, [0.0], 1.0, samples=5)
     assert repr(futures) == ("Funnel(repelling sliding of h0 at t = 0, 5 members: 2 +, 2 -, 1 s)")
     assert str(futures.departures[-1]) == "slides along path 0 until t = 1"
+
+
+def test_a_planar_two_fold_is_left_by_sliding_at_the_mean_of_both_fields():
+    """L1 = x, L2 = -x: beyond s sliding repels with x' = 3/2, and can be left at any time."""
+    system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, -x])
+    futures = ns.funnel(system, [0.0, 0.0], 2.0, samples=9)
+    assert futures.longest.itinerary == "s"
+    for departure, end in zip(futures.departures, futures(2.0), strict=True):
+        begun, s = 1.5 * departure.t, 2.0 - departure.t
+        expected = {
+            "+": (begun + s, begun * s + s**2 / 2),
+            "-": (begun + 2 * s, -(begun * s + s**2)),
+            "s": (3.0, 0.0),
+        }[departure.side]
+        np.testing.assert_allclose(end, expected, atol=1e-8)
+
+
+def test_a_planar_visible_invisible_fold_has_one_future():
+    """L1 = x and L2 = x: nothing slides, and only the orbit above is there for t > 0."""
+    system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, x])
+    futures = ns.funnel(system, [0.0, 0.0], 2.0, samples=9)
+    assert [d.side for d in futures.departures] == ["+"]
+    np.testing.assert_allclose(futures(2.0)[0], [2.0, 2.0], atol=1e-9)

@@ -1,0 +1,45 @@
+"""What is typed wrongly is refused in one line that says what was expected; an interrupt has its status."""
+
+import sys
+
+import pytest
+
+from bounce.cli import main as entry
+
+SHOT = "shot --speed 28.5 --angle 37.3 --spin 2094".split()
+KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5".split()
+
+
+@pytest.mark.parametrize(
+    ("argv", "said"),
+    [
+        ([*SHOT[:-1], "inf"], "expected a spin such as 1"),
+        ([*SHOT[:-1], "1e999"], "invalid spin value: '1e999'"),
+        ([*SHOT, *KV, "--set", "mu=0.3m/s", "--stiffness", "2e4"], "unit"),
+        (["map", "--over", "speed=10:40:0"], "NAME=LOW:HIGH:COUNT"),
+        (["map", "--over", "speed=10m/s:40mph:5"], "NAME=LOW:HIGH:COUNT"),
+        (["map", "--over", "speed=a:b:5"], "NAME=LOW:HIGH:COUNT"),
+    ],
+)
+def test_one_line_says_what_was_expected(argv, said, command):
+    code, out, err = command(*argv)
+    assert (code, out) == (2, "")
+    assert said in err
+    assert "Traceback" not in err
+
+
+def test_a_table_without_a_column_is_told_with_the_columns_it_has(command, tmp_path):
+    table = tmp_path / "shots.csv"
+    table.write_text("speed,angle\n28.5,37.3\n")
+    code, _, err = command("shot", "--input", table)
+    assert code == 2
+    assert "expected columns ['spin'], received ['speed', 'angle']" in err
+
+
+def test_an_interrupt_ends_with_the_status_of_the_signal(capsys, monkeypatch):
+    def interrupted(*args, **options):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(sys.modules["bounce.cli.main"], "_joined", interrupted)
+    assert entry(SHOT) == 130
+    assert capsys.readouterr().err == "bounce: interrupted\n"

@@ -1,0 +1,89 @@
+"""A picture of what it cannot show is refused with the reason; legends and titles are as asked for."""
+
+import casadi as ca
+import pytest
+
+import nonsmooth as ns
+
+x, y, z, t, lam, kap, a = (ca.SX.sym(s) for s in ("x", "y", "z", "t", "lam", "kap", "a"))
+
+
+@pytest.mark.parametrize(
+    ("system", "received"),
+    [
+        (1, "received int"),
+        (ns.FilippovSystem([x, y], surface=x, above=[1, 1], below=[1, 1]), "2 states: x, y"),
+        (
+            ns.FilippovSystem(
+                [x, y, z], surfaces=[x, y], multipliers=[lam, kap], field=[-lam, -kap, 1]
+            ),
+            "2 surfaces",
+        ),
+        (
+            ns.FilippovSystem([x, y, z], surface=x, above=[1, 1, t], below=[1, 1, 1], time=t),
+            "explicit time",
+        ),
+        (
+            ns.FilippovSystem(
+                [x, y, z], surface=x, multipliers=lam, field=[lam**3, 1, 1], hidden=True
+            ),
+            "hidden dynamics",
+        ),
+    ],
+)
+def test_a_sliding_portrait_is_of_three_autonomous_states_and_one_surface(system, received):
+    with pytest.raises(ns.DefinitionError, match=received):
+        ns.plot.sliding_portrait(system, (-1, 1, -1, 1))
+
+
+@pytest.mark.parametrize("orbits", [-1, 1.5, True])
+def test_a_number_of_orbits_is_whole(orbits):
+    system = ns.textbook.two_fold("VV-C1").system
+    with pytest.raises(ns.OptionError, match="orbits: expected a whole number"):
+        ns.plot.sliding_portrait(system, (-1, 1, -1, 1), orbits=orbits)
+
+
+def test_a_sliding_portrait_has_the_title_and_the_legend_that_were_asked_for():
+    system = ns.textbook.two_fold("VV-C1").system
+    figure = ns.plot.sliding_portrait(system, (-1, 1, -1, 1), orbits=0, legend=False, title="mine")
+    assert figure.axes[0].get_title() == "mine"
+    assert figure.axes[0].get_legend() is None
+
+
+def test_branches_of_different_parameters_are_not_drawn_in_one_picture():
+    b = ca.SX.sym("b")
+    system = ns.FilippovSystem(
+        [x, y], surface=y, above=[a + b - x, 1 - y], below=[1, 1], parameters={a: 0.0, b: 0.0}
+    )
+    one, two = (
+        ns.continue_equilibrium(system, [0.0, 1.0], name, bounds=(-0.1, 0.1)) for name in "ab"
+    )
+    with pytest.raises(ns.OptionError, match="branches in one parameter, received a, b"):
+        ns.plot.branch([one, two])
+
+
+def test_an_equilibrium_behind_the_surface_is_drawn_as_a_virtual_one():
+    """(0, a) is on its own side for a > 0 only; the pseudo-equilibrium goes on where it ends."""
+    system = ns.FilippovSystem(
+        [x, y], surface=y, above=[-x, a - y], below=[-1 - x, 1], parameters={a: 1.0}
+    )
+    branch = ns.continue_equilibrium(system, [0.0, 1.0], "a", bounds=(-1, 2))
+    assert branch.events[0].kind.startswith("boundary equilibrium")
+    figure = ns.plot.branch(branch, legend=False, against="y")
+    drawn = {line.get_gid() for line in figure.axes[0].lines}
+    assert "stable equilibrium of +" in drawn
+    assert figure.axes[0].get_legend() is None
+    for line in figure.axes[0].lines:
+        if line.get_gid() == "stable equilibrium of +":
+            assert line.get_xdata().min() > -1e-9
+            assert abs(line.get_ydata() - line.get_xdata()).max() < 1e-9
+
+
+def test_a_plane_of_an_orbit_has_two_states():
+    mu = ca.SX.sym("mu")
+    system = ns.FilippovSystem([x, y], field=[y, -x + mu * (1 - x**2) * y], parameters={mu: 1.0})
+    orbit = ns.periodic_orbit(system, [2.0, 0.0])
+    for states in (["x"], ["x", "q"]):
+        with pytest.raises(ns.OptionError, match=r"states: expected two names among \['x', 'y'\]"):
+            ns.plot.periodic_orbit(orbit, states=states)
+    assert ns.plot.periodic_orbit(orbit, legend=False).axes[0].get_legend() is None

@@ -43,7 +43,9 @@ from .maps.dividing_surface import DividingSurface, dividing_surface
 from .maps.lift_offs import lift_off
 from .maps.outcomes import OutcomeMap, outcome_map
 from .maps.proven import ProvenMap, proven_map
-from .maps.results import BounceStatus, LiftOffs
+from .maps.results import BounceStatus, LiftOffs, LiftOffs3D
+from .maps.slip_directions import SlipMap, Vortex, find_vortices, slip_map, winding_number
+from .maps.turning import SlipTurn, slip_turn
 from .shot.certify import BounceProof, certify
 from .shot.sensitivity import Sensitivity, sensitivity
 from .shot.single import Shot, State, simulate
@@ -77,6 +79,7 @@ __all__ = [
     "LandingError",
     "LiftOffError",
     "LiftOffs",
+    "LiftOffs3D",
     "LuGre",
     "Maxwell",
     "ModelError",
@@ -87,16 +90,20 @@ __all__ = [
     "Sensitivity",
     "Shot",
     "Shot3D",
+    "SlipMap",
+    "SlipTurn",
     "State",
     "State3D",
     "Stribeck",
     "Tsuji",
     "UnknownNameError",
     "Viscous",
+    "Vortex",
     "certify",
     "critical_eta",
     "dividing_curve",
     "dividing_surface",
+    "find_vortices",
     "golf",
     "laws",
     "lift_off",
@@ -105,6 +112,9 @@ __all__ = [
     "proven_map",
     "sensitivity",
     "simulate",
+    "slip_map",
+    "slip_turn",
+    "winding_number",
 ]
 
 

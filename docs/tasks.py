@@ -131,8 +131,9 @@ TASKS = {
         "Many bounces, and what divides them",
         "Arrays of landings, maps of outcomes, and the curve that divides forward from reverse slip.",
         "bounce",
-        "lift_off LiftOffs outcome_map OutcomeMap proven_map ProvenMap dividing_curve DividingCurve "
-        "maps.Arc dividing_surface DividingSurface critical_eta",
+        "lift_off LiftOffs LiftOffs3D outcome_map OutcomeMap proven_map ProvenMap dividing_curve DividingCurve "
+        "maps.Arc dividing_surface DividingSurface critical_eta slip_map SlipMap find_vortices winding_number Vortex slip_turn "
+        "SlipTurn",
     ),
     "bounce_units": _task(
         "Metres and seconds",

@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 import nonsmooth as ns
 
 from ..contact.equations import (
+    Blueprint,
     contact_system,
     equations,
     free_system,
@@ -22,6 +23,7 @@ from ..contact.equations import (
     touch_down_function,
 )
 from ..contact.model import NO_GRAVITY, ContactModel
+from ..contact.space import Contact3D
 from ..errors import EnergyWarning, LandingError
 from ..parameters import LIMITS, numbers
 from ..shot.energy import advice, gains
@@ -35,7 +37,7 @@ from ..shot.touch_down import (
     rise,
     surfaced,
 )
-from .results import BounceStatus, LiftOffs
+from .results import BounceStatus
 
 Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
@@ -55,7 +57,7 @@ _FROM_RUN = {
 class Part(NamedTuple):
     """Rows that share their equations; ``rows`` is None where these are all."""
 
-    blueprint: ContactModel
+    blueprint: Blueprint
     rows: Bools | None
 
 
@@ -64,7 +66,7 @@ class Batch:
 
     Parameters
     ----------
-    model : ContactModel
+    model : ContactModel or Contact3D
     inputs, parameters : mapping of str to array_like
         Landings, and values that replace the model's; they broadcast against each other.
 
@@ -75,7 +77,7 @@ class Batch:
 
     def __init__(
         self,
-        model: ContactModel,
+        model: ContactModel | Contact3D,
         inputs: Mapping[str, ArrayLike],
         parameters: Mapping[str, ArrayLike] | None,
     ):
@@ -162,7 +164,7 @@ class Batch:
                 rows = np.flatnonzero(later & (longest == step))
                 self._fall(part.blueprint, rows, float(step), t_max, options)
 
-    def _rise(self, blueprint: ContactModel) -> Rise:
+    def _rise(self, blueprint: Blueprint) -> Rise:
         """What :func:`rise` says of each row, asked once for each value that this depends on."""
         names = load_inputs(blueprint)
         states = [self.given[n] if n in names else np.array(0.0) for n in self.names]
@@ -174,7 +176,7 @@ class Batch:
 
     def _fall(
         self,
-        blueprint: ContactModel,
+        blueprint: Blueprint,
         rows: Rows,
         longest: float,
         t_max: float,
@@ -204,7 +206,7 @@ class Batch:
         rows = rows[~unpressed]
         self.states[rows] = onto_zero_load(blueprint, self.states[rows].T, self._columns(rows)).T
 
-    def _velocities(self, blueprint: ContactModel, rows: Rows) -> Array:
+    def _velocities(self, blueprint: Blueprint, rows: Rows) -> Array:
         """Rates of the states of some rows without friction."""
         field = ns.call(touch_down_function(blueprint), self.states[rows].T, self._columns(rows))[2]
         return np.array(field).T
@@ -214,8 +216,10 @@ class Batch:
         values = self.parameters(rows)
         return np.array([np.broadcast_to(values[n], rows.size) for n in self.values])
 
-    def contact(self, t_max: float, work: ns.Work, options: dict[str, Any]) -> LiftOffs:
-        """Follow the contact with friction."""
+    def contact(
+        self, t_max: float, work: ns.Work, options: dict[str, Any]
+    ) -> tuple[tuple[str, ...], NDArray[np.int32]]:
+        """Follow the contact with friction; return the itineraries and each row's among them."""
         words: list[str] = []
         code = np.full(self.status.size, -1, np.int32)
         for part in self.parts:
@@ -243,18 +247,11 @@ class Batch:
         failed = self.status != BounceStatus.LIFTED_OFF
         self.states[failed], self.time[failed], code[failed] = np.nan, np.nan, -1
         itineraries, code = _sorted(words, code)
-        x, xdot, y, ydot, omega = (self.states[:, k].reshape(self.shape) for k in range(5))
-        return LiftOffs(
-            xdot=xdot,
-            ydot=ydot,
-            omega=omega,
-            x=x,
-            y=y,
-            time=self.time.reshape(self.shape),
-            status=self.status.reshape(self.shape),
-            itineraries=itineraries,
-            itinerary_code=code.reshape(self.shape),
-        )
+        return itineraries, code.reshape(self.shape)
+
+    def column(self, name: str) -> Array:
+        """Values of one state, of the shape of the landings."""
+        return self.states[:, self.names.index(name)].reshape(self.shape)
 
     def _look_at_energy(self, tol: float) -> None:
         """Warn of balls that leave faster than they came, because the surface did work on them."""
@@ -269,8 +266,10 @@ class Batch:
             p, off = self._columns(rows), self.states[rows].T
             count += int(np.sum(gains(part.blueprint, landing, off, p, tol)))
         if count:
-            said = advice(self.model, count, self.status.size)
-            warnings.warn(said, EnergyWarning, stacklevel=4)
+            model = self.model
+            surface = model.model if isinstance(model, Contact3D) else model
+            said = advice(surface, count, self.status.size)
+            warnings.warn(said, EnergyWarning, stacklevel=5)
 
 
 def _translate(status: NDArray[np.int8]) -> NDArray[np.int8]:

@@ -45,8 +45,37 @@ _ADVICE = {
 }
 
 
+class _Ended:
+    """How the bounces of an array ended: common to the plane and to 3-D."""
+
+    time: Array
+    status: NDArray[np.int8]
+    itineraries: tuple[str, ...]
+    itinerary_code: NDArray[np.int32]
+
+    @property
+    def itinerary(self) -> NDArray[np.object_]:
+        """Phases as in ``Shot.itinerary`` (...); equal ones are the same object, "" where none."""
+        return np.array([*self.itineraries, ""], dtype=object)[self.itinerary_code]
+
+    @property
+    def complete(self) -> NDArray[np.bool_]:
+        """Where the ball lifted off (...)."""
+        return self.status == BounceStatus.LIFTED_OFF
+
+    def __repr__(self) -> str:
+        counts = ", ".join(
+            f"{BounceStatus(int(s))} {k}"
+            for s, k in zip(*np.unique(self.status, return_counts=True), strict=True)
+        )
+        words = ", ".join(map(repr, self.itineraries[:8])) + (
+            ", ..." if len(self.itineraries) > 8 else ""
+        )
+        return f"{type(self).__name__}(shape {self.time.shape}; {counts}; itineraries {words})"
+
+
 @dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs:
+class LiftOffs(_Ended):
     """Lift-offs, each array of the broadcast shape ``(...)`` of the inputs.
 
     Attributes
@@ -78,22 +107,52 @@ class LiftOffs:
         """H_F = xdot + omega at lift-off (...); below zero is reverse slip."""
         return self.xdot + self.omega
 
-    @property
-    def itinerary(self) -> NDArray[np.object_]:
-        """Phases as in ``Shot.itinerary`` (...); equal ones are the same object, "" where none."""
-        return np.array([*self.itineraries, ""], dtype=object)[self.itinerary_code]
+
+@dataclass(frozen=True, eq=False, repr=False)
+class LiftOffs3D(_Ended):
+    """Lift-offs in 3-D, arrays of the broadcast shape ``(...)`` of the landings.
+
+    Attributes
+    ----------
+    xdot, omega, x : ndarray (..., 2)
+        Velocity, spin and place along the ground, forward and to the right, as in
+        :class:`State3D`; NaN where ``status`` is not LIFTED_OFF.
+    ydot, y : ndarray (...)
+        Velocity and place normal to the ground.
+    slip : ndarray (..., 2)
+        Velocity of the contact point.
+    time : ndarray (...)
+        Duration of the contact.
+    status : ndarray of int8 (...)
+        Values of :class:`BounceStatus`.
+    itineraries : tuple of str
+        Those that occur, sorted.
+    itinerary_code : ndarray of int32 (...)
+        Position in ``itineraries``; -1 where there was no lift-off.
+    """
+
+    xdot: Array
+    ydot: Array
+    omega: Array
+    x: Array
+    y: Array
+    slip: Array
+    time: Array
+    status: NDArray[np.int8]
+    itineraries: tuple[str, ...]
+    itinerary_code: NDArray[np.int32]
 
     @property
-    def complete(self) -> NDArray[np.bool_]:
-        """Where the ball lifted off (...)."""
-        return self.status == BounceStatus.LIFTED_OFF
+    def slip_speed(self) -> Array:
+        """Length of the slip (...)."""
+        return np.hypot(self.slip[..., 0], self.slip[..., 1])
 
-    def __repr__(self) -> str:
-        counts = ", ".join(
-            f"{BounceStatus(int(s))} {k}"
-            for s, k in zip(*np.unique(self.status, return_counts=True), strict=True)
-        )
-        words = ", ".join(map(repr, self.itineraries[:8])) + (
-            ", ..." if len(self.itineraries) > 8 else ""
-        )
-        return f"LiftOffs(shape {self.time.shape}; {counts}; itineraries {words})"
+    @property
+    def slip_angle(self) -> Array:
+        """Direction of the slip (...), rad from forward to the right, in (-pi, pi]."""
+        return np.arctan2(self.slip[..., 1] + 0.0, self.slip[..., 0])
+
+    @property
+    def travel_angle(self) -> Array:
+        """Direction in which the ball leaves along the ground (...), as ``slip_angle``."""
+        return np.arctan2(self.xdot[..., 1] + 0.0, self.xdot[..., 0])

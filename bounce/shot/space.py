@@ -139,7 +139,7 @@ class Shot3D(Record[Contact3D, State3D]):
         -------
         State3D
         """
-        return state_3d(self(t), self.model)
+        return state_3d(self(t), self.model.drilling)
 
     def forces(self, t: ArrayLike) -> Forces:
         """Load and friction force along the bounce.
@@ -197,12 +197,12 @@ def direction(vector: Array) -> float:
     return math.atan2(vector[1] + 0.0, vector[0])  # -0.0 is no other side
 
 
-def state_3d(states: Array, model: Contact3D) -> State3D:
+def state_3d(states: Array, drilling: bool) -> State3D:
     """Return states of :meth:`Contact3D.system`, ndarray (..., n), by what they are."""
     x, xdot, y, ydot, z, zdot, slip_x, slip_z = (states[..., k] for k in range(len(STATES_3D)))
     slip, velocity = np.stack([slip_x, slip_z], axis=-1), np.stack([xdot, zdot], axis=-1)
     omega = slip - velocity
-    if model.drilling:
+    if drilling:
         omega = np.concatenate([omega, states[..., [len(STATES_3D)]]], axis=-1)
     place = np.stack([x, z], axis=-1)
     return State3D(velocity, _plain(ydot), omega, place, _plain(y), slip)
@@ -239,8 +239,8 @@ def simulate_3d(
     blueprint = model.blueprint()
     x0 = start_3d(model, velocity, down, spin, place, height)
     before, run = contact(blueprint, model.values, x0, tol, limit)
-    landing = state_3d(np.array(x0), model)
-    lift_off = state_3d(run.x[-1], model)
+    landing = state_3d(np.array(x0), model.drilling)
+    lift_off = state_3d(run.x[-1], model.drilling)
     if height == 0.0 and lift_off.ydot > -down:
         p = np.array(list(model.values.values()))[:, None]
         if gains(blueprint, np.array(x0)[:, None], run.x[-1][:, None], p, tol)[0]:

@@ -1,0 +1,320 @@
+"""Which way the slip at lift-off points, over the spins of a ball in 3-D: vortices and their index.
+
+In the plane the slip at lift-off changes its sign across a curve of landings. In 3-D it is a vector,
+which is zero at single spins only; around each it turns once, a vortex.
+"""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import nonsmooth as ns
+
+from ..contact.model import ContactModel
+from ..contact.space import Contact3D
+from ..errors import LandingError, ModelError
+from ..parameters import number, numbers
+from .lift_offs import lift_off
+from .results import LiftOffs3D
+
+Array = NDArray[np.float64]
+
+#: Turn between neighbouring points of a circle that is still one turn and not another, rad.
+_FINE = math.pi / 2
+#: How often the points of a circle are doubled, and cells of spins divided.
+_DOUBLINGS, _DIVISIONS = 7, 60
+
+
+class Vortex(NamedTuple):
+    """A spin at which the slip at lift-off is zero, and around which it turns.
+
+    Attributes
+    ----------
+    omega : ndarray (2,)
+        The spin, (omega_z, -omega_x).
+    winding : int
+        How often the slip's direction turns around it, in the sense of the spins.
+    """
+
+    omega: Array
+    winding: int
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class SlipMap:
+    """Slip at lift-off over a rectangle of spins, ``omega[0]`` along the last axis.
+
+    Attributes
+    ----------
+    model : Contact3D
+        The contact.
+    xdot : ndarray (2,)
+        Velocity along the ground at touch-down.
+    ydot : float
+        Velocity into the ground.
+    omega : (ndarray (m,), ndarray (n,))
+        Spins: for ``xdot`` forward that about the lateral axis (backspin) and that about the axis of
+        travel.
+    lift_offs : LiftOffs3D
+        Arrays (n, m).
+    """
+
+    model: Contact3D
+    xdot: Array
+    ydot: float
+    omega: tuple[Array, Array]
+    lift_offs: LiftOffs3D
+
+    @property
+    def angle(self) -> Array:
+        """Direction of the slip at lift-off (n, m), rad from forward to the right."""
+        return self.lift_offs.slip_angle
+
+    @property
+    def vortices(self) -> tuple[Vortex, ...]:
+        """Cells of the map around which the direction turns, by their middles."""
+        angle = self.angle
+        ring = [angle[:-1, :-1], angle[:-1, 1:], angle[1:, 1:], angle[1:, :-1]]
+        turns = sum(wrapped(b - a) for a, b in zip(ring, [*ring[1:], ring[0]], strict=True))
+        count = np.rint(np.nan_to_num(turns / (2 * math.pi))).astype(int)
+        middles = [(values[:-1] + values[1:]) / 2 for values in self.omega]
+        return tuple(
+            Vortex(np.array([middles[0][k], middles[1][i]]), int(count[i, k]))
+            for i, k in np.argwhere(count)
+        )
+
+    def __repr__(self) -> str:
+        size = " x ".join(str(len(values)) for values in self.omega)
+        found = ", ".join(
+            f"{v.winding:+d} at [{v.omega[0]:.4g}, {v.omega[1]:.4g}]" for v in self.vortices
+        )
+        return f"SlipMap({size} spins; vortices: {found or 'none'})"
+
+
+def wrapped(angle: Array) -> Array:
+    """Return angles in [-pi, pi)."""
+    return np.asarray((angle + math.pi) % (2 * math.pi) - math.pi)
+
+
+def slip_map(
+    model: ContactModel | Contact3D,
+    xdot: ArrayLike,
+    omega: tuple[ArrayLike, ArrayLike],
+    ydot: float = -1.0,
+    **options: Any,
+) -> SlipMap:
+    """Map the direction of the slip at lift-off over the two components of the spin.
+
+    Parameters
+    ----------
+    model : ContactModel or Contact3D
+        The contact model.
+    xdot : array_like (2,)
+        Velocity along the ground at touch-down.
+    omega : (array_like (m,), array_like (n,))
+        Values of the spin's two components, the first horizontal in a picture.
+    ydot : float, optional
+        Velocity into the ground.
+    **options
+        As :func:`lift_off` takes: ``tol``, ``work``, ...
+
+    Returns
+    -------
+    SlipMap
+
+    Raises
+    ------
+    LandingError, ModelError, nonsmooth.OptionError
+
+    Examples
+    --------
+    >>> import numpy as np, bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    >>> spins = np.linspace(0.3, 0.8, 3), np.linspace(-0.25, 0.2, 2)
+    >>> bounce.slip_map(turf, [0.2, 0.0], spins, tol=1e-6)
+    SlipMap(3 x 2 spins; vortices: +1 at [0.675, -0.025])
+    """
+    surface = _in_3d(model)
+    v = _pair("xdot", xdot)
+    axes = [numbers(values, "omega", LandingError) for values in omega]
+    if len(axes) != 2 or any(a.ndim != 1 or a.size == 0 for a in axes):
+        raise ns.OptionError(
+            f"omega: expected two lists of spins, received shapes {[a.shape for a in axes]}."
+        )
+    spins = np.stack(np.meshgrid(*axes), axis=-1)
+    off = lift_off(surface, v, ydot, spins, **options)
+    return SlipMap(surface, v, float(ydot), (axes[0], axes[1]), off)
+
+
+def winding_number(
+    model: ContactModel | Contact3D,
+    xdot: ArrayLike,
+    centre: ArrayLike,
+    radius: float,
+    ydot: float = -1.0,
+    *,
+    points: int = 8,
+    **options: Any,
+) -> int:
+    """Return how often the slip at lift-off turns as the spin goes round a circle once.
+
+    It is the sum of the indices of the vortices inside. The circle's points are doubled until no two
+    neighbours differ by more than a quarter of a turn.
+
+    Parameters
+    ----------
+    model : ContactModel or Contact3D
+        The contact model.
+    xdot : array_like (2,)
+        Velocity along the ground at touch-down.
+    centre : array_like (2,)
+        Spin in the middle of the circle.
+    radius : float
+        Of the circle.
+    ydot : float, optional
+        Velocity into the ground.
+    points : int, optional
+        At first.
+    **options
+        As :func:`lift_off` takes.
+
+    Returns
+    -------
+    int
+
+    Raises
+    ------
+    nonsmooth.ConvergenceError
+        The direction still jumps: the circle passes through a vortex, or a ball does not lift off.
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.NormalKelvinVoigt(mu=0.3, d2=0.1)
+    >>> bounce.winding_number(turf, [0.2, 0.0], centre=[4.0, 0.0], radius=1.0, tol=1e-6)
+    0
+    """
+    surface, v, middle = _in_3d(model), _pair("xdot", xdot), _pair("centre", centre)
+    size = number(radius, "radius", ns.OptionError)
+    if size <= 0.0 or points < 3:
+        raise ns.OptionError(
+            f"radius, points: expected a positive radius and three points or more, received {radius!r}, "
+            f"{points!r}."
+        )
+    known: dict[float, float] = {}
+    for _ in range(_DOUBLINGS):
+        share = np.arange(points) / points
+        new = [q for q in share.tolist() if q not in known]
+        turn = 2 * math.pi * np.array(new)
+        spins = middle + size * np.stack([np.cos(turn), np.sin(turn)], axis=-1)
+        off = lift_off(surface, v, ydot, spins, **options)
+        known |= dict(
+            zip(new, np.where(off.slip_speed > 0, off.slip_angle, np.nan).tolist(), strict=True)
+        )
+        angles = np.array([known[q] for q in share.tolist()])
+        if np.any(np.isnan(angles)):
+            raise _jumps(f"{np.isnan(angles).sum()} bounces without a direction of {points}")
+        steps = wrapped(np.roll(angles, -1) - angles)
+        if np.all(np.abs(steps) < _FINE):
+            return round(float(steps.sum()) / (2 * math.pi))
+        points *= 2
+    raise _jumps(f"steps of {np.abs(steps).max():.3g} rad with {points // 2} points")
+
+
+def _jumps(received: str) -> ns.ConvergenceError:
+    return ns.ConvergenceError(
+        f"winding_number: expected a direction that turns continuously on the circle, received {received}. "
+        "A vortex is on the circle, or a ball on it does not lift off or rolls to its end: take another "
+        "radius."
+    )
+
+
+def find_vortices(
+    model: ContactModel | Contact3D,
+    xdot: ArrayLike,
+    ydot: float = -1.0,
+    *,
+    largest: float = 10.0,
+    cells: int = 400,
+    tol: float = 1e-13,
+) -> tuple[Array, ...]:
+    """Return the spins along the direction of travel at which a ball lifts off without slip.
+
+    They are landings in a vertical plane, where slip is one number with a sign, so they are found
+    there: between the signs of a grid of spins, by division.
+
+    Parameters
+    ----------
+    model : ContactModel or Contact3D
+        One without slopes and grain, which would leave the plane of travel.
+    xdot : array_like (2,)
+        Velocity along the ground at touch-down, not zero.
+    ydot : float, optional
+        Velocity into the ground.
+    largest : float, optional
+        Spins up to this are looked at.
+    cells : int, optional
+        Of the grid.
+    tol : float, optional
+        Of the bounces.
+
+    Returns
+    -------
+    tuple of ndarray (2,)
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    >>> (spin,) = bounce.find_vortices(turf, [0.2, 0.0])
+    >>> f"{spin[0]:.10f}", float(spin[1])
+    ('0.5505198965', 0.0)
+    """
+    surface, v = _in_3d(model), _pair("xdot", xdot)
+    speed = float(np.hypot(*v))
+    if not surface.isotropic:
+        raise ModelError(
+            f"model: expected one that is the same in all directions, received {surface!r}. Its vortices "
+            "are no planar bounces: look for them in a slip_map."
+        )
+    if speed == 0.0:
+        raise LandingError(
+            "xdot: expected a direction of travel, received a ball that falls straight."
+        )
+    most = number(largest, "largest", ns.OptionError)
+
+    def slip(spin: Array) -> Array:
+        return lift_off(surface.model, speed, ydot, spin, tol=tol).slip
+
+    grid = np.linspace(-most, most, cells + 1)
+    values = slip(grid)
+    at = np.flatnonzero(values[:-1] * values[1:] < 0)
+    low, high, sign = grid[at], grid[at + 1], np.sign(values[at])
+    for _ in range(_DIVISIONS):
+        middle = (low + high) / 2
+        below = np.sign(slip(middle)) == sign if middle.size else np.zeros(0, bool)
+        low, high = np.where(below, middle, low), np.where(below, high, middle)
+    found = np.sort(np.append((low + high) / 2, grid[values == 0.0]))
+    return tuple(spin * v / speed for spin in found)
+
+
+def _in_3d(model: ContactModel | Contact3D) -> Contact3D:
+    if isinstance(model, Contact3D):
+        return model
+    if not isinstance(model, ContactModel):
+        raise ModelError(f"model: expected a ContactModel, received {model!r}.")
+    return model.in_3d()
+
+
+def _pair(name: str, value: ArrayLike) -> Array:
+    array = numbers(value, name, LandingError)
+    if array.shape != (2,) or not np.all(np.isfinite(array)):
+        raise LandingError(
+            f"{name}: expected two finite numbers, forward and to the right, received {value!r}."
+        )
+    return array

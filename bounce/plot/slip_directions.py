@@ -1,0 +1,169 @@
+"""Pictures of slip directions in 3-D (matplotlib; reached as ``bounce.plot.slip_map``)."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+import nonsmooth as ns
+
+from ..maps.slip_directions import SlipMap
+
+style = ns.plot.style
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.colors import ListedColormap
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+#: Lightness forward and reverse, and how yellow the right and how blue the left (CIE L*, b*).
+_LIGHTNESS, _SWING, _YELLOW = 58.0, 30.0, 48.0
+#: From XYZ (D65) to linear sRGB, and the white point.
+_TO_RGB = np.array(
+    [
+        [3.2404542, -1.5371385, -0.4985314],
+        [-0.9692660, 1.8760108, 0.0415560],
+        [0.0556434, -0.2040259, 1.0572252],
+    ]
+)
+_WHITE = np.array([0.95047, 1.0, 1.08883])
+_COLOURS = 360
+_ARROWS = 13
+
+
+def direction_colours(angle: ArrayLike) -> Array:
+    """Return colours of directions that colour-blind readers tell apart too.
+
+    Forward is light, reverse dark, the right yellow, the left blue: a circle in lightness and in the
+    one pair of hues that all but the rarest of colour-blind eyes see.
+
+    Parameters
+    ----------
+    angle : array_like (...)
+        rad from forward to the right.
+
+    Returns
+    -------
+    ndarray (..., 3)
+        Red, green and blue, from 0 to 1.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import bounce
+    >>> light, dark = bounce.plot.direction_colours([0.0, np.pi]).mean(axis=-1)
+    >>> bool(light > 0.8), bool(dark < 0.35)
+    (True, True)
+    """
+    turned = np.asarray(angle, dtype=float)
+    lightness = _LIGHTNESS + _SWING * np.cos(turned)
+    f_y = (lightness + 16) / 116
+    f = np.stack([f_y, f_y, f_y - _YELLOW * np.sin(turned) / 200], axis=-1)
+    xyz = _WHITE * np.where(f > 6 / 29, f**3, 3 * (6 / 29) ** 2 * (f - 4 / 29))
+    linear = np.clip(xyz @ _TO_RGB.T, 0.0, 1.0)
+    return np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
+
+
+def _palette() -> ListedColormap:
+    from matplotlib.colors import ListedColormap
+
+    return ListedColormap(direction_colours(np.linspace(-math.pi, math.pi, _COLOURS)))
+
+
+def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
+    """Draw the direction of the slip at lift-off over the spins, with a colour wheel.
+
+    Light is forward, dark reverse, yellow to the right, blue to the left; arrows say the same (up is
+    forward). White dots are vortices, where the ball lifts off without slip.
+
+    Parameters
+    ----------
+    directions : SlipMap
+        The map, from :func:`bounce.slip_map`.
+    ax : matplotlib Axes, optional
+        Draw here instead of in a new figure.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+
+    Examples
+    --------
+    >>> import numpy as np, bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    >>> spins = np.linspace(0.3, 0.8, 3), np.linspace(-0.25, 0.2, 2)
+    >>> figure = bounce.plot.slip_map(bounce.slip_map(turf, [0.2, 0.0], spins, tol=1e-6))
+    >>> [key.get_text() for key in figure.axes[0].child_axes[0].get_xticklabels()]
+    ['forward', 'right', 'reverse', 'left']
+    """
+    with style.settings():
+        figure, ax = style.axes_for(ax, (7.2, 5.6))
+        lateral, axial = directions.omega
+        angle = np.where(directions.lift_offs.complete, directions.angle, np.nan)
+        ax.pcolormesh(
+            lateral, axial, angle, cmap=_palette(), vmin=-math.pi, vmax=math.pi,
+            shading="nearest", rasterized=True,
+        )  # fmt: skip
+        _arrows(ax, directions, angle)
+        for vortex in directions.vortices:
+            ax.plot(
+                *vortex.omega, "o", color="white", markeredgecolor="black", markersize=8, zorder=6
+            )
+            style.write(
+                ax, tuple(vortex.omega), f"  {vortex.winding:+d}", ha="left", va="bottom", zorder=7
+            )
+        ax.set_xlabel(r"lateral spin, $\omega_z$ (backspin)")
+        ax.set_ylabel(r"axial spin, $-\omega_x$ (slips to the right)")
+        v = directions.xdot
+        ax.set_title(
+            f"slip at lift-off: xdot = ({v[0]:g}, {v[1]:g}), ydot = {directions.ydot:g}",
+            fontsize=9, loc="left", color="0.3",
+        )  # fmt: skip
+        _wheel(ax)
+    return figure
+
+
+def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
+    lateral, axial = directions.omega
+    rows = np.unique(np.linspace(0, axial.size - 1, min(_ARROWS, axial.size)).round().astype(int))
+    columns = np.unique(
+        np.linspace(0, lateral.size - 1, min(_ARROWS, lateral.size)).round().astype(int)
+    )
+    shown = angle[np.ix_(rows, columns)]
+    # Up is forward: the second component of an arrow is that along the direction of travel.
+    ax.quiver(
+        lateral[columns], axial[rows], np.sin(shown), np.cos(shown), color="black", edgecolor="white",
+        linewidth=0.5, width=0.0045, scale=26, headwidth=4, headlength=4.5, headaxislength=4,
+        pivot="middle", angles="uv", zorder=4,
+    )  # fmt: skip
+
+
+def _wheel(ax: Axes) -> None:
+    """The key: a ring of colours beside the picture, forward at its top."""
+    ring: Any = ax.inset_axes((1.09, 0.66, 0.22, 0.28), projection="polar")
+    ring.set_theta_zero_location("N")
+    ring.set_theta_direction(-1)
+    edges = np.linspace(-math.pi, math.pi, 181)
+    middles = (edges[:-1] + edges[1:]) / 2
+    ring.pcolormesh(
+        edges,
+        [0.55, 1.0],
+        middles[None, :],
+        cmap=_palette(),
+        vmin=-math.pi,
+        vmax=math.pi,
+        rasterized=True,
+    )
+    ring.set_ylim(0.0, 1.0)
+    ring.set_yticks([])
+    ring.grid(False)
+    ring.spines["polar"].set_visible(False)
+    ring.set_xticks(
+        [0.0, math.pi / 2, math.pi, 3 * math.pi / 2], labels=["forward", "right", "reverse", "left"]
+    )
+    ring.tick_params(pad=0, labelsize=7.5)

@@ -284,3 +284,16 @@ def test_a_slip_next_to_rounding_is_none(v, w, itinerary):
     p = {"mu": 1.4326846432846805, "d1": 0.23, "d2": 0.26, "eta": 0.0868, "G": 1e-3, "k": 0.6}
     run = _ball(v, w, tol=1e-14, p=p)
     assert run.status == ns.Status.STOPPED and run.itinerary == itinerary
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_slip_that_falls_to_rounding_slowly_ends(engine):
+    # Its last steps each end far from a tenth of it.
+    p = {"mu": 1.4457164102791997, "d1": 0.30549677017535637, "d2": 0.03326735320558579}
+    p |= {"eta": 1.0900828299229095, "G": 0.016207736400060048, "k": 0.6}
+    v, w = (2.69033200272562, -1.4892391709366652), (2.7720083301603515, 3.5211825978719737)
+    start = [0.0, 0.0, *v, *w, 0.0, -1.0]
+    run = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-14, engine=engine)
+    fine = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-12, engine=engine)
+    assert run.status == ns.Status.STOPPED and run.itinerary == "* s *"
+    assert np.abs(run.x[-1] - fine.x[-1]).max() < 1e-12

@@ -100,7 +100,8 @@ class Driver(Bookkeeping):
                 self.x[self.system.dimension] = self.t
         if plan.hits:
             self._serve(plan.hits[0].guard)
-        elif not plan.last and "s" in self.mode:
+        elif not plan.last:
+            sets.look(self)
             self._watch_two_fold()
 
     def expand(self) -> Expansion:
@@ -154,10 +155,7 @@ class Driver(Bookkeeping):
             return
         surface = self.mode.index("s")
         if is_two_fold(self.modes, self.mode, self.x, surface, self.options.rtol):
-            self.end(
-                Status.NON_UNIQUE,
-                messages.slid_to_two_fold(surface),
-            )
+            self.end(Status.NON_UNIQUE, messages.slid_to_two_fold(surface))
 
     # events ------------------------------------------------------------------------------------
 

@@ -7,6 +7,7 @@ tolerance, the rest is taken in one step with a and M frozen. Else the motion go
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -37,7 +38,7 @@ def near(driver: Driver, guard: Guard) -> None:
     h = slip_of(driver, own)
     scale = scale_of(driver, own)
     law = frozen(coupled, mode, x, driver.unknowns, p, own)
-    r = float(np.linalg.norm(h))
+    r = math.hypot(*h)
     at_floor = r <= VANISHES * scale
     hits = law.attracts
     dt = law.time_left(h) if hits else law.straight(h)
@@ -71,6 +72,19 @@ def near(driver: Driver, guard: Guard) -> None:
     driver.go_on(active, {}, before, guard.name)
 
 
+def look(driver: Driver) -> None:
+    """After a step that ended with no guard: sets that are close may be reached to rounding."""
+    if not driver.system.sets:
+        return None
+    for row, guard in enumerate(driver.stepper.guards(driver.mode)):
+        members = driver.system.set_of.get(guard.index, ())
+        if guard.kind != "near" or driver.mode[guard.index] == "s" or driver.drops.get(row, 0):
+            continue
+        if math.hypot(*slip_of(driver, list(members))) <= CLOSE * scale_of(driver, list(members)):
+            return near(driver, guard)
+    return None
+
+
 def shortest(driver: Driver) -> float:
     """Time to a set below which coefficients of series are too large for numbers."""
     return float(OVERFLOW ** (-1.0 / driver.options.order))
@@ -79,7 +93,7 @@ def shortest(driver: Driver) -> float:
 def met(driver: Driver, mode: str, members: tuple[int, ...], h: Array) -> bool:
     """Whether a state is on a set, or as close as no series can begin."""
     own = list(members)
-    r, scale = float(np.linalg.norm(h[own])), scale_of(driver, own)
+    r, scale = math.hypot(*h[own]), scale_of(driver, own)
     if r <= VANISHES * scale or r > CLOSE * scale:
         return r <= VANISHES * scale
     law = frozen(driver.coupled, mode, driver.x, driver.unknowns, driver.p, own)
@@ -134,7 +148,7 @@ def after_step(driver: Driver) -> None:
             for i in own:
                 letters[i] = "b"
         elif letters[own[0]] == "b":
-            if np.linalg.norm(driver.unknowns[own]) > LEFT * scale_of(driver, own):
+            if math.hypot(*driver.unknowns[own]) > LEFT * scale_of(driver, own):
                 for i in own:
                     letters[i] = "*"
                 driver.unknowns[own] = 0.0

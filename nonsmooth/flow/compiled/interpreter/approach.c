@@ -351,3 +351,17 @@ static int without_friction(Run *r) {
   }
   return 0;
 }
+
+/* After a step that ended with no guard: sets that are close may be reached to rounding. */
+static void look_at_sets(Run *r) {
+  for (int row = 0; row < r->now.rows; row++) {
+    int f = r->now.index[row], s, k;
+    if (r->now.kind[row] != NEAR_GUARD || r->letter[f] < OFF || r->drop[row]) continue;
+    s = set_of(r, f);
+    k = size_of(r, s);
+    const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
+    double scale = 0, radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
+    for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
+    if (radius <= 1e-8 * scale) { near_set(r, row); return; }
+  }
+}

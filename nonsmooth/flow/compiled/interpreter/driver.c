@@ -404,7 +404,10 @@ static void step(Run *r) {
     if (r->o.dense) r->out.point_t[r->out.points - 1] = r->t;
   }
   if (row >= 0) serve(r, row);
-  else if (!last) watch_two_fold(r);
+  else if (!last) {
+    if (sets_of(r)) look_at_sets(r);
+    watch_two_fold(r);
+  }
 }
 
 /* The last mode counts only if it lasted for a step (or is the only one). */

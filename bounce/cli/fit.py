@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 
 from ..golf import fit
 from .choices import chosen_model, ground_arguments
@@ -37,10 +38,15 @@ def run(args: argparse.Namespace) -> int:
         bad_rows="leave out" if args.leave_out else "raise",
         progress=True,
     )
+    ends = found.profile() if found.narrow else {}
+    profile = {name: ends[name] for name in found.narrow}
     if args.json:
-        print_json({**opening(args), **found.to_dict()})
+        shown = {n: [v if math.isfinite(v) else None for v in pair] for n, pair in profile.items()}
+        print_json({**opening(args), **found.to_dict(), "profile_95": shown})
     else:
         print(repr(found))
+        for name, (low, high) in profile.items():
+            print(f"  {name}: as far as the data allow, 95 % in [{low:.6g}, {high:.6g}]")
     if args.residuals:
         from ..plot import residuals
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass
-from typing import Any
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +15,9 @@ import nonsmooth as ns
 from .ground import Model
 from .measurements import Measurements
 
+if TYPE_CHECKING:
+    from .profile import Profile
+
 Array = NDArray[np.float64]
 
 #: Half a confidence interval that is this many times the value says nothing of it.
@@ -22,7 +25,7 @@ _WIDE = 3.0
 
 
 class IdentifiabilityWarning(UserWarning):
-    """The data of a fit do not determine one of its parameters."""
+    """The data of a fit do not determine a parameter, or its interval is too narrow."""
 
 
 class FitError(ns.NonsmoothError, RuntimeError):
@@ -83,6 +86,11 @@ class FitResult:
         combination of them hardly has an effect on what was measured.
     message : str
         Why the least squares stopped.
+    narrow : tuple of str
+        Parameters whose 95 % interval ends where the sum of squares has hardly risen: it is too
+        narrow, and :meth:`profile` has one that is not.
+    search : Profile
+        What :meth:`profile` asks.
     """
 
     model: Model
@@ -96,6 +104,8 @@ class FitResult:
     at_bound: tuple[str, ...]
     condition: float
     message: str
+    narrow: tuple[str, ...] = ()
+    search: Profile | None = field(default=None, compare=False)
 
     @property
     def undetermined(self) -> tuple[str, ...]:
@@ -123,16 +133,72 @@ class FitResult:
         ----------
         level : float, optional
             In (0, 1).
+
+        Returns
+        -------
+        dict of str to (float, float)
+            Lower and upper end by name.
+
+        Raises
+        ------
+        nonsmooth.OptionError
+            A level outside (0, 1).
+        """
+        width = self.width(level)
+        return {
+            n: (v - width * self.errors[n], v + width * self.errors[n])
+            for n, v in self.values.items()
+        }
+
+    def profile(self, level: float = 0.95) -> dict[str, tuple[float, float]]:
+        """Return confidence intervals from the sum of squares itself, the other parameters refitted.
+
+        They reach as far as the data allow, also where the sum of squares is no parabola: friction
+        in bounces that mostly roll, for example, has no upper end. Slower than :meth:`interval`.
+
+        Parameters
+        ----------
+        level : float, optional
+            In (0, 1).
+
+        Returns
+        -------
+        dict of str to (float, float)
+            Lower and upper end by name; a bound, or infinite, where the data give none.
+
+        Raises
+        ------
+        nonsmooth.OptionError
+            A level outside (0, 1), or a result that was not made by :func:`fit`.
+        """
+        width = self.width(level)
+        if self.search is None:
+            raise ns.OptionError("profile: expected a result of fit, received one without search.")
+        return {name: self.search.interval(k, width) for k, name in enumerate(self.values)}
+
+    def width(self, level: float) -> float:
+        """Return half an interval in standard errors, by Student's t.
+
+        Parameters
+        ----------
+        level : float
+            In (0, 1).
+
+        Returns
+        -------
+        float
+            The quantile.
+
+        Raises
+        ------
+        nonsmooth.OptionError
+            A level outside (0, 1).
         """
         from scipy.stats import t
 
         if not 0.0 < level < 1.0:
             raise ns.OptionError(f"level: expected a number in (0, 1), received {level!r}.")
-        width = float(t.ppf((1 + level) / 2, self.degrees_of_freedom))
-        return {
-            n: (v - width * self.errors[n], v + width * self.errors[n])
-            for n, v in self.values.items()
-        }
+        return float(t.ppf((1 + level) / 2, self.degrees_of_freedom))
 
     def to_dict(self) -> dict[str, Any]:
         """Return the numbers as plain Python, for JSON; None is infinite."""
@@ -146,6 +212,7 @@ class FitResult:
             left_out=[list(pair) for pair in self.measurements.left_out],
             at_bound=list(self.at_bound),
             undetermined=list(self.undetermined),
+            narrow=list(self.narrow),
             condition=_finite(self.condition),
             message=self.message,
         )
@@ -156,6 +223,8 @@ class FitResult:
             note = "  (on its bound)" if name in self.at_bound else ""
             if name in self.undetermined:
                 note += "  (not determined by these data)"
+            elif name in self.narrow:
+                note += "  (too narrow: see profile)"
             lines.append(
                 f"  {name} = {self.values[name]:.6g}  95 % in [{low:.6g}, {high:.6g}]{note}"
             )

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import warnings
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -18,6 +19,7 @@ from .fit_result import FitError, FitResult, IdentifiabilityWarning, Start
 from .ground import Model
 from .least_squares import Problem
 from .measurements import read_measurements
+from .profile import Profile
 
 Array = NDArray[np.float64]
 
@@ -88,7 +90,8 @@ def fit(
     Warns
     -----
     IdentifiabilityWarning
-        The data do not determine a parameter, see :attr:`FitResult.undetermined`.
+        The data do not determine a parameter, see :attr:`FitResult.undetermined`; or an interval is
+        too narrow, see :attr:`FitResult.narrow` and :meth:`FitResult.profile`.
 
     Examples
     --------
@@ -125,6 +128,21 @@ def fit(
         fitted = problem.named(run.x)
         tried[k] = Start(tried[k].values, tried[k].cost, "", fitted, float(2 * run.cost))
     found = problem.result(runs[winner], tuple(tried), low, high)
+    found = _profiled(found, Profile(problem, runs[winner].x, found.covariance, low, high))
+    _warn(found)
+    return found
+
+
+def _profiled(found: FitResult, search: Profile) -> FitResult:
+    """Compare the intervals with the sum of squares at their ends."""
+    narrow = search.too_narrow(found.width(0.95))
+    return replace(
+        found, narrow=tuple(n for n in narrow if n not in found.undetermined), search=search
+    )
+
+
+def _warn(found: FitResult) -> None:
+    """Say what the data do not determine, and which intervals are too narrow."""
     if found.undetermined:
         said = "; ".join(f"{n}: not determined by these data" for n in found.undetermined)
         warnings.warn(
@@ -132,9 +150,16 @@ def fit(
             f"number {found.condition:.3g}): leave it out of the fit, or measure landings that depend "
             "on it.",
             IdentifiabilityWarning,
-            stacklevel=2,
+            stacklevel=3,
         )
-    return found
+    if found.narrow:
+        warnings.warn(
+            f"{', '.join(found.narrow)}: the 95 % interval of the linearised fit is too narrow: at one "
+            "of its ends the data object less than it says. FitResult.profile() follows the sum of "
+            "squares itself, as far as the data allow.",
+            IdentifiabilityWarning,
+            stacklevel=3,
+        )
 
 
 def _bar(items: list[int], progress: bool) -> Any:

@@ -3,6 +3,7 @@
 import casadi as ca
 import numpy as np
 import pytest
+from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -41,7 +42,6 @@ def test_what_does_not_fit_is_refused():
     found = ns.manifold(PLANE, saddle, length=0.2)
     with pytest.raises(ns.OptionError, match="found: expected manifolds"):
         ns.plot.manifold([found, PLANE])
+    space = Figure().add_subplot(projection="3d")  # pyplot would keep its figure
     with pytest.raises(ns.OptionError, match="ax: expected axes of as many dimensions"):
-        import matplotlib.pyplot as plt
-
-        ns.plot.manifold(found, ax=plt.figure().add_subplot(projection="3d"))
+        ns.plot.manifold(found, ax=space)

@@ -45,3 +45,24 @@ def test_parameters_that_are_not_determined(command, tmp_path):
     assert err.startswith("bounce: caution: mu: not determined by these data")
     code, out, _ = command("fit", path, "--parameters", "mu,restitution,tilt", "--json")
     assert code == 3 and json.loads(out)["undetermined"] == ["mu"]
+
+
+def test_an_interval_that_is_too_narrow_is_shown_beside_its_profile(command, tmp_path):
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    rng = np.random.default_rng(36)
+    u = rng.uniform(-0.1, 0.1, 5)
+    w = -u + rng.uniform(-0.1, 0.1, 5)
+    off = bounce.lift_off(turf, u, -1.0, w)
+    lift_off = [getattr(off, n) + rng.normal(size=5) * 0.001 for n in ("xdot", "ydot", "omega")]
+    path = tmp_path / "gentle.csv"
+    head = "xdot,ydot,omega,lift_off_xdot,lift_off_ydot,lift_off_omega"
+    columns = np.column_stack([u, -np.ones(5), w, *lift_off])
+    np.savetxt(path, columns, fmt="%.17g", delimiter=",", header=head, comments="")
+    values = ["mu=0.4", "d1=0.1", "d2=0.1", "eta=0.5", "G=1e-4"]
+    argv = ["fit", path, "--model", "KelvinVoigt", "--parameters", "mu", "--starts", "4"]
+    argv += [word for value in values for word in ("--set", value)]
+    code, out, err = command(*argv)
+    assert code == 0 and "(too narrow: see profile)" in out and "as far as the data allow" in out
+    assert err.startswith("bounce: caution: mu: the 95 % interval")
+    low, high = json.loads(command(*argv, "--json")[1])["profile_95"]["mu"]
+    assert low <= 0.3 and (high is None or high >= 0.3)

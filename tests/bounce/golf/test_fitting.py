@@ -232,7 +232,8 @@ def test_parameters_that_only_their_product_fixes():
 def test_good_data_are_no_cause_for_a_warning():
     with warnings.catch_warnings():
         warnings.simplefilter("error")
+        guess = GUESS.replace(d2=TRUE.values["d2"])  # a wrong one that stays is a cause
         found = bounce.golf.fit(
-            GUESS, synthetic(TRUE, 15, 0.01), parameters=["mu", "eta"], starts=0
+            guess, synthetic(TRUE, 15, 0.01), parameters=["mu", "eta"], starts=0
         )
     assert found.undetermined == () and 1.0 <= found.condition < 100.0

@@ -95,7 +95,7 @@ class Profile:
             if step > _FAR * size:
                 return side * math.inf
             inside, step = outside, 2 * step
-        while abs(outside - inside) > 1e-4 * max(abs(outside - best), 1e-9 * size):
+        while abs(outside - inside) > 1e-4 * min(abs(outside - best), abs(outside) + abs(inside)):
             middle = (inside + outside) / 2
             if self.at(k, middle) >= target:
                 outside = middle

@@ -50,6 +50,20 @@ def test_friction_of_bounces_that_only_roll_has_no_upper_end():
     assert low <= 0.3 and high == np.inf
 
 
+def test_an_end_far_below_a_fitted_value_that_ran_away_is_resolved():
+    """All balls grip, so only a friction below what the steepest needed is refused by the data."""
+    law = bounce.laws.RigidBounce(mu=0.3, restitution=0.5)
+    u, v = np.array([1.0, 2.0, 3.0]), np.full(3, 10.0)
+    off = law.lift_off(u, -v, 0 * u)
+    seen = off.xdot + np.array([1e-3, -1e-3, 1e-3])
+    data = dict(xdot=u, ydot=-v, omega=0 * u, lift_off_xdot=seen)
+    with pytest.warns(bounce.golf.IdentifiabilityWarning):
+        found = bounce.golf.fit(law.replace(mu=1e6), data, parameters=["mu"], starts=0)
+    # to stop a slip u the friction of a uniform sphere needs mu (1 + e) v >= 2 u/7
+    low, high = found.profile()["mu"]
+    assert low == pytest.approx(2 * 3.0 / 7 / 1.5 / 10.0, rel=0.02) and high == np.inf
+
+
 def test_a_parameter_that_enters_linearly_has_the_interval_of_student():
     law = bounce.laws.RigidBounce(mu=0.3, restitution=0.5)
     v, rng = np.linspace(5, 20, 12), np.random.default_rng(0)

@@ -297,3 +297,17 @@ def test_a_slip_that_falls_to_rounding_slowly_ends(engine):
     fine = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-12, engine=engine)
     assert run.status == ns.Status.STOPPED and run.itinerary == "* s *"
     assert np.abs(run.x[-1] - fine.x[-1]).max() < 1e-12
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_line_crosses_again_within_the_step_that_left(engine):
+    # Along a line the series of leaving reaches far: to the next zero of slip, where it ends in rounding.
+    p = {"mu": 0.05185574893987187, "d1": 0.3057990207800733, "d2": 0.2166692797028548}
+    p |= {"eta": 1.4489698921967489, "G": 1.0660467368662658e-06, "k": 2 / 3}
+    v, w = (-0.7954321571225536, 1.444639697247086), (-0.3073360719784702, 0.5581744288314956)
+    start = [0.0, 0.0, *v, *w, 0.0, -1.0]
+    run = ns.simulate(plane.ball(), start, 20.0, parameters=p, tol=1e-13, engine=engine)
+    along = np.array([0.0, 0.0, np.hypot(*v), 0.0, np.hypot(*w), 0.0, 0.0, -1.0])
+    axis = ns.simulate(plane.ball(), along, 20.0, parameters=p, tol=1e-13, engine=engine)
+    assert run.itinerary == axis.itinerary == "* * *" and run.status == ns.Status.STOPPED
+    assert np.hypot(*run.x[-1, 2:4]) == pytest.approx(abs(axis.x[-1, 2]), abs=1e-13)

@@ -29,8 +29,11 @@ CLOSE = 1e-8
 # reaching ------------------------------------------------------------------------------------------
 
 
-def near(driver: Driver, guard: Guard) -> None:
-    """|h| has fallen tenfold: the set is reached or passed now, or looked at again nearer."""
+def near(driver: Driver, guard: Guard, fell: bool = True) -> None:
+    """|h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer.
+
+    What has fallen to rounding is zero, whatever its direction says.
+    """
     own = list(driver.system.set_of[guard.index])
     if driver.mode[own[0]] == "s":
         return  # friction's limit has fallen: the next step sees its digits
@@ -46,7 +49,7 @@ def near(driver: Driver, guard: Guard) -> None:
     if not hits and not at_floor:
         return
     if not (0.0 < dt < np.inf):
-        if not (hits and at_floor):
+        if not (at_floor and (hits or fell)):
             return
         dt = 0.0
     if dt > 0.0:
@@ -81,7 +84,7 @@ def look(driver: Driver) -> None:
         if guard.kind != "near" or driver.mode[guard.index] == "s" or driver.drops.get(row, 0):
             continue
         if math.hypot(*slip_of(driver, list(members))) <= CLOSE * scale_of(driver, list(members)):
-            return near(driver, guard)
+            return near(driver, guard, fell=False)
     return None
 
 

@@ -151,8 +151,9 @@ static int is_met(Run *r, const int8_t *letter, int set, const double *h, const 
   return radius < shortest(r) * (length_of(a, k) + sqrt(speed));
 }
 
-/* |h| has fallen tenfold: the set is reached or passed now, or looked at again nearer. */
-static void near_set(Run *r, int row) {
+/* |h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer. What has
+ * fallen to rounding is zero, whatever its direction says. */
+static void near_set(Run *r, int row, int fell) {
   int f = r->now.index[row], s = set_of(r, f), k = size_of(r, s), n = n_of(r), before = r->mode;
   int32_t own[3];
   double h[3], a[3], m[9], u[3], b[3], mean[3], scale = 0, dt, c = 0;
@@ -185,7 +186,7 @@ static void near_set(Run *r, int row) {
   at_floor |= dt < shortest(r);
   if (!hits && !at_floor) return;
   if (!(dt > 0 && dt < INFINITY)) {
-    if (!(hits && at_floor)) return;
+    if (!(at_floor && (hits || fell))) return;
     dt = 0;
   }
   if (dt > 0) {
@@ -362,6 +363,6 @@ static void look_at_sets(Run *r) {
     const double *h = surface_values(r, r->x), *scales_of = surface_scales(r, r->x);
     double scale = 0, radius = length_of(r->letter[f] == LEFT_BEHIND ? r->unknowns + f : h + f, k);
     for (int i = f; i < f + k; i++) scale = larger(scales_of[i], scale);
-    if (radius <= 1e-8 * scale) { near_set(r, row); return; }
+    if (radius <= 1e-8 * scale) { near_set(r, row, 0); return; }
   }
 }

@@ -308,7 +308,7 @@ static void serve(Run *r, int row) {
   } else if (kind == RESET_GUARD) reset(r, row);
   else if (kind == IMPACT_GUARD) impact(r, row);
   else if (kind == RELEASE_GUARD) release(r, row);
-  else if (kind == NEAR_GUARD) near_set(r, row);
+  else if (kind == NEAR_GUARD) near_set(r, row, 1);
   else {
     Known known[] = {{EXIT_GUARD, index, side, 1}, {SURFACE_GUARD, index, side, 2}};
     if (kind == SLIP_GUARD) {

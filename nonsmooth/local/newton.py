@@ -81,12 +81,13 @@ class _Values:
 
     @property
     def finite(self) -> bool:
-        return bool(np.isfinite(self.values).all() and np.isfinite(self.jacobian).all())
+        return bool(np.isfinite(self.values).all() and np.isfinite(self.lengths).all())
 
 
 def _evaluate(equations: Equations, x: Array) -> _Values:
     values, jacobian = equations(x)
-    lengths = np.sqrt((jacobian * jacobian).sum(axis=1))
+    with np.errstate(over="ignore"):  # far from a root entries may be huge: a trial that is no step
+        lengths = np.sqrt((jacobian * jacobian).sum(axis=1))
     lengths[lengths == 0] = 1.0
     return _Values(x, values, jacobian, lengths)
 

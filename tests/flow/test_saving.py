@@ -135,3 +135,28 @@ def test_libraries_that_are_not_there_are_asked_for(name, monkeypatch):
     for make in MADE.values():
         with pytest.raises(ns.OptionError, match=rf"to_{name}: expected {name} to be installed"):
             getattr(make(), f"to_{name}")()
+
+
+def test_a_file_of_another_format_and_what_is_no_result_are_refused(tmp_path):
+    from nonsmooth.flow import saving
+
+    path = tmp_path / "run.npz"
+    run().save(path)
+    with np.load(path) as data:
+        arrays = {name: data[name] for name in data.files}
+    head = arrays["tree"].tobytes().replace(b'"format": ', b'"format": 9')
+    assert head != arrays["tree"].tobytes()
+    np.savez(path, **{**arrays, "tree": np.frombuffer(head, np.uint8)})
+    with pytest.raises(ns.OptionError, match=r"written by save.*format 9"):
+        ns.load(path)
+    with pytest.raises(ns.OptionError, match="a result of numbers and systems, received <object"):
+        saving._packed(object())
+    with pytest.raises(ns.OptionError, match="arrays of numbers, received <U1"):
+        saving._packed([np.array(["a"])])
+
+
+def test_one_system_of_two_results_is_written_once():
+    from nonsmooth.flow import saving
+
+    once, twice = len(saving._packed([BLOCK])), len(saving._packed([BLOCK, BLOCK]))
+    assert twice < 1.1 * once

@@ -54,3 +54,18 @@ def test_words_that_do_not_fit_are_refused(block: ns.FilippovSystem) -> None:
         ns.FixedItinerary(block, "- -", until="h0").arrive([-1.0, 0.0])
     with pytest.raises(ns.ConvergenceError, match="leg in mode"):
         ns.FixedItinerary(block, "s", until="L_F1 h", t_max=1.0).arrive([0.0, 1.0])
+
+
+def test_a_word_without_modes_is_refused(block: ns.FilippovSystem) -> None:
+    for word in ("", []):
+        with pytest.raises(ns.OptionError, match="expected at least one mode, received none"):
+            ns.FixedItinerary(block, word, until="h0")
+
+
+def test_a_system_without_switches_has_one_mode_whatever_it_is_called() -> None:
+    """x'' = -x from (1, 0) meets v = 0 again at t = pi."""
+    smooth = ns.FilippovSystem([x, v], field=[v, -x], stops=[ns.Stop(x + 0.5, -1, name="half")])
+    for word in ("o", [""]):
+        arrival = ns.FixedItinerary(smooth, word, until="half").arrive([1.0, 0.0])
+        assert arrival.t == pytest.approx(2 * np.pi / 3, abs=1e-10)
+        assert arrival.x == pytest.approx([-0.5, -np.sqrt(0.75)], abs=1e-10)

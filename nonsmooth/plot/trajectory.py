@@ -29,6 +29,7 @@ _MODES = {
     "+": (style.ABOVE, "-", 1.5, "+  above, h > 0"),
     "-": (style.BELOW, (0, (5, 1.5)), 1.5, "−  below, h < 0"),
     "s": (style.BLACK, "-", 3.0, "s  sliding"),
+    "*": (style.ABOVE, "-", 1.5, "*  off the set, h ≠ 0"),
     "": (style.BLUE, "-", 1.5, "smooth"),
 }
 _CYCLE = (style.ABOVE, style.BLUE, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)

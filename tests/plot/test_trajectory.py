@@ -131,3 +131,18 @@ def test_wrong_input_is_refused(run):
     line = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])
     with pytest.raises(ns.DefinitionError, match="expected a system of 2 states, received 1"):
         ns.plot.trajectory(ns.simulate(line, [1.0], t_end=0.5), phase_plane=True)
+
+
+@pytest.mark.parametrize("name", ["cue_ball", "shaken_block"])
+def test_motion_off_a_set_is_drawn_with_its_own_words(name):
+    run = ns.textbook.by_name(name).run()
+    figure = ns.plot.trajectory(run)
+    words = [text.get_text() for legend in figure.legends for text in legend.get_texts()]
+    words += [
+        t.get_text()
+        for axes in figure.axes
+        if axes.get_legend()
+        for t in axes.get_legend().get_texts()
+    ]
+    assert any("off the set" in word for word in words)
+    assert len(figure.axes) >= 2

@@ -156,7 +156,8 @@ GOLF = {
         "From launch to rest",
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
-        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map",
+        "flight Flight Air rebound Rebound side_rebound SideRebound axis_spin AxisSpin play Run Bounce "
+        "Glide landing_map",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

@@ -24,7 +24,8 @@ _NO_INPUTS = ("run", "json", "command", "output")
 _MEASURES = dict(
     speed="speed", angle="angle", spin="spin", slip="speed", carry="length", bounced="length",
     rolled="length", run_out="length", total="length", height="height", first_height="height",
-    time="time", contact_time="time",
+    time="time", contact_time="time", kick="angle", slip_angle="angle", side_spin="spin",
+    side_spin_after="spin",
 )  # fmt: skip
 
 

@@ -9,6 +9,7 @@ from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, play, rebound
 from ..units import Landing
 from .choices import Chosen, chosen_model, ground_arguments, require_scale
 from .report import Units, in_words, opening, polar, print_json, tabulate
+from .side import asked_for_side, side_arguments, side_bounce, side_lines, side_report
 from .starts import start_arguments, starts
 from .values import number, quantity
 
@@ -28,6 +29,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--air", choices=["none", *AIRS], default="none", help="during the hops")
     run_arguments(parser)
     parser.add_argument("--first-only", action="store_true", help="the first bounce only")
+    side_arguments(parser)
 
 
 def run_arguments(parser: argparse.ArgumentParser) -> None:
@@ -44,18 +46,36 @@ def run(args: argparse.Namespace) -> int:
     """Bounce the ball, and print what becomes of it."""
     chosen = chosen_model(args)
     require_scale(args, chosen)
+    side = asked_for_side(args)
     if args.input is not None:
-        return tabulate(
-            args, starts(args, up=False), lambda one: _report(chosen, *_bounce(args, chosen, one))
-        )
+
+        def report_on(one: Landing) -> dict[str, Any]:
+            if side:
+                return side_report(chosen, side_bounce(args, chosen, one))
+            return _report(chosen, *_bounce(args, chosen, one))
+
+        return tabulate(args, starts(args, up=False), report_on)
     ((landing, _),) = starts(args, up=False)
     assert landing is not None
+    if side:
+        return _print_side(args, chosen, landing)
     units, (hit, rest) = Units(args.units), _bounce(args, chosen, landing)
     if args.json:
         report = units.report(_report(chosen, hit, rest))
         print_json({**opening(args), "units": units.names, **report})
     else:
         print("\n".join(_lines(hit, rest, chosen, units)))
+    return 0
+
+
+def _print_side(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> int:
+    """Bounce a ball with side spin, and print what becomes of it."""
+    units, hit = Units(args.units), side_bounce(args, chosen, landing)
+    if args.json:
+        report = units.report(side_report(chosen, hit))
+        print_json({**opening(args), "units": units.names, **report})
+    else:
+        print("\n".join(side_lines(hit, units)))
     return 0
 
 

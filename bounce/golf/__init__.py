@@ -25,6 +25,7 @@ from .ground import ExtrapolationWarning, Rebound, rebound
 from .maps import landing_map
 from .measurements import Measurements, read_measurements
 from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
+from .side_spin import AxisSpin, SideRebound, axis_spin, side_rebound
 
 __all__ = [
     "AIRS",
@@ -33,6 +34,7 @@ __all__ = [
     "QUINTAVALLA",
     "SMITS_SMITH",
     "Air",
+    "AxisSpin",
     "Bounce",
     "DataError",
     "ExtrapolationWarning",
@@ -45,11 +47,14 @@ __all__ = [
     "NoRestError",
     "Rebound",
     "Run",
+    "SideRebound",
     "Start",
+    "axis_spin",
     "fit",
     "flight",
     "landing_map",
     "play",
     "read_measurements",
     "rebound",
+    "side_rebound",
 ]

@@ -48,7 +48,6 @@ def compare(count, seed, tol):
         fast = ns.simulate(system, x, 20.0, parameters=p, tol=tol)
         slow = ns.simulate(system, x, 20.0, parameters=p, tol=tol, engine="reference")
         assert fast.itinerary == slow.itinerary and fast.status == slow.status
-        assert len(fast.steps) == pytest.approx(len(slow.steps), abs=3)
         times = np.array([[e.t for e in run.events] for run in (fast, slow)])
         worst = max(
             worst, np.abs(fast.x[-1] - slow.x[-1]).max(), 0.01 * np.abs(times[0] - times[1]).max()

@@ -10,6 +10,7 @@ from hypothesis import strategies as st
 
 from nonsmooth.model import NotSmoothError
 from nonsmooth.model.jets import taylor
+from nonsmooth.model.numbers import Numbers
 
 x, y, p = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("p")
 U = 0.45 + 0.3 * ca.sin(x) + 0.1 * y  # stays in (0.05, 0.85), inside every domain below
@@ -109,3 +110,15 @@ def test_series_sums_to_the_solution_of_a_linear_system(entries, t):
 def test_an_operation_without_a_recurrence_is_refused():
     with pytest.raises(NotSmoothError, match="recurrence"):
         taylor(ca.floor(x), x, x, ca.SX(0, 1), 3)
+
+
+def test_values_outside_of_the_numbers_are_infinite_or_none():
+    """As C's: 10^400 overflows, 1/0 and log 0 are poles, sqrt(-1) has no value, x^y of both."""
+    numbers = Numbers()
+    assert numbers.apply("pow", [2.0, 10.0]) == 1024.0
+    assert numbers.apply("pow", [10.0, 400.0]) == math.inf
+    assert numbers.apply("exp", [1000.0]) == math.inf
+    assert numbers.apply("inv", [0.0]) == math.inf
+    assert numbers.apply("log", [0.0]) == -math.inf
+    assert math.isnan(numbers.apply("sqrt", [-1.0]))
+    assert numbers.apply("hypot", [3.0, 4.0]) == 5.0

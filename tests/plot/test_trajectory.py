@@ -146,3 +146,19 @@ def test_motion_off_a_set_is_drawn_with_its_own_words(name):
     ]
     assert any("off the set" in word for word in words)
     assert len(figure.axes) >= 2
+
+
+def test_a_run_of_very_many_events_marks_its_end_and_shortens_its_title():
+    """A relay oscillator of some 340 crossings: what is drawn is the last event alone."""
+    p, q = ca.SX.sym("p"), ca.SX.sym("q")
+    system = ns.FilippovSystem([p, q], surface=p, above=[q, -1], below=[q, 1])
+    run = ns.simulate(system, [0.0, 0.25], 170.0)
+    assert len(run.events) > 300
+    figure = ns.plot.trajectory(run)
+    titles = [figure.get_suptitle(), *[ax.get_title() for ax in figure.axes]]
+    (title,) = [t for t in titles if t.startswith("itinerary")]
+    assert " …   status" in title
+    marks = [
+        line for ax in figure.axes for line in ax.lines if str(line.get_gid()).startswith("event")
+    ]
+    assert all(len(line.get_xdata()) == 1 for line in marks)

@@ -43,6 +43,7 @@ GALLERY = (
     "wells",
     "friction_cone",
     "outcome_map",
+    "slip_directions",
 )
 
 

@@ -19,8 +19,10 @@ from ..contact.model import ContactModel
 from ..contact.space import Contact3D
 from ..errors import LandingError, ModelError
 from ..parameters import number, numbers
+from ..shot.single import simulate
 from .lift_offs import lift_off
 from .results import LiftOffs3D
+from .shooting import Shooting
 
 Array = NDArray[np.float64]
 
@@ -28,6 +30,8 @@ Array = NDArray[np.float64]
 _FINE = math.pi / 2
 #: How often the points of a circle are doubled, and cells of spins divided.
 _DOUBLINGS, _DIVISIONS = 7, 60
+#: Distance from a vortex, in cells, at which what vanishes there is looked at first, and steps to it.
+_BESIDE, _SECANTS = 0.01, 6
 
 
 class Vortex(NamedTuple):
@@ -273,7 +277,7 @@ def find_vortices(
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
     >>> (spin,) = bounce.find_vortices(turf, [0.2, 0.0])
     >>> f"{spin[0]:.10f}", float(spin[1])
-    ('0.5505198965', 0.0)
+    ('0.5505199102', 0.0)
     """
     surface, v = _in_3d(model), _pair("xdot", xdot)
     speed = float(np.hypot(*v))
@@ -295,12 +299,40 @@ def find_vortices(
     values = slip(grid)
     at = np.flatnonzero(values[:-1] * values[1:] < 0)
     low, high, sign = grid[at], grid[at + 1], np.sign(values[at])
-    for _ in range(_DIVISIONS):
+    for _ in range(_DIVISIONS if at.size else 0):
         middle = (low + high) / 2
-        below = np.sign(slip(middle)) == sign if middle.size else np.zeros(0, bool)
+        below = np.sign(slip(middle)) == sign
         low, high = np.where(below, middle, low), np.where(below, high, middle)
-    found = np.sort(np.append((low + high) / 2, grid[values == 0.0]))
-    return tuple(spin * v / speed for spin in found)
+    found = np.append((low + high) / 2, grid[values == 0.0])
+    shooting = Shooting(surface.model, ydot, tol=tol)
+    polished = [_polished(shooting, speed, spin, most / cells) for spin in np.sort(found).tolist()]
+    return tuple(spin * v / speed for spin in polished)
+
+
+def _polished(shooting: Shooting, speed: float, spin: float, near: float) -> float:
+    """A spin that is known where the slip is above rounding, to the digits of what vanishes there.
+
+    Slip at lift-off after rolling is quadratic in the distance, so its sign is known to half of the
+    digits; the tangential force at the end of rolling until lift-off is linear in it.
+    """
+    beside = spin + _BESIDE * near
+    word = simulate(shooting.model, speed, shooting.ydot, beside, tol=shooting.tol).itinerary
+    word = word.replace("F", "").replace(" ", "")
+    if "s" not in word:
+        return spin  # slip itself is linear, and known to rounding
+    word = word[: word.rindex("s") + 1]
+
+    def pull(value: float) -> float:
+        return shooting.shoot(np.array([speed, value]), word).pull
+
+    one, other = beside, spin - _BESIDE * near
+    at_one, at_other = pull(one), pull(other)
+    for _ in range(_SECANTS):
+        if at_one == at_other:
+            break
+        one, other, at_other = one - at_one * (one - other) / (at_one - at_other), one, at_one
+        at_one = pull(one)
+    return one if abs(one - spin) <= near else spin
 
 
 def _in_3d(model: ContactModel | Contact3D) -> Contact3D:

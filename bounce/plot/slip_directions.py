@@ -145,7 +145,7 @@ def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
 
 def _wheel(ax: Axes) -> None:
     """The key: a ring of colours beside the picture, forward at its top."""
-    ring: Any = ax.inset_axes((1.085, 0.68, 0.19, 0.24), projection="polar")
+    ring: Any = ax.inset_axes((1.075, 0.68, 0.19, 0.24), projection="polar")
     ring.set_theta_zero_location("N")
     ring.set_theta_direction(-1)
     edges = np.linspace(-math.pi, math.pi, 181)

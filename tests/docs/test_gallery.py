@@ -85,6 +85,16 @@ def test_limit_directions_of_plane_friction():
     assert np.array_equal(found["counts"], np.where(inside, 4, 2))
 
 
+def test_the_vortex_of_slip_directions():
+    found = ran("slip_directions")
+    (cell,) = found["directions"].vortices
+    assert cell.winding == 1
+    width = [np.diff(values)[0] for values in found["spins"]]
+    assert np.all(np.abs(cell.omega - found["vortex"]) <= width)
+    error = np.abs(found["turned"].turn - found["turned"].first_order)
+    assert error[0] < 0.3 * error[1] < 0.09 * error[2]  # of second order
+
+
 def test_stick_slip_period():
     found = ran("stick_slip")
     assert found["period"] == pytest.approx(PERIOD, abs=1e-9)

@@ -87,3 +87,22 @@ def test_a_plane_of_an_orbit_has_two_states():
         with pytest.raises(ns.OptionError, match=r"states: expected two names among \['x', 'y'\]"):
             ns.plot.periodic_orbit(orbit, states=states)
     assert ns.plot.periodic_orbit(orbit, legend=False).axes[0].get_legend() is None
+
+
+def test_a_legend_is_left_out_where_it_is_not_wanted():
+    at, b = ca.SX.sym("at"), ca.SX.sym("b")
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y,
+        above=[at + b * x - x**3, 1 - y],
+        below=[1, 1],
+        parameters={at: -1.0, b: 0.75},
+    )
+    branch = ns.continue_equilibrium(system, [-1.5, 1.0], "at", bounds=(-2, 2))
+    folds = ns.continue_bifurcation(branch.events[0], ("at", "b"), bounds=[(-1, 1), (-1, 1)])
+    figure = ns.plot.bifurcation_curves([folds], legend=False, title="folds")
+    assert figure.axes[0].get_legend() is None
+    assert figure.axes[0].get_title() == "folds"
+    # 4 b^3 = 27 a^2: the semicubical parabola of a cubic's double roots
+    a, slope = folds.values.T
+    assert abs(4 * slope**3 - 27 * a**2).max() < 1e-9

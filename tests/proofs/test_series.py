@@ -4,6 +4,7 @@ import mpmath
 import pytest
 from flint import arb, arb_series, ctx
 
+from nonsmooth.proofs.arithmetic import precision
 from nonsmooth.proofs.series import Series, length
 
 TWO = ("add", "sub", "mul", "div", "pow", "hypot", "atan2", "fmin", "fmax")
@@ -59,3 +60,23 @@ def test_coefficients_are_those_of_mpmath(op):
         for k, value in enumerate(truth):
             assert abs(mpmath.mpf(float(found[k].mid())) - value) < 1e-12
             assert float(found[k].rad()) < 1e-12
+
+
+@pytest.mark.parametrize("turn", [0.4, 1.2, 1.9, 2.8, -0.3, -1.4, -2.9])
+def test_the_angle_of_a_uniform_rotation_grows_by_its_speed(turn):
+    """atan2(sin(turn + 3 s), cos(turn + 3 s)) = turn + 3 s in every quadrant."""
+    with length(6), precision(200):  # tangents of fast angles cancel
+        angle = arb_series([arb(turn), 3])
+        found = Series([], "stored").apply("atan2", [angle.sin(), angle.cos()])
+        expected = [turn, 3, 0, 0, 0, 0]
+        assert all(found[k].overlaps(arb(v)) for k, v in enumerate(expected))
+        assert all(found[k].rad() < 1e-9 for k in range(6))
+
+
+def test_what_jumps_has_a_value_only_for_constants():
+    with length(4):
+        arithmetic = Series([], "stored")
+        still = arithmetic.apply("fmax", [arb_series([2]), arb_series([3])])
+        assert [still[k] for k in range(4)] == [3, 0, 0, 0]
+        moving = arithmetic.apply("fmax", [arb_series([2, 1]), arb_series([3])])
+        assert not any(moving[k].is_finite() for k in range(4))

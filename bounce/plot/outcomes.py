@@ -113,7 +113,7 @@ def outcome_map(
             f"curve: expected a map over xdot and omega, received one over {outcomes.names}."
         )
     with style.settings():
-        figure, ax = style.axes_for(ax, (7.2, 5.6))
+        figure, ax = style.axes_for(ax, (7.0, 5.4))
         if quantity == "itinerary":
             _regions(ax, outcomes)
         else:

@@ -55,7 +55,7 @@ def proven_map(
     from matplotlib.patches import Patch, Rectangle
 
     with style.settings():
-        figure, ax = style.axes_for(ax, (7.2, 5.6))
+        figure, ax = style.axes_for(ax, (7.0, 5.4))
         for k, name in enumerate(OUTCOMES):
             boxes = found.boxes[found.outcome == k]
             patches = [Rectangle((a, c), b - a, d - c) for a, b, c, d in boxes]

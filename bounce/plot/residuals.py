@@ -38,7 +38,7 @@ def residuals(found: FitResult) -> Figure:
     names = list(found.residuals)
     unit = " [m/s]" if found.measurements.si else ""
     with style.settings():
-        figure = style.new_figure((4.2 * len(names), 3.6))
+        figure = style.new_figure((min(7.0, 0.6 + 3.2 * len(names)), 2.8))
         axes = figure.subplots(1, len(names), squeeze=False)[0]
         for ax, name in zip(axes, names, strict=True):
             rms = found.rms[name]
@@ -48,7 +48,8 @@ def residuals(found: FitResult) -> Figure:
             measured = found.measurements.lift_off[name]
             ax.plot(measured, found.residuals[name], "o", color=style.BLUE, markersize=4)
             label = "R omega" if name == "omega" and found.measurements.si else name
-            ax.set_xlabel(f"measured {label} at lift-off{unit}")
-            ax.set_ylabel(f"predicted less measured{unit}")
+            ax.set_xlabel(f"measured {label}{unit}", fontsize=9)
+            if ax is axes[0]:
+                ax.set_ylabel(f"predicted less measured{unit}", fontsize=9)
             ax.set_title(f"rms {rms:.3g}{' m/s' if found.measurements.si else ''}")
     return figure

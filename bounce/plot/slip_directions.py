@@ -102,7 +102,7 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     ['forward', 'right', 'reverse', 'left']
     """
     with style.settings():
-        figure, ax = style.axes_for(ax, (7.2, 5.6))
+        figure, ax = style.axes_for(ax, (7.0, 5.4))
         lateral, axial = directions.omega
         angle = np.where(directions.lift_offs.complete, directions.angle, np.nan)
         ax.pcolormesh(
@@ -166,4 +166,4 @@ def _wheel(ax: Axes) -> None:
     ring.set_xticks(
         [0.0, math.pi / 2, math.pi, 3 * math.pi / 2], labels=["forward", "right", "reverse", "left"]
     )
-    ring.tick_params(pad=0, labelsize=7.5)
+    ring.tick_params(pad=0, labelsize=8)

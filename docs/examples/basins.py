@@ -7,7 +7,6 @@ starts, integrated together; the colour says where each of them ends, darker aft
 
 import casadi as ca
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -28,7 +27,7 @@ where = np.digitize(many.x[..., 0], [-0.5, 0.5]) - 1  # -1 left, 0 on the hill, 
 swings = many.events["crossing"]
 share = {name: float(np.mean(where == k)) for name, k in (("left", -1), ("hill", 0), ("right", 1))}
 
-figure = Figure(figsize=(6.6, 5.6), layout="constrained")
+figure = ns.plot.style.new_figure((6.6, 5.6))
 ax = figure.add_subplot(xlabel="x", ylabel="v")
 hue = np.array([[0.00, 0.45, 0.70], [0.95, 0.90, 0.25], [0.84, 0.37, 0.00]])[where + 1]
 light = 1 - 0.55 * swings[..., None] / swings.max()

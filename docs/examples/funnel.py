@@ -6,7 +6,6 @@ two-fold with `NON_UNIQUE`; a funnel samples the set of futures instead of choos
 """
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -16,7 +15,7 @@ slope = fold.classification.into.low  # z3/z2 on the canard
 run = ns.simulate(system, [0.0, 0.5, 0.5 * slope], t_end=10.0)
 futures = ns.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
 
-figure = Figure(figsize=(9.0, 4.2), layout="constrained")
+figure = ns.plot.style.new_figure((7.0, 3.6))
 height, plane = figure.subplots(1, 2)
 STYLE = {
     "+": dict(color=ns.plot.style.ABOVE, linewidth=0.8),

@@ -6,8 +6,6 @@ line and leaves a pseudo-saddle behind (boundary focus); at last pseudo-saddle a
 and vanish (pseudo-saddle-node). Kuznetsov, Rinaldi & Gragnani 2003; parameters quoted from memory.
 """
 
-from matplotlib.figure import Figure
-
 import nonsmooth as ns
 
 problem = ns.textbook.harvested_prey_predator()
@@ -17,7 +15,7 @@ values = {
     "saddle and node": 1.06,
     "pseudo-saddle-node": problem["pseudo-saddle-node"].value,
 }
-figure = Figure(figsize=(11.0, 8.4), layout="constrained")
+figure = ns.plot.style.new_figure((7.0, 7.6))
 panels = dict(zip(values, figure.subplots(2, 2).T.flat, strict=True))
 for name, ax in panels.items():
     ns.plot.phase_portrait(
@@ -28,6 +26,10 @@ for name, ax in panels.items():
         legend=name == "saddle and node",
         title=f"{name}, alpha = {values[name]:.4f}",
     )
+
+legend = panels["saddle and node"].get_legend()
+figure.legend(handles=legend.legend_handles, loc="outside lower center", ncols=3, frameon=False)
+legend.remove()
 
 merged = ((1 - problem.parameters["b"]) / 2, values["pseudo-saddle-node"])
 panels["pseudo-saddle-node"].plot(*merged, "ks", fillstyle="left", markersize=8, zorder=9)

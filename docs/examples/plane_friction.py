@@ -1,15 +1,14 @@
 """Where friction in the plane lets go
 
-Near slip h = 0 a body sees h' = a - M u, with the direction u of its slip. Left: the blow-up, direction
+Near slip h = 0 a body sees h' = a - M u, with the direction u of its slip. Above left: the blow-up, direction
 against distance, for a load that friction holds (isotropic, |a| = 0.6 c). All orbits end at r = 0, turned
-towards the load. Middle: paths of a block on an incline, from starts all round: where it holds they come
-to rest along one limit direction; where it does not, all leave along it. Right: with friction of two
+towards the load. Beside it: paths of a block on an incline, from starts all round: where it holds they come
+to rest along one limit direction; where it does not, all leave along it. Below: with friction of two
 strengths four limit directions exist for loads inside the astroid, else two.
 """
 
 import casadi as ca
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -23,8 +22,9 @@ block = ns.FilippovSystem(
     parameters={a1: 0.6, a2: 0.0, m1: 1.0, m2: 1.0},
 )
 
-figure = Figure(figsize=(11.0, 3.7), layout="constrained")
-blown, paths, astroid = figure.subplots(1, 3)
+figure = ns.plot.style.new_figure((7.0, 6.0))
+blown, paths, astroid, nothing = figure.subplots(2, 2).flat
+nothing.remove()
 angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False) + np.pi / 16
 for angle in angles:
     start = [np.cos(angle), np.sin(angle)]

@@ -14,8 +14,8 @@ from ..model import OptionError
 from ..orbit import Basins
 from . import style
 
-#: Of attractors, in turn: told apart also without colour, light enough for dark marks.
-_COLORS = ("#9ecae1", "#fdd0a2", "#a1d99b", "#dadaeb", "#fee391", "#fbb4b9", "#ccebc5", "#bcbddc")
+#: Of attractors, in turn: told apart by deuteranopes too, light enough for dark marks.
+COLORS = ("#9ecae1", "#fdd0a2", "#9fdf5f", "#7f7fff", "#df7f7f", "#5f9fdf", "#ffdf3f", "#7f9f3f")
 _OTHERS = {0: "#ffffff", -1: "#252525", -2: "#737373", -3: "#bdbdbd", -4: "#969696"}
 
 
@@ -115,7 +115,7 @@ def _edges(axis: Any) -> Any:
 
 
 def _color(label: int) -> str:
-    return _COLORS[(label - 1) % len(_COLORS)] if label > 0 else _OTHERS[label]
+    return COLORS[(label - 1) % len(COLORS)] if label > 0 else _OTHERS[label]
 
 
 def _legend(axes: Axes, found: Basins) -> None:

@@ -50,7 +50,7 @@ def phase_portrait(
     t_end: float | None = None,
     separatrices: bool = True,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.6, 5.0),
+    size: tuple[float, float] = (7.0, 4.8),
     legend: bool = True,
     title: str | None = None,
 ) -> Figure:

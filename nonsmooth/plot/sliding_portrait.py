@@ -49,7 +49,7 @@ def sliding_portrait(
     parameters: Parameters | None = None,
     orbits: int = 12,
     ax: Axes | None = None,
-    size: tuple[float, float] = (7.6, 5.2),
+    size: tuple[float, float] = (7.0, 4.8),
     legend: bool = True,
     title: str | None = None,
 ) -> Figure:

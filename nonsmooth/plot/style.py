@@ -36,8 +36,8 @@ from matplotlib.patches import FancyArrowPatch
 from numpy.typing import ArrayLike
 
 from ..model import Array, OptionError, explain
+from .print_figure import PrintFigure
 
-# Okabe & Ito 2008.
 BLACK = "#000000"
 ORANGE = "#E69F00"
 SKY = "#56B4E9"
@@ -153,7 +153,7 @@ def check_size(size: object) -> tuple[float, float]:
 
 
 def new_figure(size: object) -> Figure:
-    """Return an empty figure that pyplot does not keep.
+    """Return an empty figure that pyplot does not keep, with TrueType fonts in its PDF files.
 
     Parameters
     ----------
@@ -174,7 +174,7 @@ def new_figure(size: object) -> Figure:
     >>> new_figure((6, 4)).get_size_inches()
     array([6., 4.])
     """
-    return Figure(figsize=check_size(size), layout="constrained")
+    return PrintFigure(figsize=check_size(size), layout="constrained")
 
 
 def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:

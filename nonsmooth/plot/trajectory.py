@@ -114,7 +114,7 @@ def _draw(
     columns = 1 if len(names) < _GRID_FROM else math.ceil(len(names) / 4)
     rows = math.ceil(len(names) / columns)
     if size is None:
-        size = (5.0 + 3.2 * (columns - 1) + 4.0 * plane, max(1.3 * rows + 1.2, 3.4))
+        size = (7.0 if plane or columns > 1 else 5.0, max(1.3 * rows + 1.2, 3.4))
     with style.settings():
         figure = style.new_figure(size) if figure is None else figure
         parts = [_Part(run, segment, samples) for segment in run.segments]
@@ -133,7 +133,7 @@ def _draw(
             _phase_plane(ax, run, parts, looks)
         figure.suptitle(_title(run), fontsize=10, fontfamily="monospace")
         handles = _legend(run, looks, plane)
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 5))
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4))
     return figure
 
 

@@ -76,7 +76,7 @@ _FLIGHTS = (3, 4, 5, 6, 8)  # n of the curves nu1 nu2 = cos^2(pi/n) that are dra
 
 
 def two_fold_atlas(
-    cases: Sequence[str] | None = None, *, maps: bool = True, columns: int = 2
+    cases: Sequence[str] | None = None, *, maps: bool = True, columns: int = 1
 ) -> Figure:
     """Draw two-folds of every class and boundary: sliding portrait, flow in space, class maps.
 
@@ -87,7 +87,7 @@ def two_fold_atlas(
     maps : bool, optional
         Whether to draw the class maps of the three kinds at the bottom.
     columns : int, optional
-        Two-folds side by side; each takes two panels.
+        Two-folds side by side; each takes two panels and 7 inches, the width of a page.
 
     Returns
     -------
@@ -122,9 +122,10 @@ def two_fold_atlas(
     columns = min(columns, len(chosen))
     rows = math.ceil(len(chosen) / columns)
     with style.settings():
-        height = 3.4 * rows + 5.2 * maps + 0.8
-        figure = style.new_figure((7.6 * columns, height))
-        ratios = [3.4 * rows + 0.8, 5.2]
+        below = {1: 8.6, 2: 5.2}.get(columns, 4.6)
+        height = 3.1 * rows + below * maps + 1.2
+        figure = style.new_figure((7.0 * columns, height))
+        ratios = [3.1 * rows + 1.2, below]
         parts: Any = figure.subfigures(2, 1, height_ratios=ratios) if maps else [figure]
         grid = parts[0].add_gridspec(rows, 2 * columns, width_ratios=[1.0, 1.35] * columns)
         for k, name in enumerate(chosen):
@@ -135,8 +136,11 @@ def two_fold_atlas(
             two_fold_3d(CASES[name], ax=space, legend=False, title="")
         parts[0].legend(handles=_legend(), loc="outside upper center", ncols=3 * columns)
         if maps:
-            for ax, kind in zip(parts[1].subplots(1, 3), ("VV", "II", "VI"), strict=True):
+            panels = parts[1].subplots(2, 2).flat if columns == 1 else parts[1].subplots(1, 3)
+            for ax, kind in zip(panels, ("VV", "II", "VI"), strict=False):
                 two_fold_map(kind, ax=ax)
+            for ax in parts[1].axes[3:]:
+                ax.remove()
     return figure
 
 

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 
+from papers.pictures import faults
+
 DOCS = Path(__file__).parents[2] / "docs"
 _spec = importlib.util.spec_from_file_location("docs_generate", DOCS / "generate.py")
 generate = importlib.util.module_from_spec(_spec)
@@ -34,6 +36,12 @@ def test_program_draws(name, tmp_path):
     assert isinstance(figure, Figure)
     figure.savefig(tmp_path / "picture.svg")
     assert (tmp_path / "picture.svg").stat().st_size > 5_000
+
+
+@pytest.mark.parametrize("name", generate.GALLERY)
+def test_picture_is_legible_on_a_page(name):
+    """As wide as a page at most, text of 8 points, nothing cut off."""
+    assert faults(ran(name)["figure"]) == []
 
 
 def test_gallery_is_all_programs():

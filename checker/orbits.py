@@ -7,7 +7,7 @@ from typing import Any
 
 from contacts import Place
 from intervals import CheckError, Iv, whole
-from series import Coefficients, Dual, constant, evaluate, minus, motion, over, times
+from series import Coefficients, Dual, constant, evaluate, minus, motion, negative, over, times
 
 FORMAT = "nonsmooth orbit 1"
 UNIT = whole(1).a
@@ -49,12 +49,11 @@ class Orbit:
     # fields and guards ---------------------------------------------------------------------------
 
     def _values(self, c: list[Coefficients], lam: list[int], along: Any = None) -> list[Dual]:
-        n = len(c[0])
         states = [Dual(v, None if along is None else along[i]) for i, v in enumerate(c)]
-        still = [Dual(constant(v, n)) for v in self.p]
-        signs = [Dual(constant(whole(s), n)) for s in lam]
-        none = [Dual(constant(whole(0), n))] * len(self.record["impacts"])
-        return evaluate(self.graph, [states, still, [], signs, none], n)
+        still = [Dual(constant(v)) for v in self.p]
+        signs = [Dual(constant(whole(s))) for s in lam]
+        none = [Dual(constant(whole(0)))] * len(self.record["impacts"])
+        return evaluate(self.graph, [states, still, [], signs, none])
 
     def _sides(self, c: list[Coefficients]) -> tuple[list[Any], list[Coefficients]]:
         """Both fields beside the surface that slides, and L1 and L2."""
@@ -67,7 +66,7 @@ class Orbit:
             f = [self._values(c, lam)[k].v for k in self.graph["field"]]
             d = self._values(c, lam, f)[self.graph["surfaces"][i]].d
             fields.append(f)
-            lie.append(d or constant(whole(0), len(c[0])))
+            lie.append(constant(whole(0)) if d is None else d)
         return fields, lie
 
     def rates(self, c: list[Coefficients]) -> list[Coefficients]:
@@ -89,13 +88,13 @@ class Orbit:
             h = values[self.graph["surfaces"][j]].v
             if letter == "s":
                 _, (l1, l2) = self._sides(c)
-                found.append(Guard("exit", j, 1, [-v for v in l1]))
+                found.append(Guard("exit", j, 1, negative(l1)))
                 found.append(Guard("exit", j, -1, l2))
             else:
-                found.append(Guard("surface", j, 0, h if letter == "+" else [-v for v in h]))
+                found.append(Guard("surface", j, 0, h if letter == "+" else negative(h)))
         for k, (kind, _, direction, node) in enumerate(self.place.ends):
             turned = self.signs.get(k, 1)
-            c_k = values[node].v if turned > 0 else [-v for v in values[node].v]
+            c_k = values[node].v if turned > 0 else negative(values[node].v)
             found.append(Guard(kind, k, direction, c_k))
         return found
 
@@ -106,7 +105,7 @@ class Orbit:
         for g in self.guards(c):
             if g.kind in ("surface", "exit"):
                 continue
-            order = next((k for k, v in enumerate(g.c) if not v.zero), 0)
+            order = next((k for k, v in enumerate(g.c[:4]) if not v.zero), 0)
             order = 1 if g.index == jumped else order
             s = g.c[order].sign()
             due = g.kind == "reset" and order and jumped is None and g.direction * s >= 0
@@ -162,7 +161,7 @@ class Orbit:
             return self._one_stop(together)
         return (hits[0][1], hits[0][0]) if hits else None
 
-    def _one_stop(self, together: list[tuple[Iv, Guard, Coefficients]]) -> tuple[Guard, Iv]:
+    def _one_stop(self, together: list[tuple[Iv, Guard, list[Iv]]]) -> tuple[Guard, Iv]:
         """Of zeros that may be at once the only one that counts, if it is a stop."""
         until = Iv(min(t.a for t, *_ in together), max(t.b for t, *_ in together))
         counting = [hit for hit in together if self._counts(hit[1])]
@@ -211,7 +210,7 @@ class Orbit:
         return kind, ""
 
 
-def _slope(c: Coefficients) -> Coefficients:
+def _slope(c: list[Iv]) -> list[Iv]:
     return [v * whole(k) for k, v in enumerate(c)][1:]
 
 
@@ -219,14 +218,14 @@ def _size(values: list[Iv]) -> float:
     return max(max(abs(v.a), abs(v.b)) for v in values) / UNIT
 
 
-def _value(c: Coefficients, t: Iv) -> Iv:
+def _value(c: list[Iv], t: Iv) -> Iv:
     total = c[-1]
     for v in reversed(c[:-1]):
         total = total * t + v
     return total
 
 
-def _first_zero(c: Coefficients, h: int, drop: int) -> Iv | None:
+def _first_zero(c: list[Iv], h: int, drop: int) -> Iv | None:
     """The first zero in (0, h] of a function that is positive just after 0; it is simple."""
     slope = _slope(c)
     todo, count = [(0, h)], 0
@@ -246,7 +245,7 @@ def _first_zero(c: Coefficients, h: int, drop: int) -> Iv | None:
     return None
 
 
-def _newton(c: Coefficients, slope: Coefficients, t: Iv) -> Iv:
+def _newton(c: list[Iv], slope: list[Iv], t: Iv) -> Iv:
     for _ in range(60):
         m = t.mid()
         new = m - _value(c, m) / _value(slope, t)

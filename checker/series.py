@@ -1,94 +1,120 @@
-"""Power series of recorded instructions along a motion, with a derivative along another direction."""
+"""Power series of recorded instructions along a motion, with a derivative along another direction.
+
+Coefficients are computed when they are asked for, each once: a motion needs those of its rates one order
+after another.
+"""
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from typing import Any
 
 from intervals import PI, CheckError, Iv, atan, cos, erf, exp, log, sin, sqrt, whole
 
-Coefficients = list[Iv]
 ZERO, ONE_ = whole(0), whole(1)
 
-
-def plus(a: Coefficients, b: Coefficients) -> Coefficients:
-    return [x + y for x, y in zip(a, b, strict=True)]
-
-
-def minus(a: Coefficients, b: Coefficients) -> Coefficients:
-    return [x - y for x, y in zip(a, b, strict=True)]
+# A coefficient asks for those that it is made of: as deep as the graph is.
+sys.setrecursionlimit(100_000)
 
 
-def times(a: Coefficients, b: Coefficients) -> Coefficients:
-    result = []
-    for k in range(len(a)):
-        total = ZERO
-        for i in range(k + 1):
-            if not (a[i].zero or b[k - i].zero):
-                total = total + a[i] * b[k - i]
-        result.append(total)
-    return result
+class Series:
+    """Coefficients by a rule that gives the next one from those before it."""
+
+    __slots__ = ("_known", "_rule")
+
+    def __init__(self, rule: Callable[[list[Iv], int], Iv]):
+        self._known: list[Iv] = []
+        self._rule = rule
+
+    def __getitem__(self, k: Any) -> Any:
+        if isinstance(k, slice):
+            return [self[i] for i in range(k.stop)]
+        while len(self._known) <= k:
+            self._known.append(self._rule(self._known, len(self._known)))
+        return self._known[k]
 
 
-def over(a: Coefficients, b: Coefficients) -> Coefficients:
-    result: Coefficients = []
-    for k in range(len(a)):
-        total = a[k]
-        for i in range(k):
-            total = total - result[i] * b[k - i]
-        result.append(total / b[0])
-    return result
+#: A series, or as many of its coefficients as are needed.
+Coefficients = Series | list[Iv]
 
 
-def scaled(a: Coefficients, n: int) -> Coefficients:
-    return [x * whole(n) for x in a]
+def plus(a: Coefficients, b: Coefficients) -> Series:
+    return Series(lambda _, k: a[k] + b[k])
 
 
-def constant(v: Iv, count: int) -> Coefficients:
-    return [v] + [ZERO] * (count - 1)
+def minus(a: Coefficients, b: Coefficients) -> Series:
+    return Series(lambda _, k: a[k] - b[k])
 
 
-def integral(a: Coefficients, slope: Coefficients, first: Iv) -> Coefficients:
+def negative(a: Coefficients) -> Series:
+    return Series(lambda _, k: -a[k])
+
+
+def _convolved(a: Any, b: Any, k: int, first: int = 0, last: int | None = None) -> Iv:
+    """Sum of a[i] b[k - i] for i from first to last."""
+    total = ZERO
+    for i in range(first, (k if last is None else last) + 1):
+        if not (a[i].zero or b[k - i].zero):
+            total = total + a[i] * b[k - i]
+    return total
+
+
+def times(a: Coefficients, b: Coefficients) -> Series:
+    return Series(lambda _, k: _convolved(a, b, k))
+
+
+def over(a: Coefficients, b: Coefficients) -> Series:
+    return Series(lambda w, k: (a[k] - _convolved(w, b, k, 0, k - 1)) / b[0])
+
+
+def scaled(a: Coefficients, n: int) -> Series:
+    return Series(lambda _, k: a[k] * whole(n))
+
+
+def constant(v: Iv) -> Series:
+    return Series(lambda _, k: ZERO if k else v)
+
+
+def slope_of(a: Coefficients) -> Series:
+    """Series of the derivative."""
+    return Series(lambda _, k: a[k + 1] * whole(k + 1))
+
+
+def integral(a: Coefficients, slope: Coefficients, first: Iv) -> Series:
     """The series that begins with ``first`` and has the rate a' slope."""
-    rate = times([a[k + 1] * whole(k + 1) for k in range(len(a) - 1)] + [ZERO], slope)
-    return [first] + [rate[k] / whole(k + 1) for k in range(len(a) - 1)]
+    rate = times(slope_of(a), slope)
+    return Series(lambda _, k: rate[k - 1] / whole(k) if k else first)
 
 
-def root(a: Coefficients) -> Coefficients:
-    w = [sqrt(a[0])]
-    for k in range(1, len(a)):
-        total = a[k]
-        for i in range(1, k):
-            total = total - w[i] * w[k - i]
-        w.append(total / (w[0] + w[0]))
-    return w
+def root(a: Coefficients) -> Series:
+    def rule(w: list[Iv], k: int) -> Iv:
+        if not k:
+            return sqrt(a[0])
+        return (a[k] - _convolved(w, w, k, 1, k - 1)) / (w[0] + w[0])
+
+    return Series(rule)
 
 
-def exponential(a: Coefficients) -> Coefficients:
-    w = [exp(a[0])]
-    for k in range(1, len(a)):
-        total = ZERO
-        for i in range(1, k + 1):
-            total = total + a[i] * whole(i) * w[k - i]
-        w.append(total / whole(k))
-    return w
+def exponential(a: Coefficients) -> Series:
+    rate = slope_of(a)
+
+    def rule(w: list[Iv], k: int) -> Iv:
+        return _convolved(rate, w, k - 1) / whole(k) if k else exp(a[0])
+
+    return Series(rule)
 
 
-def circular(a: Coefficients) -> tuple[Coefficients, Coefficients]:
+def circular(a: Coefficients) -> tuple[Series, Series]:
     """Sine and cosine."""
-    s, c = [sin(a[0])], [cos(a[0])]
-    for k in range(1, len(a)):
-        p, q = ZERO, ZERO
-        for i in range(1, k + 1):
-            p = p + a[i] * whole(i) * c[k - i]
-            q = q - a[i] * whole(i) * s[k - i]
-        s.append(p / whole(k))
-        c.append(q / whole(k))
+    rate = slope_of(a)
+    s = Series(lambda _, k: _convolved(rate, c, k - 1) / whole(k) if k else sin(a[0]))
+    c = Series(lambda _, k: -_convolved(rate, s, k - 1) / whole(k) if k else cos(a[0]))
     return s, c
 
 
 def _one(a: Coefficients) -> Coefficients:
-    return constant(ONE_, len(a))
+    return constant(ONE_)
 
 
 def _inverse(a: Coefficients) -> Coefficients:
@@ -96,8 +122,8 @@ def _inverse(a: Coefficients) -> Coefficients:
 
 
 def _sinh(a: Coefficients) -> tuple[Coefficients, Coefficients]:
-    p, m = exponential(a), exponential([-v for v in a])
-    half = lambda v: [x / whole(2) for x in v]
+    p, m = exponential(a), exponential(negative(a))
+    half = lambda v: over(v, constant(whole(2)))
     return half(minus(p, m)), half(plus(p, m))
 
 
@@ -139,7 +165,8 @@ def _pair(w: Coefficients) -> tuple[Coefficients, Coefficients]:
 
 
 def _bell(a: Coefficients) -> Coefficients:
-    return [v * (whole(2) / sqrt(PI)) for v in exponential([-v for v in times(a, a)])]
+    bell, factor = exponential(negative(times(a, a))), whole(2) / sqrt(PI)
+    return Series(lambda _, k: bell[k] * factor)
 
 
 #: Functions of one variable: series of the value and of the derivative.
@@ -150,15 +177,15 @@ FUNCTIONS: dict[str, Callable[[Coefficients], tuple[Coefficients, Coefficients]]
     "log1p": _of(lambda v: log(v + ONE_), lambda a: _inverse(plus(a, _one(a)))),
     "sqrt": lambda a: (root(a), over(_one(a), scaled(root(a), 2))),
     "sq": lambda a: (_squared(a), scaled(a, 2)),
-    "inv": lambda a: (_inverse(a), [-v for v in times(_inverse(a), _inverse(a))]),
+    "inv": lambda a: (_inverse(a), negative(times(_inverse(a), _inverse(a)))),
     "sin": lambda a: circular(a),
-    "cos": lambda a: (circular(a)[1], [-v for v in circular(a)[0]]),
+    "cos": lambda a: (circular(a)[1], negative(circular(a)[0])),
     "tan": _tan,
     "atan": _of(atan, lambda a: _inverse(plus(_one(a), times(a, a)))),
     "asin": _of(_asin, lambda a: _inverse(root(minus(_one(a), times(a, a))))),
     "acos": _of(
         lambda v: PI / whole(2) - _asin(v),
-        lambda a: [-v for v in _inverse(root(minus(_one(a), times(a, a))))],
+        lambda a: negative(_inverse(root(minus(_one(a), times(a, a))))),
     ),
     "sinh": lambda a: _sinh(a),
     "cosh": lambda a: (_sinh(a)[1], _sinh(a)[0]),
@@ -175,7 +202,7 @@ FUNCTIONS: dict[str, Callable[[Coefficients], tuple[Coefficients, Coefficients]]
 
 def _squared(a: Coefficients) -> Coefficients:
     w = times(a, a)
-    return [a[0].sq(), *w[1:]]
+    return Series(lambda _, k: w[k] if k else a[0].sq())
 
 
 class Dual:
@@ -188,8 +215,9 @@ class Dual:
 
 
 def _linear(a: Dual, b: Dual, combine: Callable[..., Coefficients]) -> Dual:
-    zero = [ZERO] * len(a.v)
-    d = None if a.d is None and b.d is None else combine(a.d or zero, b.d or zero)
+    zero = constant(ZERO)
+    known = [zero if d is None else d for d in (a.d, b.d)]
+    d = None if a.d is None and b.d is None else combine(*known)
     return Dual(combine(a.v, b.v), d)
 
 
@@ -202,9 +230,9 @@ def _times(a: Dual, b: Dual) -> Dual:
     return Dual(times(a.v, b.v), d)
 
 
-def _apply(op: str, args: list[Dual], count: int) -> Dual:
+def _apply(op: str, args: list[Dual]) -> Dual:
     if op == "pi":
-        return Dual(constant(PI, count))
+        return Dual(constant(PI))
     a = args[0]
     if op in ("add", "sub"):
         return _linear(a, args[1], plus if op == "add" else minus)
@@ -212,41 +240,41 @@ def _apply(op: str, args: list[Dual], count: int) -> Dual:
         return _times(a, args[1])
     if op == "div":
         return (
-            _times(a, _apply("inv", [args[1]], count))
-            if args[1].d
+            _times(a, _apply("inv", [args[1]]))
+            if args[1].d is not None
             else Dual(over(a.v, args[1].v), None if a.d is None else over(a.d, args[1].v))
         )
     if op in ("neg", "twice"):
         n = -1 if op == "neg" else 2
         return Dual(scaled(a.v, n), None if a.d is None else scaled(a.d, n))
     if op == "pow":
-        return _apply("exp", [_times(args[1], _apply("log", [a], count))], count)
+        return _apply("exp", [_times(args[1], _apply("log", [a]))])
     if op == "hypot":
-        squares = [_apply("sq", [v], count) for v in args]
-        return _apply("sqrt", [_linear(*squares, plus)], count)
+        p, q = (_apply("sq", [v]) for v in args)
+        return _apply("sqrt", [_linear(p, q, plus)])
     if op == "atan2":
-        return _atan2(a, args[1], count)
+        return _atan2(a, args[1])
     if op not in FUNCTIONS:
         raise CheckError(f"the operation {op!r} is not known to this checker")
     v, slope = FUNCTIONS[op](a.v)
     return Dual(v, None if a.d is None else times(slope, a.d))
 
 
-def _atan2(y: Dual, x: Dual, count: int) -> Dual:
+def _atan2(y: Dual, x: Dual) -> Dual:
     if x.v[0].sign() > 0:
-        return _apply("atan", [_apply("div", [y, x], count)], count)
+        return _apply("atan", [_apply("div", [y, x])])
     if not y.v[0].sign():
         raise CheckError("atan2 may jump")
-    quarter = Dual(constant(PI / whole(2 * y.v[0].sign()), count))
-    return _linear(quarter, _apply("atan", [_apply("div", [x, y], count)], count), minus)
+    quarter = Dual(constant(PI / whole(2 * y.v[0].sign())))
+    return _linear(quarter, _apply("atan", [_apply("div", [x, y])]), minus)
 
 
-def evaluate(graph: dict[str, Any], inputs: list[list[Dual]], count: int) -> list[Dual]:
-    """Series of all nodes, where each vector of inputs has so many coefficients."""
+def evaluate(graph: dict[str, Any], inputs: list[list[Dual]]) -> list[Dual]:
+    """Series of all nodes."""
     values: list[Dual] = []
     for op, *rest in graph["nodes"]:
         if op == "const":
-            values.append(Dual(constant(Iv.of(rest[0]), count)))
+            values.append(Dual(constant(Iv.of(rest[0]))))
         elif op == "input":
             values.append(inputs[rest[0]][rest[1]])
         elif op == "power":
@@ -255,7 +283,7 @@ def evaluate(graph: dict[str, Any], inputs: list[list[Dual]], count: int) -> lis
                 result = _times(result, values[rest[0]])
             values.append(result)
         else:
-            values.append(_apply(op, [values[k] for k in rest], count))
+            values.append(_apply(op, [values[k] for k in rest]))
     return values
 
 
@@ -263,22 +291,24 @@ def motion(
     rates: Callable[[list[Coefficients]], list[Coefficients]], x: list[Iv], count: int
 ) -> list[Coefficients]:
     """The first coefficients of x' = rates(x), one order after another."""
-    c = [[v] for v in x]
-    for k in range(1, count):
-        f = rates(c)
-        c = [[*a, b[k - 1] / whole(k)] for a, b in zip(c, f, strict=True)]
-    return c
+    f: list[Coefficients] = []
+
+    def state(i: int) -> Series:
+        return Series(lambda _, k: f[i][k - 1] / whole(k) if k else x[i])
+
+    c: list[Coefficients] = [state(i) for i in range(len(x))]
+    f.extend(rates(c))
+    return [[v[k] for k in range(count)] for v in c]
 
 
 def along_field(
     graph: dict[str, Any], field: list[int], node: int, x: list[Iv], p: list[Iv]
-) -> Coefficients:
+) -> list[Iv]:
     """The first four coefficients of a node along the motion of a field."""
+    still = [Dual(constant(v)) for v in p]
 
     def at(c: list[Coefficients]) -> list[Dual]:
-        n = len(c[0])
-        still = [Dual(constant(v, n)) for v in p]
-        return evaluate(graph, [[Dual(v) for v in c], still, []], n)
+        return evaluate(graph, [[Dual(v) for v in c], still, []])
 
     c = motion(lambda c: [at(c)[k].v for k in field], x, 4)
-    return at(c)[node].v
+    return at(c)[node].v[:4]

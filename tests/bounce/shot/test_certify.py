@@ -1,5 +1,11 @@
 """Bounces are proven to lift off as they do: closed forms, the mirror symmetry, refusals."""
 
+import json
+import subprocess
+import sys
+from fractions import Fraction
+from pathlib import Path
+
 import mpmath
 import numpy as np
 import pytest
@@ -7,6 +13,7 @@ import pytest
 import bounce
 import nonsmooth as ns
 
+CHECKER = Path(__file__).parents[3] / "checker"
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
 
 
@@ -99,3 +106,27 @@ def test_what_is_given_wrongly_is_refused():
         bounce.certify(TURF, 1, (-1, 1), 0)
     with pytest.raises(bounce.ModelError, match="ContactModel"):
         bounce.certify(3, 1, -1, 0)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("change", [None, "earlier", "other"])
+def test_the_checker_follows_a_bounce_again(change, tmp_path):
+    """Slip, rolling, reverse slip and lift-off, with intervals of whole numbers and no code in common."""
+    model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    proof = bounce.certify(model, 0.3, -1.0, 0.1)
+    assert proof.itinerary == "+ s -"
+    path = tmp_path / "bounce.json"
+    proof.orbit.save(path)
+    record = json.loads(path.read_text())["orbit"]
+    if change == "earlier":
+        record["events"][0]["t"] = [
+            str(Fraction(v) - Fraction(1, 10**15)) for v in record["events"][0]["t"]
+        ]
+    elif change == "other":
+        record["events"][0]["after"] = "-"
+    path.write_text(json.dumps({"orbit": record}))
+    done = subprocess.run(
+        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
+    )
+    assert done.returncode == (1 if change else 0)
+    assert ("3 events as claimed" in done.stdout) == (change is None)

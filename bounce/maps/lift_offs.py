@@ -150,7 +150,7 @@ def _in_3d(batch: Batch, drilling: bool, follow: dict[str, Any]) -> LiftOffs3D:
     ended = _ended(batch, follow)
     # A law without a set, such as one with bristles, has no letter for its one phase.
     words = tuple({"o": "*", "F o": "F *"}.get(word, word) for word in ended["itineraries"])
-    end = state_3d(batch.states.reshape(*batch.shape, -1), drilling)
+    end = state_3d(batch.states.reshape(*batch.shape, len(batch.names)), drilling)
     values = {n: getattr(end, n) for n in ("xdot", "ydot", "omega", "x", "y", "slip")}
     return LiftOffs3D(**values, **{**ended, "itineraries": words})
 

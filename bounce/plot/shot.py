@@ -42,6 +42,11 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
     -------
     matplotlib.figure.Figure
 
+    Raises
+    ------
+    nonsmooth.OptionError
+        A bounce in 3-D.
+
     Examples
     --------
     >>> import bounce
@@ -50,6 +55,11 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
     >>> bounce.plot.friction_cone(shot).axes[0].get_xlabel()
     'friction force $\\\\Lambda_T$'
     """
+    if not isinstance(shot, Shot):
+        raise ns.OptionError(
+            f"shot: expected a bounce in the plane, received {shot!r}. In 3-D the cone is one in space: draw "
+            "shot.forces(t) against the load."
+        )
     with style.settings():
         figure, ax = style.axes_for(ax, (6.4, 5.2))
         top = _cone(ax, shot)

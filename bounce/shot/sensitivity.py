@@ -14,11 +14,23 @@ from numpy.typing import NDArray
 import nonsmooth as ns
 
 from .single import Shot
+from .space import Shot3D
 
 Array = NDArray[np.float64]
 
-#: Landing components by which one can differentiate.
-LANDING = ("xdot", "ydot", "omega", "x")
+#: Landing components by which one can differentiate, and the states that change with each.
+LANDING = {name: (name,) for name in ("xdot", "ydot", "omega", "x")}
+#: The same in 3-D, where slip is a state in the place of spin.
+LANDING_3D = {
+    "xdot": ("xdot", "slip_x"),
+    "zdot": ("zdot", "slip_z"),
+    "ydot": ("ydot",),
+    "omega": ("slip_x",),
+    "side_omega": ("slip_z",),
+    "spin": ("spin",),
+    "x": ("x",),
+    "z": ("z",),
+}
 
 
 class Sensitivity(NamedTuple):
@@ -29,7 +41,8 @@ class Sensitivity(NamedTuple):
     names : tuple of str
         The k parameters or landing components.
     state : ndarray (n, k)
-        Of (x, xdot, y, ydot, omega, extra states) at lift-off.
+        Of (x, xdot, y, ydot, omega, extra states) at lift-off; in 3-D of the states of
+        :meth:`Contact3D.system`.
     time : ndarray (k,)
         Of the duration.
     """
@@ -39,7 +52,7 @@ class Sensitivity(NamedTuple):
     time: Array
 
 
-def sensitivity(shot: Shot, names: Sequence[str]) -> Sensitivity:
+def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
     """Differentiate a bounce by parameters of its model or by components of its landing.
 
     The derivative is that of the shot's own itinerary: across a change of itinerary the lift-off is
@@ -48,10 +61,12 @@ def sensitivity(shot: Shot, names: Sequence[str]) -> Sensitivity:
 
     Parameters
     ----------
-    shot : Shot
+    shot : Shot or Shot3D
         The bounce, from :func:`bounce.simulate`.
     names : sequence of str
-        Parameters of ``shot.model``, or "xdot", "ydot", "omega", "x" at touch-down.
+        Parameters of ``shot.model``, or "xdot", "ydot", "omega", "x" at touch-down; in 3-D also "zdot"
+        and "z" (to the right), "side_omega" (the second component of ``omega``), and with drilling
+        "spin" (the third).
 
     Returns
     -------
@@ -77,7 +92,8 @@ def sensitivity(shot: Shot, names: Sequence[str]) -> Sensitivity:
     ('-0.7440793977', '-0.7440793977', True)
     """
     model = shot.model
-    known = [*model.values, *LANDING]
+    landing = _landing(shot)
+    known = [*model.values, *landing]
     for name in names:
         if name not in known:
             raise ns.ParameterError(
@@ -86,7 +102,14 @@ def sensitivity(shot: Shot, names: Sequence[str]) -> Sensitivity:
     return _lift_off(shot, tuple(names))
 
 
-def _lift_off(shot: Shot, names: tuple[str, ...]) -> Sensitivity:
+def _landing(shot: Shot | Shot3D) -> dict[str, tuple[str, ...]]:
+    """The landing components of a shot, and the states that change with each."""
+    known = LANDING_3D if isinstance(shot, Shot3D) else LANDING
+    states = shot.trajectory.system.state_names
+    return {name: changed for name, changed in known.items() if set(changed) <= set(states)}
+
+
+def _lift_off(shot: Shot | Shot3D, names: tuple[str, ...]) -> Sensitivity:
     """Chain the derivatives of the approach and of the contact."""
     values = shot.model.values
     varied = [name for name in names if name in values]
@@ -94,8 +117,8 @@ def _lift_off(shot: Shot, names: tuple[str, ...]) -> Sensitivity:
     states = shot.trajectory.system.state_names
     state, time = np.zeros((len(states), len(names))), np.zeros(len(names))
     for name in names:
-        if name not in values:
-            state[states.index(name), place[name]] = 1.0
+        for changed in () if name in values else _landing(shot)[name]:
+            state[states.index(changed), place[name]] = 1.0
     for run in (shot.approach, shot.trajectory):
         if run is None or not len(run.steps):
             continue

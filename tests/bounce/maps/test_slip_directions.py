@@ -36,6 +36,11 @@ def test_arrays_of_a_law_with_bristles_and_of_what_is_no_landing():
             bounce.lift_off(TURF.in_3d(), ydot=-1.0, **wrong)
 
 
+def test_an_array_of_nothing_has_its_shape():
+    none = bounce.lift_off(TURF.in_3d(), np.zeros((0, 2)), -1.0, np.zeros((3, 1, 2)))
+    assert none.slip.shape == (3, 0, 2) and none.status.shape == (3, 0)
+
+
 def distances(off, eta, k):
     """Squared distances of neighbours in the metric of friction."""
     parts = ((1.0, off["xdot"]), (k, off["omega"]), (eta**2, off["x"]))

@@ -86,3 +86,31 @@ def test_homogeneity():
 def test_unknown_name():
     with pytest.raises(ns.ParameterError, match=r"names among .*received 'nu'"):
         bounce.sensitivity(bounce.simulate(KV, 0.2, -1.0, 1.0), ["nu"])
+
+
+@pytest.mark.parametrize("landing", [([1.0, 0.2], [0.1, 1.0, 0.0]), ([2.0, 0.2], [1.5, 0.4, 0.3])])
+@pytest.mark.parametrize("drilling", [None, 0.1])
+def test_derivatives_of_a_bounce_in_3d_are_those_of_differences(landing, drilling):
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    v, w = landing[0], landing[1] if drilling else landing[1][:2]
+    names = ["mu", "eta", "xdot", "zdot", "omega", "side_omega", "x", "ydot"]
+    names += ["spin"] if drilling else []
+
+    def end(change, by=0.0):
+        values = {"mu": 0.3, "eta": 0.5, "ydot": -1.0, "x": 0.0}
+        pairs = dict(zip(("xdot", "zdot", "omega", "side_omega", "spin"), (*v, *w), strict=False))
+        n = {**values, **pairs}
+        n[change] += by
+        model = turf.replace(mu=n["mu"], eta=n["eta"]).in_3d(drilling_radius=drilling)
+        spin = [n["omega"], n["side_omega"], *([n["spin"]] if drilling else [])]
+        return bounce.simulate(
+            model, [n["xdot"], n["zdot"]], n["ydot"], spin, [n["x"], 0.0], tol=1e-13
+        )
+
+    shot, h = end("mu"), 1e-5
+    found = bounce.sensitivity(shot, names)
+    for k, name in enumerate(names):
+        one, other = (end(name, s * h).trajectory.x[-1] for s in (1, -1))
+        assert found.state[:, k] == pytest.approx((one - other) / (2 * h), abs=5e-6)
+    with pytest.raises(ns.ParameterError, match="side_omega"):
+        bounce.sensitivity(shot, ["tilt"])

@@ -173,6 +173,7 @@ class ContactModel(Parametrised, ABC):
         Returns
         -------
         nonsmooth.FilippovSystem
+            The equations of motion, for everything that ``nonsmooth`` does.
 
         Examples
         --------
@@ -201,6 +202,7 @@ class ContactModel(Parametrised, ABC):
         Returns
         -------
         ContactModel
+            The model with its default values.
         """
         copy = object.__new__(type(self))
         for name, value in vars(self).items():
@@ -236,6 +238,7 @@ class ContactModel(Parametrised, ABC):
         Returns
         -------
         Contact3D
+            The model with a second direction along the ground.
 
         Examples
         --------

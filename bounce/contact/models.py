@@ -134,6 +134,7 @@ def kelvin_voigt_restitution(d2: float) -> float:
     Returns
     -------
     float
+        The coefficient of restitution.
 
     Examples
     --------

@@ -141,6 +141,7 @@ class Contact3D(Parametrised):
         Returns
         -------
         nonsmooth.FilippovSystem
+            The equations of motion, for everything that ``nonsmooth`` does.
         """
         return equations(self.blueprint(weightless=False)).build(self.values)
 

@@ -82,10 +82,15 @@ def fit(
     Returns
     -------
     FitResult
+        Fitted values, their intervals, and what the fit leaves.
 
     Raises
     ------
     DataError, FitError, ModelError, nonsmooth.ParameterError, nonsmooth.OptionError
+        In this order: measurements that cannot be read; no start from which every bounce
+        can be simulated, or too few numbers; a model that breaks its obligations, or does
+        not fit the question; an unknown or missing parameter, or one that is not a finite
+        number; an option outside what is described above.
 
     Warns
     -----

@@ -185,12 +185,14 @@ def flight(
     Returns
     -------
     Flight
+        Carry, height, time and landing; called with a time, the place.
 
     Raises
     ------
     nonsmooth.PointError
         A launch that never rises above the ground.
     nonsmooth.OptionError
+        An option outside what is described above.
 
     Examples
     --------

@@ -198,6 +198,7 @@ def rebound(
     Returns
     -------
     Rebound
+        The bounce, from touch-down to lift-off.
 
     Raises
     ------
@@ -205,6 +206,8 @@ def rebound(
         Neither a law nor a contact model, no scaling for a contact model, another moment of
         inertia or ball than the scaling's.
     LandingError, LiftOffError
+        In this order: a landing that is not finite or moves away from the ground; a ball
+        that does not lift off.
 
     Warns
     -----

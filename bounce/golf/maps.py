@@ -63,6 +63,9 @@ def landing_map(
     ModelError
         As :func:`rebound`.
     LandingError, nonsmooth.OptionError, nonsmooth.ParameterError
+        In this order: a landing that is not finite or moves away from the ground; an option
+        outside what is described above; an unknown or missing parameter, or one that is not
+        a finite number.
 
     Warns
     -----

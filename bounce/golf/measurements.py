@@ -82,10 +82,12 @@ def read_measurements(data: Any, ball: Ball = GOLF, *, bad_rows: str = "raise") 
     Returns
     -------
     Measurements
+        Landings and lift-offs, row by row.
 
     Raises
     ------
     DataError
+        Measurements that cannot be read.
 
     Examples
     --------

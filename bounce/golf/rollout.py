@@ -217,12 +217,16 @@ def play(
     Returns
     -------
     Run
+        Every bounce and every stretch on the ground, until rest.
 
     Raises
     ------
     NoRestError
         More than ``max_bounces``, or no rest on the slope.
     LandingError, LiftOffError, ModelError, nonsmooth.OptionError
+        In this order: a landing that is not finite or moves away from the ground; a ball
+        that does not lift off; a model that breaks its obligations, or does not fit the
+        question; an option outside what is described above.
 
     Warns
     -----

@@ -145,10 +145,14 @@ def side_rebound(
     Returns
     -------
     SideRebound
+        The bounce, with what goes to the side.
 
     Raises
     ------
     ModelError, LandingError, LiftOffError, nonsmooth.OptionError
+        In this order: a model that breaks its obligations, or does not fit the question; a
+        landing that is not finite or moves away from the ground; a ball that does not lift
+        off; an option outside what is described above.
 
     Examples
     --------

@@ -67,6 +67,7 @@ class CrossBounce(BounceLaw):
         Returns
         -------
         RigidShot
+            Speeds and spin at lift-off, and the case of the law.
         """
         rigid = self.rigid.lift_off(xdot, ydot, omega)
         back = self.values["tangential_restitution"]

@@ -82,6 +82,7 @@ class LandingRange:
         Returns
         -------
         ndarray of bool
+            True where a landing is inside.
         """
         inside = [
             (low <= value) & (value <= high)
@@ -142,6 +143,7 @@ class BounceLaw(Parametrised, ABC):
         Returns
         -------
         RigidShot
+            Speeds and spin at lift-off, and the case of the law.
 
         Raises
         ------

@@ -82,6 +82,7 @@ class RigidBounce(BounceLaw):
         Returns
         -------
         RigidShot
+            Speeds and spin at lift-off, and the case of the law.
 
         Raises
         ------

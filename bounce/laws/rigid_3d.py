@@ -69,6 +69,7 @@ def rigid_lift_off_3d(
     Returns
     -------
     RigidShot3D
+        Speeds and spin at lift-off, and the case of the law.
 
     Raises
     ------

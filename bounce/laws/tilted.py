@@ -133,6 +133,7 @@ def penner_restitution(speed: ArrayLike) -> Array:
     Returns
     -------
     ndarray (...)
+        The coefficient of restitution.
 
     Notes
     -----
@@ -164,6 +165,7 @@ def penner_tilt(speed: ArrayLike, angle: ArrayLike) -> Array:
     Returns
     -------
     ndarray (...)
+        The tilt, rad.
 
     Notes
     -----

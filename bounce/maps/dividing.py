@@ -155,6 +155,7 @@ class DividingCurve:
         Returns
         -------
         State
+            The state at touch-down.
 
         Raises
         ------
@@ -226,6 +227,9 @@ def dividing_curve(
         A lift-off without a visible two-fold: the load ends with zero rate (Hertz without
         gravity), friction is single-valued (a bristle), or no force acts along the ground.
     LandingError, ModelError, nonsmooth.OptionError
+        In this order: a landing that is not finite or moves away from the ground; a model
+        that breaks its obligations, or does not fit the question; an option outside what is
+        described above.
 
     Examples
     --------
@@ -285,6 +289,7 @@ def critical_eta(
     Returns
     -------
     float
+        The smallest such ratio.
 
     Raises
     ------

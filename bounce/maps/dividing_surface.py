@@ -76,10 +76,12 @@ def dividing_surface(
     Returns
     -------
     DividingSurface
+        The dividing curves, one for each normal speed.
 
     Raises
     ------
-    As :func:`dividing_curve`.
+    LandingError, ModelError, nonsmooth.OptionError
+        As :func:`dividing_curve`.
 
     Examples
     --------

@@ -99,6 +99,8 @@ def lift_off(
     nonsmooth.ParameterError
         An unknown parameter.
     ModelError, nonsmooth.OptionError
+        In this order: a model that breaks its obligations, or does not fit the question; an
+        option outside what is described above.
 
     Warns
     -----

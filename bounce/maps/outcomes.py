@@ -122,12 +122,14 @@ def outcome_map(
     Returns
     -------
     OutcomeMap
+        Itineraries and lift-offs over the grid.
 
     Raises
     ------
     nonsmooth.OptionError
         Not two names, a name that is neither input nor parameter, a missing or doubled one.
-    As :func:`lift_off`.
+    LandingError, ModelError, nonsmooth.OptionError
+        As :func:`lift_off`.
 
     Examples
     --------

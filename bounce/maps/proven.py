@@ -115,6 +115,9 @@ def proven_map(
     Raises
     ------
     LandingError, ModelError, nonsmooth.MissingError, nonsmooth.OptionError
+        In this order: a landing that is not finite or moves away from the ground; a model
+        that breaks its obligations, or does not fit the question; a package of an extra
+        that is not installed; an option outside what is described above.
 
     Examples
     --------

@@ -130,10 +130,14 @@ def slip_map(
     Returns
     -------
     SlipMap
+        Slip at lift-off over the grid.
 
     Raises
     ------
     LandingError, ModelError, nonsmooth.OptionError
+        In this order: a landing that is not finite or moves away from the ground; a model
+        that breaks its obligations, or does not fit the question; an option outside what is
+        described above.
 
     Examples
     --------
@@ -190,6 +194,7 @@ def winding_number(
     Returns
     -------
     int
+        Turns, positive in the sense of the spin's.
 
     Raises
     ------
@@ -270,6 +275,7 @@ def find_vortices(
     Returns
     -------
     tuple of ndarray (2,)
+        Places of the vortices.
 
     Examples
     --------

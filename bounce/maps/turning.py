@@ -74,6 +74,7 @@ def slip_turn(
     Returns
     -------
     SlipTurn
+        The turn as computed, and as the formula has it.
 
     Examples
     --------

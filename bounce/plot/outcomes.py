@@ -91,6 +91,7 @@ def outcome_map(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

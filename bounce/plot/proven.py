@@ -42,6 +42,7 @@ def proven_map(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Examples
     --------

@@ -25,6 +25,7 @@ def residuals(found: FitResult) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Examples
     --------

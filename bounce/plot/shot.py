@@ -41,6 +41,7 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

@@ -91,6 +91,7 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Examples
     --------

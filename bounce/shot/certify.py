@@ -96,6 +96,7 @@ def certify(
     Returns
     -------
     BounceProof
+        What was proven about the lift-off, and with what bounds.
 
     Raises
     ------
@@ -104,6 +105,9 @@ def certify(
     nonsmooth.ParameterError
         An unknown parameter, or an interval that leaves its limits.
     LandingError, ModelError, nonsmooth.OptionError
+        In this order: a landing that is not finite or moves away from the ground; a model
+        that breaks its obligations, or does not fit the question; an option outside what is
+        described above.
 
     Examples
     --------

@@ -71,6 +71,7 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
     Returns
     -------
     Sensitivity
+        Derivatives of the lift-off by the landing and the parameters.
 
     Raises
     ------

@@ -159,6 +159,7 @@ def simulate(
     Returns
     -------
     Shot or Shot3D
+        The bounce: phases, forces, and the state at lift-off.
 
     Raises
     ------

@@ -56,6 +56,7 @@ class Grid:
     Raises
     ------
     PointError
+        A state of a wrong shape, not finite, or where the question makes no sense.
 
     Examples
     --------
@@ -119,6 +120,7 @@ class RandomStarts:
     Raises
     ------
     PointError
+        A state of a wrong shape, not finite, or where the question makes no sense.
 
     Notes
     -----

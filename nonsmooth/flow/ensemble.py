@@ -83,6 +83,9 @@ def ensemble(
     Raises
     ------
     PointError, ParameterError, OptionError, CompilerError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above; no compiler that makes the engine asked for.
 
     Examples
     --------

@@ -52,6 +52,7 @@ class Section:
     Raises
     ------
     OptionError
+        An option outside what is described above.
 
     Examples
     --------

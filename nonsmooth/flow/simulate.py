@@ -81,10 +81,14 @@ def simulate(
     Returns
     -------
     Trajectory
+        The run: its states at any time, its events, and how it ended.
 
     Raises
     ------
     PointError, ParameterError, OptionError, DefinitionError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above; a system of which this cannot be asked.
 
     Notes
     -----

@@ -57,6 +57,7 @@ class Work:
     Raises
     ------
     OptionError
+        An option outside what is described above.
 
     Examples
     --------
@@ -107,6 +108,7 @@ class Work:
         Raises
         ------
         OptionError
+            An option outside what is described above.
         """
         if self.store is not None:
             return Stored(self.store, problem(), size)

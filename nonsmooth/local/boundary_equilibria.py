@@ -140,12 +140,16 @@ def boundary_equilibrium(
     Returns
     -------
     BoundaryEquilibrium
+        The equilibrium on the surface, with what the linearisations say.
 
     Raises
     ------
     PointError
         Neither field vanishes there, or the point is off the surface.
     DefinitionError, ParameterError, OptionError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number; an option outside what is described
+        above.
 
     Examples
     --------
@@ -322,10 +326,15 @@ def find_boundary_equilibrium(
     Returns
     -------
     BoundaryBifurcation
+        The point and the value of the parameter, with what the bifurcation is.
 
     Raises
     ------
     ConvergenceError, DefinitionError, PointError, ParameterError, OptionError
+        In this order: no solution found from this start; a system of which this cannot be
+        asked; a state of a wrong shape, not finite, or where the question makes no sense;
+        an unknown or missing parameter, or one that is not a finite number; an option
+        outside what is described above.
 
     Examples
     --------

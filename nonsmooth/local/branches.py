@@ -77,6 +77,9 @@ def sliding_branches(
     Raises
     ------
     DefinitionError, ParameterError, PointError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
+        or where the question makes no sense.
 
     Examples
     --------

@@ -60,6 +60,7 @@ def classify(
     Returns
     -------
     LocalObject
+        What the point is, with what is known of such points.
 
     Raises
     ------
@@ -68,6 +69,8 @@ def classify(
     DefinitionError
         Hidden dynamics; a two-fold of a planar system with explicit time.
     ParameterError, OptionError
+        In this order: an unknown or missing parameter, or one that is not a finite number;
+        an option outside what is described above.
 
     Examples
     --------

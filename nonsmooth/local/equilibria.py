@@ -128,12 +128,16 @@ def find_equilibrium(
     Returns
     -------
     Equilibrium
+        The equilibrium found, with its eigenvalues.
 
     Raises
     ------
     ConvergenceError
         With ``residual`` and ``point``, the last iterate.
     PointError, ParameterError, DefinitionError, OptionError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; a system
+        of which this cannot be asked; an option outside what is described above.
 
     Examples
     --------

@@ -105,6 +105,7 @@ def two_fold(
     Returns
     -------
     TwoFold
+        The two-fold with its normal form and its class.
 
     Raises
     ------
@@ -113,6 +114,8 @@ def two_fold(
     DegenerateError
         grad h, grad L1, grad L2 are dependent, or a field has a cusp.
     ParameterError, DefinitionError, OptionError
+        In this order: an unknown or missing parameter, or one that is not a finite number;
+        a system of which this cannot be asked; an option outside what is described above.
 
     Examples
     --------
@@ -174,6 +177,7 @@ def find_two_fold(
     Returns
     -------
     TwoFold
+        The two-fold found, with its normal form and its class.
 
     Raises
     ------
@@ -184,6 +188,9 @@ def find_two_fold(
     DefinitionError
         Fewer than three states that may change.
     PointError, ParameterError, OptionError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above.
 
     Examples
     --------

@@ -82,6 +82,7 @@ def fold_fold(
     Returns
     -------
     FoldFold
+        The two tangencies that meet, and their kind.
 
     Raises
     ------
@@ -90,6 +91,8 @@ def fold_fold(
     PointError
         The fields are not both tangent there.
     ParameterError, OptionError
+        In this order: an unknown or missing parameter, or one that is not a finite number;
+        an option outside what is described above.
 
     Examples
     --------

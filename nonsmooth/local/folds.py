@@ -162,12 +162,16 @@ def fold(
     Returns
     -------
     Fold
+        The tangency: its side, its order and whether it is visible.
 
     Raises
     ------
     PointError
         The field is not tangent there (angle above ``tol``), and as in :func:`region`.
     DefinitionError, ParameterError, OptionError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number; an option outside what is described
+        above.
 
     Examples
     --------
@@ -235,12 +239,16 @@ def find_fold(
     Returns
     -------
     Fold
+        The fold found.
 
     Raises
     ------
     ConvergenceError
         With ``residual`` and ``point``, the last iterate.
     PointError, ParameterError, DefinitionError, OptionError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; a system
+        of which this cannot be asked; an option outside what is described above.
 
     Examples
     --------

@@ -62,6 +62,8 @@ def intersection_range(
     PointError
         No convex combination stays on the intersection.
     DefinitionError, ParameterError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number.
 
     Examples
     --------

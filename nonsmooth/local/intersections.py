@@ -142,12 +142,16 @@ def intersection(
     Returns
     -------
     Intersection
+        The modes that can go on from the point, and what attracts.
 
     Raises
     ------
     PointError
         On no surface, or where the surfaces are not transversal.
     DefinitionError, ParameterError, OptionError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number; an option outside what is described
+        above.
 
     Examples
     --------

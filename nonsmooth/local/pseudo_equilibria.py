@@ -62,6 +62,9 @@ def find_pseudo_equilibrium(
     DefinitionError
         Explicit time, or hidden dynamics.
     PointError, ParameterError, OptionError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above.
 
     Examples
     --------

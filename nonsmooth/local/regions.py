@@ -104,12 +104,15 @@ def region(
     Returns
     -------
     Region
+        What the fields do at the point.
 
     Raises
     ------
     PointError
         Off the surface (the message says how far and gives the nearest point), wrong shape, NaN.
     ParameterError, DefinitionError, OptionError
+        In this order: an unknown or missing parameter, or one that is not a finite number;
+        a system of which this cannot be asked; an option outside what is described above.
 
     Examples
     --------
@@ -180,6 +183,7 @@ def alpha(
     Returns
     -------
     float in [0, 1]
+        The share of the field below.
 
     Raises
     ------
@@ -237,6 +241,7 @@ def sliding_field(
     Returns
     -------
     ndarray (n,)
+        Velocity of the sliding motion.
 
     Raises
     ------

@@ -157,6 +157,7 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
     Returns
     -------
     list
+        The points found, each once.
 
     Examples
     --------

@@ -185,10 +185,12 @@ class TwoFold:
         Returns
         -------
         ndarray (..., 3)
+            Coordinates (z1, z2, z3) of the normal form.
 
         Raises
         ------
         PointError
+            A state of a wrong shape, not finite, or where the question makes no sense.
         """
         return self.chart(x)
 
@@ -207,6 +209,7 @@ class TwoFold:
         Returns
         -------
         ndarray (..., n)
+            States at these coordinates.
 
         Raises
         ------
@@ -223,6 +226,7 @@ class TwoFold:
         Returns
         -------
         ndarray (n, 3)
+            Directions of z1, z2 and z3 in the space of states, as columns.
         """
         return self.chart.tangents()
 
@@ -242,10 +246,12 @@ class TwoFold:
         Returns
         -------
         ndarray (...,)
+            The time; negative where the orbit came from s, NaN where it does neither.
 
         Raises
         ------
         PointError
+            A state of a wrong shape, not finite, or where the question makes no sense.
         """
         z = np.asarray(z, dtype=float)
         if z.ndim == 0 or z.shape[-1] != 2 or not np.all(np.isfinite(z)):

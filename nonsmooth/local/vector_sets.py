@@ -107,6 +107,8 @@ def limit_directions(
     DefinitionError
         A system without such sets, or a surface that is none.
     ParameterError, OptionError
+        In this order: an unknown or missing parameter, or one that is not a finite number;
+        an option outside what is described above.
 
     Examples
     --------

@@ -1,7 +1,6 @@
 """WHAT a nonsmooth system is: states, parameters, fields, switching surfaces, stops and resets.
 
-Internally the state carries the time as a last component when the system depends on it, so Lie
-derivatives and jets include the explicit-time terms without any special case.
+Where it depends on time, the state carries that as a last component, in Lie derivatives and jets too.
 """
 
 from __future__ import annotations
@@ -155,15 +154,12 @@ class FilippovSystem(Structure):
         hidden : bool, optional
             Keep switches that enter nonlinearly as they are written (hidden dynamics).
 
-        Returns
-        -------
-        FilippovSystem
-
         Raises
         ------
         NotSmoothError
             floor, ceil, fmod, an equality, or a condition that is no comparison.
         DefinitionError
+            A system of which this cannot be asked.
 
         Notes
         -----
@@ -287,7 +283,8 @@ class FilippovSystem(Structure):
 
         Returns
         -------
-        SX scalar, explicit-time terms included.
+        SX scalar
+            Explicit-time terms included.
 
         Examples
         --------
@@ -350,10 +347,12 @@ class FilippovSystem(Structure):
         Returns
         -------
         ndarray of the expression's shape
+            Its values at the point.
 
         Raises
         ------
         PointError, ParameterError, DefinitionError
+            A point, parameters or an expression that do not fit.
 
         Examples
         --------
@@ -378,7 +377,8 @@ class FilippovSystem(Structure):
 
         Returns
         -------
-        ndarray, in the order of ``parameter_names``
+        ndarray (p,)
+            In the order of ``parameter_names``.
 
         Raises
         ------

@@ -153,6 +153,9 @@ def basins(
     Raises
     ------
     OptionError, PointError, ParameterError
+        In this order: an option outside what is described above; a state of a wrong shape,
+        not finite, or where the question makes no sense; an unknown or missing parameter,
+        or one that is not a finite number.
 
     Examples
     --------

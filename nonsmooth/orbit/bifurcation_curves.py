@@ -241,6 +241,8 @@ def continue_bifurcation(
     Raises
     ------
     DefinitionError, OptionError, ConvergenceError
+        In this order: a system of which this cannot be asked; an option outside what is
+        described above; no solution found from this start.
 
     Examples
     --------

@@ -175,6 +175,9 @@ def find_homoclinic(
     DegenerateError
         The point is no saddle.
     OptionError, ParameterError, PointError, DefinitionError
+        In this order: an option outside what is described above; an unknown or missing
+        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
+        or where the question makes no sense; a system of which this cannot be asked.
 
     Notes
     -----

@@ -316,6 +316,10 @@ def continue_equilibrium(
     Raises
     ------
     ConvergenceError, DefinitionError, OptionError, ParameterError, PointError
+        In this order: no solution found from this start; a system of which this cannot be
+        asked; an option outside what is described above; an unknown or missing parameter,
+        or one that is not a finite number; a state of a wrong shape, not finite, or where
+        the question makes no sense.
 
     Examples
     --------

@@ -95,6 +95,7 @@ def periodic_orbit(
     Returns
     -------
     PeriodicOrbit
+        The closed orbit: period, itinerary and multipliers.
 
     Raises
     ------
@@ -104,6 +105,9 @@ def periodic_orbit(
     DegenerateError
         The orbit grazes, or passes a two-fold or a corner.
     OptionError, ParameterError, PointError
+        In this order: an option outside what is described above; an unknown or missing
+        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
+        or where the question makes no sense.
 
     Notes
     -----

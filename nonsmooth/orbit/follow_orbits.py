@@ -65,6 +65,8 @@ def continue_orbit(
     Raises
     ------
     ConvergenceError, DefinitionError, OptionError
+        In this order: no solution found from this start; a system of which this cannot be
+        asked; an option outside what is described above.
 
     Examples
     --------

@@ -66,6 +66,7 @@ def funnel(
     Returns
     -------
     Funnel
+        Sampled futures, and how each of them departs.
 
     Raises
     ------
@@ -74,6 +75,9 @@ def funnel(
     DegenerateError
         A two-fold that is not generic.
     OptionError, ParameterError, DefinitionError
+        In this order: an option outside what is described above; an unknown or missing
+        parameter, or one that is not a finite number; a system of which this cannot be
+        asked.
 
     Notes
     -----

@@ -130,6 +130,9 @@ def lyapunov_spectrum(
     DegenerateError
         The run ends before, grazes a surface, or meets two at one instant.
     PointError, ParameterError, OptionError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above.
 
     Notes
     -----

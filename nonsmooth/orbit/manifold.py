@@ -130,6 +130,9 @@ def manifold(
     DegenerateError
         No such manifold, or one of more than two dimensions.
     OptionError, ParameterError, DefinitionError
+        In this order: an option outside what is described above; an unknown or missing
+        parameter, or one that is not a finite number; a system of which this cannot be
+        asked.
 
     Notes
     -----

@@ -176,10 +176,15 @@ def poincare(
     Returns
     -------
     PoincareOrbit
+        The returns to the section, in order.
 
     Raises
     ------
     PointError, ParameterError, OptionError, DefinitionError, NotSmoothError
+        In this order: a state of a wrong shape, not finite, or where the question makes no
+        sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above; a system of which this cannot be asked; an
+        operation without the derivatives that are needed.
 
     Examples
     --------

@@ -50,6 +50,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
     Returns
     -------
     Sensitivity
+        Derivatives of the end of the run by its start and its parameters.
 
     Raises
     ------
@@ -57,6 +58,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
         An event that is grazed, two independent events at one instant, impacts that accumulate, a
         status without an end.
     ParameterError
+        An unknown or missing parameter, or one that is not a finite number.
 
     Notes
     -----
@@ -132,6 +134,7 @@ def gradient(
     DefinitionError, NotSmoothError
         The cost.
     ParameterError
+        An unknown or missing parameter, or one that is not a finite number.
 
     Examples
     --------
@@ -206,7 +209,8 @@ def vjp(
 
     Raises
     ------
-    As :func:`sensitivity`; PointError for the shape.
+    PointError
+        Cotangents of a wrong shape; otherwise as :func:`sensitivity`.
 
     Examples
     --------
@@ -269,6 +273,7 @@ def saltation_matrix(
     Returns
     -------
     ndarray (n, n)
+        The factor by which an event multiplies small deviations.
 
     Raises
     ------
@@ -277,6 +282,9 @@ def saltation_matrix(
     OptionError
         The modes do not tell the event.
     DefinitionError, ParameterError, PointError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
+        or where the question makes no sense.
 
     Notes
     -----

@@ -85,12 +85,16 @@ def trace_two_folds(
     Returns
     -------
     list of k TwoFold
+        The two-folds along the curve, in order.
 
     Raises
     ------
     TraceError
         A search failed or met a degenerate two-fold; ``value`` and the ``folds`` before it.
     DefinitionError, ParameterError, PointError, OptionError
+        In this order: a system of which this cannot be asked; an unknown or missing
+        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
+        or where the question makes no sense; an option outside what is described above.
 
     Examples
     --------

@@ -48,6 +48,7 @@ def basins(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

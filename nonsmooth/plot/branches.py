@@ -81,6 +81,7 @@ def branch(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------
@@ -247,6 +248,7 @@ def bifurcation_curves(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

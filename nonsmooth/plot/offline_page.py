@@ -44,6 +44,7 @@ def offline_page(
     Returns
     -------
     str
+        The page, as HTML.
 
     Raises
     ------

@@ -53,6 +53,7 @@ def periodic_orbit(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------
@@ -148,6 +149,7 @@ def multipliers(
     Returns
     -------
     matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

@@ -87,12 +87,16 @@ def phase_portrait(
     Returns
     -------
     matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------
     DefinitionError
         The system is not planar, depends on time, or has not exactly one surface.
     OptionError, PointError, ParameterError
+        In this order: an option outside what is described above; a state of a wrong shape,
+        not finite, or where the question makes no sense; an unknown or missing parameter,
+        or one that is not a finite number.
 
     Examples
     --------

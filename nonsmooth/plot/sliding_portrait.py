@@ -88,6 +88,7 @@ def sliding_portrait(
     Returns
     -------
     matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------
@@ -95,6 +96,8 @@ def sliding_portrait(
         Not three states, explicit time, several surfaces, hidden dynamics; a state that is none;
         no surface in the box.
     OptionError, ParameterError
+        In this order: an option outside what is described above; an unknown or missing
+        parameter, or one that is not a finite number.
 
     Examples
     --------

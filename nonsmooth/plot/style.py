@@ -50,7 +50,6 @@ GREY = "#7F7F7F"
 
 #: The two fields: F1 (h > 0) and F2 (h < 0). F2 is also drawn dashed where the two meet.
 ABOVE, BELOW = VERMILLION, BLUE
-#: The same by the letter of the side.
 FIELDS = {"+": ABOVE, "-": BELOW}
 #: Sliding orbits in the attracting and the repelling region.
 ATTRACTING, REPELLING = "#1A1A1A", "#8A5A00"
@@ -125,6 +124,7 @@ def check_size(size: object) -> tuple[float, float]:
     Returns
     -------
     (float, float)
+        Width and height, as numbers.
 
     Raises
     ------
@@ -163,6 +163,7 @@ def new_figure(size: object) -> Figure:
     Returns
     -------
     matplotlib Figure
+        An empty figure.
 
     Raises
     ------
@@ -190,6 +191,7 @@ def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
     Returns
     -------
     (matplotlib Figure, matplotlib Axes)
+        The figure and the axes to draw on.
 
     Raises
     ------
@@ -331,6 +333,7 @@ def inside(curve: ArrayLike, box: tuple[float, float, float, float]) -> list[Arr
     Returns
     -------
     list of ndarray (k, 2)
+        The pieces, in the order of the curve.
 
     Examples
     --------
@@ -367,11 +370,7 @@ def line(
     Returns
     -------
     matplotlib Line2D
-
-    Examples
-    --------
-    >>> line(ABOVE, "orbits above").get_label()
-    'orbits above'
+        For ``handles=`` of a legend.
     """
     return Line2D([], [], color=color, linewidth=width, linestyle=dashes, label=label, alpha=alpha)
 
@@ -395,6 +394,7 @@ def marker(shape: str, label: str, fill: str = BLACK, size: float = 6.0, **optio
     Returns
     -------
     matplotlib Line2D
+        For ``handles=`` of a legend.
     """
     look = {"markeredgecolor": BLACK, "markerfacecolor": fill, "markersize": size, **options}
     return Line2D([], [], linestyle="none", marker=shape, label=label, **look)

@@ -70,6 +70,7 @@ def trajectory(
     Returns
     -------
     matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

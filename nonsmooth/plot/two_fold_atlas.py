@@ -167,6 +167,7 @@ def two_fold_map(
     Returns
     -------
     matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------

@@ -70,12 +70,14 @@ def two_fold(
     Returns
     -------
     matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------
     DefinitionError
         ``fold`` is not a two-fold.
     OptionError
+        An option outside what is described above.
 
     Examples
     --------

@@ -72,12 +72,14 @@ def two_fold_3d(
     Returns
     -------
     matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
 
     Raises
     ------
     DefinitionError
         ``fold`` is not a two-fold.
     OptionError
+        An option outside what is described above.
 
     Examples
     --------

@@ -76,6 +76,9 @@ def certify(
     NotSmoothError
         An operation that jumps or has a kink.
     OptionError, ParameterError, DefinitionError
+        In this order: an option outside what is described above; an unknown or missing
+        parameter, or one that is not a finite number; a system of which this cannot be
+        asked.
 
     Notes
     -----

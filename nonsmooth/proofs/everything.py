@@ -78,6 +78,10 @@ def prove_all(
     Raises
     ------
     MissingError, OptionError, ParameterError, DefinitionError, NotSmoothError
+        In this order: a package of an extra that is not installed; an option outside what
+        is described above; an unknown or missing parameter, or one that is not a finite
+        number; a system of which this cannot be asked; an operation without the derivatives
+        that are needed.
 
     Notes
     -----

@@ -68,10 +68,16 @@ def certify_orbit(
     Returns
     -------
     OrbitProof
+        What was proven about the orbit, and with what bounds.
 
     Raises
     ------
     MissingError, DefinitionError, PointError, ParameterError, OptionError, NotSmoothError
+        In this order: a package of an extra that is not installed; a system of which this
+        cannot be asked; a state of a wrong shape, not finite, or where the question makes
+        no sense; an unknown or missing parameter, or one that is not a finite number; an
+        option outside what is described above; an operation without the derivatives that
+        are needed.
 
     Notes
     -----

@@ -136,10 +136,12 @@ def by_name(name: str) -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Raises
     ------
     OptionError
+        An option outside what is described above.
 
     Examples
     --------

@@ -17,6 +17,7 @@ def bouncing_ball() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -59,6 +60,7 @@ def impact_oscillator() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -110,6 +112,7 @@ def kelvin_voigt_bounce() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----

@@ -22,6 +22,7 @@ def multi_sliding_relay() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -71,6 +72,7 @@ def forced_dry_friction() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -132,6 +134,7 @@ def belt_oscillator() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -185,6 +188,7 @@ def simplest_walker() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -251,6 +255,7 @@ def buck_converter() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----

@@ -18,6 +18,7 @@ def spiral_oscillator() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -64,6 +65,7 @@ def scalar_sliding() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -98,6 +100,7 @@ def scalar_repelling() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -133,6 +136,7 @@ def planar_relay() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -174,6 +178,7 @@ def pseudo_hopf() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -216,6 +221,7 @@ def piecewise_cycle() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----

@@ -24,6 +24,7 @@ def block_on_incline() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -70,6 +71,7 @@ def block_on_belt() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -113,6 +115,7 @@ def block_on_disc() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -159,6 +162,7 @@ def cue_ball() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -209,6 +213,7 @@ def turntable() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -257,6 +262,7 @@ def pivoting_disc() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -308,6 +314,7 @@ def shaken_block() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----

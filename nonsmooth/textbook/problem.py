@@ -201,6 +201,7 @@ class Problem:
         Returns
         -------
         Trajectory
+            The run of its example.
         """
         x, p = self.start_at(at or {})
         end = self.t_end if t_end is None else t_end

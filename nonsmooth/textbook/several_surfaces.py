@@ -17,6 +17,7 @@ def two_relay_spiral() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -64,6 +65,7 @@ def glass_loop() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -124,6 +126,7 @@ def ambiguous_exit() -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----
@@ -182,6 +185,7 @@ def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
     Returns
     -------
     Problem
+        The system, a start, and the values that are known of it.
 
     Notes
     -----

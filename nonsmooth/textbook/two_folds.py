@@ -53,6 +53,7 @@ def two_fold(
     Raises
     ------
     OptionError
+        An option outside what is described above.
 
     Notes
     -----

@@ -1,4 +1,4 @@
-"""Every public name is on one page of the API, and every parameter and attribute is described there."""
+"""Every public name is on one page of the API, and all it takes, has, returns and raises is described."""
 
 import importlib.util
 import inspect
@@ -19,13 +19,13 @@ _spec.loader.exec_module(api)
 
 OBJECTS = dict(api.objects())
 SECTION = re.compile(
-    r"^(?:Other Parameters|Parameters|Attributes)\n-+\n(.*?)(?=^[A-Z][A-Za-z ]*\n-+$|\Z)",
+    r"^(?:Other Parameters|Parameters|Attributes|Returns|Yields|Raises|Warns)\n-+\n(.*?)(?=^[A-Z][A-Za-z ]*\n-+$|\Z)",
     re.MULTILINE | re.DOTALL,
 )
 
 
 def undescribed(doc):
-    """Entries of a docstring's lists of parameters and attributes that have no description."""
+    """Entries of a docstring's lists (parameters, what is returned and raised) without a description."""
     bare = []
     for section in SECTION.findall(inspect.cleandoc(doc)):
         entries = re.split(r"^(?=\S)", section, flags=re.MULTILINE)
@@ -44,7 +44,7 @@ def docstrings(path, thing):
 
 
 @pytest.mark.parametrize("path", OBJECTS)
-def test_every_parameter_and_attribute_is_described(path):
+def test_every_parameter_attribute_result_and_error_is_described(path):
     missing = {
         where: bare for where, doc in docstrings(path, OBJECTS[path]) if (bare := undescribed(doc))
     }
@@ -64,10 +64,20 @@ def test_what_is_undescribed_is_seen():
     ----------
     d : str
 
+    Returns
+    -------
+    float
+
+    Raises
+    ------
+    ValueError
+        No number.
+    OSError, KeyError
+
     Examples
     --------
     """
-    assert undescribed(doc) == ["a : int", "d : str"]
+    assert undescribed(doc) == ["a : int", "d : str", "float", "OSError, KeyError"]
 
 
 @pytest.mark.parametrize("module", [ns, bounce, bounce.golf, bounce.laws], ids=lambda m: m.__name__)

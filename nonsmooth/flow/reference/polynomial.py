@@ -238,6 +238,7 @@ def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> f
     Returns
     -------
     float or None
+        The time of the first crossing; None if there is none.
 
     Examples
     --------

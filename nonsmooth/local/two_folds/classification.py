@@ -300,6 +300,7 @@ def classify_two_fold(
     Returns
     -------
     Classification
+        The class, and what it means for orbits and for determinism.
 
     Raises
     ------

@@ -62,6 +62,7 @@ def flight_above(z: ArrayLike, nu: Nu) -> Array:
     Returns
     -------
     ndarray (..., 2)
+        Where the flights land.
 
     Examples
     --------
@@ -85,6 +86,7 @@ def flight_below(z: ArrayLike, nu: Nu) -> Array:
     Returns
     -------
     ndarray (..., 2)
+        Where the flights land.
 
     Examples
     --------
@@ -108,6 +110,7 @@ def return_matrix(nu: Nu) -> Array:
     Returns
     -------
     ndarray (2, 2)
+        The linear map of two successive flights.
 
     Examples
     --------
@@ -221,10 +224,12 @@ def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
     Returns
     -------
     float
+        The time to the two-fold along the contracting line of the diabolo.
 
     Raises
     ------
     OptionError
+        An option outside what is described above.
 
     Examples
     --------

@@ -52,6 +52,7 @@ def normal_form(lie: Mapping[str, float]) -> NormalForm:
     Returns
     -------
     NormalForm
+        Signs, numbers and scales of the normal form.
 
     Raises
     ------

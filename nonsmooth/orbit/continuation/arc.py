@@ -84,6 +84,7 @@ def trace(
     Returns
     -------
     Arc
+        The arc, with why it ended.
     """
     arc = Arc()
     tracing = _Tracing(curve, arc, step, smallest, bounds)

@@ -181,6 +181,7 @@ class Curve:
         Raises
         ------
         numpy.linalg.LinAlgError
+            A singular matrix.
         """
         return np.asarray(np.linalg.solve(matrix, right), float)
 

@@ -50,6 +50,7 @@ def pieces(
     Yields
     ------
     Departure, Arc
+        A start, and the arc that was followed from it.
     """
     ends: list[Array] = []
     for _ in range(most):
@@ -136,6 +137,7 @@ def changes_around(
     Yields
     ------
     angle, label before, label after
+        Where the label changes, and from what to what.
     """
     angles = start + np.linspace(-np.pi, np.pi, count)[leave_out : count - leave_out]
     labels = [label(float(a)) for a in angles]

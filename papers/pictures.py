@@ -66,13 +66,15 @@ def faults(figure: Figure) -> list[str]:
     width, found = figure.get_figwidth(), list[str]()
     if width > PAGE:
         found.append(f"it is {width:g} inches wide, more than the {PAGE:g} of a page.")
-    figure.draw_without_rendering()
+    for _ in range(2):  # as saving does: the first layout does not know how high titles are
+        figure.draw_without_rendering()
     paper = figure.bbox.padded(1.0)  # pixel
     for text in _texts(figure):
         if text.get_fontsize() < SMALLEST - 0.01:
             found.append(f"{text.get_text()!r} is in {text.get_fontsize():g} point.")
         box = text.get_window_extent()
-        clipped = text.get_clip_on() and text.axes is not None and not text.axes.bbox.overlaps(box)
+        inside = text.get_clip_on() and text.get_clip_box() is not None and text.axes is not None
+        clipped = inside and not text.axes.bbox.overlaps(box)
         in_space = isinstance(text, Text3D)  # whose place is known only while it is drawn
         if not (clipped or in_space or (paper.contains(*box.p0) and paper.contains(*box.p1))):
             found.append(f"{text.get_text()!r} is cut off.")

@@ -109,12 +109,15 @@ def test_faults_of_print_are_found():
         figure = look.new_figure(7.5, 3.0)
         axes = figure.add_subplot()
         axes.plot([0, 1], [0, 1])
+        figure.set_layout_engine("none")
         axes.text(0.5, 0.5, "small", fontsize=6)
         figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
         axes.text(5.0, 0.5, "outside", clip_on=True)
+        axes.set_title("high", y=1.5)
         found = " ".join(faults(figure))
     assert "7.5 inches wide" in found and "'small' is in 6 point" in found
     assert "right side' is cut off" in found and "outside" not in found
+    assert "'high' is cut off" in found
 
 
 def test_all_folders_are_listed():

@@ -12,7 +12,8 @@ _FONTS: Any = {"pdf.fonttype": 42, "ps.fonttype": 42}
 
 
 class PrintFigure(Figure):
-    """A figure that saves TrueType fonts into PDF and PostScript, whatever the user's settings."""
+    """A figure that saves TrueType fonts into PDF and PostScript, whatever the user's settings, and
+    whose layout has settled before it is saved."""
 
     def savefig(self, fname: Any, **options: Any) -> None:
         """Save the figure.
@@ -25,4 +26,5 @@ class PrintFigure(Figure):
             Of ``matplotlib.figure.Figure.savefig``.
         """
         with mpl.rc_context(_FONTS):
+            self.draw_without_rendering()  # the first layout does not know how high titles are
             super().savefig(fname, **options)

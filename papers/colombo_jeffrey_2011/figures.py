@@ -37,7 +37,7 @@ def _portraits(names: tuple[str, ...]) -> Callable[[], Figure]:
     def draw() -> Figure:
         with look.settings():
             rows = (len(names) + 1) // 2
-            figure = look.new_figure(7.0, 3.2 * rows + (0.9 if len(names) % 2 == 0 else 0.2))
+            figure = look.new_figure(7.0, 3.2 * rows + (1.4 if len(names) == 2 else 0.9))
             axes = figure.subplots(rows, 2).ravel()
             for ax, name in zip(axes, names, strict=False):
                 ns.plot.two_fold(CLASSES[name], ax=ax, legend=False)

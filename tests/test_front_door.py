@@ -34,6 +34,20 @@ RESULTS = {
     "PseudoEquilibrium",
     "SlidingBranch",
 }
+ORBITS = {
+    "Basins",
+    "BifurcationCurve",
+    "Branch",
+    "BranchEvent",
+    "CodimensionTwo",
+    "Connection",
+    "FarSide",
+    "Funnel",
+    "Gradient",
+    "LyapunovSpectrum",
+    "Manifold",
+    "PoincareOrbit",
+}
 
 
 def test_dir_is_the_front_door_and_nothing_else():
@@ -44,12 +58,14 @@ def test_dir_is_the_front_door_and_nothing_else():
 
 def test_modules_at_the_front_door_are_those_it_speaks_of():
     modules = {n for n in ns.__all__ if isinstance(getattr(ns, n), types.ModuleType)}
-    assert modules == {"continuation", "local", "plot", "textbook", "two_folds"}
+    assert modules == {"continuation", "local", "orbit", "plot", "textbook", "two_folds"}
     for name in modules:
         assert name in inspect.getdoc(ns)
 
 
-@pytest.mark.parametrize(("door", "names"), [("two_folds", TWO_FOLDS), ("local", RESULTS)])
+@pytest.mark.parametrize(
+    ("door", "names"), [("two_folds", TWO_FOLDS), ("local", RESULTS), ("orbit", ORBITS)]
+)
 def test_each_name_has_one_place(door, names):
     module = getattr(ns, door)
     assert names <= set(module.__all__)

@@ -64,7 +64,7 @@ class Grid:
     >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
     >>> system = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 1], below=[v, -x + 1])
     >>> starts = ns.Grid([np.linspace(-3, 3, 7), 0.0])
-    >>> ns.ensemble(system, starts, t_end=50.0).x[:, 0]
+    >>> np.round(ns.ensemble(system, starts, t_end=50.0).x[:, 0], 9) + 0.0
     array([ 1.,  0., -1.,  0.,  1.,  0., -1.])
     """
 

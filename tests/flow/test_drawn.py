@@ -104,3 +104,8 @@ def test_they_are_part_of_what_a_checkpoint_belongs_to(tmp_path):
 def test_what_is_no_start_is_refused(make):
     with pytest.raises(ns.PointError, match="expected"):
         make()
+
+
+def test_they_say_how_many_they_are():
+    assert repr(ns.Grid([[0.0, 1.0], 2.0])) == "Grid(shape (2,), 2 states)"
+    assert "count=3" in repr(ns.RandomStarts(3, [0.0], [1.0]))

@@ -71,6 +71,11 @@ def test_a_parameter_that_is_no_restitution_is_refused(e):
     assert [ns.Status(s) for s in run.status] == [ns.Status.REACHED_END, ns.Status.INCONSISTENT]
 
 
+def test_a_gap_without_states_is_refused():
+    with pytest.raises(ns.DefinitionError, match="gap of 'impact'"):
+        ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(q), parameters={q: 1.0})
+
+
 @engines
 def test_a_start_at_rest_needs_no_accumulation(engine):
     ball = ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=0.9))

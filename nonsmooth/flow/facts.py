@@ -91,6 +91,9 @@ AT_ONCE = 40  # events at one instant
 REACHED = 0.1
 LEFT = 1e-6
 
+#: A set is reached where no more than so many of the shortest steps are left to it.
+TENFOLD = 20.0
+
 #: Coefficients of a series grow as the inverse time to a set to their order: it is reached before they
 #: are larger than this.
 OVERFLOW = 1e280

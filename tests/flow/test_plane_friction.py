@@ -311,3 +311,28 @@ def test_a_line_crosses_again_within_the_step_that_left(engine):
     axis = ns.simulate(plane.ball(), along, 20.0, parameters=p, tol=1e-13, engine=engine)
     assert run.itinerary == axis.itinerary == "* * *" and run.status == ns.Status.STOPPED
     assert np.hypot(*run.x[-1, 2:4]) == pytest.approx(abs(axis.x[-1, 2]), abs=1e-13)
+
+
+@pytest.mark.parametrize("engine", ["reference", "compiled"])
+@pytest.mark.parametrize("skew", [0.0, 2.0])
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e3, 1e6])
+def test_a_set_is_reached_whatever_the_unit_of_time(size, skew, engine):
+    """h' = -c (1 + i skew) h/|h| in the complex plane: h winds into zero, and the place is its integral.
+
+    Late in a long run the last part of the way is shorter than the rounding of the time.
+    """
+    x, y, u, v = (ca.SX.sym(name) for name in "xyuv")
+    lam, c = ca.SX.sym("lam", 2), 2.943
+    force = -c * ca.vertcat(lam[0] - skew * lam[1], skew * lam[0] + lam[1])
+    block = ns.FilippovSystem(
+        [x, y, u, v],
+        field=ca.vertcat(u, v, force),
+        surfaces=[ca.vertcat(u, v)],
+        multipliers=[lam],
+    )
+    options = dict(atol=1e-12 * size, rtol=1e-12, engine=engine)
+    run = ns.simulate(block, [0.0, 0.0, size, size], 5 * size, **options)
+    place = 2 * size**2 / c * np.exp(0.25j * np.pi) / (2 + 1j * skew)
+    assert run.itinerary == "* s" and run.status is ns.Status.REACHED_END
+    assert abs(run.events[0].t * c / (size * 2**0.5) - 1) < 1e-11
+    assert abs(complex(*run.x[-1][:2]) - place) < 1e-11 * abs(place)

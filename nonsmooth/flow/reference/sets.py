@@ -16,7 +16,7 @@ import numpy as np
 from ...model import Array, FilippovSystem, Guard, multiplier_enters
 from ...model.frozen import field_at, frozen
 from ...model.multiplier_series import unit
-from ..facts import EPSILON, LEFT, OVERFLOW, REACHED, VANISHES
+from ..facts import EPSILON, LEFT, OVERFLOW, REACHED, SHORTEST, TENFOLD, VANISHES
 from .modes import rounding_scale, tolerances
 
 if TYPE_CHECKING:
@@ -45,7 +45,7 @@ def near(driver: Driver, guard: Guard, fell: bool = True) -> None:
     at_floor = r <= VANISHES * scale
     hits = law.attracts
     dt = law.time_left(h) if hits else law.straight(h)
-    at_floor = at_floor or dt < shortest(driver)
+    at_floor = at_floor or dt < max(shortest(driver), swallowed(driver))
     if not hits and not at_floor:
         return
     if not (0.0 < dt < np.inf):
@@ -91,6 +91,11 @@ def look(driver: Driver) -> None:
 def shortest(driver: Driver) -> float:
     """Time to a set below which coefficients of series are too large for numbers."""
     return float(OVERFLOW ** (-1.0 / driver.options.order))
+
+
+def swallowed(driver: Driver) -> float:
+    """Time to a set below which rounding of the time leaves no room for a step of a tenfold fall."""
+    return TENFOLD * SHORTEST * max(abs(driver.t), abs(driver.t - driver.options.t_start))
 
 
 def met(driver: Driver, mode: str, members: tuple[int, ...], h: Array) -> bool:

@@ -183,7 +183,7 @@ static void near_set(Run *r, int row, int fell) {
     square += a[i] * a[i];
   }
   dt = hits && same ? (c * radius + along) / (c * c - square) : rate < 0 ? radius / -rate : INFINITY;
-  at_floor |= dt < shortest(r);
+  at_floor |= dt < larger(shortest(r), TENFOLD * SHORTEST * larger(fabs(r->t), fabs(r->t - r->begun)));
   if (!hits && !at_floor) return;
   if (!(dt > 0 && dt < INFINITY)) {
     if (!(at_floor && (hits || fell))) return;

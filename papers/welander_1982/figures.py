@@ -131,7 +131,6 @@ def diagram() -> Figure:
                 ax.axvline(value, color=look.GREY, linewidth=0.8, linestyle=look.DOTS)
         for value, words in (
             (BOUNDARY_MIXED, "mixed equilibrium\nmeets the threshold"),
-            (0.0, "fused focus"),
             (BOUNDARY_RESTING, "resting equilibrium\nmeets the threshold"),
         ):
             upper.text(value, 1.12, words, ha="center", va="bottom")

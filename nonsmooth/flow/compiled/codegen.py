@@ -127,6 +127,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
             defines,
             driver_text("common.h"),
             driver_text("vector.h"),
+            driver_text("polynomials.h"),
             program,
             driver_text("lanes.c"),
         ]

@@ -15,8 +15,6 @@
  */
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)
-#define HEAD 5 /* below P, which is 6 at least */
-#define MODEL (P < 8 ? P : 8)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
 #define MEMORY 256
@@ -279,112 +277,9 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
   return EXP2(MIN(h1, h2));
 }
 
-/* Roots ---------------------------------------------------------------------------------------- */
+/* Roots: polynomials.h --------------------------------------------------------------------------- */
 
-/* Power coefficients of degree n on [0, 1] to Bernstein coefficients, in place. */
-INLINE void to_bernstein(T *b, int n) {
-  double binomial = 1;
-  UNROLL for (int i = 0; i <= n; i++) { b[i] *= 1.0 / binomial; binomial = binomial * (n - i) / (i + 1); }
-  UNROLL for (int level = 1; level <= n; level++)
-    UNROLL for (int i = n; i >= level; i--) b[i] += b[i - 1];
-}
-
-/* Roots on (0, 1] of a polynomial positive at 0, without isolating them: bounds by a head of degree
- * HEAD in Bernstein form and the sum of the rest. ``none``: it stays positive. ``one``: it ends at or
- * below zero and falls throughout, is concave or is convex, so it has exactly one root.
- * ``unresolved``: the series does not converge well within the step. */
-INLINE void screen(const T *a, I *none, I *one, I *unresolved, T *end) {
-  T tail = BC(0), tail1 = BC(0), tail2 = BC(0), sum = BC(0), b[HEAD + 1];
-  UNROLL for (int k = HEAD + 1; k <= P; k++) {
-    T c = ABS(a[k]);
-    tail += c;
-    tail1 += (double)k * c;
-    tail2 += (double)(k * (k - 1)) * c;
-    sum += a[k];
-  }
-  T noise = tail;
-  UNROLL for (int k = 0; k <= HEAD; k++) { b[k] = a[k]; noise += ABS(a[k]); }
-  to_bernstein(b, HEAD);
-  T low = b[0], steepest = b[1] - b[0], most = b[2] - 2.0 * b[1] + b[0], least = most;
-  UNROLL for (int k = 1; k <= HEAD; k++) low = MIN(low, b[k]);
-  UNROLL for (int k = 1; k < HEAD; k++) {
-    T d = b[k + 1] - b[k], dd = d - (b[k] - b[k - 1]);
-    steepest = MAX(steepest, d);
-    most = MAX(most, dd);
-    least = MIN(least, dd);
-  }
-  *end = b[HEAD] + sum;
-  *unresolved = MAX(ABS(a[P]), ABS(a[P - 1])) > RESOLVED * noise;
-  tail1 *= 1.0 / HEAD;
-  tail2 *= 1.0 / (HEAD * (HEAD - 1));
-  I simple = (steepest + tail1 < 0) | (I)(most + tail2 < 0), positive = *end > -ROUNDING * noise;
-  *none = (low > tail) | (simple & positive);
-  *one = (simple | (I)(least > tail2)) & ~positive;
-}
-
-/* Even and odd parts separately: two short chains instead of a long one. */
-INLINE T values_at(const T *a, int n, T s, T z) {
-  T even = a[n - (n & 1)], odd = a[n - 1 + (n & 1)];
-  UNROLL for (int k = n - (n & 1) - 2; k >= 0; k -= 2) even = even * z + a[k];
-  UNROLL for (int k = n - 1 + (n & 1) - 2; k >= 1; k -= 2) odd = odd * z + a[k];
-  return even + s * odd;
-}
-
-/* The Taylor coefficients f[0] to f[2] at s of a polynomial of degree n: a[0] to a[n - 1], and the top. Its even
- * and odd parts are expanded in s^2, in chains of half the length. */
-INLINE void expand(const T *a, int n, T top, T s, T *f) {
-  T z = s * s, even[3] = {BC(0), BC(0), BC(0)}, odd[3] = {BC(0), BC(0), BC(0)};
-  UNROLL for (int k = n; k >= 0; k--) {
-    T *part = k % 2 ? odd : even, c = k == n ? top : a[k];
-    part[2] = part[2] * z + part[1];
-    part[1] = part[1] * z + part[0];
-    part[0] = part[0] * z + c;
-  }
-  f[0] = even[0] + s * odd[0];
-  f[1] = odd[0] + 2.0 * (z * odd[1] + s * even[1]);
-  f[2] = (even[1] + 4.0 * (z * even[2])) + s * (3.0 * odd[1] + 4.0 * (z * odd[2]));
-}
-
-/* Where a step of Halley's iteration leaves less than rounding: its error is step^3 times the difference
- * of (f2/f1)^2 and f3/f1. The size of the step alone says nothing beside another root. */
-INLINE I converged(const T *f, T third, T step) {
-  T bent = step * f[2], error = ABS(step) * (bent * bent + ABS(step * step * third * f[1]));
-  return (ABS(step) <= 2e-6) & (I)(error <= 1e-16 * (f[1] * f[1]));
-}
-
-/* The root of a polynomial with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
- * not move any more. It starts from the root of a parabola with the same end, improved once on a
- * polynomial of degree MODEL with the same end: one full iteration is then enough as a rule. */
-INLINE T polish(const T *a, T end, I active, T *slope) {
-  T lo = BC(0), hi = BC(1), f[3], top = end;
-  T disc = a[1] * a[1] - 4.0 * a[0] * (end - a[0] - a[1]);
-  T s = 2.0 * a[0] * QUICK_INVERSE(QUICK_ROOT(MAX(disc, BC(1e-300))) - a[1]);
-  s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
-  UNROLL for (int k = 0; k < MODEL; k++) top -= a[k];
-  expand(a, MODEL, top, s, f);
-  T better = s - f[0] * f[1] * QUICK_INVERSE(f[1] * f[1] - f[0] * f[2]);
-  s = SELECT((better > 0) & (better <= 1), better, s);
-  /* A bound of the third coefficient at s by the magnitudes of the first terms; the others are smaller. */
-  T third = ABS(a[3]) + s * (4.0 * ABS(a[4]) + s * (10.0 * ABS(a[5]) + s * (20.0 * ABS(a[6]))));
-  for (int it = 0; it < 60; it++) {
-    expand(a, P, a[P], s, f);
-    T step = f[0] * f[1] / (f[1] * f[1] - f[0] * f[2]), next = s - step;
-    I positive = f[0] > 0;
-    lo = SELECT(positive & active, s, lo);
-    hi = SELECT(positive | ~active, hi, s);
-    I held = (next >= lo - 4 * EPSILON) & (next <= hi + 4 * EPSILON); /* or it goes to another root */
-    I small = (converged(f, third, step) & held) | (I)(hi - lo <= 4 * EPSILON);
-    I inside = (next > lo) & (next < hi);
-    next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
-    s = SELECT(active, next, s);
-    *slope = SELECT(active, f[1], *slope);
-    active &= ~small;
-    if (!any(active)) break;
-  }
-  return s;
-}
-
-/* The same for one lane of any polynomial: isolation by subdivision. */
+/* The root of one lane of any polynomial: isolation by subdivision. */
 static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped,
                                                   double *slope) {
   double c[P + 1];

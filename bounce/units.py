@@ -53,7 +53,7 @@ class Ball:
     radius : float
         m.
     inertia : float, optional
-        I / (m R^2): 2/5 solid, 2/3 thin shell.
+        Moment of inertia over $m R^2$: 2/5 for a solid sphere, 2/3 for a thin shell.
     name : str, optional
         What the ball is called in print.
     source : str, optional
@@ -115,7 +115,7 @@ class Landing:
     Parameters
     ----------
     xdot, ydot : float
-        m/s, along and normal to the ground (ydot < 0 approaches it).
+        m/s, along and normal to the ground; a negative ``ydot`` approaches it.
     omega : float
         rad/s, backspin positive.
 
@@ -142,7 +142,7 @@ class Landing:
         speed : float
             Speed of the centre, m/s.
         angle : float
-            Between the path and the ground, in (0, pi/2].
+            Between the path and the ground, in $(0, pi/2]$.
         backspin_rpm : float
             Backspin in turns a minute.
         """
@@ -217,7 +217,7 @@ class Scaling:
     def from_stiffness(
         cls, ball: Ball, stiffness: float, convention: Literal["length", "speed"] = "length"
     ) -> Scaling:
-        """Make a scaling from the stiffness of the normal spring (N/m): T = sqrt(m / stiffness)."""
+        """Make a scaling from the stiffness of the normal spring (N/m): $T = sqrt(m / stiffness)$."""
         if not number(stiffness, "stiffness") > 0:
             raise ns.ParameterError(
                 f"stiffness: expected a positive number of N/m, received {stiffness!r}."

@@ -1,7 +1,8 @@
 """What a page's HTML gets besides what Markdown makes: mathematics as MathML, labels in tables.
 
-Formulas are written as LaTeX between dollars and become MathML while the site is built, so a page needs
-neither a script nor a network to show them. Cells of tables carry the heads of their columns, so that
+Formulas are written between dollars and become MathML while the site is built, so a page needs neither
+a script nor a network to show them: as LaTeX in the pages, as plain text in docstrings, which `help()`
+shows as they are. Cells of tables carry the heads of their columns, so that
 a narrow screen can show each row as a list.
 """
 
@@ -9,6 +10,7 @@ from __future__ import annotations
 
 import html
 import re
+from collections.abc import Callable
 from functools import cache
 
 from latex2mathml.converter import convert
@@ -49,12 +51,12 @@ def formula(latex: str, display: str = "inline") -> str:
     return made
 
 
-def mathematics(page: str) -> str:
-    """Replace the formulas of a page by MathML."""
+def mathematics(page: str, read: Callable[[str, str], str] = formula) -> str:
+    """Replace the formulas of a page by MathML, as `read` makes it from text and display."""
 
     def typeset(found: re.Match[str]) -> str:
         display = "block" if found["tag"] == "div" else "inline"
-        return formula(html.unescape(found["latex"]).strip(), display)
+        return read(html.unescape(found["latex"]).strip(), display)
 
     return _FORMULA.sub(typeset, page)
 

@@ -3,7 +3,9 @@
 Claims, checks and captions are written as plain text, for terminals and tables. Reports are read in a
 browser. There a run of words is typeset where it is mathematics: it has a relation, an operator, a
 Greek name, a prime or an index. Words of a language are left alone, and so are lone numbers and
-letters. The conversion keeps the order of what is written, so nothing can be lost in it.
+letters. In docstrings, which ``help()`` shows as they are, formulas are marked: ``$nu1 nu2 = 1$``; there
+all of it is mathematics, and a word is a name. The conversion keeps the order of what is written, so
+nothing can be lost in it.
 """
 
 from __future__ import annotations
@@ -24,6 +26,12 @@ FUNCTIONS = {
     "tan",
     "arccos",
     "arcsin",
+    "arctan",
+    "arcosh",
+    "cot",
+    "coth",
+    "ceil",
+    "Sgn",
     "log",
     "ln",
     "sgn",
@@ -49,6 +57,9 @@ _TOKEN = re.compile(
     rf"|(?P<number>{_NUMBER})"
     r"|(?P<operator><=|>=|!=|->|<<|>>|\+-|-\+|\.\.|[-+=<>~*/^|.,;:()\[\]])"
 )
+#: A name of several letters, or a number that belongs to it.
+_WORD = re.compile(r"[A-Za-z][A-Za-z_]*")
+_INTEGRAL = re.compile(r"int_(?P<low>\w)\^(?P<high>\w)(?!\w)")
 _OPENS, _CLOSES = "([", ")]"
 _LONG, _SHORT = 24, 6  # characters of a formula that is cut, and of its shortest part
 _TELLS = re.compile(
@@ -91,6 +102,30 @@ def typeset(text: str) -> str:
             made.append(html.escape(word, quote=False))
     made.append(_run(run))
     return "".join(made)
+
+
+def formula(text: str, display: str = "inline") -> str:
+    """Return a formula as MathML; what is not a symbol is a name and stays upright.
+
+    Parameters
+    ----------
+    text : str
+        Without the dollars around it.
+    display : {"inline", "block"}
+        A block has a formula on each line.
+
+    Examples
+    --------
+    >>> formula("x' = -mu load")[:12]
+    '<math><mrow>'
+    """
+    text = text.replace(r"\|", "|")  # a bar in the cell of a table
+    if display == "block":
+        lines = (line.strip() for line in text.strip().splitlines())
+        made = "".join(f'<math display="block">{_rendered(line)}</math>' for line in lines if line)
+        return f'<div class="formula" tabindex="0">{made}</div>'
+    parts = _parts(" ".join(text.split()))
+    return "<wbr>".join(f"<math>{_rendered(part)}</math>" for part in parts)
 
 
 def _may_be_mathematics(word: str) -> bool:
@@ -148,8 +183,22 @@ def _rendered(text: str) -> str:
             atoms.append(f"<mfrac><mn>{fraction[1]}</mn><mn>{fraction[2]}</mn></mfrac>")
             position = fraction.end()
             continue
+        whole = _INTEGRAL.match(text, position)
+        if whole:
+            limits = f"<mn>{whole['low']}</mn><mi>{whole['high']}</mi>"
+            atoms.append(f"<msubsup><mo>∫</mo>{limits}</msubsup>")
+            position = whole.end()
+            continue
         found = _TOKEN.match(text, position)
-        if found is None:  # a mark inside a run
+        word = _WORD.match(text, position)
+        if found is None and word:  # a name; "in" is a relation
+            name = word.group().replace("_", " ")
+            if name == "in":
+                atoms.append("<mo>∈</mo>")
+            else:
+                atoms += _apart(f"<mtext>{name}</mtext>", atoms, text[word.end() :])
+            position = word.end()
+        elif found is None:  # a mark inside a run
             atoms.append(f"<mo>{html.escape(text[position])}</mo>")
             position += 1
         elif found.group() == "^" and atoms:
@@ -163,10 +212,23 @@ def _rendered(text: str) -> str:
                 if found["name"] == "sqrt"
                 else f"<mrow>{bar}{inside}{bar}</mrow>"
             )
+        elif found["name"] in FUNCTIONS:
+            atoms += _apart(_atom(found), atoms, text[found.end() :])
+            position = found.end()
         else:
             atoms.append(_atom(found))
             position = found.end()
     return "".join(atoms)
+
+
+_SPACE = '<mspace width="0.2em"/>'
+
+
+def _apart(word: str, before: list[str], after: str) -> list[str]:
+    """A word with the space that it needs to what is beside it."""
+    first = [_SPACE] if before and not before[-1].startswith(("<mo", "<mspace")) else []
+    last = [_SPACE] if re.match(r"\s+[\w(|]", after) else []
+    return [*first, word, *last]
 
 
 def _grouped(atom: str) -> str:

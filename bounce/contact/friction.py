@@ -22,9 +22,10 @@ class FrictionLaw(Parametrised, ABC):
     """Base of friction laws. To write one:
 
     1. ``parameters``: its names and defaults, besides ``mu``, which every contact model has, and
-       ``limits`` (name -> "> 0", ...), of ``mu`` too where zero is none.
-    2. ``coefficient(s, p)``: the traction's magnitude at slip speed ``s.slip`` >= 0, smooth there.
-    3. Optional ``extra_states`` (name -> start value) and ``extra_rates(s, p, sign)``.
+       ``limits`` (a name and its limit, such as ``"> 0"``), of ``mu`` too where zero is none.
+    2. ``coefficient(s, p)``: the traction's magnitude at slip speed ``s.slip``, which is not
+       negative, smooth there.
+    3. Optional ``extra_states`` (names and their values at the start) and ``extra_rates(s, p, sign)``.
     4. Optional ``traction(s, p, sign)`` for a law that is not ``-sign * coefficient``.
     """
 
@@ -37,7 +38,7 @@ class FrictionLaw(Parametrised, ABC):
         """Return the traction's magnitude while slipping."""
 
     def traction(self, s: Names, p: Names, sign: Expression) -> Expression:
-        """Return the tangential force per unit of load where sgn(H) is ``sign``."""
+        """Return the tangential force per unit of load where the slip has the sign ``sign``."""
         return -sign * self.coefficient(s, p)
 
     def vector_traction(
@@ -51,7 +52,7 @@ class FrictionLaw(Parametrised, ABC):
         return -coefficient * direction
 
     def extra_rates(self, s: Names, p: Names, sign: Expression) -> dict[str, Expression]:
-        """Return the rates of ``extra_states`` where sgn(H) is ``sign``."""
+        """Return the rates of ``extra_states`` where the slip has the sign ``sign``."""
         return {}
 
 
@@ -69,7 +70,9 @@ class Coulomb(FrictionLaw):
 
 
 class Stribeck(FrictionLaw):
-    """From ``mu`` at rest to ``mu_kinetic``: mu_kinetic + (mu - mu_kinetic) exp(-(slip/v)^2).
+    """A coefficient that falls from ``mu`` at rest to ``mu_kinetic`` in fast slip.
+
+    At slip speed H it is $mu_k + (mu - mu_k) exp(-(H/v)^2)$.
 
     Source: Stribeck 1902; this form Armstrong-Helouvry 1991.
 
@@ -78,7 +81,7 @@ class Stribeck(FrictionLaw):
     mu_kinetic : float
         Coefficient of fast slip.
     stribeck_speed : float
-        The speed v, in the model's units.
+        The speed v at which the difference has fallen by a factor e, in the model's units.
 
     Examples
     --------
@@ -96,14 +99,16 @@ class Stribeck(FrictionLaw):
 
 
 class ExponentialDecay(FrictionLaw):
-    """mu_kinetic + (mu - mu_kinetic) exp(-slip/decay_speed), with a corner at zero slip.
+    """A coefficient that falls exponentially with the slip, with a corner at zero slip.
+
+    At slip speed H it is $mu_k + (mu - mu_k) exp(-H/v)$.
 
     Source: Oden & Martins 1985; the law of finite-element codes.
 
     Parameters
     ----------
     mu_kinetic, decay_speed : float
-        Coefficient of fast slip, and the slip over which the difference falls by a factor e.
+        Coefficient $mu_k$ of fast slip, and the speed v over which the difference falls by a factor e.
     """
 
     parameters = dict(mu_kinetic=None, decay_speed=None)
@@ -114,7 +119,7 @@ class ExponentialDecay(FrictionLaw):
 
 
 class Viscous(FrictionLaw):
-    """Coulomb's law and a part proportional to the slip: mu + viscosity * slip.
+    """Coulomb's law and a part proportional to the slip: $mu + viscosity H$.
 
     Parameters
     ----------
@@ -136,9 +141,9 @@ class Viscous(FrictionLaw):
 
 
 class LuGre(FrictionLaw):
-    """A bristle of deflection z: z' = H - bristle_stiffness |H| z / g, g of Stribeck's form.
+    """A bristle of deflection z: $z' = H - k |H| z / g(H)$, g of Stribeck's form.
 
-    The traction is -(bristle_stiffness z + bristle_damping z' + viscosity H). It is single-valued:
+    The traction is $-(k z + c z' + viscosity H)$, c the bristle's damping. It is single-valued:
     the ball creeps instead of rolling exactly, and stick is H near zero.
 
     Source: Canudas de Wit, Olsson, Astrom & Lischinsky 1995, with the force per unit of load as in
@@ -147,7 +152,7 @@ class LuGre(FrictionLaw):
     Parameters
     ----------
     bristle_stiffness : float
-        Per unit of length; the force for it saturates at ``mu`` times the load.
+        k, per unit of length; the bristle's force is at most ``mu`` times the load.
     bristle_damping, viscosity : float
         Per unit of speed.
     mu_kinetic, stribeck_speed : float
@@ -188,7 +193,7 @@ class LuGre(FrictionLaw):
 
 
 class Dahl(FrictionLaw):
-    """A bristle without Stribeck effect: z' = H - bristle_stiffness |H| z / mu, traction -k z.
+    """A bristle without Stribeck effect: $z' = H - k |H| z / mu$, with the traction $-k z$.
 
     Source: Dahl 1968.
 

@@ -27,7 +27,7 @@ BOX = dict(x=(-1.0, 1.0), xdot=(-1.0, 1.0), y=(-1.0, -1e-3), ydot=(-1.0, 1.0), o
 class GeneralisedContact(ContactModel):
     """Nonlinear coefficients of stiffness and damping, coupled between the directions.
 
-    X'' + eps upsilon X' + eps^2 zeta X = Lambda_T,  Y'' + delta Y' + kappa Y = -G.
+    $X'' + eps upsilon X' + eps^2 zeta X = Lambda_T$,  $Y'' + delta Y' + kappa Y = -G$.
 
     Source: Biber, Champneys & Szalai 2022, Sec. 4, eq. (generic_rescaled).
 
@@ -132,7 +132,7 @@ class GeneralisedContact(ContactModel):
         Parameters
         ----------
         box : mapping, optional
-            State name -> (low, high); states left out take those of ``BOX``.
+            Names of states with their ranges (low, high); states left out take those of ``BOX``.
         order_one : float
             What still counts as O(1).
         samples : int

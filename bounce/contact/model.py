@@ -28,18 +28,20 @@ NO_GRAVITY = 1e-20
 class ContactModel(Parametrised, ABC):
     """A surface: two forces written once; equations, simulation and maps follow from them.
 
-    A ball of unit radius and mass moves with centre (x, y), y = 0 at touch-down and negative in the
-    ground, and spin omega:
+    A ball of unit radius and mass moves with centre (x, y), $y = 0$ at touch-down and negative in the
+    ground, and spin $omega$:
 
-        x''     = tangential_force + Lambda_T - G sin(slope)
-        y''     = normal_force - G cos(slope)
-        omega'  = Lambda_T / inertia
-        Lambda_T = -lambda mu load,  lambda in Sgn(H),  H = x' + omega.
+    $$
+    x'' = tangential_force + Lambda_T - G sin(slope)
+    y'' = normal_force - G cos(slope)
+    omega' = Lambda_T / inertia
+    Lambda_T = -lambda mu load, lambda in Sgn(H), H = x' + omega
+    $$
 
     To write a contact model, derive a class and provide
 
     1. ``parameters``: a dict of names and defaults; None means that the user must give it. Always
-       there: ``mu`` (no default), ``G`` = 0 (scaled gravity), ``inertia`` = 2/5 (I = inertia m R^2)
+       there: ``mu`` (no default), ``G`` = 0 (scaled gravity), ``inertia`` = 2/5 (the moment of inertia over $m R^2$)
        and ``slope`` = 0 (rad, uphill for positive x; axes along and normal to the ground).
     2. ``normal_force(s, p)``: the surface's force on the ball, positive in compression, as a smooth
        CasADi expression of the states ``s.x, s.xdot, s.y, s.ydot, s.omega`` and parameters
@@ -48,23 +50,24 @@ class ContactModel(Parametrised, ABC):
 
     and, if needed,
 
-    4. ``limits``: name -> "> 0", ">= 0", "in (0, 1]", ...; values outside are refused.
-    5. ``extra_states`` (name -> value at touch-down) and ``extra_rates(s, p)`` (name -> rate) for
+    4. ``limits``: names and what holds for their values, such as ``"> 0"``, ``">= 0"`` or
+       ``"in (0, 1]"``; values outside are refused.
+    5. ``extra_states`` (names and values at touch-down) and ``extra_rates(s, p)`` (names and rates) for
        internal states such as a Maxwell element; they appear as ``s.name``.
     6. ``load(s, p)``: what ``mu`` multiplies; its first downward zero is lift-off. By default the
        normal force, or for ``load="net"`` the normal force less gravity, as in the paper. A surface
        that also pulls (adhesion) needs a load and a ``lift_off`` that last until it lets go.
     7. ``lift_off(s, p)``: a function with the sign of the load that falls through zero with a
-       nonzero rate, where the load itself does not (a power law that ends at y = 0).
+       nonzero rate, where the load itself does not (a power law that ends at $y = 0$).
     8. ``friction_coefficient(s, p)``: by default that of ``friction``; may use the slip speed
-       ``s.slip`` = |H|.
+       ``s.slip``, which is not negative.
     9. ``stored_energy(s, p)``: elastic energy, for the energy balance of a shot.
 
     Parameters
     ----------
     load : {"contact", "net"}
         What multiplies ``mu`` and ends the contact: the force of the surface (physical), or that
-        less gravity (Biber et al. 2022, eq. for Lambda_N, where gravity counts twice).
+        less gravity (Biber et al. 2022, eq. for $Lambda_N$, where gravity counts twice).
     friction : FrictionLaw
         Coulomb's by default.
     **values : float
@@ -168,7 +171,8 @@ class ContactModel(Parametrised, ABC):
     def system(self) -> ns.FilippovSystem:
         """Build the Filippov system of the contact, with this model's values as defaults.
 
-        States (x, xdot, y, ydot, omega, extra states); surface H = xdot + omega; stop "lift-off".
+        States ``x, xdot, y, ydot, omega`` and the extra ones; surface ``xdot + omega``, the slip; stop
+        ``"lift-off"``.
 
         Returns
         -------

@@ -41,22 +41,22 @@ class _LinearTangential(ContactModel):
 class KelvinVoigt(_LinearTangential):
     """Spring and damper in parallel in both directions: the paper's linear model, eq. (kv_rescaled).
 
-    X'' + 2 d1 eta X' + eta^2 X = Lambda_T,  Y'' + 2 d2 Y' + Y = -G,  Omega' = Lambda_T / inertia.
+    $X'' + 2 d1 eta X' + eta^2 X = Lambda_T$,  $Y'' + 2 d2 Y' + Y = -G$,  $Omega' = Lambda_T / inertia$.
 
     Source: Biber, Champneys & Szalai 2022, Sec. 3.
 
     Parameters
     ----------
     mu : float
-        Friction coefficient, >= 0.
+        Friction coefficient, not negative.
     d1, d2 : float
-        Damping ratios along and normal to the ground, >= 0.
+        Damping ratios along and normal to the ground, not negative.
     eta : float
-        Ratio of the tangential to the normal natural frequency, >= 0.
+        Ratio of the tangential to the normal natural frequency, not negative.
     G : float, optional
-        Scaled gravity eps2^2 g, >= 0.
+        Scaled gravity, the paper's $eps2^2 g$, not negative.
     load : {"contact", "net"}
-        "net" is the paper's Lambda_N = -2 d2 Y' - Y - G.
+        "net" is the paper's $Lambda_N = -2 d2 Y' - Y - G$.
 
     Examples
     --------
@@ -120,16 +120,16 @@ class NormalKelvinVoigt(ContactModel):
 
 
 def kelvin_voigt_restitution(d2: float) -> float:
-    """Restitution of Y'' + 2 d2 Y' + Y = 0 from touch-down to zero force, for any damping ratio.
+    """Restitution of $Y'' + 2 d2 Y' + Y = 0$ from touch-down to zero force, for any damping ratio.
 
-    -ln r = 2 c cot c with c = arccos d2, and its continuation 2 a coth a, a = arcosh d2, beyond
-    critical damping. With b = arcsin d2 this is r = exp(-tan b (pi - 2 b)); for d = 2 d2 small it
-    is exp(-pi d/2 + d^2/2 - pi d^3/16 + ...).
+    $-ln r = 2 c cot c$ with $c = arccos d2$, and its continuation $2 a coth a$, $a = arcosh d2$, beyond
+    critical damping. With $b = arcsin d2$ this is $r = exp(-tan b (pi - 2 b))$; for $d = 2 d2$ small it
+    is $exp(-pi d/2 + d^2/2 - pi d^3/16 + ...)$.
 
     Parameters
     ----------
     d2 : float
-        Damping ratio, >= 0.
+        Damping ratio, not negative.
 
     Returns
     -------
@@ -151,10 +151,10 @@ def kelvin_voigt_restitution(d2: float) -> float:
 
 
 class DepthDampedKelvinVoigt(_LinearTangential):
-    """Kelvin-Voigt whose tangential damper grows with depth: -(2 d1 eta (-Y) X' + eta^2 X).
+    """Kelvin-Voigt whose tangential damper grows with depth: $-(2 d1 eta (-Y) X' + eta^2 X)$.
 
     The damper acts on the part of the ball that is in the ground, so it starts from zero at
-    touch-down and satisfies the paper's upsilon_Y < 0, eq. (functions_constraints).
+    touch-down and satisfies the paper's $upsilon_Y < 0$, eq. (functions_constraints).
 
     Parameters
     ----------
@@ -209,7 +209,7 @@ class _PowerLaw(_LinearTangential):
 
 
 class Hertz(_PowerLaw):
-    """Elastic Hertzian contact: normal force stiffness (-Y)^(3/2).
+    """Elastic Hertzian contact: the normal force is $stiffness (-Y)^(3/2)$.
 
     Source: Hertz 1881; Johnson 1985, Contact Mechanics, eq. (4.22).
 
@@ -241,7 +241,7 @@ class Hertz(_PowerLaw):
 
 
 class HuntCrossley(_PowerLaw):
-    """Hertzian contact whose damping vanishes with the depth: (-Y)^(3/2) (stiffness - damping Y').
+    """Hertzian contact whose damping vanishes with the depth: $(-Y)^(3/2) (stiffness - damping Y')$.
 
     Source: Hunt & Crossley 1975.
 
@@ -266,14 +266,14 @@ class HuntCrossley(_PowerLaw):
 
 
 class Tsuji(_PowerLaw):
-    """Hertzian contact with restitution nearly free of speed: (-Y)^(1/4) (k (-Y)^(5/4) - c Y').
+    """Hertzian contact with restitution nearly free of speed: $(-Y)^(1/4) (k (-Y)^(5/4) - c Y')$.
 
-    Source: Tsuji, Tanaka & Ishida 1992, eq. for eta_n.
+    Source: Tsuji, Tanaka & Ishida 1992, eq. for $eta_n$.
 
     Parameters
     ----------
     mu, stiffness, damping : float
-        k and c; Tsuji's alpha is c / sqrt(k) for unit mass.
+        Friction coefficient; k and c. Tsuji's $alpha$ is $c/sqrt(k)$ for unit mass.
     d1, eta, G : float, optional
         Tangential damping ratio and frequency, and gravity; default 0.
     """
@@ -289,7 +289,7 @@ class Tsuji(_PowerLaw):
 
 
 class KuwabaraKono(_PowerLaw):
-    """Hertzian contact of viscoelastic bodies: (-Y)^(1/2) (stiffness (-Y) - damping Y').
+    """Hertzian contact of viscoelastic bodies: $(-Y)^(1/2) (stiffness (-Y) - damping Y')$.
 
     Source: Kuwabara & Kono 1987; Brilliantov, Spahn, Hertzsch & Poeschel 1996. Sometimes also
     listed under Tsuji's name.
@@ -315,8 +315,8 @@ class KuwabaraKono(_PowerLaw):
 class Maxwell(_LinearTangential):
     """Normal spring in parallel with a spring and damper in series (standard linear solid).
 
-    The branch's force is the internal state ``branch``: branch' = -k Y' - branch / relaxation, and
-    the normal force is -Y + branch.
+    The force B of the branch is the internal state ``branch``: $B' = -k Y' - B/relaxation$, and the
+    normal force is $-Y + B$.
 
     Parameters
     ----------

@@ -25,13 +25,16 @@ class Contact3D(Parametrised):
     """A contact model for landings with side spin; ``model.in_3d()`` makes one.
 
     The ground's axes are x (forward), y (up) and z (to the right). With the tangential position
-    X = (x, z) and the spin's part of the contact point's velocity W = (omega_z, -omega_x),
+    $X = (x, z)$ and the spin's part of the contact point's velocity $W = (omega_z, -omega_x)$,
 
-        X'' = tangential_force + F - gravity's part,  W' = F / inertia,  h = X' + W,
-        F = -mu load lambda,  lambda = h/|h| off h = 0, |lambda| <= 1 on it:
+    $$
+    X'' = tangential_force + F - G (sin(slope), sin(side_slope))
+    W' = F / inertia, h = X' + W
+    F = -mu load lambda, lambda = h/|h| off h = 0, |lambda| <= 1 on it
+    $$
 
-    Coulomb friction in the plane. A model's forces are called with vectors ``s.x``, ``s.xdot`` and
-    ``s.omega`` of two components, and ``s.slip`` = |h|.
+    This is Coulomb friction in the plane. A model's forces are called with vectors ``s.x``, ``s.xdot`` and
+    ``s.omega`` of two components, and ``s.slip`` is $|h|$.
 
     Parameters
     ----------
@@ -41,13 +44,15 @@ class Contact3D(Parametrised):
         Uphill to the right, rad, across the line of the slope.
     friction_ratio : float, optional
         Elliptical friction: the coefficient across the grain over that along it, in (0, 1]. The force
-        is that of maximal dissipation, -mu load E^2 h/|E h|, E the ratio across the grain.
+        is that of maximal dissipation, $-mu load E^2 h/|E h|$, where E multiplies the component
+        across the grain by the ratio.
     grain : float, optional
         Direction of the grain, rad from forward to the right; needs ``friction_ratio``.
     drilling_radius : float, optional
-        Drilling friction: slip and spin omega_y about the vertical share one multiplier of three
-        components, (h, radius omega_y), of which the third turns with moment -mu load radius
-        lambda_3 (ellipsoidal limit surface). About 2/3 of the contact's radius, in radii of the ball.
+        Drilling friction: slip and spin $omega_y$ about the vertical share one multiplier of three
+        components, $(h, r omega_y)$ with r the drilling radius, of which the third turns with moment
+        $-mu load r lambda_3$ (ellipsoidal limit surface). About 2/3 of the contact's radius, in radii
+        of the ball.
 
     Raises
     ------
@@ -136,7 +141,7 @@ class Contact3D(Parametrised):
         """Build the Filippov system of the contact, with these values as defaults.
 
         States (x, xdot, y, ydot, z, zdot, slip_x, slip_z; spin about the vertical with drilling;
-        extra states); one set, slip = 0, of codimension two or three; stop "lift-off".
+        extra states); one set, where the slip is zero, of codimension two or three; stop ``"lift-off"``.
 
         Returns
         -------

@@ -62,7 +62,7 @@ def fit(
     bounds : mapping of str to (float, float), optional
         By default what the model's limits say.
     weights : mapping of str to float, optional
-        Factors of the residuals of xdot, ydot, omega; 1 by default.
+        Factors of the residuals of ``xdot``, ``ydot``, ``omega``; 1 by default.
     starts : int or sequence of mappings, optional
         Points compared besides the model's own: this many drawn within the bounds (where those are
         infinite within a factor of 4 of the model's value), or these.

@@ -35,13 +35,14 @@ class Air:
     Parameters
     ----------
     drag, lift : callable (spin_ratio, reynolds) -> coefficient
-        At a spin ratio >= 0; numbers in, numbers out.
+        Coefficients of drag and lift from the spin ratio (surface speed over speed, not negative) and
+        the Reynolds number; numbers in, numbers out.
     spin_decay : float, optional
-        omegadot = -spin_decay v omega / radius.
+        c of $omega' = -c v omega/R$, with the speed v and the ball's radius R.
     density : float, optional
-        kg/m^3; 1.204 is dry air at 20 degrees C and 101.325 kPa.
+        kg/m³; 1.204 is dry air at 20 degrees C and 101.325 kPa.
     viscosity : float, optional
-        Kinematic, m^2/s; 1.516e-5 at 20 degrees C.
+        Kinematic, m²/s; 1.516e-5 at 20 degrees C.
     largest_spin_ratio : float, optional
         Beyond it the coefficients keep their value there: a slow ball leaves every measured range.
     name, source : str, optional
@@ -164,7 +165,7 @@ def flight(
     start: tuple[float, float] = (0.0, 0.0),
     tol: float = 1e-10,
 ) -> Flight:
-    """Fly a ball until it comes down to y = 0.
+    """Fly a ball until it comes down to $y = 0$.
 
     Parameters
     ----------

@@ -55,7 +55,7 @@ def landing_map(
     Returns
     -------
     OutcomeMap
-        ``lift_offs`` are in m/s and s, with the surface speed of the spin as omega. The regions of a
+        ``lift_offs`` are in m/s and s, with the surface speed of the spin as ``omega``. The regions of a
         law are its cases.
 
     Raises

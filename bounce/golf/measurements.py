@@ -40,7 +40,7 @@ class Measurements:
     landing : ndarray (n, 3)
         xdot, ydot and the spin's surface speed: in m/s, or as the dimensionless model has them.
     lift_off : dict of str to ndarray (n,)
-        What was measured of xdot, ydot, omega.
+        What was measured of ``xdot``, ``ydot``, ``omega``.
     rows : ndarray of int (n,)
         Numbers of the rows, from 1 (for a file, the first row under the names).
     si : bool

@@ -72,7 +72,7 @@ class Glide:
     time : float
         Duration, s.
     acceleration : float
-        m/s^2.
+        m/s².
     """
 
     mode: str
@@ -186,8 +186,8 @@ def play(
     """Follow a shot from its first touch-down to rest.
 
     The ball bounces until it would hop less than ``min_height`` above the ground, or a law keeps it
-    down. Then it slides, xddot = -+ mu g, until xdot + radius omega = 0, and rolls with
-    xddot = -+ rolling_friction g / (1 + inertia), each with the slope's part of gravity.
+    down. Then it slides, $x'' = -+ mu g$, until $x' + R omega = 0$, and rolls with
+    $x'' = -+ c g/(1 + inertia)$, c the rolling friction, each with the slope's part of gravity.
 
     Parameters
     ----------

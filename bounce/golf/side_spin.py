@@ -41,7 +41,7 @@ class SideRebound:
         speed along the ground in the direction in which the ball leaves, ``lift_off.omega`` its
         backspin about the axis across that direction.
     side_spin, side_spin_after : float
-        omega_x, rad/s, before and after: about the direction of travel, right positive.
+        $omega_x$, rad/s, before and after: about the direction of travel, right positive.
     kick : float
         Angle from the direction of travel before to that after, rad, right positive.
     slip_angle : float
@@ -65,7 +65,7 @@ class AxisSpin(NamedTuple):
     Attributes
     ----------
     backspin, side, vertical : float
-        omega_z, omega_x (right positive) and omega_y.
+        $omega_z$, $omega_x$ (right positive) and $omega_y$.
     """
 
     backspin: float
@@ -83,7 +83,7 @@ def axis_spin(spin: float, axis_tilt: float, launch_angle: float) -> AxisSpin:
     axis_tilt : float
         rad; positive is a fade of a right-handed player, curving right.
     launch_angle : float
-        Of the path above the ground at launch, rad in [0, pi/2].
+        Of the path above the ground at launch, rad in $[0, pi/2]$.
 
     Returns
     -------
@@ -129,11 +129,11 @@ def side_rebound(
     landing : Landing
         The landing, with the backspin (see :func:`axis_spin`).
     side_spin : float
-        omega_x, rad/s, right positive.
+        $omega_x$, rad/s, right positive.
     ball : Ball, optional
         Radius, mass and moment of inertia.
     vertical_spin : float, optional
-        omega_y, rad/s: it counts on a tilted plane, and with drilling friction.
+        $omega_y$, rad/s: it counts on a tilted plane, and with drilling friction.
     scaling : Scaling, optional
         Needed for a contact model, see :func:`rebound`.
     side_slope : float, optional

@@ -13,7 +13,7 @@ from .rigid import Restitution, RigidBounce
 
 
 class CrossBounce(BounceLaw):
-    """Rigid impact whose grip throws the slip back: slip after = -tangential_restitution * before.
+    """Rigid impact whose grip throws the slip back, by the factor ``-tangential_restitution``.
 
     Where that needs more than friction can give, the ball slips throughout. With
     ``tangential_restitution = 0`` it is :class:`RigidBounce`.
@@ -30,7 +30,7 @@ class CrossBounce(BounceLaw):
     tangential_restitution : float
         In [0, 1]: 0 leaves the ball rolling, 1 is a perfect super ball.
     inertia : float, optional
-        Moment of inertia over mass and radius squared; default 2/5.
+        Moment of inertia over mass and radius squared; default $2/5$.
 
     Examples
     --------

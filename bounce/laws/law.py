@@ -23,7 +23,7 @@ class RigidShot:
     Attributes
     ----------
     xdot, ydot, omega, slip : ndarray
-        At lift-off; slip is xdot + omega.
+        At lift-off; slip is $xdot + omega$.
     case : ndarray of str
         "I", "II" or "III" with the sign of the slip at touch-down: slipping throughout, rolling
         from restitution on, rolling from compression on. "I/II+" is a boundary; no sign without

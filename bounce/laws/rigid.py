@@ -35,9 +35,9 @@ class RigidBounce(BounceLaw):
     mu : float
         Friction coefficient.
     restitution : float or callable
-        In [0, 1]; a function of the normal speed abs(ydot) (arrays in, arrays out) is allowed.
+        In [0, 1]; a function of the normal speed ``abs(ydot)`` (arrays in, arrays out) is allowed.
     inertia : float
-        I = inertia m R^2; 2/5 is a solid sphere.
+        Moment of inertia over $m R^2$; 2/5 is a solid sphere.
     hypothesis : {"kinematic", "poisson", "energetic"}
         What ``restitution`` is the ratio of: normal speeds, normal impulses, or the square root of
         the ratio of the normal force's work. Equal for a sphere.

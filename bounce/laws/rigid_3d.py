@@ -54,15 +54,15 @@ def rigid_lift_off_3d(
 ) -> RigidShot3D:
     """Bounce balls with side spin on rigid ground.
 
-    With J = mu times the normal impulse, u = h/|h| at touch-down, k the inertia: a ball that slips
-    throughout, |h| > (1 + 1/k) J, leaves with X' - J u, W - J u/k; else it rolls, X' = -W = (X' - k W)/(1 + k).
+    With $J = mu$ times the normal impulse, $u = h/|h|$ at touch-down, k the inertia: a ball that slips
+    throughout, $|h| > (1 + 1/k) J$, leaves with $X' - J u$ and $W - J u/k$; else it rolls, $X' = -W = (X' - k W)/(1 + k)$.
 
     Parameters
     ----------
     law : RigidBounce
         Friction, restitution and inertia.
     xdot, omega : array_like (..., 2)
-        At touch-down, forward and to the right; omega = (omega_z, -omega_x) times the radius.
+        At touch-down, forward and to the right; $omega = (omega_z, -omega_x)$ times the radius.
     ydot : array_like (...)
         Normal velocity, below zero.
 

@@ -25,7 +25,7 @@ class TiltedBounce(BounceLaw):
 
     The plane's normal leans by ``tilt`` against the horizontal velocity, so some of the forward
     speed becomes height. A ball that falls vertically meets no tilt, so a constant tilt jumps there. A ball
-    with much backspin may leave with ydot <= 0, into the ground: the law does not exclude it.
+    with much backspin may leave with ``ydot`` not positive, into the ground: the law does not exclude it.
 
     Source: Penner 2002, The run of a golf ball, Can. J. Phys. 80, 931.
 
@@ -36,9 +36,9 @@ class TiltedBounce(BounceLaw):
     restitution : float or callable
         Of the normal speed relative to the tilted plane.
     tilt : float or callable
-        rad in [0, pi/2); a function (speed, angle of descent in rad) is allowed.
+        rad in $[0, pi/2)$; a function (speed, angle of descent in rad) is allowed.
     inertia : float, optional
-        Moment of inertia over mass and radius squared; default 2/5.
+        Moment of inertia over mass and radius squared; default $2/5$.
 
     Examples
     --------
@@ -123,7 +123,7 @@ def _check_tilt(tilt: Array) -> Array:
 def penner_restitution(speed: ArrayLike) -> Array:
     """Restitution of a golf ball on turf at a normal speed (m/s) relative to the tilted plane.
 
-    0.510 - 0.0375 v + 0.000903 v^2 up to 20 m/s, 0.120 beyond.
+    $0.510 - 0.0375 v + 0.000903 v^2$ up to 20 m/s, 0.120 beyond.
 
     Parameters
     ----------
@@ -151,8 +151,8 @@ def penner_restitution(speed: ArrayLike) -> Array:
 def penner_tilt(speed: ArrayLike, angle: ArrayLike) -> Array:
     """Penner's tilt (rad) at a speed (m/s) and angle of descent (rad): zero for a vertical fall.
 
-    15.4 deg (speed / 18.6 m/s) (phi / 44.4 deg), through one measured impact on a green, where phi
-    is the angle of the path with the *vertical*. Some public simulators take that with the ground
+    $15.4 (v/18.6) (phi/44.4)$ degrees at v m/s, through one measured impact on a green, where $phi$ is
+    the angle of the path with the *vertical* in degrees. Some public simulators take that with the ground
     instead; Penner's worked heights come out with the vertical only (tests/bounce).
 
     Parameters
@@ -194,7 +194,7 @@ class PennerBounce(BounceLaw):
     mu : float, optional
         0.40 (Penner 2002, p. 933).
     inertia : float, optional
-        Moment of inertia over mass and radius squared; default 2/5.
+        Moment of inertia over mass and radius squared; default $2/5$.
 
     Examples
     --------

@@ -36,7 +36,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingCurve:
-    """H_F = 0 in the plane of landings (xdot, omega) at one normal speed.
+    """Landings ``(xdot, omega)`` that lift off without slip, at one normal speed.
 
     Attributes
     ----------
@@ -49,7 +49,7 @@ class DividingCurve:
     reverse : tuple of Arc
         The other half, on a slope or for a model that is not symmetric.
     mirrored : bool
-        Whether the other half follows by the symmetry (xdot, omega) -> -(xdot, omega).
+        Whether the other half is the mirror image of this one, with ``-xdot`` and ``-omega``.
     tol : float
         Tolerance of the runs that the curve was found with.
     """
@@ -63,17 +63,17 @@ class DividingCurve:
 
     @property
     def two_fold(self) -> Array:
-        """Landings that reach the two-fold, (n, 2) of (xdot, omega); arcs follow each other."""
+        """Landings that reach the two-fold, (n, 2) of ``(xdot, omega)``; arcs follow each other."""
         return self._points("two-fold")
 
     @property
     def slipping(self) -> Array:
-        """Landings that slip up to lift-off with H = 0 there, (n, 2) of (xdot, omega)."""
+        """Landings that slip up to lift-off with $H = 0$ there, (n, 2) of ``(xdot, omega)``."""
         return self._points("slipping")
 
     @property
     def junction(self) -> Array | None:
-        """The first landing (xdot, omega) shared by a two-fold and a slipping arc, or None."""
+        """The first landing ``(xdot, omega)`` shared by a two-fold and a slipping arc, or None."""
         for first, second in zip(self.arcs, self.arcs[1:], strict=False):
             if first.kind != second.kind:
                 return first.points[-1]
@@ -201,25 +201,25 @@ def dividing_curve(
     step: float = 0.05,
     tol: float = 1e-12,
 ) -> DividingCurve:
-    """Trace the curve H_F = 0 that divides forward from reverse slip at lift-off.
+    """Trace the curve $H_F = 0$ that divides forward from reverse slip at lift-off.
 
     Parameters
     ----------
     model : ContactModel
         The contact model.
     ydot : float
-        Normal speed at touch-down, < 0.
+        Normal speed at touch-down, negative.
     reach : float, optional
-        Largest abs(xdot) traced, in units of abs(ydot).
+        Largest ``abs(xdot)`` traced, in units of ``abs(ydot)``.
     step : float, optional
         Distance of neighbouring points on bent arcs, in the same units.
     tol : float, optional
-        Error of the points relative to abs(ydot).
+        Error of the points relative to ``abs(ydot)``.
 
     Returns
     -------
     DividingCurve
-        The part that is connected to rest, xdot = omega = 0.
+        The part that is connected to rest, ``xdot = omega = 0``.
 
     Raises
     ------
@@ -271,7 +271,7 @@ def critical_eta(
 ) -> float:
     """Smallest tangential frequency ratio at which a slow shot without spin lifts off in topspin slip.
 
-    A slow shot without spin soon rolls, with x = 0 and xdot > 0, and lifts off with H_F of the sign
+    A slow shot without spin soon rolls, with $x = 0$ and $x' > 0$, and lifts off with $H_F$ of the sign
     of its tangential acceleration A there: negative (reverse slip) for a soft ground. The value
     returned is the first zero of A at lift-off.
 

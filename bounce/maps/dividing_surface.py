@@ -17,7 +17,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingSurface:
-    """H_F = 0 in the space of landings (xdot, ydot, omega), as curves at several normal speeds.
+    """$H_F = 0$ in the space of landings (xdot, ydot, $omega$), as curves at several normal speeds.
 
     Attributes
     ----------
@@ -34,12 +34,12 @@ class DividingSurface:
 
     @property
     def two_fold(self) -> list[Array]:
-        """For each normal speed (n, 3) of (xdot, ydot, omega)."""
+        """For each normal speed (n, 3) of (xdot, ydot, $omega$)."""
         return [_with_ydot(curve.two_fold, curve.ydot) for curve in self.curves]
 
     @property
     def slipping(self) -> list[Array]:
-        """For each normal speed (n, 3) of (xdot, ydot, omega)."""
+        """For each normal speed (n, 3) of (xdot, ydot, $omega$)."""
         return [_with_ydot(curve.slipping, curve.ydot) for curve in self.curves]
 
     @property
@@ -69,7 +69,7 @@ def dividing_surface(
     model : ContactModel
         The contact model.
     ydot : array_like (k,)
-        Normal speeds at touch-down, < 0.
+        Normal speeds at touch-down, $< 0$.
     reach, step, tol : float, optional
         As in :func:`dividing_curve`.
 

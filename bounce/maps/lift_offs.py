@@ -76,8 +76,8 @@ def lift_off(
     model : ContactModel or Contact3D
         The contact model; ``model.in_3d()`` for landings with side spin.
     xdot, ydot, omega, x, y : array_like (...)
-        Landings, as in :func:`simulate`. In 3-D xdot, omega and x are arrays (..., 2), forward and to
-        the right on the last axis; omega may be (..., 3) with drilling.
+        Landings, as in :func:`simulate`. In 3-D ``xdot``, ``omega`` and ``x`` are arrays (..., 2),
+        forward and to the right on the last axis; ``omega`` may be (..., 3) with drilling.
     parameters : mapping of str to array_like, optional
         Values that replace the model's, e.g. ``{"mu": [0.2, 0.3]}``.
     tol, t_max : float, optional

@@ -62,7 +62,7 @@ class OutcomeMap:
 
     @property
     def slip(self) -> Array:
-        """H_F at lift-off, (n, m)."""
+        """Slip $H_F$ at lift-off, (n, m); below zero is reverse slip."""
         return self.lift_offs.slip
 
     @property
@@ -74,7 +74,7 @@ class OutcomeMap:
     def lift_off_angle(self) -> Array:
         """Angle of the velocity at lift-off above the direction of +x, (n, m), rad.
 
-        Above pi/2 the ball goes to negative x.
+        Above $pi/2$ the ball goes to negative x.
         """
         return np.arctan2(self.lift_offs.ydot, self.lift_offs.xdot)
 

@@ -28,7 +28,7 @@ class ProvenMap:
     ydot : float
         Normal speed at touch-down.
     boxes : ndarray (m, 4)
-        xdot low, xdot high, omega low, omega high.
+        Columns: lowest and highest ``xdot``, lowest and highest ``omega``.
     outcome : ndarray of int (m,)
         Index in ``OUTCOMES``.
     itinerary : tuple of str

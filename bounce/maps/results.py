@@ -104,7 +104,7 @@ class LiftOffs(_Ended):
 
     @property
     def slip(self) -> Array:
-        """H_F = xdot + omega at lift-off (...); below zero is reverse slip."""
+        """Slip ``xdot + omega`` at lift-off (...); below zero is reverse slip."""
         return self.xdot + self.omega
 
 
@@ -149,7 +149,7 @@ class LiftOffs3D(_Ended):
 
     @property
     def slip_angle(self) -> Array:
-        """Direction of the slip (...), rad from forward to the right, in (-pi, pi]."""
+        """Direction of the slip (...), rad from forward to the right, in $(-pi, pi]$."""
         return np.arctan2(self.slip[..., 1] + 0.0, self.slip[..., 0])
 
     @property

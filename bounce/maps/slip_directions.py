@@ -40,7 +40,7 @@ class Vortex(NamedTuple):
     Attributes
     ----------
     omega : ndarray (2,)
-        The spin, (omega_z, -omega_x).
+        The spin, $(omega_z, -omega_x)$.
     winding : int
         How often the slip's direction turns around it, in the sense of the spins.
     """

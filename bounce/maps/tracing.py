@@ -27,11 +27,11 @@ class Arc:
         Phases up to the one that meets the surface: ``"+ s"`` rolls into the two-fold, ``"+"``
         slips to lift-off.
     points : ndarray (n, 2)
-        (xdot, omega) along the arc.
+        ``(xdot, omega)`` along the arc.
     entry : ndarray (n,)
         Times at which the last phase begins; at the first point, of the arc before.
     lift_off : ndarray (n, d)
-        States at lift-off: x, xdot, y, ydot, omega, extra states.
+        States at lift-off: ``x, xdot, y, ydot, omega``, extra states.
     end : str
         Why the arc ends where it does.
     """

@@ -29,7 +29,7 @@ class SlipTurn(NamedTuple):
     eta : ndarray (n,)
         Frequency ratios.
     turn : ndarray (n,)
-        Computed, rad in (-pi, pi], from forward to the right positive.
+        Computed, rad in $(-pi, pi]$, from forward to the right positive.
     first_order : ndarray (n,)
         By the formula, for a ball that slips throughout.
     """
@@ -51,11 +51,13 @@ def slip_turn(
     """Turn of the slip's direction with the stiffness along the ground, beside a formula.
 
     A rigid ground keeps the direction of the slip h. A compliant one pushes against the velocity V of
-    the centre, so where V has a component V_n normal to h (to the right of it), to first order
+    the centre, so where V has a component $V_n$ normal to h (to the right of it), to first order
 
-        turn = -V_n int_0^tF (2 d1 eta + eta^2 t) / (|h_0| - (1 + 1/inertia) mu J(t)) dt,
+    $$
+    turn = -V_n int_0^T (2 d1 eta + eta^2 t)/(|h_0| - (1 + 1/inertia) mu J(t)) dt
+    $$
 
-    with J(t) the impulse of the load.
+    with T the duration and $J(t)$ the impulse of the load.
 
     Parameters
     ----------

@@ -84,7 +84,7 @@ def outcome_map(
     quantity : {"itinerary", "slip", "omega", "spin_reversal", "lift_off_angle"}
         ``omega`` is the spin at lift-off.
     curve : DividingCurve, optional
-        Drawn over a map of xdot and omega instead of the contour H_F = 0 of the map.
+        Drawn over a map of ``xdot`` and ``omega`` instead of the contour $H_F = 0$ of the map.
     ax : matplotlib Axes, optional
         Draw here instead of in a new figure.
 

@@ -83,7 +83,7 @@ def certify(
     Parameters
     ----------
     model : ContactModel
-        Its equations must be smooth at the landing; power laws are not, at y = 0.
+        Its equations must be smooth at the landing; power laws are not, at $y = 0$.
     xdot, ydot, omega, x, y : number, string or (low, high)
         The landing, dimensionless as the model is; a pair makes the theorem hold for all between.
     parameters : mapping, optional

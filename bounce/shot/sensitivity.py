@@ -41,7 +41,7 @@ class Sensitivity(NamedTuple):
     names : tuple of str
         The k parameters or landing components.
     state : ndarray (n, k)
-        Of (x, xdot, y, ydot, omega, extra states) at lift-off; in 3-D of the states of
+        Of ``x, xdot, y, ydot, omega`` and the extra states at lift-off; in 3-D of the states of
         :meth:`Contact3D.system`.
     time : ndarray (k,)
         Of the duration.

@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 
 class State(NamedTuple):
-    """The ball at one instant: speeds, spin, position of its centre (y = 0 at touch-down)."""
+    """The ball at one instant: speeds, spin, position of its centre ($y = 0$ at touch-down)."""
 
     xdot: float
     ydot: float
@@ -32,7 +32,7 @@ class State(NamedTuple):
 
     @property
     def slip(self) -> float:
-        """Speed of the contact point, H = xdot + omega."""
+        """Speed of the contact point, ``xdot + omega``."""
         return self.xdot + self.omega
 
 
@@ -49,7 +49,7 @@ class Shot(Record[ContactModel, State]):
     time : float
         Duration.
     trajectory : nonsmooth.Trajectory
-        The contact; its states are (x, xdot, y, ydot, omega, extra states).
+        The contact; its states are ``x, xdot, y, ydot, omega`` and the extra ones.
     approach : nonsmooth.Trajectory or None
         The frictionless phase before it, where the load was not positive yet.
     tol : float
@@ -58,7 +58,7 @@ class Shot(Record[ContactModel, State]):
 
     @property
     def slip(self) -> float:
-        """H_F = xdot + omega at lift-off; below zero is reverse slip."""
+        """Slip ``xdot + omega`` at lift-off; below zero is reverse slip."""
         return self.lift_off.slip
 
     @property
@@ -77,7 +77,7 @@ class Shot(Record[ContactModel, State]):
         Returns
         -------
         Forces
-            Arrays (...), load Lambda_N and friction Lambda_T; both zero at lift-off.
+            Load $Lambda_N$ and friction $Lambda_T$, arrays (...); both zero at lift-off.
         """
         times = np.asarray(t, dtype=float)
         function = forces_function(self.model.blueprint())
@@ -146,15 +146,15 @@ def simulate(
     xdot, ydot, omega : float
         Speeds along and normal to the ground and spin at touch-down. ``ydot < 0``, unless the ball
         starts in the ground. In 3-D ``xdot`` and ``omega`` are pairs, forward and to the right:
-        ``omega`` = (omega_z, -omega_x) is the contact point's velocity due to spin. With drilling
-        friction a third number of ``omega`` is the spin omega_y about the vertical.
+        ``omega``, $(omega_z, -omega_x)$, is the contact point's velocity due to spin. With drilling
+        friction a third number of ``omega`` is the spin $omega_y$ about the vertical.
     x, y : float, optional
         Position of the centre, ``x`` a pair in 3-D; ``y < 0`` is a start in the middle of a contact,
         with any ``ydot``.
     tol : float, optional
         Relative and absolute tolerance.
     t_max : float, optional
-        Longest time before lift-off; a linear bounce takes about pi.
+        Longest time before lift-off; a linear bounce takes about $pi$.
 
     Returns
     -------

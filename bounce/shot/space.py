@@ -40,14 +40,14 @@ class State3D:
     ydot : float or ndarray (...)
         Velocity normal to the ground.
     omega : ndarray (..., 2)
-        The spin's part of the contact point's velocity, (omega_z, -omega_x); with drilling a third
-        component is the spin omega_y about the vertical.
+        The spin's part of the contact point's velocity, $(omega_z, -omega_x)$; with drilling a third
+        component is the spin $omega_y$ about the vertical.
     x : ndarray (..., 2)
         Place of the centre along the ground.
     y : float or ndarray (...)
         Its height, 0 at touch-down.
     slip : ndarray (..., 2)
-        Velocity of the contact point, h = xdot + omega: known to its own relative accuracy, however
+        Velocity of the contact point, ``xdot + omega``: known to its own relative accuracy, however
         small it is.
     """
 
@@ -101,7 +101,7 @@ class Shot3D(Record[Contact3D, State3D]):
 
     @property
     def kick(self) -> float:
-        """By how much the bounce turns the direction of travel, rad in (-pi, pi], right positive.
+        """By how much the bounce turns the direction of travel, rad in $(-pi, pi]$, right positive.
 
         Zero for a ball that comes straight down.
         """
@@ -109,7 +109,7 @@ class Shot3D(Record[Contact3D, State3D]):
 
     @property
     def turn(self) -> float:
-        """By how much the slip's direction differs from that at touch-down, rad in (-pi, pi]."""
+        """By how much the slip's direction differs from that at touch-down, rad in $(-pi, pi]$."""
         return _between(self.landing.slip, self.slip)
 
     @property
@@ -153,7 +153,7 @@ class Shot3D(Record[Contact3D, State3D]):
         Returns
         -------
         Forces
-            Load Lambda_N (...) and friction (..., 2); both zero at lift-off.
+            Load $Lambda_N$ (...) and friction (..., 2); both zero at lift-off.
         """
         times = np.asarray(t, dtype=float)
         states = self(times).reshape(-1, self.trajectory.x.shape[1]).T

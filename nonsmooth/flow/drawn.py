@@ -108,7 +108,7 @@ class RandomStarts:
     low, high : array_like (n,)
         Corners of the box; equal numbers hold a state.
     seed : int, optional
-        Which random starts: from 0 to 2^64 - 1.
+        Which random starts: from 0 to $2^64 - 1$.
 
     Attributes
     ----------
@@ -124,8 +124,8 @@ class RandomStarts:
 
     Notes
     -----
-    Component j of start i is drawn from output i n + j of SplitMix64 (Steele, Lea & Flood 2014, "Fast
-    splittable pseudorandom number generators", fig. 17), its upper 53 bits over 2^53.
+    Component j of start i is drawn from output $i n + j$ of SplitMix64 (Steele, Lea & Flood 2014, "Fast
+    splittable pseudorandom number generators", fig. 17), its upper 53 bits over $2^53$.
 
     Examples
     --------

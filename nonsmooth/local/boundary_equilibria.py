@@ -36,7 +36,7 @@ class BoundaryEquilibrium:
     point : ndarray (n,)
         The point, in the order of the states.
     side : {"+", "-"}
-        Whose equilibrium: of F1 or F2.
+        Whose equilibrium: of $F1$ or $F2$.
     label : str
         In the plane ``"BF1"`` ... ``"BF5"``, ``"BN1"``, ``"BN2"``, ``"UN1"``, ``"UN2"``,
         ``"BS1"`` ... ``"BS3"``; otherwise ``"persistence"`` or ``"nonsmooth fold"``;
@@ -44,13 +44,13 @@ class BoundaryEquilibrium:
     unfolding : {"persistence", "nonsmooth fold"}
         Whether the equilibrium turns into a pseudo-equilibrium, or they annihilate.
     time_reversed : bool
-        The other field points away from the equilibrium's side (d < 0): the class is that of the
+        The other field points away from the equilibrium's side $(d < 0)$: the class is that of the
         system with time reversed.
     eigenvalues : ndarray (n,)
         Of the field's linear part A.
     numbers : mapping
         ``d`` and ``s``; in the plane ``trace``, ``determinant``; ``landing`` (BF2, BF3) or
-        ``unstable`` (BS1, BS2) and ``pseudo``, all in units of L_i along the surface for a unit
+        ``unstable`` (BS1, BS2) and ``pseudo``, all in units of $L_i$ along the surface for a unit
         shift of the equilibrium.
     margins : mapping
         Distance from each boundary of the class.
@@ -86,7 +86,7 @@ class BoundaryBifurcation:
     parameters : mapping of str to float
         All of them there, to be given to :func:`boundary_equilibrium` or :func:`classify`.
     side : {"+", "-"}
-        Whose equilibrium: of F1 or F2.
+        Whose equilibrium: of $F1$ or $F2$.
     distance : float
         From the start of the search, in the states.
     residual : float
@@ -133,7 +133,7 @@ def boundary_equilibrium(
     side : {"+", "-"}, optional
         Whose equilibrium; by default the field that vanishes there.
     tol : float, optional
-        How far away the zero of the field may be, relative to 1 + |x|.
+        How far away the zero of the field may be, relative to $1 + |x|$.
     margin : float, optional
         Below this distance from a change of class the label is ``"degenerate"``.
 
@@ -317,7 +317,7 @@ def find_boundary_equilibrium(
     vary : str
         Name of the parameter; the search starts from its value in ``parameters``.
     side : {"+", "-"}
-        Whose field: ``"+"`` is F1 (above), ``"-"`` is F2 (below).
+        Whose field: ``"+"`` is $F1$ (above), ``"-"`` is $F2$ (below).
     tol : float, optional
         The residual at which the search is satisfied.
     max_iterations : int, optional

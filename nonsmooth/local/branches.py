@@ -35,7 +35,7 @@ class SlidingBranch:
     velocity : ndarray (n,)
         The field of the states there.
     eigenvalues : ndarray (k,)
-        Of d(grad h_i . f)/d lambda_j; all with negative real part where the branch attracts.
+        Of the matrix $d(grad h_i . f)/d lambda_j$; all with negative real part where the branch attracts.
     """
 
     multipliers: Array

@@ -27,7 +27,7 @@ class Equilibrium:
     point : ndarray (n,)
         The point, in the order of the states.
     side : {"+", "-"}
-        Of the field F1 (h > 0) or F2 (h < 0).
+        Of the field $F1$ above the surface or $F2$ below it.
     status : {"real", "virtual", "boundary"}
         Whether it is on its field's own side, on the other side, or on the surface.
     kind : str
@@ -67,7 +67,7 @@ class Equilibrium:
 
 
 def equilibrium_distance(field: Array, derivative: Array, x: Array) -> float:
-    """How far the next zero of a field is, to first order, relative to 1 + |x|.
+    """How far the next zero of a field is, to first order, relative to $1 + |x|$.
 
     Infinite where the linearised equations have no solution.
     """
@@ -119,9 +119,9 @@ def find_equilibrium(
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
-        Of the field F1 or F2.
+        Of the field $F1$ or $F2$.
     tol : float, optional
-        Accepted residual (a distance), relative to 1 + |x|.
+        Accepted residual (a distance), relative to $1 + |x|$.
     max_iterations : int, optional
         Newton's method gives up after this many.
 

@@ -100,7 +100,8 @@ def two_fold(
     point : array_like (n,)
         The point, in the order of the states.
     tol : float, optional
-        How well h = L1 = L2 = 0 must hold: each |.|/|grad .| is at most ``tol (1 + |x|)``.
+        How well $h = L1 = L2 = 0$ must hold: each function over the length of its gradient is at most
+        $tol (1 + |x|)$.
 
     Returns
     -------
@@ -112,7 +113,7 @@ def two_fold(
     PointError
         The point is not a two-fold.
     DegenerateError
-        grad h, grad L1, grad L2 are dependent, or a field has a cusp.
+        $grad h$, $grad L1$ and $grad L2$ are dependent, or a field has a cusp.
     ParameterError, DefinitionError, OptionError
         In this order: an unknown or missing parameter, or one that is not a finite number;
         a system of which this cannot be asked; an option outside what is described above.
@@ -156,9 +157,9 @@ def find_two_fold(
     tol: float = 1e-12,
     max_iterations: int = 50,
 ) -> TwoFold:
-    """Find a two-fold close to a point: h = L1 = L2 = 0.
+    """Find a two-fold close to a point: $h = L1 = L2 = 0$.
 
-    Newton's method with exact gradients and least-norm steps; in a system of n > 3 states the
+    Newton's method with exact gradients and least-norm steps; in a system of $n > 3$ states the
     two-fold found is near the start, not exactly the nearest of the (n-3)-dimensional set.
 
     Parameters
@@ -170,7 +171,7 @@ def find_two_fold(
     hold : sequence of str, optional
         Names of states that keep their value.
     tol : float, optional
-        Accepted residual (a distance), relative to 1 + |x|; the search itself goes to rounding.
+        Accepted residual (a distance), relative to $1 + |x|$; the search itself goes to rounding.
     max_iterations : int, optional
         Newton's method gives up after this many.
 

@@ -33,7 +33,7 @@ class FoldFold:
         ``"VV1"``, ``"VV2"``, ``"VI1"``, ``"VI2"``, ``"VI3"``, ``"II1"``, ``"II2"``, or
         ``"degenerate"``.
     visible : (bool, bool)
-        Of the folds of F1 and F2.
+        Of the folds of $F1$ and $F2$.
     same_direction : bool
         Whether the two fields point the same way along the surface.
     numbers : mapping
@@ -66,7 +66,7 @@ def fold_fold(
     tol: float = 1e-9,
     margin: float = MARGIN,
 ) -> FoldFold:
-    """Describe the fold-fold of a planar system at a point where L1 = L2 = 0.
+    """Describe the fold-fold of a planar system at a point where $L1 = L2 = 0$.
 
     Parameters
     ----------

@@ -30,21 +30,21 @@ class Fold:
     point : ndarray (n,)
         The point, in the order of the states.
     side : {"+", "-"}
-        Of the field F1 (h > 0) or F2 (h < 0).
+        Of the field $F1$ above the surface or $F2$ below it.
     order : int or None
-        First k with L^k h != 0; None if there is none up to the order that was looked at.
+        First k with $L^k h != 0$; None if there is none up to the order that was looked at.
     kind : {"visible", "invisible", "cusp", "degenerate"}
         A fold (order 2) is visible if the orbit of its field through the point stays on the
         field's side; order 3 is a cusp; anything higher is degenerate.
     lie : ndarray (order looked at + 1,)
-        L^k h for k = 0, 1, ...
+        $L^k h$ for k from 0.
     other : float
         First Lie derivative of h along the other field: attracting or repelling sliding begins
         here unless it is zero too.
     distance : float
         From the start of the search; 0 if the point was given.
     residual : float
-        Distance to the solution of h = L_i = 0 to first order.
+        Distance to the solution of $h = L_i = 0$ to first order.
     iterations : int
         Iterations that Newton's method took; 0 where nothing was searched.
     """
@@ -155,7 +155,7 @@ def fold(
     system, point, parameters, t, surface, mode, tol
         As in :func:`region`.
     side : {"+", "-"}
-        Whose field: ``"+"`` is F1 (above), ``"-"`` is F2 (below).
+        Whose field: ``"+"`` is $F1$ (above), ``"-"`` is $F2$ (below).
     max_order : int, optional
         Highest order of contact to look at.
 
@@ -213,9 +213,9 @@ def find_fold(
     tol: float = 1e-12,
     max_iterations: int = 50,
 ) -> Fold:
-    """Find a fold close to a point: h = 0 and L_i h = 0.
+    """Find a fold close to a point: $h = 0$ and $L_i h = 0$.
 
-    Newton's method with exact gradients and least-norm steps. For n > 2 folds form a set of
+    Newton's method with exact gradients and least-norm steps. For $n > 2$ folds form a set of
     dimension n - 2; the one found is near the start, not exactly the nearest. A cusp of a planar
     system is a double root: it is found to about 1e-8 and named.
 
@@ -226,13 +226,13 @@ def find_fold(
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}, optional
-        Whose fold: of F1 or F2.
+        Whose fold: of $F1$ or $F2$.
     hold : sequence of str, optional
         Names of states that keep their value.
     max_order : int, optional
         Highest order of contact to look at.
     tol : float, optional
-        Accepted residual (a distance), relative to 1 + |x|; the search itself goes to rounding.
+        Accepted residual (a distance), relative to $1 + |x|$; the search itself goes to rounding.
     max_iterations : int, optional
         Newton's method gives up after this many.
 

@@ -56,11 +56,11 @@ class Continuation:
     velocity : ndarray (n,)
         Velocity of the states in that mode.
     rates : ndarray (k,)
-        d h_i/dt of the surfaces that meet at the point.
+        $d h_i/dt$ of the surfaces that meet at the point.
     eigenvalues : ndarray
         Of the layer problem of those that slide: all with negative real part where it attracts.
     slack : float
-        How far the mode is from being impossible: the least of 1 - abs(lambda_i) and of the angles
+        How far the mode is from being impossible: the least of $1 - abs(lambda_i)$ and of the angles
         between the motion and the surfaces that it leaves.
     """
 
@@ -137,7 +137,7 @@ def intersection(
     parameters, t : optional
         As in :func:`region`.
     tol : float, optional
-        A point is on a surface where abs(h)/|grad h| <= tol (1 + |x|).
+        A point is on a surface where $abs(h)/|grad h| <= tol (1 + |x|)$.
 
     Returns
     -------

@@ -36,7 +36,7 @@ class LocalObject:
     margins : mapping
         Distance from each condition that was looked at.
     evidence : mapping
-        Numbers: h, L1, L2, and what decided the class.
+        Numbers: ``h``, ``L1``, ``L2``, and what decided the class.
     detail : object
         The Fold, TwoFold, FoldFold, BoundaryEquilibrium, PseudoEquilibrium or Intersection, if there is
         one.

@@ -116,7 +116,7 @@ def solve(
         x (n,) -> values (m,), Jacobian (m, n).
     start : ndarray (n,)
     tol : float
-        Accepted residual, relative to 1 + |x|; its square root at a multiple root.
+        Accepted residual, relative to $1 + |x|$; its square root at a multiple root.
     max_iterations : int
         Newton's method gives up after this many.
     what : str
@@ -205,7 +205,7 @@ class Secant:
     Parameters
     ----------
     values : callable
-        x (n,) -> values (m,).
+        Takes unknowns (n,) and returns values (m,).
     scale : float
         Size of the unknowns.
 
@@ -255,12 +255,12 @@ def converge(
     """Root of as many equations as unknowns from a good guess, or None.
 
     Full steps; it ends with the step after which the next one would be below ``tol``: steps shrink
-    by a factor that itself shrinks, so the next one is below size^2/last.
+    by a factor that itself shrinks, so the next one is below the square of the size over the last one.
 
     Parameters
     ----------
     equations : callable
-        x (n,) -> values (n,), Jacobian (n, n); a :class:`Secant` is tried again with fresh
+        Takes unknowns (n,) and returns values (n,) and Jacobian (n, n); a :class:`Secant` is tried again with fresh
         differences.
     start : ndarray (n,)
         Where the iteration starts.

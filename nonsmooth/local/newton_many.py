@@ -29,7 +29,7 @@ def solve_many(
     equations : callable
     starts : ndarray (k, n)
     tol : float
-        Accepted residual, a distance relative to 1 + |x|.
+        Accepted residual, a distance relative to $1 + |x|$.
     iterations : int, optional
 
     Returns

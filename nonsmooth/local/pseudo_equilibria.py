@@ -35,7 +35,7 @@ def find_pseudo_equilibrium(
     tol: float = 1e-12,
     max_iterations: int = 50,
 ) -> PseudoEquilibrium:
-    """Find a pseudo-equilibrium close to a point: h = 0 and (1 - alpha) F1 + alpha F2 = 0.
+    """Find a pseudo-equilibrium close to a point: $h = 0$ and $(1 - alpha) F1 + alpha F2 = 0$.
 
     Parameters
     ----------
@@ -45,14 +45,14 @@ def find_pseudo_equilibrium(
     near : array_like (n,)
         Where the search starts.
     tol : float, optional
-        Accepted residual (a distance), relative to 1 + |x|.
+        Accepted residual (a distance), relative to $1 + |x|$.
     max_iterations : int, optional
         Newton's method gives up after this many.
 
     Returns
     -------
     PseudoEquilibrium
-        Check its ``status``: where alpha is outside (0, 1) the fields are parallel and orbits
+        Check its ``status``: where $alpha$ is outside (0, 1) the fields are parallel and orbits
         cross.
 
     Raises

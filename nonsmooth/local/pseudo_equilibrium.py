@@ -20,9 +20,9 @@ class PseudoEquilibrium:
     point : ndarray (n,)
         The point, in the order of the states.
     alpha : float
-        Weight of F2; in (0, 1) for a real one. NaN on several surfaces.
+        Weight of $F2$; in (0, 1) for a real one. NaN on several surfaces.
     status : {"real", "virtual"}
-        Virtual if alpha is outside (0, 1): the fields are parallel there, not opposite. On several
+        Virtual if $alpha$ is outside (0, 1): the fields are parallel there, not opposite. On several
         surfaces: if a multiplier is outside (-1, 1).
     region : Region
         On several surfaces: whether sliding along their intersection attracts or repels, else MIXED.
@@ -31,11 +31,11 @@ class PseudoEquilibrium:
         eigenvalues ``"stable pseudo-focus"``, ...; ``"pseudo-saddle-node"`` or ``"degenerate"``
         where the sliding flow decides nothing.
     eigenvalues : ndarray (n - k,)
-        Of the sliding field on the tangent space of the surface (k = 1) or of k that meet, by real part.
+        Of the sliding field on the tangent space of the surface ($k = 1$) or of k that meet, by real part.
     stable : bool
         Attracting from the surface and along it.
     margin : float
-        Smallest of: alpha, 1 - alpha, the real parts relative to the largest modulus of DF_i.
+        Smallest of: $alpha$, $1 - alpha$, the real parts relative to the largest modulus of $D F_i$.
     distance, residual : float
         Distance from the start of the search, and what is left of the equations.
     iterations : int
@@ -43,7 +43,7 @@ class PseudoEquilibrium:
     mode : str
         One letter for each surface, ``s`` for those that slide.
     multipliers : ndarray (k,)
-        Of those, 1 - 2 alpha on one surface.
+        Of those, $1 - 2 alpha$ on one surface.
     """
 
     point: Array

@@ -25,7 +25,7 @@ from .vector_sets import law_at
 
 
 class Region(Enum):
-    """What the two fields do at a point of the surface; above is h > 0 with F1.
+    """What the two fields do at a point of the surface; above is $h > 0$ with $F1$.
 
     Examples
     --------
@@ -78,8 +78,8 @@ def region(
 ) -> Region:
     """Region of the switching surface, or of a set of codimension two or three, in which a point lies.
 
-    On a set h = 0 with a vector multiplier h' = a - M lambda: ``SLIDING`` where |M^-1 a| < 1, so that
-    lambda = M^-1 a keeps the motion on it; ``CROSSING`` where |M^-1 a| > 1 (see
+    On a set $h = 0$ with a vector multiplier $h' = a - M lambda$: ``SLIDING`` where $|M^-1 a| < 1$, so that
+    $lambda = M^-1 a$ keeps the motion on it; ``CROSSING`` where $|M^-1 a| > 1$ (see
     :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M has a negative direction.
 
     Parameters
@@ -87,7 +87,7 @@ def region(
     system : FilippovSystem
         The system the question is about.
     point : array_like (n,)
-        A point on the surface: |h|/|grad h| <= tol (1 + |x|).
+        A point on the surface: $|h|/|grad h| <= tol (1 + |x|)$.
     parameters : mapping, optional
         Values that replace defaults.
     t : float, optional
@@ -98,7 +98,7 @@ def region(
         With several surfaces, one letter each: the sides of the others. By default the signs of
         their functions at the point.
     tol : float, optional
-        A field is tangent when |L_i| <= tol |grad h| |F_i|: it makes an angle below ``tol`` with
+        A field is tangent when $|L_i| <= tol |grad h| |F_i|$: it makes an angle below ``tol`` with
         the surface. This does not change when h or a field is multiplied by a positive number.
 
     Returns
@@ -170,9 +170,9 @@ def alpha(
     mode: str | None = None,
     tol: float = TOLERANCE,
 ) -> float:
-    """Weight of the field below in the sliding field, alpha = L1/(L1 - L2) = (1 - lambda)/2.
+    """Weight of the field below in the sliding field, $alpha = L1/(L1 - L2) = (1 - lambda)/2$.
 
-    It is 0 where L1 = 0 and 1 where L2 = 0, and in between F_s = (1 - alpha) F1 + alpha F2
+    It is 0 where $L1 = 0$ and 1 where $L2 = 0$, and in between $F_s = (1 - alpha) F1 + alpha F2$
     (Filippov 1988, section 4).
 
     Parameters
@@ -188,7 +188,7 @@ def alpha(
     Raises
     ------
     PointError
-        In a crossing region; where both fields are tangent (0/0); and as in :func:`region`.
+        In a crossing region; where both fields are tangent $(0/0)$; and as in :func:`region`.
 
     Examples
     --------
@@ -229,9 +229,9 @@ def sliding_field(
 ) -> Array:
     """Velocity of sliding, attracting or repelling: the convex combination tangent to the surface.
 
-    Factors that L1 - L2 and F1 - F2 have in common are cancelled symbolically, so the field is
+    Factors that $L1 - L2$ and $F1 - F2$ have in common are cancelled symbolically, so the field is
     accurate close to a two-fold where they vanish (Coulomb friction at zero normal force). At such
-    a point itself it is F1 = F2.
+    a point itself it is $F1 = F2$.
 
     Parameters
     ----------
@@ -246,7 +246,7 @@ def sliding_field(
     Raises
     ------
     PointError
-        In a crossing region; at a two-fold where the fields differ (0/0); and as in
+        In a crossing region; at a two-fold where the fields differ $(0/0)$; and as in
         :func:`region`.
 
     Examples

@@ -152,7 +152,7 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
     starts : array_like (k, n)
         Points from which to search.
     apart : float, optional
-        Two results closer than this, relative to 1 + |x|, are the same.
+        Two results closer than this, relative to $1 + |x|$, are the same.
 
     Returns
     -------

@@ -22,8 +22,8 @@ from .two_folds import Boundary, Classification, NormalForm
 class TwoFold:
     """A generic two-fold, its normal form and its class.
 
-    ``print(fold)`` says what it means. Coordinates (z1, z2, z3), times and the matrix are those of
-    ``normal_form``: sliding is attracting where z2, z3 > 0 and repelling where z2, z3 < 0.
+    ``print(fold)`` says what it means. Coordinates $(z1, z2, z3)$, times and the matrix are those of
+    ``normal_form``: sliding is attracting where $z2, z3 > 0$ and repelling where $z2, z3 < 0$.
 
     Attributes
     ----------
@@ -38,17 +38,17 @@ class TwoFold:
     surface : int
         Index of the surface it lies on.
     form : NormalForm
-        theta, phi and the reduced flow.
+        $theta$, $phi$ and the reduced flow.
     classification : Classification
         Class, canards and determinism, from signs and numbers alone.
     lie : mapping
-        ``L11``, ``L12``, ``L21``, ``L22`` with L_ij = F_i . grad L_j.
+        ``L11``, ``L12``, ``L21``, ``L22`` with $L_ij = F_i . grad L_j$.
     coincident_fields : bool
-        Whether F1 = F2 at the point. Then Delta = 0 and sliding passes smoothly through it.
+        Whether $F1 = F2$ at the point. Then $Delta = 0$ and sliding passes smoothly through it.
     distance : float
         From the start of the search; 0 if the point was given.
     residual : float
-        Largest first-order distance to h = 0, L1 = 0, L2 = 0.
+        Largest first-order distance to $h = 0$, $L1 = 0$, $L2 = 0$.
     iterations : int
         Iterations that Newton's method took; 0 where nothing was searched.
     chart : Chart
@@ -73,42 +73,42 @@ class TwoFold:
 
     @property
     def sigma(self) -> tuple[int, int]:
-        """Signs of L11 and L22."""
+        """Signs of $L11$ and $L22$."""
         return self.form.flow.sigma
 
     @property
     def nu(self) -> tuple[float, float]:
-        """L12 and -L21 over sqrt|L11 L22|."""
+        """The two numbers: $L12$ and $-L21$ over $sqrt(|L11 L22|)$."""
         return self.form.flow.nu
 
     @property
     def theta(self) -> float:
-        """|L11 L22|^(-1/2), so z1 = theta h."""
+        """Scale of the surface's function, $|L11 L22|^(-1/2)$, so that $z1 = theta h$."""
         return self.form.theta
 
     @property
     def phi(self) -> float:
-        """|L22/L11|^(1/4): real time is phi tau above and tau/phi below."""
+        """Scale of time, $|L22/L11|^(1/4)$: real time is $phi tau$ above and $tau/phi$ below."""
         return self.form.phi
 
     @property
     def matrix(self) -> Array:
-        """M = [[nu2, -sigma1], [sigma2, nu1]]; (2, 2)."""
+        """Matrix of the reduced flow, $[[nu2, -sigma1], [sigma2, nu1]]$; (2, 2)."""
         return self.form.flow.matrix
 
     @property
     def trace(self) -> float:
-        """nu1 + nu2."""
+        """Trace of M, $nu1 + nu2$."""
         return self.form.flow.trace
 
     @property
     def determinant(self) -> float:
-        """Delta = nu1 nu2 + sigma1 sigma2."""
+        """Determinant of M, $Delta = nu1 nu2 + sigma1 sigma2$."""
         return self.form.flow.determinant
 
     @property
     def discriminant(self) -> float:
-        """(nu1 - nu2)^2 - 4 sigma1 sigma2."""
+        """Discriminant of M, $(nu1 - nu2)^2 - 4 sigma1 sigma2$; negative: a focus."""
         return self.form.flow.discriminant
 
     @property
@@ -118,12 +118,12 @@ class TwoFold:
 
     @property
     def eigenvectors(self) -> NDArray[Any]:
-        """Unit eigenvectors in (z2, z3) as columns; (2, 2)."""
+        """Unit eigenvectors in $(z2, z3)$ as columns; (2, 2)."""
         return self.form.flow.eigenvectors
 
     @property
     def slopes(self) -> NDArray[Any]:
-        """z3/z2 along the eigenvectors; (2,)."""
+        """Slopes $z3/z2$ of the eigenvectors; (2,)."""
         return self.form.flow.slopes
 
     # the class ---------------------------------------------------------------------------------
@@ -140,12 +140,12 @@ class TwoFold:
 
     @property
     def canards(self) -> float:
-        """Number of sliding orbits Da -> s: 0, 1 or inf (NaN on a boundary of classes)."""
+        """Number of sliding orbits $Da -> s -> Dr$: 0, 1 or inf (NaN on a boundary of classes)."""
         return self.classification.canards
 
     @property
     def faux_canards(self) -> float:
-        """Number of sliding orbits Dr -> s -> Da: 0, 1 or inf (NaN on a boundary of classes)."""
+        """Number of sliding orbits $Dr -> s -> Da$: 0, 1 or inf (NaN on a boundary of classes)."""
         return self.classification.faux_canards
 
     @property
@@ -173,7 +173,7 @@ class TwoFold:
     # maps --------------------------------------------------------------------------------------
 
     def coordinates(self, x: ArrayLike) -> Array:
-        """Normal-form coordinates z1 = theta h, z2 = -phi theta L1, z3 = theta L2/phi.
+        """Normal-form coordinates $z1 = theta h$, $z2 = -phi theta L1$, $z3 = theta L2/phi$.
 
         They are these functions at any state, not their linearisation.
 
@@ -185,7 +185,7 @@ class TwoFold:
         Returns
         -------
         ndarray (..., 3)
-            Coordinates (z1, z2, z3) of the normal form.
+            Coordinates $(z1, z2, z3)$ of the normal form.
 
         Raises
         ------
@@ -197,12 +197,12 @@ class TwoFold:
     def point_at(self, z: ArrayLike, *, tol: float = 1e-12, max_iterations: int = 50) -> Array:
         """Find states near the two-fold with given coordinates (the inverse of ``coordinates``).
 
-        For n > 3 the least-norm steps of Newton's method choose the state.
+        For $n > 3$ the least-norm steps of Newton's method choose the state.
 
         Parameters
         ----------
         z : array_like (..., 2) or (..., 3)
-            (z2, z3) on the surface, or (z1, z2, z3).
+            $(z2, z3)$ on the surface, or $(z1, z2, z3)$.
         tol, max_iterations
             As in :func:`find_two_fold`.
 
@@ -221,25 +221,25 @@ class TwoFold:
         return self.chart.inverse(z, tol, max_iterations)
 
     def tangents(self) -> Array:
-        """States per unit of z1, z2 and z3 at the two-fold, the derivative of ``point_at``.
+        """States per unit of $z1$, $z2$ and $z3$ at the two-fold, the derivative of ``point_at``.
 
         Returns
         -------
         ndarray (n, 3)
-            Directions of z1, z2 and z3 in the space of states, as columns.
+            Directions of $z1$, $z2$ and $z3$ in the space of states, as columns.
         """
         return self.chart.tangents()
 
     def reach_time(self, z: ArrayLike, *, tol: float = 1e-9) -> Array:
-        """Real time, to leading order, at which the sliding orbit through (z2, z3) is at s.
+        """Real time, to leading order, at which the sliding orbit through $(z2, z3)$ is at s.
 
-        t* = -(1/phi, phi) M^-1 z; on an eigenline (z2/phi + phi z3)/(-lambda). Positive: the orbit
+        It is $-(1/phi, phi) M^-1 z$; on an eigenline $(z2/phi + phi z3)/(-lambda)$. Positive: the orbit
         reaches s; negative: it came from there; NaN: it does neither.
 
         Parameters
         ----------
         z : array_like (..., 2)
-            (z2, z3) in Da or Dr.
+            $(z2, z3)$ in Da or Dr.
         tol : float, optional
             Relative distance in slope within which a point is on a single canard.
 

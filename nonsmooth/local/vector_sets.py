@@ -34,14 +34,14 @@ from .place import TOLERANCE
 
 @dataclass(frozen=True, eq=False)
 class LimitDirection:
-    """A direction in which orbits reach or leave a set h = 0.
+    """A direction in which orbits reach or leave a set $h = 0$.
 
     Attributes
     ----------
     direction : ndarray (k,)
-        u = h/|h|, of length 1.
+        $u = h/|h|$, of length 1.
     rate : float
-        r' of r = |h| along it: negative where orbits arrive.
+        $r'$ of $r = |h|$ along it: negative where orbits arrive.
     attracting : bool
         Whether nearby directions of h turn towards this one: all orbits close by that come or go do so
         along it. Others are met by single orbits only.
@@ -80,7 +80,7 @@ def limit_directions(
     system : FilippovSystem
         With a vector multiplier.
     point : array_like (n,)
-        A point on the set: |h| <= tol (1 + |x|) |grad h|.
+        A point on the set: $|h| <= tol (1 + |x|) |grad h|$.
     parameters : mapping, optional
         Values that replace defaults.
     t : float, optional
@@ -96,8 +96,8 @@ def limit_directions(
     Returns
     -------
     list of LimitDirection
-        By descending rate: two, or four (k = 2, anisotropic friction and a load inside the astroid
-        |a1|^(2/3) + |a2|^(2/3) < |m1 - m2|^(2/3)). Where a = 0 and M is isotropic every direction
+        By descending rate: two, or four ($k = 2$, anisotropic friction and a load inside the astroid
+        $|a1|^(2/3) + |a2|^(2/3) < |m1 - m2|^(2/3)$). Where $a = 0$ and M is isotropic every direction
         is one; the axes stand for them.
 
     Raises

@@ -29,7 +29,7 @@ class Stop:
 
 @dataclass(frozen=True)
 class Reset:
-    """A surface on which the state jumps, x -> ``map``.
+    """A surface on which the state jumps to ``map``.
 
     Parameters
     ----------

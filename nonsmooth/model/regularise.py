@@ -61,7 +61,7 @@ def regularise(
     name: str = "eps",
     edges: bool = True,
 ) -> FilippovSystem:
-    """Smooth a system: each multiplier becomes phi(h/eps).
+    """Smooth a system: each multiplier becomes $phi(h/eps)$.
 
     Parameters
     ----------
@@ -72,7 +72,7 @@ def regularise(
         Width of the layer, in the units of h: default of the parameter ``name``; None for no
         default.
     transition : {"tanh", "erf", "algebraic", "arctan"} or callable, optional
-        phi, with slope 1 at 0 and limits -1 and +1. A callable takes and returns an SX scalar and
+        $phi$, with slope 1 at 0 and limits -1 and +1. A callable takes and returns an SX scalar and
         must be smooth. It has no edges: give ``max_step``, below the time in which the layer is
         passed, or a run can step over it.
     name : str, optional
@@ -89,7 +89,7 @@ def regularise(
     Raises
     ------
     OptionError
-        eps is not positive, or the transition is unknown.
+        ``eps`` is not positive, or the transition is unknown.
     DefinitionError
         The name is taken.
     NotSmoothError

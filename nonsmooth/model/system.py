@@ -31,7 +31,7 @@ T = TypeVar("T")
 
 
 class FilippovSystem(Structure):
-    """A system x' = f(x, lambda; p) with lambda_i in Sgn(h_i(x)).
+    """A system $x' = f(x, lambda; p)$ with $lambda_i in Sgn(h_i(x))$.
 
     Give either the two fields of one surface, or a field with multipliers. ``lambda = +1`` where
     ``h > 0`` and ``-1`` where ``h < 0``; in between while sliding. Each multiplier must enter the
@@ -44,14 +44,14 @@ class FilippovSystem(Structure):
     surface : expression, optional
         The switching function h; its zero set is the surface.
     above, below : sequence of n expressions, optional
-        The fields F1 where h > 0 and F2 where h < 0.
+        The fields $F1$ where $h > 0$ and $F2$ where $h < 0$.
     field : sequence of n expressions, optional
         The right-hand side in states, parameters, time and multipliers.
     multipliers : SX symbol or sequence of them, optional
         One for each surface; a vector for each set.
     surfaces : sequence of expressions, optional
         Switching functions, one for each multiplier (``surface`` also takes one). A vector h of two or
-        three is one set h = 0: its multiplier is h/|h| off it and |lambda| <= 1 on it.
+        three is one set $h = 0$: its multiplier is $h/|h|$ off it and $|lambda| <= 1$ on it.
     parameters : mapping or sequence, optional
         Symbols with their default values; None, or a bare sequence of symbols, means no default.
     time : SX symbol, optional
@@ -66,7 +66,7 @@ class FilippovSystem(Structure):
         What is periodic in time; each adds its phase to the states.
     hidden : bool, optional
         Allow multipliers that enter nonlinearly (hidden dynamics, Jeffrey 2018): sliding then
-        follows a stable solution lambda of grad h . f(x, lambda) = 0.
+        follows a stable solution $lambda$ of $grad h . f(x, lambda) = 0$.
 
     Raises
     ------
@@ -138,7 +138,7 @@ class FilippovSystem(Structure):
         clocks: Sequence[Clock] | Clock = (),
         hidden: bool = False,
     ) -> FilippovSystem:
-        """Find sign, fabs, fmin, fmax and if_else in x' = ``rhs`` and make them surfaces.
+        """Find sign, fabs, fmin, fmax and if_else in a right-hand side and make them surfaces.
 
         Identical switching functions, also up to a constant factor, share one multiplier; see
         ``lifted`` for the surfaces and their order. What the expression is on a surface does not
@@ -270,12 +270,12 @@ class FilippovSystem(Structure):
     def lie_derivative(
         self, fields: str | Sequence[str], surface: int = 0, of: Expression | None = None
     ) -> ca.SX:
-        """Iterated Lie derivative; the rightmost field is applied first, as in L12 = F1.grad L2.
+        """Iterated Lie derivative; the rightmost field is applied first, as in $L12 = F1.grad L2$.
 
         Parameters
         ----------
         fields : str or sequence of str
-            Modes without sliding. With one surface a string such as ``"+-"`` reads as L12.
+            Modes without sliding. With one surface a string such as ``"+-"`` means $L12$.
         surface : int, optional
             Which switching function is differentiated.
         of : expression, optional
@@ -315,7 +315,7 @@ class FilippovSystem(Structure):
     def function(
         self, key: Hashable, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
     ) -> ca.Function:
-        """Return the cached CasADi function (states, p) -> ``build()``; states as extended."""
+        """Return the cached CasADi function of states and parameters that ``build()`` gives."""
 
         def made() -> ca.Function:
             outputs = [ca.densify(ca.SX(e)) for e in build()]

@@ -103,7 +103,7 @@ class Connection:
 
     @property
     def eigenvalue(self) -> float:
-        """The leading unstable one: periods of nearby orbits diverge as -ln|mu - mu*|/eigenvalue."""
+        """The leading unstable one: periods of nearby orbits diverge as $-ln|mu - mu_0|$ over it."""
         real = np.real(self.saddle.eigenvalues)
         return float(real[real > 0].min())
 

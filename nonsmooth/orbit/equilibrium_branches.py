@@ -294,7 +294,7 @@ def continue_equilibrium(
     bounds : (float, float)
         Where the branch ends.
     side : {"+", "-"} or None, optional
-        Of the field F1 or F2; None for a pseudo-equilibrium.
+        Of the field $F1$ or $F2$; None for a pseudo-equilibrium.
     step : float, optional
         Largest step where the branch bends, relative to the width of the bounds and to the size of
         the states.

@@ -82,7 +82,7 @@ def periodic_orbit(
         enters sines and cosines of one frequency. The orbit may take several.
     symmetry : "odd" or array_like (n, n), optional
         R, if R x solves the equations when x does (half a forcing period later, if there is one): the
-        orbit is looked for as a half, which R maps to the other half. ``"odd"`` is R = -1.
+        orbit is looked for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
     parameters : mapping, optional
         Values that replace those of the guess, or defaults.
     t_start : float, optional

@@ -288,7 +288,7 @@ def saltation_matrix(
 
     Notes
     -----
-    S = g_x + (f+ - g_x f-) e_x/(e_x f-), time included (Leine & Nijmeijer 2004, ch. 7).
+    $S = g_x + (f+ - g_x f-) e_x/(e_x f-)$, time included (Leine & Nijmeijer 2004, ch. 7).
 
     Examples
     --------

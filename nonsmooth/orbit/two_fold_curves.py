@@ -77,7 +77,7 @@ def trace_two_folds(
     near : array_like (n,)
         Start of the first search.
     over : str or SX symbol
-        Name of a parameter, or of a state (for n > 3, where two-folds form a set of dimension
+        Name of a parameter, or of a state (for $n > 3$, where two-folds form a set of dimension
         n - 3).
     values : array_like (k,)
         In the order in which they are visited.

@@ -151,12 +151,12 @@ def two_fold_map(
     size: tuple[float, float] = (4.8, 6.2),
     legend: bool = True,
 ) -> Figure:
-    """Draw the classes of one kind of two-fold over the (nu1, nu2) plane, with every boundary.
+    """Draw the classes of one kind of two-fold over the $(nu1, nu2)$ plane, with every boundary.
 
     Parameters
     ----------
     kind : {"VV", "II", "VI", "IV"}
-        V for visible, I for invisible; the fold of F1 first.
+        V for visible, I for invisible; the fold of $F1$ first.
     ax : matplotlib Axes, optional
         Axes to draw into; default a new figure.
     size : (float, float), optional

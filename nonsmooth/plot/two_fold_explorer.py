@@ -10,7 +10,7 @@ from .two_fold_atlas import CASES, REACH, SIGMA, areas, places
 
 
 def two_fold_explorer() -> str:
-    """Return a page on which (nu1, nu2) is dragged over the class map of each kind of two-folds.
+    """Return a page on which $(nu1, nu2)$ is dragged over the class map of each kind of two-folds.
 
     The sliding portrait, its eigenlines and canards, the numbers and what the class means for
     uniqueness follow. The page is one file of HTML that needs no network: write it and open it in a

@@ -62,7 +62,7 @@ def two_fold_3d(
     size : (float, float), optional
         Inches, of a new figure.
     azimuth, elevation : float, optional
-        Of the viewer, in degrees: from the z2 axis towards the z3 axis, by default where neither
+        Of the viewer, in degrees: from the $z2$ axis towards the $z3$ axis, by default where neither
         field is seen end on; and above the surface, between 5 and 85.
     legend : bool, optional
         Whether to explain lines and colours beside the picture.

@@ -58,7 +58,7 @@ def prove_all(
     kind : {"two-fold", "fold", "equilibrium", "pseudo-equilibrium"}, optional
         Equilibria are those of one field on its own side, pseudo-equilibria those that slide.
     side : {"+", "-"}, optional
-        For folds and equilibria the field F1 or F2.
+        For folds and equilibria the field $F1$ or $F2$.
     surface, mode
         As in :func:`nonsmooth.region`.
     parameters : mapping, optional

@@ -11,9 +11,9 @@ from .problem import Problem, problem, stated
 def dry_friction() -> Problem:
     """Oscillator with Coulomb friction that comes to rest in finite time.
 
-    y1' = y2, y2' = -y1 - c sgn y2, c = 0.4, from (3, 0). Half-swings are circles about -+c, so each
-    turning point is 0.8 closer to zero than the last one: -2.2, 1.4, -0.6, -0.2 at pi, 2 pi, 3 pi,
-    4 pi; there abs(y1) < c and it sticks.
+    $y1' = y2$, $y2' = -y1 - c sgn y2$, $c = 0.4$, from (3, 0). Half-swings are circles about $-+c$, so each
+    turning point is 0.8 closer to zero than the last one: -2.2, 1.4, -0.6, -0.2 at $pi$, $2 pi$, $3 pi$,
+    $4 pi$; there $abs(y1) < c$ and it sticks.
 
     Returns
     -------
@@ -57,8 +57,8 @@ _SLIP_STICK = "simulate; length of a {} segment of the periodic orbit"
 def leine_stick_slip() -> Problem:
     """Block on a belt whose friction weakens with the slip velocity.
 
-    x' = v, v' = -x + sgn(w - v)/(1 + 3 abs(v - w)), belt velocity w = 0.2. Sticking orbits leave at
-    x = 1, so every orbit that sticks once is on the periodic orbit from then on: the multipliers
+    $x' = v$, $v' = -x + sgn(w - v)/(1 + 3 abs(v - w))$, belt velocity $w = 0.2$. Sticking orbits leave at
+    $x = 1$, so every orbit that sticks once is on the periodic orbit from then on: the multipliers
     are 1 and 0.
 
     Returns
@@ -111,10 +111,10 @@ def leine_stick_slip() -> Problem:
 
 
 def stick_slip_exponential() -> Problem:
-    """Stick-slip with friction 1/(1 + abs(v_rel)) (nosnoc_py's periodic_stick_slip).
+    """Stick-slip with a friction that falls with the slip (nosnoc_py's periodic_stick_slip).
 
-    x1' = x2; x2' = -x1 + 1/(1.2 - x2) for x2 < 0.2, -x1 - 1/(0.8 + x2) for x2 > 0.2. Sliding for
-    abs(x1) < 1 with x1' = 0.2, exit at (1, 0.2).
+    $x1' = x2$; $x2' = -x1 + 1/(1.2 - x2)$ for $x2 < 0.2$, $-x1 - 1/(0.8 + x2)$ for $x2 > 0.2$. Sliding for
+    $abs(x1) < 1$ with $x1' = 0.2$, exit at (1, 0.2).
 
     Returns
     -------

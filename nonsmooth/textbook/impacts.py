@@ -11,8 +11,8 @@ from .problem import Problem, problem, stated
 def bouncing_ball() -> Problem:
     """Impacts that accumulate in finite time.
 
-    y' = v, v' = -g; at y = 0, v -> -r v. From height 1 with g = 9.81, r = 0.9: first impact at
-    t1 = sqrt(2/g), then intervals 2 t1 r^k, which add up to t1 (1 + r)/(1 - r) = 19 t1.
+    $y' = v$, $v' = -g$; at $y = 0$, $v -> -r v$. From height 1 with $g = 9.81$, $r = 0.9$: first impact at
+    $t1 = sqrt(2/g)$, then intervals $2 t1 r^k$, which add up to $t1 (1 + r)/(1 - r) = 19 t1$.
 
     Returns
     -------
@@ -53,8 +53,8 @@ def bouncing_ball() -> Problem:
 def impact_oscillator() -> Problem:
     """Forced oscillator whose periodic motion grazes a wall.
 
-    x'' + c x' + x = A cos w t, wall at x = 1 with v -> -r v; c = 0.1, w = 0.8. The motion without
-    impacts has amplitude a = A/sqrt((1 - w^2)^2 + (c w)^2) and grazes the wall when a = 1. The parameter
+    $x'' + c x' + x = A cos w t$, wall at $x = 1$ with $v -> -r v$; $c = 0.1$, $w = 0.8$. The motion without
+    impacts has amplitude $a = A/sqrt((1 - w^2)^2 + (c w)^2)$ and grazes the wall when $a = 1$. The parameter
     ``phase`` shifts time so that this motion starts at (-a, 0); the start given is the grazing one.
 
     Returns
@@ -66,7 +66,7 @@ def impact_oscillator() -> Problem:
     -----
     Source: the standard impact oscillator (Nordmark 1991, J. Sound Vib. 145, 279-297), with
     numbers chosen for this library; grazing amplitude in closed form. The coefficient of
-    restitution r = 0.8 does not enter the reference value.
+    restitution $r = 0.8$ does not enter the reference value.
 
     Examples
     --------
@@ -104,10 +104,10 @@ def impact_oscillator() -> Problem:
 def kelvin_voigt_bounce() -> Problem:
     """Spinning ball pressed into compliant ground, with Coulomb friction, until it separates.
 
-    X'' = A + T, Y'' = N, W' = (5/2) T with A = -(2 d1 eta X' + eta^2 X),
-    T = -lam mu N, N = -2 d2 Y' - Y - G, lam in Sgn(X' + W): at X' + W = 0 slip reverses or stops
-    (rolling). The run ends when the load N falls to zero. d1 = 0.3, d2 = 0.2, eta = 0.3,
-    mu = 0.3, G = 0.01, X = Y = 0, Y' = -1, and X', W given.
+    $X'' = A + T$, $Y'' = N$, $W' = (5/2) T$ with $A = -(2 d1 eta X' + eta^2 X)$,
+    $T = -lambda mu N$, $N = -2 d2 Y' - Y - G$, $lambda in Sgn(X' + W)$: at $X' + W = 0$ slip reverses or stops
+    (rolling). The run ends when the load N falls to zero. $d1 = 0.3$, $d2 = 0.2$, $eta = 0.3$,
+    $mu = 0.3$, $G = 0.01$, $X = Y = 0$, $Y' = -1$, and $X'$ and W given.
 
     Returns
     -------

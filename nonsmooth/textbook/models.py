@@ -11,10 +11,10 @@ from .problem import Problem, problem, stated
 def harvested_prey_predator() -> Problem:
     """Predator that is harvested only where it is abundant.
 
-    x1' = x1 (1 - x1) - psi x2, x2' = psi x2 - d x2 - E x2 [x2 > alpha], psi = a x1/(b + x1). On
-    x2 = alpha the fields are tangent where psi = d + E (above, x1 = 0.72) and psi = d (below,
-    x1 = 0.043). Their equilibria reach the surface at a boundary node (above) and a boundary focus
-    (below); two pseudo-equilibria merge at alpha = (1 + b)^2/(4 a).
+    $x1' = x1 (1 - x1) - psi x2$, $x2' = psi x2 - d x2 - E x2 [x2 > alpha]$, $psi = a x1/(b + x1)$. On
+    $x2 = alpha$ the fields are tangent where $psi = d + E$ (above, at $x1 = 0.72$) and $psi = d$ (below, at
+    $x1 = 0.043$). Their equilibria reach the surface at a boundary node (above) and a boundary focus
+    (below); two pseudo-equilibria merge at $alpha = (1 + b)^2/(4 a)$.
 
     Returns
     -------
@@ -24,7 +24,7 @@ def harvested_prey_predator() -> Problem:
     Notes
     -----
     Source: Kuznetsov, Rinaldi & Gragnani 2003, Int. J. Bifurcation Chaos 13, 2157-2188; the
-    parameters a, d, E, b are quoted from memory. Their f2 is the harvested field, F1 (above) here.
+    parameters a, d, E, b are quoted from memory. Their $f2$ is the harvested field, $F1$ (above) here.
 
     Examples
     --------
@@ -69,9 +69,9 @@ def harvested_prey_predator() -> Problem:
 def welander_box() -> Problem:
     """Heat and salt in a box of ocean that mixes with the deep when it is dense.
 
-    T' = 1 - T - k T, S' = b (1 - S) - k S, with k = 5 where S - a T > eps and k = 0 elsewhere;
-    a = 0.8, b = 0.5. The equilibria of the two fields reach the surface at eps = 0.2 (k = 0) and
-    eps = -7/165 (k = 5); in between the box oscillates or slides.
+    $T' = 1 - T - k T$, $S' = b (1 - S) - k S$, with $k = 5$ where $S - a T > eps$ and $k = 0$ elsewhere;
+    $a = 0.8$, $b = 0.5$. The equilibria of the two fields reach the surface at $eps = 0.2$ ($k = 0$) and
+    $eps = -7/165$ ($k = 5$); in between the box oscillates or slides.
 
     Returns
     -------
@@ -136,8 +136,8 @@ def welander_box() -> Problem:
 def state_dependent_jump() -> Problem:
     """A right-hand side that jumps while a state is in a window (IFDIFF's example).
 
-    x1' = 0.01 t^2 + x2^3, x2' = 5 if p <= x1 < p + 0.5 else 0; p = 5.437, from (1, 0): two
-    surfaces, x1 = p and x1 = p + 1/2. The sensitivities of x(20) jump at the switches.
+    $x1' = 0.01 t^2 + x2^3$; $x2' = 5$ if $p <= x1 < p + 0.5$, else 0; $p = 5.437$, from (1, 0): two
+    surfaces, $x1 = p$ and $x1 = p + 1/2$. The sensitivities of x(20) jump at the switches.
 
     Returns
     -------
@@ -146,7 +146,7 @@ def state_dependent_jump() -> Problem:
 
     Notes
     -----
-    Source: the canonical example of IFDIFF (Heidelberg), x0 and p as there.
+    Source: the canonical example of IFDIFF (Heidelberg), the start and p as there.
 
     Examples
     --------

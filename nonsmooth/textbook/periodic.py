@@ -16,8 +16,8 @@ _FROM_STATE = "periodic_orbit with the itinerary of one reset, from the start; {
 def multi_sliding_relay() -> Problem:
     """Relay feedback of a third-order system whose orbit slides fourteen times a period.
 
-    x' = A x - B sgn(x1) with A = [[-(2 xi w + 1), 1, 0], [-(2 xi w + w^2), 0, 1], [-w^2, 0, 0]],
-    B = (1, -2, 1), xi = 0.05, w = 25. The orbit is odd: half a period later it is its mirror image.
+    $x' = A x - B sgn(x1)$ with $A = [[-(2 xi w + 1), 1, 0], [-(2 xi w + w^2), 0, 1], [-w^2, 0, 0]]$,
+    $B = (1, -2, 1)$, $xi = 0.05$, $w = 25$. The orbit is odd: half a period later it is its mirror image.
 
     Returns
     -------
@@ -66,7 +66,7 @@ def multi_sliding_relay() -> Problem:
 def forced_dry_friction() -> Problem:
     """Forced oscillator with Coulomb friction: it turns without a stop, or sticks twice a period.
 
-    x'' + x + f sgn(x') = cos(W t), W = 0.6. For f = 0.2 it never sticks, for f = 0.6 it sticks once
+    $x'' + x + f sgn(x') = cos(W t)$, $W = 0.6$. For $f = 0.2$ it never sticks, for $f = 0.6$ it sticks once
     every half period. The orbit is odd: half a forcing period later it is its mirror image.
 
     Returns
@@ -128,8 +128,8 @@ def forced_dry_friction() -> Problem:
 def belt_oscillator() -> Problem:
     """Block on a moving belt, forced, whose orbit of four forcing periods grazes the belt's velocity.
 
-    u'' + u = c(1 - u') + F cos(nu t), c(v) = a0 sgn v - a1 v + a2 v^3, a0 = a1 = 1.5, a2 = 0.45,
-    F = 0.1. At nu = 1.7077997 it touches the sliding region (grazing-sliding); below there is chaos.
+    $u'' + u = c(1 - u') + F cos(nu t)$, $c(v) = a0 sgn v - a1 v + a2 v^3$, $a0 = a1 = 1.5$, $a2 = 0.45$,
+    $F = 0.1$. At $nu = 1.7077997$ it touches the sliding region (grazing-sliding); below there is chaos.
 
     Returns
     -------
@@ -138,7 +138,7 @@ def belt_oscillator() -> Problem:
 
     Notes
     -----
-    Source: Kowalczyk & di Bernardo 2005, Physica D 204, 204-229 (there nu = 1.7078).
+    Source: Kowalczyk & di Bernardo 2005, Physica D 204, 204-229 (there $nu = 1.7078$).
 
     Examples
     --------
@@ -181,9 +181,10 @@ def belt_oscillator() -> Problem:
 def simplest_walker() -> Problem:
     """The simplest walking model: two legs on a gentle slope, in the limit of light feet.
 
-    th'' = sin(th - g), ph'' = th'' + th'^2 sin ph - cos(th - g) sin ph; at heelstrike, ph = 2 th,
-    th -> -th, th' -> cos(2 th) th', ph -> -2 th, ph' -> cos(2 th) (1 - cos 2 th) th'. For the slope
-    g = 0.009 there are two gaits, a stable one of long steps and an unstable one of short steps.
+    $theta'' = sin(theta - g)$, $phi'' = theta'' + theta'^2 sin phi - cos(theta - g) sin phi$; at
+    heelstrike, $phi = 2 theta$: $theta -> -theta$, $theta' -> cos(2 theta) theta'$, $phi -> -2 theta$,
+    $phi' -> cos(2 theta) (1 - cos 2 theta) theta'$. For the slope
+    $g = 0.009$ there are two gaits, a stable one of long steps and an unstable one of short steps.
 
     Returns
     -------
@@ -247,9 +248,9 @@ def simplest_walker() -> Problem:
 def buck_converter() -> Problem:
     """Voltage-mode buck converter: a switch that is closed below a voltage ramp of a fixed period.
 
-    v' = (i - v/R)/C, i' = (E s - v)/L, s = 1 where a (v - Vref) is below the ramp
-    VL + (VU - VL) c/T; c' = 1 is a clock that returns to 0 at T. R = 22 Ohm, L = 20 mH, C = 47 uF,
-    T = 400 us, a = 8.4, Vref = 11.3 V, VL = 3.8 V, VU = 8.2 V. As the input voltage E grows, the
+    $v' = (i - v/R)/C$, $i' = (E s - v)/L$, $s = 1$ where $a (v - V_r)$ is below the
+    ramp $V_L + (V_U - V_L) c/T$; $c' = 1$ is a clock that returns to 0 at T. R is 22 Ohm, L 20 mH, C 47 uF,
+    T 400 us, a 8.4, $V_r$ 11.3 V, $V_L$ 3.8 V, $V_U$ 8.2 V. As the input voltage E grows, the
     orbit of one period doubles at 24.5166 V.
 
     Returns

@@ -11,9 +11,9 @@ from .problem import Problem, problem, stated
 def spiral_oscillator() -> Problem:
     """Spiral that turns the other way outside the unit circle (nosnoc's FESD test).
 
-    x' = A1 x for abs(x) < 1 and A2 x for abs(x) > 1, A1 = [[1, w], [-w, 1]], A2 = [[1, -w], [w, 1]],
-    w = 2 pi, from (1/e, 0). abs(x) = exp(t - 1); the circle is crossed at t = 1 at (1, 0), and
-    x(t) = exp(t - 1) (cos w(t - 1), sin w(t - 1)) from then on.
+    $x' = A1 x$ for $abs(x) < 1$ and $A2 x$ for $abs(x) > 1$, $A1 = [[1, w], [-w, 1]]$, $A2 = [[1, -w], [w, 1]]$,
+    $w = 2 pi$, from $(1/e, 0)$. The distance is $abs(x) = exp(t - 1)$; the circle is crossed at $t = 1$ at (1, 0), and
+    $x(t) = exp(t - 1) (cos w(t - 1), sin w(t - 1))$ from then on.
 
     Returns
     -------
@@ -60,7 +60,7 @@ def spiral_oscillator() -> Problem:
 def scalar_sliding() -> Problem:
     """One state that reaches the surface and stays.
 
-    x' = 3 for x < 0 and -1 for x > 0, from -1: at 0 from t = 1/3 on, where alpha = 1/4.
+    $x' = 3$ for $x < 0$ and -1 for $x > 0$, from -1: at 0 from $t = 1/3$ on, where $alpha = 1/4$.
 
     Returns
     -------
@@ -95,7 +95,7 @@ def scalar_sliding() -> Problem:
 def scalar_repelling() -> Problem:
     """One state that can leave to either side, or stay: the future is not unique.
 
-    x' = sgn x from 0. A run must stop with NON_UNIQUE at once; with ``start_mode`` it goes on.
+    $x' = sgn x$ from 0. A run must stop with NON_UNIQUE at once; with ``start_mode`` it goes on.
 
     Returns
     -------
@@ -130,8 +130,8 @@ def scalar_repelling() -> Problem:
 def planar_relay() -> Problem:
     """Relay feedback of a linear planar system, with a pseudo-node.
 
-    x' = -x + y, y' = 3 y - 10 sgn(x + y). On y = -x: L1 = -5 x - 10, L2 = -5 x + 10, so sliding for
-    abs(x) < 2, with x' = -2 x: a stable pseudo-node at 0. Both folds are visible.
+    $x' = -x + y$, $y' = 3 y - 10 sgn(x + y)$. On $y = -x$: $L1 = -5 x - 10$, $L2 = -5 x + 10$, so sliding for
+    $abs(x) < 2$, with $x' = -2 x$: a stable pseudo-node at 0. Both folds are visible.
 
     Returns
     -------
@@ -171,8 +171,9 @@ def planar_relay() -> Problem:
 def pseudo_hopf() -> Problem:
     """Crossing cycle born at a fused focus (pseudo-Hopf bifurcation).
 
-    y > 0: (1, -x); y < 0: (-1, -(x - al) - r (x - al)^2). Above, x -> -x. Below, orbits are level
-    curves of an integral, so the cycle is at x0^2 = 3 (al/r - al^2). Both folds are invisible, with
+    The field is $(1, -x)$ where $y > 0$, and $(-1, -(x - alpha) - r (x - alpha)^2)$ where $y < 0$. Above,
+    x returns as $-x$. Below, orbits are level
+    curves of an integral, so the cycle is at $x0^2 = 3 (alpha/r - alpha^2)$. Both folds are invisible, with
     opposite directions (II2): a pseudo-node on the sliding segment between them.
 
     Returns
@@ -214,9 +215,9 @@ def pseudo_hopf() -> Problem:
 def piecewise_cycle() -> Problem:
     """Cycle that crosses a line without any kink in r (COCO's piecewise-linear example).
 
-    In polar coordinates x < 0: r' = r (1 - r), th' = 1; x > 0: r' = al r (be - r),
-    th' = ga + be - r. With al = be = 1, ga = 1.5 the cycle is r = 1 with period pi + pi/1.5 and
-    multiplier exp(-5 pi/3).
+    In polar coordinates $r' = r (1 - r)$, $theta' = 1$ where $x < 0$, and $r' = alpha r (beta - r)$,
+    $theta' = gamma + beta - r$ where $x > 0$. With $alpha = beta = 1$, $gamma = 1.5$ the cycle is $r = 1$ with period $pi + pi/1.5$ and
+    multiplier $exp(-5 pi/3)$.
 
     Returns
     -------

@@ -17,9 +17,9 @@ def _symbols(*names: str) -> list[Any]:
 def block_on_incline() -> Problem:
     """Block on an inclined plane that slides down and across, turns, and comes to rest.
 
-    v' = (sin s, 0) - mu cos(s) v/abs(v), with slope s = 0.4, mu = 0.7, and gravity 1. With a = sin s,
-    c = mu cos s and r = abs(v) the sum c r + a v1 falls at the rate c^2 - a^2: the block stops at
-    (c r + a v1)/(c^2 - a^2), with its velocity turned downhill.
+    $v' = (sin s, 0) - mu cos(s) v/abs(v)$, with slope $s = 0.4$, $mu = 0.7$, and gravity 1. With $a = sin s$,
+    $c = mu cos s$ and $r = abs(v)$ the sum $c r + a v1$ falls at the rate $c^2 - a^2$: the block stops at
+    $(c r + a v1)/(c^2 - a^2)$, with its velocity turned downhill.
 
     Returns
     -------
@@ -64,9 +64,9 @@ def block_on_incline() -> Problem:
 def block_on_belt() -> Problem:
     """Block that comes from the side onto a moving belt and is carried away.
 
-    v' = -mu_g (v - b)/abs(v - b) with the belt's velocity b = (1.2, 0) and mu_g = 0.5. Relative to
+    $v' = -mu_g (v - b)/abs(v - b)$ with the belt's velocity $b = (1.2, 0)$ and $mu_g = 0.5$. Relative to
     the belt it slides straight; over the ground it runs along a parabola, and after
-    abs(v - b)/mu_g = 4 with the belt.
+    $abs(v - b)/mu_g = 4$ with the belt.
 
     Returns
     -------
@@ -109,8 +109,8 @@ def block_on_belt() -> Problem:
 def block_on_disc() -> Problem:
     """Block that is put on a spinning disc and rides with it, or slides off.
 
-    v' = -mu lam with the slip h = v - spin (-x2, x1), mu = 0.5 and gravity 1. On the disc friction
-    has to be spin^2 abs(x): at spin 1 the block stays where abs(x) < 0.5.
+    $v' = -mu lambda$ with the slip $h = v - spin (-x2, x1)$, $mu = 0.5$ and gravity 1. On the disc friction
+    has to be $spin^2 abs(x)$: at spin 1 the block stays where $abs(x) < 0.5$.
 
     Returns
     -------
@@ -155,9 +155,9 @@ def block_on_disc() -> Problem:
 def cue_ball() -> Problem:
     """Billiard ball with side spin: it slips along a parabola, then rolls straight on.
 
-    v' = -mu g lam, w' = -(5/2) mu g lam with the slip h = v + w of its lowest point, where w is the
-    part of its spin. The slip keeps its direction; after 2 abs(h)/(7 mu g) the ball rolls at
-    v - (2/7) h.
+    $v' = -mu g lambda$, $w' = -(5/2) mu g lambda$ with the slip $h = v + w$ of its lowest point, where w is the
+    part of its spin. The slip keeps its direction; after $2 abs(h)/(7 mu g)$ the ball rolls at
+    $v - (2/7) h$.
 
     Returns
     -------
@@ -207,8 +207,8 @@ def cue_ball() -> Problem:
 def turntable() -> Problem:
     """Sphere rolling on a turntable: it runs in circles, at two sevenths of the table's rate.
 
-    v' = -mu lam, w' = -(5/2) mu lam with the slip h = v + w - spin (-x2, x1), spin 1.3 and gravity 1.
-    While it rolls v turns at (2/7) spin, wherever the sphere is: it does not fly off.
+    $v' = -mu lambda$, $w' = -(5/2) mu lambda$ with the slip $h = v + w - spin (-x2, x1)$, spin 1.3 and gravity 1.
+    While it rolls v turns at 2/7 of the table's spin, wherever the sphere is: it does not fly off.
 
     Returns
     -------
@@ -256,8 +256,8 @@ def pivoting_disc() -> Problem:
     """Disc that slides and spins on a table: both stop at the same time.
 
     An ellipsoidal limit surface: force and moment of friction are one multiplier of three components,
-    v' = -mu lam12, omega' = -2 mu radius lam3, with h = (v1, v2, radius omega), mu = 0.3, radius 0.6.
-    In the time s with dt = abs(h) ds each component falls exponentially.
+    $v' = -mu (lambda1, lambda2)$, $omega' = -2 mu r lambda3$, with $h = (v1, v2, r omega)$, $mu = 0.3$ and
+    the radius $r = 0.6$. In the time s with $dt = abs(h) ds$ each component falls exponentially.
 
     Returns
     -------
@@ -307,9 +307,9 @@ def pivoting_disc() -> Problem:
 def shaken_block() -> Problem:
     """Block on a plate that is shaken in circles: it sticks, or slides for ever in a smaller circle.
 
-    v' = -mu_g lam with the slip h = v - shake (cos omega t, sin omega t), shake 1, omega 2. Where
-    mu_g < omega shake the block ends in a circle with velocity mu_g/omega, and slips at
-    sqrt(shake^2 - (mu_g/omega)^2): 0.6 and 0.8 for mu_g = 1.2. All motions end in this one.
+    $v' = -mu_g lambda$ with the slip $h = v - shake (cos omega t, sin omega t)$, shake 1, $omega = 2$. Where
+    $mu_g < omega shake$ the block ends in a circle with velocity $mu_g/omega$, and slips at
+    $sqrt(shake^2 - (mu_g/omega)^2)$: 0.6 and 0.8 for $mu_g = 1.2$. All motions end in this one.
 
     Returns
     -------

@@ -11,8 +11,8 @@ from .problem import Problem, problem, stated
 def two_relay_spiral() -> Problem:
     """Infinitely many switches on the way to the origin (Zeno).
 
-    x1' = -s1 + 2 s2, x2' = -2 s1 - s2, s_i = sgn x_i: abs(x1) + abs(x2) falls at rate 2. From
-    (1, 0.5) the switches are at 1/6, 5/9, 37/54, 59/81, ... and the orbit reaches 0 at t = 3/4.
+    $x1' = -s1 + 2 s2$, $x2' = -2 s1 - s2$, $s_i = sgn x_i$: $abs(x1) + abs(x2)$ falls at rate 2. From
+    (1, 0.5) the switches are at $1/6$, $5/9$, $37/54$, $59/81$, ... and the orbit reaches 0 at $t = 3/4$.
 
     Returns
     -------
@@ -57,10 +57,10 @@ def two_relay_spiral() -> Problem:
 def glass_loop() -> Problem:
     """Two genes, one switched on and one off by the other: a loop that spirals into its thresholds.
 
-    x' = [y > 1/2] - x, y' = [x < 1/2] - y, a Glass network. Orbits are straight in each quadrant of the
-    thresholds; at distance r/2 from the intersection a quarter turn takes log(1 + r) and leads to
-    r/(1 + r). From (3/4, 3/4) the k-th crossing is at log(k + 1/2), and |x - 1/2| + |y - 1/2| falls as
-    exp(-t): the intersection attracts though no layer does, and no orbit leaves it.
+    $x' = [y > 1/2] - x$, $y' = [x < 1/2] - y$, a Glass network. Orbits are straight in each quadrant of the
+    thresholds; at distance $r/2$ from the intersection a quarter turn takes $log(1 + r)$ and leads to
+    $r/(1 + r)$. From $(3/4, 3/4)$ the k-th crossing is at $log(k + 1/2)$, and $|x - 1/2| + |y - 1/2|$ falls as
+    $exp(-t)$: the intersection attracts though no layer does, and no orbit leaves it.
 
     Returns
     -------
@@ -118,10 +118,10 @@ def glass_loop() -> Problem:
 def ambiguous_exit() -> Problem:
     """Sliding on the intersection of two surfaces whose exit Filippov's set leaves open.
 
-    x1' = -s1 + x3/2, x2' = -s2 + x3/4, x3' = 1 + s1 s2/2 from 0. On x1 = x2 = 0 the multipliers are
-    x3/2 and x3/4; x1 = 0 is left when x3 = 2. With the bilinear law x3' = 1 + x3^2/16, so at
-    t = 4 atan(1/2). The convex hull of the four fields allows x3' from 1/2 + 3 x3/8 to
-    3/2 - x3/8, so any time from 8 log(6/5) to (8/3) log(5/2).
+    $x1' = -s1 + x3/2$, $x2' = -s2 + x3/4$, $x3' = 1 + s1 s2/2$ from 0. On $x1 = x2 = 0$ the multipliers are
+    $x3/2$ and $x3/4$; $x1 = 0$ is left when $x3 = 2$. With the bilinear law $x3' = 1 + x3^2/16$, so at
+    $t = 4 arctan(1/2)$. The convex hull of the four fields allows $x3'$ from $1/2 + 3 x3/8$ to
+    $3/2 - x3/8$, so any time from $8 log(6/5)$ to $(8/3) log(5/2)$.
 
     Returns
     -------
@@ -173,9 +173,9 @@ def ambiguous_exit() -> Problem:
 def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
     """Sliding whose speed depends on what happens inside the switch.
 
-    x1' = -lam + b, x2' = 2 lam^2 - 1: off the surface x1 = 0, lam^2 = 1 and x2' = 1. The nonlinear
-    law keeps lam = b on the surface and slides with x2' = 2 b^2 - 1; Filippov's convex combination
-    of the two fields slides with x2' = 1.
+    $x1' = -lambda + b$, $x2' = 2 lambda^2 - 1$: off the surface $x1 = 0$, $lambda^2 = 1$ and $x2' = 1$. The
+    nonlinear law keeps $lambda = b$ on the surface and slides with $x2' = 2 b^2 - 1$; Filippov's convex combination
+    of the two fields slides with $x2' = 1$.
 
     Parameters
     ----------

@@ -31,14 +31,14 @@ def two_fold(
 ) -> Problem:
     """Normal form of a two-fold: of a class by its label, or from its numbers.
 
-    z1 > 0: (-z2, -sigma1, nu1); z1 < 0: (z3, nu2, sigma2). The two-fold is the origin; sliding is
-    attracting where z2, z3 > 0, with the orbits of z' = [[nu2, -sigma1], [sigma2, nu1]] z.
+    The field is $(-z2, -sigma1, nu1)$ where $z1 > 0$, and $(z3, nu2, sigma2)$ where $z1 < 0$. The two-fold
+    is the origin; sliding is attracting where $z2, z3 > 0$, with the orbits of $z' = [[nu2, -sigma1], [sigma2, nu1]] z$.
 
     Parameters
     ----------
     label : str or (int, int)
         ``"VV-C1"``, ``"VV-F"``, ``"II-C"``, ``"II-F"``, ``"mix-0"``, ``"mix-S"``, ``"mix-C"`` or
-        ``"mix-F"``; or the two signs sigma.
+        ``"mix-F"``; or the two signs ``sigma``.
     nu : (float, float), optional
         With the signs.
     sigma : (int, int), optional
@@ -47,7 +47,7 @@ def two_fold(
     Returns
     -------
     Problem
-        Its parameters are nu1 and nu2; its references are trace, determinant and discriminant of
+        Its parameters are $nu1$ and $nu2$; its references are trace, determinant and discriminant of
         the sliding flow.
 
     Raises

@@ -1,9 +1,11 @@
 """Every public name is on one page of the API, and all it takes, has, returns and raises is described."""
 
+import html
 import importlib.util
 import inspect
 import re
 import textwrap
+import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from pathlib import Path
 
@@ -11,6 +13,7 @@ import pytest
 
 import bounce
 import nonsmooth as ns
+from papers.mathematics import formula
 
 DOCS = Path(__file__).parents[2] / "docs"
 _spec = importlib.util.spec_from_file_location("docs_api", DOCS / "api.py")
@@ -92,6 +95,48 @@ def test_rooms_of_the_ball_are_there():
     for room in ("contact", "shot", "maps"):
         for name in getattr(bounce, room).__all__:
             assert f"bounce.{room}.{name}" in OBJECTS
+
+
+#: What is no prose for the reader of a page: code, links to names, what is typeset.
+MARKED = re.compile(r":\w+:`[^`]*`|``.*?``|`[^`]*`|\"[^\"\n]*\"|\$\$.*?\$\$|\$[^$]+\$", re.DOTALL)
+PLAIN_FORMULA = re.compile(
+    r"\^|\bsqrt\b|[<>]=|->|!=|[A-Za-z0-9)]'+ *[=+]|\w+ = \S|\s[<>+*/] |\babs\(|\|\w+\||-\+|\+-"
+    r"|\b(lambda|sigma|theta|phi|kappa|Delta|nu|eta|mu|omega|pi|alpha|eps)\d?(_\w+)?\b"
+    r"|\b[FLMXYhxyz]\d\d?\b|\b(exp|sin|cos|log|grad|sgn|Sgn)\b"
+)
+
+
+def prose(doc):
+    """The text of a docstring, without examples, heads of entries, code and formulas that are marked."""
+    text = inspect.cleandoc(doc).partition("\nExamples\n---")[0]
+    return MARKED.sub("", re.sub(r"^[\w*, ]+ : .*$|^-+$", "", text, flags=re.MULTILINE))
+
+
+@pytest.mark.parametrize("path", OBJECTS)
+def test_formulas_are_marked_so_that_a_page_typesets_them(path):
+    plain = [
+        (where, line)
+        for where, doc in docstrings(path, OBJECTS[path])
+        for line in prose(doc).splitlines()
+        if PLAIN_FORMULA.search(line)
+    ]
+    assert plain == [], "write them between dollars: $x' = -mu load$"
+
+
+def test_marked_formulas_are_typeset_whole():
+    made = []
+    for path, thing in OBJECTS.items():
+        for _, doc in docstrings(path, thing):
+            text = inspect.cleandoc(doc).partition("\nExamples\n---")[0]
+            made += re.findall(
+                r"\$\$(.+?)\$\$|\$([^$]+?)\$", re.sub(r"``.*?``", "", text), re.DOTALL
+            )
+    assert len(made) > 300
+    for block, line in made:
+        typeset = formula(block or line, "block" if block else "inline").replace("<wbr>", "")
+        ElementTree.fromstring(f"<p>{typeset}</p>")
+        shown = re.sub(r"<[^>]+>", "", typeset)
+        assert not re.search(r"[\^$\\_*]|sqrt|abs\(|[<>]=|->", html.unescape(shown)), (block, line)
 
 
 def test_no_name_is_on_two_pages():

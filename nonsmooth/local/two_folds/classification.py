@@ -143,14 +143,14 @@ _COUNT = {"none": 0.0, "one": 1.0, "all": math.inf, "sector": math.inf}
 
 @dataclass(frozen=True)
 class Slopes:
-    """The slopes m = z3/z2 of the orbits of Da that connect to s.
+    """The slopes $m = z3/z2$ of the orbits of Da that connect to s.
 
     Attributes
     ----------
     kind : {"none", "one", "all", "sector", "undecided"}
         How many slopes connect: none, one, all of them, a sector, or not decided.
     low, high : float
-        Closed range of slopes; the open quadrant is 0 < m < inf. NaN if there is none.
+        Closed range of slopes; the open quadrant is $0 < m < inf$. NaN if there is none.
     """
 
     kind: str
@@ -212,7 +212,7 @@ class Classification:
     determinism : str
         What it means for uniqueness, in words.
     boundaries : tuple of Boundary
-        The degenerate boundaries on which (sigma, nu) lies within the tolerance.
+        The degenerate boundaries on which $(sigma, nu)$ lies within the tolerance.
     margin : float
         Relative distance to the nearest boundary that changes the class or the crossing
         itinerary; inf if there is none.
@@ -290,12 +290,12 @@ def classify_two_fold(
     Parameters
     ----------
     sigma : (int, int)
-        Signs of L11 and L22.
+        Signs of $L11$ and $L22$.
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
     tol : float, optional
-        A boundary counts as met within this relative distance: |Delta| against max(1, |nu1 nu2|),
-        |g - 2| and nu_i against the larger of 1, |nu1| and |nu2|.
+        A boundary counts as met within this relative distance: $|Delta|$ against $max(1, |nu1 nu2|)$,
+        $|g - 2|$ and $nu_i$ against the larger of 1, $|nu1|$ and $|nu2|$.
 
     Returns
     -------
@@ -305,9 +305,9 @@ def classify_two_fold(
     Raises
     ------
     DegenerateError
-        A sigma is 0 (cusp-fold).
+        A sign is 0 (cusp-fold).
     OptionError
-        sigma or nu is not a pair of signs or finite numbers; tol is not positive.
+        ``sigma`` or ``nu`` is not a pair of signs or finite numbers; ``tol`` is not positive.
 
     Examples
     --------

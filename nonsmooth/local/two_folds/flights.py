@@ -50,14 +50,14 @@ def _points(z: ArrayLike) -> Array:
 
 
 def flight_above(z: ArrayLike, nu: Nu) -> Array:
-    """Landing point of a flight in z1 > 0 over an invisible fold: (-z2, z3 - 2 nu1 z2).
+    """Landing point of a flight in $z1 > 0$ over an invisible fold: $(-z2, z3 - 2 nu1 z2)$.
 
     Parameters
     ----------
     z : array_like (..., 2)
-        (z2, z3) with z2 <= 0.
+        $(z2, z3)$ with $z2 <= 0$.
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
 
     Returns
     -------
@@ -74,14 +74,14 @@ def flight_above(z: ArrayLike, nu: Nu) -> Array:
 
 
 def flight_below(z: ArrayLike, nu: Nu) -> Array:
-    """Landing point of a flight in z1 < 0 under an invisible fold: (z2 - 2 nu2 z3, -z3).
+    """Landing point of a flight in $z1 < 0$ under an invisible fold: $(z2 - 2 nu2 z3, -z3)$.
 
     Parameters
     ----------
     z : array_like (..., 2)
-        (z2, z3) with z3 <= 0.
+        $(z2, z3)$ with $z3 <= 0$.
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
 
     Returns
     -------
@@ -100,12 +100,12 @@ def flight_below(z: ArrayLike, nu: Nu) -> Array:
 def return_matrix(nu: Nu) -> Array:
     """Matrix of one flight above followed by one below, of an invisible two-fold; (2, 2).
 
-    Determinant 1, trace 4 nu1 nu2 - 2.
+    Determinant 1, trace $4 nu1 nu2 - 2$.
 
     Parameters
     ----------
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
 
     Returns
     -------
@@ -125,8 +125,8 @@ def return_matrix(nu: Nu) -> Array:
 def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
     """Largest number of flights of an orbit from a crossing region before it slides or goes away.
 
-    Both folds invisible: 1 if nu1, nu2 >= 0; 2 if one of them is negative; if both are,
-    ceil(pi/arccos sqrt(nu1 nu2)) - 1 for nu1 nu2 < 1 and no bound (``inf``) for nu1 nu2 >= 1. One
+    Both folds invisible: 1 if $nu1, nu2 >= 0$; 2 if one of them is negative; if both are,
+    $ceil(pi/arccos sqrt(nu1 nu2)) - 1$ for $nu1 nu2 < 1$ and no bound (``inf``) for $nu1 nu2 >= 1$. One
     fold invisible: 1. None: 0.
 
     Parameters
@@ -134,7 +134,7 @@ def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
     sigma : (int, int)
         Signs of the two folds.
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
 
     Returns
     -------
@@ -174,25 +174,25 @@ def has_diabolo(flow: ReducedFlow) -> bool:
 
 
 def diabolo_slopes(nu: Nu) -> tuple[float, float]:
-    """Slopes |z3/z2| of the two invariant lines of the return map (the nonsmooth diabolo).
+    """Slopes $|z3/z2|$ of the two invariant lines of the return map (the nonsmooth diabolo).
 
-    For an invisible two-fold with nu1, nu2 < 0 and nu1 nu2 > 1: (r_-, r_+) with
-    r_-+ = |nu1| (1 -+ sqrt(1 - 1/(nu1 nu2))). On r_- flights grow; on r_+ they shrink to s.
+    For an invisible two-fold with $nu1, nu2 < 0$ and $nu1 nu2 > 1$ they are
+    $r_- = |nu1| (1 - sqrt(1 - 1/(nu1 nu2)))$ and $r_+ = |nu1| (1 + sqrt(1 - 1/(nu1 nu2)))$. On $r_-$ flights grow; on $r_+$ they shrink to s.
 
     Parameters
     ----------
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
 
     Returns
     -------
     (float, float)
-        (r_-, r_+).
+        The smaller and the larger slope, $r_-$ and $r_+$.
 
     Raises
     ------
     OptionError
-        For other nu: the return map has no invariant lines in the crossing region.
+        For other numbers: the return map has no invariant lines in the crossing region.
 
     Examples
     --------
@@ -211,7 +211,7 @@ def diabolo_slopes(nu: Nu) -> tuple[float, float]:
 
 
 def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
-    """Time of the infinitely many flights from (z2, z3) = (-1, r_+) into the two-fold.
+    """Time of the infinitely many flights from $(z2, z3) = (-1, r_+)$ into the two-fold.
 
     Parameters
     ----------
@@ -219,7 +219,7 @@ def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
         Both negative, product above 1.
     phi : float, optional
         Time scale of the two-fold for real time; 1 gives normal-form time. The time is
-        proportional to |z2| of the start.
+        proportional to $|z2|$ of the start.
 
     Returns
     -------

@@ -31,7 +31,7 @@ class NormalForm:
     Attributes
     ----------
     flow : ReducedFlow
-        sigma, nu and the matrix M.
+        The signs, the two numbers and the matrix M.
     theta, phi : float
         Scales of h and of the two times.
     """
@@ -47,7 +47,7 @@ def normal_form(lie: Mapping[str, float]) -> NormalForm:
     Parameters
     ----------
     lie : mapping
-        ``L11``, ``L12``, ``L21``, ``L22`` with L_ij = F_i . grad L_j.
+        ``L11``, ``L12``, ``L21``, ``L22`` with $L_ij = F_i . grad L_j$.
 
     Returns
     -------
@@ -57,7 +57,7 @@ def normal_form(lie: Mapping[str, float]) -> NormalForm:
     Raises
     ------
     DegenerateError
-        L11 or L22 is zero (cusp-fold).
+        $L11$ or $L22$ is zero (cusp-fold).
 
     Examples
     --------

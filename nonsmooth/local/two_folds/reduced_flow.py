@@ -25,17 +25,17 @@ _LARGE = 30.0
 
 @dataclass(frozen=True)
 class ReducedFlow:
-    """The linear flow dz/dr = M z that draws the sliding orbits in the (z2, z3) plane.
+    """The linear flow $dz/dr = M z$ that draws the sliding orbits in the $(z2, z3)$ plane.
 
-    Sliding is attracting in Da (z2, z3 > 0), repelling in Dr (z2, z3 < 0). Slopes m = z3/z2 of
-    orbits obey dm/dr = sigma2 + (nu1 - nu2) m + sigma1 m^2.
+    Sliding is attracting in Da ($z2, z3 > 0$), repelling in Dr ($z2, z3 < 0$). Slopes $m = z3/z2$ of
+    orbits obey $dm/dr = sigma2 + (nu1 - nu2) m + sigma1 m^2$.
 
     Attributes
     ----------
     sigma : (int, int)
-        +1 or -1 each. The fold of F1 is visible if sigma1 = 1, that of F2 if sigma2 = -1.
+        +1 or -1 each. The fold of $F1$ is visible if $sigma1 = 1$, that of $F2$ if $sigma2 = -1$.
     nu : (float, float)
-        The two numbers (nu1, nu2) of the two-fold.
+        The two numbers $(nu1, nu2)$ of the two-fold.
 
     Examples
     --------
@@ -61,7 +61,7 @@ class ReducedFlow:
 
     @property
     def folds(self) -> str:
-        """``"VV"``, ``"II"``, ``"VI"`` (F1 visible) or ``"IV"`` (F2 visible)."""
+        """``"VV"``, ``"II"``, ``"VI"`` ($F1$ visible) or ``"IV"`` ($F2$ visible)."""
         return {(1, -1): "VV", (-1, 1): "II", (1, 1): "VI", (-1, -1): "IV"}[self.sigma]
 
     @property
@@ -71,33 +71,33 @@ class ReducedFlow:
 
     @property
     def matrix(self) -> Array:
-        """M = [[nu2, -sigma1], [sigma2, nu1]]; (2, 2)."""
+        """The matrix $M = [[nu2, -sigma1], [sigma2, nu1]]$; (2, 2)."""
         (s1, s2), (n1, n2) = self.sigma, self.nu
         return np.array([[n2, -s1], [s2, n1]], dtype=float)
 
     @property
     def trace(self) -> float:
-        """T = nu1 + nu2."""
+        """Trace of M, $T = nu1 + nu2$."""
         return self.nu[0] + self.nu[1]
 
     @property
     def determinant(self) -> float:
-        """Delta = nu1 nu2 + sigma1 sigma2."""
+        """Determinant of M, $Delta = nu1 nu2 + sigma1 sigma2$."""
         return self.nu[0] * self.nu[1] + self.sigma[0] * self.sigma[1]
 
     @property
     def discriminant(self) -> float:
-        """(nu1 - nu2)^2 - 4 sigma1 sigma2; negative: a focus."""
+        """Discriminant of M, $(nu1 - nu2)^2 - 4 sigma1 sigma2$; negative: a focus."""
         return (self.nu[0] - self.nu[1]) ** 2 - 4 * self.sigma[0] * self.sigma[1]
 
     @property
     def gap(self) -> float:
-        """Return g of mixed folds: nu2 - nu1 (VI), nu1 - nu2 (IV); eigenlines slide iff g >= 2."""
+        """Return g of mixed folds: $nu2 - nu1$ (VI), $nu1 - nu2$ (IV); eigenlines slide iff $g >= 2$."""
         return self.sigma[0] * (self.nu[1] - self.nu[0])
 
     @property
     def eigenvalues(self) -> NDArray[Any]:
-        """Eigenvalues (kappa_-, kappa_+) of M, ascending; complex where ``discriminant < 0``."""
+        """Eigenvalues $(kappa_-, kappa_+)$ of M, ascending; complex where ``discriminant < 0``."""
         half, disc = self.trace / 2, self.discriminant
         if disc < 0:
             root = 0.5j * np.sqrt(-disc)
@@ -108,7 +108,7 @@ class ReducedFlow:
 
     @property
     def slopes(self) -> NDArray[Any]:
-        """Slopes m = z3/z2 = (nu2 - kappa)/sigma1 of the eigenlines, in the eigenvalues' order."""
+        """Slopes $m = z3/z2 = (nu2 - kappa)/sigma1$ of the eigenlines, in the eigenvalues' order."""
         (s1, s2), difference, disc = self.sigma, self.nu[0] - self.nu[1], self.discriminant
         if disc < 0:
             return (self.nu[1] - self.eigenvalues) / s1
@@ -118,7 +118,7 @@ class ReducedFlow:
 
     @property
     def eigenvectors(self) -> NDArray[Any]:
-        """Unit eigenvectors as columns (2, 2), z2 > 0; equal columns for a Jordan block."""
+        """Unit eigenvectors as columns (2, 2), $z2 > 0$; equal columns for a Jordan block."""
         vectors = np.vstack([np.ones(2), self.slopes])
         return vectors / np.linalg.norm(vectors, axis=0)
 

@@ -42,7 +42,7 @@ class Point:
 
 
 class Curve:
-    """A curve in R^N; subclasses say by which equations, and what to watch along it.
+    """A curve in $R^N$; subclasses say by which equations, and what to watch along it.
 
     Attributes
     ----------

@@ -126,9 +126,9 @@ def changes_around(
     Parameters
     ----------
     label : callable
-        angle -> label.
+        Takes an angle and returns a label.
     sign : callable
-        label -> -1, 0 or 1.
+        Takes a label and returns -1, 0 or 1.
     start : float
         The way ahead; the way back is left out.
     count, leave_out, halvings : int, optional

@@ -23,8 +23,9 @@ from .stored import Stored
 from .view import read_view, sectioned
 from .work import Work, run_all, size_of_chunk
 
-#: Fewer trajectories than this are not worth compiling the engine that runs several in step.
-_FEW = 64
+#: Fewer trajectories than this are not worth compiling the engine that runs several in step; nor those of
+#: systems with a set, which takes longer, unless it is asked for.
+_FEW, _FEW_WITH_SETS = 64, 4000
 
 
 def ensemble(
@@ -162,7 +163,8 @@ def _engine(system: FilippovSystem, options: Options, engine: str, count: int, s
     lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
     if not use_compiled(engine, tape is not None) or tape is None:
         return "reference"
-    if lanes is not None and count >= _FEW:
+    few = _FEW_WITH_SETS if system.sets and engine == "auto" else _FEW
+    if lanes is not None and count >= few:
         found = compiled_or_none(engine, lanes, lambda: lanes.library)
         return "reference" if found is None else "lanes"
     work = tape.compile if engine == "compiled" else library

@@ -14,6 +14,7 @@ from importlib import resources
 
 from ...model import Coupled, FilippovSystem, motion
 from ...model.printing.programs import is_flat, lanes_program
+from ...model.printing.set_program import set_program
 from ...model.printing.special import (
     MOST_PRODUCTS,
     products,
@@ -47,6 +48,14 @@ def supports_lanes(system: FilippovSystem) -> bool:
     return system.surface_count <= 1 and not (
         system.resets or system.impacts or any(system.nonlinear)
     )
+
+
+def supports_set_lanes(coupled: Coupled) -> bool:
+    """Whether lanes can be generated for a system with a set: one, alone, of constant slopes."""
+    system = coupled.system
+    alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
+    others = system.resets or system.impacts or any(system.nonlinear)
+    return alone and not others and coupled.affine and not coupled.slope_moves.any()
 
 
 def supports_special(tape: Tape, order: int) -> bool:
@@ -131,6 +140,25 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
             program,
             driver_text("lanes.c"),
         ]
+    )
+
+
+def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
+    """C source of the engine in step of a system that ``supports_set_lanes``."""
+    system, program = coupled.system, set_program(coupled, order)
+    directions = _list(d for _, d in system.stops) or "0"
+    defines = (
+        f"#define W {width}\n#define K {system.surface_count}\n#define STOPS {len(system.stops)}\n"
+        f"#define ROWS {len(program.rows)}\n#define NAMED {int(bool(program.states))}\n"
+        f"#define BENT_SLIP {int(program.bent_slip)}\n#define BENT_STOPS {int(program.bent_stops)}\n"
+        f"__attribute__((unused)) static const int DIRECTION[] = {{{directions}}};\n"
+        f"__attribute__((unused)) static const int ROW[] = {{{_list(program.rows) or 0}}};\n"
+        f"__attribute__((unused)) static const int OWN[] = {{{_list(program.states) or 0}}};\n"
+    )
+    drivers = ("polynomials.h", "set_lanes.c", "set_steps.c")
+    texts = [driver_text("common.h"), driver_text("vector.h"), program.text]
+    return "".join(
+        [facts_header(), _sizes(system, order), defines, *texts, *map(driver_text, drivers)]
     )
 
 

@@ -8,7 +8,7 @@ from collections.abc import Callable, Mapping, Sequence
 
 import numpy as np
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, coupled_of
 from ..facts import HAND_OVER
 from ..options import Options
 from ..results import Chunk, Stopped
@@ -23,7 +23,7 @@ from .arrays import (
     words_of,
 )
 from .build import build
-from .codegen import lanes_source, supports_lanes
+from .codegen import lanes_source, set_lanes_source, supports_lanes, supports_set_lanes
 from .compilers import lane_width
 from .tape import tape_for
 
@@ -52,9 +52,14 @@ class Lanes:
         """The library, loaded."""
         with self._lock:
             if self._library is None:
-                source = lanes_source(self.system, self.order, lane_width())
+                source = self._source(lane_width())
                 self._library = _declare(build(source, FLAGS))
             return self._library
+
+    def _source(self, width: int) -> str:
+        if self.system.sets:
+            return set_lanes_source(coupled_of(self.system), self.order, width)
+        return lanes_source(self.system, self.order, width)
 
     def run_many(
         self,
@@ -163,7 +168,9 @@ def _words(
 def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
     """Return what runs a system's trajectories in step at the options' tolerance, or None where they
     cannot be: several surfaces, resets, a start's mode that is asked for."""
-    if not supports_lanes(system) or options.start_mode is not None:
+    if options.start_mode is not None:
+        return None
+    if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
         return None
     order = options.order
     return system.cached(("lanes", order), lambda: Lanes(system, order))

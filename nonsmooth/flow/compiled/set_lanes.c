@@ -1,0 +1,372 @@
+/* W trajectories in step, for systems with one set of codimension two or three, and stops.
+ *
+ * Off the set, on it and leaving it are three programs; each has lanes of its own, and a trajectory waits
+ * until W of them are in the same mode (fewer only when no start is left). Whatever is rare is handed over as
+ * in lanes.c: such a trajectory gets the status HAND_OVER and runs again from its start in the interpreter.
+ * No lane's result depends on its neighbours.
+ *
+ * The generated text defines, besides what common.h asks for: N states with time, ND without, K, STOPS,
+ * DIRECTION[STOPS], TIMED, W, ROWS and ROW[ROWS] of the field that are not affine, BENT_SLIP, BENT_STOPS,
+ * OWN[K] states that the switching functions are (NAMED: whether they are), and the functions of
+ * nonsmooth/model/printing/set_program.py.
+ */
+#define SLOTS (STOPS + 2) /* the set's guard, stops, friction's limit */
+#define LIMIT_SLOT (STOPS + 1)
+#define INNER (P - P / 3) /* degree that is enough at half of a step */
+#define LONG_CODE (1LL << 60)
+#define MEMORY 256
+#define WAITING (4 * W)
+#define CLOSE 1e-8 /* only where |h| is this much of its terms its time to zero is asked for */
+#define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
+
+enum { OFF, ON, LEAVING, POOLS };
+
+/* All members are vectors, so that a trajectory is a column of words. */
+typedef struct {
+  T x[N], t, last_event, shortest, length, lam[K]; /* lam: the direction in which the set is left */
+  I behind, live, steps, events, kinds[KINDS], shrinking, code, base, index;
+  I above_stop[STOPS > 0 ? STOPS : 1];
+  T q[NQ];
+} Lanes;
+
+#define WORDS ((int)(sizeof(Lanes) / sizeof(T)))
+
+typedef struct { int64_t word[WORDS]; } Traveller;
+
+typedef struct {
+  const Batch *b;
+  const Options *o;
+  Tree *tree;
+  int64_t next, known_code[MEMORY];
+  int32_t known_node[MEMORY];
+  double size; /* of states at which both tolerances are as large */
+  int alive[POOLS], waiting[POOLS], words;
+  Traveller queue[POOLS][WAITING];
+} Work;
+
+#define SELECT_I(m, a, b) (((a) & (m)) | ((b) & ~(m)))
+#define LANE(v, l) (((double *)&(v))[l])
+#define LANE_I(v, l) (((int64_t *)&(v))[l])
+#define LAMBDA(v) UNPACK(v)
+#if K == 2
+#define UNPACK(v) (v)[0], (v)[1]
+#else
+#define UNPACK(v) (v)[0], (v)[1], (v)[2]
+#endif
+
+/* Itineraries ------------------------------------------------------------------------------------ */
+
+static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
+  for (int shift = 60; shift >= 0; shift -= 2)
+    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
+  return node;
+}
+
+static int32_t itinerary(const Lanes *s, Work *w, int l) {
+  int64_t code = LANE_I(s->code, l), base = LANE_I(s->base, l);
+  if (base) return walk(w->tree, (int32_t)base, code);
+  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
+  if (w->known_code[slot] != code) {
+    w->known_code[slot] = code;
+    w->known_node[slot] = walk(w->tree, 0, code);
+  }
+  return w->known_node[slot];
+}
+
+/* A mode, by its number among the system's, follows. */
+static void note_mode(Lanes *s, Work *w, I which, int mode) {
+  s->code = SELECT_I(which, (s->code << 2) + (mode + 1), s->code);
+  for EACH(l, s->code >= LONG_CODE) {
+    LANE_I(s->base, l) = walk(w->tree, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
+    LANE_I(s->code, l) = 0;
+  }
+}
+
+/* Loading, storing, moving on --------------------------------------------------------------------- */
+
+static void store(Lanes *s, Work *w, int pool, int l, int status) {
+  const Batch *b = w->b;
+  int64_t i = LANE_I(s->index, l);
+  LANE_I(s->live, l) = 0;
+  w->alive[pool]--;
+  b->totals[0] += LANE_I(s->steps, l);
+  b->totals[1] += LANE_I(s->events, l);
+  for (int k = 0; k < ND; k++) if (!isfinite(LANE(s->x[k], l))) status = HAND_OVER;
+  b->status[i] = (int8_t)status;
+  if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
+  b->t[i] = LANE(s->t, l);
+  b->itinerary[i] = itinerary(s, w, l);
+  for (int k = 0; k < KINDS; k++) b->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
+  b->kinds[i * KINDS + END] += status == REACHED_END;
+}
+
+static void finish_lanes(Lanes *s, Work *w, int pool, I which, int status) {
+  for EACH(l, which & s->live) store(s, w, pool, l, status);
+}
+
+static void refuse(const Batch *b, int64_t i) {
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
+  b->t[i] = b->t0;
+  b->status[i] = NOT_FINITE;
+  b->itinerary[i] = 0;
+  memset(b->kinds + i * KINDS, 0, KINDS * sizeof(int32_t));
+  b->kinds[i * KINDS + END] = 1;
+}
+
+/* Put the next start into a lane; 0 if there is none. */
+static int load(Lanes *s, Work *w, int l) {
+  const Batch *b = w->b;
+  while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
+  if (w->next >= b->count) return 0;
+  int64_t i = w->next++;
+  for (int j = 0; j < w->words; j++) LANE_I(((I *)s)[j], l) = 0;
+  for (int k = 0; k < N; k++) LANE(s->x[k], l) = b->x0[i * N + k];
+  if (b->p_stride) {
+    double q[NQ];
+    prepare(b->p + i * b->p_stride, q);
+    for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
+  }
+  LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
+  LANE(s->shortest, l) = 1e-3;
+  LANE_I(s->live, l) = -1;
+  LANE_I(s->index, l) = i;
+  w->alive[OFF]++;
+  return 1;
+}
+
+/* The lanes ``which`` leave this pool for those that wait for another. */
+static void send(Lanes *s, Work *w, int pool, I which, int to) {
+  for EACH(l, which & s->live) {
+    Traveller *one = &w->queue[to][w->waiting[to]++];
+    for (int j = 0; j < w->words; j++) one->word[j] = LANE_I(((I *)s)[j], l);
+    LANE_I(s->live, l) = 0;
+    w->alive[pool]--;
+  }
+}
+
+static void receive(Lanes *s, Work *w, int pool) {
+  for EACH(l, ~s->live) {
+    if (!w->waiting[pool]) return;
+    const Traveller *one = &w->queue[pool][--w->waiting[pool]];
+    for (int j = 0; j < w->words; j++) LANE_I(((I *)s)[j], l) = one->word[j];
+    w->alive[pool]++;
+  }
+}
+
+/* The set -------------------------------------------------------------------------------------- */
+
+INLINE T length_of(const T *h) {
+  T sum = BC(0);
+  UNROLL for (int i = 0; i < K; i++) sum += h[i] * h[i];
+  return SQRT_(sum);
+}
+
+/* sum of |gradient| (size + |x|): rounding in a function is that times epsilon. */
+INLINE T rounding_scale(const Lanes *s, const Work *w, const T *gradient) {
+  T scale = BC(0);
+  UNROLL for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (w->size + ABS(s->x[i]));
+  return scale;
+}
+
+/* h and the scale of its rounding. */
+INLINE T heights(const Lanes *s, const Work *w, T *h, T gradient[K][N]) {
+  T scale = BC(0);
+  height_values(s->x, s->q, LAMBDA(s->lam), h, &gradient[0][0]);
+  UNROLL for (int i = 0; i < K; i++) scale = MAX(scale, rounding_scale(s, w, gradient[i]));
+  return scale;
+}
+
+/* y of M y = b, from cofactors. */
+INLINE void solve_block(const T *m, const T *b, T *y) {
+#if K == 2
+  T per = 1.0 / (m[0] * m[3] - m[1] * m[2]);
+  y[0] = (m[3] * b[0] - m[1] * b[1]) * per;
+  y[1] = (m[0] * b[1] - m[2] * b[0]) * per;
+#else
+  T c[3];
+  UNROLL for (int i = 0; i < 3; i++) {
+    int j = (i + 1) % 3, k = (i + 2) % 3;
+    c[i] = m[3 + j] * m[6 + k] - m[3 + k] * m[6 + j];
+  }
+  T per = 1.0 / (m[0] * c[0] + m[1] * c[1] + m[2] * c[2]);
+  UNROLL for (int i = 0; i < 3; i++) {
+    T d[3];
+    int p = (i + 1) % 3, q = (i + 2) % 3;
+    UNROLL for (int j = 0; j < 3; j++) {
+      int u = (j + 1) % 3, v = (j + 2) % 3;
+      d[j] = m[3 * u + p] * m[3 * v + q] - m[3 * u + q] * m[3 * v + p];
+    }
+    y[i] = (d[0] * b[0] + d[1] * b[1] + d[2] * b[2]) * per;
+  }
+#endif
+}
+
+/* Whether M is symmetric and positive definite, and isotropic, with its mean diagonal. */
+INLINE I is_definite(const T *m, I *isotropic, T *mean) {
+  T most = BC(0), c = BC(0);
+  UNROLL for (int i = 0; i < K * K; i++) most = MAX(most, ABS(m[i]));
+  UNROLL for (int i = 0; i < K; i++) c += m[i * K + i] * (1.0 / K);
+  I definite = most > 0;
+  *isotropic = definite;
+  UNROLL for (int i = 0; i < K; i++) {
+    definite &= m[i * K + i] > 1e-13 * most;
+    UNROLL for (int j = 0; j < K; j++) {
+      definite &= ABS(m[i * K + j] - m[j * K + i]) <= 1e-12 * most;
+      *isotropic &= ABS(m[i * K + j] - (i == j ? c : BC(0))) <= 1e-12 * c;
+    }
+  }
+  UNROLL for (int i = 0; i < K; i++)
+    UNROLL for (int j = 0; j < i; j++)
+      definite &= m[i * K + i] * m[j * K + j] - m[i * K + j] * m[j * K + i] > 1e-13 * most * most;
+#if K == 3
+  T whole = m[0] * (m[4] * m[8] - m[5] * m[7]) - m[1] * (m[3] * m[8] - m[5] * m[6]) + m[2] * (m[3] * m[7] - m[4] * m[6]);
+  definite &= whole > 1e-13 * most * most * most;
+#endif
+  *mean = c;
+  return definite;
+}
+
+/* Newton steps of the states onto h = 0; lanes that they do not lead there. */
+INLINE I project(Lanes *s, const Work *w, I which) {
+  T h[K], g[K][N];
+  for (int again = 0; again < (NAMED ? 1 : 3); again++) {
+    T m[K * K], y[K];
+    height_values(s->x, s->q, LAMBDA(s->lam), h, &g[0][0]);
+    UNROLL for (int i = 0; i < K; i++)
+      UNROLL for (int j = 0; j < K; j++) {
+        m[i * K + j] = BC(0);
+        UNROLL for (int n = 0; n < ND; n++) m[i * K + j] += g[i][n] * g[j][n];
+      }
+    solve_block(m, h, y);
+    UNROLL for (int n = 0; n < ND; n++) {
+      T step = BC(0);
+      UNROLL for (int i = 0; i < K; i++) step += y[i] * g[i][n];
+      s->x[n] = SELECT(which, s->x[n] - step, s->x[n]);
+    }
+  }
+  if (NAMED) return (I){0};
+  T scale = heights(s, w, h, g);
+  return which & ~(I)(length_of(h) <= VANISHES * scale);
+}
+
+/* Events --------------------------------------------------------------------------------------- */
+
+INLINE void count(Lanes *s, Work *w, int kind, I which) {
+  s->kinds[kind] -= which;
+  s->events -= which;
+  const Batch *b = w->b;
+  if (w->o->at_kind != kind || !b->at_x) return;
+  I now = which & (s->kinds[kind] == w->o->at_count);
+  for EACH(l, now) {
+    int64_t at = LANE_I(s->index, l);
+    b->at_t[at] = LANE(s->t, l);
+    UNROLL for (int i = 0; i < ND; i++) b->at_x[at * ND + i] = LANE(s->x[i], l);
+  }
+}
+
+/* Whatever changes its mode: the lanes that are left to the interpreter. */
+INLINE I change_mode(Lanes *s, Work *w, I which, int kind, int mode) {
+  T interval = s->t - s->last_event;
+  I shorter = which & (interval < SHRINKS * s->shortest);
+  count(s, w, kind, which);
+  s->last_event = SELECT(which, s->t, s->last_event);
+  s->shortest = SELECT(shorter, interval, s->shortest);
+  s->shrinking -= shorter;
+  s->length = SELECT(which, BC(0), s->length);
+  note_mode(s, w, which, mode);
+  return which & ((s->shrinking >= 3) | (s->events >= w->o->max_events));
+}
+
+/* Lanes near h = 0: those that reach it now are put there; those left to the interpreter are added to
+ * ``unclear``. */
+static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear) {
+  T h[K], g[K][N], a[K], m[K * K], u[K], y[K], b[K], mean[K], c, field[N], other[N], end[N];
+  T scale = heights(s, w, h, g), radius = length_of(h), along = BC(0), square = BC(0), rate = BC(0);
+  frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
+  I isotropic, holds = is_definite(m, &isotropic, &c);
+  solve_block(m, a, y);
+  holds &= length_of(y) < 1;
+  UNROLL for (int i = 0; i < K; i++) {
+    u[i] = h[i] / radius;
+    T own = a[i];
+    UNROLL for (int j = 0; j < K; j++) own -= m[i * K + j] * (h[j] / radius);
+    rate += u[i] * own;
+    along += a[i] * h[i];
+    square += a[i] * a[i];
+  }
+  T whole = (c * radius + along) / (c * c - square), straight = SELECT(rate < 0, -radius / rate, BC(INFINITY));
+  T dt = SELECT(holds & isotropic, whole, straight), since = s->t - w->b->t0, left = w->o->t_end - s->t;
+  double shortest = pow(OVERFLOW, -1.0 / P);
+  I floor = (radius <= VANISHES * scale) | (I)(dt < MAX(BC(shortest), TENFOLD * SHORTEST * MAX(ABS(s->t), ABS(since))));
+  *unclear |= which & ((floor & ~holds) | ~(I)(radius > 0));
+  I met = which & holds & (dt > 0) & (dt < INFINITY);
+  *unclear |= which & floor & ~met;
+  UNROLL for (int i = 0; i < K; i++) b[i] = a[i] + h[i] / dt;
+  solve_block(m, b, mean);
+  field_values(s->x, s->q, LAMBDA(mean), field);
+  UNROLL for (int i = 0; i < N; i++) end[i] = s->x[i] + dt * field[i];
+  T later[K], than[K * K], bend = BC(0), turn[N];
+  frozen_values(end, s->q, LAMBDA(s->lam), later, than);
+  UNROLL for (int i = 0; i < K; i++) bend += ABS(later[i] - a[i]);
+  UNROLL for (int i = 0; i < K * K; i++) bend += ABS(than[i] - m[i]);
+  bend *= dt;
+  field_values(s->x, s->q, LAMBDA(u), other);
+  UNROLL for (int i = 0; i < N; i++) turn[i] = ABS(field[i] - other[i]);
+  field_values(end, s->q, LAMBDA(mean), other);
+  I close = bend <= REACHED * radius;
+  UNROLL for (int i = 0; i < N; i++) {
+    T allowed = EPSILON * (w->size + ABS(s->x[i]));
+    if (i < ND) allowed += REACHED * SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i]));
+    close &= (turn[i] + ABS(field[i] - other[i])) * dt <= allowed;
+  }
+  met &= close | floor;
+  *unclear |= met & ((I)(dt > left) | (floor & ~(I)(bend <= radius)));
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = SELECT(met, end[i], s->x[i]);
+  s->t = SELECT(met, s->t + dt, s->t);
+  if (TIMED) s->x[N - 1] = s->t;
+  s->steps -= met;
+  if (!any(met)) return met;
+  *unclear |= project(s, w, met);
+  frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
+  holds = is_definite(m, &isotropic, &c);
+  solve_block(m, a, y);
+  *unclear |= met & ~(holds & (length_of(y) < 1 - ROOM_TO_ROLL));
+  return met;
+}
+
+/* Lanes on the set at the end of friction's range: they leave it in the direction of friction. */
+INLINE I release(Lanes *s, I which) {
+  T a[K], m[K * K], y[K], c;
+  I isotropic;
+  frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
+  I good = is_definite(m, &isotropic, &c);
+  solve_block(m, a, y);
+  T size = length_of(y);
+  good &= ABS(size - 1) <= 1e-9;
+  UNROLL for (int i = 0; i < K; i++) s->lam[i] = SELECT(which, y[i] / size, s->lam[i]);
+  return which & ~good;
+}
+
+/* Modes of lanes just loaded: all are off the set. */
+static void begin(Lanes *s, Work *w, I fresh) {
+  T h[K], g[K][N], x[N], a[K], m[K * K];
+  T scale = heights(s, w, h, g);
+  I unclear = ~(I)(length_of(h) > CLOSE * scale), moved = {0};
+  for (int trial = 0; trial < 3; trial++) {
+    UNROLL for (int i = 0; i < N; i++) x[i] = s->x[i] + trial * (0.37 + 0.11 * i);
+    frozen_values(x, s->q, LAMBDA(s->lam), a, m);
+    UNROLL for (int i = 0; i < K * K; i++) moved |= m[i] != 0;
+  }
+  unclear |= ~moved; /* no friction */
+#if STOPS > 0
+  T stop[STOPS], gradient[STOPS][N];
+  stop_values(s->x, s->q, LAMBDA(s->lam), stop, &gradient[0][0]);
+  for (int j = 0; j < STOPS; j++) {
+    unclear |= ABS(stop[j]) <= VANISHES * rounding_scale(s, w, gradient[j]);
+    s->above_stop[j] = SELECT_I(fresh, (I)(stop[j] > 0), s->above_stop[j]);
+  }
+#endif
+  note_mode(s, w, fresh & ~unclear, 0);
+  finish_lanes(s, w, OFF, fresh & unclear, HAND_OVER);
+}

@@ -1,0 +1,410 @@
+/* A step of lanes in one of three modes at a set: set_lanes.c. */
+
+/* Coefficients of a step. */
+typedef struct {
+  T c[N][P + 1], g[SLOTS][P + 1], unknowns[K][P + 1]; /* unknowns on the set; the direction when leaving it */
+  T allowed[N], radius; /* |h|, or on the set friction's limit */
+} Step;
+
+/* Step size -------------------------------------------------------------------------------------- */
+
+INLINE T weighed(const T *gradient, const T *allowed) {
+  T sum = BC(0);
+  UNROLL for (int i = 0; i < ND; i++) sum += ABS(gradient[i]) * allowed[i];
+  return sum;
+}
+
+INLINE void bound(T last_one, T before_one, T per, T *last, T *before) {
+  *last = MAX(*last, ABS(last_one) * per);
+  *before = MAX(*before, ABS(before_one) * per);
+}
+
+/* Ratios of the last two terms of the guards to their tolerances. */
+INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *last, T *before) {
+  const Options *o = w->o;
+  T h[K], gradient[K][N], sum = BC(0);
+  height_values(s->x, s->q, LAMBDA(s->lam), h, &gradient[0][0]);
+  UNROLL for (int i = 0; i < K; i++) sum += weighed(gradient[i], e->allowed);
+  const T *g = e->g[0];
+  if (mode == OFF) bound(g[P], g[P - 1], 1.0 / (sum / e->radius + o->rtol * ABS(g[0])), last, before);
+  if (mode == LEAVING) bound(g[P - 2], g[P - 3], 1.0 / sum, last, before);
+  if (mode == ON) {
+    T value[K + 1], slope[K + 1][N];
+    slip_values(s->x, s->q, LAMBDA(s->lam), value, &slope[0][0]);
+    T of_limit = weighed(slope[K], e->allowed), all = BC(0);
+    UNROLL for (int i = 0; i < K; i++)
+      all += 2.0 * (ABS(value[i]) + ABS(value[K])) * (weighed(slope[i], e->allowed) + of_limit);
+    bound(g[P], g[P - 1], 1.0 / (all + o->rtol * ABS(g[0]) + 1e-290), last, before);
+  }
+#if STOPS > 0
+  if (!BENT_STOPS) return;
+  T stop[STOPS], slopes[STOPS][N];
+  stop_values(s->x, s->q, LAMBDA(s->lam), stop, &slopes[0][0]);
+  UNROLL for (int j = 0; j < STOPS; j++) {
+    const T *a = e->g[1 + j];
+    bound(a[P], a[P - 1], 1.0 / (weighed(slopes[j], e->allowed) + o->rtol * ABS(a[0]) + 1e-290), last, before);
+  }
+#endif
+}
+
+/* The coefficients of a step, and the size that they allow. */
+INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
+  const Options *o = w->o;
+  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), ends[4 * K], per = BC(1.0 / (SAFETY * o->rtol));
+  if (mode == OFF) off_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], ends, &e->radius);
+  if (mode == ON) on_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
+  if (mode == LEAVING) leave_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
+  UNROLL for (int i = 0; i < N; i++) {
+    e->allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
+    if (i >= ND) continue;
+    bound(e->c[i][P], e->c[i][P - 1], ROUGH_INVERSE(e->allowed[i]), &last, &before);
+    sum += e->c[i][P] + e->c[i][P - 1];
+  }
+  UNROLL for (int j = 0; j < SLOTS; j++) if (j != LIMIT_SLOT || mode == ON) sum += e->g[j][P] + e->g[j][P - 1] + e->g[j][0];
+  guard_bounds(s, w, e, mode, &last, &before);
+  UNROLL for (int i = 0; i < (mode == OFF ? 2 * K : K); i++) {
+    if (mode == ON) continue;
+    T one = mode == OFF ? ends[2 * i + 1] : e->unknowns[i][P], two = mode == OFF ? ends[2 * i] : e->unknowns[i][P - 1];
+    sum += one + two;
+    if (mode == OFF) { one = SELECT(s->behind, one, BC(0)); two = SELECT(s->behind, two, BC(0)); }
+    bound(one, two, per, &last, &before);
+  }
+  *finite = ABS(sum) < INFINITY;
+  if (mode == OFF) e->g[0][0] -= FALL;
+  if (mode == ON) {
+    T *g = e->g[LIMIT_SLOT], first = 1.0 / g[0];
+    e->radius = g[0];
+    I moves = g[0] != 0;
+    UNROLL for (int k = 1; k <= P; k++) g[k] = SELECT(moves, g[k] * first, BC(0));
+    g[0] = BC(1 - LIMIT_FALL);
+  }
+  T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
+  return EXP2(MIN(h1, h2));
+}
+
+/* Roots ------------------------------------------------------------------------------------------ */
+
+static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped, double *slope) {
+  double c[P + 1];
+  for (int k = 0; k <= P; k++) c[k] = LANE(a[k], l);
+  int stops = slot > 0 && slot <= STOPS, direction = stops ? DIRECTION[slot - 1] : 0;
+  double s = stops ? first_crossing(c, P, 1, flipped ? -direction : direction) : first_root(c, P, 1), d = 0;
+  for (int k = P; k > 0; k--) d = d * s + k * c[k];
+  *slope = d;
+  return s;
+}
+
+/* Shorten steps until a guard's series converges within them, as in the interpreter. */
+static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
+  while (any(active)) {
+    T power = BC(1), sum = BC(0), step = *h;
+    for (int k = P - 2; k >= 0; k--) { sum = sum * step + ABS(g[k]); power *= step; }
+    T last = MAX(ABS(g[P]) * step, ABS(g[P - 1])) * power, rest = RESOLVED * sum;
+    active &= (last > rest) & (rest > 0) & (rest < INFINITY);
+    *h = SELECT(active, step * 0.99 * EXP2(LOG2(rest / last) * (1.0 / (P - 1))), step);
+  }
+}
+
+/* Time of the first event within h in each lane, its slot + 1 and the guard's slope over the step; lanes that
+ * are not clear. */
+INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, T *slope) {
+  T a[SLOTS][P + 1], end[SLOTS];
+  I one[SLOTS], hard[SLOTS], flipped[SLOTS], unclear = {0};
+  for (int first = 1;; first = 0) {
+    T power[P + 1];
+    I too_long = {0};
+    power[1] = *steps;
+    UNROLL for (int k = 2; k <= P; k++) power[k] = power[k / 2] * power[k - k / 2];
+    UNROLL for (int j = 0; j < SLOTS; j++) {
+      if (j == LIMIT_SLOT && mode != ON) continue;
+      I none, unresolved, wrong_way = {0};
+      int stops = j > 0 && j <= STOPS, direction = stops ? DIRECTION[stops ? j - 1 : 0] : 0;
+      flipped[j] = (I){0};
+      if (stops) flipped[j] = e->g[j][0] < 0;
+      a[j][0] = e->g[j][0];
+      UNROLL for (int k = 1; k <= P; k++) a[j][k] = e->g[j][k] * power[k];
+      if (stops) {
+        I sign = flipped[j] & INT64_MIN;
+        UNROLL for (int k = 0; k <= P; k++) a[j][k] = (T)((I)a[j][k] ^ sign);
+        if (direction) wrong_way = direction < 0 ? flipped[j] : ~flipped[j];
+      }
+      screen(a[j], &none, &one[j], &unresolved, &end[j]);
+      I zero = ~(I)(a[j][0] > 0), counts = s->live;
+      too_long |= counts & unresolved;
+      if (first && any(counts & unresolved)) resolve_step(e->g[j], counts & unresolved, steps);
+      if (!stops) { unclear |= counts & zero; counts &= ~zero; }
+      hard[j] = counts & ((~none & ~one[j]) | (one[j] & wrong_way) | zero);
+      one[j] &= counts & ~hard[j];
+    }
+    if (!first || !any(too_long)) break;
+  }
+  T h = *steps, best = BC(INFINITY), second = BC(INFINITY), tie = NEAR * MAX(BC(1), ABS(s->t));
+  *slot = (I){0};
+  UNROLL for (int j = 0; j < SLOTS; j++) {
+    if (j == LIMIT_SLOT && mode != ON) continue;
+    T root = BC(INFINITY), d = BC(0);
+    for EACH(l, hard[j]) {
+      double at = hard_root(a[j], l, j, LANE_I(flipped[j], l) != 0, &LANE(d, l));
+      if (at >= 0) LANE(root, l) = at;
+    }
+    if (any(one[j])) {
+      T at = polish(a[j], end[j], one[j], &d);
+      root = SELECT(one[j], at, root);
+    }
+    I sooner = root < best;
+    second = SELECT(sooner, best, MIN(second, root));
+    best = SELECT(sooner, root, best);
+    *slot = SELECT_I(sooner, (I){0} + (j + 1), *slot);
+    *slope = SELECT(sooner, d, *slope);
+  }
+  I hit = *slot != 0;
+  *dt = SELECT(hit, best * h, h);
+  return unclear | (hit & ((second - best) * h <= tie));
+}
+
+/* Checks ----------------------------------------------------------------------------------------- */
+
+INLINE T series_at(const T *c, int degree, T at) {
+  T v = c[degree];
+  UNROLL for (int k = degree - 1; k >= 0; k--) v = v * at + c[k];
+  return v;
+}
+
+INLINE void state_at(T *x, const Step *e, T at, int degree) {
+  UNROLL for (int i = 0; i < N; i++) x[i] = series_at(e->c[i], degree, at);
+}
+
+/* Lanes where the field and what ends the mode at a time of the step are not those of the polynomials. */
+INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const T *x, T at, T dt, int degree) {
+  I wrong = {0};
+  T f[ROWS + 1], stop[STOPS + 1];
+  if (mode == OFF) off_check(x, s->q, LAMBDA(s->lam), f, stop);
+  if (mode == ON) on_check(x, s->q, LAMBDA(s->lam), f, stop);
+  if (mode == LEAVING) {
+    T whole[N], u[K], length;
+    UNROLL for (int i = 0; i < K; i++) u[i] = series_at(e->unknowns[i], degree, at);
+    length = length_of(u);
+    UNROLL for (int i = 0; i < K; i++) u[i] /= length;
+    field_values(x, s->q, LAMBDA(u), whole);
+    UNROLL for (int m = 0; m < ROWS; m++) f[m] = whole[ROW[m]];
+    if (BENT_STOPS) off_check(x, s->q, LAMBDA(s->lam), whole, stop);
+  }
+  UNROLL for (int m = 0; m < ROWS; m++) {
+    const T *row = e->c[ROW[m]];
+    T d = degree * row[degree];
+    UNROLL for (int k = degree - 1; k >= 1; k--) d = d * at + k * row[k];
+    wrong |= ~(I)(ABS(f[m] - d) * dt <= WRONG * e->allowed[ROW[m]] + VANISHES * dt * ABS(d));
+  }
+  UNROLL for (int j = 0; j < (BENT_STOPS ? STOPS : 0); j++) {
+    T miss = ABS(stop[j] - series_at(e->g[1 + j], degree, at));
+    T gradient[STOPS + 1][N], value[STOPS + 1];
+    stop_values(s->x, s->q, LAMBDA(s->lam), value, &gradient[0][0]);
+    wrong |= ~(I)(miss <= WRONG * weighed(gradient[j], e->allowed) + VANISHES * rounding_scale(s, w, gradient[j]));
+  }
+  if (mode == ON && BENT_SLIP) {
+    T value[K + 1], slope[K + 1][N];
+    slip_values(x, s->q, LAMBDA(s->lam), value, &slope[0][0]);
+    UNROLL for (int i = 0; i <= K; i++) {
+      T known = i < K ? series_at(e->unknowns[i], degree, at) : value[K];
+      wrong |= ~(I)(ABS(value[i] - known) <= WRONG * weighed(slope[i], e->allowed) + VANISHES * rounding_scale(s, w, slope[i]));
+    }
+  }
+  return wrong;
+}
+
+/* Steps that the polynomials bear out, with the states at their ends; shortened lanes have no event. */
+INLINE I verify(const Lanes *s, const Work *w, const Step *e, int mode, T by_series, T *dt, I *slot, I *last, T *end) {
+  I same = s->length > 0, grows = same & (I)(by_series > GROWTH * s->length), leaps = {0};
+  UNROLL for (int i = 0; i < N; i++)
+    leaps |= ~same & (I)(by_series * ABS(e->c[i][1]) > FAR * (ABS(e->c[i][0]) + w->size));
+  if (mode == ON && ROWS == 0 && !BENT_SLIP && !BENT_STOPS) { state_at(end, e, *dt, P); return (I){0}; }
+  for (int tries = 0; tries < 20; tries++) {
+    T x[N], good = *dt;
+    I wrong = {0};
+    if (any(grows & s->live)) { /* every octave down to a length that is known to be safe */
+      T low = 0.5 * *dt;
+      I high;
+      while (any(high = grows & s->live & (I)(low > s->length))) low = SELECT(high, 0.5 * low, low);
+      for (I rest = grows & s->live & ~wrong; any(rest); rest &= low < *dt) {
+        for (int k = 0; k < OCTAVE; k++) {
+          T at = low * (1 + (double)k / OCTAVE);
+          state_at(x, e, at, P);
+          I bad = rest & ~wrong & disagrees(s, w, e, mode, x, at, *dt, P);
+          good = SELECT(bad, 0.5 * at, good);
+          wrong |= bad;
+        }
+        low = SELECT(rest, 2.0 * low, low);
+      }
+    }
+    T at = 0.5 * *dt;
+    state_at(x, e, at, INNER);
+    I bad = ~wrong & disagrees(s, w, e, mode, x, at, *dt, INNER);
+    good = SELECT(bad, 0.5 * at, good);
+    wrong |= bad;
+    state_at(end, e, *dt, P);
+    bad = ~wrong & disagrees(s, w, e, mode, end, *dt, *dt, P);
+    good = SELECT(bad, 0.5 * *dt, good);
+    wrong = (wrong | bad) & s->live;
+    if (!any(wrong)) return leaps;
+    *dt = SELECT(wrong, good, *dt);
+    *slot &= ~wrong;
+    *last &= ~wrong;
+  }
+  return ~(I){0};
+}
+
+/* Steps ------------------------------------------------------------------------------------------ */
+
+/* Lanes where a stop was passed between two steps: rounding hid it from the first. */
+INLINE I passed_between(Lanes *s, const Step *e) {
+  I passed = {0};
+  UNROLL for (int j = 0; j < STOPS; j++) {
+    T value = e->g[1 + j][0];
+    I above = value > 0, was = s->above_stop[j];
+    if (DIRECTION[j] <= 0) passed |= was & ~above;
+    if (DIRECTION[j] >= 0) passed |= ~was & (I)(value >= 0);
+    s->above_stop[j] = above;
+  }
+  return passed;
+}
+
+/* Times at which |nu| = |n|, from those at which their squares are equal to rounding. */
+INLINE void polish_slip(const Step *e, I which, T h, T *dt) {
+  T root = *dt;
+  for (int again = 0; again < 3; again++) {
+    T square = BC(0), along = BC(0), n = BC(0), of_n = BC(0);
+    /* The limit's series stands in its slot over its first value. */
+    UNROLL for (int i = 0; i < K; i++) {
+      T v = e->unknowns[i][P], d = BC(0);
+      UNROLL for (int k = P - 1; k >= 0; k--) { d = d * root + v; v = v * root + e->unknowns[i][k]; }
+      square += v * v;
+      along += v * d;
+    }
+    n = e->g[LIMIT_SLOT][P];
+    UNROLL for (int k = P - 1; k >= 0; k--) { of_n = of_n * root + n; n = n * root + (k ? e->g[LIMIT_SLOT][k] : BC(1)); }
+    n *= e->radius;
+    of_n *= e->radius;
+    T size = SQRT_(square), sign = SELECT(n < 0, BC(-1), BC(1)), slope = sign * of_n - along / size;
+    T next = MIN(MAX(root - (ABS(n) - size) / slope, BC(0)), h);
+    root = SELECT((size > 0) & (slope < 0), next, root);
+  }
+  *dt = SELECT(which & (ABS(root - *dt) <= 1e-6 * *dt), root, *dt);
+}
+
+INLINE void step_in(Lanes *s, Work *w, int mode) {
+  const Options *o = w->o;
+  Step e;
+  T dt, slope = BC(0), end[N];
+  I finite, slot;
+  T by_series = expand_step(s, w, &e, mode, &finite);
+  T h = MIN(by_series, BC(o->max_step)), left = o->t_end - s->t;
+  I last = h >= left, unclear = ~finite;
+  unclear |= ~last & (h <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0)));
+  unclear |= (s->steps >= o->max_steps) | passed_between(s, &e);
+  h = SELECT(last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
+  unclear |= first_hit(s, &e, mode, &h, &dt, &slot, &slope);
+  if (mode == ON && any(slot == 1)) polish_slip(&e, slot == 1, h, &dt);
+  last &= h >= left;
+  dt = MIN(dt, SELECT(last, left, dt));
+  unclear |= last & (dt == left) & (slot == 1); /* a mode without a step */
+  h = MIN(h, left);
+  T wanted = dt;
+  unclear |= verify(s, w, &e, mode, by_series, &dt, &slot, &last, end);
+  s->length = SELECT(dt < wanted, dt, h);
+  UNROLL for (int i = 0; i < N; i++) s->x[i] = end[i];
+  s->t += dt;
+  if (TIMED) s->x[N - 1] = s->t;
+  s->steps += 1;
+  I live = s->live & ~unclear, met = live & (slot == 1), stopped = live & (slot > 1) & (slot <= STOPS + 1);
+  s->t = SELECT(live & last & (I)(dt == left), BC(o->t_end), s->t);
+  last &= live & (slot == 0);
+  I gone = {0};
+  if (mode == OFF) {
+    T height[K], g[K][N], scale = heights(s, w, height, g), radius = length_of(height);
+    if (any(s->behind)) s->behind &= radius <= LEFT * scale;
+    I near = met | (live & ~stopped & ~last & (radius <= CLOSE * scale));
+    if (any(near)) {
+      gone = reach(s, w, near, &unclear) & ~unclear;
+      if (any(gone)) unclear |= change_mode(s, w, gone, ENTRY, 1);
+    }
+  } else if (mode == ON) {
+    unclear |= project(s, w, s->live);
+    gone = met;
+    if (any(gone)) {
+      unclear |= gone & ~(I)(slope < -1e-10 * e.g[0][0]);
+      unclear |= release(s, gone) | change_mode(s, w, gone & ~unclear, EXIT, 0);
+    }
+  } else {
+    unclear |= met | (live & ~(I)(e.g[0][0] > 0));
+    gone = live & ~stopped & ~last;
+    T distance = series_at(e.g[0], P, dt) * dt * dt, height[K], g[K][N], u[K];
+    UNROLL for (int i = 0; i < K; i++) u[i] = series_at(e.unknowns[i], P, dt);
+    if (NAMED) UNROLL for (int i = 0; i < K; i++) s->x[OWN[i]] = SELECT(s->live, distance * u[i], s->x[OWN[i]]);
+    T scale = heights(s, w, height, g);
+    s->behind = distance <= LEFT * scale;
+    if (!NAMED) unclear |= gone & s->behind;
+    s->length = BC(0);
+  }
+  finish_lanes(s, w, mode, unclear, HAND_OVER);
+  if (STOPS > 0 && any(stopped & ~unclear)) {
+    count(s, w, STOP, stopped & ~unclear);
+    finish_lanes(s, w, mode, stopped & ~unclear, STOPPED);
+  }
+  finish_lanes(s, w, mode, last & ~unclear, REACHED_END);
+  send(s, w, mode, gone & ~unclear, mode == OFF ? ON : mode == ON ? LEAVING : OFF);
+}
+
+static __attribute__((noinline)) void step_off(Lanes *s, Work *w) { step_in(s, w, OFF); }
+static __attribute__((noinline)) void step_on(Lanes *s, Work *w) { step_in(s, w, ON); }
+static __attribute__((noinline)) void step_leaving(Lanes *s, Work *w) { step_in(s, w, LEAVING); }
+
+typedef struct { Lanes lanes[POOLS]; Work work; int begun; } Many;
+
+int64_t many_size(void) { return sizeof(Many); }
+
+static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree) {
+  Work *w = &many->work;
+  double q[NQ];
+  w->b = b;
+  w->o = o;
+  w->tree = tree;
+  w->size = o->atol / o->rtol;
+  w->words = WORDS - (b->p_stride ? 0 : NQ);
+  prepare(b->p, q);
+  for (int pool = 0; pool < POOLS; pool++) {
+    Lanes *s = &many->lanes[pool];
+    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
+  }
+  many->begun = 1;
+}
+
+/* The mode whose lanes take a step: the last one of a run that has enough of them. */
+static int chosen(const Work *w) {
+  for (int pool = LEAVING; pool >= OFF; pool--) if (w->alive[pool] + w->waiting[pool] >= W) return pool;
+  if (w->next < w->b->count) return OFF;
+  for (int pool = OFF; pool < POOLS; pool++) if (w->alive[pool] + w->waiting[pool]) return pool;
+  return -1;
+}
+
+/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
+ * is zero before the first, and aligned like a vector. */
+int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
+  Work *w = &many->work;
+  if (!many->begun) begin_all(many, b, o, tree);
+  for (;;) {
+    int pool = chosen(w);
+    if (pool < 0) return 0;
+    Lanes *s = &many->lanes[pool];
+    receive(s, w, pool);
+    if (pool == OFF && w->alive[OFF] < W && w->next < b->count) {
+      I fresh = {0};
+      for EACH(l, ~s->live) if (load(s, w, l)) LANE_I(fresh, l) = -1;
+      begin(s, w, fresh);
+      continue;
+    }
+    if (--budget < 0) return 1;
+    if (pool == OFF) step_off(s, w);
+    else if (pool == ON) step_on(s, w);
+    else step_leaving(s, w);
+  }
+}

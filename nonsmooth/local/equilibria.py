@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, FilippovSystem, Parameters
+from ..model import Array, FilippovSystem, OptionError, Parameters
 from .checks import require_autonomous
 from .place import TOLERANCE, Place, place
 from .search import Found, search
@@ -20,23 +20,23 @@ HYPERBOLIC = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Equilibrium:
-    """A zero of one of the two fields.
+    """A zero of one of the two fields, or of a smooth system's one field.
 
     Attributes
     ----------
     point : ndarray (n,)
         The point, in the order of the states.
     side : {"+", "-"}
-        Of the field $F1$ above the surface or $F2$ below it.
+        Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
     status : {"real", "virtual", "boundary"}
-        Whether it is on its field's own side, on the other side, or on the surface.
+        Whether it is on its field's own side, on the other side of a surface, or on the surface.
     kind : str
         ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
         eigenvalue has no real part.
     eigenvalues : ndarray (n,)
         Of DF_i, by real part.
     h : float
-        Value of the switching function there: on which side it is, and how far.
+        Value of the switching function there: on which side it is, and how far; inf without one.
     margin : float
         Smallest real part relative to the largest modulus: distance from a degenerate one.
     distance : float
@@ -45,6 +45,8 @@ class Equilibrium:
         What is left of the equations at the point.
     iterations : int
         Iterations that Newton's method took; 0 where nothing was searched.
+    mode : str
+        Whose field: one letter for each surface.
     """
 
     point: Array
@@ -57,9 +59,12 @@ class Equilibrium:
     distance: float
     residual: float
     iterations: int
+    mode: str
 
     def __str__(self) -> str:
         values = ", ".join(f"{v:.6g}" for v in self.eigenvalues)
+        if not self.mode:
+            return f"{self.kind} at {self.point.tolist()}, eigenvalues {values}."
         return (
             f"{self.status} {self.kind} of {FIELDS[self.side]} at {self.point.tolist()}, h = {self.h:.6g}, "
             f"eigenvalues {values}."
@@ -115,11 +120,11 @@ def find_equilibrium(
     Parameters
     ----------
     system, parameters, surface, mode
-        As in :func:`region`; the point need not be on the surface.
+        As in :func:`region`; the point need not be on the surface. A smooth system has none.
     near : array_like (n,)
         Where the search starts.
     side : {"+", "-"}
-        Of the field $F1$ or $F2$.
+        Of the field $F1$ or $F2$; a smooth system has one field, of ``"+"``.
     tol : float, optional
         Accepted residual (a distance), relative to $1 + |x|$.
     max_iterations : int, optional
@@ -150,12 +155,16 @@ def find_equilibrium(
     """
     k = side_index(side)
     require_autonomous(system, "equilibrium")
-    where, x = place(system, near, parameters, 0.0, surface, mode)
+    where, x = place(system, near, parameters, 0.0, surface, mode, smooth=True)
+    if not system.surface_count and side != "+":
+        raise OptionError(
+            f"side: expected '+', as a smooth system has one field, received {side!r}. Leave it out."
+        )
 
     def equations(u: Array) -> tuple[Array, Array]:
         return where.at(u).fields[k], where.jacobians(u)[k]
 
-    what = f"equilibrium of {FIELDS[side]}"
+    what = f"equilibrium of {FIELDS[side]}" if where.mode else "equilibrium"
     found = search(equations, x, tol=tol, max_iterations=max_iterations, what=what)
     return equilibrium_at(where, found, side)
 
@@ -165,19 +174,24 @@ def equilibrium_at(where: Place, found: Found, side: Side) -> Equilibrium:
     x, numbers = found.x, where.at(found.x)
     eigenvalues = by_real_part(where.jacobians(x)[side_index(side)])
     kind, margin = kind_of(eigenvalues, float(np.max(np.abs(eigenvalues))))
-    if numbers.distance <= TOLERANCE * (1 + float(np.linalg.norm(x))):
+    h, mode = (numbers.h if where.mode else np.inf), where.side(side)
+    if not where.mode:
+        status = "real"
+    elif numbers.distance <= TOLERANCE * (1 + float(np.linalg.norm(x))):
         status = "boundary"
     else:
-        status = "real" if (numbers.h > 0) == (side == "+") else "virtual"
+        signs = np.where(where.switches(x) > 0, "+", "-")
+        status = "real" if "".join(signs) == mode else "virtual"
     return Equilibrium(
         x,
         side,
         status,
         kind,
         eigenvalues,
-        numbers.h,
+        h,
         margin,
         found.distance,
         found.residual,
         found.iterations,
+        mode,
     )

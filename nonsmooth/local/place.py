@@ -42,7 +42,7 @@ class Place:
     system : FilippovSystem
     surface : int
     mode : str
-        One letter per surface, ``s`` for this one.
+        One letter per surface, ``s`` for this one; empty for a smooth system.
     parameters : ndarray
     """
 
@@ -52,7 +52,9 @@ class Place:
     parameters: Array
 
     def side(self, letter: str) -> str:
-        """Return the mode above (``+``) or below (``-``) the surface."""
+        """Return the mode above (``+``) or below (``-``) the surface; of a smooth system its one mode."""
+        if not self.mode:
+            return ""
         return self.mode[: self.surface] + letter + self.mode[self.surface + 1 :]
 
     @property
@@ -62,8 +64,12 @@ class Place:
         return dict(zip(names, map(float, self.parameters), strict=True))
 
     def _expressions(self) -> tuple[Any, list[Any], list[Any]]:
-        """h, (L1, L2) and (F1, F2)."""
+        """h, (L1, L2) and (F1, F2); of a smooth system h = 1 and both fields are the one."""
         system, modes = self.system, [self.side(letter) for letter in SIDES]
+        if not system.surface_count:
+            field = system.field("")
+            number = type(field)
+            return number(1.0), [number(0.0)] * 2, [field] * 2
         lie = [system.lie_derivative([mode], self.surface) for mode in modes]
         return system.surface_function(self.surface), lie, [system.field(mode) for mode in modes]
 
@@ -130,6 +136,15 @@ class Place:
         h, gradient = call(system.function(("h", self.surface), build), x.T, self.parameters)
         return h[0], gradient.reshape(x.shape)
 
+    def switches(self, x: Array) -> Array:
+        """The functions of all surfaces at a point; (m,)."""
+        return _switches(self.system, x, self.parameters)
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """The surfaces that are not looked at."""
+        return tuple(j for j in range(self.system.surface_count) if j != self.surface)
+
     # derivatives -------------------------------------------------------------------------------
 
     def jacobians(self, x: Array) -> Array:
@@ -193,6 +208,8 @@ def place(
     t: float = 0.0,
     surface: int = 0,
     mode: str | None = None,
+    *,
+    smooth: bool = False,
 ) -> tuple[Place, Array]:
     """Check the arguments that every function of this floor shares.
 
@@ -206,6 +223,8 @@ def place(
     mode : str, optional
         One letter per surface; the letter of ``surface`` is replaced by ``s``. By default the
         other surfaces take the signs of their functions at the point.
+    smooth : bool, optional
+        Whether the question makes sense without a surface.
 
     Returns
     -------
@@ -219,6 +238,17 @@ def place(
     require_system(system)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
+    if system.surface_count == 0 and smooth:
+        if surface or mode:
+            raise DefinitionError(
+                explain(
+                    "surface and mode",
+                    expected="none, as the system has no surface",
+                    received=f"surface {surface!r}, mode {mode!r}",
+                    advice="Leave them out.",
+                )
+            )
+        return Place(system, 0, "", p), x
     if system.surface_count == 0:
         raise DefinitionError(
             "system: expected at least one switching surface, received a smooth system. Give "
@@ -245,11 +275,7 @@ def place(
 def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     if system.surface_count == 1:
         return "s"
-
-    def build() -> Sequence[Any]:
-        return [system.surface_function(i) for i in range(system.surface_count)]
-
-    values = [v.item() for v in call(system.function(("local", "surfaces"), build), x, p)]
+    values = _switches(system, x, p).tolist()
     for i, value in enumerate(values):
         if i != surface and value == 0:
             raise PointError(
@@ -261,6 +287,16 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
                 )
             )
     return "".join("+" if value > 0 else "-" for value in values)
+
+
+def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
+    if not system.surface_count:
+        return np.zeros(0)
+
+    def build() -> Sequence[Any]:
+        return [system.surface_function(i) for i in range(system.surface_count)]
+
+    return np.array([v.item() for v in call(system.function(("local", "surfaces"), build), x, p)])
 
 
 def on_surface(where: Place, x: Array, tol: float) -> Numbers:

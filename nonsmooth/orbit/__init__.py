@@ -9,8 +9,8 @@ from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifur
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
 from .connections import Connection, find_homoclinic
-from .equilibrium_branches import continue_equilibrium
 from .find_periodic import VirtualOrbitError, periodic_orbit
+from .follow_equilibria import continue_equilibrium
 from .follow_orbits import continue_orbit
 from .funnels import Departure, Funnel
 from .futures import funnel

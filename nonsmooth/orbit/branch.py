@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
@@ -112,12 +112,17 @@ class BranchEvent:
         return f"BranchEvent({self.kind!r}, {self.parameter:.10g}, {self.far_side})"
 
 
-def _beside(curve: Any, u: Array, wanted: float) -> list[Any]:
-    """The solution next to an event, if the itinerary beyond it holds."""
-    try:
-        return [curve.solution_at(u, wanted)]
-    except NonsmoothError:
-        return []
+def _beside(choices: Sequence[tuple[Any, Point]], wanted: float) -> list[Any]:
+    """The solution next to an event, in the first itinerary that holds there."""
+    for (curve, point), (_, far) in zip(choices, reversed(choices), strict=True):
+        try:
+            guess = curve.toward(point.u, wanted, float(far.u[-1]))
+            found = curve.solution_at(guess, wanted)
+        except NonsmoothError:
+            continue
+        if not getattr(found, "is_virtual", getattr(found, "status", "") == "virtual"):
+            return [found]
+    return []
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -172,8 +177,10 @@ class Branch:
             va, vb = curve.value(a.u), other.value(b.u)
             if not min(va, vb) <= wanted <= max(va, vb) or va == vb:
                 continue
-            if curve is not other:  # beside an event, in the itinerary that begins there
-                found += [] if wanted in (va, vb) else _beside(other, b.u, wanted)
+            if curve is not other:  # beside an event, in the itinerary on whose side it is not
+                before = any(event.point is b for event in self.events)
+                ways = [(curve, a), (other, b)] if before else [(other, b), (curve, a)]
+                found += [] if wanted in (va, vb) else _beside(ways, wanted)
                 continue
             if wanted == va and k and self.nodes[k - 1][0] is curve:
                 continue  # found as the end of the step before

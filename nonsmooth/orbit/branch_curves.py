@@ -93,11 +93,25 @@ class BranchCurve(Curve):
         """How the branch goes on beyond an event that ends this curve."""
         return None
 
-    def solution_at(self, guess: Array, value: float) -> Any:
-        """The solution near a guess at a value of the parameter."""
+    def unknowns_at(self, guess: Array, value: float) -> Array | None:
+        """The unknowns near a guess at a value of the parameter; None if there are none."""
         start, axis = np.array(guess), np.zeros(len(guess))
         start[-1], axis[-1] = value, 1.0
-        u = self.correct(start, axis)
+        return self.correct(start, axis)
+
+    def toward(self, guess: Array, value: float, end: float) -> Array:
+        """A guess at a value that lies towards an event at ``end``, where a leg vanishes like a root."""
+        u = guess
+        while abs(value - end) < 0.25 * abs(self.value(u) - end):
+            closer = self.unknowns_at(u, end + 0.25 * (self.value(u) - end))
+            if closer is None:
+                break
+            u = closer
+        return u
+
+    def solution_at(self, guess: Array, value: float) -> Any:
+        """The solution near a guess at a value of the parameter."""
+        u = self.unknowns_at(guess, value)
         if u is None:
             raise ConvergenceError(
                 explain(

@@ -13,13 +13,12 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import Array
+from ..model import Array, NonsmoothError
 from ..model.event_maps import surface_map
 from ..model.variational import guarded_field, variational_field
 from .boundary import BoundaryProblem, Evaluation
-from .conditions import Condition, minima, touching
-from .far_side import contact_at, contact_numbers
-from .legs import fly
+from .conditions import Condition, minima
+from .far_side import contact_at, contact_numbers, touched
 from .multipliers import return_map
 
 #: Resonances by the cosine of their angle.
@@ -77,11 +76,11 @@ def _touches(
         found["a second touch"] = min(values[1:])
     if guard.kind != "surface":
         return found
-    if problem.system.surface_count > 1:
-        return found  # the map of a touch is known for one surface
-    t = touching(problem.system, leg, guard, x, duration, p)
-    y = fly(problem.system, leg, x, t, p).end[: problem.dimension]
-    _, other, second = contact_at(problem, leg, guard.index, guard.side, y, p)
+    y = touched(problem, condition, at, p)
+    try:
+        _, other, second = contact_at(problem, leg, guard.index, guard.side, y, p)
+    except NonsmoothError:
+        return found  # the leg slides elsewhere
     normal = guard.side * surface_map(problem.system, guard.index)(y, p).gradient
     found["two-fold"] = float(normal[: other.size] @ other)
     found["touch of higher order"] = guard.side * float(second["L11"])

@@ -15,14 +15,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from ..local.boundary_equilibria import boundary_equilibrium_of
-from ..local.checks import positive, require_autonomous, require_linear
-from ..local.equilibria import Equilibrium, by_real_part, equilibrium_at, find_equilibrium
-from ..local.place import Place, place
+from ..local.equilibria import Equilibrium, by_real_part, equilibrium_at
+from ..local.place import Place
 from ..local.pseudo_equilibria import (
-    find_pseudo_equilibrium,
     pseudo_equilibrium_at,
     sliding_matrix,
 )
@@ -31,22 +29,18 @@ from ..local.search import Found
 from ..local.sides import SIDES, Side, side_index
 from ..model import (
     Array,
-    DefinitionError,
-    FilippovSystem,
-    Parameters,
-    explain,
-    require_system,
-    whole,
+    NonsmoothError,
 )
-from .branch import Branch, BranchEvent, FarSide
-from .branch_curves import BranchCurve, check_bounds, follow_branch
+from .branch import BranchEvent, FarSide
+from .branch_curves import BranchCurve
 from .continuation import Departure, Point, Zero, depart
+from .normal_forms import hopf_coefficient
 
 #: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.
 _START = 1e-4
 
 
-class _Equilibria(BranchCurve):
+class Equilibria(BranchCurve):
     """What curves of equilibria and pseudo-equilibria share."""
 
     def __init__(self, where: Place, free: tuple[int, ...], scale: Array):
@@ -71,6 +65,18 @@ class _Equilibria(BranchCurve):
 
     def eigenvalues(self, u: Array) -> NDArray[Any]:
         raise NotImplementedError
+
+    def mode_at(self, u: Array) -> str:
+        """The mode whose field vanishes."""
+        raise NotImplementedError
+
+    def lyapunov(self, u: Array, frequency: float) -> float:
+        """The first Lyapunov coefficient; NaN where the field is not explicit."""
+        x, p = u[: self.n], self.parameters_at(u)
+        try:
+            return hopf_coefficient(self.system, self.mode_at(u), x, p, frequency)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return float("nan")
 
     def double_zero(self, u: Array) -> bool:
         sizes = np.sort(np.abs(self.eigenvalues(u)))
@@ -108,9 +114,17 @@ class _Equilibria(BranchCurve):
         frequency = float(abs(values[k[nearest]].imag))
         if frequency == 0.0:
             return None  # a neutral saddle
-        side = FarSide("", "a pair of eigenvalues crosses the imaginary axis")
-        numbers = ReadOnly({"frequency": frequency})
-        return self.described(zero, "Hopf", far_side=side, coefficients=numbers)
+        numbers = {"frequency": frequency}
+        value = self.lyapunov(u, frequency)
+        words = "a pair of eigenvalues crosses the imaginary axis"
+        if np.isfinite(value):
+            numbers["first Lyapunov coefficient"] = value
+            rest = np.delete(values, [k[nearest], l[nearest]])
+            stable = value < 0.0 and bool(np.all(rest.real < 0.0))
+            kind = "supercritical" if value < 0.0 else "subcritical"
+            words += f": orbits branch off ({kind}{', stable' if stable else ''})"
+        side = FarSide("", words, ReadOnly(numbers))
+        return self.described(zero, "Hopf", far_side=side, coefficients=ReadOnly(numbers))
 
     def boundary(self, zero: Zero, k: int) -> BranchEvent:
         """The boundary equilibrium of F1 (k = 0) or F2 (k = 1) on this curve."""
@@ -146,12 +160,15 @@ class _Equilibria(BranchCurve):
         return found
 
 
-class EquilibriumCurve(_Equilibria):
+class EquilibriumCurve(Equilibria):
     """F_k(x, p) = 0 in the unknowns (x, p), for continuation."""
 
     def __init__(self, where: Place, free: tuple[int, ...], scale: Array, side: Side):
         super().__init__(where, free, scale)
         self.side, self.k = side, side_index(side)
+
+    def mode_at(self, u: Array) -> str:
+        return self.where.side(self.side)
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         here, x = self.place_at(u), u[: self.n]
@@ -162,8 +179,10 @@ class EquilibriumCurve(_Equilibria):
         return by_real_part(self.place_at(u).jacobians(u[: self.n])[self.k])
 
     def tests(self, point: Point) -> Mapping[str, float]:
-        numbers = self.place_at(point.u).at(point.u[: self.n])
-        found = {"boundary equilibrium": numbers.h}
+        found = dict[str, float]()
+        if self.where.mode:
+            switches = self.place_at(point.u).switches(point.u[: self.n])
+            found = {self._boundary_of(j): float(h) for j, h in enumerate(switches)}
         if self.n > 1:
             found["Hopf"] = self.hopf(point.u)
         return found
@@ -171,27 +190,47 @@ class EquilibriumCurve(_Equilibria):
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
         return self.boundary_numbers(u, self.k) if name == "boundary equilibrium" else {}
 
+    def _boundary_of(self, surface: int) -> str:
+        own = "boundary equilibrium"
+        return own if surface == self.where.surface else f"{own} of surface {surface}"
+
+    def _on(self, name: str) -> EquilibriumCurve:
+        """The same curve seen from the surface that a test is about."""
+        j = next((j for j in self.where.others if self._boundary_of(j) == name), None)
+        if j is None:
+            return self
+        mode = self.where.side(self.side)
+        curve, side = copy(self), SIDES["+-".index(mode[j])]
+        curve.where = replace(self.where, surface=j, mode=mode[:j] + "s" + mode[j + 1 :])
+        curve.side, curve.k = side, side_index(side)
+        return curve
+
     def ends(self, name: str) -> bool:
-        return name == "boundary equilibrium"
+        return name.startswith("boundary equilibrium")
 
     def describe(self, u: Array) -> Equilibrium:
         return equilibrium_at(self.place_at(u), Found(u[: self.n]), self.side)
 
     def event(self, zero: Zero) -> BranchEvent | None:
-        if zero.name == "boundary equilibrium":
-            return self.boundary(zero, self.k)
+        if self.ends(zero.name):
+            curve = self._on(zero.name)
+            event = curve.boundary(zero, curve.k)
+            return replace(event, curve=curve, test="boundary equilibrium")
         return self.smooth_event(zero, "fold")
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Pseudo-equilibria with 0 < alpha < 1."""
-        x, value = zero.point.u[: self.n], zero.point.u[-1]
+        x, value, near = zero.point.u[: self.n], zero.point.u[-1], self._on(zero.name)
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
-        curve = PseudoEquilibriumCurve(self.where, self.free, scale)
-        return _leave(curve, np.concatenate([x, [float(self.k), value]]), 1.0 - 2.0 * self.k)
+        curve = PseudoEquilibriumCurve(near.where, self.free, scale)
+        return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
 
 
-class PseudoEquilibriumCurve(_Equilibria):
+class PseudoEquilibriumCurve(Equilibria):
     """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
+
+    def mode_at(self, u: Array) -> str:
+        return self.where.mode
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         n, here, x, a = self.n, self.place_at(u), u[: self.n], u[self.n]
@@ -213,6 +252,8 @@ class PseudoEquilibriumCurve(_Equilibria):
         u = point.u
         numbers = self.place_at(u).at(u[: self.n])
         found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
+        switches = self.place_at(u).switches(u[: self.n])
+        found.update({f"intersection {j}": float(switches[j]) for j in self.where.others})
         found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
         if self.n > 2 and found["two-fold"] != 0:
             found["Hopf"] = self.hopf(u)
@@ -222,7 +263,7 @@ class PseudoEquilibriumCurve(_Equilibria):
         return self.boundary_numbers(u, int(name[-1])) if name.startswith("alpha") else {}
 
     def ends(self, name: str) -> bool:
-        return name.startswith("alpha")
+        return name.startswith(("alpha", "intersection"))
 
     def describe(self, u: Array) -> Any:
         return pseudo_equilibrium_at(self.place_at(u), Found(u[: self.n]))
@@ -230,6 +271,11 @@ class PseudoEquilibriumCurve(_Equilibria):
     def event(self, zero: Zero) -> BranchEvent | None:
         if zero.name.startswith("alpha"):
             return self.boundary(zero, int(zero.name[-1]))
+        if zero.name.startswith("intersection"):
+            words = (
+                f"it reaches surface {zero.name.split()[-1]}: not followed onto the intersection"
+            )
+            return self.described(zero, "intersection", far_side=FarSide("", words))
         if zero.name == "two-fold":
             numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
             side = FarSide("", "sliding changes between attracting and repelling")
@@ -239,6 +285,8 @@ class PseudoEquilibriumCurve(_Equilibria):
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Equilibria of the field whose weight is one, on that field's own side."""
+        if not zero.name.startswith("alpha"):
+            return None
         k, u = int(zero.name[-1]), zero.point.u
         scale = np.append(self.scale[: self.n], self.scale[-1])
         curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
@@ -248,7 +296,7 @@ class PseudoEquilibriumCurve(_Equilibria):
         return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
 
 
-def _leave(curve: _Equilibria, u: Array, inward: float | Array) -> Departure | None:
+def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | None:
     """Leave a boundary equilibrium into the region where the new solutions are real.
 
     ``inward`` is a gradient that must grow, or the sign with which alpha must.
@@ -261,120 +309,3 @@ def _leave(curve: _Equilibria, u: Array, inward: float | Array) -> Departure | N
         growth = float((inward * curve.scale) @ tangent)
     direction = tangent if growth > 0 else -tangent
     return depart(curve, u, direction, _START, direction)
-
-
-def continue_equilibrium(
-    system: FilippovSystem,
-    near: ArrayLike,
-    parameter: str,
-    *,
-    bounds: tuple[float, float],
-    side: Side | None = "+",
-    parameters: Parameters | None = None,
-    surface: int = 0,
-    mode: str | None = None,
-    step: float = 0.02,
-    max_points: int = 2000,
-    through: bool = True,
-    progress: bool = False,
-) -> Branch:
-    """Follow an equilibrium or pseudo-equilibrium as a parameter varies.
-
-    Pseudo-arclength continuation both ways from the value in ``parameters``, round turning points,
-    with stability at each point.
-
-    Parameters
-    ----------
-    system, parameters, surface, mode
-        As in :func:`region`.
-    near : array_like (n,)
-        Start of the search for the first one.
-    parameter : str
-        Name of the parameter that varies.
-    bounds : (float, float)
-        Where the branch ends.
-    side : {"+", "-"} or None, optional
-        Of the field $F1$ or $F2$; None for a pseudo-equilibrium.
-    step : float, optional
-        Largest step where the branch bends, relative to the width of the bounds and to the size of
-        the states.
-    max_points : int, optional
-        Of each piece.
-    through : bool, optional
-        Whether to go on beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
-        that end there too.
-    progress : bool, optional
-        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
-
-    Returns
-    -------
-    Branch
-        Its ``solutions`` are Equilibrium and PseudoEquilibrium. Events: ``"fold"``, ``"Hopf"``,
-        ``"branch point"``, ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` (persistence or
-        nonsmooth fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability).
-
-    Raises
-    ------
-    ConvergenceError, DefinitionError, OptionError, ParameterError, PointError
-        In this order: no solution found from this start; a system of which this cannot be
-        asked; an option outside what is described above; an unknown or missing parameter,
-        or one that is not a finite number; a state of a wrong shape, not finite, or where
-        the question makes no sense.
-
-    Examples
-    --------
-    A pseudo-saddle-node of the sliding flow x' = mu - x^2 on y = 0:
-
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
-    >>> s = ns.FilippovSystem([x, y], surface=y, above=[mu - x**2, -1], below=[mu - x**2, 1],
-    ...                       parameters={mu: 1.0})
-    >>> branch = continue_equilibrium(s, [1.0, 0.0], "mu", bounds=(-1, 2), side=None)
-    >>> [(event.kind, abs(round(event.parameter, 12))) for event in branch.events]
-    [('pseudo-saddle-node', 0.0)]
-    >>> [found.kind for found in branch.at(1.0)]
-    ['pseudo-saddle', 'stable pseudo-node']
-    """
-    require_system(system)
-    require_autonomous(system, "continuation of equilibria")
-    positive(step, "step")
-    whole(max_points, "max_points", least=2)
-    if parameter not in system.parameter_names:
-        raise DefinitionError(
-            explain(
-                "parameter",
-                expected=f"a parameter among {list(system.parameter_names)}",
-                received=repr(parameter),
-                advice="Give its name.",
-            )
-        )
-    where, _ = place(system, near, parameters, 0.0, surface, mode)
-    index = system.parameter_names.index(parameter)
-    value = float(where.parameters[index])
-    low, high = check_bounds(bounds, value, parameter)
-    given: dict[str, Any] = dict(parameters=parameters, surface=surface, mode=mode)
-    curve: _Equilibria
-    if side is None:
-        require_linear(system, surface, "pseudo-equilibrium")
-        pseudo = find_pseudo_equilibrium(system, near, **given)
-        size = max(1.0, float(np.abs(pseudo.point).max()))
-        scale = np.append(np.full(system.dimension, size), [1.0, high - low])
-        curve = PseudoEquilibriumCurve(where, (index,), scale)
-        start = np.append(pseudo.point, [pseudo.alpha, value])
-    else:
-        found = find_equilibrium(system, near, side=side, **given)
-        size = max(1.0, float(np.abs(found.point).max()))
-        curve = EquilibriumCurve(
-            where, (index,), np.append(np.full(system.dimension, size), high - low), side
-        )
-        start = np.append(found.point, value)
-    return follow_branch(
-        curve,
-        start,
-        name=parameter,
-        bounds=(low, high),
-        step=step,
-        max_points=max_points,
-        through=through,
-        progress=progress,
-    )

@@ -124,7 +124,7 @@ def _is_saddle(at: Equilibrium | PseudoEquilibrium) -> bool:
 def _smooth(system: FilippovSystem, at: Array, p: Array) -> Equilibrium:
     values = spectrum_of(system, "", at, p).values
     order = np.argsort(values.real)
-    return Equilibrium(at, "+", "real", "saddle", values[order], np.inf, 0.0, 0.0, 0.0, 0)
+    return Equilibrium(at, "+", "real", "saddle", values[order], np.inf, 0.0, 0.0, 0.0, 0, "")
 
 
 def departures(system: FilippovSystem, mode: str, x: Array, p: Array) -> Iterator[Departure]:

@@ -208,7 +208,7 @@ class _Grower:
                 f"of: expected an equilibrium on its own side, received a {self.of.status} one at "
                 f"{self.point.tolist()}. It has no manifolds in the system."
             )
-        basis = self._directions(self.of.side)
+        basis = self._directions(self.of.mode)
         if basis.shape[1] == 1:
             return self._curves([self._arc(s * basis[:, 0]) for s in (1, -1)])
         return self._circle(basis, None)

@@ -31,6 +31,7 @@ from .growing_legs import grown
 from .hopf_ends import hopf_point
 from .legs import fly
 from .periodic import PeriodicOrbit, faults_of, named
+from .smooth_events import smooth_side
 
 #: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
@@ -173,7 +174,8 @@ class OrbitCurve(BranchCurve):
         curve._last = None
         found = BranchCurve.solution_at(curve, guess, value)
         assert isinstance(found, PeriodicOrbit)
-        return found
+        p = found.parameter_vector
+        return replace(found, faults=tuple(faults_of(found.problem, found.evaluation, p)))
 
     def out(self, u: Array) -> str:
         """The period diverges where it is long and grows without the parameter changing."""
@@ -237,7 +239,7 @@ class OrbitCurve(BranchCurve):
         beyond = self._edited(kind, conditions, u, p)
         if beyond is None or not beyond.test:
             word = "" if beyond is None else _word(beyond.problem)
-            side = far_side(self.problem, kind, conditions[0], at, p, word)
+            side = far_side(self.problem, kind, conditions[0], at, p, word, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
         word, curve = _word(beyond.problem), self.with_problem(beyond.problem, beyond.u)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
@@ -275,29 +277,11 @@ class OrbitCurve(BranchCurve):
         )
 
     def _smooth_event(self, zero: Zero) -> BranchEvent | None:
-        u = zero.point.u
-        orbit, words, numbers = self.describe(u), "", {}
-        if zero.name == "fold":
-            words = "two orbits meet and vanish"
-        elif zero.name == "branch point":
-            words = "branches cross"
-        elif zero.name == "Hopf":
+        if zero.name == "Hopf":
             return self._hopf(zero)
-        elif zero.name == "Neimark-Sacker":
-            values = orbit.floquet.of_map
-            k, l = np.triu_indices(values.size, 1)
-            near = int(np.argmin(np.abs(values[k] * values[l] - 1.0)))
-            pair = values[k[near]]
-            if abs(pair.imag) < 1e-9:
-                return None  # a neutral saddle: two real multipliers with the product 1
-            numbers = {"angle": float(abs(np.angle(pair)))}
-            words = "an invariant torus is born"
-        elif zero.name == "period doubling":
-            words = "an orbit of twice the period branches off"
-        else:
-            words = "two orbits without the symmetry branch off"
-        side = FarSide("", words, ReadOnly(numbers))
-        return self._event(zero.name, self, zero.point, zero.name, side)
+        at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
+        side = smooth_side(self.problem, at, p, zero.name)
+        return None if side is None else self._event(zero.name, self, zero.point, zero.name, side)
 
     def _hopf(self, zero: Zero) -> BranchEvent:
         """The orbit shrinks: where its equilibrium has two imaginary eigenvalues."""

@@ -273,4 +273,5 @@ class SaddleLoop(Loop):
             0.0,
             0.0,
             0,
+            self.mode,
         )

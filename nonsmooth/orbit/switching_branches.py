@@ -72,7 +72,7 @@ def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list
     """The small orbits around an equilibrium at its Hopf point."""
     assert event.point is not None
     system, at, n = event.curve.system, event.solution, event.curve.n
-    p, mode = event.curve.parameters_at(event.point.u), _mode_of(at)
+    p, mode = event.curve.parameters_at(event.point.u), at.mode
     slope = np.asarray(variational_field(system, mode).linear.copied(at.point, p)[1], float)
     values, vectors = np.linalg.eig(slope)
     turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
@@ -107,10 +107,6 @@ def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list
         f"Hopf: expected small orbits around {at.point.tolist()}, received no convergence. Perhaps the "
         "point is degenerate: the pair of eigenvalues does not cross the axis."
     )
-
-
-def _mode_of(at: Equilibrium | PseudoEquilibrium) -> str:
-    return at.side if isinstance(at, Equilibrium) else at.mode
 
 
 def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:

@@ -138,3 +138,102 @@ def test_a_value_that_the_branch_does_not_reach():
     with pytest.raises(ns.PointError, match="reaches"):
         branch.at(-0.5)
     assert "fold" in str(branch) and "fold" in repr(branch) and "fold" in repr(branch.events)
+
+
+def test_a_smooth_system_has_equilibria_without_a_side():
+    u, v = x - 1, y - 2
+    smooth = ns.FilippovSystem(
+        [x, y],
+        field=[mu * u - 3 * v - u * (u**2 + v**2), 3 * u + mu * v - v * (u**2 + v**2)],
+        parameters={mu: -0.4},
+    )
+    found = ns.find_equilibrium(smooth, [0.9, 2.1])
+    assert np.abs(found.point - [1, 2]).max() < 1e-12
+    assert (found.status, found.kind, found.mode) == ("real", "stable focus", "")
+    assert str(found).startswith("stable focus at")
+    branch = ns.continue_equilibrium(smooth, [0.9, 2.1], "mu", bounds=(-1, 1))
+    (event,) = branch.events
+    assert event.kind == "Hopf" and abs(event.parameter) < 1e-13
+    cycle = ns.continue_orbit(event, "mu", bounds=(-1, 1))[0.25]
+    assert cycle.period == pytest.approx(2 * np.pi / 3, rel=1e-12)  # r^2 = mu
+    radius = np.hypot(*(cycle.start - [1, 2]))
+    assert radius == pytest.approx(0.5, rel=1e-10)
+    curve = ns.continue_equilibrium(smooth, [0.9, 2.1], "mu", bounds=(-1, 1), side="+")
+    assert len(curve.events) == 1
+    for options, words in (
+        (dict(side="-"), "one field"),
+        (dict(mode="+"), "no surface"),
+        (dict(surface=1), "no surface"),
+        (dict(side=None), "at least one switching surface"),
+    ):
+        with pytest.raises((ns.OptionError, ns.DefinitionError), match=words):
+            ns.continue_equilibrium(smooth, [0.9, 2.1], "mu", bounds=(-1, 1), **options)
+
+
+def test_the_manifolds_of_a_smooth_saddle_are_followed():
+    saddle = ns.FilippovSystem([x, y], field=[x, -y + x**2])
+    found = ns.manifold(saddle, ns.find_equilibrium(saddle, [0.1, 0.1]), stable=False, length=1.0)
+    for arc in found.arcs:
+        assert np.abs(arc.points[:, 1] - arc.points[:, 0] ** 2 / 3).max() < 1e-9
+
+
+def two_relays(value=1.5):
+    """The equilibrium of ++ is at (mu, 2 - mu): on y = 0 at mu = 2, on x = 0 at mu = 0."""
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    return ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[a, b],
+        field=[mu + 1 - a - x, 3 - mu - b - y],
+        parameters={mu: value},
+    )
+
+
+def test_of_several_surfaces_each_may_be_met():
+    branch = ns.continue_equilibrium(two_relays(), [1.5, 0.5], "mu", bounds=(-0.5, 2.5))
+    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
+        ("boundary equilibrium", 0.0),
+        ("boundary equilibrium", 2.0),
+    ]
+    modes = [s.mode for s in branch.solutions]
+    assert modes[0] == "s+" and modes[-1] == "+s" and "++" in modes
+    assert np.abs(branch[-0.25].point - [0, 2.25]).max() < 1e-12
+    assert np.abs(branch[2.25].point - [2.25, 0]).max() < 1e-12
+    other = ns.find_equilibrium(two_relays(2.25), [2.25, 0.5])
+    assert other.status == "virtual" and other.h > 0  # beyond the second surface
+
+
+def test_a_cycle_around_an_equilibrium_between_two_surfaces_has_its_mode():
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    u, v = x - 1, y - 1
+    system = ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[a, b],
+        field=[
+            mu * u - 3 * v - u * (u**2 + v**2) + (1 - a),
+            3 * u + mu * v - v * (u**2 + v**2) + (1 - b),
+        ],
+        parameters={mu: -0.1},
+    )
+    (event,) = ns.continue_equilibrium(system, [1, 1], "mu", bounds=(-0.2, 0.5)).events
+    cycle = ns.continue_orbit(event, "mu", bounds=(-0.2, 0.5))[0.25]
+    assert cycle.itinerary == "++" and cycle.period == pytest.approx(2 * np.pi / 3, rel=1e-12)
+
+
+def test_a_pseudo_equilibrium_that_meets_another_surface_ends_there():
+    """On x = 0 the sliding flow rests at y = mu while y > 0."""
+    with_mode = dict(side=None, surface=0, mode="s+")
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    system = ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[a, b],
+        field=[-a, mu - y - b + 1],
+        parameters={mu: 1.0},
+    )
+    branch = ns.continue_equilibrium(system, [0.0, 1.0], "mu", bounds=(-0.5, 2), **with_mode)
+    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
+        ("intersection", 0.0)
+    ]
+    assert branch.ends[0] is ns.BranchEnd.EVENT

@@ -321,4 +321,4 @@ def test_a_corner_of_two_surfaces_is_passed_and_a_touch_of_one_is_named():
     assert np.abs(states).max(axis=1).min() < 1e-9  # both surfaces at one time
     assert [len(branch[corner.parameter + d].legs) for d in (-1e-3, 1e-3)] == [4, 4]
     top = event.orbit.trajectory(np.linspace(*event.orbit.trajectory.t[[0, -1]], 4001))[:, 1].max()
-    assert abs(top - event.parameter) < 1e-5 and "not classified" in event.far_side.verdict
+    assert abs(top - event.parameter) < 1e-5 and event.far_side.verdict == "persistence"

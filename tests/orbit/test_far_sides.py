@@ -1,0 +1,109 @@
+"""Coefficients beyond events are those of the orbits on both sides: of an impact that is grazed, of a touch
+among several surfaces, of a corner; and a branch gives real orbits up to its events."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from tests.orbit.periodic_cases import symbols
+
+X, V, T = symbols("x v t")
+
+
+def wall(w: float, *, reset: bool = False) -> ns.FilippovSystem:
+    """x'' + 0.1 x' + x = F cos w t before a wall at x = 1, restitution 0.8."""
+    F = ca.SX.sym("F")
+    contact = (
+        dict(resets=ns.Reset(X - 1, [X, -0.8 * V], 1, "wall"))
+        if reset
+        else dict(impacts=ns.Impact(1 - X, restitution=0.8, name="wall"))
+    )
+    field = [V, F * ca.cos(w * T) - X - 0.1 * V]
+    return ns.FilippovSystem([X, V], field=field, parameters={F: 0.5}, time=T, **contact)
+
+
+def grazed(w: float, **kind):
+    system, size = wall(w, **kind), np.hypot(1 - w * w, 0.1 * w)
+    at = {"F": 0.9 * size}
+    response = at["F"] / (1 - w * w + 0.1j * w)  # of the oscillator that does not hit
+    orbit = ns.periodic_orbit(system, [response.real, (1j * w * response).real], parameters=at)
+    branch = ns.continue_orbit(orbit, "F", bounds=(0.85 * size, 1.3 * size))
+    event = next(e for e in branch.events if "graz" in e.kind)
+    assert abs(event.parameter - size) < 1e-11
+    return branch, event, size
+
+
+@pytest.mark.parametrize("reset", [False, True])
+@pytest.mark.parametrize("w", [0.8, 1.6, 2.2, 2.6])
+def test_the_orbit_that_hits_leaves_a_grazing_at_the_slope_of_the_square_root(w, reset):
+    """The gap of the orbit that does not hit is 1 - F/F0; the other one hits with the speed s where
+    1 - F/F0 = n.(I - A)^-1.A.w s + O(s^2)."""
+    branch, event, size = grazed(w, reset=reset)
+    slope = event.coefficients["n.(I - A)^-1.A.w"]
+    fold = slope > 0
+    assert event.far_side.verdict.startswith("nonsmooth fold" if fold else "persistence")
+    errors = []
+    for gap in (1e-3, 2.5e-4):
+        value = size * (1 - gap if fold else 1 + gap)
+        hitting = next(o for o in branch.at(value) if o.legs[0].event == "wall")
+        speed = abs(hitting.legs[0].start[1]) / 0.8
+        errors.append(abs((1 - value / size) / speed / slope - 1))
+        assert "unstable" in hitting.stability
+    assert errors[1] < 0.02 and errors[1] < 0.5 * errors[0] + 1e-3
+
+
+def test_there_are_folds_and_persistence_among_them():
+    verdicts = {grazed(w)[1].far_side.verdict[:4] for w in (0.8, 1.6, 2.2, 2.6)}
+    assert verdicts == {"nons", "pers"}
+
+
+def two_relays():
+    k, l1, l2 = symbols("k l1 l2")
+    return ns.FilippovSystem(
+        [X, V],
+        surfaces=[X - 1, V - k],
+        multipliers=[l1, l2],
+        field=[V, -X - 0.2 * V + ca.cos(T) - 0.1 * l1 - 0.15 * l2],
+        time=T,
+        parameters={k: 3.0},
+    )
+
+
+@pytest.fixture(scope="module")
+def branch():
+    system = two_relays()
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.0], 200.0))
+    return ns.continue_orbit(orbit, "k", bounds=(3.0, 6.5))
+
+
+def test_a_touch_of_one_of_two_surfaces_has_the_multipliers_of_both_sides(branch):
+    event = branch.events[-1]
+    numbers = event.coefficients
+    assert event.kind == "grazing-sliding" and event.far_side.verdict == "persistence"
+    errors = []
+    for d in (1e-4, 1e-6):
+        out, inside = branch[event.parameter + d], branch[event.parameter - d]
+        assert (out.itinerary, inside.itinerary) == ("-- +-", "-- -s -- +-")
+        assert np.abs(out.multipliers).max() == pytest.approx(numbers["radius of A_o"], abs=2e-5)
+        assert abs(np.prod(1 - out.multipliers) - numbers["det(I - A_o)"]) < 20 * d
+        errors.append(abs(np.abs(inside.multipliers).max() - numbers["radius of A_i"]))
+    assert errors[1] < 0.2 * errors[0] < 1e-4  # as the root of the distance
+
+
+def test_a_corner_has_the_multipliers_of_both_orders(branch):
+    event = branch.events[0]
+    assert event.kind == "corner" and event.far_side.verdict == "persistence"
+    sides = [branch[event.parameter + d].multipliers for d in (-1e-7, 1e-7)]
+    found = sorted(np.prod(1 - m).real for m in sides)
+    stated = sorted(event.coefficients[f"det(I - A_{k})"] for k in "oi")
+    assert np.abs(np.array(found) - stated).max() < 1e-6
+
+
+def test_a_branch_gives_the_orbit_of_each_side_up_to_the_event(branch):
+    """Beside a touch the orbit of the other itinerary is virtual; it is not what the system does."""
+    event = branch.events[-1]
+    for d in (1e-2, 1e-3, 1e-5, 1e-7, 1e-9):
+        for sign, word in ((1, "-- +-"), (-1, "-- -s -- +-")):
+            (orbit,) = branch.at(event.parameter + sign * d)
+            assert orbit.itinerary == word and not orbit.is_virtual

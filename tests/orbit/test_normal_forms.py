@@ -1,0 +1,164 @@
+"""Coefficients at Hopf, doubling and torus points are those of closed forms, and foretell the size of what
+branches off: of continued orbits, and of iterated maps."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from tests.orbit.periodic_cases import symbols, table
+
+X, Y, Z, C, R = symbols("x y z c r")
+
+
+def ticking(states, maps, **parameters):
+    """A map as a system that stands still between the ticks of a clock."""
+    return ns.FilippovSystem(
+        [*states, C],
+        field=[*(0 * s for s in states), 1],
+        resets=ns.Reset(C - 1, [*maps, 0], 1, "tick"),
+        parameters={R: parameters.pop("r")},
+    )
+
+
+def fixed(system, point):
+    return ns.periodic_orbit(system, [*point, 0.0], itinerary=[("", "tick")])
+
+
+def test_the_logistic_map_doubles_with_the_coefficient_nine():
+    """f'' = -6 and f''' = 0 at r = 3: (f''/2)^2 + f'''/6 = 9."""
+    orbit = fixed(ticking([Y], [R * Y * (1 - Y)], r=2.8), [1 - 1 / 2.8])
+    (event,) = ns.continue_orbit(orbit, "r", bounds=(2.5, 3.3)).events
+    assert event.coefficients["cubic coefficient"] == pytest.approx(9.0, rel=1e-9)
+    assert event.far_side.verdict.endswith("(supercritical, stable)")
+    assert event.coefficients["its error"] < 1e-8
+
+
+def test_a_doubling_that_is_subcritical_says_so():
+    """x -> -r x - x^3: f''' = -6 at x = 0, c = -1."""
+    orbit = fixed(ticking([Y], [-R * Y - Y**3], r=0.8), [0.0])
+    (event,) = ns.continue_orbit(orbit, "r", bounds=(0.5, 1.3)).events
+    assert event.kind == "period doubling" and abs(event.parameter - 1) < 1e-12
+    assert event.coefficients["cubic coefficient"] == pytest.approx(-1.0, rel=1e-9)
+    assert event.far_side.verdict.endswith("(subcritical)")
+
+
+def test_the_torus_of_the_delayed_logistic_map_has_the_radius_foretold():
+    """(y, z) -> (r y (1 - z), y): angle pi/3 at r = 2, |multiplier|^2 = r - 1."""
+    orbit = fixed(ticking([Y, Z], [R * Y * (1 - Z), Y], r=1.8), [1 - 1 / 1.8] * 2)
+    (event,) = ns.continue_orbit(orbit, "r", bounds=(1.5, 2.2)).events
+    assert event.kind == "Neimark-Sacker" and abs(event.coefficients["angle"] - np.pi / 3) < 1e-10
+    value = event.coefficients["first Lyapunov coefficient"]
+    errors = []
+    for r in (2.002, 2.0005):
+        y, z = 0.5, 0.5 + 0.03
+        seen = []
+        for k in range(80_000):
+            y, z = r * y * (1 - z), y
+            if k > 60_000:
+                seen.append(y)
+        radius = (max(seen) - min(seen)) / 4 * np.sqrt(2)  # y = 2 Re z q, |q_y| = 1/sqrt 2
+        foretold = np.sqrt((np.sqrt(r - 1) - 1) / -value)
+        errors.append(abs(radius / foretold - 1))
+    assert errors[0] < 0.03 and errors[1] < 0.4 * errors[0]
+
+
+def test_a_strong_resonance_has_no_such_coefficient():
+    """(y, z) -> (-r z + y^2, y): multipliers +-i at r = 1."""
+    orbit = fixed(ticking([Y, Z], [-R * Z + Y**2, Y], r=0.8), [0.0, 0.0])
+    (event,) = ns.continue_orbit(orbit, "r", bounds=(0.5, 1.3)).events
+    assert "a strong resonance" in event.far_side.verdict
+
+
+def split(event, name, bounds, value):
+    """Half the distance of the two rounds of a doubled orbit, squared, and the multiplier of the single one."""
+    single = event.orbit
+    doubled = ns.continue_orbit(event, name, bounds=bounds)[value]
+    legs = len(doubled.legs) // 2
+    first, second = (doubled.evaluation.starts[k] for k in (0, legs))
+    apart = first - second
+    if single.problem.forcing is not None:
+        apart[-1] += single.period
+    return float(apart @ apart) / 4
+
+
+@pytest.mark.parametrize("case", ["ball on a table", "buck converter", "walker"])
+def test_doubled_orbits_part_as_the_coefficient_foretells(case):
+    """The half distance e of the two rounds obeys c e^2 = -1 - (multiplier of the single orbit)."""
+    if case == "ball on a table":
+        name, low, high = "A", 1.0, 1.2
+        orbit = ns.periodic_orbit(
+            table(), [0.65, 3.14], t_start=0.7, itinerary=[("", "reset")], parameters={"A": 1.0}
+        )
+    elif case == "buck converter":
+        name, low, high = "E", 23.0, 26.0
+        problem = ns.textbook.buck_converter()
+        orbit = ns.periodic_orbit(problem.system, problem.start, parameters={"E": 23.0})
+    else:
+        name, low, high = "gamma", 0.009, 0.018
+        problem = ns.textbook.simplest_walker()
+        orbit = ns.periodic_orbit(problem.system, problem.start, itinerary=[("", "heelstrike")])
+    branch = ns.continue_orbit(orbit, name, bounds=(low, high))
+    event = next(e for e in branch.events if e.kind == "period doubling")
+    c = event.coefficients["cubic coefficient"]
+    assert event.coefficients["its error"] < 1e-4 * abs(c)
+    errors = []
+    for part in (0.02, 0.005):
+        value = event.parameter + np.sign(c) * part * 0.1 * (high - low)
+        beyond = -1 - np.min(branch[value].multipliers.real)
+        squared = split(event, name, (low, high), value)
+        errors.append(abs(c * squared / beyond - 1))
+    assert errors[1] < 0.02 and errors[1] < 0.5 * errors[0] + 1e-6
+    assert event.far_side.verdict.endswith("(supercritical, stable)") == (c > 0)
+
+
+def brusselator():
+    return ns.FilippovSystem(
+        [X, Y], field=[1 - (R + 1) * X + X**2 * Y, R * X - X**2 * Y], parameters={R: 1.5}
+    )
+
+
+def test_orbits_around_a_hopf_point_grow_as_its_coefficient_foretells():
+    """The Brusselator with A = 1: Hopf at B = 2, frequency 1, eigenvalue (B - 2)/2 + i w."""
+    branch = ns.continue_equilibrium(brusselator(), [1.0, 1.5], "r", bounds=(1.0, 3.0))
+    (event,) = branch.events
+    assert event.kind == "Hopf" and abs(event.parameter - 2) < 1e-12
+    assert event.coefficients["frequency"] == pytest.approx(1.0, rel=1e-12)
+    value = event.coefficients["first Lyapunov coefficient"]
+    assert value < 0 and event.far_side.verdict.endswith("(supercritical, stable)")
+    cycles = ns.continue_orbit(event, "r", bounds=(1.0, 3.0))
+    q = np.linalg.eig(np.array([[1.0, 1.0], [-2.0, -1.0]]))[1][:, 0]
+    errors = []
+    for beyond in (0.02, 0.005):
+        run = cycles[2.0 + beyond].trajectory
+        x = run(np.linspace(run.t[0], run.t[-1], 2001))[:, 0]
+        size = (x.max() - x.min()) / 4 / abs(q[0])  # x = 2 Re z q
+        errors.append(abs(size / np.sqrt(beyond / 2 / -value) - 1))
+    assert errors[1] < 0.02 and errors[1] < 0.4 * errors[0]
+
+
+def test_a_sliding_flow_on_a_bent_surface_has_the_coefficient_of_its_flow_in_the_plane():
+    """On z = (x^2 + x y)/2 the sliding flow is the radial one, r' = mu r - 3 r^3; q has length one in space."""
+    flow = [
+        R * X - 2 * Y - 3 * X * (X**2 + Y**2) + X * Y,
+        2 * X + R * Y - 3 * Y * (X**2 + Y**2) - X**2,
+    ]
+    bend = (X**2 + X * Y) / 2
+    along = flow[0] * ca.jacobian(bend, X) + flow[1] * ca.jacobian(bend, Y)
+    values = []
+    for surface, climb in ((Z - bend, along), (Z, 0)):
+        system = ns.FilippovSystem(
+            [X, Y, Z],
+            surface=surface,
+            above=[*flow, climb - 1 - X / 2],
+            below=[*flow, climb + 1],
+            parameters={R: -0.5},
+        )
+        branch = ns.continue_equilibrium(system, [0, 0, 0], "r", bounds=(-1, 1), side=None)
+        (event,) = branch.events
+        assert abs(event.coefficients["frequency"] - 2) < 1e-12
+        values.append(event.coefficients["first Lyapunov coefficient"])
+    plane = ns.FilippovSystem([X, Y], field=flow, parameters={R: -0.5})
+    (event,) = ns.continue_equilibrium(plane, [0.0, 0.0], "r", bounds=(-1, 1)).events
+    values.append(event.coefficients["first Lyapunov coefficient"])
+    assert values == pytest.approx([values[-1]] * 3, rel=1e-9)

@@ -56,7 +56,7 @@ def fit(
     parameters : sequence of str
         Names to fit; for a law also "restitution" and "tilt" where they are numbers.
     ball : Ball, optional
-        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
+        Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     scaling : Scaling, optional
         The units of a contact model; needed for data with units.
     bounds : mapping of str to (float, float), optional
@@ -86,11 +86,16 @@ def fit(
 
     Raises
     ------
-    DataError, FitError, ModelError, nonsmooth.ParameterError, nonsmooth.OptionError
-        In this order: measurements that cannot be read; no start from which every bounce
-        can be simulated, or too few numbers; a model that breaks its obligations, or does
-        not fit the question; an unknown or missing parameter, or one that is not a finite
-        number; an option outside what is described above.
+    DataError
+        Measurements that cannot be read, or rows without a landing.
+    FitError
+        No start from which every bounce can be simulated, or fewer numbers than parameters.
+    ModelError
+        Neither a law nor a contact model; no ``scaling`` for a contact model and data with units.
+    nonsmooth.ParameterError
+        A parameter that the model does not have.
+    nonsmooth.OptionError
+        Bounds, weights, starts or other options out of their range.
 
     Warns
     -----

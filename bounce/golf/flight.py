@@ -172,7 +172,7 @@ def flight(
     launch : Landing
         With ``ydot > 0``, or any where ``start`` is above the ground.
     ball : Ball, optional
-        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
+        Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     air : Air, optional
         Drag and lift; none by default.
     slope : float, optional
@@ -193,7 +193,7 @@ def flight(
     nonsmooth.PointError
         A launch that never rises above the ground.
     nonsmooth.OptionError
-        An option outside what is described above.
+        A slope outside of $-pi/2$ to $pi/2$.
 
     Examples
     --------

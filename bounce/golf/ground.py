@@ -188,7 +188,7 @@ def rebound(
     landing : Landing
         The landing, in SI units.
     ball : Ball, optional
-        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
+        Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     scaling : Scaling, optional
         The units of a contact model (needed for one, unused by a law). Its scaled gravity is the
         model's own ``G``; ``scaling.gravity`` is the value that fits the ball.
@@ -205,9 +205,12 @@ def rebound(
     ModelError
         Neither a law nor a contact model, no scaling for a contact model, another moment of
         inertia or ball than the scaling's.
-    LandingError, LiftOffError
-        In this order: a landing that is not finite or moves away from the ground; a ball
-        that does not lift off.
+    LandingError
+        A ball that does not move into the ground.
+    LiftOffError
+        A ball that does not lift off a contact model.
+    nonsmooth.OptionError
+        A tolerance out of its range.
 
     Warns
     -----

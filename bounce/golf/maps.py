@@ -46,7 +46,7 @@ def landing_map(
     fixed : mapping, optional
         The other ones.
     ball : Ball, optional
-        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
+        Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     scaling : Scaling, optional
         The units of a contact model; unused by a law.
     **options
@@ -62,10 +62,10 @@ def landing_map(
     ------
     ModelError
         As :func:`rebound`.
-    LandingError, nonsmooth.OptionError, nonsmooth.ParameterError
-        In this order: a landing that is not finite or moves away from the ground; an option
-        outside what is described above; an unknown or missing parameter, or one that is not
-        a finite number.
+    nonsmooth.OptionError
+        Not two names; a name that is unknown, missing or doubled; speeds or angles that are no landings.
+    LandingError, nonsmooth.ParameterError
+        As :func:`bounce.lift_off`, for a contact model.
 
     Warns
     -----

@@ -196,7 +196,7 @@ def play(
     landing : Landing
         The first landing, in SI units.
     ball : Ball, optional
-        Radius, mass and moment of inertia; default :data:`bounce.GOLF_BALL`.
+        Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     scaling : Scaling, optional
         Needed for a contact model, see :func:`rebound`.
     air : Air, optional
@@ -223,10 +223,14 @@ def play(
     ------
     NoRestError
         More than ``max_bounces``, or no rest on the slope.
-    LandingError, LiftOffError, ModelError, nonsmooth.OptionError
-        In this order: a landing that is not finite or moves away from the ground; a ball
-        that does not lift off; a model that breaks its obligations, or does not fit the
-        question; an option outside what is described above.
+    LandingError
+        A ball that does not move into the ground.
+    LiftOffError
+        A ball that does not lift off a contact model.
+    ModelError
+        As :func:`rebound`.
+    nonsmooth.OptionError
+        A slope outside of $-pi/2$ to $pi/2$; a friction or a height that is not positive.
 
     Warns
     -----

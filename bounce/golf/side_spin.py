@@ -149,10 +149,14 @@ def side_rebound(
 
     Raises
     ------
-    ModelError, LandingError, LiftOffError, nonsmooth.OptionError
-        In this order: a model that breaks its obligations, or does not fit the question; a
-        landing that is not finite or moves away from the ground; a ball that does not lift
-        off; an option outside what is described above.
+    ModelError
+        Another law or model than these, or no scaling for a contact model.
+    LandingError
+        A ball that does not move into the ground.
+    LiftOffError
+        A ball that does not lift off a contact model.
+    nonsmooth.OptionError
+        Spins that are not finite; a slope outside of $-pi/2$ to $pi/2$.
 
     Examples
     --------

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..errors import LandingError
+from ..errors import LandingError, ModelError
 from .rigid import RigidBounce
 
 Array = NDArray[np.float64]
@@ -75,6 +75,8 @@ def rigid_lift_off_3d(
     ------
     LandingError
         Not pairs, not finite, or not approaching.
+    ModelError
+        Another law than :class:`RigidBounce`.
 
     Examples
     --------
@@ -84,6 +86,11 @@ def rigid_lift_off_3d(
     >>> str(shot.case), [round(float(v), 6) for v in shot.xdot]
     ('II', [0.657143, -0.142857])
     """
+    if not isinstance(law, RigidBounce):
+        raise ModelError(
+            f"law: expected a RigidBounce, received {law!r}. On a tilted plane the impact is that of its "
+            "own axes; bounce.golf.side_rebound turns a TiltedBounce."
+        )
     v, w = (_pairs(name, value) for name, value in (("xdot", xdot), ("omega", omega)))
     try:
         v, w = np.broadcast_arrays(v, w)

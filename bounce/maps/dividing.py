@@ -226,10 +226,10 @@ def dividing_curve(
     nonsmooth.DegenerateError
         A lift-off without a visible two-fold: the load ends with zero rate (Hertz without
         gravity), friction is single-valued (a bristle), or no force acts along the ground.
-    LandingError, ModelError, nonsmooth.OptionError
-        In this order: a landing that is not finite or moves away from the ground; a model
-        that breaks its obligations, or does not fit the question; an option outside what is
-        described above.
+    ModelError
+        No contact model of bounces in the plane.
+    nonsmooth.OptionError
+        ``ydot`` is not negative; ``reach``, ``step`` or ``tol`` is not positive.
 
     Examples
     --------

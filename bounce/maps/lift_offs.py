@@ -97,10 +97,11 @@ def lift_off(
     LandingError
         Inputs that are not numbers or do not broadcast.
     nonsmooth.ParameterError
-        An unknown parameter.
-    ModelError, nonsmooth.OptionError
-        In this order: a model that breaks its obligations, or does not fit the question; an
-        option outside what is described above.
+        An unknown parameter. Values outside their limits get the status BAD_PARAMETER.
+    ModelError
+        No contact model.
+    nonsmooth.OptionError
+        A tolerance, a time, work or an engine out of its range.
 
     Warns
     -----

@@ -114,10 +114,14 @@ def proven_map(
 
     Raises
     ------
-    LandingError, ModelError, nonsmooth.MissingError, nonsmooth.OptionError
-        In this order: a landing that is not finite or moves away from the ground; a model
-        that breaks its obligations, or does not fit the question; a package of an extra
-        that is not installed; an option outside what is described above.
+    LandingError
+        A range in the wrong order; a ``ydot`` that is not negative.
+    ModelError
+        No contact model of bounces in the plane.
+    nonsmooth.ParameterError
+        An unknown parameter, or an interval that leaves its limits.
+    nonsmooth.MissingError
+        python-flint is not installed.
 
     Examples
     --------

@@ -134,10 +134,12 @@ def slip_map(
 
     Raises
     ------
-    LandingError, ModelError, nonsmooth.OptionError
-        In this order: a landing that is not finite or moves away from the ground; a model
-        that breaks its obligations, or does not fit the question; an option outside what is
-        described above.
+    LandingError
+        A velocity that is no pair of finite numbers.
+    ModelError
+        No contact model.
+    nonsmooth.OptionError
+        As :func:`lift_off`.
 
     Examples
     --------

@@ -104,10 +104,12 @@ def certify(
         python-flint is not installed.
     nonsmooth.ParameterError
         An unknown parameter, or an interval that leaves its limits.
-    LandingError, ModelError, nonsmooth.OptionError
-        In this order: a landing that is not finite or moves away from the ground; a model
-        that breaks its obligations, or does not fit the question; an option outside what is
-        described above.
+    LandingError
+        A ball that does not move into the ground.
+    ModelError
+        No contact model of bounces in the plane.
+    nonsmooth.OptionError
+        A landing or a time that is not finite; an option out of its range.
 
     Examples
     --------

@@ -56,7 +56,7 @@ class Grid:
     Raises
     ------
     PointError
-        A state of a wrong shape, not finite, or where the question makes no sense.
+        No axes; an axis that is neither a number nor a row of numbers, or is not finite.
 
     Examples
     --------
@@ -120,7 +120,7 @@ class RandomStarts:
     Raises
     ------
     PointError
-        A state of a wrong shape, not finite, or where the question makes no sense.
+        Corners of different lengths or in the wrong order; a ``seed`` out of its range.
 
     Notes
     -----

@@ -21,7 +21,7 @@ from .select import compiled_or_none, use_compiled
 from .starts import Starts
 from .stored import Stored
 from .view import read_view, sectioned
-from .work import Work, run_all, size_of_chunk
+from .work import Work, checked_work, run_all, size_of_chunk
 
 #: Fewer trajectories than this are not worth compiling the engine that runs several in step; nor those of
 #: systems with a set, which takes longer, unless it is asked for.
@@ -83,10 +83,16 @@ def ensemble(
 
     Raises
     ------
-    PointError, ParameterError, OptionError, CompilerError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above; no compiler that makes the engine asked for.
+    PointError
+        Starts whose last axis has not the length n, or that do not broadcast with the parameters.
+    ParameterError
+        An unknown parameter, or one without a value.
+    OptionError
+        A tolerance, a limit, a time, a section or an engine out of its range.
+    DefinitionError
+        ``system`` is none; a ``start_mode`` that it does not have.
+    CompilerError
+        ``engine="compiled"`` where nothing compiles.
 
     Examples
     --------
@@ -108,7 +114,7 @@ def ensemble(
         start_mode=start_mode,
     )
     require_system(system, sets=True)
-    work = _work(work)
+    work = checked_work(work)
     if start_mode is not None:
         system.parse_mode(start_mode)
     system, at = sectioned(system, at)
@@ -140,19 +146,6 @@ def _run(job: Job, starts: Starts, work: Work) -> Ensemble:
     results = Collected(system.dimension, starts.shape, keeps, job.room, names, arrays)
     run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved)
     return results.ensemble(codes)
-
-
-def _work(work: Any) -> Work:
-    if work is not None and not isinstance(work, Work):
-        raise OptionError(
-            explain(
-                "work",
-                expected="a Work",
-                received=f"{work!r} ({type(work).__name__})",
-                advice="For example work=nonsmooth.Work(threads=2).",
-            )
-        )
-    return work or Work()
 
 
 def _engine(system: FilippovSystem, options: Options, engine: str, count: int, step: bool) -> str:

@@ -86,11 +86,16 @@ def follow(
 
     Raises
     ------
-    PointError, ParameterError, OptionError, DefinitionError, NotSmoothError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above; a system of which this cannot be asked; an
-        operation without the derivatives that are needed.
+    DefinitionError
+        ``system`` is none, or has vector multipliers; a ``mode`` that it does not have.
+    PointError
+        A point of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        A tolerance, a limit or a time out of its range; an unknown name in ``until``.
+    NotSmoothError
+        A watched expression with a kink or a jump.
 
     Examples
     --------

@@ -52,7 +52,8 @@ class Section:
     Raises
     ------
     OptionError
-        An option outside what is described above.
+        A direction other than -1, 0 and 1; a number of hits that is not positive or whole. An unknown
+        name is refused by what the section is given to, which knows the system.
 
     Examples
     --------

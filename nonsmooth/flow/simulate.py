@@ -85,10 +85,15 @@ def simulate(
 
     Raises
     ------
-    PointError, ParameterError, OptionError, DefinitionError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above; a system of which this cannot be asked.
+    DefinitionError
+        ``system`` is none; a ``start_mode`` that it does not have.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        A tolerance, a limit, a time, a section or an engine out of its range; a ``start_mode`` that
+        contradicts the side on which the run starts.
 
     Notes
     -----

@@ -10,6 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -57,7 +58,7 @@ class Work:
     Raises
     ------
     OptionError
-        An option outside what is described above.
+        A number of threads or a chunk that is not positive; no executor; no path of a folder.
 
     Examples
     --------
@@ -108,7 +109,7 @@ class Work:
         Raises
         ------
         OptionError
-            An option outside what is described above.
+            A folder that holds the results of another problem, or of another version.
         """
         if self.store is not None:
             return Stored(self.store, problem(), size)
@@ -266,6 +267,20 @@ def _submit(
 
 def _failed(future: Future[Chunk]) -> bool:
     return future.cancelled() or future.exception() is not None
+
+
+def checked_work(work: Any) -> Work:
+    """What was given, or the default; OptionError where it is no Work."""
+    if work is not None and not isinstance(work, Work):
+        raise OptionError(
+            explain(
+                "work",
+                expected="a Work",
+                received=f"{work!r} ({type(work).__name__})",
+                advice="For example work=nonsmooth.Work(threads=2).",
+            )
+        )
+    return work or Work()
 
 
 def _processors() -> int:

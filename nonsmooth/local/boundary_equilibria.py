@@ -146,10 +146,13 @@ def boundary_equilibrium(
     ------
     PointError
         Neither field vanishes there, or the point is off the surface.
-    DefinitionError, ParameterError, OptionError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number; an option outside what is described
-        above.
+    DefinitionError
+        Hidden dynamics, or vector multipliers; no surface; a ``mode``, ``surface`` or ``side`` that the
+        system does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``margin`` is not positive.
 
     Examples
     --------
@@ -330,11 +333,13 @@ def find_boundary_equilibrium(
 
     Raises
     ------
-    ConvergenceError, DefinitionError, PointError, ParameterError, OptionError
-        In this order: no solution found from this start; a system of which this cannot be
-        asked; a state of a wrong shape, not finite, or where the question makes no sense;
-        an unknown or missing parameter, or one that is not a finite number; an option
-        outside what is described above.
+    ConvergenceError
+        Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
+    DefinitionError
+        Explicit time, hidden dynamics or vector multipliers; no surface; a ``vary``, ``mode``,
+        ``surface`` or ``side`` that the system does not have.
+    PointError, ParameterError, OptionError
+        As in :func:`find_equilibrium`.
 
     Examples
     --------

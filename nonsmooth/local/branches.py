@@ -22,6 +22,7 @@ from ..model import (
     require_system,
     sliding_multipliers,
 )
+from .checks import require_surface
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,10 +77,12 @@ def sliding_branches(
 
     Raises
     ------
-    DefinitionError, ParameterError, PointError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
-        or where the question makes no sense.
+    DefinitionError
+        ``system`` is none, or has no surface, or vector multipliers; a ``mode`` that it does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A point of a wrong shape or not finite. Whether it is on the surfaces is not asked.
 
     Examples
     --------
@@ -93,6 +96,7 @@ def sliding_branches(
     [0.5] False [0.  0.5]
     """
     require_system(system)
+    require_surface(system)
     coupled = coupled_of(system)
     mode = "s" * system.surface_count if mode is None else mode
     held = coupled.held(mode)

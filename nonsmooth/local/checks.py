@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 
-from ..model import DefinitionError, FilippovSystem, explain, real
+from ..model import DefinitionError, FilippovSystem, explain, real, require_system
 
 #: A class that is closer than this to a change is not named.
 MARGIN = 1e-6
@@ -21,8 +21,22 @@ def positive(value: float, name: str) -> float:
     )
 
 
+def require_surface(system: FilippovSystem) -> None:
+    """Refuse a smooth system."""
+    if not system.surface_count:
+        raise DefinitionError(
+            explain(
+                "system",
+                expected="at least one switching surface",
+                received="a smooth system",
+                advice="Give surface= with above= and below=, or surfaces= with multipliers=.",
+            )
+        )
+
+
 def require_autonomous(system: FilippovSystem, what: str) -> None:
     """Refuse explicit time: what stays at one place does so for all time."""
+    require_system(system)
     if system.time_dependent:
         raise DefinitionError(
             explain(

@@ -65,12 +65,14 @@ def classify(
     Raises
     ------
     PointError
-        Off the surface and no equilibrium.
+        Off the surface and no equilibrium; a wrong shape; not finite.
     DefinitionError
-        Hidden dynamics; a two-fold of a planar system with explicit time.
-    ParameterError, OptionError
-        In this order: an unknown or missing parameter, or one that is not a finite number;
-        an option outside what is described above.
+        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; no
+        surface; a ``mode`` or ``surface`` that the system does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``margin`` is not positive.
 
     Examples
     --------

@@ -138,11 +138,16 @@ def find_equilibrium(
     Raises
     ------
     ConvergenceError
-        With ``residual`` and ``point``, the last iterate.
-    PointError, ParameterError, DefinitionError, OptionError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; a system
-        of which this cannot be asked; an option outside what is described above.
+        Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
+    DefinitionError
+        Explicit time or vector multipliers; a ``mode``, ``surface`` or ``side`` that the system does
+        not have.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``max_iterations`` is not positive.
 
     Examples
     --------

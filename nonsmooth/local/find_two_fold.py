@@ -111,12 +111,16 @@ def two_fold(
     Raises
     ------
     PointError
-        The point is not a two-fold.
+        The point is not a two-fold; a wrong shape; not finite.
     DegenerateError
         $grad h$, $grad L1$ and $grad L2$ are dependent, or a field has a cusp.
-    ParameterError, DefinitionError, OptionError
-        In this order: an unknown or missing parameter, or one that is not a finite number;
-        a system of which this cannot be asked; an option outside what is described above.
+    DefinitionError
+        Fewer than three states; vector multipliers; no surface; a ``mode`` or ``surface`` that the
+        system does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` is not positive.
 
     Examples
     --------
@@ -183,15 +187,18 @@ def find_two_fold(
     Raises
     ------
     ConvergenceError
-        With ``residual`` and ``point``, the last iterate.
+        Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
     DegenerateError
         A two-fold that is not generic; the message names the condition.
     DefinitionError
-        Fewer than three states that may change.
-    PointError, ParameterError, OptionError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above.
+        Fewer than three states that may change; vector multipliers; no surface; a ``mode``,
+        ``surface`` or state to ``hold`` that the system does not have.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``max_iterations`` is not positive.
 
     Examples
     --------

@@ -13,7 +13,15 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
+from ..model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    explain,
+    require_system,
+)
 from .checks import MARGIN, positive, relative_difference
 from .folds import bend
 from .numbers import Numbers
@@ -87,12 +95,14 @@ def fold_fold(
     Raises
     ------
     DefinitionError
-        Not a planar system; explicit time.
+        Not a planar system; explicit time; vector multipliers; no surface; a ``mode`` or ``surface``
+        that the system does not have.
     PointError
-        The fields are not both tangent there.
-    ParameterError, OptionError
-        In this order: an unknown or missing parameter, or one that is not a finite number;
-        an option outside what is described above.
+        The fields are not both tangent there; off the surface; a wrong shape; not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``margin`` is not positive.
 
     Examples
     --------
@@ -147,6 +157,7 @@ def fold_fold_of(where: Place, numbers: Numbers, margin: float = MARGIN) -> Fold
 
 def require_planar(system: FilippovSystem, what: str) -> None:
     """Refuse a system that is not planar and autonomous."""
+    require_system(system)
     if system.extended_dimension != 2:
         size = f"{system.dimension} states{' and time' if system.time_dependent else ''}"
         raise DefinitionError(

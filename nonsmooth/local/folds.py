@@ -168,10 +168,10 @@ def fold(
     ------
     PointError
         The field is not tangent there (angle above ``tol``), and as in :func:`region`.
-    DefinitionError, ParameterError, OptionError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number; an option outside what is described
-        above.
+    DefinitionError
+        As in :func:`region`; a ``side`` that is none; ``max_order`` below 2.
+    ParameterError, OptionError
+        As in :func:`region`.
 
     Examples
     --------
@@ -244,11 +244,16 @@ def find_fold(
     Raises
     ------
     ConvergenceError
-        With ``residual`` and ``point``, the last iterate.
-    PointError, ParameterError, DefinitionError, OptionError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; a system
-        of which this cannot be asked; an option outside what is described above.
+        Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
+    DefinitionError
+        Vector multipliers; no surface; a ``mode``, ``surface``, ``side`` or state to ``hold`` that the
+        system does not have; ``max_order`` below 2.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``max_iterations`` is not positive.
 
     Examples
     --------

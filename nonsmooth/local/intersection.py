@@ -60,10 +60,12 @@ def intersection_range(
     Raises
     ------
     PointError
-        No convex combination stays on the intersection.
-    DefinitionError, ParameterError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number.
+        No convex combination stays on the intersection; off one of the surfaces; a wrong shape.
+    DefinitionError
+        ``of`` is no expression in states, parameters and time; a surface that the system does not
+        have, or vector multipliers.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
 
     Examples
     --------

@@ -33,7 +33,7 @@ from ..model import (
     require_system,
     sliding_multipliers,
 )
-from .checks import positive
+from .checks import positive, require_surface
 from .place import TOLERANCE
 
 #: So many surfaces are decided by trying all 3^k modes.
@@ -147,11 +147,13 @@ def intersection(
     Raises
     ------
     PointError
-        On no surface, or where the surfaces are not transversal.
-    DefinitionError, ParameterError, OptionError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number; an option outside what is described
-        above.
+        On no surface, or where the surfaces are not transversal; a wrong shape; not finite.
+    DefinitionError
+        ``system`` is none, or has no surface, or vector multipliers; a surface that it does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` is not positive.
 
     Examples
     --------
@@ -172,15 +174,7 @@ def _meeting(
     system: FilippovSystem, x: Array, p: Array, surfaces: Sequence[int] | None, tol: float
 ) -> list[int]:
     """Surfaces through a point, checked."""
-    if not system.surface_count:
-        raise DefinitionError(
-            explain(
-                "system",
-                expected="at least one switching surface",
-                received="a smooth system",
-                advice="Give surfaces= with multipliers=.",
-            )
-        )
+    require_surface(system)
     found = layer_of(system).at(x, np.zeros(system.surface_count), p)
     lengths = np.linalg.norm(found.h_x, axis=1)
     with np.errstate(divide="ignore", invalid="ignore"):

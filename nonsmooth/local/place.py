@@ -26,6 +26,7 @@ from ..model import (
     motion,
     require_system,
 )
+from .checks import require_surface
 from .numbers import ManyNumbers, Numbers
 from .sides import SIDES
 
@@ -249,11 +250,7 @@ def place(
                 )
             )
         return Place(system, 0, "", p), x
-    if system.surface_count == 0:
-        raise DefinitionError(
-            "system: expected at least one switching surface, received a smooth system. Give "
-            "surface= with above= and below=, or surfaces= with multipliers=."
-        )
+    require_surface(system)
     system.surface_function(surface)  # refuses what is no index or out of range
     letters = list(_signs(system, x, p, surface) if mode is None else mode)
     if mode is not None:

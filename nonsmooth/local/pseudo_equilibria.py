@@ -58,13 +58,16 @@ def find_pseudo_equilibrium(
     Raises
     ------
     ConvergenceError
-        With ``residual`` and ``point``, the last iterate.
+        Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
     DefinitionError
-        Explicit time, or hidden dynamics.
-    PointError, ParameterError, OptionError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above.
+        Explicit time, hidden dynamics or vector multipliers; no surface; a ``mode`` or ``surface`` that
+        the system does not have.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``max_iterations`` is not positive.
 
     Examples
     --------

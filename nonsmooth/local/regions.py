@@ -109,10 +109,14 @@ def region(
     Raises
     ------
     PointError
-        Off the surface (the message says how far and gives the nearest point), wrong shape, NaN.
-    ParameterError, DefinitionError, OptionError
-        In this order: an unknown or missing parameter, or one that is not a finite number;
-        a system of which this cannot be asked; an option outside what is described above.
+        Off the surface (the message says how far and gives the nearest point), on two surfaces without
+        a ``mode`` that chooses a side, a wrong shape, not finite.
+    DefinitionError
+        ``system`` is none, or has no surface; a ``mode`` or ``surface`` that it does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` is not positive.
 
     Examples
     --------

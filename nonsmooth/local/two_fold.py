@@ -190,7 +190,7 @@ class TwoFold:
         Raises
         ------
         PointError
-            A state of a wrong shape, not finite, or where the question makes no sense.
+            States whose last axis has not the length n, or that are not finite.
         """
         return self.chart(x)
 
@@ -251,7 +251,7 @@ class TwoFold:
         Raises
         ------
         PointError
-            A state of a wrong shape, not finite, or where the question makes no sense.
+            Coordinates that are no pairs, or not finite.
         """
         z = np.asarray(z, dtype=float)
         if z.ndim == 0 or z.shape[-1] != 2 or not np.all(np.isfinite(z)):

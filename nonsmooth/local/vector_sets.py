@@ -103,12 +103,13 @@ def limit_directions(
     Raises
     ------
     PointError
-        Off the set, or not finite.
+        Off the set, a wrong shape, or not finite.
     DefinitionError
-        A system without such sets, or a surface that is none.
-    ParameterError, OptionError
-        In this order: an unknown or missing parameter, or one that is not a finite number;
-        an option outside what is described above.
+        A system without such sets; a ``surface`` that is none of them; a ``mode`` that it does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` is not positive.
 
     Examples
     --------

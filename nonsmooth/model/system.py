@@ -159,7 +159,7 @@ class FilippovSystem(Structure):
         NotSmoothError
             floor, ceil, fmod, an equality, or a condition that is no comparison.
         DefinitionError
-            A system of which this cannot be asked.
+            Shapes and symbols, as for the class.
 
         Notes
         -----

@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..flow.saving import Savable
-from ..flow.work import Work
+from ..flow.work import Work, checked_work
 from ..model import (
     Array,
     FilippovSystem,
@@ -152,10 +152,15 @@ def basins(
 
     Raises
     ------
-    OptionError, PointError, ParameterError
-        In this order: an option outside what is described above; a state of a wrong shape,
-        not finite, or where the question makes no sense; an unknown or missing parameter,
-        or one that is not a finite number.
+    DefinitionError
+        ``system`` is none, or has vector multipliers.
+    OptionError
+        A time, a number of samples or rounds or a section out of its range; no period, though the
+        system depends on time.
+    PointError
+        Starts or attractors of a wrong shape, or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
 
     Examples
     --------
@@ -184,7 +189,7 @@ def basins(
         rounds=whole(rounds, "rounds"),
         parameters=parameters,
         tol=tol,
-        work=work or Work(),
+        work=checked_work(work),
     )
     for points in attractors:
         search.known(np.atleast_2d(real_array(points, "attractors")))

@@ -240,9 +240,12 @@ def continue_bifurcation(
 
     Raises
     ------
-    DefinitionError, OptionError, ConvergenceError
-        In this order: a system of which this cannot be asked; an option outside what is
-        described above; no solution found from this start.
+    DefinitionError
+        No event of a branch that two parameters unfold; parameters that are not two of the system.
+    OptionError
+        Bounds in the wrong order, or without the event; ``step`` or ``max_points`` out of its range.
+    ConvergenceError
+        The event does not solve the equations of its curve.
 
     Examples
     --------

@@ -174,10 +174,14 @@ def find_homoclinic(
         No orbit that comes back, or Newton's method fails.
     DegenerateError
         The point is no saddle.
-    OptionError, ParameterError, PointError, DefinitionError
-        In this order: an option outside what is described above; an unknown or missing
-        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
-        or where the question makes no sense; a system of which this cannot be asked.
+    OptionError
+        A system with explicit time or hidden dynamics.
+    DefinitionError
+        ``system`` is none, or has vector multipliers.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A saddle of a wrong shape.
 
     Notes
     -----

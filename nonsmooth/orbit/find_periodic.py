@@ -100,14 +100,19 @@ def periodic_orbit(
     Raises
     ------
     ConvergenceError
-        The guess does not close, Newton's method fails, or the orbit is virtual (then it is the
-        attribute ``orbit`` of the error).
+        The guess does not close, or Newton's method fails.
+    VirtualOrbitError
+        The equations have a solution that is no motion; it is the error's attribute ``orbit``.
     DegenerateError
         The orbit grazes, or passes a two-fold or a corner.
-    OptionError, ParameterError, PointError
-        In this order: an option outside what is described above; an unknown or missing
-        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
-        or where the question makes no sense.
+    DefinitionError
+        ``system`` is none, or has vector multipliers; a mode of the itinerary that it does not have.
+    OptionError
+        No period, though the system depends on time and none is found; a symmetry that is none.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A state of a wrong shape or not finite.
 
     Notes
     -----

@@ -79,11 +79,17 @@ def continue_equilibrium(
 
     Raises
     ------
-    ConvergenceError, DefinitionError, OptionError, ParameterError, PointError
-        In this order: no solution found from this start; a system of which this cannot be
-        asked; an option outside what is described above; an unknown or missing parameter,
-        or one that is not a finite number; a state of a wrong shape, not finite, or where
-        the question makes no sense.
+    ConvergenceError
+        No equilibrium is found near the start.
+    DefinitionError
+        Explicit time or vector multipliers; a ``parameter``, ``mode``, ``surface`` or ``side`` that the
+        system does not have.
+    OptionError
+        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A start of a wrong shape or not finite.
 
     Examples
     --------

@@ -64,9 +64,12 @@ def continue_orbit(
 
     Raises
     ------
-    ConvergenceError, DefinitionError, OptionError
-        In this order: no solution found from this start; a system of which this cannot be
-        asked; an option outside what is described above.
+    ConvergenceError
+        The orbit at the start does not solve its equations, or a branch cannot be entered.
+    DefinitionError
+        Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
+    OptionError
+        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range.
 
     Examples
     --------

@@ -71,13 +71,16 @@ def funnel(
     Raises
     ------
     PointError
-        The future is unique until t_end, or the point is not one of those above.
+        The future is unique until ``t_end``, or the point is not one of those above: on several
+        surfaces, or with hidden dynamics.
     DegenerateError
         A two-fold that is not generic.
-    OptionError, ParameterError, DefinitionError
-        In this order: an option outside what is described above; an unknown or missing
-        parameter, or one that is not a finite number; a system of which this cannot be
-        asked.
+    OptionError
+        Fewer than three samples, or a time out of its range.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    DefinitionError
+        ``start`` is neither a system nor a run, or has vector multipliers.
 
     Notes
     -----

@@ -129,10 +129,14 @@ def lyapunov_spectrum(
     ------
     DegenerateError
         The run ends before, grazes a surface, or meets two at one instant.
-    PointError, ParameterError, OptionError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above.
+    DefinitionError
+        ``system`` is none, or has vector multipliers.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        More exponents than states; a time out of its range.
 
     Notes
     -----

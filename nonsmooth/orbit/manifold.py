@@ -129,10 +129,12 @@ def manifold(
     ------
     DegenerateError
         No such manifold, or one of more than two dimensions.
-    OptionError, ParameterError, DefinitionError
-        In this order: an option outside what is described above; an unknown or missing
-        parameter, or one that is not a finite number; a system of which this cannot be
-        asked.
+    OptionError
+        ``of`` is none of these points; explicit time; a length, spacing or number that is not positive.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    DefinitionError
+        ``system`` is none, or does not have the point's modes; hidden dynamics, vector multipliers.
 
     Notes
     -----

@@ -180,11 +180,16 @@ def poincare(
 
     Raises
     ------
-    PointError, ParameterError, OptionError, DefinitionError, NotSmoothError
-        In this order: a state of a wrong shape, not finite, or where the question makes no
-        sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above; a system of which this cannot be asked; an
-        operation without the derivatives that are needed.
+    DefinitionError
+        ``system`` is none, or has vector multipliers.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        An unknown name of a section; a direction or a number of hits out of its range.
+    NotSmoothError
+        A section with a kink or a jump.
 
     Examples
     --------

@@ -280,11 +280,13 @@ def saltation_matrix(
     DegenerateError
         The orbit grazes the surface.
     OptionError
-        The modes do not tell the event.
-    DefinitionError, ParameterError, PointError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
-        or where the question makes no sense.
+        The modes do not tell the event, or none of that name joins them.
+    DefinitionError
+        ``system`` is none, or has vector multipliers; modes that it does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A point of a wrong shape or not finite.
 
     Notes
     -----
@@ -301,6 +303,8 @@ def saltation_matrix(
     """
     require_system(system)
     p, x = system.parameter_vector(parameters), system.extended_point(point, t)
+    for mode in (before, after):
+        system.parse_letters(mode)  # refuses what is no mode
     leg = leg_between(system, before, after, event)
     field, following = leg.field(system), Leg(after).field(system)
     y = field.initial(x, p)

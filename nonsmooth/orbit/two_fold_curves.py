@@ -26,6 +26,7 @@ from ..model import (
     Parameters,
     PointError,
     explain,
+    require_system,
 )
 from .continuation import Curve, trace
 
@@ -91,10 +92,11 @@ def trace_two_folds(
     ------
     TraceError
         A search failed or met a degenerate two-fold; ``value`` and the ``folds`` before it.
-    DefinitionError, ParameterError, PointError, OptionError
-        In this order: a system of which this cannot be asked; an unknown or missing
-        parameter, or one that is not a finite number; a state of a wrong shape, not finite,
-        or where the question makes no sense; an option outside what is described above.
+    DefinitionError
+        ``over`` is neither a parameter nor a state; ``values`` are not finite; and as in
+        :func:`find_two_fold`.
+    ParameterError, PointError, OptionError
+        As in :func:`find_two_fold`.
 
     Examples
     --------
@@ -105,6 +107,7 @@ def trace_two_folds(
     >>> [fold.point.tolist() for fold in trace_two_folds(s, [0, 0, 0], over="a", values=[0, 0.5])]
     [[0.0, 0.0, 0.0], [0.0, 0.5, 0.0]]
     """
+    require_system(system)
     name, numbers = str(over), _values(values)
     state = name in system.state_names
     if not state and name not in system.parameter_names:

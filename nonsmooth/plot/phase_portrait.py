@@ -93,10 +93,12 @@ def phase_portrait(
     ------
     DefinitionError
         The system is not planar, depends on time, or has not exactly one surface.
-    OptionError, PointError, ParameterError
-        In this order: an option outside what is described above; a state of a wrong shape,
-        not finite, or where the question makes no sense; an unknown or missing parameter,
-        or one that is not a finite number.
+    OptionError
+        A box without an inside; a time or a size that is not positive; axes that are none.
+    PointError
+        Starts that are no rows of two finite numbers.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
 
     Examples
     --------

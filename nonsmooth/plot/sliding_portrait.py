@@ -95,9 +95,10 @@ def sliding_portrait(
     DefinitionError
         Not three states, explicit time, several surfaces, hidden dynamics; a state that is none;
         no surface in the box.
-    OptionError, ParameterError
-        In this order: an option outside what is described above; an unknown or missing
-        parameter, or one that is not a finite number.
+    OptionError
+        A box without an inside; a number of orbits or a size out of its range; axes that are none.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
 
     Examples
     --------

@@ -77,7 +77,7 @@ def two_fold(
     DefinitionError
         ``fold`` is not a two-fold.
     OptionError
-        An option outside what is described above.
+        A number of orbits below 0; a size that is not positive; axes that are none.
 
     Examples
     --------

@@ -79,7 +79,7 @@ def two_fold_3d(
     DefinitionError
         ``fold`` is not a two-fold.
     OptionError
-        An option outside what is described above.
+        An elevation outside 5 to 85 degrees; a size that is not positive; axes that are none.
 
     Examples
     --------

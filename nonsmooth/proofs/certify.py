@@ -27,6 +27,19 @@ READ = {
 }
 
 
+def check_numbers(numbers: Any) -> None:
+    """Raise OptionError unless it is said how the constants of the system are read."""
+    if numbers not in READ:
+        raise OptionError(
+            explain(
+                "numbers",
+                expected="'stored' or 'written'",
+                received=repr(numbers),
+                advice="See certify.",
+            )
+        )
+
+
 def certify(
     found: TwoFold | Fold | Equilibrium | PseudoEquilibrium,
     *,
@@ -75,10 +88,12 @@ def certify(
         python-flint is not installed.
     NotSmoothError
         An operation that jumps or has a kink.
-    OptionError, ParameterError, DefinitionError
-        In this order: an option outside what is described above; an unknown or missing
-        parameter, or one that is not a finite number; a system of which this cannot be
-        asked.
+    OptionError
+        ``found`` is none of these points, or needs its system; a width or a limit that is not positive.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is no finite number or interval.
+    DefinitionError
+        A state to ``hold`` that the system does not have.
 
     Notes
     -----
@@ -98,15 +113,7 @@ def certify(
     limit = real(width, "width", low=5e-324, expected="a positive number")
     whole(max_bits, "max_bits", least=64)
     whole(max_pieces, "max_pieces")
-    if numbers not in READ:
-        raise OptionError(
-            explain(
-                "numbers",
-                expected="'stored' or 'written'",
-                received=repr(numbers),
-                advice="See certify.",
-            )
-        )
+    check_numbers(numbers)
     pieces = _divided(subject, limit, max_bits, max_pieces)
     return pieces[0] if len(pieces) == 1 else _together(subject, pieces)
 

@@ -13,7 +13,7 @@ from ..model import FilippovSystem, OptionError, explain, real, require_system, 
 from .arithmetic import Numbers, enclose, exact, precision
 from .batch import Floats, of_fractions
 from .census import Census, Undecided
-from .certify import READ, prove_subject, where
+from .certify import READ, check_numbers, prove_subject, where
 from .decimals import given
 from .described import Described, parameter_ranges
 from .enclosure import Enclosure
@@ -77,11 +77,17 @@ def prove_all(
 
     Raises
     ------
-    MissingError, OptionError, ParameterError, DefinitionError, NotSmoothError
-        In this order: a package of an extra that is not installed; an option outside what
-        is described above; an unknown or missing parameter, or one that is not a finite
-        number; a system of which this cannot be asked; an operation without the derivatives
-        that are needed.
+    MissingError
+        python-flint is not installed.
+    OptionError
+        A box with too many or too few free states, or without an inside; an unknown ``kind``; a width
+        or a limit that is not positive.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is no finite number or interval.
+    DefinitionError
+        Vector multipliers; a ``mode``, ``surface`` or ``side`` that the system does not have.
+    NotSmoothError
+        An operation that jumps or has a kink.
 
     Notes
     -----
@@ -104,6 +110,7 @@ def prove_all(
         )
     limit = real(width, "width", low=5e-324, expected="a positive number")
     most = whole(max_boxes, "max_boxes")
+    check_numbers(numbers)
     question = QUESTIONS[kind](Described(system, surface, mode), numbers, side)
     ranges = _read_box(system, box, numbers)
     ranges += [exact(t, numbers, "t")] if system.time_dependent else []

@@ -72,12 +72,18 @@ def certify_orbit(
 
     Raises
     ------
-    MissingError, DefinitionError, PointError, ParameterError, OptionError, NotSmoothError
-        In this order: a package of an extra that is not installed; a system of which this
-        cannot be asked; a state of a wrong shape, not finite, or where the question makes
-        no sense; an unknown or missing parameter, or one that is not a finite number; an
-        option outside what is described above; an operation without the derivatives that
-        are needed.
+    MissingError
+        python-flint is not installed.
+    DefinitionError
+        ``system`` is none; hidden dynamics, vector multipliers, or contacts with friction.
+    PointError
+        Not a number or a pair for each state.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is no finite number or interval.
+    OptionError
+        A start or a time that is not finite; bits or a limit out of its range.
+    NotSmoothError
+        An operation that jumps or has a kink.
 
     Notes
     -----

@@ -141,7 +141,7 @@ def by_name(name: str) -> Problem:
     Raises
     ------
     OptionError
-        An option outside what is described above.
+        No problem of that name; the message lists them.
 
     Examples
     --------

@@ -53,7 +53,7 @@ def two_fold(
     Raises
     ------
     OptionError
-        An option outside what is described above.
+        No class of that label; signs that are no signs, or without their numbers.
 
     Notes
     -----

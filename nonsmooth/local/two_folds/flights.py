@@ -229,7 +229,7 @@ def accumulation_time(nu: Nu, phi: float = 1.0) -> float:
     Raises
     ------
     OptionError
-        An option outside what is described above.
+        For other numbers every orbit makes finitely many flights; ``phi`` is not positive.
 
     Examples
     --------

@@ -1,0 +1,59 @@
+"""What is no system, no work or no such law is refused in words, by whatever takes one."""
+
+import casadi as ca
+import pytest
+
+import bounce
+import nonsmooth as ns
+
+X, Y, Z = (ca.SX.sym(s) for s in "xyz")
+SPACE = ns.FilippovSystem(
+    [X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1 + Y], parameters={ca.SX.sym("a"): 0.0}
+)
+SMOOTH = ns.FilippovSystem([X, Y], field=[Y, -X])
+
+
+@pytest.mark.parametrize(
+    "ask",
+    [
+        lambda s: ns.simulate(s, [0.0], t_end=1.0),
+        lambda s: ns.region(s, [0.0]),
+        lambda s: ns.fold_fold(s, [0.0, 0.0]),
+        lambda s: ns.find_equilibrium(s, [0.0]),
+        lambda s: ns.find_boundary_equilibrium(s, [0.0], vary="a"),
+        lambda s: ns.continue_equilibrium(s, [0.0], "a", bounds=(0, 1)),
+        lambda s: ns.trace_two_folds(s, [0.0], over="a", values=[0.0]),
+        lambda s: ns.certify_orbit(s, [0], t_end=1),
+    ],
+)
+def test_what_is_no_system(ask):
+    with pytest.raises(ns.DefinitionError, match="expected a FilippovSystem, received 'system'"):
+        ask("system")
+
+
+def test_a_smooth_system_has_no_sliding():
+    with pytest.raises(ns.DefinitionError, match="at least one switching surface"):
+        ns.sliding_branches(SMOOTH, [0.0, 0.0])
+    with pytest.raises(ns.DefinitionError, match="mode: expected 0 letter"):
+        ns.saltation_matrix(SMOOTH, "+", "-", [0.0, 0.0])
+
+
+def test_what_is_no_work():
+    for ask in (
+        lambda: ns.ensemble(SMOOTH, [0.0, 0.0], t_end=1.0, work=2),
+        lambda: ns.basins(SMOOTH, [[0.0, 0.0]], t_end=1.0, work=2),
+    ):
+        with pytest.raises(ns.OptionError, match="work: expected a Work, received 2"):
+            ask()
+
+
+def test_how_constants_are_read():
+    pytest.importorskip("flint")
+    with pytest.raises(ns.OptionError, match="numbers: expected 'stored' or 'written'"):
+        ns.prove_all(SPACE, [(-1, 1)] * 3, numbers="exact")
+
+
+def test_a_tilted_law_is_not_bounced_as_if_its_plane_were_level():
+    law = bounce.laws.TURFS["natural"].law
+    with pytest.raises(bounce.ModelError, match=r"expected a RigidBounce.*side_rebound"):
+        bounce.laws.rigid_lift_off_3d(law, [1.0, 0.0], -1.0, [0.2, 0.5])

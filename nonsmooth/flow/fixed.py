@@ -18,6 +18,7 @@ from numpy.typing import NDArray
 from ..model import Array, ConvergenceError, Evaluator
 from ..model.printing.tape import Series, Values
 from ..model.variational import ORDER
+from .compiled.shooting import FollowedProgram
 from .compiled.smooth import LegsProgram, SmoothProgram, ValuesProgram
 from .compiled.tape import library
 from .select import compiled_or_none, use_compiled
@@ -138,6 +139,32 @@ def legs_program(
         [None if event is None else _evaluated(event) for event in events],
         parameters,
     )
+
+
+def followed_program(
+    fields: Sequence[CompiledField],
+    ends: Sequence[tuple[int, int]],
+    events: Sequence[Evaluated],
+    plain: Sequence[Evaluated],
+    dimensions: tuple[int, int, int],
+) -> FollowedProgram:
+    """Legs to be followed one after the other.
+
+    Parameters
+    ----------
+    fields : sequence of CompiledField
+        Of each leg, with functions that are watched.
+    ends : sequence of tuple of int
+        The function that ends a leg, and its direction.
+    events, plain : sequence of Evaluated
+        What happens there, with derivatives and without.
+    dimensions : tuple of int
+        States with the time, and without; parameters.
+    """
+    own = [[_evaluated(event) for event in each] for each in (events, plain)]
+    rows, directions = zip(*ends, strict=True)
+    programs = [program_of(field) for field in fields]
+    return FollowedProgram(programs, rows, directions, own[0], own[1], dimensions)
 
 
 def _evaluated(event: Evaluated) -> ValuesProgram:

@@ -6,10 +6,13 @@ is overlooked.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from ..model import Array
 from ..model.variational import GuardedField
+from .compiled.smooth import watch_legs
 from .fixed import MOST_STEPS, TOLERANCE, has_interpreter, program_of, steps_for, stuck
 from .reference.polynomial import first_crossing, first_root, sign_changes
 
@@ -47,6 +50,44 @@ def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: fl
     if left:
         raise stuck(duration, left, end)
     return found
+
+
+def watched_legs(
+    fields: Sequence[GuardedField], starts: Sequence[Array], p: Array, durations: Array, ends: float
+) -> tuple[list[Array], list[Array]]:
+    """The same of many legs at once; legs of no positive duration are not followed.
+
+    Parameters
+    ----------
+    fields : sequence of GuardedField
+    starts : sequence of ndarray (N,)
+    p : ndarray
+    durations : ndarray (L,)
+    ends : float
+        Part of a leg's duration beside its ends that is left out.
+
+    Returns
+    -------
+    list of ndarray (m, 4 + N), list of ndarray (N + g, 4)
+        Rows of each leg, and first coefficients of states and guards at its start.
+
+    Raises
+    ------
+    ConvergenceError
+        The field is not finite on the way.
+    """
+    if has_interpreter():
+        programs = [program_of(field) for field in fields]
+        found = watch_legs(programs, starts, p, durations, TOLERANCE, MOST_STEPS, ends)
+        if found.failed >= 0:
+            raise stuck(float(durations[found.failed]), found.left, starts[found.failed])
+        return found.rows, found.begins
+    rows, begins = list[Array](), list[Array]()
+    for field, y, duration in zip(fields, starts, durations.tolist(), strict=True):
+        begins.append(np.vstack([part[:, :4] for part in field.starts.copied(y, p)]))
+        seen = _watched(field, y, p, duration, ends * duration) if duration > 0.0 else None
+        rows.append(np.zeros((0, 4 + len(y))) if seen is None else seen)
+    return rows, begins
 
 
 def _watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:

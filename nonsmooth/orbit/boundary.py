@@ -29,7 +29,7 @@ from ..flow.fixed import TOLERANCE
 from ..model import Array, FilippovSystem
 from ..model.event_maps import AtEvent, surface_map
 from ..model.forcing import Forcing
-from .flight import Flight, Flights
+from .flight import Flight, Flights, flights_of
 from .legs import Flown, Leg, fly
 
 #: Up to so many unknowns a dense solution is faster than elimination in Python.
@@ -172,7 +172,7 @@ class BoundaryProblem:
         starts, durations = self.split(u)
         columns = list(chosen)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
-            return self._assembled(self._flights(chosen)(starts, durations, p, tol), u, p, columns)
+            return self._assembled(self.flights(chosen)(starts, durations, p, tol), u, p, columns)
 
     def _assembled(self, flight: Flight, u: Array, p: Array, columns: list[int]) -> Evaluation:
         starts, durations = self.split(u)
@@ -216,7 +216,7 @@ class BoundaryProblem:
         starts, durations = self.split(u)
         if self.phase is not None or self.kept:
             return None
-        found = self._flights(()).exact(starts, durations, p)
+        found = self.flights(()).exact(starts, durations, p)
         if found is None:
             return None
         after, rest, value = found
@@ -227,13 +227,12 @@ class BoundaryProblem:
         gap += rest
         return np.concatenate([gap.ravel(), value])
 
-    def _flights(self, chosen: tuple[int, ...]) -> Flights:
+    def flights(self, chosen: tuple[int, ...] = ()) -> Flights:
+        """The legs, ready to be flown with derivatives by chosen parameters."""
         made = _FLIGHTS.setdefault(self, {})
         found = made.get(chosen)
         if found is None:
-            key = ("flights", self.legs, chosen)
-            found = self.system.cached(key, lambda: Flights(self.system, self.legs, chosen))
-            made[chosen] = found
+            found = made[chosen] = flights_of(self.system, self.legs, chosen)
         return found
 
     def _phased(

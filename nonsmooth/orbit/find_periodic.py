@@ -27,21 +27,10 @@ from .guess import Itinerary, Start, mirror_of, start_of
 from .legs import Leg, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 from .rounds import once_round
-
-#: Newton's method ends when the next step would be below this, relative to the orbit.
-_TOLERANCE = 1e-10
-
-#: Steps below this, relative to the orbit, are rounding.
-_ROUNDING = 1e-14
+from .shooting import CLOSE, COARSE, FINAL, ROUNDING, shot
 
 #: A period below this part of the guess is that of a point.
 _POINT = 1e-9
-
-#: Legs far from the orbit are flown with local errors up to this.
-_COARSE = 1e-8
-
-#: Steps below this, relative to the orbit, change its derivatives by rounding.
-_FINAL = 1e-13
 
 #: What moves by no more than this part of its size rests.
 _STILL = 1e-6
@@ -168,9 +157,13 @@ class _Solver:
         ------
         ConvergenceError
         """
+        longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
+        found = shot(self.problem, u, self.p, longest, max_iterations)
+        if found is not None:
+            self.iterations += found[2]
+            return found[:2]
         scales = self.problem.scales(u)
         last: list[Array] = []
-        longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
 
         def equations(v: Array) -> tuple[Array, Array]:
             u = v * scales
@@ -184,7 +177,7 @@ class _Solver:
                 )
             size = float(np.abs(v - last[-1]).max()) if last else 1e-2
             # after a step of this size the next one is its square, and what it leaves its fourth power
-            tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
+            tol = min(max(1e-3 * size**4, TOLERANCE), COARSE)
             at = self.problem.evaluate(u, self.p, tol=tol)
             last.append(v)
             self.last = u, at
@@ -197,7 +190,7 @@ class _Solver:
             root = converge(
                 equations,
                 u / scales,
-                tol=_TOLERANCE,
+                tol=CLOSE,
                 max_iterations=max_iterations,
                 linear=self.problem.solve,
             )
@@ -233,9 +226,9 @@ class _Solver:
             exact = self.problem.exact_residual(u, self.p)
             step = self._step(at.jacobian, at.residual if exact is None else exact)
             size = float(np.abs(step / scales).max())
-            if exact is not None and size <= _FINAL:  # the derivatives are those of the orbit
+            if exact is not None and size <= FINAL:  # the derivatives are those of the orbit
                 return self._moved(u, step, at, exact)
-            if size <= _ROUNDING:
+            if size <= ROUNDING:
                 break
             try:
                 there = self.problem.evaluate(u + step, self.p)

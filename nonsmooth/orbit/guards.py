@@ -13,10 +13,10 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..flow.watched import passing, watched
+from ..flow.watched import passing, watched, watched_legs
 from ..model import Array, FilippovSystem, Guard
-from ..model.variational import guarded_field, variational_field
-from .legs import Leg
+from ..model.variational import GuardedField, guarded_field, variational_field
+from .legs import Leg, leg_name
 
 #: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
 _ENDS = 1e-6
@@ -77,22 +77,30 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     field = guarded_field(system, mode)
     guards = field.motion.guards
     y = variational_field(system, mode).states_at(x, p)
-    approaches: list[Approach] = []
-    seen: list[list[tuple[float, float, float]]] = [[] for _ in guards]  # time, value, scale
-    for row in watched(field, y, p, duration, _ENDS * duration):
-        k, (t, value, bend) = int(row[0]), row[1:4].tolist()
-        guard, scale = guards[k], 0.0
-        passed = guard.kind in ("stop", "reset")
-        if (bend and (passed or bend > 0.0)) or (value < 0.0 and not passed):
-            at = row[4:]
-            slope = field.gradients.copied(at, p)[0][k]
+    rows, approaches = watched(field, y, p, duration, _ENDS * duration), list[Approach]()
+    for row in rows:
+        guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
+        if bend and (bend > 0.0 or guard.kind in ("stop", "reset")):
+            slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
-            scale = float(np.abs(slope) @ np.abs(at)) + size * 1e-3
-            if size > 0.0 and bend and (passed or bend > 0.0):
+            if size > 0.0:
                 approaches.append(Approach(guard, t, value, value / size))
+    return Watch(approaches, _faults_seen(field, rows, p))
+
+
+def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
+    """What guards contradict, from their extrema and values at the ends of steps."""
+    if not len(rows) or float(rows[:, 2].min()) >= 0.0:
+        return []
+    guards = field.motion.guards
+    seen: list[list[tuple[float, float, float]]] = [[] for _ in guards]  # time, value, scale
+    for row in rows:
+        k, (t, value), scale = int(row[0]), row[1:3].tolist(), 0.0
+        if value < 0.0 and guards[k].kind not in ("stop", "reset"):
+            slope = np.abs(field.gradients.copied(row[4:], p)[0][k])
+            scale = float(slope @ np.abs(row[4:])) + math.sqrt(float(slope @ slope)) * 1e-3
         seen[k].append((t, value, scale))
-    faults = [f for g, values in zip(guards, seen, strict=True) for f in _faults(g, values)]
-    return Watch(approaches, faults)
+    return [f for g, values in zip(guards, seen, strict=True) for f in _faults(g, values)]
 
 
 def _faults(guard: Guard, values: Sequence[tuple[float, float, float]]) -> list[str]:
@@ -139,40 +147,100 @@ def change_fault(
         States before and after the event.
     p : ndarray
     """
-    field = leg.field(system)
-    own = leg.map(system)
-    if own is None:
+    if not leg.name:
         return ""
-    at, rate = own(end, p), field.rate.copied(end, p)[0][:, 0]
-    speed = float(at.gradient @ rate)
+    own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
+    y = variational_field(system, following).states_at(after, p)
+    field = guarded_field(system, following)
+    begin = np.vstack([part[:, :4] for part in field.starts.copied(y, p)])
+    return _change_fault(system, leg, float(own.gradient @ rate), field, begin, p)
+
+
+def _change_fault(
+    system: FilippovSystem, leg: Leg, speed: float, field: GuardedField, begin: Array, p: Array
+) -> str:
+    """The same from the rate of the event's function, and from the first coefficients of the next leg."""
+    own = leg.map(system)
+    assert own is not None
     guard = own.guard
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
         return f"at its end {described(guard)} is about to hold, not to fail ({leg.name})"
     if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
         return f"{guard.kind} {guard.name!r} is met from the wrong side at its end"
-    return _following_fault(system, following, after, p, moved=not own.smooth)
+    return _following_fault(field, begin, p)
 
 
-def _following_fault(
-    system: FilippovSystem, following: str, after: Array, p: Array, moved: bool
-) -> str:
+def _following_fault(field: GuardedField, begin: Array, p: Array) -> str:
     """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
-    field = guarded_field(system, following)
-    y = variational_field(system, following).states_at(after, p)
-    states, rows = field.starts.copied(y, p)
-    slopes = field.gradients.copied(y, p)[0]
-    for k, guard in enumerate(field.motion.guards):
+    guards = field.motion.guards
+    states, rows = begin[: len(begin) - len(guards)], begin[len(begin) - len(guards) :]
+    if not len(rows) or float(rows.min()) >= 0.0:
+        return ""
+    slopes, sizes = field.gradients.copied(states[:, 0], p)[0], np.abs(states).max(axis=0)
+    for k, guard in enumerate(guards):
         if guard.kind in ("stop", "reset", "zero", "branch"):
             continue
-        length = float(np.linalg.norm(slopes[k]))
-        scale = length * np.abs(states[:, :4]).max(axis=0)
+        length = math.sqrt(float(slopes[k] @ slopes[k]))
+        scale = length * sizes
         scale[0] += 1e-3 * length
-        for value, size in zip(rows[k, :4], scale, strict=False):
+        for value, size in zip(rows[k].tolist(), scale.tolist(), strict=False):
             if abs(value) > _NEGATIVE * size:
                 if value < 0.0:
-                    return f"where mode {following!r} begins after it, {described(guard)} fails"
+                    mode = field.motion.mode
+                    return f"where mode {mode!r} begins after it, {described(guard)} fails"
                 break
     return ""
+
+
+def faults_along(
+    system: FilippovSystem,
+    legs: Sequence[Leg],
+    starts: Array,
+    durations: Array,
+    speeds: Array,
+    p: Array,
+    closes: bool,
+) -> list[str]:
+    """What the guards contradict along legs that follow each other, leg by leg.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    legs : sequence of Leg
+    starts, durations : ndarray (L, N), (L,)
+    speeds : ndarray (L,)
+        Rates of the events' functions at the ends.
+    p : ndarray
+    closes : bool
+        Whether the first leg follows the last one as it is.
+    """
+    fields = [guarded_field(system, leg.mode) for leg in legs]
+    plain = [variational_field(system, leg.mode) for leg in legs]
+    states = [field.states_at(x, p) for field, x in zip(plain, starts, strict=True)]
+    rows, begins = watched_legs(fields, states, p, durations, _ENDS)
+    result, count = list[str](), len(legs)
+    for i, leg in enumerate(legs):
+        if durations[i] <= 0.0:
+            result.append(f"leg {i + 1} {leg_name(leg)} has the duration {durations[i]:.6g}")
+            continue
+        found, following = _faults_seen(fields[i], rows[i], p), (i + 1) % count
+        if leg.name and (closes or following):
+            field, begin = fields[following], begins[following]
+            fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)
+            found += [fault] if fault else []
+        result += [f"leg {i + 1} {leg_name(leg)}: {fault}" for fault in found]
+    return result
+
+
+def ending(system: FilippovSystem, leg: Leg) -> tuple[int, int]:
+    """Number of the guard that ends a leg among those of its mode, and its direction."""
+    guards = guarded_field(system, leg.mode).motion.guards
+    row = next(
+        k
+        for k, g in enumerate(guards)
+        if g.name == leg.name and (g.kind != "exit" or leg.side in (0, g.side))
+    )
+    return row, guards[row].side if guards[row].kind in ("stop", "reset") else -1
 
 
 def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) -> float | None:
@@ -181,13 +249,7 @@ def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) ->
     A zero where the leg starts is not counted.
     """
     field = guarded_field(system, leg.mode)
-    guards = field.motion.guards
-    row = next(
-        k
-        for k, g in enumerate(guards)
-        if g.name == leg.name and (g.kind != "exit" or leg.side in (0, g.side))
-    )
-    direction = guards[row].side if guards[row].kind in ("stop", "reset") else -1
+    row, direction = ending(system, leg)
     y = variational_field(system, leg.mode).states_at(x, p)
     size = float(np.linalg.norm(field.gradients.copied(y, p)[0][row])) * float(np.abs(y).max())
     return passing(field, row, y, p, t_max, direction=direction, still=1e-9 * size)

@@ -28,6 +28,7 @@ from ..model import (
 from ..model.forcing import Forcing, frequencies
 from ..model.variational import plain_field
 from .boundary import BoundaryProblem
+from .flight import flights_of
 from .guards import march
 from .itinerary import leg_between, read_word
 from .legs import Leg, fly, leg_name
@@ -266,43 +267,55 @@ def _from_word(
     p: Array,
 ) -> Start:
     """Follow the legs of an itinerary, each to its event."""
-    pairs = (
-        [(e, "") if isinstance(e, str) else e for e in itinerary]
-        if not isinstance(itinerary, str)
-        else [(mode, "") for mode in read_word(system, itinerary)]
-    )
-    modes = [mode for mode, _ in pairs]
-    n, t = system.dimension, float(x[-1]) if system.time_dependent else 0.0
-    t_first, state = t, x[:n]
-    legs, starts, durations = list[Leg](), list[Array](), list[float]()
-    for k, (mode, name) in enumerate(pairs):
-        following = modes[(k + 1) % len(modes)]
-        if mirror is not None and k + 1 == len(modes):
-            following = following.translate(str.maketrans("+-", "-+"))
-        leg = leg_between(system, mode, following, name)
-        begin = system.extended_point(state, t)
-        longest = _LONGEST * _natural_time(system, begin, p, mode)
-        duration = march(system, leg, begin, p, longest)
-        if duration is None:
-            raise ConvergenceError(
-                f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
-                f"from {state.tolist()} at t = {t:.6g}. Start closer to the orbit, or change the "
-                "itinerary."
-            )
-        starts.append(begin)
-        durations.append(duration)
-        t += duration
-        y = leg.field(system).states_at(begin, p)
-        end = flow_for(plain_field(system, mode), y, p, duration)
-        state = leg.at_end(system, end, p).after[:n]
-        legs.append(leg)
+    legs = _word_legs(system, itinerary, mirror is not None)
+    found = flights_of(system, legs).followed(x, p, _LONGEST)
+    starts, durations = found or _followed(system, legs, x, p)
     periods = 0.0
     if forcing is not None:
-        count = (t - t_first) / forcing(p)[0]
+        count = float(durations.sum()) / forcing(p)[0]
         periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
-    return _problem(
-        system, tuple(legs), np.array(starts), np.array(durations), periods, forcing, mirror, p
-    )
+    return _problem(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
+
+
+def _word_legs(system: FilippovSystem, itinerary: Itinerary, mirrored: bool) -> tuple[Leg, ...]:
+    """The legs of an itinerary, of which the first follows the last one, or its mirror image does."""
+    word: Any = itinerary if isinstance(itinerary, str) else tuple(itinerary)
+
+    def read() -> tuple[Leg, ...]:
+        modes = read_word(system, word) if isinstance(word, str) or not word else word
+        pairs = [(e, "") if isinstance(e, str) else e for e in modes]
+        following = [mode for mode, _ in pairs[1:]] + [pairs[0][0]]
+        if mirrored:
+            following[-1] = following[-1].translate(str.maketrans("+-", "-+"))
+        told = zip(pairs, following, strict=True)
+        return tuple(leg_between(system, mode, then, name) for (mode, name), then in told)
+
+    try:
+        return system.cached(("word", word, mirrored), read)
+    except TypeError:  # of lists, which are no keys
+        return read()
+
+
+def _followed(
+    system: FilippovSystem, legs: Sequence[Leg], x: Array, p: Array
+) -> tuple[Array, Array]:
+    """Starts and durations of legs that are followed one after the other."""
+    starts, durations = list[Array](), list[float]()
+    for k, leg in enumerate(legs):
+        duration = march(system, leg, x, p, _LONGEST * _natural_time(system, x, p, leg.mode))
+        if duration is None:
+            n, t = system.dimension, float(x[-1]) if system.time_dependent else sum(durations)
+            raise ConvergenceError(
+                f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
+                f"from {x[:n].tolist()} at t = {t:.6g}. Start closer to the orbit, or change the "
+                "itinerary."
+            )
+        starts.append(x)
+        durations.append(duration)
+        y = leg.field(system).states_at(x, p)
+        end = flow_for(plain_field(system, leg.mode), y, p, duration)
+        x = leg.at_end(system, end, p).after
+    return np.array(starts), np.array(durations)
 
 
 def _simulated(

@@ -15,11 +15,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..flow.compiled.shooting import reduced_map
+from ..flow.fixed import has_interpreter
 from ..model import Array
 from ..model.event_maps import surface_map
 from .boundary import BoundaryProblem, Evaluation
 from .legs import leg_name
-from .saltation import saltations
+from .saltation import GRAZING, saltations
 
 #: A direction of which a leg leaves no more than this part is lost.
 _LOST = 1e-12
@@ -39,27 +41,31 @@ class Multipliers:
         How many are structurally zero.
     reduced : ndarray (r, r)
         The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
-    matrix : ndarray (N, N)
-        The full derivative of the legs' map.
-    held : int
-        Surfaces on which the orbit slides all the time.
+    problem : BoundaryProblem
+    at : Evaluation
+        The orbit.
     """
 
     values: NDArray[np.complex128]
     of_map: NDArray[np.complex128]
     zeros: int
     reduced: Array
-    matrix: Array
-    held: int
+    problem: BoundaryProblem
+    at: Evaluation
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The full derivative of the legs' map, (N, N)."""
+        return monodromy(self.problem, self.at)
 
     @cached_property
     def error(self) -> float:
         """Distance of the structural multipliers of ``matrix`` from 1 and 0."""
-        whole = np.linalg.eigvals(self.matrix)
+        whole, held = np.linalg.eigvals(self.matrix), len(self.problem.kept)
         # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
-        ones = np.argsort(np.abs(whole - 1.0))[: 1 + self.held]
+        ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]
         rest = np.sort(np.abs(np.delete(whole, ones)))
-        structural = rest[: self.zeros - self.held].tolist()
+        structural = rest[: self.zeros - held].tolist()
         return max(float(np.abs(whole[ones] - 1.0).max()), *structural, 0.0)
 
 
@@ -82,10 +88,10 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
     reduced = _condensed(problem, at, p)
     nontrivial = np.linalg.eigvals(reduced) if reduced.size else np.zeros(0)
     zeros = n - 1 - nontrivial.size
-    matrix = monodromy(problem, at, p)
-    of_map = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
-    power = 2 if problem.symmetry is not None else 1
-    return Multipliers(_sorted(of_map**power), of_map, zeros, reduced, matrix, len(problem.kept))
+    of_map = values = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
+    if problem.symmetry is not None:
+        values = _sorted(of_map**2)
+    return Multipliers(values, of_map, zeros, reduced, problem, at)
 
 
 def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
@@ -115,12 +121,25 @@ def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
 
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
-    count, n = len(problem.legs), problem.dimension
+    n, flight = problem.dimension, at.flight
     # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
     units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+    basis = _kept(problem, at, p, units)
+    if has_interpreter():
+        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
+        wrap = None if problem.symmetry is None else problem.wrap
+        found = reduced_map(legs, wrap, units, basis, GRAZING, _LOST)
+        if found is not None:
+            return found
+    monodromy(problem, at)  # DegenerateError where an event is grazed
+    return _passed(problem, at, units, basis)
+
+
+def _passed(problem: BoundaryProblem, at: Evaluation, units: Array, basis: Array) -> Array:
+    """The return map on what the legs leave of some directions."""
+    count, n = len(problem.legs), problem.dimension
     maps = leg_maps(problem, at) * (units / units[:, None])
     flown = at.flight.by_start[:, :n] * (units / units[:, None])
-    basis = _kept(problem, at, p, units)
     bases: list[Array] = [np.eye(n)] * count
     for _ in range(2):
         for i in range(count):
@@ -151,7 +170,7 @@ def _range(matrix: Array, size: float) -> Array:
     return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
 
 
-def monodromy(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
     n, flight = problem.dimension, at.flight
     after = np.roll(flight.before[:, :n], -1, axis=0)

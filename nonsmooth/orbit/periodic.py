@@ -15,8 +15,7 @@ from ..model import Array, FilippovSystem, ParameterError, Surfaces
 from ..model.cards import card, circle
 from ..model.variational import variational_field
 from .boundary import BoundaryProblem, Evaluation
-from .guards import change_fault, described, watch
-from .legs import leg_name
+from .guards import described, faults_along, watch
 from .multipliers import Multipliers, multipliers_of, stability
 from .orbit_run import orbit_run
 
@@ -319,22 +318,9 @@ def mirrored_mode(orbit: PeriodicOrbit, mode: str, x: Array, duration: float) ->
 
 def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
     """What the guards of a solution contradict, leg by leg."""
-    result: list[str] = []
-    count = len(problem.legs)
-    for i, leg in enumerate(problem.legs):
-        name, duration = f"leg {i + 1} {leg_name(leg)}", float(at.durations[i])
-        if duration <= 0.0:
-            result.append(f"{name} has the duration {duration:.6g}")
-            continue
-        seen = watch(problem.system, leg.mode, at.starts[i], duration, p)
-        result += [f"{name}: {fault}" for fault in seen.faults]
-        following = problem.legs[(i + 1) % count].mode
-        if leg.name and not (problem.symmetry is not None and i + 1 == count):
-            fault = change_fault(
-                problem.system, leg, following, at.flown[i].end, at.starts[(i + 1) % count], p
-            )
-            result += [f"{name}: {fault}"] if fault else []
-    return result
+    speeds = (at.flight.gradient * at.flight.rate).sum(axis=1)
+    closes = problem.symmetry is None
+    return faults_along(problem.system, problem.legs, at.starts, at.durations, speeds, p, closes)
 
 
 def _margins(orbit: PeriodicOrbit) -> list[Margin]:

@@ -1,9 +1,14 @@
-"""Every kind of guard has its condition in words, by its side."""
+"""Every kind of guard has its condition in words, by its side; many legs are judged as each of them is."""
 
+import casadi as ca
+import numpy as np
 import pytest
 
+import nonsmooth as ns
+from nonsmooth.flow import watched
 from nonsmooth.model import Guard
-from nonsmooth.orbit.guards import described
+from nonsmooth.orbit.guards import change_fault, described, faults_along, watch
+from nonsmooth.orbit.legs import Leg, fly, leg_name
 
 
 @pytest.mark.parametrize(
@@ -22,3 +27,43 @@ from nonsmooth.orbit.guards import described
 )
 def test_a_guard_is_told_as_the_condition_that_holds(guard, words):
     assert described(guard) == words
+
+
+def test_legs_are_judged_together_as_one_by_one(monkeypatch):
+    """A swing above and below y = 0, of which some legs pass it, begin beyond it, or have no duration."""
+    x, y, v = (ca.SX.sym(name) for name in ("x", "y", "v"))
+    system = ns.FilippovSystem(
+        [x, y, v],
+        surface=y,
+        above=[1, v, -y - 0.2],
+        below=[1, v, 0.2 - y],
+        stops=ns.Stop(x - 7.5, 1, "out"),
+    )
+    legs = [
+        Leg("+", "h0", "crossing"),
+        Leg("-", "h0", "crossing"),
+        Leg("+", "h0", "crossing"),
+        Leg("-", "h0", "crossing"),
+        Leg("+"),
+    ]
+    starts = np.array([[0, 0.2, 0.7], [7, -0.3, 0], [0, 0.0, 1], [0, 0.1, -1], [0, 1, 0.0]])
+    durations, p = np.array([5.0, 1.0, 2.6, 0.0, 9.0]), np.zeros(0)
+    ends = [fly(system, leg, s, d, p) for leg, s, d in zip(legs, starts, durations, strict=True)]
+    speeds = np.array([end.rate[1] * (-1) ** i for i, end in enumerate(ends)])
+    expected = []
+    for i, leg in enumerate(legs):
+        if durations[i] <= 0.0:
+            expected.append(f"leg {i + 1} {leg_name(leg)} has the duration 0")
+            continue
+        found = watch(system, leg.mode, starts[i], durations[i], p).faults
+        j = (i + 1) % len(legs)
+        fault = change_fault(system, leg, legs[j].mode, ends[i].end, starts[j], p)
+        found += [fault] if fault else []
+        expected += [f"leg {i + 1} {leg_name(leg)}: {fault}" for fault in found]
+    together = faults_along(system, legs, starts, durations, speeds, p, True)
+    assert together == expected and len(together) >= 5
+    assert sum("is violated" in fault for fault in together) >= 1
+    assert sum("begins after it" in fault for fault in together) >= 1
+    assert sum("'out' is met" in fault for fault in together) == 1
+    monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+    assert faults_along(system, legs, starts, durations, speeds, p, True) == together

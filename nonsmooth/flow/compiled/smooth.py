@@ -51,7 +51,9 @@ def _library() -> ctypes.CDLL:
     made.fly_legs.restype = made.field_work.restype = _I64
     made.fly_legs.argtypes = [_POINTER, _POINTER, _D, _I64, _POINTER]
     made.field_work.argtypes = [_POINTER]
-    made.fly_legs_extended.restype = _I64
+    made.fly_legs_extended.restype = made.watch_legs.restype = _I64
+    made.watch_legs.argtypes = [_POINTER, _I64, _I64, _POINTER, _POINTER, _POINTER, _D, _I64, _D]
+    made.watch_legs.argtypes += [_POINTER, _I64, _POINTER, _POINTER, _I64, _POINTER, _POINTER]
     made.fly_legs_extended.argtypes = [_POINTER, _POINTER, _D, _I64, _POINTER, _POINTER]
     return made
 
@@ -71,7 +73,7 @@ class SmoothProgram:
     def __init__(self, series: Series, group: NDArray[np.int32], order: int):
         self._kept: list[NDArray[Any]] = [np.ascontiguousarray(group, np.int32)]
         self.size, groups = len(group), int(group.max(initial=-1)) + 1
-        watched = len(series.outputs) - self.size
+        self.watched = watched = len(series.outputs) - self.size
         rules = series_structure(series, self._kept)
         self._c = _Field(self.size, watched, order, groups, address(self._kept[0]), rules)
         self.pointer = ctypes.addressof(self._c)
@@ -201,6 +203,7 @@ class LegsProgram:
         self._places, self._count, self._parameters = places, count, parameters
         pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
         self._c = _Legs(count, self.width, results, *places[1:7], *pointers)
+        self.pointer, self.size = ctypes.addressof(self._c), int(places[-1])
 
     def __call__(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
@@ -214,9 +217,14 @@ class LegsProgram:
         rows = [part.reshape(self._count, -1) for part in (parts[1], parts[3], parts[4], parts[5])]
         return FlownLegs(rows[0], rows[1], rows[2], rows[3], failed, left.value)
 
+    def parts(self, memory: Array) -> list[Array]:
+        """Parameters, states, durations, fields before and after, and results in the memory of a call."""
+        at = self._places
+        return [memory[at[k] : at[k + 1]] for k in range(6)]
+
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
-        memory, at = np.empty(self._places[-1]), self._places
-        parts = [memory[at[k] : at[k + 1]] for k in range(6)]
+        memory = np.empty(self.size)
+        parts = self.parts(memory)
         parts[0][: self._parameters] = p
         parts[1][:] = z.ravel()
         parts[2][:] = durations
@@ -240,3 +248,66 @@ class LegsProgram:
         if failed >= 0:
             return None
         return parts[5].reshape(self._count, -1), rest.reshape(self._count, -1)
+
+
+class WatchedLegs(NamedTuple):
+    """Functions along many legs.
+
+    Attributes
+    ----------
+    rows : list of ndarray (m, 4 + N)
+        Of each leg: number of the function, time, value, second derivative (0 at the end of a step),
+        state.
+    begins : list of ndarray (N + g, 4)
+        First coefficients of the states and of the functions at the starts.
+    failed : int
+        Number of a leg that fails, or -1.
+    left : float
+        Time that is left of it.
+    """
+
+    rows: list[Array]
+    begins: list[Array]
+    failed: int
+    left: float
+
+
+def watch_legs(
+    fields: Sequence[SmoothProgram],
+    z: Sequence[Array],
+    p: Array,
+    durations: Array,
+    tol: float,
+    most_steps: int,
+    ends: float,
+) -> WatchedLegs:
+    """Watch the functions of many flows in one call; those of no positive duration have their starts alone."""
+    legs, width = len(fields), max(f.size for f in fields)
+    rows = [f.size + f.watched for f in fields]
+    begin, work = 4 * max(rows), max(f.work for f in fields)
+    pointers = (_POINTER * legs)(*[f.pointer for f in fields])
+    counts, left, room = np.empty(legs, np.int64), ctypes.c_double(), _ROOM + 16 * legs
+    durations, p = np.ascontiguousarray(durations, float), np.append(p, 0.0)
+    while True:
+        states = np.empty((legs, width))
+        for i, y in enumerate(z):
+            states[i, : len(y)] = y
+        memory = np.empty(legs * begin + work)
+        found, at = np.empty(room * (4 + width)), memory.ctypes.data
+        failed = _library().watch_legs(
+            *(ctypes.addressof(pointers), legs, width, p.ctypes.data, states.ctypes.data),
+            *(durations.ctypes.data, tol, most_steps, ends, found.ctypes.data, room),
+            *(counts.ctypes.data, at, begin, ctypes.addressof(left), at + 8 * legs * begin),
+        )
+        if failed != -2:
+            break
+        room *= 8
+    if failed >= 0:
+        return WatchedLegs([], [], failed, left.value)
+    own, begins, place = list[Array](), list[Array](), 0
+    for i, (f, count) in enumerate(zip(fields, counts.tolist(), strict=True)):
+        size = count * (4 + f.size)
+        own.append(found[place : place + size].reshape(count, 4 + f.size))
+        begins.append(memory[i * begin : i * begin + 4 * rows[i]].reshape(rows[i], 4))
+        place += size
+    return WatchedLegs(own, begins, -1, 0.0)

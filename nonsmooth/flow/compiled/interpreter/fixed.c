@@ -125,51 +125,140 @@ static int extrema(const double *c, int n, double h, double *root, int room) {
   return found.count;
 }
 
+/* First coefficients, to order 3, of the states and of what is watched. */
+static void first_terms(const Flow *w, double *begin) {
+  int64_t rows = w->field->n + w->field->watched, stride = w->field->order + 1;
+  for (int64_t i = 0; i < rows; i++) memcpy(begin + 4 * i, w->states + i * stride, 4 * sizeof(double));
+}
+
 /* Values of what is watched at its extrema and at the ends of steps, further than ``margin`` from both ends of the
- * flow. Rows of ``found``: number, time, value, second derivative (0 at the end of a step), state. What is left of
- * the flow; the number of rows goes to ``count``, which stops at ``room``. */
-double fixed_watch(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
-                   double margin, double *found, int64_t room, int64_t *count, double *work) {
-  Flow w = flow_of(f, p, duration, tol, work);
-  int64_t stride = f->order + 1, width = 4 + f->n;
+ * flow. Rows of ``found``: number, time, value, second derivative (0 at the end of a step), state; their number,
+ * which stops at ``room``, is returned. First coefficients at the start go to ``begin``, if it is given. */
+static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin, double *found, int64_t room,
+                          double *begin) {
+  const Field *f = w->field;
+  int64_t stride = f->order + 1, width = 4 + f->n, count = 0;
   double root[P + 1];
-  *count = 0;
-  for (int64_t step = 0; step < most_steps && w.left > 0; step++) {
-    double h = expand_flow(&w, z) ? flow_step(&w) : 0, t = w.whole - w.left, slope;
+  for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
+    double h = expand_flow(w, z) ? flow_step(w) : 0, t = w->whole - w->left, slope;
+    if (step == 0 && begin) first_terms(w, begin);
     if (!(h > 0)) break;
     for (int j = 0; j < f->watched; j++) {
-      const double *c = w.watched + j * stride;
+      const double *c = w->watched + j * stride;
       int many = extrema(c, f->order, h, root, P);
       root[many] = h;
       for (int k = 0; k <= many; k++) {
-        double s = root[k], bend = 0, *row = found + *count * width;
-        if (k == many && t + h >= w.whole - margin) continue;
-        if (!(margin < t + s && t + s < w.whole - margin) || *count == room) continue;
+        double s = root[k], bend = 0, *row = found + count * width;
+        if (k == many && t + h >= w->whole - margin) continue;
+        if (!(margin < t + s && t + s < w->whole - margin) || count == room) continue;
         for (int i = f->order; i >= 2 && k < many; i--) bend = bend * s + i * (i - 1) * c[i];
         row[0] = j; row[1] = t + s; row[2] = horner(c, f->order, s, &slope); row[3] = bend;
-        for (int i = 0; i < f->n; i++) row[4 + i] = horner(w.states + i * stride, f->order, s, &slope);
-        ++*count;
+        for (int i = 0; i < f->n; i++) row[4 + i] = horner(w->states + i * stride, f->order, s, &slope);
+        count++;
       }
     }
-    advance_flow(&w, h, z);
+    advance_flow(w, h, z);
   }
+  return count;
+}
+
+/* The same of one flow: what is left of it. */
+double fixed_watch(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
+                   double margin, double *found, int64_t room, int64_t *count, double *work) {
+  Flow w = flow_of(f, p, duration, tol, work);
+  *count = watch_flow(&w, z, most_steps, margin, found, room, NULL);
   return w.left;
 }
 
+/* The same of many, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
+ * ``counts``, and first coefficients. Those whose duration is not positive have these alone. The number of a flow
+ * that fails, with what is left of it, or -1; -2 where there was not enough room. */
+int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, double *z,
+                   const double *durations, double tol, int64_t most_steps, double ends, double *found, int64_t room,
+                   int64_t *counts, double *begins, int64_t begin_width, double *left, double *work) {
+  for (int64_t i = 0; i < legs; i++) {
+    const Field *f = fields[i];
+    Flow w = flow_of(f, p, durations[i], tol, work);
+    counts[i] = 0;
+    if (durations[i] > 0 && f->watched) {
+      counts[i] = watch_flow(&w, z + i * width, most_steps, ends * w.whole, found, room, begins + i * begin_width);
+      *left = w.left;
+      if (w.left > 0 || w.left != w.left) return i;
+      if (counts[i] == room) return -2;
+    } else {
+      expand_flow(&w, z + i * width);
+      first_terms(&w, begins + i * begin_width);
+    }
+    found += counts[i] * (4 + f->n);
+    room -= counts[i];
+  }
+  return -1;
+}
+
 /* Time until a watched function passes zero in a direction; a start nearer to zero than ``still`` is not counted.
- * -1 if it does not within the duration, -2 where the flow ends before. */
+ * -1 if it does not within the duration, -2 where the flow ends before. z is where the last step begins. */
+static double march_flow(Flow *w, double *z, int64_t most_steps, int32_t row, int32_t direction, double still) {
+  int order = w->field->order;
+  for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
+    double h = expand_flow(w, z) ? flow_step(w) : 0;
+    if (!(h > 0)) return -2;
+    const double *c = w->watched + (int64_t)row * (order + 1);
+    int drop = 0;
+    while (step == 0 && drop < order && !(fabs(c[drop]) > still)) drop++;
+    double t = first_crossing(c + drop, order - drop, h, direction);
+    if (t >= 0 && w->whole - w->left + t > 0) return w->whole - w->left + t;
+    advance_flow(w, h, z);
+  }
+  return w->left > 0 ? -2 : -1;
+}
+
 double fixed_march(const Field *f, const double *p, double *z, double duration, double tol, int64_t most_steps,
                    int32_t row, int32_t direction, double still, double *work) {
   Flow w = flow_of(f, p, duration, tol, work);
-  for (int64_t step = 0; step < most_steps && w.left > 0; step++) {
-    double h = expand_flow(&w, z) ? flow_step(&w) : 0;
-    if (!(h > 0)) return -2;
-    const double *c = w.watched + (int64_t)row * (f->order + 1);
-    int drop = 0;
-    while (step == 0 && drop < f->order && !(fabs(c[drop]) > still)) drop++;
-    double t = first_crossing(c + drop, f->order - drop, h, direction);
-    if (t >= 0 && w.whole - w.left + t > 0) return w.whole - w.left + t;
-    advance_flow(&w, h, z);
+  return march_flow(&w, z, most_steps, row, direction, still);
+}
+
+/* Legs that are followed to their events, one after the other. Each has a field whose functions are watched, the
+ * number of the one that ends it and its direction, and programs: with derivatives, and of the state after it. */
+typedef struct {
+  int64_t count, n, dimension, parameters;
+  const Field *const *field;
+  const Values *const *event, *const *plain;
+  const int32_t *row, *direction;
+} Followed;
+
+int64_t followed_size(void) { return sizeof(Followed); }
+
+/* Follow legs from the first state in ``starts`` (count + 1, n), each for at most so many of the times in which the
+ * state changes by its size. How many came to their events; ``starts`` and ``durations`` are then filled. */
+int64_t follow_legs(const Followed *l, const double *p, double *starts, double *durations, double times, double tol,
+                    int64_t most_steps, double *work) {
+  for (int64_t i = 0; i < l->count; i++) {
+    const Values *e = l->event[i], *g = l->plain[i];
+    double *z = starts + i * l->n, *next = z + l->n, size = 0, speed = 0, slope = 0, largest = 0;
+    memset(work, 0, sizeof(double) * e->size);
+    values_prepare(e, p, work);
+    values_run(e, z, p, work);
+    for (int64_t k = 0; k < l->n; k++) {
+      double part = work[e->output[l->n + l->n * (l->n + l->parameters) + 1 + k]];
+      slope += part * part;
+      largest = larger(fabs(z[k]), largest);
+    }
+    Flow w = flow_of(l->field[i], p, 1, tol, work);
+    field_at(&w, z, next);
+    for (int64_t k = 0; k < l->dimension; k++) {
+      size += z[k] * z[k];
+      speed += next[k] * next[k];
+    }
+    w.whole = w.left = times * (size > 0 && speed > 0 && speed < INFINITY ? sqrt(size / speed) : 1);
+    memcpy(next, z, sizeof(double) * l->n);
+    durations[i] = march_flow(&w, next, most_steps, l->row[i], l->direction[i], 1e-9 * sqrt(slope) * largest);
+    if (!(durations[i] >= 0)) return i;
+    advance_flow(&w, durations[i] - (w.whole - w.left), next);
+    memset(work, 0, sizeof(double) * g->size);
+    values_prepare(g, p, work);
+    values_run(g, next, p, work);
+    for (int64_t k = 0; k < l->n; k++) next[k] = work[g->output[k]];
   }
-  return w.left > 0 ? -2 : -1;
+  return l->count;
 }

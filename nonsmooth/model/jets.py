@@ -36,6 +36,10 @@ class Arithmetic(Protocol):
         """Return None for what is zero and known to be."""
         ...
 
+    def inner(self, u: Sequence[Any], v: Sequence[Any]) -> Any:
+        """Return the sum of products, from the first to the last."""
+        ...
+
     def divide(self, a: Any, b: Any) -> Any:
         """Return a quotient; a division by zero is no error."""
         ...
@@ -55,6 +59,17 @@ class Expressions:
     def clean(self, a: ca.SX) -> Coefficient:
         """Return None for zero."""
         return None if a.is_zero() else a
+
+    def inner(self, u: Sequence[Coefficient], v: Sequence[Coefficient]) -> Coefficient:
+        """Return the sum of products."""
+        total: Coefficient = None
+        for a, b in zip(u, v, strict=True):
+            if a is not None and b is not None:
+                term = self.clean(a * b)
+                total = (
+                    term if total is None else total if term is None else self.clean(total + term)
+                )
+        return total
 
     def divide(self, a: ca.SX, b: Coefficient) -> ca.SX:
         """Return a quotient."""
@@ -215,10 +230,7 @@ class Expansion:
 
     def _convolve(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
         """Sum of u_i v_(k-i) for i from first to last."""
-        total = None
-        for i in range(first, last + 1):
-            total = self._sum(total, self._product(u[i], v[k - i]))
-        return total
+        return self._on.inner(u[first : last + 1], v[k - last : k - first + 1][::-1])
 
     def _weigh(self, u: list[Any], v: list[Any], k: int, first: int, last: int) -> Any:
         """Sum of i u_i v_(k-i) for i from first to last."""

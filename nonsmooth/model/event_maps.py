@@ -149,6 +149,42 @@ def event_map(
     return system.cached(("event map", mode, name, side, letters), build)
 
 
+def instant_map(
+    system: FilippovSystem, mode: str, kind: str, name: str, letters: str = ""
+) -> EventMap:
+    """The map of a crossing, entry, stop, reset or impact as one of the extended states alone: what acts
+    may be anything. Built once.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+        Before the event, with a letter for each switching function and contact.
+    kind, name : str
+        Of the event.
+    letters : str
+        As for :func:`event_map`.
+    """
+
+    def build() -> EventMap:
+        d = system.definition
+        if kind in ("stop", "reset"):
+            own = [n for n, _ in (system.stops if kind == "stop" else system.resets)]
+            i = own.index(name)
+            function = d.guards[i if kind == "stop" else len(system.stops) + i]
+        elif kind == "impact":
+            i = system.impacts.index(name)
+            function = d.gaps[i]
+        else:
+            i = system.entries[int(name.removeprefix("h"))][0]
+            function = d.surfaces[i]
+        guard = Guard("surface" if kind in ("crossing", "entry") else kind, i, 0, name)
+        after = _after(system, mode, guard, letters)
+        return EventMap(system, system.extended_states, function, guard, after)
+
+    return system.cached(("instant map", mode, kind, name, letters), build)
+
+
 def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap:
     """The map of a leg that ends where a function of states, parameters and time is zero."""
     symbols = [system.extended_states, system.parameter_symbols]

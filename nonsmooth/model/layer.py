@@ -72,27 +72,6 @@ class Layer:
         )
 
 
-def layer_evaluator(system: FilippovSystem) -> Evaluator:
-    """Field f, switching functions h and their rates G at states and multipliers, with derivatives.
-
-    The outputs are f, f_x, f_lambda, f_p, h, h_x, h_p, G, G_x, G_lambda, G_p; the inputs the extended
-    states followed by the multipliers of all switching functions, and the parameters.
-    """
-
-    def build() -> Evaluator:
-        x, q = system.extended_states, system.parameter_symbols
-        lam = ca.SX.sym("lambda", system.surface_count)
-        f, h = system.field_with(lam), ca.vertcat(system.definition.surfaces)
-        g = ca.mtimes(ca.jacobian(h, x), f)
-        outputs = [f, *(ca.jacobian(f, v) for v in (x, lam, q)), h]
-        outputs += [ca.jacobian(h, v) for v in (x, q)]
-        outputs += [g, *(ca.jacobian(g, v) for v in (x, lam, q))]
-        dense = [ca.densify(e) for e in outputs]
-        return Evaluator(ca.Function("layer", [ca.vertcat(x, lam), q], dense, {"cse": True}))
-
-    return system.cached("layer evaluator", build)
-
-
 def layer_of(system: FilippovSystem) -> Layer:
     """Return the layer of a system, built once."""
     return system.cached("layer", lambda: Layer(system))

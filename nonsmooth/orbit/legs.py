@@ -7,7 +7,7 @@ without one causing the other are a corner, where a derivative depends on which 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 
@@ -16,7 +16,7 @@ import numpy as np
 from ..flow.facts import TIE
 from ..flow.fixed import flow_for
 from ..flow.trajectory import Event, Trajectory
-from ..model import Array, DegenerateError, FilippovSystem
+from ..model import Array, DegenerateError, FilippovSystem, coupled_of
 from ..model.event_maps import AtEvent, EventMap, event_map
 from ..model.variational import VariationalField, variational_field
 
@@ -250,22 +250,41 @@ def corner(t: float, one: str, other: str) -> str:
 
 def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
     """The sides with which friction acted at an impact: those that give the state after it."""
-    from ..model import coupled_of
+    x = _extended(system, event.x, event.t)
+    mode = event.mode_before
+    y = variational_field(system, mode).states_at(x, p)
+    after = _extended(system, event.x_after, event.t)
+    choice = lambda letters: event_map(system, mode, event.name, 0, letters)(y, p)
+    return struck_letters(system, mode, event.name, choice, after)
 
-    mode, m, coupled = event.mode_before, system.surface_count, coupled_of(system)
-    signs = system.parse_letters(mode)
-    struck = system.impacts.index(event.name)
-    taking = [struck, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
+
+def struck_letters(
+    system: FilippovSystem, mode: str, name: str, struck: Callable[[str], AtEvent], after: Array
+) -> str:
+    """The sides with which friction acted at an impact, of those that are possible.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+        Before it.
+    name : str
+        Of the impact.
+    struck : callable
+        What the impact with given letters does.
+    after : ndarray (N,)
+        The state that it led to.
+    """
+    m, coupled = system.surface_count, coupled_of(system)
+    signs, mode = system.parse_letters(mode), system.widened(mode)
+    contact = system.impacts.index(name)
+    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
     carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
     choices = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in carried]
     misses: list[tuple[float, str]] = []
     for choice in product(*choices):
         letters = "".join(choice)
-        at = event_map(system, mode, event.name, 0, letters)
-        x = _extended(system, event.x, event.t)
-        y = variational_field(system, mode).states_at(x, p)
-        after = _extended(system, event.x_after, event.t)
-        misses.append((float(np.abs(at(y, p).after - after).max()), letters))
+        misses.append((float(np.abs(struck(letters).after - after).max()), letters))
     return min(misses)[1]
 
 
@@ -281,14 +300,14 @@ def _caused(
         other = then.at_end(system, start[:, 0], p)
         n = len(at.after)
         pulled = (other.gradient @ start[:, 1 : 1 + n]) @ at.after_state
-        if not _parallel(pulled, at.gradient):
+        if not parallel(pulled, at.gradient):
             raise DegenerateError(corner(t, leg.name, then.name))
         if then.kind in ("reset", "impact"):
             kept = (*kept, then)
     return kept
 
 
-def _parallel(a: Array, b: Array) -> bool:
+def parallel(a: Array, b: Array) -> bool:
     size = float(np.linalg.norm(b))
     along = b * (a @ b) / size**2 if size else b
     return bool(np.linalg.norm(a - along) <= _PARALLEL * max(float(np.linalg.norm(a)), 1e-300))

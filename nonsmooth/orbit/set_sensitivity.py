@@ -1,199 +1,26 @@
-"""Derivatives of runs through sets of codimension two and three: friction in the plane.
+"""Derivatives of runs through sets of codimension two and three, also where surfaces, impacts, resets and
+stops are beside them: friction in the plane.
 
-Off a set the multiplier u = h/|h| moves with the state, du = (1 - u u^T) dh/|h|; on it lambda keeps h at
-zero. The variational equation is integrated along the steps of the run by Gauss collocation, which stays
-accurate where du is stiff: next to the set.
-
-At a hit the derivatives by the time of the hit cancel: with h' = a - M lambda and B = df/dlambda
-
-    dx+ = (1 + B M^-1 grad h) dx,
-
-whatever the directions are from which neighbours come. At the end of sliding the field is continuous and
-dx+ = dx. A set that is crossed exactly at h = 0 is a corner, where a run has no derivative.
+Between events the variational equation is integrated along the steps of the run (``set_variation``). At a
+hit of a set its own formula holds; at every other event that of ``saltation``. A set that is crossed
+exactly at h = 0 is a corner, where a run has no derivative.
 """
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from functools import lru_cache
 from itertools import pairwise
 
 import numpy as np
 
-from ..flow.trajectory import Event, Segment, Trajectory
-from ..model import Array, DefinitionError, DegenerateError, FilippovSystem, explain
-from ..model.layer import layer_evaluator
+from ..flow.facts import TIE
+from ..flow.trajectory import Event, Trajectory
+from ..model import Array, DegenerateError
+from ..model.event_maps import AtEvent, instant_map
+from .legs import corner, parallel, struck_letters
+from .saltation import saltation
+from .set_variation import Variation
 from .variation import Sensitivity
-
-#: Nodes of the collocation on each step.
-_NODES = 10
-
-#: A matrix of friction this close to a multiple of 1 is one.
-_ISOTROPIC = 1e-9
-
-
-@lru_cache(maxsize=1)
-def _gauss() -> tuple[Array, Array, Array]:
-    """Nodes in (0, 1), and the integrals of Lagrange's polynomials up to each and up to 1."""
-    nodes = 0.5 * (np.polynomial.legendre.leggauss(_NODES)[0] + 1.0)
-    powers = np.vander(nodes, increasing=True)
-    degrees = np.arange(1, _NODES + 1)
-    upto = (nodes[:, None] ** degrees) / degrees
-    inner, outer = np.linalg.solve(powers.T, upto.T).T, np.linalg.solve(powers.T, 1.0 / degrees)
-    return nodes, np.asarray(inner), np.asarray(outer)
-
-
-@dataclass(frozen=True, eq=False)
-class _At:
-    """Field f, switching functions h and their rates G at a state and multipliers, with derivatives."""
-
-    f: Array
-    f_x: Array
-    f_l: Array
-    f_p: Array
-    h: Array
-    h_x: Array
-    h_p: Array
-    g: Array
-    g_x: Array
-    g_l: Array
-    g_p: Array
-
-
-class Variation:
-    """The variational equation of a system whose switches are sets.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    p : ndarray
-    chosen : sequence of int
-        Parameters by which is differentiated.
-    """
-
-    def __init__(self, system: FilippovSystem, p: Array, chosen: Sequence[int]):
-        if len(system.sets) != len(system.entries) or system.impacts:
-            raise DefinitionError(
-                explain(
-                    "system",
-                    expected="one with sets of codimension two or three, or one with surfaces, here",
-                    received=repr(system),
-                    advice="Derivatives of runs that meet both are not available.",
-                )
-            )
-        self.system, self.p, self.chosen = system, p, list(chosen)
-        self._m = system.surface_count
-
-        self._evaluate = layer_evaluator(system)
-
-    def at(self, x: Array, lam: Array) -> _At:
-        """Evaluate at an extended state and multipliers."""
-        found = self._evaluate.copied(np.concatenate([x, lam]), self.p)
-        f, f_x, f_l, f_p, h, h_x, h_p, g, g_x, g_l, g_p = found
-        c = self.chosen
-        return _At(
-            *(f.ravel(), f_x, f_l, f_p[:, c], h.ravel(), h_x, h_p[:, c]),
-            *(g.ravel(), g_x, g_l, g_p[:, c]),
-        )
-
-    def moving(self, mode: str, x: Array, slip: Array | None = None) -> tuple[_At, Array, Array]:
-        """Values at a state of a mode, with the derivatives of the multipliers by states and parameters.
-
-        ``slip`` is h with all its digits, where it is known.
-        """
-        off = [s for s in self.system.sets if mode[self._entry(s)] == "*"]
-        on = [i for s in self.system.sets if s not in off for i in s]
-        lam, n = np.zeros(self._m), len(x)
-        here = self.at(x, lam)
-        by_state, by_p = np.zeros((self._m, n)), np.zeros((self._m, len(self.chosen)))
-        for s in off:
-            own = list(s)
-            h = here.h[own] if slip is None else slip[own]
-            r = math.hypot(*h)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                lam[own] = u = h / r
-                turn = (np.eye(len(own)) - np.outer(u, u)) / r
-            by_state[own], by_p[own] = turn @ here.h_x[own], turn @ here.h_p[own]
-        here = self.at(x, lam)
-        if on:
-            lam[on] = -np.linalg.solve(here.g_l[np.ix_(on, on)], here.g[on])
-            here = self.at(x, lam)
-            slope = here.g_l[np.ix_(on, on)]
-            by_state[on] = -np.linalg.solve(slope, here.g_x[on] + here.g_l[on] @ by_state)
-            by_p[on] = -np.linalg.solve(slope, here.g_p[on] + here.g_l[on] @ by_p)
-        self.multipliers = lam
-        return here, by_state, by_p
-
-    def _entry(self, members: tuple[int, ...]) -> int:
-        return self.system.entries.index(members)
-
-    def across(
-        self, mode: str, c: Array, dt: float, y: Array, leaving: tuple[int, ...] | None
-    ) -> Array:
-        """Carry derivatives (N, N + q) over a step with the Taylor coefficients c of the states."""
-        nodes, inner, outer = _gauss()
-        n, count = len(c), y.shape[1]
-        slips = self._slips(c, leaving)
-        matrix, right = np.eye(_NODES * n), np.zeros((_NODES * n, count))
-        for i, node in enumerate(nodes):
-            powers = (node * dt) ** np.arange(c.shape[1])
-            slip = None if slips is None else slips @ powers
-            here, by_state, by_p = self.moving(mode, c @ powers, slip)
-            jacobian = here.f_x + here.f_l @ by_state
-            rows = slice(i * n, (i + 1) * n)
-            for j in range(_NODES):
-                matrix[rows, j * n : (j + 1) * n] -= dt * inner[i, j] * jacobian
-            right[rows] = jacobian @ y
-            right[rows, n:] += here.f_p + here.f_l @ by_p
-        if not np.all(np.isfinite(matrix)):
-            return np.full_like(y, np.nan)
-        rates = np.linalg.solve(matrix, right).reshape(_NODES, n, count)
-        return np.asarray(y + dt * np.tensordot(outer, rates, 1))
-
-    def _slips(self, c: Array, leaving: tuple[int, ...] | None) -> Array | None:
-        """Series of all h where a set is left, without the rounding of its first two coefficients."""
-        if leaving is None:
-            return None
-        here = self.at(c[:, 0], np.zeros(self._m))
-        series = here.h_x @ c
-        series[:, 0] = here.h
-        series[list(leaving), :2] = 0.0
-        return np.asarray(series)
-
-    def hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
-        """Derivatives after a set is reached, from those just before; ``mode`` is that after."""
-        here, _, _ = self.moving(mode, x)
-        on = [i for s in self.system.sets if mode[self._entry(s)] == "s" or s == members for i in s]
-        n = len(x)
-        miss = here.h_x[on] @ y
-        miss[:, n:] += here.h_p[on]
-        back = np.linalg.solve(here.g_l[np.ix_(on, on)], miss)
-        return np.asarray(y - here.f_l[:, on] @ back)
-
-    def time_of_hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
-        """Derivatives of the time at which a set is reached, from close by; NaN if M is anisotropic."""
-        here, _, _ = self.moving(mode, x)
-        own = list(members)
-        u, m = self.multipliers[own], -here.g_l[np.ix_(own, own)]
-        c = float(np.trace(m)) / len(own)
-        if np.abs(m - c * np.eye(len(own))).max() > _ISOTROPIC * c:
-            return np.full(y.shape[1], np.nan)
-        a = here.g[own] + m @ u
-        dh = here.h_x[own] @ y
-        dh[:, len(x) :] += here.h_p[own]
-        return np.asarray((c * u + a) @ dh / (c * c - a @ a))
-
-    def time_of_exit(self, members: tuple[int, ...], mode: str, x: Array, y: Array) -> Array:
-        """Derivatives of the time at which |lambda| reaches 1."""
-        here, by_state, by_p = self.moving(mode, x)
-        own, n = list(members), len(x)
-        lam = self.multipliers[own]
-        g_x, g_p = lam @ by_state[own], lam @ by_p[own]
-        change = g_x @ y
-        change[n:] += g_p
-        return np.asarray(-change / (g_x @ here.f))
 
 
 def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
@@ -202,37 +29,21 @@ def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     Raises
     ------
     DegenerateError
-        A set that is crossed exactly, a start that leaves one, a reset.
-    DefinitionError
-        A system with surfaces too.
+        A set that is crossed exactly, a start that leaves one, an event that is grazed, events at one
+        instant that do not follow from one another, impacts that accumulate.
     """
     system = run.system
-    p = system.parameter_vector(run.parameters)
     chosen = [system.parameter_names.index(name) for name in names]
-    law = Variation(system, p, chosen)
+    passage = _Passage(run, Variation(system, system.parameter_vector(run.parameters), chosen))
+    passage.follow()
     n, size = system.dimension, system.extended_dimension
-    y = np.concatenate([np.eye(size), np.zeros((size, len(chosen)))], axis=1)
-    events = [e for e in run.events if e.kind not in ("stop", "end")]
-    bad = next((e for e in events if e.kind not in ("entry", "exit")), None)
-    if bad is not None:
-        raise DegenerateError(
-            f"run: expected hits of sets and ends of sliding only, received {bad.kind!r} at "
-            f"t = {bad.t:.10g}. A set that is crossed exactly is a corner: perturb the start."
-        )
-    times, rows = list[float](), list[Array]()
-    for k, segment in enumerate(run.segments):
-        before = run.segments[k - 1].mode if k else None
-        y, more = _over(run, law, segment, before, y)
-        rows += more
-        times += [e.t for e in events[len(times) : len(times) + len(more)]]
-    by_time = np.array(rows).reshape(len(rows), y.shape[1])
-    end, dt = _ended(run, law, y)
     keep = np.r_[0:n, size : size + len(chosen)]
-    y, by_time, dt = end[:n, keep], by_time[:, keep], dt[keep]
+    by_time = np.array(passage.rows).reshape(len(passage.rows), size + len(chosen))[:, keep]
+    y, dt = passage.y[:n, keep], passage.dt_end[keep]
     return Sensitivity(
         dx_dx0=y[:, :n],
         dx_dp=y[:, n:],
-        event_times=np.array(times),
+        event_times=np.array(passage.times),
         dt_dx0=by_time[:, :n],
         dt_dp=by_time[:, n:],
         dt_end_dx0=dt[:n],
@@ -242,71 +53,194 @@ def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     )
 
 
-def _changed(system: FilippovSystem, before: str, after: str) -> list[tuple[int, ...]]:
-    return [s for k, s in enumerate(system.entries) if before[k] != after[k]]
+#: A state is close to a set that it hits at this part of the |h| that it had after the last event.
+_NEAR = 1e-6
 
 
-def _over(
-    run: Trajectory, law: Variation, segment: Segment, before: str | None, y: Array
-) -> tuple[Array, list[Array]]:
-    """Carry derivatives through the event before a stretch of steps, and over the steps."""
-    system, steps, mode = run.system, run.steps, segment.mode
-    first, rows = _extended(run, segment.first), list[Array]()
-    leaving: tuple[int, ...] | None = None
-    if before is None:
-        on = [s for k, s in enumerate(system.entries) if mode[k] == "s"]
-        for s in on:
-            y = law.hit(mode, s, first, y)
-        h = law.at(first, np.zeros(system.surface_count)).h
-        for k, s in enumerate(system.entries):
-            if mode[k] == "*" and not h[list(s)].any():
+#: Switching functions of a set that was held are zero at this part of what they are made of.
+_ON_SET = 1e-14
+
+
+class _Passage:
+    """Derivatives on their way along a run."""
+
+    def __init__(self, run: Trajectory, law: Variation):
+        self.run, self.law, self.system = run, law, run.system
+        size, q = self.system.extended_dimension, len(law.chosen)
+        self.y: Array = np.concatenate([np.eye(size), np.zeros((size, q))], axis=1)
+        self.times: list[float] = []
+        self.rows: list[Array] = []
+        self.dt_end: Array = np.zeros(size + q)
+        edges = [*run.steps.starts.tolist(), float(run.t[-1])]
+        #: Steps with a duration.
+        self._steps = [(k, a, b) for k, (a, b) in enumerate(pairwise(edges)) if a != b]
+
+    def follow(self) -> None:
+        """Carry the derivatives to the end."""
+        events = self.run.events
+        self._begin(events[0].mode_before)
+        k, leaving = 0, list[int]()
+        before: list[tuple[Array, Array]] = []
+        forward = self.run.t[-1] >= self.run.t[0]
+        for event, previous in zip(events, [None, *events[:-1]], strict=True):
+            mode = self.system.widened(event.mode_before)
+            while k < len(self._steps):
+                step, a, b = self._steps[k]
+                if (a >= event.t) if forward else (a <= event.t):
+                    break
+                c = np.asarray(self.run.steps.coefficients[step])
+                before.append((c[:, 0], self.y))
+                # Up to a hit rounding may leave no slip: what is lost there the hit takes away anyway.
+                moved = self.law.across(mode, c, b - a, self.y, leaving)
+                self.y, leaving, k = moved if np.all(np.isfinite(moved)) else self.y, [], k + 1
+            if event.kind in ("end", "stop"):
+                if event.kind == "stop":
+                    self._stop(mode, event)
+                continue
+            self._require_caused(event, previous)
+            leaving += self._pass(mode, event, before)
+            before = []
+
+    def _begin(self, spelled: str) -> None:
+        """Neighbours of a start on a set reach it at once."""
+        mode, x = self.system.widened(spelled), self._extended(self.run.x[0], self.run.t[0])
+        h = self.law.at(x).heights.value
+        for s in self.system.sets:
+            if mode[s[0]] == "s":
+                self.y = self.law.hit(mode, s, x, self.y)
+            elif not h[list(s)].any() and s not in self.law.idle:
                 raise DegenerateError(
                     "run: expected a start off the sets that it leaves, received one on h = 0. "
                     "Neighbours leave from elsewhere: start a little later."
                 )
-    else:
-        for s in _changed(system, before, mode):
-            if mode[system.entries.index(s)] == "s":
-                near = _extended(run, segment.first - 1)
-                rows.append(law.time_of_hit(before, s, near, y))
-                y = law.hit(mode, s, first, y)
-            else:
-                rows.append(law.time_of_exit(s, before, first, y))
-                leaving = s
-    edges = [*steps.starts[segment.first : segment.last].tolist(), segment.t_end]
-    for k, (a, b) in enumerate(pairwise(edges), segment.first):
-        c = np.asarray(steps.coefficients[k])
-        # Up to a hit rounding may leave no slip: what is lost there the hit takes away anyway.
-        moved = law.across(mode, c, b - a, y, leaving) if b > a else y
-        y, leaving = moved if np.all(np.isfinite(moved)) else y, None
-    return y, rows
+
+    def _extended(self, x: Array, t: float) -> Array:
+        return np.append(x, t) if self.system.time_dependent else np.asarray(x)
+
+    def _require_caused(self, event: Event, previous: Event | None) -> None:
+        """Refuse what has no derivative: corners, and infinitely many impacts."""
+        if event.kind == "contact":
+            raise DegenerateError(
+                f"run: expected finitely many impacts before a contact closes, received impacts on "
+                f"{event.name!r} that accumulate at t = {event.t:.10g}. End the run before, or give a "
+                "restitution of 0."
+            )
+        met = self._met(event)
+        if event.kind == "crossing" and len(met) > 1:
+            raise DegenerateError(
+                f"run: expected hits of sets and ends of sliding only, received {event.kind!r} at "
+                f"t = {event.t:.10g}. A set that is crossed exactly is a corner: perturb the start."
+            )
+        pairs = zip(event.mode_before, event.mode_after, self.system.entries, strict=False)
+        others = [s for a, b, s in pairs if a != b and a in "+-*" and s != met]
+        if event.kind in ("crossing", "entry", "exit", "release") and others:
+            other = f"h{self.system.entries.index(others[0])}"
+            raise DegenerateError(corner(event.t, event.name, other))
+        if previous is None or abs(event.t - previous.t) > TIE * max(1.0, abs(event.t)):
+            return
+        if event.kind not in ("reset", "impact") or not self._follows(event, previous):
+            raise DegenerateError(corner(event.t, previous.name, event.name))
+
+    def _follows(self, event: Event, previous: Event) -> bool:
+        """Whether neighbours meet an event at the instant of the one before, which led onto its zero."""
+        if _ends_sliding(previous):
+            return False
+        one = self._at(self.system.widened(previous.mode_before), previous)
+        other = self._at(self.system.widened(event.mode_before), event)
+        return parallel(other.gradient @ one.after_state, one.gradient)
+
+    def _met(self, event: Event) -> tuple[int, ...]:
+        """Switching functions of the surface or set that an event is named after."""
+        if event.kind not in ("crossing", "entry", "exit"):
+            return ()
+        return self.system.entries[int(event.name.removeprefix("lambda").removeprefix("h"))]
+
+    def _at(self, mode: str, event: Event) -> AtEvent:
+        """An event's function and the state after it, with derivatives."""
+        x, p, letters = self._extended(event.x, event.t), self.law.p, ""
+        if event.kind == "impact":
+            after = self._extended(event.x_after, event.t)
+            choice = lambda w: instant_map(self.system, mode, "impact", event.name, w)(x, p)
+            letters = struck_letters(self.system, mode, event.name, choice, after)
+        return instant_map(self.system, mode, event.kind, event.name, letters)(x, p)
+
+    def _pass(self, mode: str, event: Event, before: Sequence[tuple[Array, Array]]) -> list[int]:
+        """Carry the derivatives through an event; switching functions of the sets that are left there.
+
+        ``before`` are the states and derivatives at the steps since the last event.
+        """
+        x, following = self._extended(event.x, event.t), self.system.widened(event.mode_after)
+        met = self._met(event)
+        self.times.append(event.t)
+        if event.kind == "entry" and len(met) > 1:
+            self.rows.append(self._time_of_hit(mode, met, before))
+            self.y = self.law.hit(mode, met, x, self.y)
+        elif _ends_sliding(event):
+            j = self.system.impacts.index(event.name) if event.kind == "release" else 0
+            which = met or (self.system.surface_count + j,)
+            self.rows.append(self.law.time_of_exit(mode, which, x, self.y))
+        else:
+            self._jump(mode, following, event)
+        after = self._slip(mode, self._extended(event.x_after, event.t))
+        left = [s for s in self.system.sets if mode[s[0]] == "s" != following[s[0]]]
+        return [i for s in left if not after[list(s)].any() for i in s]
+
+    def _slip(self, mode: str, x: Array) -> Array:
+        """Switching functions at a state, zero to rounding where a set was held."""
+        h = self.law.at(x).heights
+        size = np.abs(h.x) @ np.abs(x)
+        held = [i for i, letter in enumerate(mode) if letter == "s"]
+        value = h.value.copy()
+        value[held] = np.where(np.abs(value) <= _ON_SET * size, 0.0, value)[held]
+        return value
+
+    def _time_of_hit(
+        self, mode: str, met: tuple[int, ...], before: Sequence[tuple[Array, Array]]
+    ) -> Array:
+        """Derivatives of the time of a hit: from two states close to it, for what is between them and the set
+        counts in proportion to |h|."""
+        r = [float(np.linalg.norm(self.law.at(x).heights.value[list(met)])) for x, _ in before]
+        near = [k for k, size in enumerate(r) if 0.0 < size <= _NEAR * r[0]][:2]
+        if len(near) < 2:
+            near = [k for k, size in enumerate(r) if size > 0.0][-2:]
+        found = [self.law.time_of_hit(mode, met, *before[k]) for k in near]
+        if not found:
+            return np.full(self.y.shape[1], np.nan)
+        if len(found) == 1 or r[near[0]] == r[near[1]]:
+            return found[-1]
+        one, other = (r[k] for k in near)
+        return np.asarray((one * found[1] - other * found[0]) / (one - other))
+
+    def _jump(self, mode: str, following: str, event: Event) -> None:
+        """Saltation, and the sets onto which a reset or impact leads."""
+        at, chosen = self._at(mode, event), self.law.chosen
+        x, after = self._extended(event.x, event.t), self._extended(event.x_after, event.t)
+        what = f"{event.name!r} at t = {event.t:.10g}"
+        n, rates = len(x), list[Array]()
+        for letters, state in ((mode, x), (following, after)):
+            here, _, _ = self.law.moving(letters, state, self._slip(mode, state))
+            rates.append(here.field.value)
+        s = saltation(at, rates[0], rates[1], what)
+        time = s.time_by_state @ self.y
+        time[n:] += s.time_by_parameters[chosen]
+        self.rows.append(time)
+        self.y = s.matrix @ self.y
+        self.y[:, n:] += s.by_parameters[:, chosen]
+        if event.kind in ("reset", "impact"):
+            for own in self.system.sets:
+                if following[own[0]] == "s":
+                    self.y = self.law.hit(following, own, after, self.y)
+
+    def _stop(self, mode: str, event: Event) -> None:
+        """Derivatives of the end and of its time."""
+        at, x = self._at(mode, event), self._extended(event.x, event.t)
+        rate = self.law.moving(mode, x)[0].field.value
+        s = saltation(at, rate, rate, f"{event.name!r} at t = {event.t:.10g}")
+        self.dt_end = s.time_by_state @ self.y
+        self.dt_end[len(x) :] += s.time_by_parameters[self.law.chosen]
+        self.y = self.y + np.outer(rate, self.dt_end)
 
 
-def _extended(run: Trajectory, k: int) -> Array:
-    """State at the start of a step."""
-    return np.asarray(run.steps.coefficients[k][:, 0])
-
-
-def _ended(run: Trajectory, law: Variation, y: Array) -> tuple[Array, Array]:
-    """Derivatives of the end, and of its time where a stop is met."""
-    stops = [e for e in run.events if e.kind == "stop"]
-    if not stops:
-        return y, np.zeros(y.shape[1])
-    system, last = run.system, run.segments[-1]
-    x = run.x[-1] if not system.time_dependent else np.append(run.x[-1], run.t[-1])
-    here, _, _ = law.moving(last.mode, x)
-    function = system.definition.guards[_stop(system, stops[-1])]
-    gradient = system.evaluate(
-        system.gradient(function), run.x[-1], run.parameters, float(run.t[-1])
-    ).ravel()
-    change = gradient @ y
-    by_p = system.evaluate(
-        system.parameter_gradient(function), run.x[-1], run.parameters, float(run.t[-1])
-    ).ravel()
-    change[len(x) :] += by_p[law.chosen]
-    dt = -change / (gradient @ here.f)
-    return y + np.outer(here.f, dt), dt
-
-
-def _stop(system: FilippovSystem, event: Event) -> int:
-    return [name for name, _ in system.stops].index(event.name)
+def _ends_sliding(event: Event) -> bool:
+    """Whether a multiplier or reaction came to its limit, where the field is continuous."""
+    return event.kind == "release" or event.name.startswith("lambda")

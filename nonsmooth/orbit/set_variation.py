@@ -1,0 +1,269 @@
+"""The variational equation of systems with sets of codimension two and three, and its jumps at the sets.
+
+Off a set the multiplier u = h/|h| moves with the state, du = (1 - u u^T) dh/|h|; on it lambda keeps h at
+zero, as multipliers of sliding surfaces and reactions of closed contacts do. The variational equation is
+integrated along the steps of the run by Gauss collocation, which stays accurate where du is stiff: next
+to the set.
+
+At a hit the derivatives by the time of the hit cancel: with h' = a - M lambda and B = df/dlambda
+
+    dx+ = (1 + B M^-1 grad h) dx,
+
+whatever the directions are from which neighbours come; what slides elsewhere is eliminated from a, M and
+B. At the end of sliding the field is continuous and dx+ = dx.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from functools import lru_cache
+
+import numpy as np
+
+from ..model import Array, DegenerateError, FilippovSystem, multiplier_enters, sliding_multipliers
+from ..model.frozen import Frozen
+from ..model.limit_directions import leaving_direction
+from ..model.mode_derivatives import AtMode, mode_derivatives
+
+#: Nodes of the collocation on each step.
+_NODES = 10
+
+#: A matrix of friction this close to a multiple of 1 is one.
+_ISOTROPIC = 1e-9
+
+#: Steps of Newton's method for multipliers that do not enter linearly together.
+_TURNS = 30
+
+#: A set is left tangentially where |h'| is below this part of its rates.
+_TANGENTIAL = 1e-8
+
+
+@lru_cache(maxsize=1)
+def _gauss() -> tuple[Array, Array, Array]:
+    """Nodes in (0, 1), and the integrals of Lagrange's polynomials up to each and up to 1."""
+    nodes = 0.5 * (np.polynomial.legendre.leggauss(_NODES)[0] + 1.0)
+    powers = np.vander(nodes, increasing=True)
+    degrees = np.arange(1, _NODES + 1)
+    upto = (nodes[:, None] ** degrees) / degrees
+    inner, outer = np.linalg.solve(powers.T, upto.T).T, np.linalg.solve(powers.T, 1.0 / degrees)
+    return nodes, np.asarray(inner), np.asarray(outer)
+
+
+class Variation:
+    """The variational equation of a system with sets.
+
+    Derivatives y are (N, N + q): by the extended start, then by the chosen parameters. Modes have a letter
+    for each switching function and contact.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    p : ndarray
+    chosen : sequence of int
+        Parameters by which is differentiated.
+
+    Attributes
+    ----------
+    acting : ndarray (A,)
+        What acts where ``moving`` was evaluated last.
+    """
+
+    def __init__(self, system: FilippovSystem, p: Array, chosen: Sequence[int]):
+        self.system, self.p, self.chosen = system, p, list(chosen)
+        self._of = mode_derivatives(system)
+        self._coupled = self._of.coupled
+        self.acting = np.zeros(self._of.size)
+        self.idle = [s for s in system.sets if not multiplier_enters(system, s, p)]
+
+    def at(self, x: Array, acting: Array | None = None) -> AtMode:
+        """Values at an extended state, with what acts there; nothing by default."""
+        given = np.zeros(self._of.size) if acting is None else acting
+        return self._of.at(x, given, self.p, self.chosen)
+
+    def moving(self, mode: str, x: Array, slip: Array | None = None) -> tuple[AtMode, Array, Array]:
+        """Values at a state of a mode, with the derivatives of what acts by states and parameters.
+
+        ``slip`` is h with all its digits, where it is known. A set that is left at h = 0 is left in
+        the direction in which the motion goes.
+        """
+        acting = np.zeros(self._of.size)
+        known = self._coupled.held(mode)[: self.system.surface_count]
+        acting[: len(known)] = known
+        by_state = np.zeros((self._of.size, len(x)))
+        by_p = np.zeros((self._of.size, len(self.chosen)))
+        h = self.at(x).heights
+        values = h.value if slip is None else slip
+        left = list[tuple[int, ...]]()
+        for s in self.system.sets:
+            own = list(s)
+            r = math.hypot(*values[own])
+            if mode[own[0]] != "*" or (r == 0.0 and s in self.idle):
+                continue
+            if r == 0.0:
+                left.append(s)
+                continue
+            acting[own] = u = values[own] / r
+            turn = (np.eye(len(own)) - np.outer(u, u)) / r
+            by_state[own], by_p[own] = turn @ h.x[own], turn @ h.p[own]
+        for s in left:
+            acting[list(s)] = self._direction(mode, s, x, acting)
+        here = self._balanced(mode, x, acting)
+        sliding, columns = self._sliding(mode)
+        if sliding:
+            slope, g = here.rates.a[np.ix_(sliding, columns)], here.rates
+            by_state[columns] = -np.linalg.solve(slope, g.along(by_state)[sliding])
+            by_p[columns] = -np.linalg.solve(slope, g.by_parameters(by_p)[sliding])
+        self.acting = acting
+        return here, by_state, by_p
+
+    def _sliding(self, mode: str, but: Sequence[int] = ()) -> tuple[list[int], list[int]]:
+        """What slides in a mode and is closed, and where its unknowns are among what acts."""
+        sliding = [i for i in self._coupled.sliding(mode) if i not in but]
+        return sliding, [self._of.column[i] for i in sliding]
+
+    def _balanced(self, mode: str, x: Array, acting: Array, but: Sequence[int] = ()) -> AtMode:
+        """Values with the unknowns of what slides, which are written into ``acting``."""
+        sliding, columns = self._sliding(mode, but)
+        here = self.at(x, acting)
+        if not sliding:
+            return here
+        linear = self._coupled.affine
+        if not linear:
+            acting[columns] = self._near(mode, x, columns)
+            here = self.at(x, acting)
+        for _ in range(1 if linear else _TURNS):
+            step = np.linalg.solve(
+                here.rates.a[np.ix_(sliding, columns)], here.rates.value[sliding]
+            )
+            acting[columns] -= step
+            here = self.at(x, acting)
+            if np.abs(step).max() <= 1e-16 * (1.0 + np.abs(acting).max()):
+                break
+        return here
+
+    def _near(self, mode: str, x: Array, columns: Sequence[int]) -> Array:
+        """Where Newton's method for multipliers that do not enter linearly begins: those nearby."""
+        if self.acting[list(columns)].any():
+            return np.asarray(self.acting[list(columns)])
+        found = sliding_multipliers(self._coupled, mode, x, self.p)
+        if len(found) != 1:
+            raise DegenerateError(
+                f"mode {self.system.spelled(mode)!r} at {x.tolist()}: expected one set of multipliers "
+                f"that keeps the sliding, received {len(found)}. Start elsewhere on the surface."
+            )
+        return np.asarray(found[0][self._coupled.sliding(mode)])
+
+    def frozen(self, mode: str, s: tuple[int, ...], x: Array, acting: Array) -> Frozen:
+        """The law h' = a - M lambda of a set, with what slides elsewhere eliminated."""
+        own, rest = list(s), acting.copy()
+        rest[own] = 0.0
+        rest[[self._of.column[i] for i in own]] = 0.0
+        here = self._balanced(mode, x, rest, but=own)
+        sliding, columns = self._sliding(mode, but=own)
+        g = here.rates
+        slope = g.a[np.ix_(own, own)]
+        if sliding:
+            back = np.linalg.solve(g.a[np.ix_(sliding, columns)], g.a[np.ix_(sliding, own)])
+            slope = slope - g.a[np.ix_(own, columns)] @ back
+        return Frozen(g.value[own], -slope)
+
+    def _direction(self, mode: str, s: tuple[int, ...], x: Array, acting: Array) -> Array:
+        law = self.frozen(mode, s, x, acting)
+        if not law.definite or np.abs(law.m - law.m.T).max() > 1e-12 * np.abs(law.m).max():
+            raise DegenerateError(
+                f"set h{self.system.entries.index(s)} at {x.tolist()}: expected friction that gives the "
+                "direction in which it is left, received a matrix that is not symmetric and positive "
+                "definite. Start off the set."
+            )
+        return leaving_direction(law.a, law.m)[1]
+
+    # along steps --------------------------------------------------------------------------------
+
+    def across(self, mode: str, c: Array, dt: float, y: Array, leaving: Sequence[int]) -> Array:
+        """Carry derivatives over a step with the Taylor coefficients c of the states.
+
+        ``leaving`` are switching functions of sets that are left at its start.
+        """
+        nodes, inner, outer = _gauss()
+        n, count = len(c), y.shape[1]
+        slips = self._slips(mode, c, dt * nodes, leaving)
+        matrix, right = np.eye(_NODES * n), np.zeros((_NODES * n, count))
+        for i, node in enumerate(nodes):
+            powers = (node * dt) ** np.arange(c.shape[1])
+            slip = None if slips is None else slips[:, i]
+            with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
+                here, by_state, by_p = self.moving(mode, c @ powers, slip)
+            jacobian = here.field.along(by_state)
+            rows = slice(i * n, (i + 1) * n)
+            for j in range(_NODES):
+                matrix[rows, j * n : (j + 1) * n] -= dt * inner[i, j] * jacobian
+            right[rows] = jacobian @ y
+            right[rows, n:] += here.field.by_parameters(by_p)
+        if not np.all(np.isfinite(matrix)):
+            return np.full_like(y, np.nan)
+        rates = np.linalg.solve(matrix, right).reshape(_NODES, n, count)
+        return np.asarray(y + dt * np.tensordot(outer, rates, 1))
+
+    def _slips(self, mode: str, c: Array, times: Array, leaving: Sequence[int]) -> Array | None:
+        """All h at times after sets were left, without the rounding of what is zero at the start."""
+        if not leaving:
+            return None
+        own, start = list(leaving), self.at(c[:, 0]).heights
+        series = start.x @ c
+        tangential = np.abs(series[own, 1]) <= _TANGENTIAL * np.abs(start.x[own]) @ np.abs(c[:, 1])
+        series[own, 0] = 0.0
+        series[np.array(own)[tangential], 1] = 0.0
+        found = np.empty((len(start.value), len(times)))
+        for i, t in enumerate(times):
+            x = c @ t ** np.arange(c.shape[1])
+            bent = self.at(x).heights.value - start.value - start.x @ (x - c[:, 0])
+            size = np.abs(start.x) @ np.abs(x)
+            bent[np.abs(bent) <= 64 * np.finfo(float).eps * size] = 0.0
+            linear = series @ t ** np.arange(c.shape[1])
+            found[:, i] = start.value + start.x @ (x - c[:, 0]) + bent
+            found[own, i] = (linear + bent)[own]
+        return found
+
+    # at sets ------------------------------------------------------------------------------------
+
+    def hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
+        """Derivatives after a set is reached, from those just before; ``mode`` is that before."""
+        held = "".join("s" if i in members else c for i, c in enumerate(mode))
+        here, _, _ = self.moving(held, x)
+        sliding, columns = self._sliding(held)
+        miss = here.heights.x @ y
+        miss[:, len(x) :] += here.heights.p
+        wanted = np.where(np.isin(sliding, members)[:, None], miss[sliding], 0.0)
+        back = np.linalg.solve(here.rates.a[np.ix_(sliding, columns)], wanted)
+        return np.asarray(y - here.field.a[:, columns] @ back)
+
+    def time_of_hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
+        """Derivatives of the time at which a set is reached, from close by; NaN if M is anisotropic."""
+        here, _, _ = self.moving(mode, x)
+        own = list(members)
+        u, law = self.acting[own], self.frozen(mode, members, x, self.acting)
+        a, c = law.a, float(np.trace(law.m)) / len(own)
+        if np.abs(law.m - c * np.eye(len(own))).max() > _ISOTROPIC * c:
+            return np.full(y.shape[1], np.nan)
+        dh = here.heights.x[own] @ y
+        dh[:, len(x) :] += here.heights.p[own]
+        return np.asarray((c * u + a) @ dh / (c * c - a @ a))
+
+    def time_of_exit(self, mode: str, which: Sequence[int], x: Array, y: Array) -> Array:
+        """Derivatives of the time at which |lambda| of a set or surface reaches 1, or a reaction 0."""
+        here, by_state, by_p = self.moving(mode, x)
+        own = [self._of.column[i] for i in which]
+        lam, n = self.acting[own], here.factors.value[list(which)]
+        g_x, g_p = by_state[own], by_p[own]
+        if which[0] < self.system.surface_count:
+            ratio = (lam / n)[:, None]
+            f = here.factors
+            g_x = (g_x - ratio * f.along(by_state)[list(which)]) / n[:, None]
+            g_p = (g_p - ratio * f.by_parameters(by_p)[list(which)]) / n[:, None]
+            g_x, g_p = (lam / n) @ g_x, (lam / n) @ g_p
+        else:
+            g_x, g_p = g_x[0], g_p[0]
+        change = g_x @ y
+        change[len(x) :] += g_p
+        return np.asarray(-change / (g_x @ here.field.value))

@@ -217,7 +217,22 @@ class Scaling:
     def from_stiffness(
         cls, ball: Ball, stiffness: float, convention: Literal["length", "speed"] = "length"
     ) -> Scaling:
-        """Make a scaling from the stiffness of the normal spring (N/m): $T = sqrt(m / stiffness)$."""
+        """Make a scaling from the stiffness of the normal spring (N/m): $T = sqrt(m / stiffness)$.
+
+        Parameters
+        ----------
+        ball : Ball
+            The ball.
+        stiffness : float
+            Of the normal spring, N/m.
+        convention : {"length", "speed"}, optional
+            As for the class.
+
+        Raises
+        ------
+        nonsmooth.ParameterError
+            A stiffness that is not positive.
+        """
         if not number(stiffness, "stiffness") > 0:
             raise ns.ParameterError(
                 f"stiffness: expected a positive number of N/m, received {stiffness!r}."
@@ -245,11 +260,23 @@ class Scaling:
         return GRAVITY * self.time / self.speed
 
     def state(self, landing: Landing) -> State:
-        """Return a landing at the origin in the model's units."""
+        """Return a landing in the model's units, at the origin.
+
+        Parameters
+        ----------
+        landing : Landing
+            In SI units.
+        """
         spin = landing.omega * self.ball.radius / self.speed
         return State(landing.xdot / self.speed, landing.ydot / self.speed, spin)
 
     def landing(self, state: State) -> Landing:
-        """Return a state's speeds and spin in SI units."""
+        """Return a state's speeds and spin in SI units.
+
+        Parameters
+        ----------
+        state : State
+            In the model's units.
+        """
         spin = state.omega * self.speed / self.ball.radius
         return Landing(state.xdot * self.speed, state.ydot * self.speed, spin)

@@ -35,10 +35,24 @@ class FrictionLaw(Parametrised, ABC):
 
     @abstractmethod
     def coefficient(self, s: Names, p: Names) -> Expression:
-        """Return the traction's magnitude while slipping."""
+        """Return the traction's magnitude while slipping.
+
+        Parameters
+        ----------
+        s, p : namespace
+            Symbols of the states, with ``s.slip``, and of the parameters.
+        """
 
     def traction(self, s: Names, p: Names, sign: Expression) -> Expression:
-        """Return the tangential force per unit of load where the slip has the sign ``sign``."""
+        """Return the tangential force per unit of load where the slip has the sign ``sign``.
+
+        Parameters
+        ----------
+        s, p : namespace
+            Symbols of the states, with ``s.slip``, and of the parameters.
+        sign : SX symbol
+            The sign of the slip; between -1 and 1 while the ball rolls.
+        """
         return -sign * self.coefficient(s, p)
 
     def vector_traction(
@@ -46,13 +60,27 @@ class FrictionLaw(Parametrised, ABC):
     ) -> Expression:
         """Return the tangential force per unit of load of a set-valued law in 3-D.
 
-        ``direction`` is the slip's, or inside its ball while rolling; ``coefficient`` that of the
-        contact model.
+        Parameters
+        ----------
+        s, p : namespace
+            Symbols of the states, with ``s.slip``, and of the parameters.
+        direction : SX (2,)
+            Direction of the slip; inside the unit circle while the ball rolls.
+        coefficient : expression
+            That of the contact model.
         """
         return -coefficient * direction
 
     def extra_rates(self, s: Names, p: Names, sign: Expression) -> dict[str, Expression]:
-        """Return the rates of ``extra_states`` where the slip has the sign ``sign``."""
+        """Return the rates of ``extra_states`` where the slip has the sign ``sign``.
+
+        Parameters
+        ----------
+        s, p : namespace
+            Symbols of the states, with ``s.slip``, and of the parameters.
+        sign : SX symbol
+            The sign of the slip.
+        """
         return {}
 
 

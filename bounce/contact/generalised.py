@@ -186,7 +186,19 @@ class GeneralisedContact(ContactModel):
 
 @dataclass(frozen=True)
 class Condition:
-    """One condition of the paper: its label there, "holds", "equality" or "fails", worst value."""
+    """One condition of the paper on the coefficients of a generalised model.
+
+    Attributes
+    ----------
+    name : str
+        What the condition says.
+    equation : str
+        Its label in the paper.
+    verdict : {"holds", "equality", "fails"}
+        What was found at the states that were looked at.
+    worst : float
+        The value that is nearest to breaking it, or breaks it most.
+    """
 
     name: str
     equation: str

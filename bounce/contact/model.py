@@ -135,31 +135,90 @@ class ContactModel(Parametrised, ABC):
 
     @abstractmethod
     def normal_force(self, s: Names, p: Names) -> Expression:
-        """Return the surface's force along y, positive in compression."""
+        """Return the surface's force along y, positive in compression.
+
+        Parameters
+        ----------
+        s : namespace
+            Symbols of the states: ``s.x``, ``s.xdot``, ``s.y``, ``s.ydot``, ``s.omega``, extra states.
+        p : namespace
+            Symbols of the parameters by name.
+
+        Returns
+        -------
+        expression
+            The force, in units of the model.
+        """
 
     @abstractmethod
     def tangential_force(self, s: Names, p: Names) -> Expression:
-        """Return the surface's force along x besides friction."""
+        """Return the surface's force along x besides friction.
+
+        Parameters
+        ----------
+        s, p : namespace
+            As for :meth:`normal_force`.
+
+        Returns
+        -------
+        expression
+            The force, in units of the model.
+        """
 
     def load(self, s: Names, p: Names) -> Expression:
-        """Return what ``mu`` multiplies; lift-off is its first downward zero."""
+        """Return what ``mu`` multiplies; lift-off is its first downward zero.
+
+        Parameters
+        ----------
+        s, p : namespace
+            As for :meth:`normal_force`.
+        """
         force = self.normal_force(s, p)
         return force - p.G * ca.cos(p.slope) if self.convention == "net" else force
 
     def lift_off(self, s: Names, p: Names) -> Expression:
-        """Return a function of the load's sign that crosses zero at lift-off."""
+        """Return a function of the load's sign that crosses zero at lift-off.
+
+        Parameters
+        ----------
+        s, p : namespace
+            As for :meth:`normal_force`.
+        """
         return self.load(s, p)
 
     def friction_coefficient(self, s: Names, p: Names) -> Expression:
-        """Return the friction coefficient at slip speed ``s.slip``."""
+        """Return the friction coefficient at slip speed ``s.slip``.
+
+        Parameters
+        ----------
+        s, p : namespace
+            As for :meth:`normal_force`, with ``s.slip``.
+        """
         return self.friction.coefficient(s, p)
 
     def extra_rates(self, s: Names, p: Names) -> dict[str, Expression]:
-        """Return the rates of ``extra_states``."""
+        """Return the rates of ``extra_states``.
+
+        Parameters
+        ----------
+        s, p : namespace
+            As for :meth:`normal_force`.
+
+        Returns
+        -------
+        dict of str to expression
+            A rate for each extra state.
+        """
         return {}
 
     def stored_energy(self, s: Names, p: Names) -> Expression | None:
-        """Return the elastic energy of the surface, or None where a model defines none."""
+        """Return the elastic energy of the surface, or None where a model defines none.
+
+        Parameters
+        ----------
+        s, p : namespace
+            As for :meth:`normal_force`.
+        """
         return None
 
     def limits_of_values(self) -> dict[str, str]:

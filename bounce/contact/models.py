@@ -134,7 +134,7 @@ def kelvin_voigt_restitution(d2: float) -> float:
     Returns
     -------
     float
-        The coefficient of restitution.
+        Normal speed at lift-off over that at touch-down, from 1 without damping to 0.
 
     Examples
     --------

@@ -131,7 +131,13 @@ class Contact3D(Parametrised):
         return SpaceEquations(self.model, tuple(self.values))
 
     def blueprint(self, weightless: bool | None = None) -> Self:
-        """Return the same kind of contact with default values, as :meth:`ContactModel.blueprint`."""
+        """Return the same kind of contact with default values, as :meth:`ContactModel.blueprint`.
+
+        Parameters
+        ----------
+        weightless : bool, optional
+            Whether to take it as one without gravity; by default what ``G`` says.
+        """
         copy = object.__new__(type(self))
         copy._set("model", self.model.blueprint(weightless))
         copy._set("values", dict.fromkeys(self.values, 0.0))
@@ -152,6 +158,11 @@ class Contact3D(Parametrised):
 
     def replace(self, **changes: Any) -> Self:
         """Return a copy with other parameters, of the model or of these.
+
+        Parameters
+        ----------
+        **changes : float
+            New values by name.
 
         Examples
         --------

@@ -56,7 +56,15 @@ class Measurements:
     left_out: tuple[tuple[int, str], ...]
 
     def keep(self, rows: NDArray[np.bool_], reasons: Mapping[int, str]) -> Measurements:
-        """Return a part of the rows; ``reasons`` says why the others are left out."""
+        """Return a part of the rows.
+
+        Parameters
+        ----------
+        rows : ndarray of bool (n,)
+            Which rows to keep.
+        reasons : mapping of int to str
+            Why the others, by their numbers, are left out.
+        """
         return Measurements(
             self.landing[rows],
             {name: values[rows] for name, values in self.lift_off.items()},

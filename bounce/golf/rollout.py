@@ -95,7 +95,7 @@ class Run:
     Attributes
     ----------
     bounces : tuple of Bounce
-        The bounces, in order.
+        In order; the last one has no hop after it.
     glides : tuple of Glide
         Sliding and rolling, in order; empty if the ball stops dead.
     time : float
@@ -217,7 +217,7 @@ def play(
     Returns
     -------
     Run
-        Every bounce and every stretch on the ground, until rest.
+        Every bounce, hop, slide and roll until rest, with their times, distances and cautions.
 
     Raises
     ------

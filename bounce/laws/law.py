@@ -91,7 +91,18 @@ class LandingRange:
         return np.logical_and.reduce(np.broadcast_arrays(*inside))
 
     def misses(self, xdot: float, ydot: float, spin: float) -> str:
-        """Say what of a landing is outside, or nothing."""
+        """Say what of a landing is outside, or nothing.
+
+        Parameters
+        ----------
+        xdot, ydot, spin : float
+            m/s and rad/s, as for :meth:`holds`.
+
+        Returns
+        -------
+        str
+            Empty for a landing inside.
+        """
         words = []
         for value, (low, high), what, unit, factor in self._pairs(xdot, ydot, spin):
             if not low <= value <= high:
@@ -164,18 +175,29 @@ class BounceLaw(Parametrised, ABC):
         return copy
 
     def replace(self, **changes: Any) -> Self:
-        """Return a copy with other parameters or options, and the same range of landings."""
+        """Return a copy with other parameters or options, and the same range of landings.
+
+        Parameters
+        ----------
+        **changes
+            New values by name.
+        """
         copy = super().replace(**changes)
         copy._set("covers", self.covers)
         return copy
 
     def caution(self, xdot: float, ydot: float) -> str:
-        """Say why the form of the law, whatever its numbers, does not hold for a landing, or nothing.
+        """Say why the form of the law, whatever its numbers, does not hold for a landing.
 
         Parameters
         ----------
         xdot, ydot : float
             m/s.
+
+        Returns
+        -------
+        str
+            Empty where it holds.
         """
         return ""
 

@@ -92,7 +92,13 @@ class TiltedBounce(BounceLaw):
         return replace(shot, xdot=xdot_off, ydot=ydot_off, slip=xdot_off + shot.omega)
 
     def caution(self, xdot: float, ydot: float) -> str:
-        """Say where the ball comes in beyond the normal of its tilted plane, or nothing."""
+        """Say where the ball comes in beyond the normal of its tilted plane, or nothing.
+
+        Parameters
+        ----------
+        xdot, ydot : float
+            m/s.
+        """
         angle = math.atan2(-ydot, abs(xdot))
         tilt = self.tilt(math.hypot(xdot, ydot), angle) if callable(self.tilt) else self.tilt
         steepest = math.pi / 2 - float(np.asarray(tilt))
@@ -133,7 +139,7 @@ def penner_restitution(speed: ArrayLike) -> Array:
     Returns
     -------
     ndarray (...)
-        The coefficient of restitution.
+        Normal speed after the impact over that before, relative to the tilted plane.
 
     Notes
     -----
@@ -229,5 +235,11 @@ class PennerBounce(BounceLaw):
         return self.tilted.lift_off(xdot, ydot, omega)
 
     def caution(self, xdot: float, ydot: float) -> str:
-        """As :class:`TiltedBounce`."""
+        """Say where the ball comes in beyond the normal of its tilted plane, or nothing.
+
+        Parameters
+        ----------
+        xdot, ydot : float
+            m/s.
+        """
         return self.tilted.caution(xdot, ydot)

@@ -41,7 +41,7 @@ class DividingCurve:
     Attributes
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     ydot : float
         Normal speed at touch-down.
     arcs : tuple of Arc
@@ -206,7 +206,7 @@ def dividing_curve(
     Parameters
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     ydot : float
         Normal speed at touch-down, negative.
     reach : float, optional
@@ -278,7 +278,7 @@ def critical_eta(
     Parameters
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     name : str, optional
         The parameter that is varied.
     bounds : (float, float), optional

@@ -67,7 +67,7 @@ def dividing_surface(
     Parameters
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     ydot : array_like (k,)
         Normal speeds at touch-down, $< 0$.
     reach, step, tol : float, optional

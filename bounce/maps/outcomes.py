@@ -30,7 +30,7 @@ class OutcomeMap:
     Attributes
     ----------
     model : ContactModel or BounceLaw
-        The contact model or law.
+        The surface, or a law in closed form.
     names : (str, str)
         Names of the two that vary.
     axes : (ndarray (m,), ndarray (n,))
@@ -110,7 +110,7 @@ def outcome_map(
     Parameters
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     over : mapping
         Two names with their values, e.g. ``{"xdot": speeds, "omega": spins}`` or
         ``{"eta": ratios, "omega": spins}``; the first is horizontal.

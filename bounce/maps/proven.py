@@ -24,7 +24,7 @@ class ProvenMap:
     Attributes
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     ydot : float
         Normal speed at touch-down.
     boxes : ndarray (m, 4)
@@ -54,7 +54,17 @@ class ProvenMap:
         }
 
     def at(self, xdot: float, omega: float) -> str:
-        """Outcome proven for a landing of the map.
+        """Return the outcome that is proven for a landing.
+
+        Parameters
+        ----------
+        xdot, omega : float
+            A landing inside the ranges of the map.
+
+        Returns
+        -------
+        str
+            One of ``OUTCOMES``; ``"undecided"`` where nothing is proven.
 
         Raises
         ------
@@ -95,7 +105,7 @@ def proven_map(
     Parameters
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     xdot, omega : (float, float)
         Ranges of the landing's speed and spin.
     ydot : float, optional

@@ -28,7 +28,7 @@ class BounceStatus(IntEnum):
 
     @property
     def advice(self) -> str:
-        """What it means."""
+        """The status in a sentence, with what to do."""
         return _ADVICE[self]
 
 

@@ -117,7 +117,7 @@ def slip_map(
     Parameters
     ----------
     model : ContactModel or Contact3D
-        The contact model.
+        The surface; a model of bounces in the plane is taken in 3-D.
     xdot : array_like (2,)
         Velocity along the ground at touch-down.
     omega : (array_like (m,), array_like (n,))
@@ -179,7 +179,7 @@ def winding_number(
     Parameters
     ----------
     model : ContactModel or Contact3D
-        The contact model.
+        The surface; a model of bounces in the plane is taken in 3-D.
     xdot : array_like (2,)
         Velocity along the ground at touch-down.
     centre : array_like (2,)

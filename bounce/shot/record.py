@@ -25,14 +25,30 @@ Point = TypeVar("Point")
 
 
 class Forces(NamedTuple):
-    """Load (what ``mu`` multiplies) and friction at the times asked for."""
+    """Forces on the ball at the times asked for.
+
+    Attributes
+    ----------
+    load : ndarray (...)
+        What ``mu`` multiplies: the surface's force, less gravity if the model says so.
+    friction : ndarray (...) or (..., 2)
+        The friction force along the ground, with its sign.
+    """
 
     load: Array
     friction: Array
 
 
 class Phase(NamedTuple):
-    """A stretch of the bounce: ``+`` forward slip, ``-`` reverse slip, ``s`` rolling, ``F`` free."""
+    """A stretch of the bounce in one mode.
+
+    Attributes
+    ----------
+    mode : str
+        ``+`` forward slip, ``-`` reverse slip, ``s`` rolling, ``F`` free of friction; in 3-D ``*`` slips.
+    t_start, t_end : float
+        Its times since touch-down.
+    """
 
     mode: str
     t_start: float

@@ -80,7 +80,7 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
 
     Examples
     --------
-    Without friction's help the normal speed depends on d2 alone, r = exp(-2 c cot c), c = arccos d2:
+    The normal speed depends on the damping d2 alone: $r = exp(-2 c cot c)$ with $c = arccos d2$.
 
     >>> import bounce
     >>> shot = bounce.simulate(bounce.NormalKelvinVoigt(mu=0.3, d2=0.1), 1.0, -1.0, 0.5, tol=1e-12)

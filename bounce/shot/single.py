@@ -22,7 +22,17 @@ Array = NDArray[np.float64]
 
 
 class State(NamedTuple):
-    """The ball at one instant: speeds, spin, position of its centre ($y = 0$ at touch-down)."""
+    """The ball at one instant.
+
+    Attributes
+    ----------
+    xdot, ydot : float
+        Velocity of the centre, along and normal to the ground.
+    omega : float
+        Spin, in units in which the contact point moves at ``xdot + omega``.
+    x, y : float
+        Position of the centre; ``y`` is 0 at touch-down.
+    """
 
     xdot: float
     ydot: float
@@ -43,7 +53,7 @@ class Shot(Record[ContactModel, State]):
     Attributes
     ----------
     model : ContactModel
-        The contact model.
+        The surface, with its friction.
     landing, lift_off : State
         Touch-down and lift-off.
     time : float
@@ -142,7 +152,7 @@ def simulate(
     Parameters
     ----------
     model : ContactModel or Contact3D
-        The contact model to bounce on.
+        The surface, with its friction.
     xdot, ydot, omega : float
         Speeds along and normal to the ground and spin at touch-down. ``ydot < 0``, unless the ball
         starts in the ground. In 3-D ``xdot`` and ``omega`` are pairs, forward and to the right:

@@ -138,7 +138,7 @@ class Shot3D(Record[Contact3D, State3D]):
         Returns
         -------
         State3D
-            The state at the times asked for.
+            Arrays of the shape of ``t``.
         """
         return state_3d(self(t), self.model.drilling)
 

@@ -75,14 +75,27 @@ class Grid:
 
     @property
     def shape(self) -> tuple[int, ...]:
+        """Lengths of the axes, in the order of the states; single numbers have none."""
         return tuple(len(a) for a in self._axes if a.ndim)
 
     @property
     def dimension(self) -> int:
+        """Number of states n."""
         return len(self._axes)
 
     def at(self, index: Index) -> Array:
-        """States (m, n) of the starts with the numbers (m,)."""
+        """Return some of the starts.
+
+        Parameters
+        ----------
+        index : ndarray of int (m,)
+            Their numbers, counted along the last axis first.
+
+        Returns
+        -------
+        ndarray (m, n)
+            Their states.
+        """
         where = iter(np.unravel_index(index, self.shape) if self.shape else ())
         columns = [a[next(where)] if a.ndim else np.full(len(index), a) for a in self._axes]
         return np.column_stack(columns)
@@ -91,7 +104,7 @@ class Grid:
         return f"Grid(shape {self.shape}, {self.dimension} states)"
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts depend on."""
+        """What the starts are made from, so that a checkpoint knows them again."""
         return "grid", [(a.shape, a.tobytes()) for a in self._axes]
 
 
@@ -166,21 +179,34 @@ class RandomStarts:
 
     @property
     def shape(self) -> tuple[int, ...]:
+        """The number of starts, ``(count,)``."""
         return (self.count,)
 
     @property
     def dimension(self) -> int:
+        """Number of states n."""
         return len(np.asarray(self.low))
 
     def at(self, index: Index) -> Array:
-        """States (m, n) of the starts with the numbers (m,)."""
+        """Return some of the starts.
+
+        Parameters
+        ----------
+        index : ndarray of int (m,)
+            Their numbers, from 0.
+
+        Returns
+        -------
+        ndarray (m, n)
+            Their states.
+        """
         low, high, n = np.asarray(self.low), np.asarray(self.high), self.dimension
         number = np.asarray(n * index[:, None] + np.arange(n), np.uint64)
         part = (_split_mix(np.uint64(self.seed), number) >> np.uint64(11)) * 2.0**-53
         return low + (high - low) * part
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts depend on."""
+        """What the starts are made from, so that a checkpoint knows them again."""
         low, high = np.asarray(self.low), np.asarray(self.high)
         return "random", self.count, low.tobytes(), high.tobytes(), self.seed
 

@@ -53,7 +53,7 @@ def ensemble(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        As for :func:`simulate`.
     x0 : array_like (..., n), Grid or RandomStarts
         Starts. Those that are not finite get the status NOT_FINITE; the others go on.
     t_end : float

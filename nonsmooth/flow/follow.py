@@ -60,7 +60,7 @@ def follow(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers.
     point : array_like (n,)
         Where the orbit starts.
     t_end : float

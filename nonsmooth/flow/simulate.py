@@ -46,7 +46,7 @@ def simulate(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With one surface, several, sets of higher codimension, or none.
     x0 : array_like (n,)
         Start; on a surface the mode follows from Filippov's convention.
     t_end : float
@@ -102,7 +102,7 @@ def simulate(
 
     Examples
     --------
-    Dry friction brings an oscillator to rest at t = 4 pi:
+    Dry friction brings an oscillator to rest at $t = 4 pi$:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> y1, y2, lam = (ca.SX.sym(s) for s in ("y1", "y2", "lam"))

@@ -8,7 +8,11 @@ from enum import IntEnum
 class Status(IntEnum):
     """Why a run ended.
 
-    The values are stable: ensembles store them in arrays and checkpoints.
+    It reached its end (REACHED_END) or a stop (STOPPED); its future is not unique (NON_UNIQUE); events
+    accumulate (ACCUMULATION); several surfaces meet where no motion is stable (INTERSECTION); steps
+    became too short (STEP_TOO_SMALL); a value is not finite (NOT_FINITE); a limit on events or steps was
+    reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot hold (INCONSISTENT). The message of a
+    run says more. The values are stable: ensembles store them in arrays and checkpoints.
     """
 
     REACHED_END = 0

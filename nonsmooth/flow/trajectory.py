@@ -54,7 +54,17 @@ class Event:
 @savable
 @dataclass(frozen=True)
 class Segment:
-    """A stretch of motion in one mode: steps ``first`` to ``last`` - 1."""
+    """A stretch of motion in one mode, between two events.
+
+    Attributes
+    ----------
+    mode : str
+        One letter for each surface, and one for each impact.
+    t_start, t_end : float
+        Its times.
+    first, last : int
+        Its steps are those with the numbers ``first`` to ``last - 1`` of ``Trajectory.steps``.
+    """
 
     mode: str
     t_start: float
@@ -192,6 +202,11 @@ class Trajectory(Savable):
             ``points`` and ``samples`` have the time as index and a column for each state; ``events``
             has time, kind, name, modes, and the states before and after (``x_after``, ...).
 
+        Returns
+        -------
+        pandas.DataFrame
+            With the names of the states as columns.
+
         Raises
         ------
         OptionError
@@ -201,6 +216,11 @@ class Trajectory(Savable):
 
     def to_xarray(self) -> Any:
         """Return a Dataset with ``x`` (t, state), and ``sample_x`` (sample, state) if there are any.
+
+        Returns
+        -------
+        xarray.Dataset
+            With the names of the states as a coordinate.
 
         Raises
         ------

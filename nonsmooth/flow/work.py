@@ -117,7 +117,7 @@ class Work:
 
     @property
     def workers(self) -> int:
-        """How many chunks run at once, as far as is known here."""
+        """Number of chunks at once: the threads, or as many as an executor is given ahead."""
         return (self.threads or _processors()) if self.executor is None else _IN_FLIGHT
 
 

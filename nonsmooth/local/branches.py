@@ -62,7 +62,7 @@ def sliding_branches(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With one surface or several; multipliers may enter nonlinearly.
     point : array_like (n,)
         A point on the sliding surfaces.
     mode : str, optional

@@ -157,7 +157,7 @@ def fold(
     side : {"+", "-"}
         Whose field: ``"+"`` is $F1$ (above), ``"-"`` is $F2$ (below).
     max_order : int, optional
-        Highest order of contact to look at.
+        Highest order of contact to look at, at least 2.
 
     Returns
     -------

@@ -42,7 +42,7 @@ def intersection_range(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With the surfaces that meet, and their multipliers.
     point : array_like (n,)
         A point on the surfaces.
     of : expression

@@ -211,7 +211,7 @@ class Meeting:
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With two surfaces or more.
     x : ndarray (N,)
     p : ndarray
     surfaces : list of int

@@ -85,7 +85,7 @@ def region(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With a surface, or a set of codimension two or three.
     point : array_like (n,)
         A point on the surface: $|h|/|grad h| <= tol (1 + |x|)$.
     parameters : mapping, optional

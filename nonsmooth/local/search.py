@@ -157,7 +157,7 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
     Returns
     -------
     list
-        The points found, each once.
+        What the search returned, each once, in the order of the starts.
 
     Examples
     --------

@@ -10,7 +10,7 @@ from .reading import Expression
 
 @dataclass(frozen=True)
 class Stop:
-    """A surface that ends a run.
+    """A surface that ends a run, with the status STOPPED.
 
     Parameters
     ----------
@@ -20,6 +20,15 @@ class Stop:
         Only when falling, either way, only when rising.
     name : str
         Shown in events and messages.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x = ca.SX.sym("x")
+    >>> falling = ns.FilippovSystem([x], field=[-1], stops=ns.Stop(x - 2, name="floor"))
+    >>> run = ns.simulate(falling, [5.0], t_end=10.0)
+    >>> run.status.name, run.events[-1].name, run.events[-1].t
+    ('STOPPED', 'floor', 3.0)
     """
 
     function: Expression
@@ -41,6 +50,18 @@ class Reset:
         Only when falling, either way, only when rising.
     name : str
         Shown in events and messages.
+
+    Examples
+    --------
+    A mass that keeps four fifths of its speed at the floor:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> y, v = ca.SX.sym("y"), ca.SX.sym("v")
+    >>> hit = ns.Reset(y, [y, -0.8 * v], direction=-1, name="floor")
+    >>> mass = ns.FilippovSystem([y, v], field=[v, -2.0], resets=hit)
+    >>> run = ns.simulate(mass, [1.0, 0.0], t_end=1.5)
+    >>> round(run.events[0].t, 12), (run.events[0].x_after.round(12) + 0.0).tolist()
+    (1.0, [0.0, 1.6])
     """
 
     function: Expression

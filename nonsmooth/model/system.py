@@ -309,13 +309,13 @@ class FilippovSystem(Structure):
     # numeric -----------------------------------------------------------------------------------
 
     def cached(self, key: Hashable, build: Callable[[], T]) -> T:
-        """Return what was built for a key, or build it; the last 256 things are kept."""
+        """Return what is kept for ``key``, or what ``build`` makes; the last 256 things are kept."""
         return self._cache.get(key, build)
 
     def function(
         self, key: Hashable, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
     ) -> ca.Function:
-        """Return the cached CasADi function of states and parameters that ``build()`` gives."""
+        """Return the function of ``states`` and parameters that ``build`` makes; it is kept for ``key``."""
 
         def made() -> ca.Function:
             outputs = [ca.densify(ca.SX(e)) for e in build()]
@@ -388,7 +388,7 @@ class FilippovSystem(Structure):
         return consistent_parameters(self.definition, self.parameter_names, parameters)
 
     def extended_point(self, point: ArrayLike, t: float = 0.0) -> Array:
-        """Check a state and append the time where the system depends on it.
+        """Check the state ``point`` and append ``t`` where the system depends on time.
 
         Raises
         ------

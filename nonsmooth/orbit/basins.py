@@ -91,7 +91,18 @@ class Basins(Savable):
         return {k: float(np.sqrt(p * (1 - p) / size)) for k, p in self.fractions.items()}
 
     def name(self, label: int) -> str:
-        """What a label means, in words."""
+        """Say what a label means.
+
+        Parameters
+        ----------
+        label : int
+            An entry of ``labels``.
+
+        Returns
+        -------
+        str
+            For example ``"attractor 2"`` or ``"undecided"``.
+        """
         return _NAMES.get(label, f"attractor {label}")
 
     def __repr__(self) -> str:
@@ -122,7 +133,7 @@ def basins(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers; where it depends on time, periodically.
     grid : mapping or array_like (..., n)
         Starts; or for each state, by name, a number or the values (k,) of an axis.
     t_end : float
@@ -174,7 +185,7 @@ def basins(
     >>> [a.points[0].round(3).tolist() for a in found.attractors], found.labels.tolist()
     ([[1.0, 0.0], [-1.0, -0.0]], [1, 2, 2, 2, 2, 2, -1, 1, 1, 1, 1, 1, 2])
 
-    At rest on the edge, x = 0, both futures are possible: -1 says that.
+    At rest on the edge, $x = 0$, both futures are possible: -1 says that.
     """
     require_system(system)
     starts, axes = _starts(system, grid)

@@ -50,7 +50,7 @@ class CodimensionTwo:
     Attributes
     ----------
     kind : str
-        Which point of codimension two it is.
+        What it is, such as ``"cusp"``, or both events that happen at once.
     values : ndarray (2,)
         Of the two parameters.
     solution
@@ -72,7 +72,7 @@ class BifurcationCurve:
     Attributes
     ----------
     kind : str
-        Of the bifurcation.
+        Of the bifurcation, as in ``BranchEvent.kind``.
     parameters : tuple of two str
         Names of the two parameters.
     values : ndarray (k, 2)
@@ -96,7 +96,13 @@ class BifurcationCurve:
     curve: EventCurve | ConnectionCurve
 
     def solution(self, k: int) -> Any:
-        """The equilibrium or orbit at a point of the curve."""
+        """Return the equilibrium or orbit at a point of the curve.
+
+        Parameters
+        ----------
+        k : int
+            Number of the point: a row of ``values``.
+        """
         return self.curve.base.describe(self.points[k])
 
     def __len__(self) -> int:
@@ -249,7 +255,7 @@ def continue_bifurcation(
 
     Examples
     --------
-    The cusp x' = a + b x - x^3: folds lie on 4 b^3 = 27 a^2.
+    The cusp $x' = a + b x - x^3$: folds lie on $4 b^3 = 27 a^2$.
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y, a, b = (ca.SX.sym(s) for s in ("x", "y", "a", "b"))

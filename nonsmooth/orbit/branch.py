@@ -20,7 +20,13 @@ from .continuation import Point
 
 
 class BranchEnd(Enum):
-    """Why a branch ends."""
+    """Why a branch ends.
+
+    It reached a bound of the parameter (REACHED_BOUND), closed (CLOSED), met an event that nothing
+    continues (EVENT), has a period that diverges (PERIOD_DIVERGES), needs shorter steps than there are
+    (STEP_TOO_SMALL), has the number of points asked for (TOO_MANY_POINTS), or was interrupted
+    (INTERRUPTED).
+    """
 
     REACHED_BOUND = "bound"
     CLOSED = "closed"
@@ -35,7 +41,7 @@ class BranchEnd(Enum):
 
     @property
     def advice(self) -> str:
-        """What it means, in a sentence."""
+        """The reason in a sentence, with what to do."""
         return _ADVICE[self]
 
 
@@ -141,6 +147,8 @@ class Branch:
         In their order along the branch.
     ends : tuple of two BranchEnd
         Why it ends at its first and its last point.
+    nodes : tuple of (curve, Point)
+        For each solution the equations and the point of their curve.
     """
 
     parameter: str
@@ -159,7 +167,17 @@ class Branch:
         return len(self.values)
 
     def at(self, value: float) -> list[Any]:
-        """Solutions at a value of the parameter, solved for; in their order along the branch.
+        """Solve for the solutions at a value of the parameter.
+
+        Parameters
+        ----------
+        value : float
+            Of the parameter.
+
+        Returns
+        -------
+        list
+            Equilibria or orbits, in their order along the branch.
 
         Raises
         ------

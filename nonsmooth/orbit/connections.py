@@ -45,15 +45,15 @@ class Connection:
     system : FilippovSystem
         Whose orbit it is.
     parameter : str
-        That was varied.
+        Name of the parameter that was varied.
     value : float
         Of that parameter at the connection.
     parameters : dict of str to float
         All of them there.
     saddle : Equilibrium or PseudoEquilibrium
-        There.
+        The saddle at that value.
     legs : tuple of OrbitLeg
-        Of the orbit. One that approaches the saddle for ever begins and ends close to it.
+        Those of the orbit. One that approaches the saddle for ever begins and ends close to it.
     iterations : int
         Evaluations of the equations.
     residual : float
@@ -61,9 +61,9 @@ class Connection:
     faults : tuple of str
         What its guards contradict; empty unless it is virtual.
     loop : Loop
-        Its equations, and
+        Its equations.
     unknowns : ndarray
-        what solves them: from these ``continue_bifurcation`` starts.
+        What solves them; from these ``continue_bifurcation`` starts.
     """
 
     system: FilippovSystem

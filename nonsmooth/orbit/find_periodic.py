@@ -59,7 +59,7 @@ def periodic_orbit(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers; it may slide, jump, hit, and depend periodically on time.
     guess : Trajectory, state (n,) or PeriodicOrbit
         A run whose end is near the orbit; a state near it, from which the system is simulated; an
         orbit at other parameters, whose itinerary is kept.
@@ -110,8 +110,8 @@ def periodic_orbit(
 
     Examples
     --------
-    A relay that is forced to cross, with c = 2.5 cos(phase) at the crossing and sin(phase) = -pi/5: its
-    multiplier is ((c - 1)/(c + 1))^2.
+    A relay that is forced to cross, at a phase $phi$ with $sin phi = -pi/5$. With $c = 2.5 cos phi$ its
+    multiplier is $((c - 1)/(c + 1))^2$.
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, t = ca.SX.sym("x"), ca.SX.sym("t")

@@ -93,7 +93,7 @@ def continue_equilibrium(
 
     Examples
     --------
-    A pseudo-saddle-node of the sliding flow x' = mu - x^2 on y = 0:
+    A pseudo-saddle-node of the sliding flow $x' = mu - x^2$ on $y = 0$:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))

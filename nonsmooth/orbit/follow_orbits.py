@@ -73,8 +73,8 @@ def continue_orbit(
 
     Examples
     --------
-    A relay that is forced, x' = A cos t - sgn x: crossing orbits end to cross at
-    A = sqrt(1 + pi^2/4), below which they slide.
+    A relay that is forced, $x' = A cos t - sgn x$: crossing orbits end to cross at
+    $A = sqrt(1 + pi^2/4)$, below which they slide.
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))

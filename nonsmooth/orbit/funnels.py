@@ -48,7 +48,7 @@ class Funnel:
     t : float
         When the future stops being unique.
     point : ndarray (n,)
-        Where.
+        The state at which it stops being unique.
     cause : str
         Why, in words.
     two_fold : TwoFold or None

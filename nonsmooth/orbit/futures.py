@@ -93,7 +93,7 @@ def funnel(
 
     Examples
     --------
-    x' = sgn x from 0 can be anywhere in abs(x) <= t:
+    An orbit of $x' = sgn x$ from 0 can be anywhere in $abs(x) <= t$:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x = ca.SX.sym("x")

@@ -105,7 +105,7 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers.
     mode, following : str
     name : str
         Of the event, where the letters do not tell it: a reset, a stop, an impact.
@@ -178,9 +178,9 @@ class FixedItinerary:
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers.
     word : str or sequence of str
-        Modes in order, e.g. ``"+ s"``.
+        Modes in order, e.g. ``"+ s"``; ``modes`` has them one by one.
     until : str or expression
         What ends the last leg: the name of an event, or a function of states, parameters and time.
         What else its guards say is a fault, not an end.
@@ -225,6 +225,11 @@ class FixedItinerary:
             The states at the start.
         t_start : float, optional
             Time at the start.
+
+        Returns
+        -------
+        Arrival
+            Its end ``x`` and ``t``, its legs, and ``fault``: what guards contradict, or nothing.
 
         Raises
         ------
@@ -299,7 +304,14 @@ class FixedItinerary:
     def leg(
         self, mode: str, t: float, x: Array, until: object, t_end: float | None = None
     ) -> Trajectory:
-        """Follow one mode to one of some events, or to a time.
+        """Follow one mode from a time and state to one of some events, or to a time.
+
+        Parameters
+        ----------
+        mode, t, x
+            The mode, whatever its guards say, and the start.
+        until, t_end
+            The events, and the time that ends it in place of an event.
 
         Raises
         ------
@@ -341,7 +353,7 @@ class FixedItinerary:
         )
 
     def derivative(self, arrival: Arrival) -> tuple[Array, Array]:
-        """Derivatives of the end by the start, at a fixed duration of the last leg and at its event.
+        """Derivatives of the end of an ``arrival`` by its start.
 
         Returns
         -------

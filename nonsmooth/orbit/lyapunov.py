@@ -104,7 +104,7 @@ def lyapunov_spectrum(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers; an attractor is reached from the start.
     x0 : array_like (n,)
         States at the start.
     t_end : float

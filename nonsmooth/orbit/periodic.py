@@ -141,7 +141,7 @@ class PeriodicOrbit:
 
     @property
     def period(self) -> float:
-        """Of the whole orbit."""
+        """Duration of the whole orbit, in the system's unit of time."""
         return float(self.evaluation.durations.sum()) * (2 if self.symmetric else 1)
 
     @property
@@ -198,18 +198,22 @@ class PeriodicOrbit:
 
     @property
     def half_multipliers(self) -> NDArray[np.complex128]:
-        """Of the map of the legs: of a symmetric orbit the half map with the mirror."""
+        """Multipliers of the map of the legs that were solved for.
+
+        Of an orbit with a symmetry these are those of half the orbit, mirrored back; otherwise
+        ``multipliers``.
+        """
         return self.floquet.of_map
 
     @property
     def monodromy(self) -> Array:
-        """Derivative of the flow over one period at the start; with the time if there is forcing."""
+        """Derivative of the flow over one period by the start, (n, n); with the time if there is forcing."""
         matrix = self.floquet.matrix
         return matrix @ matrix if self.symmetric else matrix
 
     @property
     def structural(self) -> tuple[str, ...]:
-        """Which multipliers are exact, and why."""
+        """Which multipliers are known exactly, and why, in words."""
         of = "the time" if self.system.time_dependent else "the flow"
         result = [f"1: along {of}"]
         if self.floquet.zeros:
@@ -223,18 +227,23 @@ class PeriodicOrbit:
 
     @property
     def stability(self) -> str:
-        """In words."""
+        """Stability in words, such as ``"asymptotically stable"``."""
         return stability(self.floquet.values, self.error_estimate)
 
     @property
     def residual(self) -> float:
-        """Largest entry of the equations."""
+        """Largest entry that is left of the equations that were solved."""
         return float(np.abs(self.evaluation.residual).max())
 
     # neighbours ---------------------------------------------------------------------------------
 
     def derivative(self, parameter: str) -> OrbitDerivative:
         """Derivatives of the orbit by a parameter.
+
+        Parameters
+        ----------
+        parameter : str
+            Its name.
 
         Raises
         ------

@@ -158,7 +158,7 @@ def poincare(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers.
     section : expression, str, number or Section
         A function of states, parameters and time; a name of a surface, reset or impact, or a kind of
         event; a period. See :class:`Section`.
@@ -193,7 +193,7 @@ def poincare(
 
     Examples
     --------
-    Returns of a spiral whose radius shrinks by exp(-2 pi/10) each turn:
+    Returns of a spiral whose radius shrinks by $exp(-2 pi/10)$ each turn:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")

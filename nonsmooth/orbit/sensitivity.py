@@ -58,7 +58,9 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
         An event that is grazed, two independent events at one instant, impacts that accumulate, a
         status without an end.
     ParameterError
-        An unknown or missing parameter, or one that is not a finite number.
+        An unknown name in ``wrt``.
+    OptionError
+        No run of :func:`simulate`, or one without a step.
 
     Notes
     -----
@@ -66,7 +68,7 @@ def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameter
 
     Examples
     --------
-    A mass dropped from the height y meets the floor at t = sqrt(y) with v = -2 sqrt(y):
+    A mass dropped from the height y meets the floor at $t = sqrt(y)$ with $v = -2 sqrt(y)$:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> y, v, r = (ca.SX.sym(s) for s in "yvr")
@@ -92,7 +94,7 @@ class Gradient:
     Attributes
     ----------
     value : float
-        The quantity whose gradient it is.
+        Of the cost.
     x0 : ndarray (n,)
         Derivatives by the start.
     parameters : dict of str to float
@@ -132,9 +134,11 @@ def gradient(
     DegenerateError
         As :func:`sensitivity`.
     DefinitionError, NotSmoothError
-        The cost.
+        A cost with foreign symbols, or with a kink or a jump.
+    OptionError
+        As :func:`sensitivity`.
     ParameterError
-        An unknown or missing parameter, or one that is not a finite number.
+        An unknown name in ``wrt``.
 
     Examples
     --------
@@ -258,7 +262,7 @@ def saltation_matrix(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        The one with the event.
     before, after : str
         Modes.
     point : array_like (n,)
@@ -273,7 +277,7 @@ def saltation_matrix(
     Returns
     -------
     ndarray (n, n)
-        The factor by which an event multiplies small deviations.
+        It maps small deviations of the state before the event to those after it.
 
     Raises
     ------

@@ -37,7 +37,7 @@ class TraceError(ConvergenceError):
     Attributes
     ----------
     value : float
-        The value at which it failed.
+        Of the parameter or state, at which no two-fold was found.
     folds : list of TwoFold
         Those found before.
     residual, point

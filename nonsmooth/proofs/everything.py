@@ -51,7 +51,7 @@ def prove_all(
     Parameters
     ----------
     system : FilippovSystem
-        The system the question is about.
+        With scalar multipliers, and with operations that interval arithmetic knows.
     box : sequence of n pairs (low, high)
         For each state its range; a number holds a state at that value. As many states must be left
         free as there are equations: 3 for two-folds, 2 for folds, all for points of rest.

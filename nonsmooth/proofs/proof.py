@@ -51,7 +51,7 @@ class Proof:
         For two-folds ``nu1``, ``nu2``, ``Delta``, ``T`` and the eigenvalues; the second
         derivatives ``L11`` ... ; for equilibria the eigenvalues and h.
     parameters : mapping of str to Enclosure
-        For which it holds.
+        Values or ranges for which it holds.
     pieces : tuple of Proof
         What is proven where, if the parameters had to be divided.
     bits : int
@@ -85,6 +85,11 @@ class Proof:
 
         ``python checker FILE`` (in the repository) checks it; that program shares no code with the
         one that proved it and needs nothing but Python.
+
+        Parameters
+        ----------
+        path : str or Path
+            Where to write it.
         """
         records = [p.record for p in self.pieces] or [self.record]
         text: dict[str, Any] = {"proofs": records}

@@ -76,6 +76,11 @@ class Reference:
     def agrees(self, computed: ArrayLike) -> bool:
         """Whether a computed value is within the tolerance.
 
+        Parameters
+        ----------
+        computed : float or array_like
+            The value to compare with the answer.
+
         Examples
         --------
         >>> Reference("period", 2.0, 1e-9, "time between crossings").agrees(2 + 1e-10)
@@ -201,7 +206,7 @@ class Problem:
         Returns
         -------
         Trajectory
-            The run of its example.
+            From ``start`` to ``t_end``, with what ``at`` replaces.
         """
         x, p = self.start_at(at or {})
         end = self.t_end if t_end is None else t_end

@@ -1,5 +1,6 @@
 """Every public name is on one page of the API, and all it takes, has, returns and raises is described."""
 
+import dataclasses
 import html
 import importlib.util
 import inspect
@@ -52,6 +53,49 @@ def test_every_parameter_attribute_result_and_error_is_described(path):
         where: bare for where, doc in docstrings(path, OBJECTS[path]) if (bare := undescribed(doc))
     }
     assert missing == {}
+
+
+def entries(doc):
+    """Names that a docstring's lists have, or that its text says as ``name``."""
+    said = set(re.findall(r"``(\w+)``", doc))
+    heads = re.findall(
+        r"^(\*{0,2}\w+(?:, \*{0,2}\w+)*)(?: : .*)?$", inspect.cleandoc(doc), re.MULTILINE
+    )
+    return said | {name.strip(" *") for head in heads for name in head.split(",")}
+
+
+def wanted(path, thing):
+    """Parameters of functions and methods, and fields of results; those of overrides are their base's."""
+    if not inspect.isclass(thing):
+        return [(path, thing.__doc__, [*inspect.signature(thing).parameters])]
+    found = []
+    if not issubclass(thing, Exception):
+        fields = (
+            [f.name for f in dataclasses.fields(thing)] if dataclasses.is_dataclass(thing) else []
+        )
+        fields += getattr(thing, "_fields", ())
+        own = {
+            n for base in thing.__mro__ for n, m in vars(base).items() if isinstance(m, property)
+        }
+        found = [
+            (path, thing.__doc__, [f for f in fields if not f.startswith("_") and f not in own])
+        ]
+    for name, member in vars(thing).items():
+        function = getattr(member, "__func__", member)
+        inherited = any(name in vars(base) for base in thing.__mro__[1:])
+        if not name.startswith("_") and inspect.isfunction(function) and not inherited:
+            names = [p for p in inspect.signature(function).parameters if p not in ("self", "cls")]
+            found.append((f"{path}.{name}", function.__doc__, names))
+    return found
+
+
+@pytest.mark.parametrize("path", OBJECTS)
+def test_no_parameter_and_no_field_is_left_out(path):
+    missing = {
+        where: [name for name in names if name not in entries(doc or "")]
+        for where, doc, names in wanted(path, OBJECTS[path])
+    }
+    assert {where: names for where, names in missing.items() if names} == {}
 
 
 def test_what_is_undescribed_is_seen():
@@ -107,8 +151,10 @@ PLAIN_FORMULA = re.compile(
 
 
 def prose(doc):
-    """The text of a docstring, without examples, heads of entries, code and formulas that are marked."""
-    text = inspect.cleandoc(doc).partition("\nExamples\n---")[0]
+    """The text of a docstring, without heads of entries, code and formulas that are marked."""
+    text, _, examples = inspect.cleandoc(doc).partition("\nExamples\n")
+    paragraphs = re.split(r"\n\s*\n", examples.lstrip("-\n"))
+    text = "\n\n".join([text, *(p for p in paragraphs if not p.lstrip().startswith(">>>"))])
     return MARKED.sub("", re.sub(r"^[\w*, ]+ : .*$|^-+$", "", text, flags=re.MULTILINE))
 
 

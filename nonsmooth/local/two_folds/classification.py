@@ -158,7 +158,15 @@ class Slopes:
     high: float = math.nan
 
     def contains(self, slope: float, tol: float = 1e-9) -> bool:
-        """Whether an orbit of this slope connects; a single slope is met within relative tol."""
+        """Whether an orbit of this slope connects.
+
+        Parameters
+        ----------
+        slope : float
+            $m = z3/z2$.
+        tol : float, optional
+            A single slope is met within this relative distance.
+        """
         if self.kind == "one":
             return abs(slope - self.low) <= tol * (1 + abs(self.low))
         return (

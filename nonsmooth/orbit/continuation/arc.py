@@ -226,7 +226,21 @@ class _Tracing:
 
 
 def ahead(rows: Sequence[Array], size: float, tangent: Array) -> Array:
-    """Guess for the point ``size`` ahead: the polynomial in arclength through the last points.
+    """Guess the point ahead: the polynomial in arclength through the last points.
+
+    Parameters
+    ----------
+    rows : sequence of ndarray (N,)
+        The last points, the newest at the end.
+    size : float
+        How far ahead.
+    tangent : ndarray (N,)
+        The direction that is taken where there are fewer than three points.
+
+    Returns
+    -------
+    ndarray (N,)
+        The guess.
 
     Examples
     --------

@@ -79,41 +79,112 @@ class Curve:
     branching: bool = False
 
     def equations(self, u: Array) -> tuple[Array, Array]:
-        """Values (N - 1,) and their Jacobian (N - 1, N)."""
+        """Return the values of the equations and their Jacobian; what a subclass must give.
+
+        Parameters
+        ----------
+        u : ndarray (N,)
+            The unknowns.
+
+        Returns
+        -------
+        values, jacobian : ndarray (N - 1,), (N - 1, N)
+            Zero on the curve, and the derivatives by the unknowns.
+        """
         raise NotImplementedError
 
     def fault(self, u: Array) -> str:
-        """Why a zero of the equations is not a point of the curve; empty if it is one."""
+        """Say why a zero of the equations is not a point of the curve; empty if it is one.
+
+        Parameters
+        ----------
+        u : ndarray (N,)
+            The unknowns.
+        """
         return ""
 
     def tests(self, point: Point) -> Mapping[str, float]:
-        """Functions whose zeros along the curve are located."""
+        """Return the functions whose zeros along the curve are located.
+
+        Parameters
+        ----------
+        point : Point
+            A point of the curve.
+
+        Returns
+        -------
+        mapping of str to float
+            Their values by name.
+        """
         return {}
 
     def ends(self, name: str) -> bool:
-        """Whether the curve ends at a zero of this test."""
+        """Whether the curve ends at a zero of a test.
+
+        Parameters
+        ----------
+        name : str
+            Of the test.
+        """
         return False
 
     def singular(self, name: str) -> bool:
-        """Whether the equations are singular at a zero of this test, so that it is interpolated."""
+        """Whether the equations are singular at a zero of a test, so that it is interpolated.
+
+        Parameters
+        ----------
+        name : str
+            Of the test.
+        """
         return name == "branch point"
 
     def renewed(self, point: Point) -> Point | None:
-        """The same point of better equations, e.g. on a new section; None to keep these."""
+        """Return the same point of better equations, e.g. on a new section; None to keep these.
+
+        Parameters
+        ----------
+        point : Point
+            The newest point.
+        """
         return None
 
     def out(self, u: Array) -> str:
-        """Why the curve need not be followed beyond a point; empty if it is."""
+        """Say why the curve need not be followed beyond a point; empty if it is followed.
+
+        Parameters
+        ----------
+        u : ndarray (N,)
+            The unknowns.
+        """
         return ""
 
     def snap(self, u: Array, tangent: Array, reach: float) -> Array | None:
-        """The end of the curve ahead within ``reach``, solved for, where it is known what ends it."""
+        """Solve for the end of the curve, where it is known what ends it; None if it is not near.
+
+        Parameters
+        ----------
+        u, tangent : ndarray (N,)
+            The newest point, and the way ahead in scaled unknowns.
+        reach : float
+            How far ahead to look.
+        """
         return None
 
     # what follows from the equations ------------------------------------------------------------
 
     def scaled(self, u: Array) -> tuple[Array, Array]:
-        """Values and Jacobian by scaled unknowns, from scaled unknowns."""
+        """Return values and Jacobian by scaled unknowns.
+
+        Parameters
+        ----------
+        u : ndarray (N,)
+            Scaled unknowns.
+
+        Returns
+        -------
+        values, jacobian : ndarray (N - 1,), (N - 1, N)
+            As of :meth:`equations`.
+        """
         values, jacobian = self.equations(u * self.scale)
         return values, jacobian * self.scale
 
@@ -158,7 +229,19 @@ class Curve:
         return None if found is None else found * self.scale
 
     def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
-        """Describe a zero of the equations: tangent, along ``before``, and tests; None if it fails."""
+        """Describe a zero of the equations: its tangent and its tests; None if that fails.
+
+        Parameters
+        ----------
+        u : ndarray (N,)
+            The zero.
+        before : ndarray (N,)
+            The tangent before, along which the new one points.
+        chord : ndarray (N,)
+            The direction from the last point, which stands for the tangent without derivatives.
+        arclength : float
+            From the start of the arc, in scaled unknowns.
+        """
         if not self.exact:
             plain = Point(u, chord, arclength)
             return Point(u, chord, arclength, tests=dict(self.tests(plain)))
@@ -176,7 +259,19 @@ class Curve:
         return Point(u, tangent, arclength, jacobian, tests)
 
     def solve(self, matrix: Array, right: Array) -> Array:
-        """Solve the equations of a corrector: the Jacobian, then the row across.
+        """Solve the linear equations of a corrector; a subclass may know their structure.
+
+        Parameters
+        ----------
+        matrix : ndarray (N, N)
+            The Jacobian, then the row across.
+        right : ndarray (N,)
+            The right-hand side.
+
+        Returns
+        -------
+        ndarray (N,)
+            The step.
 
         Raises
         ------
@@ -186,9 +281,22 @@ class Curve:
         return np.asarray(np.linalg.solve(matrix, right), float)
 
     def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
-        """Null vector of a Jacobian that continues ``before``, and a determinant.
+        """Return the tangent that a Jacobian says, and a determinant.
 
-        That of the Jacobian bordered by the tangent: it changes its sign at a simple branch point.
+        The determinant is that of the Jacobian bordered by the tangent: it changes its sign at a simple
+        branch point.
+
+        Parameters
+        ----------
+        jacobian : ndarray (N - 1, N)
+            By scaled unknowns.
+        before : ndarray (N,)
+            The tangent before, along which the new one points.
+
+        Returns
+        -------
+        tangent, determinant : ndarray (N,), float
+            Of length 1; up to a factor that keeps its sign.
 
         Raises
         ------
@@ -203,6 +311,12 @@ class Curve:
         return tangent / length, self.determinant(bordered) * length
 
     def determinant(self, matrix: Array) -> float:
-        """Determinant of bordered equations, up to a factor that keeps its sign."""
+        """Determinant of bordered equations, up to a factor that keeps its sign.
+
+        Parameters
+        ----------
+        matrix : ndarray (N, N)
+            The bordered Jacobian.
+        """
         sign, size = np.linalg.slogdet(matrix)
         return float(sign) * float(np.exp(size))

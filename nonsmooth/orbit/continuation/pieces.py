@@ -14,7 +14,17 @@ from .curve import Curve, Point
 
 @dataclass(frozen=True, eq=False)
 class Departure:
-    """How a piece begins: its curve, points of it, and the way it goes in scaled unknowns."""
+    """How a piece of a curve begins.
+
+    Attributes
+    ----------
+    curve : Curve
+        Its equations.
+    rows : list of ndarray (N,)
+        Points of it, the last one where the piece begins.
+    tangent : ndarray (N,)
+        The way it goes, in scaled unknowns.
+    """
 
     curve: Curve
     rows: list[Array]
@@ -94,17 +104,40 @@ def depart(
 
 
 def directions(curve: Curve, u: Array) -> list[Array]:
-    """Both directions of the curve at a point, by its Jacobian; in scaled unknowns."""
+    """Return both directions of a curve at a point, by its Jacobian.
+
+    Parameters
+    ----------
+    curve : Curve
+        The curve: its equations.
+    u : ndarray (N,)
+        The point.
+
+    Returns
+    -------
+    list of two ndarray (N,)
+        Unit vectors in scaled unknowns.
+    """
     _, jacobian = curve.scaled(u / curve.scale)
     tangent = np.linalg.svd(jacobian)[2][-1]
     return [tangent, -tangent]
 
 
 def other_direction(point: Point) -> Array:
-    """Across the curve in the plane of both branches that meet at a branch point.
+    """Return the direction across the curve in the plane of both branches that meet at a branch point.
 
     The Jacobian has two null vectors there. The one across the tangent leads, corrected in the
     hyperplane across it, to the other branch (Keller 1977).
+
+    Parameters
+    ----------
+    point : Point
+        The branch point.
+
+    Returns
+    -------
+    ndarray (N,)
+        A unit vector in scaled unknowns.
     """
     null = np.linalg.svd(point.jacobian)[2][-2:]
     inside = null @ point.tangent

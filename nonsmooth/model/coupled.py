@@ -78,7 +78,8 @@ class Coupled:
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
         guards, smooth = ca.vertcat(heights, stops), not system.sets
-        self.linearity = linearity(field, self.layer, guards, factor, x, every, smooth)
+        time = d.time
+        self.linearity = linearity(field, self.layer, guards, factor, x, every, smooth, time)
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)

@@ -18,6 +18,7 @@ import casadi as ca
 from .cache import Content
 from .definition import read_function
 from .jets import taylor
+from .linearity import bent
 from .switches import Guard, Guarded, Implicit, Sliding, guards_of, sliding
 from .system import FilippovSystem
 
@@ -64,9 +65,10 @@ class Motion:
 
     @cached_property
     def affine(self) -> bool:
-        """Whether field and guards are affine in the states, so that the first coefficients of
-        their series tell all the others."""
-        return bool(ca.is_linear(ca.vertcat(self.field, self.functions), self.states))
+        """Whether field and guards are affine in the states, with sines of the time added, so that
+        the first coefficients of their series tell all the others."""
+        both = ca.vertcat(self.field, self.functions)
+        return not any(bent(both, self.states, self.system.definition.time))
 
     def value_function(self) -> ca.Function:
         """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""

@@ -24,9 +24,10 @@ from ..values import Array
 Integers = NDArray[np.int32]
 
 #: Operations and rules by number, as in the C enumerations. Where one argument does not move, sums are
-#: ``shift``, differences ``lower`` and ``below`` it, products ``scale``, quotients ``over`` and ``under`` it.
+#: ``shift``, differences ``lower`` and ``below`` it, products ``scale``, quotients ``over`` and ``under`` it;
+#: an ``integral`` over what is affine in the time, as in cos(omega t), is a ``turn``.
 OPERATIONS = ("const", "input", *UNARY, *BINARY)
-TAPE_RULES = (*RULES, "shift", "lower", "below", "scale", "over", "under")
+TAPE_RULES = (*RULES, "shift", "lower", "below", "scale", "over", "under", "turn")
 
 
 @dataclass(frozen=True)
@@ -204,10 +205,11 @@ def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     rules, rows = _rules_of(inputs, [*coupled.outputs, slopes])
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
-    every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n)
+    time = n - 1 if coupled.system.time_dependent else None
+    every = _series(rules, rows, range(6), lambda k: k not in held, lambda k: k >= n, time)
     free = (0, 1, 2, 4) if of_sets else (0, 2, 4)
     follow = lambda k: k in of_sets
-    return every, _series(rules, rows, free, lambda k: k < n or follow(k), follow)
+    return every, _series(rules, rows, free, lambda k: k < n or follow(k), follow, time)
 
 
 def _rules_of(
@@ -226,6 +228,7 @@ def _series(
     wanted: Sequence[int],
     moves: Callable[[int], bool],
     unknown: Callable[[int], bool],
+    time: int | None = None,
 ) -> Series:
     """Rules as the interpreter reads them.
 
@@ -235,13 +238,18 @@ def _series(
         Numbers of the outputs that are asked for.
     moves, unknown : callable
         Whether an entry of the first vector of inputs moves in time, and is an unknown multiplier.
+    time : int, optional
+        The entry that is the time.
     """
     still = [_is_still(rule) for rule in rules]
     moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
     operations = {op: k for k, op in enumerate(OPERATIONS)}
     args, first, second, names = np.zeros((len(rules), 3), np.int32), [], [], []
+    lines = _lines(rules, still, time)
     for j, rule in enumerate(rules):
         name, own = _specialised(rule, moving)
+        if name == "integral" and lines[own[0]]:
+            name = "turn"
         names.append(TAPE_RULES.index(name))
         args[j, : len(own)] = own
         numbers = (*rule.numbers, 0.0, 0.0)
@@ -290,6 +298,18 @@ def _reached(
 
 def _is_still(rule: Rule) -> bool:
     return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.place[0] == 1)
+
+
+def _lines(rules: Sequence[Rule], still: Sequence[bool], time: int | None) -> list[bool]:
+    """Which rules are affine in the time: their series end with the second coefficient."""
+    found: list[bool] = []
+    for j, rule in enumerate(rules):
+        sums = rule.rule in ("add", "sub", "neg", "twice", "affine")
+        scaled = rule.rule == "mul" and any(still[a] for a in rule.args)
+        scaled |= rule.rule == "div" and still[rule.args[1]]
+        own = rule.rule == "input" and rule.place == (0, time)
+        found.append(still[j] or own or ((sums or scaled) and all(found[a] for a in rule.args)))
+    return found
 
 
 #: Name of a rule where its first, or its second, argument does not move; whether they change places.

@@ -195,6 +195,9 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
       case RULE_integral:
         w[k] = k ? t->first[j] / k * weigh(u, v, k, 1, k) : operate(t->op[j], u[0], 0);
         break;
+      case RULE_turn:
+        w[k] = k ? t->first[j] / k * (u[1] * v[k - 1]) : operate(t->op[j], u[0], 0);
+        break;
       case RULE_quotient:
         w[k] = k ? over(t->first[j] * k * u[k] - weigh(w, v, k, 1, k - 1), v[0]) * (1.0 / k)
                  : operate(t->op[j], u[0], 0);

@@ -16,7 +16,6 @@ import casadi as ca
 
 from .graph import evaluate, instructions
 
-
 _NO_TIME = ca.SX(0, 1)
 
 

@@ -190,7 +190,9 @@ class Writer:
     def _turn(self, j: int, k: int, u: int, v: int) -> str:
         if k == 0:
             return self._called(j, u)
-        return f"{literal(self.first[j])} / {float(k)!r} * ({self.name(u, 1)} * {self.name(v, k - 1)})"
+        return (
+            f"{literal(self.first[j])} / {float(k)!r} * ({self.name(u, 1)} * {self.name(v, k - 1)})"
+        )
 
     def _quotient(self, j: int, k: int, u: int, v: int) -> str:
         if k == 0:

@@ -6,19 +6,20 @@ from typing import Any
 
 
 class _NoBar:
-    def update(self, count: int) -> None:
+    def update(self, count: float = 1) -> None:
         """Do nothing."""
 
     def close(self) -> None:
         """Do nothing."""
 
 
-def progress_bar(total: int, shown: bool, unit: str = "run") -> Any:
+def progress_bar(total: int | None, shown: bool, unit: str = "run") -> Any:
     """Return a bar on a terminal, for work of more than a second; nothing elsewhere.
 
     Parameters
     ----------
-    total : int
+    total : int or None
+        None if it is not known.
     shown : bool
     unit : str, optional
     """

@@ -19,7 +19,12 @@ _CLOSEST = 1e-10
 
 
 def bundle(
-    seed: Callable[[float], Arc | None], closed: bool, spacing: float, count: int, most: int
+    seed: Callable[[float], Arc | None],
+    closed: bool,
+    spacing: float,
+    count: int,
+    most: int,
+    report: Callable[[], object] = lambda: None,
 ) -> tuple[list[tuple[float, Arc]], bool]:
     """Arcs from seeds on a curve with the parameter 0 to 1, with further ones where they part.
 
@@ -33,6 +38,8 @@ def bundle(
         Distance of neighbours that is aimed at, and of points on an arc.
     count, most : int
         Arcs at the beginning, and at most.
+    report : callable, optional
+        Called with every arc.
 
     Returns
     -------
@@ -55,6 +62,7 @@ def bundle(
                 arc = seed(u)
                 if arc is not None:
                     arcs[u] = arc
+                report()
             new = [u for u in _wide(arcs, closed, spacing) if u not in tried][: most - len(arcs)]
     except KeyboardInterrupt:
         if len(arcs) < 2:

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..flow.progress import progress_bar
 from ..flow.trajectory import Trajectory
 from ..local import Equilibrium, PseudoEquilibrium
 from ..local.newton import Equations, converge, solve
@@ -64,6 +66,8 @@ class Connection:
         Its equations.
     unknowns : ndarray
         What solves them; from these ``continue_bifurcation`` starts.
+    complete : bool
+        False if the search was interrupted: the orbit ends farther from the saddle than it could.
     """
 
     system: FilippovSystem
@@ -77,6 +81,7 @@ class Connection:
     faults: tuple[str, ...]
     loop: Loop
     unknowns: Array
+    complete: bool = True
 
     @property
     def itinerary(self) -> str:
@@ -129,6 +134,8 @@ class Connection:
         lines.append(f"  {kind} {self.saddle.point.tolist()}, eigenvalues {values}")
         if self.fold is not None:
             lines.append(f"  leaves the surface at {self.fold.tolist()} to {self.side!r}")
+        if isinstance(self.loop, SaddleLoop) and not self.complete:
+            lines.append(f"  interrupted: the orbit ends {self.loop.far:.2g} from the saddle")
         return "\n".join(lines)
 
     def __repr__(self) -> str:
@@ -143,6 +150,7 @@ def find_homoclinic(
     guess: float | None = None,
     parameters: Parameters | None = None,
     max_iterations: int = 30,
+    progress: bool = False,
 ) -> Connection:
     """Find the parameter at which an orbit is homoclinic to a saddle or pseudo-saddle.
 
@@ -162,11 +170,14 @@ def find_homoclinic(
         Values that replace defaults.
     max_iterations : int, optional
         Newton's method gives up after this many steps.
+    progress : bool, optional
+        Show on a terminal how close to the saddle the orbit comes.
 
     Returns
     -------
     Connection
-        Of codimension one. ``continue_bifurcation`` follows it as two parameters vary.
+        Of codimension one. ``continue_bifurcation`` follows it as two parameters vary. Ctrl-C ends the
+        search with the orbit that there is, which ends farther from the saddle: ``complete`` is false.
 
     Raises
     ------
@@ -237,7 +248,7 @@ def find_homoclinic(
     reasons = list[str]()
     for start in departures(system, mode, at.point, p):
         try:
-            return _by_projections(system, mode, start, p, index, parameter, max_iterations)
+            return _by_projections(system, mode, start, p, index, max_iterations, progress)
         except ConvergenceError as error:
             reasons.append(str(error))
     raise ConvergenceError(
@@ -254,29 +265,37 @@ def _by_projections(
     start: Departure,
     p: Array,
     index: int,
-    parameter: str,
     max_iterations: int,
+    progress: bool,
 ) -> Connection:
     """The orbit that ends where the guess comes nearest, then closer and closer to the saddle."""
     far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
+    parameter = system.parameter_names[index]
     loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)
     u = np.concatenate([np.ravel(start.starts), start.durations, [p[index]]])
     u = _solved(loop, u, parameter, max_iterations, damped=True)
-    target, factor = loop.target() * start.size, _CLOSER
-    while far > target:
-        closer = max(target, far / factor)
-        wait = np.log(far / closer) / -loop.reference.leading(True)
-        longer, guess = loop.prolonged(u, wait, closer)
-        try:
-            u = _solved(longer, guess, parameter, max_iterations)
-            loop, far, factor = longer, closer, _CLOSER
-        except ConvergenceError:
-            factor **= 0.5
-            if factor < _SLOWLY:
-                if far > _ENOUGH * start.size:
-                    raise
-                break
-    return connection_of(loop, u, parameter)
+    target, factor, complete = loop.target() * start.size, _CLOSER, True
+    bar, whole = progress_bar(100, progress, "%"), math.log(max(far / target, _SLOWLY))
+    try:
+        while far > target:
+            closer = max(target, far / factor)
+            wait = np.log(far / closer) / -loop.reference.leading(True)
+            longer, guess = loop.prolonged(u, wait, closer)
+            try:
+                found = _solved(longer, guess, parameter, max_iterations)
+                bar.update(100.0 * math.log(far / closer) / whole)
+                u, loop, far, factor = found, longer, closer, _CLOSER
+            except ConvergenceError:
+                factor **= 0.5
+                if factor < _SLOWLY:
+                    if far > _ENOUGH * start.size:
+                        raise
+                    break
+    except KeyboardInterrupt:
+        complete = False
+    finally:
+        bar.close()
+    return replace(connection_of(loop, u, parameter), complete=complete)
 
 
 def _guarded(equations: Equations) -> Equations:

@@ -299,7 +299,7 @@ def _require_motion(at: Evaluation, start: Start) -> None:
     """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
     guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
     period, x = float(np.abs(at.durations).sum()), at.starts[0]
-    way = float(np.abs(at.flown[0].rate).max()) * period
+    way = float(np.abs(at.flight.rate[0]).max()) * period
     rests = not start.problem.legs[-1].name and not start.problem.system.time_dependent
     if period > _POINT * guess and not (rests and way <= _STILL * max(1.0, np.abs(x).max())):
         return
@@ -319,7 +319,8 @@ def _require_simple(orbit: PeriodicOrbit) -> None:
         if leg.kind != "exit" or system.coupled:
             continue
         other = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}[leg.name]
-        end = orbit.evaluation.flown[i].end
+        flight = orbit.evaluation.flight
+        end = flight.end[i, : flight.sizes[i]]
         at = Leg(leg.mode, other, "exit").at_end(system, end, p)
         size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
         if abs(at.value) <= 1e-9 * size:

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..flow.progress import progress_bar
 from ..flow.saving import Savable
 from ..local import Equilibrium, Fold, FoldFold, PseudoEquilibrium
 from ..local.regions import Region
@@ -93,6 +95,7 @@ def manifold(
     parameters: Parameters | None = None,
     tol: float = 1e-10,
     max_orbits: int = 400,
+    progress: bool = False,
 ) -> Manifold:
     """Follow the stable or unstable manifold of a point through switches.
 
@@ -117,13 +120,15 @@ def manifold(
         As in :func:`simulate`.
     max_orbits : int, optional
         Of a surface.
+    progress : bool, optional
+        Show on a terminal how many orbits were followed.
 
     Returns
     -------
     Manifold
         Curves where the manifold has one dimension, a surface where it has two. Backward it ends
-        where it meets sliding: what arrives there comes from a whole neighbourhood. Ctrl-C ends a
-        surface with the orbits that it has.
+        where it meets sliding: what arrives there comes from a whole neighbourhood. Ctrl-C ends it
+        with the orbits that it has (``complete`` is false then).
 
     Raises
     ------
@@ -177,14 +182,21 @@ def manifold(
     given = of.parameters | dict(parameters or {}) if isinstance(of, PeriodicOrbit) else parameters
     p = dict(zip(system.parameter_names, system.parameter_vector(given).tolist(), strict=True))
     follower = Follower(system, p, not stable, length, spacing or length / 100, tol)
-    return _Grower(follower, of, stable, whole(max_orbits, "max_orbits")).grow()
+    most, bar = whole(max_orbits, "max_orbits"), progress_bar(None, progress, "orbit")
+    try:
+        return _Grower(follower, of, stable, most, bar.update).grow()
+    finally:
+        bar.close()
 
 
 class _Grower:
     """Local directions of a manifold and what grows from them."""
 
-    def __init__(self, follower: Follower, of: Any, stable: bool, most: int):
+    def __init__(
+        self, follower: Follower, of: Any, stable: bool, most: int, report: Callable[[], object]
+    ):
         self.follower, self.of, self.stable, self.most = follower, of, stable, most
+        self.report = report
         self.system = follower.system
         self.point = np.asarray(of.start if isinstance(of, PeriodicOrbit) else of.point, float)
         self.step = _NEAR * follower.length
@@ -192,12 +204,12 @@ class _Grower:
 
     def grow(self) -> Manifold:
         if isinstance(self.of, (Fold, FoldFold)):
-            return self._curves([self._leave(mode) for mode in "+-"])
+            return self._curves([partial(self._leave, mode) for mode in "+-"])
         if isinstance(self.of, TwoFold):
             return self._of_two_fold()
         if isinstance(self.of, PeriodicOrbit):
             seeds = orbit_seeds(self.of, self.follower, self.stable)
-            return self._joined([self._surface(seed, False) for seed in seeds])
+            return self._surfaces(seeds)
         if isinstance(self.of, Equilibrium):
             return self._of_equilibrium()
         return self._of_pseudo_equilibrium()
@@ -212,7 +224,7 @@ class _Grower:
             )
         basis = self._directions(self.of.mode)
         if basis.shape[1] == 1:
-            return self._curves([self._arc(s * basis[:, 0]) for s in (1, -1)])
+            return self._curves([partial(self._arc, s * basis[:, 0]) for s in (1, -1)])
         return self._circle(basis, None)
 
     def _of_pseudo_equilibrium(self) -> Manifold:
@@ -226,7 +238,7 @@ class _Grower:
         collects = (of.region is Region.ATTRACTING) == self.stable
         sides = [of.mode.replace("s", side) for side in "+-"]
         if collects and basis.shape[1] == 0:
-            return self._curves([self._leave(mode) for mode in sides])
+            return self._curves([partial(self._leave, mode) for mode in sides])
         if collects and basis.shape[1] == 1:
             return self._sheets(basis[:, 0], sides)
         if collects:
@@ -235,7 +247,7 @@ class _Grower:
                 f"{basis.shape[1] + 1}: all that slides to it, and what comes to that."
             )
         if basis.shape[1] == 1:
-            return self._curves([self._arc(s * basis[:, 0], of.mode) for s in (1, -1)])
+            return self._curves([partial(self._arc, s * basis[:, 0], of.mode) for s in (1, -1)])
         return self._circle(basis, of.mode)
 
     def _directions(self, mode: str) -> Array:
@@ -269,12 +281,22 @@ class _Grower:
     def _arc(self, direction: Array, mode: str | None = None) -> Arc | None:
         return self.follower.arc(self.point + self.step * direction, mode)
 
-    def _curves(self, arcs: list[Arc | None]) -> Manifold:
-        found = [arc for arc in arcs if arc is not None and len(arc.points) > 1]
+    def _curves(self, orbits: Sequence[Callable[[], Arc | None]]) -> Manifold:
+        found, complete = list[Arc](), True
+        try:
+            for orbit in orbits:
+                arc = orbit()
+                if arc is not None and len(arc.points) > 1:
+                    found.append(arc)
+                self.report()
+        except KeyboardInterrupt:
+            if not found:
+                raise
+            complete = False
         if not found:
             kind = "comes to" if self.stable else "leaves"
             raise DegenerateError(f"of: expected a point that an orbit {kind}, received {self.of}.")
-        return Manifold(self.stable, self.point, 1, found)
+        return Manifold(self.stable, self.point, 1, found, complete=complete)
 
     def _circle(self, basis: Array, mode: str | None) -> Manifold:
         """A surface of the orbits that start on a small circle."""
@@ -317,17 +339,23 @@ class _Grower:
         return self._from_curve(canard_curve(self.of, self.follower, self.stable), ["+", "-"])
 
     def _from_curve(self, curve: Callable[[float], Array], sides: list[str]) -> Manifold:
-        parts = []
-        for mode in sides:
+        def orbit(mode: str, u: float) -> Arc | None:
+            return self.follower.arc(curve(u), mode)
 
-            def seed(u: float, mode: str = mode) -> Arc | None:
-                return self.follower.arc(curve(u), mode)
+        return self._surfaces([partial(orbit, mode) for mode in sides])
 
-            parts.append(self._surface(seed, False))
-        return self._joined(parts)
-
-    def _joined(self, parts: list[Manifold]) -> Manifold:
+    def _surfaces(self, seeds: Sequence[Callable[[float], Arc | None]]) -> Manifold:
         """Several surfaces as one."""
+        parts, complete = list[Manifold](), True
+        try:
+            for seed in seeds:
+                if complete:
+                    parts.append(self._surface(seed, False))
+                    complete = parts[-1].complete
+        except KeyboardInterrupt:
+            if not parts:
+                raise
+            complete = False
         offsets = np.cumsum([0, *[len(part.points) for part in parts]])
         return Manifold(
             self.stable,
@@ -336,7 +364,7 @@ class _Grower:
             [arc for part in parts for arc in part.arcs],
             np.concatenate([part.points for part in parts]),
             np.concatenate([p.triangles + k for p, k in zip(parts, offsets, strict=False)]),
-            all(part.complete for part in parts),
+            complete,
         )
 
     def _sliding_curve(self, direction: Array) -> Callable[[float], Array]:
@@ -361,7 +389,7 @@ class _Grower:
 
     def _surface(self, seed: Any, closed: bool) -> Manifold:
         f = self.follower
-        arcs, complete = bundle(seed, closed, f.spacing, _FIRST, self.most)
+        arcs, complete = bundle(seed, closed, f.spacing, _FIRST, self.most, self.report)
         if len(arcs) < 2:
             raise DegenerateError(
                 f"of: expected a point with orbits around it, received {self.of}."

@@ -3,11 +3,15 @@ parameter, in two, and where branches of periodic orbits end."""
 
 from __future__ import annotations
 
+import itertools
+
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.orbit import connections
+from nonsmooth.orbit.saddle_loops import SaddleLoop
 from tests.orbit.periodic_cases import CASES
 
 x, y, c, rho = (ca.SX.sym(s) for s in ("x", "y", "c", "rho"))
@@ -139,11 +143,10 @@ def test_planar_and_solid_curves_agree(spiral: ns.FilippovSystem) -> None:
     assert planar.solution(0).value == pytest.approx(planar.values[0][1])
 
 
-@pytest.mark.parametrize("a", [-0.2, 0.2])
-def test_a_loop_with_a_closed_form(a: float) -> None:
+def sandstede(a: float) -> ns.FilippovSystem:
     """Sandstede 1997: at mu = 0 the curve x^2 (1 - x) = y^2 in z = 0 is homoclinic."""
     bend = mu - 0.1 * z
-    system = ns.FilippovSystem(
+    return ns.FilippovSystem(
         [x, y, z],
         field=[
             a * x + y - a * x**2 + bend * x * (2 - 3 * x),
@@ -152,11 +155,65 @@ def test_a_loop_with_a_closed_form(a: float) -> None:
         ],
         parameters={mu: 0.02},
     )
-    found = ns.find_homoclinic(system, [0.0, 0.0, 0.0], "mu")
-    assert abs(found.value) < 1e-12
+
+
+@pytest.mark.parametrize("a", [-0.2, 0.2])
+def test_a_loop_with_a_closed_form(a: float) -> None:
+    found = ns.find_homoclinic(sandstede(a), [0.0, 0.0, 0.0], "mu")
+    assert abs(found.value) < 1e-12 and found.complete
     u, v, w = found.trajectory.x.T
     assert max(np.abs(u**2 * (1 - u) - v**2).max(), np.abs(w).max()) < 1e-8
     assert abs(found.saddle_quantity - 2 * a) < 1e-12
+
+
+def test_an_interrupted_search_returns_the_orbit_that_it_has(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Its parameter has an error of the second power, or more, of where it ends; the truth is 0."""
+    system, errors, prolonged = sandstede(-0.2), [], SaddleLoop.prolonged
+    for count in range(4):
+        calls = []
+
+        def counted(*given, calls=calls, count=count):
+            calls.append(1)
+            if len(calls) > count:
+                raise KeyboardInterrupt
+            return prolonged(*given)
+
+        monkeypatch.setattr(SaddleLoop, "prolonged", counted)
+        found = ns.find_homoclinic(system, [0.0, 0.0, 0.0], "mu")
+        assert not found.complete and found.residual < 1e-10
+        assert f"interrupted: the orbit ends {found.loop.far:.2g} from the saddle" in str(found)
+        errors.append(abs(found.value))
+        assert errors[-1] < found.loop.far**2
+    assert all(later < 0.3 * earlier for earlier, later in itertools.pairwise(errors))
+
+
+def test_a_search_interrupted_before_it_has_an_orbit_is_interrupted(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    def equations(*given):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(SaddleLoop, "equations", equations)
+    with pytest.raises(KeyboardInterrupt):
+        ns.find_homoclinic(sandstede(-0.2), [0.0, 0.0, 0.0], "mu")
+
+
+def test_progress_of_a_search_ends_at_all_of_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    parts, asked = [], []
+
+    class Bar:
+        def update(self, part: float) -> None:
+            parts.append(part)
+
+        def close(self) -> None:
+            parts.append(0.0)
+
+    monkeypatch.setattr(connections, "progress_bar", lambda *given: asked.append(given) or Bar())
+    ns.find_homoclinic(sandstede(-0.2), [0.0, 0.0, 0.0], "mu", progress=True)
+    assert len(parts) > 3 and sum(parts) == pytest.approx(100.0) and parts[-1] == 0.0
+    assert asked == [(100, True, "%")]
 
 
 def test_lorenz_has_his_homoclinic_orbit() -> None:

@@ -1,6 +1,7 @@
 """Manifolds are those of closed forms: separatrices through switches, thresholds, surfaces."""
 
 import json
+import sys
 from pathlib import Path
 
 import casadi as ca
@@ -123,6 +124,65 @@ def test_an_interrupted_surface_keeps_its_orbits(monkeypatch):
     found = ns.manifold(system, saddle, length=0.5, spacing=0.1)
     assert not found.complete and len(found.arcs) == 9 and "interrupted" in repr(found)
     assert np.abs(found.points[:, 2]).max() < 1e-12
+
+
+def interrupt_after(monkeypatch, count):
+    plain, calls = Follower.arc, []
+
+    def arc(*args):
+        calls.append(1)
+        if len(calls) > count:
+            raise KeyboardInterrupt
+        return plain(*args)
+
+    monkeypatch.setattr(Follower, "arc", arc)
+
+
+def test_an_interrupted_curve_keeps_its_other_half(monkeypatch):
+    system = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
+    saddle = ns.find_equilibrium(system, [0.1, 0.1])
+    whole = ns.manifold(system, saddle, length=1.0)
+    interrupt_after(monkeypatch, 1)
+    found = ns.manifold(system, saddle, length=1.0)
+    assert not found.complete and found.dimension == 1 and len(found.arcs) == 1
+    assert np.array_equal(found.arcs[0].points, whole.arcs[0].points) and whole.complete
+    interrupt_after(monkeypatch, 0)
+    with pytest.raises(KeyboardInterrupt):
+        ns.manifold(system, saddle, length=1.0)
+
+
+@pytest.mark.parametrize("more", [0, 1, 5])
+def test_an_interrupted_second_sheet_leaves_the_first_one(monkeypatch, more):
+    """Orbits of both fields end on the line that slides to 0: one sheet above it, one below."""
+    system = ns.FilippovSystem([x, y, z], surface=z, above=[x, -y, -1], below=[x, -y, 1])
+    saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.0])
+    whole = ns.manifold(system, saddle, length=0.8, spacing=0.2)
+    above = sum(arc.itinerary == "+" for arc in whole.arcs)
+    interrupt_after(monkeypatch, above + more)
+    found = ns.manifold(system, saddle, length=0.8, spacing=0.2)
+    assert not found.complete and whole.complete and found.dimension == 2
+    sheets = [arc.itinerary for arc in found.arcs]
+    assert sheets.count("+") == above and sheets.count("-") == (more if more > 1 else 0)
+    assert found.triangles.max() < len(found.points)
+
+
+def test_orbits_of_a_manifold_are_counted(monkeypatch):
+    counted = []
+
+    class Bar:
+        def update(self, count=1):
+            counted.append(count)
+
+        def close(self):
+            counted.append("closed")
+
+    asked = []
+    module = sys.modules[ns.manifold.__module__]
+    monkeypatch.setattr(module, "progress_bar", lambda *given: asked.append(given) or Bar())
+    system = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
+    saddle = ns.find_equilibrium(system, [0.1, 0.1])
+    ns.manifold(system, saddle, length=1.0, progress=True)
+    assert counted == [1, 1, "closed"] and asked == [(None, True, "orbit")]
 
 
 def test_backward_a_manifold_ends_where_sliding_begins():

@@ -150,10 +150,11 @@ def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
     directions = _list(d for _, d in system.stops) or "0"
     defines = (
         f"#define W {width}\n#define K {system.surface_count}\n#define STOPS {len(system.stops)}\n"
-        f"#define ROWS {len(program.rows)}\n#define NAMED {int(bool(program.states))}\n"
+        f"#define ROWS {len(program.rows)}\n#define ON_ROWS {len(program.on_rows)}\n#define NAMED {int(bool(program.states))}\n"
         f"#define BENT_SLIP {int(program.bent_slip)}\n#define BENT_STOPS {int(program.bent_stops)}\n"
         f"__attribute__((unused)) static const int DIRECTION[] = {{{directions}}};\n"
         f"__attribute__((unused)) static const int ROW[] = {{{_list(program.rows) or 0}}};\n"
+        f"__attribute__((unused)) static const int ON_ROW[] = {{{_list(program.on_rows) or 0}}};\n"
         f"__attribute__((unused)) static const int OWN[] = {{{_list(program.states) or 0}}};\n"
     )
     drivers = ("polynomials.h", "set_lanes.c", "set_steps.c")

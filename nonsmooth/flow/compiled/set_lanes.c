@@ -6,7 +6,7 @@
  * No lane's result depends on its neighbours.
  *
  * The generated text defines, besides what common.h asks for: N states with time, ND without, K, STOPS,
- * DIRECTION[STOPS], TIMED, W, ROWS and ROW[ROWS] of the field that are not affine, BENT_SLIP, BENT_STOPS,
+ * DIRECTION[STOPS], TIMED, W, ROWS and ROW[ROWS] of the field that are not affine (on the set ON_ROWS), BENT_SLIP, BENT_STOPS,
  * OWN[K] states that the switching functions are (NAMED: whether they are), and the functions of
  * nonsmooth/model/printing/set_program.py.
  */
@@ -17,13 +17,15 @@
 #define MEMORY 256
 #define WAITING (4 * W)
 #define CLOSE 1e-8 /* only where |h| is this much of its terms its time to zero is asked for */
+#define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
+#define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the interpreter sees to it */
 #define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
 
 enum { OFF, ON, LEAVING, POOLS };
 
 /* All members are vectors, so that a trajectory is a column of words. */
 typedef struct {
-  T x[N], t, last_event, shortest, length, lam[K]; /* lam: the direction in which the set is left */
+  T x[N], t, last_event, shortest, length, left_at, lam[K]; /* when the set was left, and in which direction */
   I behind, live, steps, events, kinds[KINDS], shrinking, code, base, index;
   I above_stop[STOPS > 0 ? STOPS : 1];
   T q[NQ];
@@ -47,7 +49,7 @@ typedef struct {
 #define SELECT_I(m, a, b) (((a) & (m)) | ((b) & ~(m)))
 #define LANE(v, l) (((double *)&(v))[l])
 #define LANE_I(v, l) (((int64_t *)&(v))[l])
-#define LAMBDA(v) UNPACK(v)
+#define LAMBDA(v) UNPACK(v), BC(0)
 #if K == 2
 #define UNPACK(v) (v)[0], (v)[1]
 #else
@@ -129,6 +131,7 @@ static int load(Lanes *s, Work *w, int l) {
   }
   LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
   LANE(s->shortest, l) = 1e-3;
+  LANE(s->left_at, l) = -INFINITY;
   LANE_I(s->live, l) = -1;
   LANE_I(s->index, l) = i;
   w->alive[OFF]++;
@@ -227,6 +230,21 @@ INLINE I is_definite(const T *m, I *isotropic, T *mean) {
   return definite;
 }
 
+/* The time in which h = 0 is reached, exact where a and M do not change and M is isotropic; infinite where |h| does
+ * not fall. */
+INLINE T time_left(const T *a, const T *m, const T *h, T radius, I exact, T c) {
+  T along = BC(0), square = BC(0), rate = BC(0);
+  UNROLL for (int i = 0; i < K; i++) {
+    T own = a[i] * radius;
+    UNROLL for (int j = 0; j < K; j++) own -= m[i * K + j] * h[j];
+    rate += h[i] * own;
+    along += a[i] * h[i];
+    square += a[i] * a[i];
+  }
+  T straight = SELECT(rate < 0, -(radius * radius) * (radius / rate), BC(INFINITY));
+  return SELECT(exact, (c * radius + along) / (c * c - square), straight);
+}
+
 /* Newton steps of the states onto h = 0; lanes that they do not lead there. */
 INLINE I project(Lanes *s, const Work *w, I which) {
   T h[K], g[K][N];
@@ -282,24 +300,16 @@ INLINE I change_mode(Lanes *s, Work *w, I which, int kind, int mode) {
  * ``unclear``. */
 static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear) {
   T h[K], g[K][N], a[K], m[K * K], u[K], y[K], b[K], mean[K], c, field[N], other[N], end[N];
-  T scale = heights(s, w, h, g), radius = length_of(h), along = BC(0), square = BC(0), rate = BC(0);
+  T scale = heights(s, w, h, g), radius = length_of(h);
   frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
   I isotropic, holds = is_definite(m, &isotropic, &c);
   solve_block(m, a, y);
   holds &= length_of(y) < 1;
-  UNROLL for (int i = 0; i < K; i++) {
-    u[i] = h[i] / radius;
-    T own = a[i];
-    UNROLL for (int j = 0; j < K; j++) own -= m[i * K + j] * (h[j] / radius);
-    rate += u[i] * own;
-    along += a[i] * h[i];
-    square += a[i] * a[i];
-  }
-  T whole = (c * radius + along) / (c * c - square), straight = SELECT(rate < 0, -radius / rate, BC(INFINITY));
-  T dt = SELECT(holds & isotropic, whole, straight), since = s->t - w->b->t0, left = w->o->t_end - s->t;
+  UNROLL for (int i = 0; i < K; i++) u[i] = h[i] / radius;
+  T dt = time_left(a, m, h, radius, holds & isotropic, c), since = s->t - w->b->t0, left = w->o->t_end - s->t;
   double shortest = pow(OVERFLOW, -1.0 / P);
   I floor = (radius <= VANISHES * scale) | (I)(dt < MAX(BC(shortest), TENFOLD * SHORTEST * MAX(ABS(s->t), ABS(since))));
-  *unclear |= which & ((floor & ~holds) | ~(I)(radius > 0));
+  *unclear |= which & ((~holds & (floor | (I)(radius <= PASSED * scale))) | ~(I)(radius > 0));
   I met = which & holds & (dt > 0) & (dt < INFINITY);
   *unclear |= which & floor & ~met;
   UNROLL for (int i = 0; i < K; i++) b[i] = a[i] + h[i] / dt;
@@ -311,6 +321,8 @@ static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear)
   UNROLL for (int i = 0; i < K; i++) bend += ABS(later[i] - a[i]);
   UNROLL for (int i = 0; i < K * K; i++) bend += ABS(than[i] - m[i]);
   bend *= dt;
+  /* What turning could still do; in the exact case, what a change of a and M could. */
+  UNROLL for (int i = 0; i < K; i++) u[i] = SELECT(isotropic, mean[i] + bend / c, u[i]);
   field_values(s->x, s->q, LAMBDA(u), other);
   UNROLL for (int i = 0; i < N; i++) turn[i] = ABS(field[i] - other[i]);
   field_values(end, s->q, LAMBDA(mean), other);

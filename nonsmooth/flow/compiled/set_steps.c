@@ -3,8 +3,42 @@
 /* Coefficients of a step. */
 typedef struct {
   T c[N][P + 1], g[SLOTS][P + 1], unknowns[K][P + 1]; /* unknowns on the set; the direction when leaving it */
-  T allowed[N], radius; /* |h|, or on the set friction's limit */
+  T allowed[N];
+  T radius, stretch, fall; /* |h|, or friction's limit; 1 over the time to a branch point; part that |h| may fall to */
 } Step;
+
+/* Time and the variable s of a step: dt = (1 - stretch s/3)^2 ds (set_program.py). */
+INLINE T time_of(const Step *e, T s) {
+  T v = s * e->stretch * (1.0 / 3);
+  return s * (1.0 - v + v * v * (1.0 / 3));
+}
+
+INLINE T rate_of(const Step *e, T s) {
+  T v = 1.0 - s * e->stretch * (1.0 / 3);
+  return v * v;
+}
+
+INLINE T place_of(const Step *e, T time) {
+  T q = 1.0 - time * e->stretch, size = MAX(ABS(q), BC(1e-30)), y = EXP2(LOG2(size) * (1.0 / 3));
+  for (int again = 0; again < 2; again++) {
+    T cube = y * y * y;
+    y *= (cube + 2.0 * size) / (2.0 * cube + size);
+  }
+  y = SELECT(q < 0, -y, y);
+  return 3.0 * time / (1.0 + y + y * y);
+}
+
+/* Where the set is reached, or was left. */
+INLINE T stretch_of(const Lanes *s) {
+  T h[K], g[K][N], a[K], m[K * K], y[K], c;
+  height_values(s->x, s->q, LAMBDA(s->lam), h, &g[0][0]);
+  frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
+  I isotropic, holds = is_definite(m, &isotropic, &c);
+  solve_block(m, a, y);
+  holds &= length_of(y) < 1;
+  T left = time_left(a, m, h, length_of(h), isotropic, c);
+  return SELECT(holds & (left > 0), 1.0 / left, -1.0 / (s->t - s->left_at));
+}
 
 /* Step size -------------------------------------------------------------------------------------- */
 
@@ -26,6 +60,7 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   height_values(s->x, s->q, LAMBDA(s->lam), h, &gradient[0][0]);
   UNROLL for (int i = 0; i < K; i++) sum += weighed(gradient[i], e->allowed);
   const T *g = e->g[0];
+  e->fall = SELECT(e->radius * (SAFETY * o->rtol) > LEFT * sum, BC(FALLEN), BC(FALL));
   if (mode == OFF) bound(g[P], g[P - 1], 1.0 / (sum / e->radius + o->rtol * ABS(g[0])), last, before);
   if (mode == LEAVING) bound(g[P - 2], g[P - 3], 1.0 / sum, last, before);
   if (mode == ON) {
@@ -51,7 +86,8 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
 INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
   const Options *o = w->o;
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0), ends[4 * K], per = BC(1.0 / (SAFETY * o->rtol));
-  if (mode == OFF) off_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], ends, &e->radius);
+  e->stretch = mode == OFF ? stretch_of(s) : BC(0);
+  if (mode == OFF) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], ends, &e->radius);
   if (mode == ON) on_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
   if (mode == LEAVING) leave_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
   UNROLL for (int i = 0; i < N; i++) {
@@ -70,7 +106,7 @@ INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite
     bound(one, two, per, &last, &before);
   }
   *finite = ABS(sum) < INFINITY;
-  if (mode == OFF) e->g[0][0] -= FALL;
+  if (mode == OFF) e->g[0][0] -= e->fall;
   if (mode == ON) {
     T *g = e->g[LIMIT_SLOT], first = 1.0 / g[0];
     e->radius = g[0];
@@ -105,11 +141,27 @@ static __attribute__((noinline)) void resolve_step(const T *g, I active, T *h) {
   }
 }
 
+/* Hard cases by sign changes of all Bernstein coefficients: those with one become ``one``, those without are
+ * none, the others stay. */
+static __attribute__((noinline)) void count_changes(const T *a, I wrong_way, I *one, I *hard) {
+  T b[P + 1];
+  UNROLL for (int k = 0; k <= P; k++) b[k] = a[k] + ROUNDING * ABS(a[k]);
+  to_bernstein(b, P);
+  I changes = {0}, positive = b[0] > 0, first = positive;
+  UNROLL for (int k = 1; k <= P; k++) {
+    I next = b[k] > 0;
+    changes -= positive ^ next;
+    positive = next;
+  }
+  *one |= *hard & first & (changes == 1) & ~wrong_way;
+  *hard &= ~(*one | (first & (changes == 0)));
+}
+
 /* Time of the first event within h in each lane, its slot + 1 and the guard's slope over the step; lanes that
  * are not clear. */
 INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, T *slope) {
   T a[SLOTS][P + 1], end[SLOTS];
-  I one[SLOTS], hard[SLOTS], flipped[SLOTS], unclear = {0};
+  I one[SLOTS], hard[SLOTS], flipped[SLOTS], turned[SLOTS], unclear = {0};
   for (int first = 1;; first = 0) {
     T power[P + 1];
     I too_long = {0};
@@ -135,6 +187,7 @@ INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, 
       if (!stops) { unclear |= counts & zero; counts &= ~zero; }
       hard[j] = counts & ((~none & ~one[j]) | (one[j] & wrong_way) | zero);
       one[j] &= counts & ~hard[j];
+      turned[j] = wrong_way;
     }
     if (!first || !any(too_long)) break;
   }
@@ -143,6 +196,7 @@ INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, 
   UNROLL for (int j = 0; j < SLOTS; j++) {
     if (j == LIMIT_SLOT && mode != ON) continue;
     T root = BC(INFINITY), d = BC(0);
+    if (any(hard[j])) count_changes(a[j], turned[j], &one[j], &hard[j]);
     for EACH(l, hard[j]) {
       double at = hard_root(a[j], l, j, LANE_I(flipped[j], l) != 0, &LANE(d, l));
       if (at >= 0) LANE(root, l) = at;
@@ -177,7 +231,8 @@ INLINE void state_at(T *x, const Step *e, T at, int degree) {
 /* Lanes where the field and what ends the mode at a time of the step are not those of the polynomials. */
 INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const T *x, T at, T dt, int degree) {
   I wrong = {0};
-  T f[ROWS + 1], stop[STOPS + 1];
+  T f[N], stop[STOPS + 1], rate = rate_of(e, at);
+  const int rows = mode == ON ? ON_ROWS : ROWS, *const row_of = mode == ON ? ON_ROW : ROW;
   if (mode == OFF) off_check(x, s->q, LAMBDA(s->lam), f, stop);
   if (mode == ON) on_check(x, s->q, LAMBDA(s->lam), f, stop);
   if (mode == LEAVING) {
@@ -189,11 +244,11 @@ INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const
     UNROLL for (int m = 0; m < ROWS; m++) f[m] = whole[ROW[m]];
     if (BENT_STOPS) off_check(x, s->q, LAMBDA(s->lam), whole, stop);
   }
-  UNROLL for (int m = 0; m < ROWS; m++) {
-    const T *row = e->c[ROW[m]];
+  UNROLL for (int m = 0; m < rows; m++) {
+    const T *row = e->c[row_of[m]];
     T d = degree * row[degree];
     UNROLL for (int k = degree - 1; k >= 1; k--) d = d * at + k * row[k];
-    wrong |= ~(I)(ABS(f[m] - d) * dt <= WRONG * e->allowed[ROW[m]] + VANISHES * dt * ABS(d));
+    wrong |= ~(I)(ABS(f[m] * rate - d) * dt <= WRONG * e->allowed[row_of[m]] + VANISHES * dt * ABS(d));
   }
   UNROLL for (int j = 0; j < (BENT_STOPS ? STOPS : 0); j++) {
     T miss = ABS(stop[j] - series_at(e->g[1 + j], degree, at));
@@ -212,43 +267,23 @@ INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const
   return wrong;
 }
 
-/* Steps that the polynomials bear out, with the states at their ends; shortened lanes have no event. */
+/* Steps that the polynomials bear out, with the states at their ends; shortened lanes have no event. Lanes whose
+ * first step in a mode may not see what comes are left to the interpreter. */
 INLINE I verify(const Lanes *s, const Work *w, const Step *e, int mode, T by_series, T *dt, I *slot, I *last, T *end) {
-  I same = s->length > 0, grows = same & (I)(by_series > GROWTH * s->length), leaps = {0};
+  I leaps = {0};
+  if (mode == ON && ON_ROWS == 0 && !BENT_SLIP && !BENT_STOPS) { state_at(end, e, *dt, P); return leaps; }
   UNROLL for (int i = 0; i < N; i++)
-    leaps |= ~same & (I)(by_series * ABS(e->c[i][1]) > FAR * (ABS(e->c[i][0]) + w->size));
-  if (mode == ON && ROWS == 0 && !BENT_SLIP && !BENT_STOPS) { state_at(end, e, *dt, P); return (I){0}; }
+    leaps |= (I)(s->length == 0) & (I)(by_series * ABS(e->c[i][1]) > FAR * (ABS(e->c[i][0]) + w->size));
   for (int tries = 0; tries < 20; tries++) {
-    T x[N], good = *dt;
-    I wrong = {0};
-    if (any(grows & s->live)) { /* every octave down to a length that is known to be safe */
-      T low = 0.5 * *dt;
-      I high;
-      while (any(high = grows & s->live & (I)(low > s->length))) low = SELECT(high, 0.5 * low, low);
-      for (I rest = grows & s->live & ~wrong; any(rest); rest &= low < *dt) {
-        for (int k = 0; k < OCTAVE; k++) {
-          T at = low * (1 + (double)k / OCTAVE);
-          state_at(x, e, at, P);
-          I bad = rest & ~wrong & disagrees(s, w, e, mode, x, at, *dt, P);
-          good = SELECT(bad, 0.5 * at, good);
-          wrong |= bad;
-        }
-        low = SELECT(rest, 2.0 * low, low);
-      }
-    }
-    T at = 0.5 * *dt;
+    T x[N], at = 0.5 * *dt;
     state_at(x, e, at, INNER);
-    I bad = ~wrong & disagrees(s, w, e, mode, x, at, *dt, INNER);
-    good = SELECT(bad, 0.5 * at, good);
-    wrong |= bad;
+    I early = s->live & disagrees(s, w, e, mode, x, at, *dt, INNER);
     state_at(end, e, *dt, P);
-    bad = ~wrong & disagrees(s, w, e, mode, end, *dt, *dt, P);
-    good = SELECT(bad, 0.5 * *dt, good);
-    wrong = (wrong | bad) & s->live;
-    if (!any(wrong)) return leaps;
-    *dt = SELECT(wrong, good, *dt);
-    *slot &= ~wrong;
-    *last &= ~wrong;
+    I late = s->live & ~early & disagrees(s, w, e, mode, end, *dt, *dt, P);
+    if (!any(early | late)) return leaps;
+    *dt = SELECT(early, 0.5 * at, SELECT(late, at, *dt));
+    *slot &= ~(early | late);
+    *last &= ~(early | late);
   }
   return ~(I){0};
 }
@@ -297,26 +332,32 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
   T dt, slope = BC(0), end[N];
   I finite, slot;
   T by_series = expand_step(s, w, &e, mode, &finite);
-  T h = MIN(by_series, BC(o->max_step)), left = o->t_end - s->t;
-  I last = h >= left, unclear = ~finite;
-  unclear |= ~last & (h <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0)));
+  T h = by_series, left = o->t_end - s->t, longest = SELECT(s->length > 0, GROWTH * s->length, BC(INFINITY));
+  longest = MIN(longest, BC(o->max_step));
+  I held = time_of(&e, h) > longest, last, unclear = ~finite;
+  if (any(held)) h = SELECT(held, place_of(&e, longest), h);
+  last = time_of(&e, h) >= left;
+  unclear |= ~last & (time_of(&e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0)));
   unclear |= (s->steps >= o->max_steps) | passed_between(s, &e);
-  h = SELECT(last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
+  if (any(last)) h = SELECT(last, place_of(&e, left + AT_END * MAX(BC(1), ABS(s->t + left))), h);
+  T whole = h;
   unclear |= first_hit(s, &e, mode, &h, &dt, &slot, &slope);
   if (mode == ON && any(slot == 1)) polish_slip(&e, slot == 1, h, &dt);
-  last &= h >= left;
-  dt = MIN(dt, SELECT(last, left, dt));
-  unclear |= last & (dt == left) & (slot == 1); /* a mode without a step */
-  h = MIN(h, left);
+  last &= h == whole;
+  I over = last & (time_of(&e, dt) >= left);
+  unclear |= over & (slot == 1); /* a mode without a step */
+  if (any(over)) dt = SELECT(over, place_of(&e, left), dt);
   T wanted = dt;
   unclear |= verify(s, w, &e, mode, by_series, &dt, &slot, &last, end);
-  s->length = SELECT(dt < wanted, dt, h);
+  T passed = time_of(&e, dt);
+  over &= last;
+  s->length = SELECT(dt < wanted, passed, MIN(time_of(&e, h), left));
   UNROLL for (int i = 0; i < N; i++) s->x[i] = end[i];
-  s->t += dt;
+  s->t += passed;
   if (TIMED) s->x[N - 1] = s->t;
   s->steps += 1;
   I live = s->live & ~unclear, met = live & (slot == 1), stopped = live & (slot > 1) & (slot <= STOPS + 1);
-  s->t = SELECT(live & last & (I)(dt == left), BC(o->t_end), s->t);
+  s->t = SELECT(live & over, BC(o->t_end), s->t);
   last &= live & (slot == 0);
   I gone = {0};
   if (mode == OFF) {
@@ -333,6 +374,7 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
     if (any(gone)) {
       unclear |= gone & ~(I)(slope < -1e-10 * e.g[0][0]);
       unclear |= release(s, gone) | change_mode(s, w, gone & ~unclear, EXIT, 0);
+      s->left_at = SELECT(gone, s->t, s->left_at);
     }
   } else {
     unclear |= met | (live & ~(I)(e.g[0][0] > 0));

@@ -2,6 +2,11 @@
 
 Off the set lambda = h/|h|; on it the unknowns nu = factor lambda keep h' = G at zero; where it is left h = r u
 with |u| = 1 and u = lambda (``multiplier_series``). Each is written out order by order.
+
+Towards a set that is reached, and away from one that was left, series in time converge up to the branch point
+there only, a part of the way that does not grow with the order. With dt = (1 - w s/3)^2 ds, 1/w the time to
+it (negative: since it), that point is at s = 3/w, and a step of a part f of the way in s is one of
+1 - (1 - f)^3 in time.
 """
 
 from __future__ import annotations
@@ -29,8 +34,8 @@ class SetProgram:
     text : str
         C of ``off_jet``, ``on_jet``, ``leave_jet``, ``heights``, ``frozen_values``, ``field_values``,
         ``stop_values``, ``slip_values``, ``off_check``, ``on_check``.
-    rows : tuple of int
-        Rows of the field that are not affine off the set or on it, which a step is checked with.
+    rows, on_rows : tuple of int
+        Rows of the field that are not affine off the set and on it, which a step is checked with.
     bent_slip, bent_stops : bool
         Whether what a step on the set ends with, and stops, have to be checked too.
     states : tuple of int
@@ -39,6 +44,7 @@ class SetProgram:
 
     text: str
     rows: tuple[int, ...]
+    on_rows: tuple[int, ...]
     bent_slip: bool
     bent_stops: bool
     states: tuple[int, ...]
@@ -55,7 +61,7 @@ class _Writer:
         self.system, self.order = system, order
         self.x, self.p = system.extended_states, system.parameter_symbols
         self.n, self.k = int(self.x.numel()), system.surface_count
-        self.lam = coupled.multipliers
+        self.lam, self.stretch = coupled.multipliers, ca.SX.sym("stretch")
         nu = ca.vertcat(*[coupled.unknown(i) for i in range(self.k)])
         field, layer, heights, factor, stops = coupled.outputs
         none = ca.SX.zeros(self.k, 1)
@@ -74,7 +80,7 @@ class _Writer:
 
     def program(self) -> SetProgram:
         x, k = self.x, self.k
-        program = Program(x, self.p, self.lam, ("T",) * k)
+        program = Program(x, self.p, ca.vertcat(self.lam, self.stretch), ("T",) * (k + 1))
         program.add("off_jet", **self._off())
         program.add("on_jet", **self._on())
         program.add("leave_jet", **self._leave())
@@ -88,13 +94,14 @@ class _Writer:
         radius = ca.sqrt(ca.sumsqr(self.heights))
         off = ca.substitute(self.off_field, self.lam, self.heights / radius)
         on = ca.substitute(self.on_field, self.nu, self.nu_at)
-        both = (off, on)
-        rows = tuple(i for i in range(self.n) if not all(ca.is_linear(f[i], x) for f in both))
+        rows, on_rows = (
+            tuple(i for i in range(self.n) if not ca.is_linear(f[i], x)) for f in (off, on)
+        )
         program.add("off_check", f=off[list(rows)], value=self.stops)
-        program.add("on_check", f=on[list(rows)], value=self.stops)
+        program.add("on_check", f=on[list(on_rows)], value=self.stops)
         bent_slip = not ca.is_linear(used, x)
         bent_stops = bool(self.stops.numel()) and not ca.is_linear(self.stops, x)
-        return SetProgram(program.text(), rows, bent_slip, bent_stops, self._states())
+        return SetProgram(program.text(), rows, on_rows, bent_slip, bent_stops, self._states())
 
     def _states(self) -> tuple[int, ...]:
         found = []
@@ -120,6 +127,7 @@ class _Writer:
         jet = self._begin()
         direction = _Direction(self.k)
         stops: list[list[Coefficient]] = []
+        fields: list[list[Coefficient]] = []
         none: list[Coefficient] = [None] * self.k
         for k in range(self.order + 1):
             now = [row[k] for row in jet]
@@ -130,8 +138,9 @@ class _Writer:
                 u = direction.push(k, expansion.advance(k, [*now, *none])[1])
                 known = expansion.again(k, [*now, *u], late)
             stops.append(known[2])
-            self._next(jet, known[0], k)
-        last = range(self.order - 1, self.order + 1)
+            fields.append(known[0])
+            self._next(jet, self._stretched(fields), k)
+        last = range(self.order - 1, self.order + 1)  # of the direction, and of h
         ends = [row[k] for row in [*direction.u, *direction.own] for k in last]
         return dict(
             c=_matrix(jet),
@@ -210,6 +219,19 @@ class _Writer:
         return dict(
             c=_matrix(jet), g=_matrix([distance, *zip(*stops, strict=True)]), u=_matrix(u)
         )  # fmt: skip
+
+    def _stretched(self, fields: Sequence[Sequence[Coefficient]]) -> list[Coefficient]:
+        """The last coefficients of (1 - w s/3)^2 times the field."""
+        w = self.stretch
+        result = []
+        for row in zip(*fields[-3:], strict=True):
+            total = value_of(row[-1])
+            if len(row) > 1:
+                total += (w * (-2 / 3)) * value_of(row[-2])
+            if len(row) > 2:
+                total += (w * w * (1 / 9)) * value_of(row[-3])
+            result.append(clean(total))
+        return result
 
     def _begin(self) -> list[list[Coefficient]]:
         return [[self.x[i]] for i in range(self.n)]

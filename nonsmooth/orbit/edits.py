@@ -24,8 +24,7 @@ from .boundary import BoundaryProblem, Evaluation
 from .conditions import Condition, surface_of, touching
 from .itinerary import leg_between
 from .legs import Leg, fly
-
-_TURNED = str.maketrans("+-", "-+")
+from .mirrors import TURNED, mirrored, neighbours
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,7 +84,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
     """The bifurcation that the zero of a test is."""
     legs, i = problem.legs, test.leg
     leg, guard = legs[i], test.guard
-    before, after = legs[i - 1], legs[(i + 1) % len(legs)]
+    before, after = neighbours(problem, i)
     if test.what == "interior":
         assert guard is not None
         return _grazed(problem, leg, guard, test, at, p)
@@ -143,7 +142,7 @@ def mode_after(leg: Leg) -> str:
         letter = "+" if leg.name == "L_F1 h" else "-"
     else:
         k = int(leg.name.removeprefix("lambda").removeprefix("h"))
-        turned = leg.mode[k].translate(_TURNED)
+        turned = leg.mode[k].translate(TURNED)
         letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
     return leg.mode[:k] + letter + leg.mode[k + 1 :]
 
@@ -221,7 +220,7 @@ def _inserted(chain: _Chain, kind: str, i: int, p: Array) -> Edited:
         new = leg_between(system, slide, mode_after(before))
     else:
         chain.legs[k] = replace(before, kind="crossing")
-        far = _with(before.mode, surface, before.mode[surface].translate(_TURNED))
+        far = _with(before.mode, surface, before.mode[surface].translate(TURNED))
         new = leg_between(system, far, _with(far, surface, "s"))
     chain.insert(k + 1, new, start)
     return chain.done(k + 1)
@@ -369,32 +368,3 @@ def _rotated(before: Edited, k: int, p: Array) -> Edited:
     whole = replace(problem, legs=legs)
     u = whole.pack(np.array(moved), np.concatenate([durations[k:], durations[:k]]))
     return Edited(whole, u, (*before.origin[k:], *before.origin[:k]))
-
-
-def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
-    """A leg as the symmetry of the problem maps it; surfaces whose function changes its sign turn."""
-    if problem.symmetry is None:
-        return leg
-    turned = _turning(problem)
-    mode = "".join(
-        c.translate(_TURNED) if k < len(turned) and turned[k] else c for k, c in enumerate(leg.mode)
-    )
-    surface = surface_of(problem.system, leg)
-    name, side = leg.name, leg.side
-    if surface >= 0 and turned[surface]:
-        name = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}.get(name, name)
-        side = -side
-    return replace(leg, mode=mode, name=name, side=side)
-
-
-def _turning(problem: BoundaryProblem) -> list[bool]:
-    """Which switching functions the symmetry maps to their negatives."""
-    system = problem.system
-    x = np.cos(1.0 + np.arange(system.dimension))
-    back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
-    result = []
-    for k in range(system.surface_count):
-        h = system.surface_function(k)
-        a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
-        result.append(a * b < 0.0)
-    return result

@@ -8,8 +8,8 @@ import numpy as np
 
 from ..model import Array
 from .boundary import BoundaryProblem
-from .edits import mirrored
 from .legs import fly
+from .mirrors import mirrored
 
 #: An orbit without an event is asked whether it goes round up to so many times.
 _MOST_ROUNDS = 60

@@ -12,8 +12,8 @@ from ..model.variational import variational_field
 from .boundary import BoundaryProblem
 from .branch import BranchEvent
 from .continuation import other_direction
-from .edits import mirrored
 from .legs import Leg
+from .mirrors import mirrored
 from .multipliers import leg_maps
 from .orbit_branches import OrbitCurve
 

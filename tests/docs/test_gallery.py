@@ -206,3 +206,90 @@ def test_buck_converter_doubles_where_its_closed_form_flows_say():
     slope = np.column_stack([(after(d) - after(-d)) / 2e-6 for d in step])
     assert np.abs(np.linalg.eigvals(slope) + 1).min() < 1e-5
     assert len(found["doublings"]) == 3 and np.all(np.diff(found["doublings"]) > 0)
+
+
+def test_forced_friction_is_den_hartogs():
+    """Amplitudes of motions without a stop, and where the first stop is, from their closed forms."""
+    found = ran("friction_drive")
+    seen = 0
+    for family in found["families"]:
+        for W, orbit in zip(family.values, family.solutions, strict=True):
+            friction = orbit.parameters["f"]
+            if friction < 0.99 * found["first_stop"](W):
+                assert "s" not in orbit.itinerary
+                truth = found["amplitude"](W, friction)
+                assert found["largest"](orbit) == pytest.approx(truth, rel=1e-10)
+                seen += 1
+            elif friction > 1.01 * found["first_stop"](W):
+                assert "s" in orbit.itinerary
+    assert seen > 100 and len(found["curves"]) == 2
+    for curve in found["curves"]:
+        W, friction = curve.values.T
+        assert np.abs(friction - found["first_stop"](W)).max() < 1e-10
+
+
+def test_chaos_beyond_the_touch_grows_in_proportion():
+    found = ran("belt")
+    touch = found["touch"]
+    assert touch.parameter == pytest.approx(1.707799714885060333, abs=1e-12)  # of the textbook
+    widths = np.array([np.ptp(cloud) for cloud in found["clouds"]])
+    beyond = touch.parameter - found["values"]
+    assert widths[beyond < -1e-4].max() < 1e-7  # a stable orbit
+    sizes = (widths / beyond)[beyond > 4e-4]
+    assert np.ptp(sizes) < 0.15 * sizes.mean()
+    assert "chaos of size linear" in touch.far_side.verdict
+
+
+def test_the_relay_slides_as_often_as_runs_do():
+    """Runs beside two of its bifurcations, beyond their transients: slides in a period."""
+    found = ran("relay")
+    branch, relay = found["branch"], found["relay"]
+    for event in branch.events[1:3]:
+        for w in (event.parameter - 0.05, event.parameter + 0.05):
+            orbit = branch[w]
+            run = relay.run({"w": w}, t_end=60.0)
+            late = [
+                s for s in run.segments if s.mode == "s" and s.t_start > 60.0 - 4 * orbit.period
+            ]
+            long = [s.t_start for s in late if s.t_end - s.t_start > 1.0]
+            once = [s for s in late if long[0] <= s.t_start < long[0] + orbit.period * (1 - 1e-9)]
+            assert len(once) == sum(leg.mode == "s" for leg in orbit.legs)
+    assert [e.kind for e in branch.events].count("grazing-sliding") == 6
+    assert all("stable" in orbit.stability for orbit in branch.orbits)
+
+
+def test_the_walker_alternates_where_the_multiplier_of_its_step_is_minus_one():
+    """By differences of simulated steps; between its first two doublings walks take the steps of the branch."""
+    found = ran("walker")
+    first, second = found["doublings"][:2]
+    assert first == pytest.approx(0.0151, abs=5e-5)  # Garcia et al. 1998: "about 0.015"
+    event = found["gaits"][1].events[0]
+    middle = event.orbit.trajectory(event.orbit.trajectory.t[0] + 1.0)
+
+    def step(change):
+        """One second into a step, to one second into the next."""
+        given = dict(parameters={"gamma": event.parameter}, tol=1e-13)
+        strike = found["ns"].Section("heelstrike", count=1)
+        at = found["ns"].simulate(found["system"], middle + change, 6.0, at=strike, **given).t[-1]
+        return found["ns"].simulate(found["system"], middle + change, at + 1.0, **given).x[-1]
+
+    slope = np.column_stack([(step(d) - step(-d)) / 2e-5 for d in 1e-5 * np.eye(4)])
+    assert np.abs(np.linalg.eigvals(slope) + 1).min() < 1e-4
+    alternating = found["gaits"][2]
+    for slope, angles in zip(found["slopes"], found["walks"], strict=True):
+        if slope < second - 2e-4:
+            legs = [leg.start[0] for leg in alternating[float(slope)].legs]
+            assert sorted({round(a, 6) for a in angles}) == sorted(round(a, 6) for a in legs)
+
+
+def test_the_oscillator_grazes_where_its_free_response_reaches_the_wall():
+    found = ran("impact")
+    size = math.hypot(1 - 2.2**2, 0.1 * 2.2)
+    assert found["grazing"].parameter == pytest.approx(size, rel=1e-12)
+    x, forces = found["many"].sample_x[..., 0], found["forces"]
+    last = forces > 4.55
+    truth = [found["strobed"](0)(found["single"][float(force)]) for force in forces[last]]
+    assert np.abs(x[last] - np.array(truth)[:, None]).max() < 1e-6
+    before = forces < 0.99 * size
+    free = (forces / (1 - 2.2**2 + 0.22j)).real[before]
+    assert np.abs(x[before] - free[:, None]).max() < 1e-6

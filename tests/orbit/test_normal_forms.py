@@ -34,6 +34,34 @@ def test_the_logistic_map_doubles_with_the_coefficient_nine():
     assert event.coefficients["its error"] < 1e-8
 
 
+def test_doubled_orbits_meet_the_doubling_of_the_single_one():
+    """From r = 3.2 down: the two rounds become one at r = 3."""
+    system = ticking([Y], [R * Y * (1 - Y)], r=3.2)
+    twice = [("", "tick"), ("", "tick")]
+    orbit = ns.periodic_orbit(system, [0.513, 0.0], itinerary=twice)
+    events = ns.continue_orbit(orbit, "r", bounds=(2.5, 3.3)).events
+    event = next(e for e in events if e.kind == "period doubling")
+    assert abs(event.parameter - 3) < 1e-9 and len(event.orbit.legs) == 1
+    assert event.coefficients["cubic coefficient"] == pytest.approx(9.0, rel=1e-6)
+    single = ns.continue_orbit(event.orbit, "r", bounds=(2.5, 3.3))
+    assert single[2.8].legs[0].start[0] == pytest.approx(1 - 1 / 2.8, rel=1e-12)
+
+
+def test_the_third_doubling_of_the_walker_has_its_coefficient_too():
+    """The orbits beside it hold in a small neighbourhood only."""
+    problem = ns.textbook.simplest_walker()
+    orbit = ns.periodic_orbit(problem.system, problem.start, itinerary=[("", "heelstrike")])
+    values = []
+    for _ in range(3):
+        branch = ns.continue_orbit(orbit, "gamma", bounds=(0.009, 0.0185))
+        orbit = next(e for e in branch.events if e.kind == "period doubling")
+        values.append(orbit.parameter)
+        assert orbit.far_side.verdict.endswith("(supercritical, stable)")
+    assert (
+        4.5 < (values[1] - values[0]) / (values[2] - values[1]) < 6
+    )  # Feigenbaum: 4.669 in the limit
+
+
 def test_a_doubling_that_is_subcritical_says_so():
     """x -> -r x - x^3: f''' = -6 at x = 0, c = -1."""
     orbit = fixed(ticking([Y], [-R * Y - Y**3], r=0.8), [0.0])

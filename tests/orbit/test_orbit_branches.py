@@ -322,3 +322,19 @@ def test_a_corner_of_two_surfaces_is_passed_and_a_touch_of_one_is_named():
     assert [len(branch[corner.parameter + d].legs) for d in (-1e-3, 1e-3)] == [4, 4]
     top = event.orbit.trajectory(np.linspace(*event.orbit.trajectory.t[[0, -1]], 4001))[:, 1].max()
     assert abs(top - event.parameter) < 1e-5 and event.far_side.verdict == "persistence"
+
+
+def test_an_event_at_the_first_leg_of_a_half_orbit_is_that_of_its_own_mode():
+    """The slide that ends at w = 31.63 begins the half; before it is the mirror image of the last leg."""
+    problem = ns.textbook.multi_sliding_relay()
+    at = {"w": 31.0}
+    run = problem.run(at, t_end=60.0)
+    orbit = ns.periodic_orbit(problem.system, run, parameters=at, symmetry="odd")
+    begun = ns.periodic_orbit(problem.system, orbit.legs[0].start, parameters=at, symmetry="odd")
+    branch = ns.continue_orbit(begun, "w", bounds=(31.0, 31.8))
+    assert kinds(branch) == ["adding-sliding", "grazing-sliding"]
+    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    late = problem.run({"w": 31.8}, t_end=60.0)
+    again = ns.periodic_orbit(problem.system, late, parameters={"w": 31.8}, symmetry="odd")
+    assert branch[31.8].period == pytest.approx(again.period, rel=1e-12)
+    assert len(branch[31.8].legs) == len(again.legs)

@@ -8,12 +8,16 @@ from typing import Any
 from graphs import D, run
 from intervals import CheckError, Iv, whole
 
+#: States and parameters.
+At = tuple[list[Iv], list[Iv]]
+UNIT = whole(1).a
+
 
 class Place:
     """Questions about a point of a recorded system."""
 
-    def __init__(self, record: dict[str, Any], p: list[Iv]):
-        self.graph, self.p = record["graph"], p
+    def __init__(self, record: dict[str, Any]):
+        self.graph = record["graph"]
         self.count = len(self.graph["surfaces"])
         self.contacts = len(record["impacts"])
         ends = [("stop", *s) for s in record["stops"]] + [("reset", *r) for r in record["resets"]]
@@ -27,7 +31,7 @@ class Place:
         """The letters of the surfaces."""
         return word[: self.count]
 
-    def _at(self, x: list[Iv], lam: list[Iv], further: bool = False) -> list[D]:
+    def _at(self, x: list[Iv], p: list[Iv], lam: list[Iv], further: bool = False) -> list[D]:
         """Values with derivatives by the states, and then by multipliers and reactions."""
         n, more = len(x), (len(lam) + self.contacts) * further
         size = n + more
@@ -39,50 +43,57 @@ class Place:
             D(whole(0), unit[n + len(lam) + i], zero) if further else D(whole(0))
             for i in range(self.contacts)
         ]
-        values = run(self.graph, states, [D(v) for v in self.p], [], signs, none)
+        values = run(self.graph, states, [D(v) for v in p], [], signs, none)
         empty = [whole(0)] * size
         return [v if v.g else D(v.v, empty, zero) for v in values]
 
-    def heights(self, x: list[Iv]) -> list[Iv]:
-        values = self._at(x, [whole(0)] * self.count)
+    def heights(self, x: list[Iv], p: list[Iv]) -> list[Iv]:
+        values = self._at(x, p, [whole(0)] * self.count)
         return [values[k].v for k in self.graph["surfaces"]]
 
-    def word(self, x: list[Iv]) -> str:
-        """The mode of a point off all surfaces."""
-        signs = [h.sign() for h in self.heights(x)]
-        if not all(signs):
+    def word(self, x: list[Iv], p: list[Iv], slides: int | None = None) -> str:
+        """The mode of a point off all surfaces but one that it is on, if it is."""
+        signs = [h.sign() for h in self.heights(x, p)]
+        if not all(s for j, s in enumerate(signs) if j != slides):
             raise CheckError("the side of a surface is undecided")
-        return "".join("+" if s > 0 else "-" for s in signs) + "o" * self.contacts
+        word = "".join("+" if s > 0 else "-" for s in signs) + "o" * self.contacts
+        if slides is None:
+            return word
+        after, _ = self._beyond((x, p), word, slides)
+        if after[slides] != "s":
+            raise CheckError("a jump that ends the sliding is not checked here")
+        return after
 
-    def start(self, x: list[Iv], exact: list[list[str]], parameters: list[list[str]]) -> str:
+    def start(self, x: list[Iv], p: list[Iv], box: list[tuple[Fraction, Fraction]]) -> str:
         """The mode of the start, which may lie on one surface exactly."""
-        signs = [h.sign() for h in self.heights(x)]
+        signs = [h.sign() for h in self.heights(x, p)]
         on = [j for j, s in enumerate(signs) if not s]
         if not on:
-            return self.word(x)
-        values = _rational(self.graph, exact, parameters)
+            return self.word(x, p)
+        values = _rational(self.graph, box[: len(x)], box[len(x) :])
         if len(on) > 1 or values[self.graph["surfaces"][on[0]]] != 0:
             raise CheckError("the side of a surface at the start is undecided")
         word = "".join({1: "+", -1: "-", 0: "?"}[s] for s in signs) + "o" * self.contacts
         self.began = on[0]
-        return self._beyond(x, word, on[0])[0]
+        return self._beyond((x, p), word, on[0])[0]
 
-    def rates(self, x: list[Iv], word: str, surface: int) -> tuple[Iv, Iv]:
+    def rates(self, at: At, word: str, surface: int) -> tuple[Iv, Iv]:
         """L1 and L2 at a surface."""
         found = []
         for s in (1, -1):
-            lam = [1 if w == "+" else -1 for w in self.surfaces_of(word)]
-            lam[surface] = s
-            values = self._at(x, [whole(v) for v in lam])
-            normal = values[self.graph["surfaces"][surface]].g
-            total = whole(0)
-            for g, k in zip(normal, self.graph["field"], strict=True):
-                total = total + g * values[k].v
-            found.append(total)
+            lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(word)]
+            lam[surface] = whole(s)
+            found.append(self._rate(at, lam, surface)[0])
         return found[0], found[1]
 
-    def _beyond(self, x: list[Iv], word: str, j: int) -> tuple[str, int]:
-        signs = tuple(v.sign() for v in self.rates(x, word, j))
+    def _rate(self, at: At, lam: list[Iv], surface: int) -> tuple[Iv, list[Iv]]:
+        """How fast a switching function rises in a field, and that field."""
+        values = self._at(*at, lam)
+        f = [values[k].v for k in self.graph["field"]]
+        return _dot(values[self.graph["surfaces"][surface]].g, f), f
+
+    def _beyond(self, at: At, word: str, j: int) -> tuple[str, int]:
+        signs = tuple(v.sign() for v in self.rates(at, word, j))
         letters = {(-1, 1): ("s", 0), (1, 1): ("+", 1), (-1, -1): ("-", 1)}
         if signs not in letters:
             raise CheckError("what follows at a surface is undecided")
@@ -90,44 +101,86 @@ class Place:
         return word[:j] + letter + word[j + 1 :], zeros
 
     def switched(
-        self, x: list[Iv], word: str, guard: str, j: int, direction: int
+        self, at: At, word: str, guard: str, j: int, direction: int
     ) -> tuple[str, int, str]:
         """The mode after a surface was met or left, zeros of its function, and the event's kind."""
         if guard == "exit":
-            l1, l2 = self.rates(x, word, j)
+            l1, l2 = self.rates(at, word, j)
             if (l2 if direction > 0 else -l1).sign() <= 0:
                 raise CheckError("the other field at an exit is undecided")
             return word[:j] + ("+" if direction > 0 else "-") + word[j + 1 :], 2, "exit"
         if "s" in word:
-            raise CheckError("a surface that is met while another slides is not checked here")
-        after, zeros = self._beyond(x, word, j)
+            return self._across(at, word, j), 1, "crossing"
+        after, zeros = self._beyond(at, word, j)
         return after, zeros, "entry" if after[j] == "s" else "crossing"
 
-    def jumped(self, x: list[Iv], index: int) -> tuple[list[Iv], bool]:
-        """The state after a reset or an impact, and whether its function is zero there exactly."""
+    def _across(self, at: At, word: str, j: int) -> str:
+        """Beyond a surface that is met while another slides.
+
+        For every multiplier of the one that is met the other attracts, and sliding on it leads across.
+        """
+        i, found = word.index("s"), []
+        for s in (1, -1):
+            lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(word)]
+            lam[i], lam[j] = whole(s), Iv(-UNIT, UNIT)
+            found.append(self._rate(at, lam, i))
+        (l1, f1), (l2, f2) = found
+        side = 1 if word[j] == "-" else -1
+        if l1.sign() >= 0 or l2.sign() <= 0:
+            raise CheckError("whether a surface goes on sliding is undecided")
+        a = l1 / (l1 - l2)
+        values = self._at(*at, [whole(0)] * self.count)
+        field = [p - a * (p - q) for p, q in zip(f1, f2, strict=True)]
+        if _dot(values[self.graph["surfaces"][j]].g, field).sign() != side:
+            raise CheckError(
+                "what follows where a surface is met while another slides is undecided"
+            )
+        return word[:j] + ("+" if side > 0 else "-") + word[j + 1 :]
+
+    def jumped(
+        self, x: list[Iv], p: list[Iv], word: str, index: int
+    ) -> tuple[list[Iv], bool, int | None]:
+        """The state after a reset or an impact.
+
+        Also whether its own function stays zero, and the surface that slides if it is not left.
+        """
         kind, _, _, node = self.ends[index]
         if kind == "reset":
             rows = self.graph["maps"][index - self.stops]
-            values = self._at(x, [whole(0)] * self.count)
+            values = self._at(x, p, [whole(0)] * self.count)
             new = [values[k].v for k in rows] + x[len(rows) :]
-            moved = [i for i, k in enumerate(rows) if self.graph["nodes"][k] != ["input", 0, i]]
-            return new, all(values[node].g[i].zero for i in moved)
-        new, moved = self._struck(x, index - len(self.ends) + self.contacts)
-        values = self._at(x, [whole(0)] * self.count)
-        return new, all(values[node].g[i].zero for i in moved)
+            moved = {i for i, k in enumerate(rows) if self.graph["nodes"][k] != ["input", 0, i]}
+        else:
+            new, moved = self._struck(x, p, index - len(self.ends) + self.contacts)
+        slides = word.index("s") if "s" in word else None
+        if slides is not None and self._depends(self.graph["surfaces"][slides], moved):
+            slides = None
+        return new, not self._depends(node, moved), slides
 
-    def _struck(self, x: list[Iv], contact: int) -> tuple[list[Iv], list[int]]:
+    def _depends(self, node: int, states: set[int]) -> bool:
+        """Whether a node has one of these states in it."""
+        todo, seen = [node], set[int]()
+        while todo:
+            k = todo.pop()
+            if k in seen:
+                continue
+            seen.add(k)
+            op, *rest = self.graph["nodes"][k]
+            if op == "input" and rest[0] == 0 and rest[1] in states:
+                return True
+            todo += [] if op in ("const", "input") else rest[:1] if op == "power" else rest
+        return False
+
+    def _struck(self, x: list[Iv], p: list[Iv], contact: int) -> tuple[list[Iv], set[int]]:
         """Newton's law, and which states the impulse moves; friction is not known here."""
         n, graph = len(x), self.graph
-        values = self._at(x, [whole(0)] * self.count, further=True)
+        values = self._at(x, p, [whole(0)] * self.count, further=True)
         gap, f = values[graph["gaps"][contact]], [values[k] for k in graph["field"]]
         reaction = n + self.count + contact
         column = [v.g[reaction] for v in f]
         if any(not v.zero for d in f for v in d.H[reaction][n:]):
             raise CheckError("an impulse that a multiplier enters is not checked here")
-        rate, effect = whole(0), whole(0)
-        for j in range(n):
-            rate = rate + gap.g[j] * f[j].v
+        rate, effect = _dot(gap.g[:n], [d.v for d in f]), whole(0)
         for i in range(n):
             slope = whole(0)
             for j in range(n):
@@ -137,15 +190,19 @@ class Place:
         impulse = -((whole(1) + e) * rate) / effect
         if impulse.sign() <= 0:
             raise CheckError("an impulse is not proven to push")
-        moved = [i for i, c in enumerate(column) if not c.zero]
+        moved = {i for i, c in enumerate(column) if not c.zero}
         return [v + impulse * c for v, c in zip(x, column, strict=True)], moved
 
 
+def _dot(a: list[Iv], b: list[Iv]) -> Iv:
+    return sum((s * t for s, t in zip(a, b, strict=True) if not (s.zero or t.zero)), whole(0))
+
+
 def _rational(
-    graph: dict[str, Any], start: list[list[str]], parameters: list[list[str]]
+    graph: dict[str, Any], *boxes: list[tuple[Fraction, Fraction]]
 ) -> list[Fraction | None]:
-    """Exact values of nodes, None where they are not known to be rational."""
-    inputs = [[Fraction(a) for a, _ in start], [Fraction(a) for a, _ in parameters]]
+    """Exact values of nodes, None where they are not known to be one rational number."""
+    inputs = [[a if a == b else None for a, b in box] for box in boxes]
     values: list[Fraction | None] = []
     for op, *rest in graph["nodes"]:
         if op == "const":

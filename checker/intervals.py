@@ -38,8 +38,15 @@ class Iv:
         return Iv(-self.b, -self.a)
 
     def __mul__(self, o: Iv) -> Iv:
-        p = (self.a * o.a, self.a * o.b, self.b * o.a, self.b * o.b)
-        return Iv(min(p) >> BITS, -(-max(p) >> BITS))
+        a, b, c, d = self.a, self.b, o.a, o.b
+        if a == b and c == d:
+            low = high = a * c
+        elif a >= 0 and c >= 0:
+            low, high = a * c, b * d
+        else:
+            p = (a * c, a * d, b * c, b * d)
+            low, high = min(p), max(p)
+        return Iv(low >> BITS, -(-high >> BITS))
 
     def __truediv__(self, o: Iv) -> Iv:
         if o.a <= 0 <= o.b:
@@ -70,6 +77,15 @@ def whole(n: int) -> Iv:
     return Iv(n * ONE, n * ONE)
 
 
+def _smooth(slope: Callable[[Any], Any]) -> Callable[[Callable[[Iv], Iv]], Callable[[Any], Any]]:
+    """Functions of intervals, and by their slopes of whatever else knows the chain rule."""
+
+    def of(f: Callable[[Iv], Iv]) -> Callable[[Any], Any]:
+        return lambda x: f(x) if type(x) is Iv else x.chained(f, slope)
+
+    return of
+
+
 def _ends(f: Callable[[Iv], Iv], x: Iv) -> Iv:
     """A rising function from its values at both ends."""
     return Iv(f(Iv(x.a, x.a)).a, f(Iv(x.b, x.b)).b)
@@ -91,6 +107,7 @@ def _series(first: Iv, factor: Callable[[Iv, int], Iv]) -> Iv:
     return Iv(total.a - r, total.b + r)
 
 
+@_smooth(lambda x: exp(x))
 def exp(x: Iv) -> Iv:
     def point(p: Iv) -> Iv:
         k = max(0, abs(p.a).bit_length() - BITS + 4)
@@ -113,6 +130,7 @@ def _atanh_series(z: Iv) -> Iv:
     return _series(z, factor)
 
 
+@_smooth(lambda x: whole(1) / x)
 def log(x: Iv) -> Iv:
     def point(p: Iv) -> Iv:
         if p.a <= 0:
@@ -125,12 +143,14 @@ def log(x: Iv) -> Iv:
     return _ends(point, x)
 
 
+@_smooth(lambda x: whole(1) / (sqrt(x) + sqrt(x)))
 def sqrt(x: Iv) -> Iv:
     if x.a < 0:
         raise CheckError("a root of what may be negative")
     return Iv(isqrt(x.a << BITS), isqrt(x.b << BITS) + 1)
 
 
+@_smooth(lambda x: whole(1) / (whole(1) + x.sq()))
 def atan(x: Iv) -> Iv:
     def point(p: Iv) -> Iv:
         for _ in range(4):
@@ -163,14 +183,17 @@ def _circular(x: Iv, shift: int) -> Iv:
     return Iv(max(value.a - r, -ONE - 1), min(value.b + r, ONE + 1))
 
 
+@_smooth(lambda x: cos(x))
 def sin(x: Iv) -> Iv:
     return _circular(x, 0)
 
 
+@_smooth(lambda x: -sin(x))
 def cos(x: Iv) -> Iv:
     return _circular(x, 1)
 
 
+@_smooth(lambda x: whole(2) / sqrt(PI) * exp(-x.sq()))
 def erf(x: Iv) -> Iv:
     def point(p: Iv) -> Iv:
         s, powers = p.sq(), {0: p}

@@ -34,21 +34,25 @@ def times(a: Polynomial, b: Polynomial) -> Polynomial:
     return result
 
 
-def polynomials(graph: dict[str, Any]) -> list[Polynomial]:
-    """The polynomial of every node."""
+def polynomials(
+    graph: dict[str, Any], signs: list[int] | None = None, nodes: set[int] | None = None
+) -> list[Polynomial]:
+    """The polynomial of every node, or of some of them, where multipliers are those signs."""
     values: list[Polynomial] = []
     for k, (op, *rest) in enumerate(graph["nodes"]):
-        if op == "const":
-            c = Fraction(rest[0])
+        if nodes is not None and k not in nodes:
+            values.append({})
+        elif op == "const" or (op == "input" and rest[0] == 3 and signs):
+            c = Fraction(rest[0]) if op == "const" else Fraction(signs[rest[1]])
             values.append({(): c} if c else {})
         elif op in ("add", "sub"):
             values.append(add(values[rest[0]], values[rest[1]], 1 if op == "add" else -1))
         elif op == "mul":
             values.append(times(values[rest[0]], values[rest[1]]))
         elif op == "div":
-            values.append(times(values[rest[0]], {((("inv", rest[1]), 1),): Fraction(1)}))
+            values.append(times(values[rest[0]], _inverse(values[rest[1]], rest[1])))
         elif op == "inv":
-            values.append({((("inv", rest[0]), 1),): Fraction(1)})
+            values.append(_inverse(values[rest[0]], rest[0]))
         elif op == "neg":
             values.append(add({}, values[rest[0]], -1))
         elif op == "twice":
@@ -63,6 +67,11 @@ def polynomials(graph: dict[str, Any]) -> list[Polynomial]:
     return values
 
 
+def _inverse(p: Polynomial, node: int) -> Polynomial:
+    """One over a number, or an inverse that stands for itself."""
+    return {(): 1 / p[()]} if list(p) == [()] else {((("inv", node), 1),): Fraction(1)}
+
+
 def is_multiple(graph: dict[str, Any]) -> bool:
     """Whether F1 - F2 = g G for the recorded factor g and direction G."""
     if "factor" not in graph:
@@ -73,3 +82,21 @@ def is_multiple(graph: dict[str, Any]) -> bool:
         not add(add(p[a], p[b], -1), times(g, p[d]), -1)
         for a, b, d in zip(graph["above"], graph["below"], graph["direction"], strict=True)
     )
+
+
+def is_factored(
+    graph: dict[str, Any], signs: tuple[list[int], list[int]], factor: int, direction: list[int]
+) -> bool:
+    """Whether the fields at two lists of multipliers differ by the factor times the direction."""
+    todo, nodes = [*graph["field"], factor, *direction], set[int]()
+    while todo:
+        k = todo.pop()
+        if k not in nodes:
+            nodes.add(k)
+            op, *rest = graph["nodes"][k]
+            todo += [] if op in ("const", "input") else rest[:1] if op == "power" else rest
+    p, q = (polynomials(graph, s, nodes) for s in signs)
+    return all(
+        not add(add(p[f], q[f], -1), times(p[factor], p[d]), -1) and not add(p[d], q[d], -1)
+        for f, d in zip(graph["field"], direction, strict=True)
+    ) and not add(p[factor], q[factor], -1)

@@ -28,11 +28,22 @@ class Series:
         self._rule = rule
 
     def __getitem__(self, k: Any) -> Any:
-        if isinstance(k, slice):
-            return [self[i] for i in range(k.stop)]
-        while len(self._known) <= k:
-            self._known.append(self._rule(self._known, len(self._known)))
-        return self._known[k]
+        known = self._known
+        try:
+            return known[k]
+        except IndexError:
+            while len(known) <= k:
+                known.append(self._rule(known, len(known)))
+            return known[k]
+
+
+class Constant(Series):
+    """A series of one coefficient, which is computed when it is asked for."""
+
+    __slots__ = ()
+
+    def __init__(self, first: Callable[[], Iv]):
+        super().__init__(lambda _, k: ZERO if k else first())
 
 
 #: A series, or as many of its coefficients as are needed.
@@ -40,10 +51,14 @@ Coefficients = Series | list[Iv]
 
 
 def plus(a: Coefficients, b: Coefficients) -> Series:
+    if type(a) is Constant and type(b) is Constant:
+        return Constant(lambda: a[0] + b[0])
     return Series(lambda _, k: a[k] + b[k])
 
 
 def minus(a: Coefficients, b: Coefficients) -> Series:
+    if type(a) is Constant and type(b) is Constant:
+        return Constant(lambda: a[0] - b[0])
     return Series(lambda _, k: a[k] - b[k])
 
 
@@ -55,25 +70,36 @@ def _convolved(a: Any, b: Any, k: int, first: int = 0, last: int | None = None) 
     """Sum of a[i] b[k - i] for i from first to last."""
     total = ZERO
     for i in range(first, (k if last is None else last) + 1):
-        if not (a[i].zero or b[k - i].zero):
-            total = total + a[i] * b[k - i]
+        p, q = a[i], b[k - i]
+        if not (p.zero or q.zero):
+            total = total + p * q
     return total
 
 
 def times(a: Coefficients, b: Coefficients) -> Series:
+    if type(b) is Constant:
+        a, b = b, a
+    if type(a) is Constant and type(b) is Constant:
+        return Constant(lambda: a[0] * b[0])
+    if type(a) is Constant:
+        return Series(lambda _, k: b[k] if b[k].zero else b[k] * a[0])
     return Series(lambda _, k: _convolved(a, b, k))
 
 
 def over(a: Coefficients, b: Coefficients) -> Series:
+    if type(a) is Constant and type(b) is Constant:
+        return Constant(lambda: a[0] / b[0])
+    if type(b) is Constant:
+        return Series(lambda _, k: a[k] if k and a[k].zero else a[k] / b[0])
     return Series(lambda w, k: (a[k] - _convolved(w, b, k, 0, k - 1)) / b[0])
 
 
 def scaled(a: Coefficients, n: int) -> Series:
-    return Series(lambda _, k: a[k] * whole(n))
+    return times(a, constant(whole(n)))
 
 
 def constant(v: Iv) -> Series:
-    return Series(lambda _, k: ZERO if k else v)
+    return Constant(lambda: v)
 
 
 def slope_of(a: Coefficients) -> Series:
@@ -257,6 +283,8 @@ def _apply(op: str, args: list[Dual]) -> Dual:
     if op not in FUNCTIONS:
         raise CheckError(f"the operation {op!r} is not known to this checker")
     v, slope = FUNCTIONS[op](a.v)
+    if type(a.v) is Constant and a.d is None:
+        return Dual(Constant(lambda: v[0]))
     return Dual(v, None if a.d is None else times(slope, a.d))
 
 
@@ -311,4 +339,4 @@ def along_field(
         return evaluate(graph, [[Dual(v) for v in c], still, []])
 
     c = motion(lambda c: [at(c)[k].v for k in field], x, 4)
-    return at(c)[node].v[:4]
+    return [at(c)[node].v[k] for k in range(4)]

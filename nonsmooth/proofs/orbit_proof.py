@@ -106,7 +106,8 @@ class OrbitProof:
             | {k: getattr(e, k) for k in ("kind", "name", "before", "after")}
             for e in self.events
         ]
-        record = motion_of(self.system, self.numbers) | {  # type: ignore[arg-type]
+        words = sorted({self.first, *(e.after for e in self.events)})
+        record = motion_of(self.system, self.numbers, words) | {  # type: ignore[arg-type]
             "proven": self.proven,
             "status": self.status,
             "first": self.first,

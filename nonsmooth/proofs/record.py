@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from fractions import Fraction
 from typing import Any
 
 from ..model import FilippovSystem
+from .algebra import Difference
 from .arithmetic import Numbers, ends, exact, fraction
 from .described import Written
 from .flint import arb
@@ -61,10 +63,11 @@ def _instructions(program: Program, numbers: Numbers) -> list[list[Any]]:
     return nodes
 
 
-def motion_of(system: FilippovSystem, numbers: Numbers) -> dict[str, Any]:
+def motion_of(system: FilippovSystem, numbers: Numbers, words: Iterable[str]) -> dict[str, Any]:
     """A system as instructions: surfaces, field, guards, maps, gaps and restitutions.
 
-    Inputs of vector 3 are multipliers, of vector 4 reactions.
+    Inputs of vector 3 are multipliers, of vector 4 reactions. Of the modes ``words`` that slide, where
+    F1 - F2 = g G has a common factor g, its node and those of G are named.
     """
     written, d = Written(system), system.definition
     tape = written.tape
@@ -74,10 +77,16 @@ def motion_of(system: FilippovSystem, numbers: Numbers) -> dict[str, Any]:
     one = lambda e: written.insert([e])[0] if e.numel() else []
     maps = [one(d.maps[:, k]) for k in range(len(system.resets))]
     rows = [one(d.surfaces), field, one(d.guards), one(d.gaps), one(d.restitutions), *maps]
+    sliding = {w: _factored(written, rows[0], w, numbers) for w in words if "s" in w}
+    rows += [[d.factor, *d.direction] for d in sliding.values()]
     program = Program(tape, rows)
     names = ("surfaces", "field", "guards", "gaps", "restitutions")
-    *found, maps = *program.rows[:5], program.rows[5:]
-    graph = dict(zip(names, found, strict=True)) | {"maps": maps}
+    found, maps = program.rows[:5], program.rows[5 : 5 + len(maps)]
+    graph: dict[str, Any] = dict(zip(names, found, strict=True)) | {"maps": maps}
+    graph["sliding"] = {
+        w: {"factor": row[0], "direction": row[1:]}
+        for w, row in zip(sliding, program.rows[5 + len(maps) :], strict=True)
+    }
     return {
         "format": "nonsmooth orbit 1",
         "graph": graph | {"nodes": _instructions(program, numbers)},
@@ -85,6 +94,17 @@ def motion_of(system: FilippovSystem, numbers: Numbers) -> dict[str, Any]:
         "resets": [list(r) for r in system.resets],
         "impacts": list(system.impacts),
     }
+
+
+def _factored(written: Written, surfaces: list[int], word: str, numbers: Numbers) -> Difference:
+    """The factor that both fields' difference has where a surface slides."""
+    tape, i = written.tape, word.index("s")
+    fields = []
+    for s in (1.0, -1.0):
+        signs = [1.0 if c == "+" else -1.0 for c in word[: len(surfaces)]]
+        signs[i] = s
+        fields.append(written.field([tape.constant(v) for v in signs]))
+    return Difference(tape, fields, written.gradient(surfaces[i]), numbers)
 
 
 def asked(subject: Any, coincident: bool = False) -> dict[str, Any]:

@@ -108,25 +108,49 @@ def test_what_is_given_wrongly_is_refused():
         bounce.certify(3, 1, -1, 0)
 
 
-@pytest.mark.slow
+def run_checker(path):
+    return subprocess.run(
+        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
+    )
+
+
 @pytest.mark.parametrize("change", [None, "earlier", "other"])
-def test_the_checker_follows_a_bounce_again(change, tmp_path):
+@pytest.mark.parametrize("box", [False, True])
+def test_the_checker_follows_a_bounce_again(change, box, tmp_path):
     """Slip, rolling, reverse slip and lift-off, with intervals of whole numbers and no code in common."""
     model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-    proof = bounce.certify(model, 0.3, -1.0, 0.1)
+    landing = ((0.3, 0.301), -1.0, (0.1, 0.101)) if box else (0.3, -1.0, 0.1)
+    proof = bounce.certify(model, *landing)
     assert proof.itinerary == "+ s -"
     path = tmp_path / "bounce.json"
     proof.orbit.save(path)
     record = json.loads(path.read_text())["orbit"]
     if change == "earlier":
         record["events"][0]["t"] = [
-            str(Fraction(v) - Fraction(1, 10**15)) for v in record["events"][0]["t"]
+            str(Fraction(v) - Fraction(1, 1000 if box else 10**15))
+            for v in record["events"][0]["t"]
         ]
     elif change == "other":
         record["events"][0]["after"] = "-"
     path.write_text(json.dumps({"orbit": record}))
-    done = subprocess.run(
-        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
-    )
+    done = run_checker(path)
     assert done.returncode == (1 if change else 0)
     assert ("3 events as claimed" in done.stdout) == (change is None)
+
+
+@pytest.mark.slow
+def test_the_checker_follows_random_boxes_of_bounces_again(tmp_path):
+    rng = np.random.default_rng(1)
+    soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
+    for k in range(20):
+        wide = 10.0 ** rng.uniform(-6, -2)
+        xdot, omega = rng.uniform([-1, -2], [1, 2])
+        model = soft if k % 2 else TURF.replace(G=1e-4)
+        proof = bounce.certify(model, (xdot, xdot + wide), -1, (omega, omega + wide))
+        if proof.proven:
+            proof.orbit.save(tmp_path / "bounce.json")
+            assert run_checker(tmp_path / "bounce.json").returncode == 0, proof
+    model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    proof = bounce.certify(model, "0.1", -1, 1, parameters={"mu": (0.295, 0.305)})
+    proof.orbit.save(tmp_path / "mu.json")
+    assert run_checker(tmp_path / "mu.json").returncode == 0

@@ -157,14 +157,18 @@ def _parts(text: str) -> list[str]:
     """
     if len(text) <= _LONG:
         return [text]
-    depth, cuts = 0, [0]
+    depth, cuts, groups = 0, [0], list[bool]()
     for k, letter in enumerate(text):
         depth += (letter in _OPENS) - (letter in _CLOSES)
+        if letter in _OPENS:  # what is under a root, a power or bars stays together
+            groups.append(bool(re.search(r"(sqrt|abs|\^)$", text[:k])))
+        elif letter in _CLOSES and groups:
+            groups.pop()
         outer = depth == 0 and text[k - 1 : k] == " " and text[k + 1 : k + 2] == " "
         if outer and letter in "=<>+-~" and k - cuts[-1] > _SHORT:
             cuts.append(k)
-        elif depth == 0 and letter in ",;" and k + 1 - cuts[-1] > _SHORT:
-            cuts.append(k + 1)
+        elif letter in ",;" and k + 1 - cuts[-1] > (_LONG if depth else _SHORT) and not any(groups):
+            cuts.append(k + 1)  # inside brackets, those of a matrix, only where it is long
     for digits in re.finditer(r"\d{25,}", text):  # of a number proven to many
         cuts += range(digits.start() + 15, digits.end() - 5, 15)
     cuts.sort()

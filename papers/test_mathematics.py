@@ -7,7 +7,7 @@ import xml.etree.ElementTree as ElementTree
 
 import pytest
 
-from papers.mathematics import typeset, typeset_page
+from papers.mathematics import formula, typeset, typeset_page
 
 
 def seen(text: str) -> str:
@@ -78,3 +78,21 @@ def test_a_number_of_very_many_digits_can_be_broken():
     pieces = re.findall(r"<mn>([\d.]*)</mn>", made)
     assert "".join(pieces).strip(".") == digits and max(map(len, pieces)) <= 20
     assert made.count("<wbr>") >= 2
+
+
+def test_a_long_row_of_a_matrix_can_be_broken_but_nothing_under_a_root():
+    made = formula("A = [[-(2 xi w + 1), 1, 0], [-(2 xi w + w^2), 0, 1], [-w^2, 0, 0]]")
+    assert made.count("<wbr>") == 2
+    assert "<wbr>" not in formula("f(sqrt(aa + bb, cc + dd, ee + ff + gg))")
+
+
+def test_a_marked_formula_keeps_its_words_upright():
+    made = formula("x'' = tangential_force - mu load, lambda in Sgn(H)")
+    assert "<mtext>tangential force</mtext>" in made and "<mtext>load</mtext>" in made
+    assert "<mo>∈</mo>" in made and "<mi>Sgn</mi>" in made
+    ElementTree.fromstring(f"<p>{made}</p>".replace("<wbr>", "<wbr/>"))
+
+
+def test_a_block_has_a_formula_on_each_line():
+    made = formula("turn = int_0^T f dt\n\nW' = F / inertia", "block")
+    assert made.count('<math display="block">') == 2 and "<mo>∫</mo>" in made

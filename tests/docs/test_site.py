@@ -202,6 +202,56 @@ def test_built_site_loads_nothing_from_elsewhere_and_everything_it_loads_is_ther
     assert {p.stem for p in (site / "gallery").glob("*.svg")} == set(generate.GALLERY)
 
 
+class _Prose(html.parser.HTMLParser):
+    """The text of a page without what is no prose: code, formulas, heads, navigation, scripts."""
+
+    LEFT_OUT = {
+        "pre",
+        "code",
+        "math",
+        "script",
+        "style",
+        "nav",
+        "header",
+        "footer",
+        "title",
+        "b",
+    } | {f"h{k}" for k in range(1, 7)}
+
+    def __init__(self):
+        super().__init__()
+        self.inside, self.text = [], []
+
+    def handle_starttag(self, tag, attrs):
+        if tag in self.LEFT_OUT:
+            self.inside.append(tag)
+
+    def handle_endtag(self, tag):
+        if self.inside and tag == self.inside[-1]:
+            self.inside.pop()
+
+    def handle_data(self, data):
+        if not self.inside:
+            self.text.append(data)
+
+
+@pytest.mark.slow
+def test_no_page_of_the_api_has_a_formula_as_plain_text(site):
+    plain = re.compile(r"\^|\bsqrt\b|[<>]=|\w'+ *=|\$\w|\w\$|\b(?:lambda|sigma|theta|kappa)\d?\b")
+    pages = sorted((site / "api").glob("*.html"))
+    assert len(pages) > 20
+    formulas = 0
+    for page in pages:
+        text = page.read_text(encoding="utf-8")
+        formulas += text.count("<math")
+        prose = _Prose()
+        prose.feed(text)
+        assert prose.inside == [], page.name
+        lines = "".join(prose.text).splitlines()
+        assert [line.strip() for line in lines if plain.search(line)] == [], page.name
+    assert formulas > 300
+
+
 @pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)

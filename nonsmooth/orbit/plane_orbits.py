@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from functools import cached_property
+from functools import cached_property, partial
 
 import numpy as np
 
@@ -42,7 +42,12 @@ class PlaneOrbits:
         return {ahead: _bounded(self.scan, 1 if ahead else -1) for ahead in (True, False)}
 
     def follow(
-        self, start: Array, ahead: bool = True, cut: Cut | None = None, mode: str | None = None
+        self,
+        start: Array,
+        ahead: bool = True,
+        cut: Cut | None = None,
+        mode: str | None = None,
+        landing: bool = False,
     ) -> Array:
         """Follow one orbit, a few steps at a time, until ``cut`` shortens it.
 
@@ -55,6 +60,8 @@ class PlaneOrbits:
             Shown the curve as it grows; returns the part of it that is wanted.
         mode : str, optional
             Which way to leave the surface at the start.
+        landing : bool, optional
+            End where sliding begins.
 
         Returns
         -------
@@ -76,10 +83,13 @@ class PlaneOrbits:
                 max_steps=_CHUNK,
                 engine="reference",
             )
-            curve = np.vstack([curve, polyline(part, self.scan.box.size)[1:]])
+            entry = next((e for e in part.events if landing and e.kind == "entry"), None)
+            until = None if entry is None else (entry.t, entry.x)
+            curve = np.vstack([curve, polyline(part, self.scan.box.size, until=until)[1:]])
             kept = curve if cut is None else cut(curve)
             events += [event.x for event in part.events[:-1]]
             done = part.status is not Status.TOO_MANY_STEPS or len(events) > _EVENTS
+            done |= entry is not None
             if done or len(kept) < len(curve) or self._closed(events):
                 return kept
             x, t, mode = part.x[-1], float(part.t[-1]), _mode_at_end(part)
@@ -93,8 +103,22 @@ class PlaneOrbits:
         return bool(np.min(np.linalg.norm(gaps, axis=1)) < _NEAR)
 
     def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[Array]:
-        """Orbits (m, 2) in the direction of time, about evenly spaced; none starts beside ``avoid``."""
-        for _, curve in evenly_spaced(self.scan.box, count, self.follow, avoid=avoid):
+        """Orbits (m, 2) in the direction of time, about evenly spaced; none starts beside ``avoid``.
+
+        They go from where they begin to where they end, if that is in the box: sliding or rest.
+        """
+        follow = partial(self.follow, landing=True)
+        rests = [at.point for at in self.scan.equilibria]
+        rests += [at.point for at in self.scan.pseudo_equilibria]
+        curves = evenly_spaced(
+            self.scan.box,
+            count,
+            follow,
+            avoid=avoid,
+            rests=rests,
+            switch=lambda points: self.scan.at(points).h,
+        )
+        for _, curve in curves:
             yield curve
 
     def separatrices(self) -> Iterator[tuple[str, Array]]:

@@ -126,7 +126,10 @@ class SlidingOrbits:
         def orbit(flat: Array, ahead: bool, cut: Cut) -> Array:
             return self.follow(scan.lift(flat[None, :])[0], ahead, cut)
 
-        for flat, curve in evenly_spaced(scan.box, count, orbit, shortest=_SHORTEST, avoid=avoid):
+        rests = [scan.flat(at.point) for at in scan.two_folds]
+        rests += [scan.flat(at.point) for at in scan.pseudo_equilibria]
+        found = evenly_spaced(scan.box, count, orbit, shortest=_SHORTEST, avoid=avoid, rests=rests)
+        for flat, curve in found:
             l1, l2 = scan.where.at(scan.lift(flat[None, :])[0]).lie
             yield curve, bool(l1 < l2)
 

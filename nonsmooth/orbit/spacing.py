@@ -1,7 +1,9 @@
-"""Orbits that fill a box evenly: each ends where it comes close to another, or to itself.
+"""Orbits that fill a box evenly: none starts close to another, and each goes on to where it ends.
 
 After Jobard & Lefer 1997, "Creating evenly-spaced streamlines of arbitrary density", with cells of a
-grid for distances.
+grid for distances. Their streamlines end where they come close to another; here that would be short of
+the equilibrium or the surface at which they meet, so an orbit goes on until it touches the other, comes to
+rest, or has gone too far beside it.
 """
 
 from __future__ import annotations
@@ -17,14 +19,21 @@ from ..model import Array
 _CELLS = 34  # across the box, for 12 orbits: one that enters a cell of another ends
 _APART = 0.55  # from a start to the next orbit, in units of the box over the number of orbits
 _AGAIN = 8  # a curve that has left a cell for so many others and comes back has closed
+_FINE = 12  # cells across one of those: curves in one of them are one line to the eye
+_BESIDE = 0.7  # how far a curve goes on beside another, in units of the box
+_AT_REST = 4e-3  # of an equilibrium that a curve has come to, in units of the box
 
 #: Part of a curve (m, 2) that is wanted.
 Cut = Callable[[Array], Array]
+#: Values (m,) at points (m, 2) of a function that is zero on the switching surface.
+Switch = Callable[[Array], Array]
 #: From a start (2,), forward in time or backward, to where the cut says: the curve (m, 2).
 Follow = Callable[[Array, bool, Cut], Array]
 
 
-def polyline(run: Trajectory, scale: Array, step: float = 1 / 90) -> Array:
+def polyline(
+    run: Trajectory, scale: Array, step: float = 1 / 90, until: tuple[float, Array] | None = None
+) -> Array:
     """Points (m, n) of a run so close that straight lines between them draw its polynomials.
 
     Parameters
@@ -34,19 +43,24 @@ def polyline(run: Trajectory, scale: Array, step: float = 1 / 90) -> Array:
         Width and height of the picture.
     step : float, optional
         Largest distance of neighbours, relative to ``scale``; each step has at least eight parts.
+    until : (float, ndarray (n,)), optional
+        Time and state of the event at which the curve ends; by default the end of the run.
     """
-    if run.t[-1] == run.t[0]:
-        return run.x[:1]
+    ends, last = run.t, run.x[-1]
+    if until is not None:
+        ends, last = np.append(run.t[run.t < until[0]], until[0]), until[1]
+    if ends[-1] == ends[0]:
+        return last[None, :]
     shares = np.linspace(0.0, 1.0, 9)[:-1]
-    spans = np.diff(run.t)
-    coarse = run((run.t[:-1, None] + shares * spans[:, None]).ravel())
-    gaps = np.linalg.norm(np.diff(np.vstack([coarse, run.x[-1:]]), axis=0) / scale, axis=1)
+    spans = np.diff(ends)
+    coarse = run((ends[:-1, None] + shares * spans[:, None]).ravel())
+    gaps = np.linalg.norm(np.diff(np.vstack([coarse, last]), axis=0) / scale, axis=1)
     lengths = np.nan_to_num(gaps).reshape(-1, len(shares)).sum(axis=1)
     counts = np.clip(np.ceil(lengths / step), len(shares), 400).astype(int)
     times = [
-        t + span * np.arange(n) / n for t, span, n in zip(run.t[:-1], spans, counts, strict=True)
+        t + span * np.arange(n) / n for t, span, n in zip(ends[:-1], spans, counts, strict=True)
     ]
-    return np.vstack([run(np.concatenate(times)), run.x[-1:]])
+    return np.vstack([run(np.concatenate(times)), last])
 
 
 class Spacing:
@@ -58,14 +72,30 @@ class Spacing:
     count : int
         About how many orbits fit across the box.
     avoid : sequence of ndarray (m, 2)
-        Curves that orbits may meet, but do not start beside.
+        Curves that orbits may cross, but do not start beside.
+    rests : sequence of ndarray (2,)
+        Equilibria: an orbit that comes to one ends in it.
+    switch : callable, optional
+        Orbits that would go beside others for too long end where they cross its zeros.
     """
 
-    def __init__(self, box: Box, count: int, avoid: Sequence[Array] = ()):
+    def __init__(
+        self,
+        box: Box,
+        count: int,
+        avoid: Sequence[Array] = (),
+        rests: Sequence[Array] = (),
+        switch: Switch | None = None,
+    ):
+        self.switch = switch
         self.box, self.count = box, count
         self._cells_across = max(round(_CELLS * count / 12), 1)
         self._taken: set[tuple[int, int]] = set()
         self._points = [self._unit(curve) for curve in avoid if len(curve)]
+        self._rests = [np.asarray(rest, dtype=float) for rest in rests]
+        self._lines: set[tuple[int, int]] = set()
+        for curve in avoid:
+            self._lines.update(self._fine(curve)[0])
 
     def _unit(self, points: Array) -> Array:
         return (np.atleast_2d(points) - self.box.corner) / self.box.size
@@ -78,22 +108,72 @@ class Spacing:
         at, apart = self._unit(point), _APART / self.count
         return all(np.min(np.linalg.norm(p - at, axis=1)) >= apart for p in self._points)
 
+    def _fine(self, curve: Array) -> tuple[list[tuple[int, int]], list[int]]:
+        """Fine cells that a curve passes, and after which of its points."""
+        across = _FINE * self._cells_across
+        at = self._unit(curve) * across
+        parts = np.ceil(2.0 * np.linalg.norm(np.diff(at, axis=0), axis=1))
+        parts = np.clip(np.nan_to_num(parts, nan=1.0), 1, 4 * across).astype(int)
+        index = np.repeat(np.arange(len(parts)), parts)
+        share = np.arange(len(index)) - np.repeat(np.cumsum(parts) - parts, parts)
+        dense = at[index] + (share / parts[index])[:, None] * np.diff(at, axis=0)[index]
+        cells = [(int(a), int(b)) for a, b in np.floor(np.vstack([dense, at[-1:]]))]
+        return cells, [*index.tolist(), len(at) - 1]
+
     def until_met(self, curve: Array) -> Array:
-        """Part of a curve before it comes close to another, or to itself long ago."""
+        """Part of a curve until it rests, touches another or itself, or has been beside it for long."""
         first: dict[tuple[int, int], int] = {}
-        distinct = 0
+        distinct, close = 0, len(curve)
         last: tuple[int, int] | None = None
         for k, cell in enumerate(self._cells(curve)):
             if cell == last:
                 continue
             distinct, last = distinct + 1, cell
             if cell in self._taken or distinct - first.setdefault(cell, distinct) > _AGAIN:
-                return curve[: k + 1]
-        return curve
+                close = k
+                break
+        rested = self._rested(curve)
+        if rested is not None and len(rested) <= close + 1:
+            return rested
+        if close == len(curve):
+            return curve
+        lines = self._lines.union(self._fine(curve[: close + 1])[0][: -2 * _FINE])
+        beside = curve[close:]
+        cells, index = self._fine(beside)
+        touches = next((i for c, i in zip(cells, index, strict=True) if c in lines), len(beside))
+        kept = curve if touches == len(beside) else curve[: close + touches + 2]
+        if rested is not None and len(rested) <= len(kept):
+            kept = rested
+        far = self.box.length(kept[close:]) > _BESIDE
+        return self._to_surface(curve, close) if far else kept
+
+    def _to_surface(self, curve: Array, k: int) -> Array:
+        """Part of a curve to where it crosses the surface, if it soon does after point k; to k if not."""
+        if self.switch is not None:
+            beside = curve[k:]
+            lengths = np.linalg.norm(np.diff(beside, axis=0) / self.box.size, axis=1).cumsum()
+            beside = beside[: 1 + int(np.searchsorted(lengths, _BESIDE))]
+            h = self.switch(beside)
+            changes = np.flatnonzero(h[1:] * h[:-1] <= 0)
+            if changes.size:
+                j = int(changes[0])
+                return curve[: k + j + 1 + int(abs(h[j + 1]) < abs(h[j]))]
+        return curve[: k + 1]
+
+    def _rested(self, curve: Array) -> Array | None:
+        """Part of a curve to the equilibrium that it comes to, if it does; not the one it starts in."""
+        found = None
+        for rest in self._rests:
+            near = np.linalg.norm((curve - rest) / self.box.size, axis=1) < _AT_REST
+            after = np.flatnonzero(near & (np.cumsum(~near) > 0))
+            if after.size and (found is None or after[0] + 1 < len(found)):
+                found = np.vstack([curve[: after[0]], rest])
+        return found
 
     def add(self, curve: Array) -> None:
         """Keep other orbits away from a curve."""
         self._taken.update(self._cells(curve))
+        self._lines.update(self._fine(curve)[0])
         self._points.append(self._unit(curve))
 
 
@@ -104,6 +184,8 @@ def evenly_spaced(
     *,
     shortest: float = 0.09,
     avoid: Sequence[Array] = (),
+    rests: Sequence[Array] = (),
+    switch: Switch | None = None,
 ) -> Iterator[tuple[Array, Array]]:
     """Follow orbits both ways from middles of count x count cells that are still free.
 
@@ -116,7 +198,11 @@ def evenly_spaced(
     shortest : float, optional
         Curves shorter than this, in units of the box, are left out.
     avoid : sequence of ndarray (m, 2), optional
-        Curves that orbits may meet, but do not start beside.
+        Curves that orbits may cross, but do not start beside.
+    rests : sequence of ndarray (2,), optional
+        Equilibria: an orbit that comes to one ends in it.
+    switch : callable, optional
+        Orbits that would go beside others for too long end where they cross its zeros.
 
     Yields
     ------
@@ -124,7 +210,7 @@ def evenly_spaced(
     curve : ndarray (m, 2)
         In the direction of time.
     """
-    spacing = Spacing(box, count, avoid)
+    spacing = Spacing(box, count, avoid, rests, switch)
     for start in np.random.default_rng(0).permutation(box.middles(count)):
         if not spacing.free(start):
             continue

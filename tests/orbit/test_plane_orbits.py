@@ -127,3 +127,41 @@ def test_evenly_spaced_orbits_fill_the_box_both_ways():
 
 def test_starts_that_are_not_finite_have_no_orbit():
     assert orbits([1, 1], [1, 1]).follow(np.array([np.nan, 0.0])).shape == (0, 2)
+
+
+def ends_in_the_box(flow, curves, rests):
+    """Ends, and whether each is on another of the curves or in one of the points, as the eye sees it."""
+    for k, curve in enumerate(curves):
+        if flow.scan.box.contains(curve[-1]):
+            others = np.vstack([c for j, c in enumerate(curves) if j != k] + rests)
+            gaps = np.linalg.norm((others - curve[-1]) / flow.scan.box.size, axis=1)
+            yield curve[-1], gaps.min() < 1 / 150
+
+
+def test_every_orbit_goes_to_where_it_ends():
+    """Predator and prey with a threshold: to sliding, to rest, to another orbit or out of the box."""
+    a, d, effort, b = 0.3556, 0.0444, 0.2067, 0.3
+    psi = a * x / (b + x)
+    prey = x * (1 - x) - psi * y
+    above, below = [prey, psi * y - d * y - effort * y], [prey, psi * y - d * y]
+    flow = orbits(above, below, surface=y - 1.06, box=(0.0, 1.1, 0.3, 1.4))
+    curves = list(flow.spaced())
+    rests = [e.point for e in [*flow.scan.equilibria, *flow.scan.pseudo_equilibria]]
+    ends = list(ends_in_the_box(flow, curves, rests))
+    assert len(curves) > 20 and len(ends) > 15
+    assert all(abs(end[1] - 1.06) < 1e-7 or met for end, met in ends)
+
+
+def test_orbits_end_in_a_node_and_spirals_in_a_focus():
+    for field in ([-x, -2 * y], [y - 0.8 * x, -x - 0.8 * y]):
+        flow = orbits(field, field, surface=y + 1.9, t_end=1e3)
+        ends = list(ends_in_the_box(flow, list(flow.spaced(6)), [np.zeros(2)]))
+        assert len(ends) > 5 and all(met for _, met in ends)
+        assert sum(bool(np.all(np.abs(end) < 1e-12)) for end, _ in ends) > 2
+
+
+def test_an_orbit_may_end_where_it_begins_to_slide():
+    fall = orbits([1.0, -1.0], [1.0, 1.0])
+    landed = fall.follow(np.array([-1.0, 0.5]), landing=True)
+    assert_allclose(landed[-1], [-0.5, 0.0], atol=1e-12)
+    assert fall.follow(np.array([-1.0, 0.5]))[-1, 0] > 2.0

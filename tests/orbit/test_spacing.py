@@ -67,3 +67,41 @@ def test_what_is_avoided_is_met_but_nothing_starts_beside_it():
     for start, curve in found:
         assert start[1] > 1 / 8  # the row of starts on the line is left out
         assert curve[0, 1] == 0.0  # but orbits run through it
+
+
+def lines_to_a_node(rests):
+    """Two orbits of x' = -x, y' = -2 y on parabolas that touch at the origin."""
+    box = Box(-1.0, 1.0, -1.0, 1.0)
+    spacing, s = Spacing(box, 12, rests=rests), np.exp(-np.linspace(0, 9, 4000))
+    first, second = (np.column_stack([0.9 * s, c * s**2]) for c in (0.5, 0.7))
+    spacing.add(first)
+    return spacing.until_met(second)
+
+
+def test_a_curve_goes_on_beside_another_until_they_are_one_line():
+    kept = lines_to_a_node([])
+    gap = 0.2 * (kept[-1, 0] / 0.9) ** 2 / 2  # in units of the box
+    assert 0 < gap < 1 / 200
+
+
+def test_a_curve_that_comes_to_an_equilibrium_ends_in_it():
+    spacing = Spacing(BOX, 12, rests=[np.array([1.0, 0.5])])
+    s = np.exp(-np.linspace(0, 9, 400))
+    kept = spacing.until_met(np.column_stack([1.0 + 0.9 * s, np.full(400, 0.5)]))
+    assert_allclose(kept[-1], [1.0, 0.5], atol=0)
+    away = np.column_stack([np.linspace(1.0, 2.0, 100), np.full(100, 0.5)])
+    assert len(spacing.until_met(away)) == 100  # it starts there
+
+
+def test_a_curve_that_stays_beside_another_ends_at_the_surface():
+    box = Box(0.0, 4.0, 0.0, 2.0)
+    line = np.linspace(0, 4, 800)
+    beside = np.column_stack([line, np.maximum(1.4 - line, 1.015)])
+    beside = np.vstack([beside, np.column_stack([line[::-1], np.full(800, 1.025)])])
+    ends = []
+    for switch in (lambda points: points[:, 0] - 1.5, None):
+        spacing = Spacing(box, 12, switch=switch)
+        spacing.add(np.column_stack([line, np.full(800, 1.0)]))
+        ends.append(spacing.until_met(beside)[-1, 0])
+    assert ends[0] == pytest.approx(1.5, abs=0.006)
+    assert ends[1] < 0.5  # without a surface, where they came close

@@ -6,10 +6,12 @@ import csv
 import dataclasses
 import importlib
 import json
+import math
 import re
 from functools import cache
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from papers import __main__ as everything
@@ -118,6 +120,31 @@ def test_faults_of_print_are_found():
     assert "7.5 inches wide" in found and "'small' is in 6 point" in found
     assert "right side' is cut off" in found and "outside" not in found
     assert "'high' is cut off" in found
+
+
+def test_long_legends_and_texts_on_one_another_are_found():
+    with look.settings():
+        figure = look.new_figure(7.0, 3.0)
+        axes = figure.add_subplot()
+        for k in range(7):
+            axes.plot([0, 1], [k, k], label=f"line {k}")
+        axes.legend(loc="upper left")
+        assert faults(figure) == ["a legend has 7 entries: label the things themselves."]
+        axes.get_legend().remove()
+        axes.text(0.5, 1.0, "one text", rotation=40)
+        axes.text(0.5, 1.1, "another", rotation=40)
+        axes.text(0.6, 1.0, "beside", rotation=40)
+        assert faults(figure) == ["'one text' is on 'another'."]
+
+
+def test_curves_are_sampled_where_they_bend():
+    x, y = look.sampled(lambda t: [math.exp(-30 * t), math.sqrt(t)], [0.0, 0.3, 1.0])
+    assert y.shape == (len(x), 2) and np.all(np.diff(x) > 0) and 30 < len(x) <= 200
+    assert np.array_equal(y[:, 0], [math.exp(-30 * t) for t in x])
+    steps = np.column_stack([np.diff(x), np.diff(y[:, 0])])
+    turn = np.degrees(np.abs(np.diff(np.arctan2(*steps.T[::-1]))))
+    assert turn.max() < 4.5
+    assert len(look.sampled(lambda t: 2 * t, [0.0, 0.4, 1.0])[0]) == 3  # straight
 
 
 def test_all_folders_are_listed():

@@ -24,6 +24,7 @@ for name, ax in panels.items():
         parameters={"alpha": values[name]},
         ax=ax,
         legend=name == "saddle and node",
+        labels=True,
         title=f"{name}, alpha = {values[name]:.4f}",
     )
 

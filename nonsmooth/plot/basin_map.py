@@ -13,9 +13,13 @@ from matplotlib.patches import Patch
 from ..model import OptionError
 from ..orbit import Basins
 from . import style
+from .labels import Labels
 
 #: Of attractors, in turn: told apart by deuteranopes too, light enough for dark marks.
 COLORS = ("#9ecae1", "#fdd0a2", "#9fdf5f", "#7f7fff", "#df7f7f", "#5f9fdf", "#ffdf3f", "#7f9f3f")
+_LISTED = (
+    4  # attractors in a legend, beside what else may become of a start; more are named on the map
+)
 _OTHERS = {0: "#ffffff", -1: "#252525", -2: "#737373", -3: "#bdbdbd", -4: "#969696"}
 
 
@@ -92,6 +96,7 @@ def basins(
         if title:
             axes.set_title(title)
         if legend:
+            _names(axes, found) if sum(k > 0 for k in found.fractions) > _LISTED else None
             _legend(axes, found)
     return figure
 
@@ -121,7 +126,9 @@ def _color(label: int) -> str:
 
 def _legend(axes: Axes, found: Basins) -> None:
     parts = found.fractions
-    order = [k for k in parts if k > 0][:8] + [k for k in parts if k <= 0]
+    attractors = [k for k in parts if k > 0]
+    order = [k for k in parts if k <= 0]
+    order = order if len(attractors) > _LISTED else [*attractors, *order]
     handles = [
         Patch(
             facecolor=_color(k),
@@ -130,4 +137,17 @@ def _legend(axes: Axes, found: Basins) -> None:
         )
         for k in order
     ]
-    axes.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0)
+    if handles:
+        axes.legend(
+            handles=handles[:6], loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0
+        )
+
+
+def _names(axes: Axes, found: Basins) -> None:
+    """Names of the attractors inside their basins, those of the largest."""
+    labels, parts = Labels(axes), found.fractions
+    x, y = found.axes.values()
+    for k in sorted((k for k in parts if k > 0), key=lambda k: -parts[k])[: len(COLORS)]:
+        i, j = np.nonzero(found.labels == k)
+        text = f"{found.name(k)}:\n{100 * parts[k]:.1f} %"
+        labels.name(text, np.column_stack([x[i], y[j]]), inside=True)

@@ -14,6 +14,7 @@ from ..local import Equilibrium
 from ..model import Array, DefinitionError, OptionError, explain
 from ..orbit import BifurcationCurve, Branch, BranchEvent, Connection, PeriodicOrbit
 from . import style
+from .labels import Labels
 
 #: Marker and fill of each kind of event; shape tells them apart without colour.
 MARKERS = {
@@ -46,6 +47,7 @@ _CURVES = (
 )
 _DASHES: tuple[Any, ...] = ("-", (0, (6, 1.5)), (0, (3, 1.2)), style.DASH_DOT, style.DOTS)
 _SAMPLES = 240
+_LISTED = 6  # entries of a legend; more are named beside the things themselves
 
 Measure = str | Callable[[Any], float]
 
@@ -106,6 +108,8 @@ def branch(
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         looks: dict[str, Any] = {}
+        marks: dict[str, Any] = {}
+        labels = list[tuple[str, Any]]()
         for one in several:
             values = np.array([measure(solution) for solution in one.solutions])
             for (name, look), part in _parts(one):
@@ -124,11 +128,17 @@ def branch(
                     zorder=5,
                     gid=f"event {event.kind}",
                 )
-                looks[event.kind] = style.marker(shape, event.kind, fill)
+                marks[event.kind] = style.marker(shape, event.kind, fill)
+                labels.append((event.kind, (event.parameter, height)))
         axes.set(xlabel=several[0].parameter, ylabel=label, title=title or "")
         axes.margins(0.05)
         if legend:
-            axes.legend(handles=list(looks.values()), loc="best")
+            together = {**looks, **marks}
+            many = len(together) > _LISTED
+            axes.legend(handles=list((looks if many else together).values()), loc="best")
+            names = Labels(axes)
+            for kind, place in labels if many else ():
+                names.name(kind, place)
     return figure
 
 
@@ -282,27 +292,22 @@ def bifurcation_curves(
         figure, axes = style.axes_for(ax, size)
         kinds = list(dict.fromkeys(one.kind for one in several))
         handles: dict[str, Any] = {}
+        labels = Labels(axes)
         for one in several:
             k = kinds.index(one.kind)
             color, dashes = _CURVES[k % len(_CURVES)], _DASHES[k % len(_DASHES)]
             axes.plot(*one.values.T, color=color, linestyle=dashes, linewidth=1.8, gid=one.kind)
             handles[one.kind] = style.line(color, one.kind, 1.8, dashes)
+            if len(kinds) > _LISTED and legend:
+                labels.name(one.kind, one.values, color)
             for point in one.special:
                 axes.plot(
                     *point.values, "o", color=style.BLACK, markersize=5.5, zorder=5, gid=point.kind
                 )
-                style.write(
-                    axes,
-                    point.values,
-                    f" {point.kind}",
-                    fontsize=8,
-                    ha="left",
-                    va="bottom",
-                    zorder=6,
-                )
+                labels.name(point.kind, point.values)
         axes.set(xlabel=several[0].parameters[0], ylabel=several[0].parameters[1])
         axes.set_title(title or "")
         axes.margins(0.06)
-        if legend:
+        if legend and len(kinds) <= _LISTED:
             axes.legend(handles=list(handles.values()), loc="best")
     return figure

@@ -17,6 +17,7 @@ from ..local.plane_scan import Piece, PlaneScan
 from ..model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
 from ..orbit.plane_orbits import PlaneOrbits
 from . import style
+from .labels import Labels
 
 _ORBIT, _SEPARATRIX, _FOLD_ORBIT = "#444444", style.CANARD, style.GREEN
 _PIECES: dict[str, tuple[str, float, Any, str]] = {
@@ -24,7 +25,7 @@ _PIECES: dict[str, tuple[str, float, Any, str]] = {
     "repelling": (style.ORANGE, 3.4, (0, (2.2, 1.0)), "sliding, repelling"),
     "crossing": (style.GREY, 1.2, "-", "crossing"),
 }
-#: Markers by the last word of a kind, in the order of the legend.
+#: Markers by the last word of a kind.
 _MARKERS = {
     "fold": "D",
     "cusp": "^",
@@ -37,7 +38,7 @@ _MARKERS = {
     "degenerate": "P",
     "saddle": "X",
 }
-_WORDS = ("visible ", "invisible ", "stable ", "unstable ", "")
+_ONE_MARK = 0.012  # points so close together, in units of the box, have one name
 Special = Fold | PseudoEquilibrium | Equilibrium
 
 
@@ -52,6 +53,7 @@ def phase_portrait(
     ax: Axes | None = None,
     size: tuple[float, float] = (7.0, 4.8),
     legend: bool = True,
+    labels: bool | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the phase portrait of a planar system with one surface.
@@ -80,7 +82,9 @@ def phase_portrait(
     size : (float, float), optional
         Inches, of a new figure.
     legend : bool, optional
-        Whether a legend is drawn.
+        Whether a legend of the lines is drawn.
+    labels : bool, optional
+        Whether special points are named beside them; by default where there is a legend.
     title : str, optional
         Title of the picture; the default says what is shown.
 
@@ -123,6 +127,8 @@ def phase_portrait(
             axes.set_title(title)
         if legend:
             portrait.legend()
+        if legend if labels is None else labels:
+            portrait.names()
     return figure
 
 
@@ -276,26 +282,32 @@ class _Portrait:
     def legend(self) -> None:
         """Explain lines and marks beside the axes."""
         handles = [
-            style.line(style.ABOVE, "field above, $h>0$", 1.0, alpha=0.5),
-            style.line(style.BELOW, "field below, $h<0$", 1.0, alpha=0.5),
-            style.line(_ORBIT, "orbits", 0.9),
+            style.line(_PIECES[kind][0], text, width, dashes)
+            for kind, (_, width, dashes, text) in _PIECES.items()
+            if any(piece.kind == kind for piece in self.scan.pieces)
         ]
-        for kind, (color, width, dashes, text) in _PIECES.items():
-            if any(piece.kind == kind for piece in self.scan.pieces):
-                handles.append(style.line(color, text, width, dashes))
+        handles.append(style.line(_ORBIT, "orbits", 0.9))
         if "separatrix" in self.drawn:
             handles.append(style.line(_SEPARATRIX, "separatrices", 1.8))
         if "fold orbit" in self.drawn:
             handles.append(style.line(_FOLD_ORBIT, "orbits through visible folds", 1.5))
-        looks = {_name(found): _look(found) for found in self.special}
-        order = [f"{word}{kind}" for kind in _MARKERS for word in _WORDS]
-        for name in sorted(looks, key=order.index):
-            shape, fill = looks[name]
-            text = name + " (open)" * (name == "invisible fold")
-            handles.append(style.marker(shape, text, fill))
         self.ax.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0
         )
+
+    def names(self) -> None:
+        """Name the sides of the surface and the special points, beside them."""
+        labels = Labels(self.ax)
+        mesh = self.scan.box.middles(9)
+        h = self.scan.at(mesh).h
+        for side, color in style.FIELDS.items():
+            chosen = mesh[h > 0 if side == "+" else h < 0]
+            if len(chosen):
+                text = f"$h {'>' if side == '+' else '<'} 0$"
+                labels.name(text, chosen, color, inside=True, fontsize=10)
+        for name, points in _together(self.special, self.scan.box.size).items():
+            for point in points:
+                labels.name(name, point)
 
     def _draw(self, curve: Array, color: str, width: float, name: str) -> None:
         if len(curve) < 2:
@@ -309,6 +321,22 @@ class _Portrait:
                     self.ax, piece, 0.5, color, mutation_scale=9 + 2 * width, zorder=order + 0.1
                 )
                 return
+
+
+def _together(special: list[Special], size: Array) -> dict[str, list[Array]]:
+    """Names and places of points; those that lie on one another are named together."""
+    groups = list[tuple[Array, list[str]]]()
+    for found in special:
+        point = np.asarray(found.point, dtype=float)
+        near = [names for at, names in groups if np.linalg.norm((at - point) / size) < _ONE_MARK]
+        names = near[0] if near else list[str]()
+        if not near:
+            groups.append((point, names))
+        names += [_name(found)] if _name(found) not in names else []
+    together: dict[str, list[Array]] = {}
+    for point, names in groups:
+        together.setdefault(",\n".join(names), []).append(point)
+    return together
 
 
 def _name(found: Special) -> str:

@@ -19,6 +19,7 @@ from ..local.surface_scan import REGIONS, SurfaceScan
 from ..model import Array, DefinitionError, FilippovSystem, OptionError, Parameters, explain, real
 from ..orbit.sliding_orbits import SlidingOrbits
 from . import style
+from .labels import Labels
 
 _ATTRACTING, _REPELLING = REGIONS.index(Region.ATTRACTING), REGIONS.index(Region.REPELLING)
 _NAMES = ("$D_a$", "$D_r$", "$C_1$", "$C_2$")
@@ -51,6 +52,7 @@ def sliding_portrait(
     ax: Axes | None = None,
     size: tuple[float, float] = (7.0, 4.8),
     legend: bool = True,
+    labels: bool | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the switching surface of a system of three states over two of them.
@@ -81,7 +83,10 @@ def sliding_portrait(
     size : (float, float), optional
         Inches, of a new figure.
     legend : bool, optional
-        Whether a legend is drawn.
+        Whether the regions and their orbits are explained in a legend.
+    labels : bool, optional
+        Whether folds, canards and special points are named beside them; by default where there is a
+        legend.
     title : str, optional
         Title of the picture; the default says what is shown.
 
@@ -123,6 +128,8 @@ def sliding_portrait(
             axes.set_title(title)
         if legend:
             portrait.legend()
+        if legend if labels is None else labels:
+            portrait.line_names()
     return figure
 
 
@@ -156,7 +163,7 @@ class _Portrait:
     def __init__(self, ax: Axes, scan: SurfaceScan):
         self.ax, self.scan = ax, scan
         self.flow = SlidingOrbits(scan)
-        self.drawn: set[str] = set()
+        self.named: dict[str, Array] = {}
         self.separated: list[Array] = []
 
     def draw(self, orbits: int) -> None:
@@ -219,7 +226,7 @@ class _Portrait:
             path_effects=style.halo(3.6),
         )
         style.arrowhead(self.ax, curve, 0.5, color, mutation_scale=15, zorder=3.1)
-        self.drawn.add(name)
+        self.named.setdefault(name, curve)
         self.separated.append(curve)
 
     def orbits(self, count: int) -> None:
@@ -296,27 +303,32 @@ class _Portrait:
             for k in range(4)
             if np.any(self.scan.regions == k)
         ]
-        for side, name in (("+", "F_1"), ("-", "F_2")):
-            for visible, word in ((True, "visible"), (False, "invisible")):
-                folds = [f for f in self.scan.folds if f.side == side]
-                if any(seen is visible for f in folds for _, seen in f.pieces):
-                    look = (style.FIELDS[side], f"fold of ${name}$, {word}", 2.2, _DASHES[visible])
-                    handles.append(style.line(*look))
         if np.any(self.scan.regions == _ATTRACTING):
             handles.append(style.line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
         if np.any(self.scan.regions == _REPELLING):
             handles.append(style.line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
-        for name, (color, dashes) in _SPECIAL.items():
-            if name in self.drawn:
-                handles.append(style.line(color, name, 2.4, dashes))
-        if self.scan.two_folds:
-            handles.append(style.marker("o", "two-fold", style.BLACK))
-        if any(fold.cusps.size for fold in self.scan.folds):
-            handles.append(style.marker("^", "cusp", style.GREY))
-        for kind in dict.fromkeys(rest.kind for rest in self.scan.pseudo_equilibria):
-            filled = "saddle" in kind or kind.startswith("stable")
-            shape = _MARKERS.get(kind.rpartition("-")[2], "P")
-            handles.append(style.marker(shape, kind, style.BLACK if filled else "white"))
         self.ax.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0
         )
+
+    def line_names(self) -> None:
+        """Name folds, canards, manifolds and special points beside them."""
+        labels = Labels(self.ax)
+        for side, name in (("+", "F_1"), ("-", "F_2")):
+            for visible, word in ((True, "visible"), (False, "invisible")):
+                pieces = [
+                    piece
+                    for fold in self.scan.folds
+                    for piece, seen in fold.pieces
+                    if fold.side == side and seen is visible
+                ]
+                if pieces:
+                    text = f"fold of ${name}$,\n{word}"
+                    labels.name(text, np.vstack(pieces), style.FIELDS[side])
+        for name, curve in self.named.items():
+            labels.name(name, curve, _SPECIAL[name][0])
+        for fold in self.scan.folds:
+            for cusp in fold.cusps:
+                labels.name("cusp", cusp)
+        for found in self.scan.pseudo_equilibria:
+            labels.name(found.kind, self.scan.flat(found.point))

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.font_manager import FontProperties
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
@@ -35,6 +36,7 @@ _MODES = {
 _CYCLE = (style.ABOVE, style.BLUE, style.GREEN, style.PURPLE, style.ORANGE, style.SKY)
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 _GRID_FROM = 5  # states; fewer are stacked in one column
+_LISTED = 6  # entries of a legend
 _MANY = 300  # events; more are not marked one by one
 
 
@@ -132,9 +134,7 @@ def _draw(
         if plane:
             ax = figure.add_subplot(grid[1:, columns])
             _phase_plane(ax, run, parts, looks)
-        figure.suptitle(_title(run), fontsize=10, fontfamily="monospace")
-        handles = _legend(run, looks, plane)
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4))
+        _explain(figure, _title(run), _legend(run, looks, plane), len(looks))
     return figure
 
 
@@ -300,6 +300,7 @@ def _phase_plane(
     ax.plot(*run.x[0], "o", color=style.GREEN, markersize=6, zorder=5, gid="start")
     _mark(ax, run.events, lambda event: event.x)
     ax.margins(0.08)
+    ax.locator_params(axis="x", nbins=5)  # more would move the frame, which moves them
     low, high = ax.get_xlim(), ax.get_ylim()
     if not run.system.time_dependent:
         draw_surfaces(ax, run.system, np.array(list(run.parameters.values())), (*low, *high))
@@ -328,7 +329,6 @@ def draw_surfaces(
                 colors=[style.GREY],
                 linewidths=2.2,
                 alpha=0.7,
-                linestyles="-",
                 zorder=1,
             )
 
@@ -338,6 +338,31 @@ def _title(run: Trajectory) -> str:
     if len(itinerary) > 48:
         itinerary = itinerary[:44].rstrip() + " …"
     return f"itinerary: {itinerary}   status: {run.status}"
+
+
+def _explain(figure: Figure, title: str, handles: list[Line2D | Patch], modes: int) -> None:
+    """A title and a legend, or where it would be long one of modes, above, and one of marks."""
+    if len(handles) <= _LISTED:
+        figure.suptitle(title, fontsize=10, fontfamily="monospace")
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4))
+        return
+    upper = figure.legend(
+        handles=_shortened(handles[:modes]),
+        loc="outside upper center",
+        ncols=min(modes, 4),
+        title=title,
+    )
+    upper.get_title().set_fontproperties(FontProperties(family="monospace", size=10))
+    rest = _shortened(handles[modes:])
+    if rest:
+        figure.legend(handles=rest, loc="outside lower center", ncols=min(len(rest), 4))
+
+
+def _shortened(handles: list[Line2D | Patch]) -> list[Line2D | Patch]:
+    if len(handles) <= _LISTED:
+        return handles
+    more = f"and {len(handles) - _LISTED + 1} more, named above the panels"
+    return [*handles[: _LISTED - 1], Patch(alpha=0.0, label=more)]
 
 
 def _legend(

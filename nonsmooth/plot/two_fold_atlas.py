@@ -132,8 +132,8 @@ def two_fold_atlas(
             row, column = divmod(k, columns)
             flat = parts[0].add_subplot(grid[row, 2 * column])
             space = parts[0].add_subplot(grid[row, 2 * column + 1])
-            two_fold(CASES[name], ax=flat, legend=False, orbits=6)
-            two_fold_3d(CASES[name], ax=space, legend=False, title="")
+            two_fold(CASES[name], ax=flat, legend=False, labels=True, orbits=6)
+            two_fold_3d(CASES[name], ax=space, legend=False, labels=True, title="")
         parts[0].legend(handles=_legend(), loc="outside upper center", ncols=3 * columns)
         if maps:
             panels = parts[1].subplots(2, 2).flat if columns == 1 else parts[1].subplots(1, 3)
@@ -211,22 +211,13 @@ def two_fold_map(
 
 def _legend() -> list[Line2D | Patch]:
     """What is common to all portraits."""
-    dashed = (0, (4, 2))
     return [
         Patch(facecolor=style.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
         Patch(facecolor=style.TINT_REPELLING, label="$D_r$: repelling sliding"),
-        style.line(style.ABOVE, "fold of $F_1$, visible", 2.2, "-"),
-        style.line(style.ABOVE, "fold of $F_1$, invisible", 2.2, dashed),
-        style.line(style.BELOW, "fold of $F_2$, visible", 2.2, "-"),
-        style.line(style.BELOW, "fold of $F_2$, invisible", 2.2, dashed),
-        style.line(style.CANARD, "canard", 2.6, "-"),
-        style.line(style.FAUX_CANARD, "faux canard", 2.6, style.LONG_DASH),
-        style.line(style.BLACK, "pseudo-equilibria", 2.6, ":"),
         Patch(
             facecolor="white", edgecolor="#9A9A9A", hatch="////", label="all $D_a\\to s\\to D_r$"
         ),
         Patch(facecolor="white", edgecolor="#9A9A9A", hatch="...", label="all $D_r\\to s\\to D_a$"),
-        style.line(style.GREY, "diabolo", 1.3, style.DASH_DOT),
         style.line(style.ABOVE, "orbits above, $F_1$", 1.2, "-"),
         style.line(style.BELOW, "orbits below, $F_2$", 1.2, (0, (3.5, 1.3))),
     ]

@@ -19,6 +19,7 @@ from ..local.two_folds.flights import has_diabolo
 from ..local.two_folds.reduced_flow import Sector, eigenlines, sectors
 from ..model import Array, OptionError
 from . import style
+from .labels import Labels
 from .two_fold_marks import (
     TINTS,
     ZERO,
@@ -44,6 +45,7 @@ def two_fold(
     size: tuple[float, float] = (7.0, 5.0),
     orbits: int = 7,
     legend: bool = True,
+    labels: bool | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the sliding portrait of a two-fold in normal-form coordinates.
@@ -63,7 +65,9 @@ def two_fold(
     orbits : int, optional
         About how many orbits to draw in each sliding region.
     legend : bool, optional
-        Whether to explain lines and colours beside the axes.
+        Whether to explain the regions beside the axes.
+    labels : bool, optional
+        Whether to name the lines beside them; by default where there is a legend.
     title : str, optional
         Instead of the class and the numbers of the normal form.
 
@@ -99,11 +103,13 @@ def two_fold(
         for part in parts:
             _orbits(axes, part, orbits)
         _folds(axes, portrait.flow)
-        _eigenlines(axes, portrait)
+        _eigenlines(axes, portrait, legend)
         _names(axes, parts)
         _frame(axes, title if title is not None else title_of(portrait))
         if legend:
-            _legend(axes, portrait, parts)
+            _legend(axes, parts)
+        if legend if labels is None else labels:
+            _line_names(axes, portrait)
     return figure
 
 
@@ -169,7 +175,7 @@ def _folds(ax: Axes, flow: ReducedFlow) -> None:
         ax.plot(x, y, color=color, linewidth=2.2, linestyle=dashes, zorder=3, gid="fold")
 
 
-def _eigenlines(ax: Axes, portrait: Portrait) -> None:
+def _eigenlines(ax: Axes, portrait: Portrait, numbers: bool) -> None:
     sliding = eigenlines(portrait.flow)
     for value, m in sliding:
         end = to_box(math.atan(m))
@@ -186,6 +192,7 @@ def _eigenlines(ax: Axes, portrait: Portrait) -> None:
             path_effects=style.halo(4.0),
         )
         if abs(value) < ZERO:
+            _along(ax, m, end, name, color)
             continue
         for at in (0.62, -0.42):
             tip = at * end - np.sign(-value) * 1e-3 * end
@@ -198,7 +205,7 @@ def _eigenlines(ax: Axes, portrait: Portrait) -> None:
                 linewidth=0,
                 zorder=4.1,
             )
-        _along(ax, m, end, name, color)
+        _along(ax, m, end, f"{name}, $\\kappa$ = {number(value)}" if numbers else name, color)
     if portrait.flow.discriminant > 0:
         for m in np.real(portrait.flow.slopes):
             if m < 0:
@@ -249,6 +256,7 @@ def _crossing_arrows(ax: Axes, flow: ReducedFlow) -> None:
                 linewidth=1.2,
                 linestyle=dashes[0],
                 zorder=1.8,
+                gid="crosses 0" if sign > 0 else None,
             )
             ax.plot(
                 *np.array([z, after]).T,
@@ -256,6 +264,7 @@ def _crossing_arrows(ax: Axes, flow: ReducedFlow) -> None:
                 linewidth=1.2,
                 linestyle=dashes[1],
                 zorder=1.8,
+                gid="crosses 1" if sign > 0 else None,
             )
             style.arrow(ax, after - 1e-3 * leaving, after, colors[1], linewidth=0, zorder=1.9)
             ax.plot(
@@ -281,12 +290,8 @@ def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
     """Draw the invariant lines of the return map of an invisible two-fold, where it has some."""
     if not has_diabolo(flow):
         return
-    for slope, color, dashes in zip(
-        diabolo_slopes(flow.nu),
-        (style.FAUX_CANARD, style.CANARD),
-        (style.DOTS, style.DASH_DOT),
-        strict=True,
-    ):
+    looks = ((style.FAUX_CANARD, style.DOTS), (style.CANARD, style.DASH_DOT))
+    for k, (slope, (color, dashes)) in enumerate(zip(diabolo_slopes(flow.nu), looks, strict=True)):
         start = np.array([-1.0, slope])
         for z in (start, flight_above(start, flow.nu)):
             end = z / np.max(np.abs(z))
@@ -297,7 +302,7 @@ def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
                 linewidth=1.3,
                 linestyle=dashes,
                 zorder=1.7,
-                gid="diabolo",
+                gid=f"diabolo {k}",
             )
 
 
@@ -324,38 +329,44 @@ def _frame(ax: Axes, title: str) -> None:
     ax.set_yticks([-1, -0.5, 0, 0.5, 1])
 
 
-def _legend(ax: Axes, portrait: Portrait, parts: list[Sector]) -> None:
+def _line_names(ax: Axes, portrait: Portrait) -> None:
+    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside them."""
+    labels, flow, along = Labels(ax), portrait.flow, np.linspace(0.1, 0.98, 23)
+    both = np.concatenate([-along[::-1], along])
+    for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):
+        seen = "visible" if flow.folds[k] == "V" else "invisible"
+        points = np.zeros((len(both), 2))
+        points[:, 1 - k] = both
+        labels.name(f"fold of ${name}$,\n{seen}", points, color)
+    names = {"diabolo 0": "diabolo,\nflights grow", "diabolo 1": "diabolo,\nflights shrink"}
+    names["virtual eigenline"] = "eigenline\noutside sliding"
+    for gid, text in names.items():
+        lines = [line for line in ax.lines if line.get_gid() == gid]
+        if lines:
+            ends = np.vstack([line.get_xydata() for line in lines])
+            points = np.vstack([end * along[:, None] for end in ends if np.any(end)])
+            labels.name(text, points, str(lines[0].get_color()))
+    before, after = (
+        [line for line in ax.lines if line.get_gid() == f"crosses {n}"] for n in (0, 1)
+    )
+    for lines, text in ((before, "below"), (after, "above")):  # those of C1
+        middles = [np.mean(np.asarray(line.get_xydata()), axis=0) for line in lines]
+        labels.name(text, middles, str(lines[0].get_color()))
+
+
+def _legend(ax: Axes, parts: list[Sector]) -> None:
     handles: list[Line2D | Patch] = [
         Patch(facecolor=style.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
         Patch(facecolor=style.TINT_REPELLING, label="$D_r$: repelling sliding"),
         _circle(".", "$C_1$: crossing up"),
         _circle("x", "$C_2$: crossing down"),
     ]
-    for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):
-        visible = portrait.flow.folds[k] == "V"
-        text = f"fold of ${name}$, $z_{k + 2}=0$: {'visible' if visible else 'invisible'}"
-        handles.append(style.line(color, text, 2.2, "-" if visible else (0, (3, 1.5))))
-    handles.append(style.line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
-    handles.append(style.line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
-    handles.append(style.line(style.ABOVE, "through the surface: above it", 1.2))
-    handles.append(style.line(style.BELOW, "through the surface: below it", 1.2, "--"))
-    for value, _ in eigenlines(portrait.flow):
-        color, name, dashes = line_style(value, portrait.flow)
-        text = f"{name}, $\\kappa$ = {number(value)}" if abs(value) > ZERO else name
-        handles.append(style.line(color, text, 2.6, dashes))
-    if portrait.flow.discriminant > 0 and any(m < 0 for m in np.real(portrait.flow.slopes)):
-        handles.append(style.line(style.GREY, "eigenline outside sliding", 0.9, ":"))
     if any(part.orbit.goes_to == "s" for part in parts):
         text = "hatched: all $D_a \\to s \\to D_r$"
         handles.append(Patch(facecolor="white", edgecolor="#9A9A9A", hatch="////", label=text))
     if any(part.orbit.comes_from == "s" for part in parts):
         text = "dotted: all $D_r \\to s \\to D_a$"
         handles.append(Patch(facecolor="white", edgecolor="#9A9A9A", hatch="...", label=text))
-    if has_diabolo(portrait.flow):
-        handles.append(
-            style.line(style.CANARD, "diabolo: flights shrink to $s$", 1.3, style.DASH_DOT)
-        )
-        handles.append(style.line(style.FAUX_CANARD, "diabolo: flights grow", 1.3, style.DOTS))
     ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0)
 
 

@@ -25,6 +25,7 @@ from ..local.two_folds.reduced_flow import eigenlines, sectors
 from ..model import Array, OptionError
 from . import style
 from .camera import Camera, azimuth_of, stretch_of
+from .labels import Labels
 from .two_fold_marks import (
     TINTS,
     Portrait,
@@ -46,6 +47,7 @@ def two_fold_3d(
     azimuth: float | None = None,
     elevation: float = 37.0,
     legend: bool = True,
+    labels: bool | None = None,
     title: str | None = None,
 ) -> Figure:
     """Draw the flow around a two-fold in three dimensions, in normal-form coordinates.
@@ -65,7 +67,9 @@ def two_fold_3d(
         Of the viewer, in degrees: from the $z2$ axis towards the $z3$ axis, by default where neither
         field is seen end on; and above the surface, between 5 and 85.
     legend : bool, optional
-        Whether to explain lines and colours beside the picture.
+        Whether to explain the orbits beside the picture.
+    labels : bool, optional
+        Whether to name folds, canards and the diabolo beside them; by default where there is a legend.
     title : str, optional
         Instead of the class and the numbers of the normal form.
 
@@ -103,6 +107,8 @@ def two_fold_3d(
         axes.set_title(title if title is not None else title_of(portrait))
         if legend:
             scene.legend()
+        if legend if labels is None else labels:
+            scene.line_names()
     return figure
 
 
@@ -206,9 +212,8 @@ class _Scene:
         """Cones of flights from the invariant lines of the return map."""
         if not has_diabolo(self.flow):
             return
-        for slope, color in zip(
-            diabolo_slopes(self.flow.nu), (style.FAUX_CANARD, style.CANARD), strict=True
-        ):
+        looks = (("grow", style.FAUX_CANARD), ("shrink", style.CANARD))
+        for slope, (name, color) in zip(diabolo_slopes(self.flow.nu), looks, strict=True):
             line = np.array([-1.0, slope]) / max(1.0, slope)
             starts: dict[Side, Array] = {"+": line, "-": flight_above(line, self.flow.nu)}
             for side, start in starts.items():
@@ -224,7 +229,7 @@ class _Scene:
                 )
                 for scale in (1.0, 0.55, 0.3):
                     shrunk = curve * np.array([scale**2, scale, scale])
-                    self._off(shrunk, side, color)
+                    self._off(shrunk, side, color, f"flights {name}")
                 ends = np.array([[0.0, 0.0], start])
                 self._curve(self._flat(ends), color, 1.2, self.SLIDING, dashes=style.DASH_DOT)
 
@@ -284,18 +289,26 @@ class _Scene:
             style.line(style.ATTRACTING, "sliding, attracting", 0.9),
             style.line(style.REPELLING, "sliding, repelling", 0.9),
         ]
-        for k in (0, 1):
-            word = "visible" if self.flow.folds[k] == "V" else "invisible"
-            dashes = "-" if word == "visible" else (0, (4, 2))
-            color = (style.ABOVE, style.BELOW)[k]
-            handles.append(style.line(color, f"fold of $F_{k + 1}$: {word}", 2.2, dashes))
-        for value, _ in eigenlines(self.flow):
-            color, name, dashes = line_style(value, self.flow)
-            handles.append(style.line(color, name, 2.4, dashes))
-        if has_diabolo(self.flow):
-            handles.append(style.line(style.CANARD, "diabolo: flights shrink", 4.0, alpha=0.3))
-            handles.append(style.line(style.FAUX_CANARD, "diabolo: flights grow", 4.0, alpha=0.3))
         self.ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
+
+    def line_names(self) -> None:
+        """Name folds, eigenlines and the diabolo beside them."""
+        labels, along = Labels(self.ax), np.linspace(-1, 1, 25)[:, None]
+        for k, (end, color) in enumerate((([0, 0, 1], style.ABOVE), ([0, 1, 0], style.BELOW))):
+            seen = "visible" if self.flow.folds[k] == "V" else "invisible"
+            labels.name(f"fold of $F_{k + 1}$,\n{seen}", self.camera(along * end), color)
+        for value, m in eigenlines(self.flow):
+            color, name, _ = line_style(value, self.flow)
+            labels.name(name, self.camera(along * [0.0, 1.0, m] / max(1.0, m)), color)
+        for name, color in (("grow", style.FAUX_CANARD), ("shrink", style.CANARD)):
+            gid = f"flights {name}"
+            points = [
+                np.asarray(line.get_xydata())[::4]
+                for line in self.ax.lines
+                if line.get_gid() == gid
+            ]
+            if points:
+                labels.name(f"diabolo,\n{gid}", np.vstack(points), color)
 
     # strokes -----------------------------------------------------------------------------------
 
@@ -326,14 +339,14 @@ class _Scene:
                 )
                 return
 
-    def _off(self, curve: Array, side: Side, color: str | None = None) -> None:
+    def _off(self, curve: Array, side: Side, color: str | None = None, gid: str = "arc") -> None:
         """Draw an orbit above or below the surface, with an arrow."""
         if len(curve) < 4:
             return
         color = color or style.FIELDS[side]
         dashes = "-" if side == "+" else (0, (3.5, 1.3))
         order = self.ABOVE if side == "+" else self.BELOW
-        self._curve(curve, color, 1.2, order, dashes=dashes, at=0.62, gid="arc")
+        self._curve(curve, color, 1.2, order, dashes=dashes, at=0.62, gid=gid)
 
     def _curve(
         self,

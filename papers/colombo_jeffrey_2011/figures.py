@@ -20,12 +20,10 @@ from .model import BEND, CALM, CLASSES, RECURRENT, excursions, recurrent, slid_f
 
 def _legend() -> list[Line2D | Patch]:
     return [
-        look.line(look.ABOVE, "fold of $x > 0$, visible", 2.2),
-        look.line(look.ABOVE, "the same, invisible", 2.2, look.DASHED),
-        look.line(look.BELOW, "fold of $x < 0$, visible", 2.2),
-        look.line(look.BELOW, "the same, invisible", 2.2, look.DASHED),
-        look.line(look.CANARD, "canard", 2.6),
-        look.line(look.GREEN, "faux canard", 2.6, look.DASHED),
+        Patch(facecolor=look.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
+        Patch(facecolor=look.TINT_REPELLING, label="$D_r$: repelling sliding"),
+        look.line(look.ABOVE, "orbits in $x > 0$, field $F_1$"),
+        look.line(look.BELOW, "orbits in $x < 0$, field $F_2$", dashes=look.DASHED),
         Patch(
             facecolor="white", edgecolor=look.GREY, hatch="////", label="all pass $D_a$ to $D_r$"
         ),
@@ -40,7 +38,7 @@ def _portraits(names: tuple[str, ...]) -> Callable[[], Figure]:
             figure = look.new_figure(7.0, 3.2 * rows + (1.4 if len(names) == 2 else 0.9))
             axes = figure.subplots(rows, 2).ravel()
             for ax, name in zip(axes, names, strict=False):
-                ns.plot.two_fold(CLASSES[name], ax=ax, legend=False)
+                ns.plot.two_fold(CLASSES[name], ax=ax, legend=False, labels=True)
                 ax.set(xlabel="$y$", ylabel="$z$")
             if len(names) % 2:
                 axes[-1].set_axis_off()
@@ -58,8 +56,8 @@ def space() -> Figure:
     with look.settings():
         figure = look.new_figure(7.0, 5.8)
         for ax, name in zip(figure.subplots(2, 2).ravel(), names, strict=True):
-            ns.plot.two_fold_3d(CLASSES[name], ax=ax, legend=False)
-        figure.legend(handles=_legend()[:6], loc="outside lower center", ncols=3)
+            ns.plot.two_fold_3d(CLASSES[name], ax=ax, legend=False, labels=True)
+        figure.legend(handles=_legend()[:4], loc="outside lower center", ncols=2)
     return figure
 
 
@@ -161,18 +159,15 @@ def surface() -> Figure:
                 parameters={"nu1": nu, "nu2": nu},
                 ax=ax,
                 legend=False,
+                labels=True,
                 title=rf"$\nu_1 = \nu_2$ = {nu:g}".replace("-", "−"),
             )
             ax.set_aspect("equal")
         handles = [
             Patch(facecolor=look.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
             Patch(facecolor=look.TINT_REPELLING, label="$D_r$: repelling sliding"),
-            look.line(look.ABOVE, "invisible fold of $x > 0$", 2.2, look.DASHED),
-            look.line(look.BELOW, "invisible fold of $x < 0$", 2.2, look.DASHED),
-            look.line(look.CANARD, "canard", 2.4),
-            look.line(look.GREEN, "faux canard", 2.4, look.DASHED),
         ]
-        figure.legend(handles=handles, loc="outside lower center", ncols=3)
+        figure.legend(handles=handles, loc="outside lower center", ncols=2)
     return figure
 
 

@@ -46,15 +46,12 @@ def space() -> Figure:
         *axes, key = figure.subplots(2, 2).ravel()
         for ax, (letter, v, words) in zip(axes, _CASES, strict=True):
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
-            ns.plot.two_fold_3d((SIGMA, v), ax=ax, legend=False, title=title)
+            ns.plot.two_fold_3d((SIGMA, v), ax=ax, legend=False, labels=True, title=title)
         handles = [
-            look.line(look.ABOVE, "orbits in $x > 0$"),
-            look.line(look.BELOW, "orbits in $x < 0$", dashes=look.DASHED),
-            look.line(look.CANARD, "canard", 2.4),
-            look.line(look.GREEN, "faux canard", 2.4, look.DASHED),
-            look.line(look.BLACK, "pseudo-equilibria", 2.4, look.DOTS),
-            Patch(color=look.CANARD, alpha=0.2, label="diabolo: orbits fall in"),
-            Patch(color=look.GREEN, alpha=0.2, label="diabolo: orbits come out"),
+            look.line(look.ABOVE, "orbits in $x > 0$, field $F_1$"),
+            look.line(look.BELOW, "orbits in $x < 0$, field $F_2$", dashes=look.DASHED),
+            look.line(look.BLACK, "sliding, attracting", 0.9),
+            look.line(look.REPELLING, "sliding, repelling", 0.9),
         ]
         key.set_axis_off()
         key.legend(handles=handles, loc="center")
@@ -68,17 +65,19 @@ def sliding() -> Figure:
         *axes, key = figure.subplots(2, 2).ravel()
         for ax, (letter, v, words) in zip(axes, _CASES, strict=True):
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
-            ns.plot.two_fold((SIGMA, v), ax=ax, legend=False, title=title)
+            ns.plot.two_fold((SIGMA, v), ax=ax, legend=False, labels=True, title=title)
             ax.set(xlabel="$y$", ylabel="$z$")
         handles = [
-            look.line(look.BLACK, "sliding orbits"),
-            look.line(look.ABOVE, "invisible fold of $x > 0$", 2.2, look.DASHED),
-            look.line(look.BELOW, "invisible fold of $x < 0$", 2.2, look.DASHED),
-            look.line(look.CANARD, "canard", 2.4),
-            look.line(look.GREEN, "faux canard", 2.4, look.DASHED),
-            look.line(look.BLACK, "pseudo-equilibria", 2.4, look.DOTS),
-            look.line(look.CANARD, "diabolo: orbits fall in", dashes=look.DASH_DOT),
-            look.line(look.GREEN, "diabolo: orbits come out", dashes=look.DOTS),
+            Patch(facecolor=look.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
+            Patch(facecolor=look.TINT_REPELLING, label="$D_r$: repelling sliding"),
+            look.line(look.ABOVE, "orbits in $x > 0$, field $F_1$"),
+            look.line(look.BELOW, "orbits in $x < 0$, field $F_2$", dashes=look.DASHED),
+            Patch(
+                facecolor="white",
+                edgecolor=look.GREY,
+                hatch="////",
+                label="all pass $D_a$ to $D_r$",
+            ),
         ]
         key.set_axis_off()
         key.legend(handles=handles, loc="center")

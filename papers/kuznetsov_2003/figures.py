@@ -44,12 +44,6 @@ def _legend() -> list[Line2D]:
         look.line(look.GREY, "crossing", 1.2),
         look.line(look.GREEN, "orbit through a visible fold", 1.6),
         look.line(look.CANARD, "separatrix", 1.8),
-        look.marker("D", "visible fold"),
-        look.marker("D", "invisible fold", "white"),
-        look.marker("o", "stable equilibrium"),
-        look.marker("o", "unstable equilibrium", "white"),
-        look.marker("s", "stable pseudo-node"),
-        look.marker("X", "pseudo-saddle", "white"),
     ]
 
 
@@ -65,6 +59,7 @@ def _around(levels: tuple[float, float, float], boxes: Callable[[float], Box], x
                 parameters=at(alpha),
                 ax=ax,
                 legend=False,
+                labels=True,
                 title=f"$\\alpha$ = {alpha:.6g}",
                 t_end=150.0,
             )
@@ -109,11 +104,12 @@ def whole() -> Figure:
                 parameters=at(alpha),
                 ax=ax,
                 legend=False,
+                labels=True,
                 title=f"$\\alpha$ = {alpha:g}",
                 t_end=150.0,
             )
             ax.set(xlabel="$x_1$", ylabel="$x_2$")
-        figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+        figure.legend(handles=_legend(), loc="outside lower center", ncols=4)
     return figure
 
 
@@ -162,26 +158,48 @@ def diagram() -> Figure:
             levels = np.append(np.linspace(start, SADDLE_NODE, 300)[:-1], SADDLE_NODE * (1 - 1e-15))
             roots = [pseudo_equilibria(a) for a in levels]
             points = [r[which] if r else np.nan for r in roots]
-            upper.plot(levels, points, color=look.BLACK, linestyle=dashes, linewidth=1.6)
-        ends = top - np.geomspace(0.1, 1e-6, 20)  # where it ends as a square root does
-        levels = np.concatenate([np.linspace(BOUNDARY_FOCUS + 1e-3, top - 0.11, 80), ends])
-        landings = np.array([landing(float(a))[1] for a in levels])
+            name = "stable pseudo-node" if which else "pseudo-saddle"
+            upper.plot(levels, points, color=look.BLACK, linestyle=dashes, linewidth=1.6, gid=name)
+        ends = top - np.geomspace(0.1, 1e-6, 12)  # where it ends as a square root does
+        begun = [*np.linspace(BOUNDARY_FOCUS + 1e-3, top - 0.11, 24), *ends]
         born = sliding_homoclinic()
-        upper.plot(
-            levels[levels < born], landings[levels < born], color=look.GREEN, linestyle=look.DOTS
-        )
-        upper.plot(
-            levels[levels >= born], landings[levels >= born], color=look.GREEN, linewidth=1.8
-        )
+        levels, values = look.sampled(lambda a: landing(a)[1], [*begun, born])
+        landings = values[:, 0]
+        for part, dashes, width, name in (
+            (levels <= born, look.DOTS, 1.4, "landing of the fold's orbit"),
+            (levels >= born, "-", 1.8, "landing of the sliding cycle"),
+        ):
+            curve = levels[part], landings[part]
+            upper.plot(*curve, color=look.GREEN, linestyle=dashes, linewidth=width, gid=name)
         _bifurcations(upper, lower, top)
-        later = [*(born + np.geomspace(2e-6, 0.3, 30)), *np.linspace(born + 0.32, top - 1e-3, 25)]
-        lower.plot(
-            later, [period(float(a), 2500.0) for a in later], color=look.GREEN, linewidth=1.8
-        )
+        begun = [*(born + np.geomspace(2e-6, 0.3, 20)), *np.linspace(born + 0.32, top - 1e-3, 12)]
+        later, logs = look.sampled(lambda a: np.log10(period(a, 2500.0)), begun)
+        lower.plot(later, 10 ** logs[:, 0], color=look.GREEN, linewidth=1.8)
         upper.set(ylabel="$x_1$ on $x_2 = \\alpha$", ylim=(0, 0.9))
         lower.set(xlabel="$\\alpha$", ylabel="period", yscale="log", xlim=(0.7, 2.5))
-        upper.legend(handles=_diagram_legend(), loc="upper right", ncols=2, bbox_to_anchor=(1, 0.8))
+        _names(upper)
     return figure
+
+
+def _names(ax: Axes) -> None:
+    """Name the curves beside them; those that lie to both sides of a bifurcation twice."""
+    labels = look.Labels(ax)
+    for x, level, color, name in (
+        (FREE_FOLD, BOUNDARY_FOCUS, look.BELOW, "fold of the free field"),
+        (HARVESTED_FOLD, BOUNDARY_NODE, look.ABOVE, "fold of the harvested field"),
+    ):
+        after, before = ("visible", "invisible") if x == FREE_FOLD else ("invisible", "visible")
+        labels.name(f"{name}, {after}", [(a, x) for a in np.linspace(1.3, 2.4, 12)], color)
+        labels.name(before, [((0.7 + level) / 2, x)], color)
+    curves = {line.get_gid(): line.get_xydata() for line in ax.lines if line.get_gid()}
+    for name, color in (
+        ("stable pseudo-node", look.BLACK),
+        ("pseudo-saddle", look.BLACK),
+        ("landing of the sliding cycle", look.GREEN),
+        ("landing of the fold's orbit", look.GREEN),
+    ):
+        points = np.asarray(curves[name])
+        labels.name(name, points[np.all(np.isfinite(points), axis=1)], color)
 
 
 def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:
@@ -204,19 +222,6 @@ def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:
             ha="right" if right else "left",
             rotation=90 if "boundary" in name else 0,
         )
-
-
-def _diagram_legend() -> list[Line2D]:
-    return [
-        look.line(look.BELOW, "fold of the free field, visible", 2.0),
-        look.line(look.BELOW, "the same, invisible", 2.0, look.DASHED),
-        look.line(look.ABOVE, "fold of the harvested field, visible", 2.0),
-        look.line(look.ABOVE, "the same, invisible", 2.0, look.DASHED),
-        look.line(look.BLACK, "stable pseudo-node", 1.6),
-        look.line(look.BLACK, "pseudo-saddle", 1.6, look.DASHED),
-        look.line(look.GREEN, "landing of the sliding cycle", 1.8),
-        look.line(look.GREEN, "landing of the fold's orbit", dashes=look.DOTS),
-    ]
 
 
 PICTURES: tuple[Picture, ...] = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
@@ -42,14 +43,15 @@ def _cycle_points(eps: float) -> tuple[Array, Array, Array]:
 def portraits() -> Figure:
     """Portraits for six thresholds."""
     with look.settings():
-        figure = look.new_figure(7.0, 5.8)
-        for ax, eps in zip(figure.subplots(2, 3).ravel(), _LEVELS, strict=True):
+        figure = look.new_figure(7.0, 8.4)
+        for ax, eps in zip(figure.subplots(3, 2).ravel(), _LEVELS, strict=True):
             ns.plot.phase_portrait(
                 DENSITY,
                 (0.0, 1.12, -0.12, 0.26),
                 parameters={"eps": eps},
                 ax=ax,
                 legend=False,
+                labels=True,
                 t_end=8.0,
                 title=rf"$\varepsilon$ = {eps:g}".replace("-", "−"),
             )
@@ -65,12 +67,6 @@ def portraits() -> Figure:
             look.line(look.PURPLE, "stable cycle", 2.6),
             look.line(look.CANARD, "separatrix", 1.8),
             look.line(look.GREEN, "orbit through a visible fold", 1.5),
-            look.marker("D", "visible fold"),
-            look.marker("D", "invisible fold", "white"),
-            look.marker("o", "stable equilibrium"),
-            look.marker("s", "stable pseudo-node"),
-            look.marker("s", "unstable pseudo-node", "white"),
-            look.marker("X", "pseudo-saddle", "white"),
         ]
         figure.legend(handles=handles, loc="outside lower center", ncols=3)
     return figure
@@ -117,10 +113,8 @@ def diagram() -> Figure:
             upper.plot(threshold_of(branch), branch, color=color, linestyle=dashes, linewidth=1.8)
         upper.plot([-0.08, BOUNDARY_MIXED], [MIXED[0]] * 2, color=look.ABOVE, linewidth=2.2)
         upper.plot([BOUNDARY_RESTING, 0.25], [RESTING[0]] * 2, color=look.BELOW, linewidth=2.2)
-        levels = np.concatenate(
-            [BOUNDARY_MIXED + np.geomspace(1e-7, 1e-2, 30), -np.geomspace(0.032, 1e-5, 26)]
-        )
-        extremes = np.array([_extremes(float(eps)) for eps in levels])
+        begun = [*(BOUNDARY_MIXED + np.geomspace(1e-7, 1e-2, 16)), *-np.geomspace(0.032, 1e-5, 16)]
+        levels, extremes = look.sampled(_extremes, begun)
         upper.fill_between(levels, *extremes[:, :2].T, color=look.PURPLE, alpha=0.15, linewidth=0)
         for k in (0, 1):
             upper.plot(levels, extremes[:, k], color=look.PURPLE, linewidth=1.8)
@@ -136,17 +130,27 @@ def diagram() -> Figure:
             upper.text(value, 1.12, words, ha="center", va="bottom")
         upper.set(ylabel="$T$", xlim=(-0.08, 0.25), ylim=(0, 1.1))
         lower.set(xlabel=r"$\varepsilon$", ylabel="period", ylim=(0, None))
-        handles = [
-            look.line(look.ABOVE, "mixed equilibrium, stable", 2.2),
-            look.line(look.BELOW, "resting equilibrium, stable", 2.2),
-            look.line(look.BLACK, "stable pseudo-node", 1.8),
-            look.line(look.BLACK, "pseudo-saddle", 1.8, look.DASHED),
-            look.line(look.ORANGE, "unstable pseudo-node", 1.8, look.DASHED),
-            look.line(look.PURPLE, "cycle: least and largest $T$", 1.8),
-            look.marker("*", "fused focus", "#F0E442"),
-        ]
-        upper.legend(handles=handles, loc="lower right")
+        _names(upper, levels, extremes[:, 1])
     return figure
+
+
+def _names(ax: Axes, levels: Array, warmest: Array) -> None:
+    """Name the curves of the diagram beside them."""
+    labels = look.Labels(ax)
+    for low, high, color, name in (
+        (MIXED[0], MERGING, look.BLACK, "pseudo-saddle"),
+        (MERGING, FOLD_FOLD[0], look.ORANGE, "unstable pseudo-node"),
+        (FOLD_FOLD[0], RESTING[0], look.BLACK, "stable pseudo-node"),
+    ):
+        branch = np.linspace(low, high, 30)
+        labels.name(name, np.column_stack([threshold_of(branch), branch]), color)
+    for name, low, high, value, color in (
+        ("mixed equilibrium,\nstable", -0.08, BOUNDARY_MIXED, MIXED[0], look.ABOVE),
+        ("resting equilibrium,\nstable", BOUNDARY_RESTING, 0.25, RESTING[0], look.BELOW),
+    ):
+        labels.name(name, [(x, value) for x in np.linspace(low, high, 9)], color)
+    labels.name("cycle: least\nand largest $T$", np.column_stack([levels, warmest]), look.PURPLE)
+    labels.name("fused focus", (0.0, FOLD_FOLD[0]))
 
 
 def _extremes(eps: float) -> tuple[float, float, float]:

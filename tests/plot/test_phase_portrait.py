@@ -4,6 +4,7 @@ import casadi as ca
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from numpy.testing import assert_allclose
 
 import nonsmooth as ns
@@ -35,7 +36,9 @@ def test_every_object_of_a_portrait_is_drawn_and_explained():
             "invisible fold", "stable pseudo-node", "pseudo-saddle", "unstable focus"}  # fmt: skip
     assert want <= kinds
     legend = {text.get_text() for text in ax.get_legend().get_texts()}
-    assert {"visible fold", "stable pseudo-node", "unstable focus", "separatrices"} <= legend
+    assert {"sliding, attracting", "crossing", "orbits", "separatrices"} <= legend
+    named = {text.get_text() for text in ax.findobj(Text)}
+    assert {"visible fold", "stable pseudo-node", "unstable focus", "$h > 0$", "$h < 0$"} <= named
 
 
 def test_drawn_orbits_follow_the_fields():

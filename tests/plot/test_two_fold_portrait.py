@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.text import Text
 from numpy.testing import assert_allclose
 
 import nonsmooth as ns
@@ -53,7 +54,7 @@ def lines(figure: Figure, gid: str) -> list[np.ndarray]:
 
 
 def words(figure: Figure) -> set[str]:
-    return {text.get_text() for text in figure.axes[0].texts}
+    return {text.get_text() for text in figure.axes[0].findobj(Text)}
 
 
 @pytest.mark.parametrize("sigma, nu", ALL.values(), ids=ALL)
@@ -107,10 +108,22 @@ def test_every_part_is_named(draw, sigma, nu):
     title = ax.get_title()
     label = classify_two_fold(sigma, nu).label
     assert label.removeprefix("boundary ").replace("Delta", "Δ") in title
-    legend = " ".join(text.get_text() for text in ax.get_legend().get_texts())
+    named = " ".join(words(figure))
     for value, _ in eigenlines(ReducedFlow(sigma, nu)):
-        name = "pseudo-equilibria" if abs(value) < 1e-9 else "canard"
-        assert name in legend
+        assert ("pseudo-equilibria" if abs(value) < 1e-9 else "canard") in named
+    assert {"visible", "invisible"} >= {w.split(",\n")[1] for w in words(figure) if "fold of" in w}
+    assert len([w for w in words(figure) if "fold of" in w]) == 2
+    assert len(ax.get_legend().get_texts()) <= 6
+
+
+def test_names_of_lines_are_left_out_or_stand_without_a_legend():
+    case = CLASSES["II-C"]
+    for draw in (ns.plot.two_fold, ns.plot.two_fold_3d):
+        folds = [
+            sum("fold of" in w for w in words(draw(case, legend=legend, labels=labels)))
+            for legend, labels in ((True, False), (False, True), (False, None))
+        ]
+        assert folds == [0, 2, 0]
 
 
 def test_axes_are_labelled():

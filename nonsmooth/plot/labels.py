@@ -1,0 +1,243 @@
+"""Names beside the things they name: places are chosen so that texts lie on no other and hide little."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
+from matplotlib.text import Text
+from matplotlib.transforms import IdentityTransform
+from numpy.typing import ArrayLike
+
+from ..model import Array
+from . import style
+
+_CELL = 1.5  # points, of the grid on which room is looked for
+_GAPS = (4.0, 9.0, 16.0, 25.0)  # points, from a thing to its name
+_LEADER = 8.0  # points: over a longer gap a thin line leads to the thing
+_MARK = 3.5  # points: from the middle of a mark to where that line ends
+_ANCHORS = 24  # places along a thing that are tried
+_TEXT, _FAR = (
+    40.0,
+    0.02,
+)  # costs, in shares of a name's area: on other texts; for a point of distance
+_DIRECTIONS = np.array(
+    [(a, b) for a in (-1.0, 0.0, 1.0) for b in (-1.0, 0.0, 1.0) if (a, b) != (0.0, 0.0)]
+    + [(a, b) for a in (-0.5, 0.5) for b in (-1.0, 1.0)]
+)
+
+
+@dataclass
+class _Name:
+    text: Text
+    leader: Line2D
+    anchors: Array
+    inside: bool
+
+
+class Labels(Artist):
+    """Names of things in axes, placed anew each time the figure is drawn.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        Axes in which the named things are.
+
+    Examples
+    --------
+    >>> from nonsmooth.plot import style
+    >>> figure = style.new_figure((3, 2))
+    >>> ax = figure.add_subplot()
+    >>> line, = ax.plot([0, 1], [0, 1])
+    >>> labels = Labels(ax)
+    >>> labels.name("diagonal", line.get_xydata())
+    >>> [text.get_text() for text in labels.get_children()]
+    ['diagonal']
+    """
+
+    def __init__(self, ax: Axes):
+        super().__init__()
+        self.home = ax
+        self.names: list[_Name] = []
+        self.seen: object = None  # for what the names are placed
+        self.set_zorder(9.0)
+        self.set_in_layout(False)
+        ax.add_artist(self)
+
+    def name(
+        self,
+        text: str,
+        anchors: ArrayLike,
+        color: str = style.BLACK,
+        *,
+        inside: bool = False,
+        **options: Any,
+    ) -> None:
+        """Name a thing.
+
+        Parameters
+        ----------
+        text : str
+            Its name.
+        anchors : array_like (m, 2) or (2,)
+            Points of the thing, in data coordinates: the name is put beside one of them.
+        color : str, optional
+            The colour of the thing.
+        inside : bool, optional
+            Put the name on a point instead, as for a region.
+        **options
+            Of ``matplotlib.text.Text``.
+        """
+        points = np.atleast_2d(np.asarray(anchors, dtype=float))
+        step = max(1, -(-len(points) // _ANCHORS))
+        look = {"fontsize": 8.0, "ha": "center", "va": "center", "color": color, "linespacing": 1.0}
+        artist = Text(0, 0, text, path_effects=style.halo(2.5), **{**look, **options})
+        leader = Line2D([], [], color=color, linewidth=0.6, path_effects=style.halo(1.6))
+        for part in (artist, leader):
+            part.axes = self.home
+            part.set_figure(self.home.figure)
+            part.set_transform(IdentityTransform())
+            part.set_in_layout(False)
+        self.names.append(_Name(artist, leader, points[step // 2 :: step], inside))
+
+    def get_children(self) -> list[Artist]:
+        """The texts."""
+        return [name.text for name in self.names]
+
+    def draw(self, renderer: Any, *args: Any, **options: Any) -> None:
+        """Place the names and draw them."""
+        if not self.get_visible() or not self.names:
+            return
+        self._arrange(renderer)
+        for name in self.names:
+            name.leader.draw(renderer)
+        for name in self.names:
+            name.text.draw(renderer)
+        self.stale = False
+
+    def _arrange(self, renderer: Any) -> None:
+        axes = self.home
+        point = renderer.points_to_pixels(1.0)
+        box = axes.get_window_extent(renderer).bounds
+        seen = (point, box, axes.viewLim.bounds, len(axes.lines), len(axes.texts), len(self.names))
+        if seen == self.seen:
+            return
+        self.seen = seen
+        room = _Room(axes, renderer, _CELL * point, set(map(id, self.get_children())))
+        for name in sorted(self.names, key=lambda n: len(n.anchors)):
+            name.text.set_position((0.0, 0.0))
+            box = name.text.get_window_extent(renderer)
+            size = np.array([box.width, box.height]) + 2.0 * point
+            middle = np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2
+            anchors = axes.transData.transform(name.anchors)
+            anchors = anchors[room.contains(anchors)]
+            for part in (name.text, name.leader):
+                part.set_visible(bool(len(anchors)))
+            if not len(anchors):
+                continue
+            gaps: Sequence[float] = (0.0,) if name.inside else _GAPS
+            offsets = [_DIRECTIONS * (size / 2 + gap * point) for gap in gaps]
+            offset = np.zeros((1, 2)) if name.inside else np.vstack(offsets)
+            far = np.repeat(gaps, len(offset) // len(gaps))
+            tried = (anchors[:, None] + offset).reshape(-1, 2)
+            cost = room.cost(tried, size) + _FAR * np.tile(far, len(anchors))
+            k = int(np.argmin(cost))
+            name.text.set_position(tuple(tried[k] - middle))
+            room.take(tried[k], size)
+            anchor = anchors[k // len(offset)]
+            near = np.clip(anchor, tried[k] - size / 2, tried[k] + size / 2)
+            mark = anchor + (near - anchor) * min(
+                1.0, _MARK * point / np.hypot(*(near - anchor) + 1e-9)
+            )
+            ends = np.array([mark, near])
+            leads = far[k % len(offset)] > _LEADER
+            name.leader.set_data(*(ends.T if leads else ([], [])))
+
+
+class _Room:
+    """What is drawn in axes, as numbers on a grid of cells: lines, and texts and marks."""
+
+    def __init__(self, ax: Axes, renderer: Any, cell: float, own: set[int]):
+        box = ax.get_window_extent(renderer)
+        self.corner, self.cell = np.array([box.x0, box.y0]), cell
+        self.size = np.array([box.width, box.height])
+        nx, ny = np.maximum(np.ceil(self.size / cell).astype(int), 1)
+        self.lines, self.texts = np.zeros((nx, ny)), np.zeros((nx, ny))
+        for line in ax.lines:
+            self._line(line, renderer)
+        for text in ax.texts:
+            if text.get_visible() and id(text) not in own:
+                frame = text.get_bbox_patch()
+                extent = (frame or text).get_window_extent(renderer)
+                self.take(np.mean(extent.get_points(), axis=0), np.array(extent.size))
+        legend = ax.get_legend()
+        if legend is not None:
+            extent = legend.get_window_extent(renderer)
+            self.take(np.mean(extent.get_points(), axis=0), np.array(extent.size))
+
+    def contains(self, points: Array) -> Array:
+        """Whether points (m, 2) are in the axes, in pixels."""
+        share = (points - self.corner) / self.size
+        return np.all((share >= -1e-9) & (share <= 1 + 1e-9), axis=1)
+
+    def _line(self, line: Line2D, renderer: Any) -> None:
+        if not line.get_visible():
+            return
+        points = line.get_transform().transform(line.get_xydata())
+        points = points[np.all(np.isfinite(points), axis=1)]
+        if not len(points):
+            return
+        if line.get_linestyle() not in ("None", "none", "", " ") and len(points) > 1:
+            limit = self.size.max()
+            low, high = self.corner - limit, self.corner + self.size + limit
+            dense = _dense(np.clip(points, low, high), self.cell)
+            weight = max(1.0, float(line.get_linewidth()) / 1.5)
+            i, j = self._cells(dense[self.contains(dense)])
+            self.lines[i, j] = np.maximum(self.lines[i, j], weight)
+        if line.get_marker() not in ("None", "none", "", " ", None):
+            side = renderer.points_to_pixels(line.get_markersize() + 2.0)
+            for point in points[self.contains(points)]:
+                self.take(point, np.full(2, side))
+
+    def _cells(self, points: Array) -> tuple[Any, Any]:
+        at = ((points - self.corner) / self.cell).astype(int)
+        i, j = np.clip(at, 0, np.array(self.lines.shape) - 1).T
+        return i, j
+
+    def take(self, middle: Array, size: Array) -> None:
+        """Keep names off a rectangle."""
+        low = np.floor((middle - size / 2 - self.corner) / self.cell).astype(int)
+        high = np.ceil((middle + size / 2 - self.corner) / self.cell).astype(int)
+        (a, b), (c, d) = np.maximum(low, 0), np.maximum(high, 0)
+        self.texts[a:c, b:d] = 1.0
+
+    def cost(self, middles: Array, size: Array) -> Array:
+        """What rectangles (m, 2) would hide, as shares of their area; infinite outside of the axes."""
+        low = np.round((middles - size / 2 - self.corner) / self.cell).astype(int)
+        high = np.round((middles + size / 2 - self.corner) / self.cell).astype(int)
+        shape = np.array(self.lines.shape)
+        outside = np.any((low < 0) | (high > shape), axis=1)
+        low, high = np.clip(low, 0, shape), np.clip(high, 0, shape)
+        area = np.maximum(np.prod(size) / self.cell**2, 1.0)
+        found = np.where(outside, 1e6, 0.0)
+        for weight, layer in ((1.0, self.lines), (_TEXT, self.texts)):
+            total = np.zeros(shape + 1)
+            total[1:, 1:] = layer.cumsum(axis=0).cumsum(axis=1)
+            (a, b), (c, d) = low.T, high.T
+            found += weight * (total[c, d] - total[a, d] - total[c, b] + total[a, b]) / area
+        return found
+
+
+def _dense(points: Array, step: float) -> Array:
+    """Points along a polyline, no further apart than a step."""
+    parts = np.maximum(np.ceil(np.linalg.norm(np.diff(points, axis=0), axis=1) / step), 1).astype(
+        int
+    )
+    index = np.repeat(np.arange(len(parts)), parts)
+    share = (np.arange(len(index)) - np.repeat(np.cumsum(parts) - parts, parts)) / parts[index]
+    return np.asarray(points[index] + share[:, None] * np.diff(points, axis=0)[index])

@@ -1,0 +1,89 @@
+"""Names stand beside what they name, on no other name, mark or frame, and hide as little as they can."""
+
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.plot.labels import Labels
+
+
+@pytest.fixture
+def axes():
+    with ns.plot.style.settings():
+        ax = ns.plot.style.new_figure((4.0, 3.0)).add_subplot()
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    return ax
+
+
+def boxes(ax, labels):
+    """Rectangles of the names, after the figure was drawn."""
+    ax.figure.draw_without_rendering()
+    return [text.get_window_extent() for text in labels.get_children()]
+
+
+def gap(box, points):
+    """Shortest distance in points from a rectangle to one of some pixels."""
+    low, high = box.get_points()
+    away = np.maximum(np.maximum(low - points, points - high), 0.0)
+    return np.hypot(*away.T).min() * 72 / 100
+
+
+def test_names_of_neighbours_do_not_meet(axes):
+    labels = Labels(axes)
+    places = [(0.5, 0.5), (0.52, 0.5), (0.5, 0.53), (0.98, 0.98), (0.02, 0.01)]
+    for k, place in enumerate(places):
+        axes.plot(*place, "o", color="black", markersize=6)
+        labels.name(f"a point with number {k}", place)
+    found = boxes(axes, labels)
+    frame = axes.get_window_extent()
+    for k, (box, place) in enumerate(zip(found, axes.transData.transform(places), strict=True)):
+        assert not any(box.overlaps(other) for other in found[k + 1 :])
+        assert frame.contains(*box.p0) and frame.contains(*box.p1)
+        assert 2.0 < gap(box, place[None]) < 26.0
+
+
+def test_a_line_leads_from_a_mark_to_a_name_that_is_far(axes):
+    labels = Labels(axes)
+    for _ in range(8):
+        labels.name("many names in one place", (0.5, 0.5))
+    boxes(axes, labels)
+    place = axes.transData.transform((0.5, 0.5))
+    far = [gap(t.get_window_extent(), place[None]) > 9.0 for t in labels.get_children()]
+    lines = [len(name.leader.get_xdata()) == 2 for name in labels.names]
+    assert any(lines) and lines == far
+
+
+def test_a_name_hides_no_line_where_there_is_room(axes):
+    labels, x = Labels(axes), np.linspace(0, 1, 200)
+    axes.plot(x, 0.4 + 0.1 * np.sin(40 * x))
+    axes.plot([0, 1], [0.4, 0.9])
+    labels.name("a straight line", np.column_stack([x, 0.4 + 0.5 * x]), "red")
+    (box,) = boxes(axes, labels)
+    for drawn in axes.lines:
+        points = axes.transData.transform(np.column_stack([x, np.interp(x, *drawn.get_data())]))
+        assert gap(box, points) > 0.5
+    assert gap(box, axes.transData.transform(np.column_stack([x, 0.4 + 0.5 * x]))) < 26.0
+    assert labels.get_children()[0].get_color() == "red"
+
+
+def test_names_inside_regions_are_on_their_points_and_those_out_of_sight_are_left_out(axes):
+    labels = Labels(axes)
+    labels.name("here", [(0.2, 0.2), (0.8, 0.8)], inside=True)
+    labels.name("elsewhere", (3.0, 3.0))
+    axes.plot(0.2, 0.2, "s", markersize=20)
+    here, _ = boxes(axes, labels)
+    middle = (here.p0 + here.p1) / 2
+    assert np.abs(axes.transData.inverted().transform(middle) - 0.8).max() < 0.02
+    assert [text.get_visible() for text in labels.get_children()] == [True, False]
+
+
+def test_names_are_placed_again_for_another_resolution(axes, tmp_path):
+    labels = Labels(axes)
+    labels.name("a point", (0.5, 0.5))
+    (small,) = boxes(axes, labels)
+    axes.figure.savefig(tmp_path / "fine.png", dpi=300)
+    (again,) = boxes(axes, labels)
+    assert np.allclose(small.get_points(), again.get_points(), atol=1.0)
+    axes.figure.savefig(tmp_path / "picture.pdf")
+    labels.set_visible(False)
+    axes.figure.draw_without_rendering()

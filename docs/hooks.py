@@ -81,6 +81,6 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
         read = mathematics.formula  # docstrings have formulas as plain text
         html = _LISTED.sub(lambda found: found[1].replace(", <a", "</code>, <code><a"), html)
         html = _NOTHING.sub("", html)
-    if page.file.src_uri.startswith("papers/"):  # their tables are plain text, for terminals too
+    if page.file.src_uri.startswith(("papers/", "benchmarks")):  # plain text, for terminals too
         html = mathematics.typeset_page(html)
     return typeset.labelled(typeset.mathematics(_ROLE.sub("", html), read))

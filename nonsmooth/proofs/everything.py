@@ -294,5 +294,5 @@ def _words(
         f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{where(subject)} "
         f"holds {count}.",
         *lines,
-        f"{search.boxes} pieces of the box were looked at. {READ[subject.numbers]}",
+        f"Pieces of the box that were looked at: {search.boxes}. {READ[subject.numbers]}",
     )

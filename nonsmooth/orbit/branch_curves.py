@@ -278,7 +278,9 @@ def _drop_turning(arc: Arc) -> None:
     arc.zeros[:] = [
         zero
         for zero in arc.zeros
-        if zero.name not in ("fold", "branch point") or end - zero.point.arclength > near
+        if zero.name not in ("fold", "branch point")
+        or end - zero.point.arclength > near
+        or zero is arc.zeros[-1]
     ]
 
 

@@ -22,6 +22,9 @@ from .multipliers import return_map
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
+#: Entries of a return map beyond this say nothing of its multipliers.
+_NO_DIGITS = 1e10
+
 
 @dataclass(frozen=True)
 class Condition:
@@ -112,7 +115,7 @@ def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
     """
     with np.errstate(all="ignore"):
         reduced = return_map(problem, at)
-        if not np.isfinite(reduced).all():
+        if not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
             return {}
         flip = float(np.linalg.det(reduced + np.eye(len(reduced))))
         values = np.linalg.eigvals(reduced)

@@ -25,6 +25,9 @@ from .edits import Edited
 from .legs import Leg, fly
 from .multipliers import leg_maps, return_map
 
+#: Sine of the angle below which an event is grazed.
+_TANGENT = 1e-6
+
 _SMOOTH = "persistence: the derivative of the return map is continuous"
 _VERDICTS = {
     "crossing-sliding": _SMOOTH,
@@ -35,7 +38,8 @@ _VERDICTS = {
     "grazing of a stop": "the orbit ends at the stop",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where the future is not unique",
-    "corner": "the derivative of the return map jumps with the order of the events",
+    "corner": "two events at one time; the itinerary beyond is not known here: simulate there and "
+    "continue what is found",
 }
 
 
@@ -117,6 +121,7 @@ def contact_maps(
 ) -> tuple[Array, Array]:
     """Return maps on the section L1 = 0 at the touching point, without and with contact."""
     assert test.guard is not None
+    _require_one_touch(at)
     y = touched(problem, test, at, p)
     own, other, second = contact_at(
         problem, problem.legs[test.leg], test.guard.index, test.guard.side, y, p
@@ -141,6 +146,7 @@ def impact_numbers(
     """
     system, n, leg, guard = problem.system, problem.dimension, problem.legs[test.leg], test.guard
     assert guard is not None
+    _require_one_touch(at)
     values = np.linalg.eigvals(return_map(problem, at))
     leading = complex(values[np.argmax(np.abs(values))])
     # by it the bifurcations beyond are ordered
@@ -162,6 +168,15 @@ def impact_numbers(
     numbers["n.A.w"] = float(normal @ after)
     numbers["n.(I - A)^-1.A.w"] = float(normal @ np.linalg.solve(np.eye(n) - outside, after))
     return numbers
+
+
+def _require_one_touch(at: Evaluation) -> None:
+    """Refuse an orbit that grazes at an event too, as one does that touches two places by symmetry."""
+    for event, flown in zip(at.events, at.flown, strict=True):
+        speed = abs(float(event.gradient @ flown.rate))
+        size = float(np.linalg.norm(event.gradient) * np.linalg.norm(flown.rate))
+        if size and speed < _TANGENT * size:
+            raise DegenerateError("another event is grazed at the same orbit")
 
 
 def touched(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> Array:

@@ -140,6 +140,11 @@ class OrbitCurve(BranchCurve):
     def ends(self, name: str) -> bool:
         return name == "Hopf" or not is_smooth(name)
 
+    def ends_at(self, zero: Zero) -> bool:
+        """As by name; and where doubled orbits become one, as beyond are the same, a round later."""
+        halves = zero.name == "branch point" and self._halved(zero) is not None
+        return halves or self.ends(zero.name)
+
     def singular(self, name: str) -> bool:
         """At a Hopf point the equations hold for the equilibrium with any duration."""
         return name in ("branch point", "Hopf")

@@ -107,3 +107,46 @@ def test_a_branch_gives_the_orbit_of_each_side_up_to_the_event(branch):
         for sign, word in ((1, "-- +-"), (-1, "-- -s -- +-")):
             (orbit,) = branch.at(event.parameter + sign * d)
             assert orbit.itinerary == word and not orbit.is_virtual
+
+
+def test_doubled_orbits_between_two_doublings_are_followed_once():
+    """A block on a belt, forced: the orbits of two periods begin and end at doublings of the single one."""
+    b, A = symbols("b A")
+    slip = V - b
+    drive = A * ca.cos(1.3 * T) - X - 0.05 * V
+
+    def pull(sign):
+        return 0.6 * sign * (0.5 + 0.5 / (1 + 3 * sign * slip))
+
+    system = ns.FilippovSystem(
+        [X, V],
+        surface=slip,
+        above=[V, drive - pull(1)],
+        below=[V, drive - pull(-1)],
+        parameters={b: 0.4, A: 0.5},
+        time=T,
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.5], 600.0))
+    branch = ns.continue_orbit(orbit, "A", bounds=(0.05, 3.0))
+    kinds = [event.kind for event in branch.events]
+    assert kinds.count("period doubling") == 2 and len(kinds) == 4 and len(branch) < 100
+    assert branch.ends == (ns.BranchEnd.EVENT,) * 2
+    ends = [event for event in branch.events if event.kind == "period doubling"]
+    single = ns.continue_orbit(ends[0].orbit, "A", bounds=(0.4, 0.6))
+    again = [event.parameter for event in single.events if event.kind == "period doubling"]
+    assert sorted(again) == pytest.approx(sorted(e.parameter for e in ends), abs=1e-8)
+
+
+def test_a_symmetric_orbit_that_grazes_two_walls_at_once_is_not_classified():
+    """A mass between two walls: where it touches one it touches the other half a period later."""
+    F = ca.SX.sym("F")
+    walls = [ns.Impact(1 - X, restitution=0.7, name="right")]
+    walls += [ns.Impact(1 + X, restitution=0.7, name="left")]
+    system = ns.FilippovSystem(
+        [X, V], field=[V, F * ca.cos(T)], parameters={F: 1.0}, time=T, impacts=walls
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.5], 200.0))
+    branch = ns.continue_orbit(orbit, "F", bounds=(0.8, 1.5))
+    event = max(branch.events, key=lambda e: e.parameter)
+    assert event.kind == "impact grazing"
+    assert "another event is grazed" in event.far_side.verdict and not event.coefficients

@@ -43,6 +43,7 @@ def test_doubled_orbits_meet_the_doubling_of_the_single_one():
     event = next(e for e in events if e.kind == "period doubling")
     assert abs(event.parameter - 3) < 1e-9 and len(event.orbit.legs) == 1
     assert event.coefficients["cubic coefficient"] == pytest.approx(9.0, rel=1e-6)
+    assert [e.kind for e in events] == ["period doubling"]  # beyond are the same orbits
     single = ns.continue_orbit(event.orbit, "r", bounds=(2.5, 3.3))
     assert single[2.8].legs[0].start[0] == pytest.approx(1 - 1 / 2.8, rel=1e-12)
 

@@ -182,7 +182,7 @@ class _Tracing:
             found = [zero for zero in found if zero.point.arclength <= new.arclength]
         for zero in found:
             self.arc.zeros.append(zero)
-            if self.curve.ends(zero.name):
+            if self.curve.ends_at(zero):
                 self.arc.points.append(zero.point)
                 self.arc.end = zero.name
                 return

@@ -8,12 +8,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from ...local.newton import Secant, converge
 from ...model import Array, NonsmoothError
+
+if TYPE_CHECKING:
+    from .zeros import Zero
 
 
 @dataclass(frozen=True, eq=False)
@@ -127,6 +130,15 @@ class Curve:
             Of the test.
         """
         return False
+
+    def ends_at(self, zero: Zero) -> bool:
+        """Whether the curve ends at a located zero.
+
+        Parameters
+        ----------
+        zero : Zero
+        """
+        return self.ends(zero.name)
 
     def singular(self, name: str) -> bool:
         """Whether the equations are singular at a zero of a test, so that it is interpolated.

@@ -16,6 +16,7 @@ from .manifold_picture import (
 from .offline_page import offline_page
 from .orbits import multipliers, periodic_orbit
 from .phase_portrait import phase_portrait
+from .proven_ranges import proof_map
 from .sliding_portrait import sliding_portrait
 from .trajectory import trajectory
 from .two_fold_atlas import two_fold_atlas, two_fold_map
@@ -32,6 +33,7 @@ __all__ = [
     "offline_page",
     "periodic_orbit",
     "phase_portrait",
+    "proof_map",
     "sliding_portrait",
     "style",
     "trajectory",

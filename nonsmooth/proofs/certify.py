@@ -138,7 +138,7 @@ def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> 
             done.append(proof)
             continue
         failed += 1
-        todo += one.halves(start)
+        todo += one.halves(start, proof.exists)
     return done
 
 

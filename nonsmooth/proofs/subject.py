@@ -83,24 +83,40 @@ class Subject:
             values[i] = pair
         return replace(self, parameters=list(ranges[:count]), values=values)
 
-    def halves(self, start: list[float]) -> list[Subject]:
-        """The same question over both halves of the range that matters most."""
+    def halves(self, start: list[float], exists: bool) -> list[Subject]:
+        """The same question over both halves of the range that matters most.
+
+        That is the one that moves the equations, or where the point is known to exist its class.
+        """
         wide = [k for k, (a, b) in enumerate(self.ranges) if a < b]
-        k = max(wide, key=lambda k: self._influence(k, start))
+        matters = lambda k: (self._in_class(k, start) if exists else 0.0, self._influence(k, start))
+        k = max(wide, key=matters)
         low, high = self.ranges[k]
         middle = (low + high) / 2
         parts = ((low, middle), (middle, high))
         changed = [[p if j == k else v for j, v in enumerate(self.ranges)] for p in parts]
         return [replace(self.over(ranges), start=start) for ranges in changed]
 
+    def _middles(self) -> list[tuple[Fraction, Fraction]]:
+        return [((a + b) / 2, (a + b) / 2) for a, b in self.ranges]
+
+    def _alone(self, k: int) -> Subject:
+        """The same question with one range, and the middles of the others."""
+        parts = zip(self.ranges, self._middles(), strict=True)
+        return self.over([own if j == k else middle for j, (own, middle) in enumerate(parts)])
+
+    def _in_class(self, k: int, start: list[float]) -> float:
+        """How much one range alone moves what the class is told from, beside how large that is."""
+        inputs = self._alone(k).equations().inputs([arb(v) for v in start])
+        values = [v for v in self.question.verdict(inputs).values.values() if v.is_finite()]
+        return sum(radius(v) / (radius(v) + abs(float(v.mid())) or 1.0) for v in values)
+
     def _influence(self, k: int, start: list[float]) -> float:
         """How much one range alone moves and turns the equations, seen by the inverse Jacobian."""
-        middles = [((a + b) / 2,) * 2 for a, b in self.ranges]
-        alone = [self.ranges[k] if j == k else v for j, v in enumerate(middles)]
         at = [arb(v) for v in start]
-        _, jacobian = self.over(middles).equations().with_jacobian(at)
+        _, jacobian = self.over(self._middles()).equations().with_jacobian(at)
         matrix = inverse(jacobian)
-        values, slopes = self.over(alone).equations().with_jacobian(at)
+        values, slopes = self._alone(k).equations().with_jacobian(at)
         if matrix is None:
             return radius_of([*values.entries(), *slopes.entries()])
         return radius_of([*(matrix * values).entries(), *(matrix * slopes).entries()])

@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 import inspect
+import pkgutil
 import sys
 from collections.abc import Iterable, Iterator
+from functools import cache
 from operator import attrgetter
 from pathlib import Path
 from types import ModuleType
+from typing import Any
 
 import bounce
 import nonsmooth as ns
@@ -92,7 +95,7 @@ _INTRODUCTION = (
 
 def _rows(title: str, path: str, names: Iterable[str]) -> str:
     module = sys.modules[path]
-    rows = [(f"[`{n}`][{path}.{n}]", first_line(attrgetter(n)(module))) for n in names]
+    rows = [(f"[`{n}`][{place(path, n)}]", first_line(attrgetter(n)(module))) for n in names]
     return f"## {title}\n\n" + table(("name", "what it is"), rows)
 
 
@@ -139,7 +142,32 @@ def page(title: str, about: str, path: str, names: Iterable[str]) -> str:
 
 def members(path: str, names: Iterable[str]) -> str:
     """Ask mkdocstrings for the description of each name."""
-    return "\n".join(f"::: {path}.{name}\n{_OPTIONS.get(name, '')}" for name in names)
+    return "\n".join(_member(path, name) for name in names)
+
+
+def _member(path: str, name: str) -> str:
+    """One name; where a module has the same name, it is asked for by the place of its definition."""
+    asked, shown = place(path, name), f"{path}.{name}"
+    if asked == shown:
+        return f"::: {asked}\n{_OPTIONS.get(name, '')}"
+    options = f"    options:\n      heading: {shown}\n      toc_label: {shown}\n"
+    return f"[](){{#{shown}}}\n\n::: {asked}\n{options}"
+
+
+def place(path: str, name: str) -> str:
+    """By which path mkdocstrings finds a name."""
+    if name not in _module_names():
+        return f"{path}.{name}"
+    thing: Any = inspect.unwrap(attrgetter(name)(sys.modules[path]))
+    return f"{thing.__module__}.{thing.__qualname__}"
+
+
+@cache
+def _module_names() -> set[str]:
+    """Names of modules: mkdocstrings reads sources, and takes the module where both have the name."""
+    packages = [(ns.__path__, "nonsmooth."), (bounce.__path__, "bounce.")]
+    found = [m.name for path, start in packages for m in pkgutil.walk_packages(path, start)]
+    return {name.rpartition(".")[2] for name in found}
 
 
 #: The class that a reader sees has the methods of what it is built on.

@@ -57,7 +57,7 @@ class Contact3D(Parametrised):
     Raises
     ------
     nonsmooth.ParameterError
-        Outside its limits.
+        A slope, ratio or radius outside its limits; a ``grain`` without a ``friction_ratio``.
     ModelError
         A model whose forces are no vectors along the ground, or favour a direction.
 

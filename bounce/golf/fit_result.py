@@ -43,7 +43,7 @@ class Start:
     cost : float
         Sum of squares there; infinite where not every bounce could be simulated.
     problem : str
-        Why not.
+        Why not every bounce could be simulated there; empty if all could.
     fitted : dict of str to float or None
         Where the least squares from here ended, or was after a dozen steps if another was better
         then; None if it was not among the best.
@@ -90,7 +90,7 @@ class FitResult:
         Parameters whose 95 % interval ends where the sum of squares has hardly risen: it is too
         narrow, and :meth:`profile` has one that is not.
     search : Profile
-        What :meth:`profile` asks.
+        The search that :meth:`profile` goes on with.
     """
 
     model: Model
@@ -132,7 +132,7 @@ class FitResult:
         Parameters
         ----------
         level : float, optional
-            In (0, 1).
+            Probability that the interval contains the value, in (0, 1).
 
         Returns
         -------
@@ -159,7 +159,7 @@ class FitResult:
         Parameters
         ----------
         level : float, optional
-            In (0, 1).
+            Probability that the interval contains the value, in (0, 1).
 
         Returns
         -------
@@ -182,12 +182,12 @@ class FitResult:
         Parameters
         ----------
         level : float
-            In (0, 1).
+            Probability that the interval contains the value, in (0, 1).
 
         Returns
         -------
         float
-            The quantile.
+            Half the interval over the standard error.
 
         Raises
         ------

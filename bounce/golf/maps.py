@@ -44,7 +44,7 @@ def landing_map(
         horizontal. ``speed`` in m/s, ``angle`` of descent in rad, ``spin`` in rad/s, backspin
         positive; parameters of a contact model as it has them.
     fixed : mapping, optional
-        The other ones.
+        Values of the other names, in the same units.
     ball : Ball, optional
         Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     scaling : Scaling, optional

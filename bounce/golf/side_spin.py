@@ -125,7 +125,7 @@ def side_rebound(
     Parameters
     ----------
     model : RigidBounce, TiltedBounce, ContactModel or Contact3D
-        The ground.
+        The ground, as a law in closed form or a contact model.
     landing : Landing
         The landing, with the backspin (see :func:`axis_spin`).
     side_spin : float

@@ -171,7 +171,7 @@ def penner_tilt(speed: ArrayLike, angle: ArrayLike) -> Array:
     Returns
     -------
     ndarray (...)
-        The tilt, rad.
+        Angle of the plane's normal from the vertical, rad.
 
     Notes
     -----

@@ -150,7 +150,7 @@ class DividingCurve:
         time : float
             After touch-down, before lift-off.
         itinerary : {"+ s", "- s"}
-            Slip before.
+            Forward or reverse slip before it rolls.
 
         Returns
         -------
@@ -160,7 +160,9 @@ class DividingCurve:
         Raises
         ------
         nonsmooth.PointError
-            There is none.
+            There is no such landing.
+        LiftOffError
+            ``time`` is not before lift-off.
 
         Examples
         --------

@@ -56,7 +56,7 @@ class SlipMap:
     Attributes
     ----------
     model : Contact3D
-        The contact.
+        The surface, in 3-D.
     xdot : ndarray (2,)
         Velocity along the ground at touch-down.
     ydot : float
@@ -189,7 +189,7 @@ def winding_number(
     ydot : float, optional
         Velocity into the ground.
     points : int, optional
-        At first.
+        Points of the circle to begin with, three or more.
     **options
         As :func:`lift_off` takes.
 

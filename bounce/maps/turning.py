@@ -27,7 +27,7 @@ class SlipTurn(NamedTuple):
     Attributes
     ----------
     eta : ndarray (n,)
-        Frequency ratios.
+        Tangential over normal natural frequency.
     turn : ndarray (n,)
         Computed, rad in $(-pi, pi]$, from forward to the right positive.
     first_order : ndarray (n,)
@@ -67,7 +67,7 @@ def slip_turn(
     xdot, omega : array_like (2,)
         Velocity and spin at touch-down, forward and to the right.
     eta : array_like (n,)
-        Frequency ratios.
+        Tangential over normal natural frequency, one bounce for each.
     ydot : float, optional
         Velocity into the ground.
     tol : float, optional

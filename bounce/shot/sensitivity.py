@@ -76,7 +76,7 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
     Raises
     ------
     nonsmooth.ParameterError
-        Unknown name.
+        A name that is neither a parameter nor a component of the landing.
 
     Examples
     --------

@@ -55,9 +55,9 @@ class Shot(Record[ContactModel, State]):
     model : ContactModel
         The surface, with its friction.
     landing, lift_off : State
-        Touch-down and lift-off.
+        The ball at touch-down and at lift-off.
     time : float
-        Duration.
+        Duration of the bounce, in the model's unit.
     trajectory : nonsmooth.Trajectory
         The contact; its states are ``x, xdot, y, ydot, omega`` and the extra ones.
     approach : nonsmooth.Trajectory or None

@@ -66,11 +66,11 @@ class Shot3D(Record[Contact3D, State3D]):
     Attributes
     ----------
     model : Contact3D
-        The contact.
+        The surface, in 3-D.
     landing, lift_off : State3D
-        Touch-down and lift-off.
+        The ball at touch-down and at lift-off.
     time : float
-        Duration.
+        Duration of the bounce, in the model's unit.
     trajectory : nonsmooth.Trajectory
         The contact; its states are those of :meth:`Contact3D.system`.
     approach : nonsmooth.Trajectory or None

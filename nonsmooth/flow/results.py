@@ -104,9 +104,9 @@ class Ensemble(Savable):
     Attributes
     ----------
     x : ndarray (..., n)
-        Last states.
+        States at the ends of the runs.
     t : ndarray (...)
-        Last times.
+        Times of these ends.
     status : ndarray of int8 (...)
         Values of :class:`Status`; compare with its members.
     itineraries : tuple of str

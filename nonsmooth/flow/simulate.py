@@ -50,7 +50,7 @@ def simulate(
     x0 : array_like (n,)
         Start; on a surface the mode follows from Filippov's convention.
     t_end : float
-        Final time.
+        Time at which the run ends, not before ``t_start``.
     t_start : float, optional
         Time of the start.
     parameters : mapping, optional
@@ -58,7 +58,7 @@ def simulate(
     tol : float, optional
         Relative and absolute tolerance of the local error and of events.
     rtol, atol : float, optional
-        Set them apart.
+        Relative and absolute tolerance apart, in place of ``tol``.
     start_mode : str, optional
         One letter per surface: which continuation to take where more than one is possible.
     max_step : float, optional

@@ -61,7 +61,7 @@ class Segment:
     mode : str
         One letter for each surface, and one for each impact.
     t_start, t_end : float
-        Its times.
+        Times at which it begins and ends.
     first, last : int
         Its steps are those with the numbers ``first`` to ``last - 1`` of ``Trajectory.steps``.
     """

@@ -239,7 +239,7 @@ def find_fold(
     Returns
     -------
     Fold
-        The fold found.
+        The fold, with its distance from the start of the search.
 
     Raises
     ------

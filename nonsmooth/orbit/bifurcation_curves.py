@@ -84,7 +84,7 @@ class BifurcationCurve:
     ends : tuple of two BranchEnd
         Why the curve ends at its two ends.
     curve : Curve
-        The equations.
+        The equations, from which other curves start.
     """
 
     kind: str
@@ -234,7 +234,7 @@ def continue_bifurcation(
     step : float, optional
         Largest step where the curve bends, relative to the widths of the bounds.
     max_points : int, optional
-        To each side.
+        Limit of the points to each side of the event.
     progress : bool, optional
         Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
 

@@ -65,7 +65,7 @@ class FarSide:
     itinerary : str
         Or the kind of solution; empty if nothing continues the branch.
     verdict : str
-        In words.
+        What becomes of the solutions there, in words.
     numbers : mapping of str to float
         What the verdict rests on.
     """

@@ -162,7 +162,7 @@ def find_homoclinic(
         At the guess, or a point near it. A saddle of one mode, on the surface or off it; of a planar
         pseudo-saddle the surface is the unstable manifold.
     parameter : str
-        That is varied.
+        Name of the parameter that is varied.
     guess : float, optional
         Its value to start from; by default that of ``parameters``. There an orbit of the unstable
         manifold should come back to within half of its size.

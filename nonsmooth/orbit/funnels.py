@@ -50,7 +50,7 @@ class Funnel:
     point : ndarray (n,)
         The state at which it stops being unique.
     cause : str
-        Why, in words.
+        Why it stops being unique, such as ``"repelling sliding of h0"``.
     two_fold : TwoFold or None
         The two-fold that the set begins at, if it does at one.
     trajectories : tuple of Trajectory

@@ -189,7 +189,7 @@ class FixedItinerary:
     tol : float, optional
         Relative tolerance.
     t_max : float, optional
-        Longest leg.
+        Longest duration of a leg.
 
     Examples
     --------

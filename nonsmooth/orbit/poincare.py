@@ -73,7 +73,7 @@ class PoincareOrbit(Savable):
         Raises
         ------
         OptionError
-            No such hits.
+            Numbers of hits that the run does not have.
         DegenerateError
             The run grazes a surface, or meets two at one instant.
         """
@@ -165,7 +165,7 @@ def poincare(
     x0 : array_like (n,)
         A start on the section is no hit.
     count : int
-        Hits.
+        Hits to follow the run for.
     direction : {-1, 0, 1}, optional
         Of an expression or a surface: where it falls, either way, where it rises.
     skip : int, optional

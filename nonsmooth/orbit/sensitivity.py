@@ -264,7 +264,7 @@ def saltation_matrix(
     system : FilippovSystem
         The one with the event.
     before, after : str
-        Modes.
+        Modes on the two sides of the event.
     point : array_like (n,)
         Where the event happens, before a reset.
     event : str, optional

@@ -20,7 +20,7 @@ def two_fold_explorer() -> str:
     Returns
     -------
     str
-        HTML.
+        The page, as HTML.
 
     Examples
     --------

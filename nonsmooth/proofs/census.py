@@ -48,7 +48,7 @@ class Census:
     undecided : tuple of Undecided
         Parts of the box where nothing is proven.
     boxes : int
-        Pieces looked at.
+        Pieces of the box that were looked at.
     statement : str
         The theorem, or what is missing to it, in one sentence.
     record : mapping

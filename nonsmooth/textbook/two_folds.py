@@ -40,7 +40,7 @@ def two_fold(
         ``"VV-C1"``, ``"VV-F"``, ``"II-C"``, ``"II-F"``, ``"mix-0"``, ``"mix-S"``, ``"mix-C"`` or
         ``"mix-F"``; or the two signs ``sigma``.
     nu : (float, float), optional
-        With the signs.
+        The two numbers of the two-fold, where the signs are given.
     sigma : (int, int), optional
         The signs by name, in place of the first argument.
 

@@ -2,6 +2,7 @@
 
 import dataclasses
 import html
+import importlib
 import importlib.util
 import inspect
 import re
@@ -22,6 +23,8 @@ api = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(api)
 
 OBJECTS = dict(api.objects())
+PACKAGES = {task.package for task in api.listed().values()} | {"nonsmooth.local"}
+PACKAGES |= {module.__name__ for _, module, _ in api.MODULES}
 SECTION = re.compile(
     r"^(?:Other Parameters|Parameters|Attributes|Returns|Yields|Raises|Warns)\n-+\n(.*?)(?=^[A-Z][A-Za-z ]*\n-+$|\Z)",
     re.MULTILINE | re.DOTALL,
@@ -193,8 +196,13 @@ def test_no_name_is_on_two_pages():
 def test_pages_ask_for_each_name_and_are_in_the_navigation():
     pages = api.pages()
     text = "\n".join(t for uri, t in pages.items() if uri != "api/index.md")
-    asked = re.findall(r"^::: ([\w.]+)$", text, re.MULTILINE)
-    assert sorted(asked) == sorted(OBJECTS)
+    asked = re.findall(r"^(?:\[\]\(\)\{#([\w.]+)\}\n\n)?::: ([\w.]+)$", text, re.MULTILINE)
+    assert sorted(shown or path for shown, path in asked) == sorted(OBJECTS)
+    for shown, path in asked:  # a module of the same name would be described instead
+        module, _, name = path.rpartition(".")
+        thing = getattr(importlib.import_module(module), name)
+        assert not inspect.ismodule(thing) and thing is OBJECTS[shown or path]
+    assert len([shown for shown, _ in asked if shown]) > 20
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert [uri for uri in pages if f": {uri}\n" not in navigation] == []
 
@@ -202,6 +210,9 @@ def test_pages_ask_for_each_name_and_are_in_the_navigation():
 def test_overview_says_what_each_name_is():
     overview = api.overview()
     for path, thing in OBJECTS.items():
-        assert f"[{path}] | " in overview
+        package = next(
+            p for p in sorted(PACKAGES, key=len, reverse=True) if path.startswith(p + ".")
+        )
+        assert f"[{api.place(package, path.removeprefix(package + '.'))}] | " in overview
         first = (thing.__doc__ or "").partition("\n")[0]
         assert textwrap.shorten(first, 400), path

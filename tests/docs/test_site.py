@@ -253,6 +253,16 @@ def test_no_page_of_the_api_has_a_formula_as_plain_text(site):
 
 
 @pytest.mark.slow
+def test_every_name_of_the_overview_leads_to_its_description(site):
+    overview = (site / "api" / "index.html").read_text(encoding="utf-8")
+    assert "][" not in overview  # a link that leads nowhere stays as it was written
+    links = re.findall(r'href="(\w+\.html)#([\w.]+)"[^>]*><code>', overview)
+    assert len(links) > 200
+    for page, anchor in links:
+        assert f'id="{anchor}"' in (site / "api" / page).read_text(encoding="utf-8"), anchor
+
+
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_every_page_fits_the_window_and_complains_of_nothing(browser, site, width):

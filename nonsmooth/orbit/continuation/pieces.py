@@ -47,7 +47,7 @@ def pieces(
     departure : Departure
         Of the first piece.
     follow : callable
-        Traces one piece.
+        Takes a departure and returns its arc.
     following : callable
         How the next one begins, from the piece that ended; None if nothing follows.
     last : callable
@@ -55,7 +55,7 @@ def pieces(
     apart : float, optional
         A piece that ends where an earlier one did closes the curve; distance in scaled unknowns.
     most : int, optional
-        Number of pieces.
+        Limit of the number of pieces.
 
     Yields
     ------

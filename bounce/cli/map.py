@@ -24,10 +24,10 @@ ABOUT = "Map the itinerary, or a quantity at lift-off, of one bounce over two in
 _QUANTITIES = dict(
     region="itinerary", slip="slip", omega="omega", angle="lift_off_angle", reversal="spin_reversal"
 )
-#: What is mapped unless told: in units that golfers know, and in those of a contact model without.
-_LANDINGS = ("speed=5m/s:40m/s:100", "angle=15deg:75deg:100")
+#: What is mapped unless told, so that every kind of bounce is on the map: in units that golfers know, and in those of a contact model without.
+_LANDINGS = ("angle=5deg:75deg:150", "spin=-10000rpm:10000rpm:150")
 _USUAL = ("speed=28m/s", "angle=40deg", "spin=2500rpm")
-_DIMENSIONLESS = ("xdot=-2:2:100", "omega=-4:4:100")
+_DIMENSIONLESS = ("xdot=-2:2:150", "omega=-4:4:150")
 
 
 def arguments(parser: argparse.ArgumentParser) -> None:

@@ -10,7 +10,7 @@ import nonsmooth as ns
 
 from ..golf.columns import read_columns
 from ..units import Landing
-from .values import KINDS, SYSTEMS, Quantity, factor, quantity
+from .values import KINDS, Quantity, factor, quantity
 
 NAMES = ("speed", "angle", "spin")
 _HELP = dict(
@@ -56,14 +56,16 @@ def starts(args: argparse.Namespace, up: bool) -> Iterator[tuple[Landing | None,
         raise ns.OptionError(
             f"--input: expected instead of {', '.join('--' + n for n in NAMES)}, received both."
         )
-    columns, si, titles = read_columns(args.input, {name: KINDS[name] for name in NAMES})
-    absent = [name for name in NAMES if name not in columns]
+    table = read_columns(args.input, {name: KINDS[name] for name in NAMES})
+    absent = [name for name in NAMES if name not in table.values]
     if absent:
-        raise ns.OptionError(f"--input: expected columns {absent}, received {titles}.")
-    for row in zip(*(columns[name].tolist() for name in NAMES), strict=True):
-        sizes = [factor(name, SYSTEMS[args.units][name]) if si else 1.0 for name in NAMES]
-        values = zip(NAMES, row, sizes, strict=True)
-        typed = {name: Quantity(value / size, None, name) for name, value, size in values}
+        raise ns.OptionError(f"--input: expected columns {absent}, received {table.titles}.")
+    for row in zip(*(table.values[name].tolist() for name in NAMES), strict=True):
+        typed = {
+            name: Quantity(value / factor(name, unit) if unit else value, unit, name)
+            for name, value in zip(NAMES, row, strict=True)
+            for unit in [table.units[name]]
+        }
         try:
             yield _start(typed, args.units, up, ""), ""
         except ns.OptionError as error:

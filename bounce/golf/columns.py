@@ -36,11 +36,14 @@ class Columns(NamedTuple):
         Whether they have units.
     titles : list of str
         Of every column, as received.
+    units : dict of str to str or None
+        Of the columns that were asked for, as received.
     """
 
     values: dict[str, Array]
     si: bool
     titles: list[str]
+    units: dict[str, str | None]
 
 
 def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
@@ -96,7 +99,8 @@ def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
         raise DataError(f"data: expected columns of one length, received {lengths}.")
     if columns and not next(iter(lengths.values())):
         raise DataError("data: expected at least one row, received none.")
-    return Columns(columns, si, [str(title) for title, _ in table])
+    units = {name: unit for name, unit, _, _ in read}
+    return Columns(columns, si, [str(title) for title, _ in table], units)
 
 
 def _title(title: Any) -> tuple[str, str | None]:

@@ -107,7 +107,7 @@ def read_measurements(data: Any, ball: Ball = GOLF, *, bad_rows: str = "raise") 
     """
     if bad_rows not in ("raise", "leave out"):
         raise ns.OptionError(f"bad_rows: expected 'raise' or 'leave out', received {bad_rows!r}.")
-    columns, si, titles = read_columns(data, _KINDS)
+    columns, si, titles, _ = read_columns(data, _KINDS)
     _check_names(columns, titles)
     radius = ball.radius if si else 1.0
     landing, lift_off = _landing(columns, radius), _lift_off(columns, radius)

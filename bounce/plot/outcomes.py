@@ -31,14 +31,19 @@ COLOURS = {
     "S- R S-": style.BLUE,
     "S+ R S-": style.SKY,
     "S+ S-": "#0B3C5D",
+    # of the laws: slip throughout in the same colours, rolling at lift-off in those of its own side
+    "I+": "#F6C7A3",
+    "II+": style.GREEN,
+    "III+": style.SKY,
+    "III-": style.VERMILLION,
+    "II-": "#B7E4C7",
+    "I-": "#BCDDF5",
 }
 #: For other itineraries, in the order in which they occur.
 MORE = (
     style.PURPLE,
-    style.GREEN,
     "#999999",
     "#7A5195",
-    "#B7E4C7",
     "#5F5F5F",
     "#EBC4DB",
     "#00573F",
@@ -63,8 +68,9 @@ _LABELS = {
     "d2": r"$d_2$",
     "G": r"gravity $G$",
 }
-#: How many regions without room for their name are listed, the largest first.
-_LISTED = 16
+#: How many regions without room for their name are listed, the largest first; a few more have it beside
+#: them, but not where there are dozens.
+_LISTED, _BESIDE = 5, 8
 _QUANTITIES = ("itinerary", "slip", "omega", "spin_reversal", "lift_off_angle")
 
 
@@ -143,16 +149,23 @@ def _regions(ax: Axes, outcomes: OutcomeMap) -> None:
     ax.pcolormesh(
         *_axes(outcomes), outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits
     )
-    narrow: list[tuple[int, Patch]] = []
+    narrow: list[tuple[int, Patch, NDArray[np.bool_]]] = []
     for code, (name, colour) in enumerate(zip(outcomes.regions, colours, strict=True)):
         inside = outcomes.code == code
         if not _named(ax, outcomes, inside, name, colour):
             patch = Patch(facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name))
-            narrow.append((int(inside.sum()), patch))
+            narrow.append((int(inside.sum()), patch, inside))
+    narrow.sort(key=lambda entry: -entry[0])
     if narrow:
-        handles = [patch for _, patch in sorted(narrow, key=lambda pair: -pair[0])[:_LISTED]]
-        if len(narrow) > _LISTED:
-            handles.append(Patch(alpha=0, label=f"and {len(narrow) - _LISTED} more"))
+        handles = [patch for _, patch, _ in narrow[:_LISTED]]
+        rest = narrow[_LISTED:]
+        if len(rest) > _BESIDE:
+            handles.append(Patch(alpha=0, label=f"and {len(rest)} more"))
+            rest = []
+        labels, (x, y) = ns.plot.labels.Labels(ax), _axes(outcomes)
+        for _, patch, inside in rest:
+            row, column = np.nonzero(inside)
+            labels.name(str(patch.get_label()), np.column_stack([x[column], y[row]]))
         ax.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
             frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,

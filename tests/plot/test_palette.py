@@ -122,3 +122,9 @@ def test_fonts_are_true_type_whatever_the_settings(name, kind, tmp_path):
     fonts = {"pdf": (b"/Type3", b"/CIDFontType2"), "ps": (b"/FontType 3", b"/FontType 42")}
     unwanted, wanted = fonts[kind]
     assert unwanted not in content and wanted in content
+
+
+@pytest.mark.parametrize("eye", [np.eye(3), DEUTERANOPIA], ids=["most", "deuteranopia"])
+def test_neighbours_on_a_map_of_a_law_are_told_apart(eye):
+    ring = ["I+", "II+", "III+", "III-", "II-", "I-"]
+    assert all(apart(COLOURS[a], COLOURS[b], eye) > 15.0 for a, b in pairwise(ring))

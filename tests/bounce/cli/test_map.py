@@ -87,3 +87,35 @@ def test_inputs_are_echoed(command, tmp_path):
     speed = report["inputs"]["over"][0]
     assert speed == dict(name="speed", low=40.0, high=70.0, points=4, unit="mph")
     assert report["version"] and report["command"] == "map"
+
+
+@pytest.mark.parametrize("turf", [*bounce.laws.TURFS, None])
+def test_the_default_landings_show_several_kinds_of_bounce(command, tmp_path, turf):
+    ground = [*KV, "--stiffness", "2e4"] if turf is None else ["--turf", turf]
+    shares = json.loads(command("map", *ground, "--json", "--output", tmp_path / "map.npz")[1])[
+        "share"
+    ]
+    assert sum(share > 0.005 for share in shares.values()) >= 3
+    assert max(shares.values()) < 0.85
+
+
+def test_a_kind_of_bounce_has_one_colour_on_every_map(command, tmp_path, monkeypatch):
+    drawn = []
+
+    def keep(result, quantity, curve=None):
+        drawn.append((result.regions, draw(result, quantity, curve=curve)))
+        return drawn[-1][1]
+
+    draw = bounce.plot.outcome_map
+    monkeypatch.setattr(bounce.plot, "outcome_map", keep)
+    for over in (["angle=5:75:40", "spin=-9000:9000:40"], ["angle=30:75:40", "spin=2000:9000:40"]):
+        both = [word for text in over for word in ("--over", text)]
+        argv = ["map", "--turf", "natural-rigid", *both, "--output", tmp_path / "map.png"]
+        assert command(*argv)[0] == 0
+    colours = [
+        dict(zip(names, figure.axes[0].collections[0].cmap.colors[1:], strict=True))
+        for names, figure in drawn
+    ]
+    shared = {*colours[0]} & {*colours[1]}
+    assert shared and {*colours[0]} != {*colours[1]}
+    assert all(colours[0][name] == colours[1][name] for name in shared)

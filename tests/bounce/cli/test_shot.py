@@ -153,3 +153,21 @@ def test_a_table_without_units_has_those_of_the_system(command, tmp_path):
     assert float(rows[0]["run_run_out [m]"]) == pytest.approx(RUN_OUT, rel=1e-4)
     rows = list(csv.DictReader(io.StringIO(command("shot", "--input", path, "--units", "us")[1])))
     assert float(rows[0]["landing_speed [mph]"]) == pytest.approx(28.5)
+
+
+@pytest.mark.parametrize(
+    ("titles", "row", "said"),
+    [
+        ("speed [mph],angle [deg],spin [rpm]", "-64,37,2000", "received -64 mph"),
+        ("speed [km/h],angle [rad],spin [rad/s]", "103,2,200", "at most pi/2 rad, received 2 rad"),
+        ("speed [m/s],angle [deg],spin [rpm]", "0,37,2000", "received 0 m/s"),
+        ("speed,angle,spin", "-64,37,2000", "received -64 mph"),  # of --units us
+    ],
+)
+def test_what_is_wrong_with_a_row_is_said_in_the_units_of_its_columns(
+    command, tmp_path, titles, row, said
+):
+    path = tmp_path / "wrong.csv"
+    path.write_text(f"{titles}\n{row}\n", encoding="utf-8")
+    (found,) = csv.DictReader(io.StringIO(command("shot", "--input", path, "--units", "us")[1]))
+    assert said in found["error"]

@@ -168,10 +168,10 @@ return {...map, code: [...map.code], curve: Maps.curve(map), rooms: Maps.rooms(m
 def test_map_is_that_of_python(browser, page, load):
     model = TURF.replace(eta=0.8, G=0.15, load=load)
     browser.open(page)
-    got = browser.run(MAP, surface_of(model), -1.0, [3, 6], 40, 1e-3)
+    got = browser.run(MAP, surface_of(model), -1.0, [3, 6], 24, 1e-3)
     over = {"xdot": got["xdot"], "omega": got["omega"]}
     wanted = bounce.outcome_map(model, over, tol=1e-11)
-    names = np.array([*got["regions"], ""])[np.array(got["code"]).reshape(40, 40)]
+    names = np.array([*got["regions"], ""])[np.array(got["code"]).reshape(24, 24)]
     assert np.array_equal(names, np.array([*wanted.regions, ""])[wanted.code])
     for entry in got["shares"]:
         assert entry["share"] == pytest.approx(wanted.share()[entry["name"]])

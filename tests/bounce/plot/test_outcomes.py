@@ -3,6 +3,7 @@
 import matplotlib.colors
 import numpy as np
 import pytest
+from matplotlib.text import Text
 
 import bounce
 import nonsmooth as ns
@@ -24,14 +25,14 @@ def test_regions_are_named_on_the_picture(outcomes):
     assert axes.get_xlim() == (-2, 2) and axes.get_ylim() == (-4, 4)
 
 
-def test_narrow_regions_are_in_the_legend():
+def test_narrow_regions_are_in_the_legend_or_beside_their_names():
     over = dict(eta=np.linspace(0.05, 3, 60), omega=np.linspace(-2, 3, 60))
     m = bounce.outcome_map(TURF, over, fixed=dict(xdot=0.5))
     axes = bounce.plot.outcome_map(m).axes[0]
     legend = axes.get_legend()
     assert legend is not None
-    names = [t.get_text() for t in axes.texts] + [t.get_text() for t in legend.get_texts()]
-    assert sorted(names) == sorted(m.regions)
+    names = {t.get_text() for t in axes.findobj(Text)}
+    assert set(m.regions) <= names and len(legend.get_texts()) <= 6
 
 
 @pytest.mark.parametrize("quantity", ["slip", "spin_reversal", "lift_off_angle"])
@@ -83,6 +84,6 @@ def test_a_legend_of_dozens_of_regions_is_short():
     legend = bounce.plot.outcome_map(outcomes).axes[0].get_legend()
     names = [text.get_text() for text in legend.get_texts()]
     assert len(outcomes.regions) > 40
-    assert len(names) <= 17
+    assert len(names) == 6
     assert names[-1].endswith("more")
     assert max(map(len, names)) < 30

@@ -126,7 +126,7 @@ def _hits(system: FilippovSystem, section: Section, t_start: float) -> Hits:
         kinds, names = KINDS_OF_SECTIONS, (name,)
         if section.direction:
             letter = surfaces.index(name), "+" if section.direction < 0 else "-"
-    elif section.direction:
+    elif section.direction and (owners or name in KINDS_OF_SECTIONS):
         raise OptionError(
             f"direction: expected 0 for {name!r}, received {section.direction}. Only surfaces are "
             "chosen by direction here; give a stop or a reset its own."

@@ -5,7 +5,10 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
+from .checks import is_real
+from .errors import OptionError, explain
 from .evaluators import Evaluator
+from .periods import read_period
 from .system import FilippovSystem
 from .values import Array
 
@@ -24,10 +27,25 @@ class Forcing:
     ----------
     expression : SX
     found : bool
+
+    Raises
+    ------
+    OptionError
+        Neither a number nor an expression in the parameters.
     """
 
     def __init__(self, system: FilippovSystem, period: ca.SX | float, found: bool = False):
         self.found = found
+        if not is_real(period) and read_period(system, period) is None:
+            raise OptionError(
+                explain(
+                    "period",
+                    expected="a number, or an expression in the parameters "
+                    f"{list(system.parameter_names)}",
+                    received=repr(period),
+                    advice="Give period=2*pi/w.",
+                )
+            )
         self.expression = ca.SX(period)
         p = system.parameter_symbols
         outputs = [ca.densify(e) for e in (self.expression, ca.jacobian(self.expression, p))]

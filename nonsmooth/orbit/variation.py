@@ -10,7 +10,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -22,7 +22,7 @@ from ..model import Array, ConvergenceError
 from .collocation import collocated
 from .flight import Flight, Flights
 from .guards import described, watch
-from .legs import Flown, Stretch, fly, stretches
+from .legs import Flown, Leg, Stretch, fly, stretches
 from .saltation import Saltation, saltation, saltations
 
 
@@ -89,7 +89,12 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
         )
     except ConvergenceError:
         return _one_by_one(run, parts, p, chosen)
-    return _together(parts, flight)
+    found = _together(parts, flight)
+    if parts[-1].leg.name and run.events[-1].kind == "end":  # the run ends at the very event
+        last = found[-1]
+        jump = saltation_after(run, last.stretch, last.flown, None, p)
+        found[-1] = replace(last, event=jump)
+    return found
 
 
 def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
@@ -149,6 +154,8 @@ def saltation_after(
 ) -> Saltation | None:
     """What the event that ends a leg does to neighbours; None where a time ends it.
 
+    At the end of a run that goes no further the field after it is that of the mode reached.
+
     Raises
     ------
     DegenerateError
@@ -158,10 +165,12 @@ def saltation_after(
         return None
     system, n = run.system, len(part.start)
     at = part.leg.at_end(system, flown.end, p)
-    if part.leg.kind == "stop" or following is None:
+    ends = run.events[-1]
+    leg = following.leg if following else Leg(ends.mode_before) if ends.kind == "end" else None
+    if part.leg.kind == "stop" or leg is None:
         after = at.after_state @ flown.rate
     else:
-        field = following.leg.field(system)
+        field = leg.field(system)
         start = field.states_at(at.after, p)
         after = field.rate.copied(start, p)[0][:n, 0]
         if not np.all(np.isfinite(after)):

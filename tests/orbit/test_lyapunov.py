@@ -127,3 +127,17 @@ def test_interruption_keeps_what_was_counted(monkeypatch):
     found = ns.lyapunov_spectrum(system, [1.0, 0.0], t_end=200.0, transient=40.0, k=2)
     assert not found.complete and 10.0 <= found.t < 160.0 and "interrupted" in repr(found)
     assert np.allclose(np.sort(found.exponents), [-math.log(2), 0.0], atol=1e-9)
+
+
+def test_a_run_that_ends_at_an_event_loses_no_direction():
+    """Chebyshev's map at each tick of a clock: ln 2, and 0 of the clock, whose last tick is the end."""
+    x, c = ca.SX.sym("x"), ca.SX.sym("c")
+    clocked = ns.FilippovSystem(
+        [x, c], field=[0 * x, 1], resets=ns.Reset(c - 1, [2 * x**2 - 1, 0], 1, "tick")
+    )
+    found = ns.lyapunov_spectrum(clocked, [0.3, 0.0], t_end=800.0)
+    assert found.exponents == pytest.approx([np.log(2), 0.0], abs=0.02)
+    run = ns.simulate(clocked, [0.3, 0.0], 2.0)
+    slope = ns.sensitivity(run, wrt="x0").dx_dx0
+    value = 2 * 0.3**2 - 1
+    assert np.abs(slope - [[4 * value * 4 * 0.3, 0], [0, 1]]).max() < 1e-12

@@ -23,6 +23,11 @@ X, Y = ca.SX.sym("x"), ca.SX.sym("y")
             "the same again, received 3.3, after which it differs by",
         ),
         (
+            lambda: (forced_friction(), [1.5, 0.0], {"period": "x"}),
+            ns.OptionError,
+            r"a number, or an expression in the parameters \['f', 'W'\], received 'x'",
+        ),
+        (
             lambda: (walker(), [0.2, -0.2, 0.4, -0.0158], {"itinerary": [("", "toe")]}),
             ns.OptionError,
             r"an event among \['heelstrike'\] .* received 'toe'",
@@ -59,3 +64,8 @@ def test_a_guess_from_which_trial_steps_overflow_is_no_reason_to_give_up() -> No
     near = ns.periodic_orbit(stick_slip(), [1.0, 0.5], itinerary="- s")
     far = ns.periodic_orbit(stick_slip(), [1e9, 0.5], itinerary="- s")
     assert far.period == pytest.approx(near.period, rel=1e-12)
+
+
+def test_a_section_that_is_unknown_is_named_with_those_that_are_known() -> None:
+    with pytest.raises(ns.OptionError, match=r"a name of \['h0'\] .* received 'h7'"):
+        ns.poincare(forced_friction(), "h7", [1.0, 0.0], count=3)

@@ -20,6 +20,7 @@ from . import (
     report,
     resources,
     short_runs,
+    space,
     startup,
     theorems,
     two_folds,
@@ -35,6 +36,7 @@ def sections(folder: Path, quick: bool) -> dict[str, Callable[[], Any]]:
     return {
         "peak": resources.peak,
         "bounces": lambda: {name: bounces.run(name, folder, quick) for name in BOUNCES},
+        space.NAME: lambda: space.run(quick),
         "long runs": lambda: long_runs.run(quick),
         "elsewhere": lambda: elsewhere.run(quick),
         "chain": lambda: chain.run(quick),

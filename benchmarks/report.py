@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from . import orbits, theorems
+from . import orbits, space, theorems
 
 #: What the project asks of itself, and whether more or less is better.
 TARGETS = {
@@ -36,7 +36,7 @@ TARGETS = {
     "proof: a linear bounce (s)": (0.05, "at most"),
     "proof: all 100 two-folds of a box (s)": (10.0, "at most"),
     "wrong or missing theorems": (0, "at most"),
-    **orbits.TARGETS,
+    **{**orbits.TARGETS, **space.TARGETS},
     "wrong itineraries, random starts": (0, "at most"),
     "wrong itineraries, within 1e-9 of a boundary": (0, "at most"),
 }
@@ -75,7 +75,7 @@ def figures(results: dict[str, Any]) -> dict[str, float]:
         found["a new system: 40 pendulums (s)"] = short["40 pendulums"]["low"]
     if "theorems" in results:
         found["wrong or missing theorems"] = theorems.wrong(results["theorems"])
-    found |= orbits.figures(results.get("orbits", {}))
+    found |= orbits.figures(results.get("orbits", {})) | space.figures(results)
     return found | _startup(results) | _itineraries(results)
 
 
@@ -323,6 +323,7 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "proofs": _proofs,
     "theorems": theorems.markdown,
     "orbits": lambda section: orbits.markdown(section, table),
+    space.NAME: lambda section: space.markdown(section, table),
     "correctness": _correct,
 }
 

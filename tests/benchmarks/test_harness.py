@@ -10,6 +10,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
+import bounce
 import nonsmooth as ns
 from benchmarks import (
     bounces,
@@ -22,6 +23,7 @@ from benchmarks import (
     proofs,
     reference,
     report,
+    space,
     theorems,
     two_folds,
 )
@@ -212,4 +214,26 @@ def test_figures_of_orbits_are_ratios_of_medians():
     assert set(found) <= set(orbits.TARGETS)
     assert "| W1 | scipy DOP853, every state, 1e-13 | 200 |" in orbits.markdown(
         section, report.table
+    )
+
+
+def test_bounces_in_space_are_those_of_the_library_and_their_parts_are_told():
+    x = space.starts(5)
+    many = ns.ensemble(space.system("linear"), x, problems.T_MAX, tol=1e-11)
+    v, w = x[:, [1, 3]], x[:, 6:] - x[:, [1, 3]]
+    same = bounce.lift_off(space.TURF.in_3d(), v, -1.0, w, tol=1e-11)
+    assert np.abs(many.x[:, [1, 3]] - same.xdot).max() < 1e-10
+    assert many.itinerary.tolist() == same.itinerary.tolist()
+    rates = {
+        f"{name}, in 3-D": {"rate": r, "median": r}
+        for name, r in (("linear", 30.0), ("nonlinear", 20.0))
+    }
+    section = {
+        "rates": {**rates, space.PLANE: {"rate": 100.0, "median": 90.0}},
+        "errors": {"linear": 1e-11},
+    }
+    found = report.figures({space.NAME: section})
+    assert found["linear bounce in 3-D: part of the nonlinear planar rate"] == 0.3
+    assert "| nonlinear, in 3-D | 20 | 20 | 0.20 |" in report.markdown(
+        {space.NAME: section, "machine": {}}
     )

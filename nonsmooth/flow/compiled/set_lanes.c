@@ -329,7 +329,8 @@ static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear)
   I close = bend <= REACHED * radius;
   UNROLL for (int i = 0; i < N; i++) {
     T allowed = EPSILON * (w->size + ABS(s->x[i]));
-    if (i < ND) allowed += REACHED * SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i]));
+    T whole = i < ND ? SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i])) : BC(0);
+    allowed += SELECT(isotropic, whole, REACHED * whole);
     close &= (turn[i] + ABS(field[i] - other[i])) * dt <= allowed;
   }
   met &= close | floor;

@@ -139,7 +139,9 @@ class _Writer:
                 known = expansion.again(k, [*now, *u], late)
             stops.append(known[2])
             fields.append(known[0])
-            self._next(jet, self._stretched(fields), k)
+            if k < self.order:
+                for row, value in zip(jet, self._stretched(fields), strict=True):
+                    row.append(value)
         last = range(self.order - 1, self.order + 1)  # of the direction, and of h
         ends = [row[k] for row in [*direction.u, *direction.own] for k in last]
         return dict(
@@ -221,16 +223,14 @@ class _Writer:
         )  # fmt: skip
 
     def _stretched(self, fields: Sequence[Sequence[Coefficient]]) -> list[Coefficient]:
-        """The last coefficients of (1 - w s/3)^2 times the field."""
-        w = self.stretch
+        """The next coefficients of states, from those of (1 - w s/3)^2 times the field: what is known
+        early stands apart from the last, which everything waits for."""
+        w, per = self.stretch, 1.0 / len(fields)
+        weights = (1.0, w * (-2 / 3), w * w * (1 / 9))
         result = []
-        for row in zip(*fields[-3:], strict=True):
-            total = value_of(row[-1])
-            if len(row) > 1:
-                total += (w * (-2 / 3)) * value_of(row[-2])
-            if len(row) > 2:
-                total += (w * w * (1 / 9)) * value_of(row[-3])
-            result.append(clean(total))
+        for row in zip(*reversed(fields[-3:]), strict=True):
+            terms = [per * (weights[i] * value_of(c)) for i, c in enumerate(row) if c is not None]
+            result.append(clean(sum(terms[1:], terms[0])) if terms else None)
         return result
 
     def _begin(self) -> list[list[Coefficient]]:

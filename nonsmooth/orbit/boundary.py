@@ -350,17 +350,13 @@ class BoundaryProblem:
                 for part in (0.2, 0.4, 0.6, 0.8)
             ]
             seen = np.vstack([starts, *inside])
-        size = np.abs(seen).max(axis=0)
-        states = size[: self.system.dimension]  # the time has units of its own
-        largest = max(float(states.max()), 1e-300)
+        size, n = np.abs(seen).max(axis=0).tolist(), self.system.dimension
+        largest = max(*size[:n], 1e-300)  # the time has units of its own
         if self.system.time_dependent and largest < 1e-9 * span:  # all legs begin at zero
             largest = span
-        states[~(states > 1e-6 * largest)] = largest
-        size[self.system.dimension :] = span
-        result = np.empty(self.size)
-        result[: starts.size].reshape(starts.shape)[:] = size
-        result[starts.size :] = span
-        return result
+        size = [part if part > 1e-6 * largest else largest for part in size[:n]]
+        count, more = len(self.legs), [span] * (self.dimension - n)
+        return np.array((size + more) * count + [span] * count)
 
 
 #: Legs of a problem ready to be flown, by the chosen parameters.

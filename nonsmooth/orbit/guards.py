@@ -94,8 +94,11 @@ def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
         return []
     guards = field.motion.guards
     seen: list[list[tuple[float, float, float]]] = [[] for _ in guards]  # time, value, scale
+    positive = {k for k, _, value in rows[:, :3].tolist() if value > 0.0}
     for row in rows:
         k, (t, value), scale = int(row[0]), row[1:3].tolist(), 0.0
+        if k not in positive and guards[k].kind in ("stop", "reset", "zero"):
+            continue  # no change of sign
         if value < 0.0 and guards[k].kind not in ("stop", "reset"):
             slope = np.abs(field.gradients.copied(row[4:], p)[0][k])
             scale = float(slope @ np.abs(row[4:])) + math.sqrt(float(slope @ slope)) * 1e-3

@@ -86,7 +86,7 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
     """
     n = problem.dimension
     reduced = _condensed(problem, at, p)
-    nontrivial = np.linalg.eigvals(reduced) if reduced.size else np.zeros(0)
+    nontrivial = np.linalg.eigvals(reduced) if len(reduced) > 1 else reduced.ravel()
     zeros = n - 1 - nontrivial.size
     of_map = values = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
     if problem.symmetry is not None:
@@ -95,6 +95,8 @@ def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multip
 
 
 def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
+    if len(values) < 2:
+        return values.astype(complex)
     order = np.lexsort((values.imag, -np.abs(values).round(14)))
     return np.asarray(values[order], complex)
 

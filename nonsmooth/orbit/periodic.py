@@ -127,7 +127,7 @@ class PeriodicOrbit:
     @cached_property
     def parameter_vector(self) -> Array:
         """Values of all parameters."""
-        return self.system.parameter_vector(self.parameters)
+        return np.array([self.parameters[name] for name in self.system.parameter_names])
 
     @property
     def is_virtual(self) -> bool:

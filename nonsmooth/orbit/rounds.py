@@ -27,7 +27,7 @@ def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
     count, n = len(problem.legs), problem.system.dimension
     if not problem.legs[-1].name:
         return _leg_once(problem, starts[0], float(durations[0]), p)
-    size = problem.scales(u)[:n]
+    size = problem.scales(u)[:n] if count > 1 else np.ones(n)
     for k in range(1, count // 2 + 1):
         if count % k or (problem.symmetry is not None and count // k % 2 == 0):
             continue

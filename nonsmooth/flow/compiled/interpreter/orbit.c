@@ -203,7 +203,7 @@ static int plain_residual(const Shooting *w, int is_exact) {
 static int64_t orbit_converges(const Shooting *w) {
   const Demands *d = w->d;
   int64_t count = w->o->legs->count;
-  double last = INFINITY, size, most = 1e-2;
+  double last = INFINITY, size, most = 0.1;
   for (int64_t iteration = 1; iteration <= d->most; iteration++) {
     double longest = 0, least = 0;
     for (int64_t i = w->size - count; i < w->size; i++) {
@@ -212,7 +212,7 @@ static int64_t orbit_converges(const Shooting *w) {
     }
     if (!(larger(-least, longest) <= d->longest)) return 0;
     /* after a step of this size the next one is its square, and what it leaves its fourth power */
-    if (!fly_orbit(w, smaller(larger(1e-3 * pow(most, 4), d->finest), d->coarse))) return 0;
+    if (!fly_orbit(w, smaller(larger(0.1 * pow(most, 4), d->finest), d->coarse))) return 0;
     orbit_equations(w);
     if (!factor_orbit(w)) return 0;
     size = orbit_step(w, &most);

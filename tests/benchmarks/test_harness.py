@@ -210,6 +210,7 @@ def test_figures_of_orbits_are_ratios_of_medians():
     }
     found = orbits.figures(section)
     assert found["orbit W1: times scipy, every state"] == pytest.approx(200)
+    assert found["orbit W1: times scipy, every state, fastest turns"] == pytest.approx(100)
     assert found["branch of four legs: points a second"] == pytest.approx(150)
     assert set(found) <= set(orbits.TARGETS)
     assert "| W1 | scipy DOP853, every state, 1e-13 | 200 |" in orbits.markdown(

@@ -16,7 +16,7 @@ import numpy as np
 from ..model import Array, Evaluator, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .boundary import BoundaryProblem, Evaluation
-from .guards import Approach, watch
+from .guards import Approach, near_and_first, watch
 from .legs import Leg
 from .multipliers import return_map
 
@@ -59,13 +59,14 @@ def conditions_of(
 ) -> dict[str, float]:
     """All tests of an orbit; what they are about is added to ``known``."""
     found: dict[str, float] = {}
-    for i, leg in enumerate(problem.legs):
-        before = problem.legs[i - 1]
+    system, legs = problem.system, problem.legs
+    seen = near_and_first(system, legs, at.starts, at.durations, p)
+    for i, (leg, (approaches, first)) in enumerate(zip(legs, seen, strict=True)):
         rows = [
             (Condition("duration", i), float(at.durations[i])),
-            *_at_start(problem.system, i, leg, before, at.starts[i], p),
+            *_at_start(system, i, leg, legs[i - 1], first),
             *_at_end(problem, i, at, p),
-            *_interior(problem.system, i, leg, at.starts[i], float(at.durations[i]), p),
+            *_interior(i, approaches),
         ]
         for test, value in rows:
             known.setdefault(test.name, test)
@@ -90,8 +91,10 @@ def condition_row(
 
     def value(x: Array, q: Array) -> float:
         if condition.what == "start":
-            before = problem.legs[i - 1]
-            rows = _at_start(problem.system, i, problem.legs[i], before, x, q)
+            leg, before = problem.legs[i], problem.legs[i - 1]
+            y = variational_field(problem.system, leg.mode).states_at(x, q)
+            first = guarded_field(problem.system, leg.mode).starts.copied(y, q)[1]
+            rows = _at_start(problem.system, i, leg, before, first)
             return dict((test.name, v) for test, v in rows).get(condition.name, np.nan)
         values = minima(problem.system, problem.legs[i], condition, x, duration, q)
         return min(values, key=abs, default=np.nan)  # the one that touches, not the least
@@ -126,17 +129,14 @@ def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
 
 
 def _at_start(
-    system: FilippovSystem, i: int, leg: Leg, before: Leg, x: Array, p: Array
+    system: FilippovSystem, i: int, leg: Leg, before: Leg, first: Array
 ) -> list[tuple[Condition, float]]:
-    """First Taylor coefficient, at the start of a leg, of each guard that is not zero by construction."""
+    """First Taylor coefficient, at the start of a leg, of each guard that is not zero by construction,
+    of those to order 3."""
     field = guarded_field(system, leg.mode)
     orders = [_order(system, guard, before) for guard in field.motion.guards]
-    if all(order is None for order in orders):
-        return []
-    y = variational_field(system, leg.mode).states_at(x, p)
-    rows = field.jets(y, p)[1]
     return [
-        (Condition("start", i, guard), float(rows[k, order]))
+        (Condition("start", i, guard), float(first[k, order]))
         for k, (guard, order) in enumerate(zip(field.motion.guards, orders, strict=True))
         if order is not None
     ]
@@ -194,14 +194,10 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
     return system.cached(("guard values", mode), lambda: Evaluator(motion.value_function()))
 
 
-def _interior(
-    system: FilippovSystem, i: int, leg: Leg, x: Array, duration: float, p: Array
-) -> list[tuple[Condition, float]]:
+def _interior(i: int, approaches: list[Approach]) -> list[tuple[Condition, float]]:
     """Smallest minimum of each guard inside a leg."""
-    if duration <= 0.0:
-        return []
     least: dict[Guard, float] = {}
-    for near in watch(system, leg.mode, x, duration, p).approaches:
+    for near in approaches:
         value = _signed(near)
         least[near.guard] = min(value, least.get(near.guard, np.inf))
     return [(Condition("interior", i, guard), value) for guard, value in least.items()]

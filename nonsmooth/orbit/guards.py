@@ -75,17 +75,43 @@ def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array
     p : ndarray
     """
     field = guarded_field(system, mode)
-    guards = field.motion.guards
     y = variational_field(system, mode).states_at(x, p)
-    rows, approaches = watched(field, y, p, duration, _ENDS * duration), list[Approach]()
+    rows = watched(field, y, p, duration, _ENDS * duration)
+    return Watch(_approaches(field, rows, p), _faults_seen(field, rows, p))
+
+
+def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
+    """Extrema at which guards come near to zero."""
+    guards, found = field.motion.guards, list[Approach]()
     for row in rows:
         guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
         if bend and (bend > 0.0 or guard.kind in ("stop", "reset")):
             slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
             size = math.sqrt(float(slope @ slope))
             if size > 0.0:
-                approaches.append(Approach(guard, t, value, value / size))
-    return Watch(approaches, _faults_seen(field, rows, p))
+                found.append(Approach(guard, t, value, value / size))
+    return found
+
+
+def near_and_first(
+    system: FilippovSystem, legs: Sequence[Leg], starts: Array, durations: Array, p: Array
+) -> list[tuple[list[Approach], Array]]:
+    """Of each leg: approaches of guards inside it, and first coefficients (g, 4) of the guards at its start.
+
+    Legs of no positive duration have no inside.
+    """
+    fields = [guarded_field(system, leg.mode) for leg in legs]
+    rows, begins = watched_legs(fields, _states(system, legs, starts, p), p, durations, _ENDS)
+    return [
+        (_approaches(field, own, p), begin[len(begin) - len(field.motion.guards) :])
+        for field, own, begin in zip(fields, rows, begins, strict=True)
+    ]
+
+
+def _states(system: FilippovSystem, legs: Sequence[Leg], starts: Array, p: Array) -> list[Array]:
+    """Starts of legs with the multipliers that are states."""
+    plain = [variational_field(system, leg.mode) for leg in legs]
+    return [field.states_at(x, p) for field, x in zip(plain, starts, strict=True)]
 
 
 def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
@@ -218,9 +244,7 @@ def faults_along(
         Whether the first leg follows the last one as it is.
     """
     fields = [guarded_field(system, leg.mode) for leg in legs]
-    plain = [variational_field(system, leg.mode) for leg in legs]
-    states = [field.states_at(x, p) for field, x in zip(plain, starts, strict=True)]
-    rows, begins = watched_legs(fields, states, p, durations, _ENDS)
+    rows, begins = watched_legs(fields, _states(system, legs, starts, p), p, durations, _ENDS)
     result, count = list[str](), len(legs)
     for i, leg in enumerate(legs):
         if durations[i] <= 0.0:

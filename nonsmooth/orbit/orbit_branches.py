@@ -80,7 +80,7 @@ class OrbitCurve(BranchCurve):
         self.scale = np.append(problem.scales(u, p), widths)
         self.known: dict[str, Condition] = {}
         self._many = problem.size > _MANY and applies(problem)
-        self._last: tuple[bytes, Evaluation] | None = None
+        self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
 
     # equations ----------------------------------------------------------------------------------
 
@@ -102,10 +102,11 @@ class OrbitCurve(BranchCurve):
     def evaluation(self, u: Array) -> Evaluation:
         """The equations at a point, computed once."""
         key = u.tobytes()
-        if self._last is None or self._last[0] != key:
+        if key not in self._found:
             p, unknowns = self.parameters_at(u), u[: self.problem.size]
-            self._last = key, self.problem.evaluate(unknowns, p, self.free)
-        return self._last[1]
+            self._found.pop(self._last, None)
+            self._found[key], self._last = self.problem.evaluate(unknowns, p, self.free), key
+        return self._found[key]
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         at = self.evaluation(u)
@@ -122,7 +123,7 @@ class OrbitCurve(BranchCurve):
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
     def tests(self, point: Point) -> Mapping[str, float]:
-        at, p = self.evaluation(point.u), self.parameters_at(point.u)
+        at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""
         found = conditions_of(self.problem, at, p, self.known)
         if self._on_plane:  # the flow across the plane on which the orbit starts
             assert self.problem.phase is not None
@@ -130,8 +131,9 @@ class OrbitCurve(BranchCurve):
         return found
 
     def restart(self, u: Array) -> None:
-        self.problem = self.problem.rephased(u[: self.problem.size], self.parameters_at(u))
-        self._last = None
+        problem = self.problem.rephased(u[: self.problem.size], self.parameters_at(u))
+        if problem is not self.problem:
+            self.problem, self._found = problem, {}
 
     @property
     def _on_plane(self) -> bool:
@@ -175,9 +177,8 @@ class OrbitCurve(BranchCurve):
     def solution_at(self, guess: Array, value: float) -> PeriodicOrbit:
         """The orbit near a guess at a value of the parameter."""
         curve = copy(self)
-        unknowns = guess[: self.problem.size]
-        curve.problem = self.problem.rephased(unknowns, self.parameters_at(guess))
-        curve._last = None
+        curve._found = {}
+        curve.restart(guess)
         found = BranchCurve.solution_at(curve, guess, value)
         assert isinstance(found, PeriodicOrbit)
         p = found.parameter_vector
@@ -211,9 +212,8 @@ class OrbitCurve(BranchCurve):
     def describe(self, u: Array) -> PeriodicOrbit:
         p, unknowns = self.parameters_at(u), np.array(u[: self.problem.size])
         problem = self.problem.rephased(unknowns, p)
-        at = self.evaluation(u)
-        if problem is not self.problem:
-            at = problem.evaluate(unknowns, p, self.free)
+        same = problem is self.problem
+        at = self.evaluation(u) if same else problem.evaluate(unknowns, p, self.free)
         return PeriodicOrbit(self.system, named(self.system, p), problem, unknowns, at, 0)
 
     def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:

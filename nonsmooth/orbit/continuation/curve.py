@@ -137,6 +137,7 @@ class Curve:
         Parameters
         ----------
         zero : Zero
+            Of one of the tests, located on the curve.
         """
         return self.ends(zero.name)
 

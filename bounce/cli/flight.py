@@ -5,11 +5,20 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..golf import AIRS, Flight, Run, flight
+from ..golf import AIRS, Flight, Run, SideFlight, SideRun, flight
 from ..units import Landing
 from .choices import Chosen, chosen_model, ground_arguments, require_scale
 from .report import Units, in_words, opening, polar, print_json, tabulate
 from .shot import UNVALIDATED, run_arguments, run_lines, run_report, to_rest
+from .side import (
+    asked_for_side,
+    side_arguments,
+    side_carry,
+    side_run_lines,
+    side_run_report,
+    side_to_rest,
+    sideways,
+)
 from .starts import start_arguments, starts
 
 HELP = "a launch: carry and landing, and with a ground the run until rest"
@@ -24,18 +33,26 @@ def arguments(parser: argparse.ArgumentParser) -> None:
     )
     ground_arguments(parser, turf=None)
     run_arguments(parser)
+    side_arguments(parser, launched=True)
 
 
 def run(args: argparse.Namespace) -> int:
     """Fly the ball, and print where it lands and comes to rest."""
     chosen = chosen_model(args)
     require_scale(args, chosen)
+    side = asked_for_side(args)
     if args.input is not None:
-        return tabulate(
-            args, starts(args, up=True), lambda launch: _report(*_fly(args, chosen, launch))
-        )
+
+        def report_on(launch: Landing) -> dict[str, Any]:
+            if side:
+                return _side_report(launch, *_fly_aside(args, chosen, launch))
+            return _report(*_fly(args, chosen, launch))
+
+        return tabulate(args, starts(args, up=True), report_on)
     ((launch, _),) = starts(args, up=True)
     assert launch is not None
+    if side:
+        return _print_side(args, chosen, launch)
     units, (path, rest) = Units(args.units), _fly(args, chosen, launch)
     if args.json:
         print_json({**opening(args), "units": units.names, **units.report(_report(path, rest))})
@@ -69,5 +86,57 @@ def _report(path: Flight, rest: Run | None) -> dict[str, Any]:
     if rest is not None:
         report |= dict(
             run=run_report(rest), total=path.range + rest.run_out, cautions=list(rest.cautions)
+        )
+    return report
+
+
+def _print_side(args: argparse.Namespace, chosen: Chosen, launch: Landing) -> int:
+    """Fly a ball with side spin, and print where it lands and comes to rest."""
+    units, (path, rest) = Units(args.units), _fly_aside(args, chosen, launch)
+    if args.json:
+        report = units.report(_side_report(launch, path, rest))
+        print_json({**opening(args), "units": units.names, **report})
+        return 0
+    heading = units.say("angle", abs(path.landing.heading), 1)
+    print(
+        f"carry     {units.say('length', path.range)}, {sideways(path.side, units)}, in {path.time:.2f} s, "
+        f"{units.say('height', path.height)} high\n"
+        f"landing   {in_words(path.landing.in_plane, units)}, heading {heading} to the "
+        f"{'left' if path.landing.heading < 0 else 'right'}"
+    )
+    if rest is not None:
+        print("\n".join(side_run_lines(rest, units)))
+        print(
+            f"total     {units.say('length', path.range + float(rest.rest[0]))}, "
+            f"{sideways(path.side + float(rest.rest[1]), units)}"
+        )
+    return 0
+
+
+def _fly_aside(
+    args: argparse.Namespace, chosen: Chosen, launch: Landing
+) -> tuple[SideFlight, SideRun | None]:
+    path = side_carry(args, chosen, launch)
+    to_ground = args.turf is not None or args.model is not None
+    return path, side_to_rest(args, chosen, path.landing) if to_ground else None
+
+
+def _side_report(launch: Landing, path: SideFlight, rest: SideRun | None) -> dict[str, Any]:
+    """What becomes of a launch with side spin, in SI units; right is positive."""
+    report: dict[str, Any] = dict(
+        launch=polar(launch),
+        carry=path.range,
+        side=path.side,
+        time=path.time,
+        height=path.height,
+        landing=polar(path.landing.in_plane),
+        heading=path.landing.heading,
+    )
+    if rest is not None:
+        report |= dict(
+            run=side_run_report(rest),
+            total=path.range + float(rest.rest[0]),
+            total_side=path.side + float(rest.rest[1]),
+            cautions=list(rest.cautions),
         )
     return report

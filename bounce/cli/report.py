@@ -25,7 +25,7 @@ _MEASURES = dict(
     speed="speed", angle="angle", spin="spin", slip="speed", carry="length", bounced="length",
     rolled="length", run_out="length", total="length", height="height", first_height="height",
     time="time", contact_time="time", kick="angle", slip_angle="angle", side_spin="spin",
-    side_spin_after="spin",
+    side_spin_after="spin", run_side="length", side="length", total_side="length", heading="angle",
 )  # fmt: skip
 
 

@@ -5,11 +5,21 @@ from __future__ import annotations
 import argparse
 from typing import Any
 
-from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, play, rebound
+from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideRebound, SideRun, play, rebound
 from ..units import Landing
 from .choices import Chosen, chosen_model, ground_arguments, require_scale
 from .report import Units, in_words, opening, polar, print_json, tabulate
-from .side import asked_for_side, side_arguments, side_bounce, side_lines, side_report
+from .side import (
+    asked_for_side,
+    side_arguments,
+    side_bounce,
+    side_lines,
+    side_report,
+    side_run_lines,
+    side_run_report,
+    side_state,
+    side_to_rest,
+)
 from .starts import start_arguments, starts
 from .values import number, quantity
 
@@ -51,7 +61,7 @@ def run(args: argparse.Namespace) -> int:
 
         def report_on(one: Landing) -> dict[str, Any]:
             if side:
-                return side_report(chosen, side_bounce(args, chosen, one))
+                return _side_report(chosen, *_bounce_aside(args, chosen, one))
             return _report(chosen, *_bounce(args, chosen, one))
 
         return tabulate(args, starts(args, up=False), report_on)
@@ -70,13 +80,30 @@ def run(args: argparse.Namespace) -> int:
 
 def _print_side(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> int:
     """Bounce a ball with side spin, and print what becomes of it."""
-    units, hit = Units(args.units), side_bounce(args, chosen, landing)
+    units, (hit, rest) = Units(args.units), _bounce_aside(args, chosen, landing)
     if args.json:
-        report = units.report(side_report(chosen, hit))
+        report = units.report(_side_report(chosen, hit, rest))
         print_json({**opening(args), "units": units.names, **report})
     else:
-        print("\n".join(side_lines(hit, units)))
+        print("\n".join(side_lines(hit, units) + (side_run_lines(rest, units) if rest else [])))
     return 0
+
+
+def _bounce_aside(
+    args: argparse.Namespace, chosen: Chosen, landing: Landing
+) -> tuple[SideRebound, SideRun | None]:
+    hit = side_bounce(args, chosen, landing)
+    if args.first_only:
+        return hit, None
+    return hit, side_to_rest(args, chosen, side_state(args, landing))
+
+
+def _side_report(chosen: Chosen, hit: SideRebound, rest: SideRun | None) -> dict[str, Any]:
+    """What becomes of a landing with side spin, in SI units."""
+    report = side_report(chosen, hit)
+    if rest is not None:
+        report |= dict(run=side_run_report(rest), cautions=list(rest.cautions))
+    return report
 
 
 def _bounce(

@@ -1,4 +1,4 @@
-"""Side spin on the command line: one bounce in 3-D, of ``bounce shot --first-only``."""
+"""Side spin on the command line: one bounce in 3-D, a run until rest, a flight that curves."""
 
 from __future__ import annotations
 
@@ -7,7 +7,17 @@ from typing import Any
 
 import nonsmooth as ns
 
-from ..golf import SideRebound, axis_spin, side_rebound
+from ..golf import (
+    AIRS,
+    SideFlight,
+    SideRebound,
+    SideRun,
+    SideState,
+    axis_spin,
+    side_flight,
+    side_play,
+    side_rebound,
+)
 from ..units import Landing
 from .choices import Chosen
 from .report import Units, in_words, polar
@@ -16,26 +26,25 @@ from .values import quantity
 _NAMES = ("side_spin", "axis_tilt", "launch_angle", "side_slope")
 
 
-def side_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add the arguments of side spin and side slope."""
+def side_arguments(parser: argparse.ArgumentParser, launched: bool = False) -> None:
+    """Add the arguments of side spin and side slope; ``launched`` where the start is the launch."""
     parser.add_argument(
         "--side-spin",
         type=quantity("spin"),
-        help="about the direction of travel, right positive; with --first-only",
+        help="about the direction of travel, right positive",
     )
+    more = "" if launched else "; with --launch-angle"
     parser.add_argument(
         "--axis-tilt",
         type=quantity("angle"),
-        help="of the spin axis at launch, right (fade) positive, instead of --side-spin; with "
-        "--launch-angle",
+        help=f"of the spin axis at launch, right (fade) positive, instead of --side-spin{more}",
     )
+    if not launched:
+        parser.add_argument(
+            "--launch-angle", type=quantity("angle"), help="of the launch, for --axis-tilt"
+        )
     parser.add_argument(
-        "--launch-angle", type=quantity("angle"), help="of the launch, for --axis-tilt"
-    )
-    parser.add_argument(
-        "--side-slope",
-        type=quantity("angle"),
-        help="of the ground, uphill to the right; with --first-only",
+        "--side-slope", type=quantity("angle"), help="of the ground, uphill to the right"
     )
 
 
@@ -45,19 +54,15 @@ def asked_for_side(args: argparse.Namespace) -> bool:
     Raises
     ------
     nonsmooth.OptionError
-        Without --first-only, or arguments that do not go together.
+        Arguments that do not go together.
     """
-    given = [name for name in _NAMES if getattr(args, name) is not None]
+    given = [name for name in _NAMES if getattr(args, name, None) is not None]
     if not given:
         return False
     said = ", ".join("--" + name.replace("_", "-") for name in given)
-    if not args.first_only:
-        raise ns.OptionError(
-            f"{said}: expected with --first-only, because the run until rest is in one vertical plane."
-        )
     if args.side_spin is not None and args.axis_tilt is not None:
         raise ns.OptionError("--axis-tilt: expected instead of --side-spin, received both.")
-    if (args.axis_tilt is None) != (args.launch_angle is None):
+    if hasattr(args, "launch_angle") and (args.axis_tilt is None) != (args.launch_angle is None):
         raise ns.OptionError(
             f"--axis-tilt: expected together with --launch-angle, received {said}. The axis is tilted in "
             "the plane normal to the launch."
@@ -65,25 +70,92 @@ def asked_for_side(args: argparse.Namespace) -> bool:
     return True
 
 
+def _spins(args: argparse.Namespace, start: Landing) -> tuple[Landing, float, float]:
+    """A start with its backspin, side spin and spin about the vertical."""
+    if args.side_spin is not None:
+        return start, args.side_spin.si(args.units), 0.0
+    if args.axis_tilt is None:
+        return start, 0.0, 0.0
+    launch = args.launch_angle.si(args.units) if hasattr(args, "launch_angle") else start.angle
+    back, side, vertical = axis_spin(start.omega, args.axis_tilt.si(args.units), launch)
+    return Landing(start.xdot, start.ydot, back), side, vertical
+
+
+def _side_slope(args: argparse.Namespace) -> float:
+    return 0.0 if args.side_slope is None else float(args.side_slope.si(args.units))
+
+
+def side_state(args: argparse.Namespace, start: Landing) -> SideState:
+    """A landing or launch with its spins, in the axes of the ground."""
+    return SideState.of(*_spins(args, start), _side_slope(args))
+
+
 def side_bounce(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> SideRebound:
     """Bounce a ball with side spin once."""
-    side, vertical = 0.0, 0.0
-    if args.side_spin is not None:
-        side = args.side_spin.si(args.units)
-    elif args.axis_tilt is not None:
-        tilt, launch = (q.si(args.units) for q in (args.axis_tilt, args.launch_angle))
-        back, side, vertical = axis_spin(landing.omega, tilt, launch)
-        landing = Landing(landing.xdot, landing.ydot, back)
-    slope = 0.0 if args.side_slope is None else args.side_slope.si(args.units)
+    plane, side, vertical = _spins(args, landing)
     return side_rebound(
         chosen.model,
-        landing,
+        plane,
         side,
         chosen.ball,
         vertical_spin=vertical,
         scaling=chosen.scaling,
-        side_slope=slope,
+        side_slope=_side_slope(args),
     )
+
+
+def side_to_rest(args: argparse.Namespace, chosen: Chosen, landing: SideState) -> SideRun:
+    """Follow a shot with side spin from its first touch-down to rest."""
+    return side_play(
+        chosen.model,
+        landing,
+        chosen.ball,
+        scaling=chosen.scaling,
+        air=None if args.air == "none" else AIRS[args.air],
+        slope=args.slope.si(args.units),
+        side_slope=_side_slope(args),
+        rolling_friction=args.rolling_friction,
+    )
+
+
+def side_carry(args: argparse.Namespace, chosen: Chosen, launch: Landing) -> SideFlight:
+    """Fly a ball with side spin."""
+    return side_flight(
+        side_state(args, launch),
+        chosen.ball,
+        air=None if args.air == "none" else AIRS[args.air],
+        slope=args.slope.si(args.units),
+        side_slope=_side_slope(args),
+    )
+
+
+def side_run_report(rest: SideRun) -> dict[str, float]:
+    """Numbers of a run with side spin until rest, in SI units; right is positive."""
+    return dict(
+        bounces=len(rest.bounces),
+        extrapolated=rest.extrapolated,
+        first_height=rest.first_height,
+        kick=rest.kick,
+        run_out=float(rest.rest[0]),
+        run_side=float(rest.rest[1]),
+        time=rest.time,
+    )
+
+
+def side_run_lines(rest: SideRun, units: Units) -> list[str]:
+    """A run with side spin until rest in words."""
+    count = len(rest.bounces)
+    outside = f" ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else ""
+    return [
+        f"run       {units.say('length', float(rest.rest[0]))} on and "
+        f"{sideways(float(rest.rest[1]), units)} in {rest.time:.2f} s: {count} bounces{outside}, the first "
+        f"{units.say('height', rest.first_height)} high"
+    ]
+
+
+def sideways(way: float, units: Units) -> str:
+    """A way to the side in words."""
+    return f"{units.say('length', abs(way))} to the {'left' if way < 0 else 'right'}"
 
 
 def side_report(chosen: Chosen, hit: SideRebound) -> dict[str, Any]:

@@ -3,7 +3,8 @@
 ``flight(launch, air=...)`` flies a ball to the ground; ``play(ground, landing)`` follows it from
 there to rest; ``rebound`` is one bounce. The ground is a law of ``bounce.laws``, such as
 ``bounce.laws.TURFS["natural"].law``, or a contact model with the ``bounce.Scaling`` that gives its
-numbers their units. ``read_measurements`` reads measured bounces, ``fit`` finds the parameters
+numbers their units; with side spin they are ``side_flight``, ``side_play`` and
+``side_rebound``. ``read_measurements`` reads measured bounces, ``fit`` finds the parameters
 behind them. Speeds are m/s, spins rad/s, angles rad.
 
 Examples
@@ -25,6 +26,8 @@ from .ground import ExtrapolationWarning, Rebound, rebound
 from .maps import landing_map
 from .measurements import Measurements, read_measurements
 from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
+from .side_flight import SideFlight, SideState, side_flight
+from .side_run import SideBounce, SideGlide, SideRun, side_play
 from .side_spin import AxisSpin, SideRebound, axis_spin, side_rebound
 
 __all__ = [
@@ -47,7 +50,12 @@ __all__ = [
     "NoRestError",
     "Rebound",
     "Run",
+    "SideBounce",
+    "SideFlight",
+    "SideGlide",
     "SideRebound",
+    "SideRun",
+    "SideState",
     "Start",
     "axis_spin",
     "fit",
@@ -56,5 +64,7 @@ __all__ = [
     "play",
     "read_measurements",
     "rebound",
+    "side_flight",
+    "side_play",
     "side_rebound",
 ]

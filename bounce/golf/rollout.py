@@ -2,7 +2,7 @@
 
 What is modelled: one vertical plane; flat ground of constant slope; each bounce by one and the same
 law or contact model; flight in still air or none; a ball that stays down slides under Coulomb
-friction until it rolls, and rolls against a constant resistance. What is not: side spin, wind,
+friction until it rolls, and rolls against a constant resistance. What is not: side spin (``side_run``), wind,
 ground that changes, plugging, spin that decays while rolling, and the small hops left out below
 ``min_height``.
 """
@@ -281,16 +281,19 @@ def play(
     left_out = 2 * max(off.ydot, 0.0) * off.xdot / (GRAVITY * math.cos(slope))
     if glides:
         t, x = t + sum(g.time for g in glides), glides[-1].end
-    cautions = (*turf.cautions(bounces[0].rebound.landing), *_roll(glides, rolling_friction))
+    fastest = max((abs(g.xdot) for g in glides if g.mode == "s"), default=0.0)
+    cautions = (
+        *turf.cautions(bounces[0].rebound.landing),
+        *roll_cautions(fastest, rolling_friction),
+    )
     for caution in cautions:
         warnings.warn(caution, ExtrapolationWarning, stacklevel=2)
     extrapolated = sum(bool(turf.cautions(b.rebound.landing)) for b in bounces)
     return Run(tuple(bounces), glides, t, x, left_out, extrapolated, cautions)
 
 
-def _roll(glides: tuple[Glide, ...], rolling_friction: float) -> tuple[str, ...]:
+def roll_cautions(fastest: float, rolling_friction: float) -> tuple[str, ...]:
     """Say where the default friction is used for a ball that rolls as no putt does."""
-    fastest = max((abs(g.xdot) for g in glides if g.mode == "s"), default=0.0)
     if rolling_friction != GREEN_ROLLING_FRICTION or fastest <= _FASTEST_PUTT:
         return ()
     return (

@@ -26,6 +26,7 @@ from ..parameters import LIMITS, number
 from ..shot.space import simulate_3d
 from ..units import GOLF, Ball, Landing, Scaling
 from .ground import require_scaling
+from .side_flight import SideState
 
 Array = NDArray[np.float64]
 
@@ -180,29 +181,69 @@ def side_rebound(
             f"inertia: expected that of the ball, {ball.inertia:g}, received {model_inertia(model):g}."
         )
     about = number(vertical_spin, "vertical_spin", ns.OptionError)
-    # In the axes of the ground, whose normal leans to the left where it rises to the right.
-    cos, sin = math.cos(slope), math.sin(slope)
-    velocity = np.array([landing.xdot, landing.ydot * sin])
-    normal = about * cos - landing.omega * sin
-    across = landing.omega * cos + about * sin
-    spin = ball.radius * np.array([across, -turn, normal])
-    if isinstance(model, BounceLaw):
-        after = _by_law(model, velocity, landing.ydot * cos, spin)
-    else:
-        after = _by_contact(model, velocity, landing.ydot * cos, spin, ball, scaling, slope, tol)
-    v, h, w = after.xdot, after.slip, after.omega / ball.radius
-    angle = math.atan2(v[1] + 0.0, v[0])
-    e = np.array([math.cos(angle), math.sin(angle)])
-    off = Landing(float(np.hypot(*v)), after.ydot, float(w @ e))
+    state = SideState.of(landing, turn, about, slope)
+    after = bounced(model, state, ball, scaling, slope, tol)
+    angle, spin = after.state.heading, after.state.spin
+    side = float(spin[0] * math.cos(angle) + spin[2] * math.sin(angle))
     return SideRebound(
         landing,
-        off,
+        after.state.in_plane,
         turn,
-        float(w[0] * e[1] - w[1] * e[0]),
+        side,
         angle,
-        math.atan2(h[1] + 0.0, h[0]),
+        math.atan2(after.slip[1] + 0.0, after.slip[0]),
         after.itinerary,
     )
+
+
+class Bounced(NamedTuple):
+    """A bounce in the axes of the ground.
+
+    Attributes
+    ----------
+    state : SideState
+        At lift-off.
+    slip : ndarray (2,)
+        There, forward and to the right, m/s.
+    itinerary : str
+    time : float
+        Duration, s.
+    way : ndarray (3,)
+        Of the centre meanwhile, m.
+    """
+
+    state: SideState
+    slip: Array
+    itinerary: str
+    time: float
+    way: Array
+
+
+def bounced(
+    model: BounceLaw | ContactModel | Contact3D,
+    landing: SideState,
+    ball: Ball,
+    scaling: Scaling | None,
+    side_slope: float,
+    tol: float,
+) -> Bounced:
+    """Bounce a ball once, in the axes of the ground.
+
+    Raises
+    ------
+    ModelError, LandingError, LiftOffError, nonsmooth.OptionError
+        As :func:`side_rebound`.
+    """
+    velocity, down, about = landing.velocity[[0, 2]], float(landing.velocity[1]), landing.spin
+    w = ball.radius * np.array([about[2], -about[0], about[1]])
+    if isinstance(model, BounceLaw):
+        after = _by_law(model, velocity, down, w)
+    else:
+        after = _by_contact(model, velocity, down, w, ball, scaling, side_slope, tol)
+    w = after.omega / ball.radius
+    v = np.array([after.xdot[0], after.ydot, after.xdot[1]])
+    off = SideState(v, np.array([-w[1], w[2], w[0]]))
+    return Bounced(off, after.slip, after.itinerary, after.time, after.way)
 
 
 def model_inertia(model: BounceLaw | ContactModel | Contact3D) -> float:
@@ -218,20 +259,25 @@ def model_inertia(model: BounceLaw | ContactModel | Contact3D) -> float:
 
 
 class _After(NamedTuple):
-    """Lift-off in the axes of the ground: velocities, and the spin's part of the contact point's."""
+    """Lift-off in the axes of the ground: velocities, the spin's part of the contact point's with that about
+    the normal as its third component, time and way."""
 
     xdot: Array
     ydot: float
     omega: Array
     slip: Array
     itinerary: str
+    time: float = 0.0
+    way: Array = np.zeros(3)
 
 
 def _by_law(model: BounceLaw, v: Array, down: float, w: Array) -> _After:
     """Bounce by a rigid law, in its own plane if that is tilted towards the ball."""
     if isinstance(model, RigidBounce):
         off = rigid_lift_off_3d(model, v, down, w[:2])
-        return _After(off.xdot, float(off.ydot), off.omega, off.slip, str(off.case))
+        return _After(
+            off.xdot, float(off.ydot), np.append(off.omega, w[2]), off.slip, str(off.case)
+        )
     if not isinstance(model, TiltedBounce):
         raise ModelError(
             f"model: expected RigidBounce, TiltedBounce or a contact model, received {model!r}. The other "
@@ -257,10 +303,11 @@ def _by_law(model: BounceLaw, v: Array, down: float, w: Array) -> _After:
     velocity = np.array([hit.xdot[0] * cos - up * sin, hit.xdot[1]])
     forward = -hit.omega[1] * cos - normal * sin
     spin = np.array([hit.omega[0], -forward])
+    vertical = -hit.omega[1] * sin + normal * cos
     return _After(
         turn.T @ velocity,
         up * cos + float(hit.xdot[0]) * sin,
-        turn.T @ spin,
+        np.append(turn.T @ spin, vertical),
         turn.T @ (velocity + spin),
         str(hit.case),
     )
@@ -281,10 +328,19 @@ def _by_contact(
         raise ns.OptionError(
             f"side_slope: expected that of the model, {surface.values['side_slope']!r}, received {slope!r}."
         )
-    unit = require_scaling(surface.model, ball, scaling).speed
+    scale = require_scaling(surface.model, ball, scaling)
+    unit = scale.speed
     spin = (w if surface.drilling else w[:2]) / unit
     shot = simulate_3d(surface, (v / unit).tolist(), down / unit, spin.tolist(), tol=tol)
     end = shot.lift_off
+    about = end.omega * unit if surface.drilling else np.append(end.omega * unit, w[2])
+    way = scale.length * np.array([end.x[0], end.y, end.x[1]])
     return _After(
-        end.xdot * unit, end.ydot * unit, end.omega[:2] * unit, end.slip * unit, shot.itinerary
+        end.xdot * unit,
+        end.ydot * unit,
+        about,
+        end.slip * unit,
+        shot.itinerary,
+        shot.time * scale.time,
+        way,
     )

@@ -1,4 +1,5 @@
-"""``bounce shot`` takes side spin, a tilted axis and a side slope, and prints the library's kick."""
+"""``bounce shot`` and ``bounce flight`` take side spin, a tilted axis and a side slope, and print the library's
+kick, curve and place of rest."""
 
 import json
 import math
@@ -49,10 +50,47 @@ def test_published_turf_and_tables(command, tmp_path):
     assert code == 0 and "kick [deg]" in out.splitlines()[0] and len(out.splitlines()) == 3
 
 
+def test_a_run_until_rest_with_side_spin(command, tmp_path):
+    argv = "shot --speed 25 --angle 53 --spin 4000".split()
+    law = bounce.laws.TURFS["natural"].law
+    landing = bounce.Landing.polar(25, 53 * DEG, 4000)
+    run = bounce.golf.side_play(
+        law, bounce.golf.SideState.of(landing, 500 * math.pi / 30, 0.0, 2 * DEG), side_slope=2 * DEG
+    )
+    more = ("--side-spin", 500, "--side-slope", 2)
+    code, out, _ = command(*argv, *more, "--json")
+    report = json.loads(out)
+    assert code == 0 and report["run"]["bounces"] == len(run.bounces)
+    assert [report["run"][n] for n in ("run_out", "run_side")] == pytest.approx(run.rest, rel=1e-12)
+    assert report["run"]["kick"] == pytest.approx(run.kick / DEG, rel=1e-9)
+    words = command(*argv, *more)[1]
+    assert f"run       {run.rest[0]:.2f} m on and {abs(run.rest[1]):.2f} m to the " in words
+    table = tmp_path / "landings.csv"
+    table.write_text("speed,angle,spin\n25,53,4000\n", encoding="utf-8")
+    code, out, _ = command("shot", "--input", table, "--side-spin", 500)
+    assert code == 0 and "run_run_side [m]" in out.splitlines()[0]
+
+
+def test_a_flight_curves_with_the_axis(command, tmp_path):
+    argv = "flight --speed 70 --angle 11 --spin 2700 --axis-tilt".split()
+    report = json.loads(command(*argv, 10, "--turf", "natural", "--json")[1])
+    spin = bounce.golf.axis_spin(2700 * math.pi / 30, 10 * DEG, 11 * DEG)
+    launch = bounce.Landing(70 * math.cos(11 * DEG), 70 * math.sin(11 * DEG), spin.backspin)
+    start = bounce.golf.SideState.of(launch, spin.side, spin.vertical)
+    path = bounce.golf.side_flight(start, air=bounce.golf.SMITS_SMITH)
+    assert report["side"] == pytest.approx(path.side, rel=1e-9) and path.side > 0
+    assert report["heading"] == pytest.approx(path.landing.heading / DEG, rel=1e-9)
+    assert report["total_side"] == pytest.approx(path.side + report["run"]["run_side"], rel=1e-12)
+    code, out, _ = command(*argv, -10, "--turf", "natural")
+    assert code == 0 and f"{path.side:.2f} m to the left" in out and "total" in out
+    table = tmp_path / "launches.csv"
+    table.write_text("speed,angle,spin\n70,11,2700\n", encoding="utf-8")
+    assert "side [m]" in command("flight", "--input", table, "--axis-tilt", 10)[1]
+
+
 @pytest.mark.parametrize(
     "argv, message",
     [
-        (["--side-spin", "100"], "--side-spin: expected with --first-only"),
         (["--first-only", "--axis-tilt", "10"], "expected together with --launch-angle"),
         (["--first-only", "--launch-angle", "10"], "expected together with --launch-angle"),
         (

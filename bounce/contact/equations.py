@@ -117,16 +117,23 @@ class Equations:
         else:
             traction = self._scalar("traction", law.traction(s, q, self._sign))
         self.friction_force = traction * self.load
-        own = model.extra_rates(s, q)
-        rates = {**own, **law.extra_rates(s, q, self._sign)} if isinstance(own, Mapping) else own
-        if set(rates) != set(self.start):
-            raise ModelError(
-                f"{type(model).__name__}: extra_rates: expected a rate for each of "
-                f"{list(self.start)}, received {list(rates)}."
-            )
+        rates = self._rates_of(list(self.start), self._sign)
         self.rates = [self._scalar(f"rate of {name}", rates[name]) for name in self.start]
         energy = model.stored_energy(s, q)
         self.stored = None if energy is None else self._scalar("stored_energy", energy)
+
+    def _rates_of(self, names: list[str], direction: ca.SX) -> Mapping[str, Any]:
+        """Rates of the further states, as the model and its friction law give them."""
+        own = self.model.extra_rates(self.s, self.q)
+        if isinstance(own, Mapping):
+            own = {**own, **self.model.friction.extra_rates(self.s, self.q, direction)}
+        if not isinstance(own, Mapping) or set(own) != set(names):
+            received = list(own) if isinstance(own, Iterable) else repr(own)
+            raise ModelError(
+                f"{type(self.model).__name__}: extra_rates: expected a rate for each of {names}, "
+                f"received {received}."
+            )
+        return own
 
     def _require_end(self) -> None:
         if not ca.depends_on(self.lift_off, ca.vertcat(*self.x.values())):

@@ -117,15 +117,8 @@ class SpaceEquations(Equations):
         return ratio * ca.SX.eye(2) + (1 - ratio) * along @ along.T
 
     def _further_rates(self, direction: ca.SX) -> list[ca.SX]:
-        model = self.model
-        own = model.extra_rates(self.s, self.q)
-        rates = {**own, **model.friction.extra_rates(self.s, self.q, direction)}
-        names = list(further_states(model))
-        if set(rates) != set(names):
-            raise ModelError(
-                f"{type(model).__name__}: extra_rates: expected a rate for each of {names}, received "
-                f"{list(rates)}."
-            )
+        names = list(further_states(self.model))
+        rates = self._rates_of(names, direction)
         flat: list[ca.SX] = []
         for name in names:
             read = self._vector if name in self.vectors else self._scalar

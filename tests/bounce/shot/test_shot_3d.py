@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import bounce
@@ -137,21 +137,45 @@ def test_every_model_has_a_form_in_3d(model):
 
 
 @settings(max_examples=6)
+@given(v=st.tuples(SPEED, SPEED), w=st.tuples(SPEED, SPEED))
+def test_a_mirrored_landing_gives_mirrored_bits(v, w):
+    v, w = np.array(v), np.array(w)
+    one = bounce.simulate(TURF, v, -1.0, w, tol=1e-13)
+    many = bounce.lift_off(TURF.in_3d(), [v, v * [1, -1]], -1.0, [w, w * [1, -1]], tol=1e-13)
+    assert many.itinerary[0] == many.itinerary[1] == one.itinerary
+    assert np.array_equal(many.slip[0] * [1, -1], many.slip[1])
+    assert np.array_equal(many.time, [one.time, one.time])
+    for mirror in ([1, -1], [-1, 1], [-1, -1]):
+        other = bounce.simulate(TURF, v * mirror, -1.0, w * mirror, tol=1e-13)
+        assert other.itinerary == one.itinerary and other.time == one.time
+        for name in ("x", "xdot", "omega", "slip"):
+            a, b = (getattr(shot.lift_off, name) for shot in (one, other))
+            assert np.array_equal(a * mirror, b)
+
+
+@settings(max_examples=6)
 @given(
     angle=st.floats(-3, 3),
     v=st.tuples(SPEED, SPEED),
     w=st.tuples(SPEED, SPEED),
-    mirror=st.booleans(),
+    eta=st.floats(0.01, 5.0),
 )
-def test_a_landing_that_is_turned_or_mirrored_lifts_off_so(angle, v, w, mirror):
-    turn = rotation(angle) @ np.diag([1.0, -1.0 if mirror else 1.0])
-    one = bounce.simulate(TURF, v, -1.0, w, tol=1e-13)
-    other = bounce.simulate(TURF, turn @ v, -1.0, turn @ w, tol=1e-13)
+def test_a_turned_landing_lifts_off_turned_to_rounding(angle, v, w, eta):
+    """The landing turned is off by eps of its size; the flow lets that grow as its derivatives say."""
+    v, w, turn, model = np.array(v), np.array(w), rotation(angle), TURF.replace(eta=eta)
+    # On a line, and without slip, a rounding of the landing is another itinerary.
+    assume(abs(v[0] * w[1] - v[1] * w[0]) > 1e-6 and np.hypot(*(v + w)) > 1e-6)
+    one = bounce.simulate(model, v, -1.0, w, tol=1e-13)
+    other = bounce.simulate(model, turn @ v, -1.0, turn @ w, tol=1e-13)
+    growth = np.abs(ns.sensitivity(one.trajectory, wrt="x0").dx_dx0).sum(axis=1).max()
+    allowed = 16 * np.finfo(float).eps * (1 + growth) * np.abs(one.trajectory.x).max()
     assert one.itinerary == other.itinerary
     for name in ("x", "xdot", "omega", "slip"):
         a, b = (getattr(shot.lift_off, name) for shot in (one, other))
-        assert np.abs(turn @ a - b).max() <= 5e-13
-    assert abs(one.time - other.time) <= 1e-14
+        assert np.abs(turn @ a - b).max() <= allowed
+    assert (
+        abs(one.time - other.time) <= 0.5 * len(one.trajectory.t) * np.finfo(float).eps * one.time
+    )
 
 
 def test_forces_oppose_the_slip_and_are_inside_the_cone_while_rolling():

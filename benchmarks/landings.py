@@ -2,8 +2,8 @@
 
 ``python -m benchmarks.landings`` runs what is missing and prints the counts; interrupt it at any time.
 Every landing is followed by the compiled engine at its default tolerance and at 1e-14, with the
-spin as a state, and as a bounce, with the slip as a state; pieces in their order, as many as there is
-time for, also by the reference driver at 1e-14. Landings of which any two differ are listed.
+spin as a state, and as a bounce, with the slip as a state; by the reference driver at 1e-14 those
+on which these answers differ, and then all, in their order. Landings of which any two differ are listed.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ import argparse
 import json
 import os
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from functools import lru_cache
 from pathlib import Path
@@ -82,12 +82,16 @@ def drawn(piece: int, count: int) -> dict[str, Array]:
     return dict(**p, v=v, w=w)
 
 
-def answers(piece: int, count: int, asked: str) -> list[str]:
-    """Itineraries of a piece's landings; a run that did not lift off says so in the place of it."""
+def answers(piece: int, count: int, asked: str, which: Sequence[int] | None = None) -> list[str]:
+    """Itineraries of a piece's landings, or of some; a run that did not lift off says so in the place of it."""
     found = np.empty(count, dtype=object)
     cases, work = drawn(piece, count), ns.Work(progress=False, threads=1)
     for i, load in enumerate(LOADS):
         rows = np.arange(count) // 4 % 2 == i
+        if which is not None:
+            rows &= np.isin(np.arange(count), which)
+        if not rows.any():
+            continue
         own = {name: values[rows] for name, values in cases.items()}
         v, w = own.pop("v"), own.pop("w")
         if asked == "bounce":
@@ -112,7 +116,7 @@ def answers(piece: int, count: int, asked: str) -> list[str]:
         ended = many.status == ns.Status.STOPPED
         words = [str(ns.Status(s)) for s in many.status]
         found[rows] = np.where(ended, many.itinerary, words)
-    return [str(word) for word in found]
+    return [str(word) for word in (found if which is None else found[list(which)])]
 
 
 def _ask(piece: int, asked: str, count: int, folder: Path) -> None:
@@ -123,11 +127,27 @@ def _ask(piece: int, asked: str, count: int, folder: Path) -> None:
         partial.replace(path)
 
 
+def _ask_doubtful(count: int, folder: Path) -> None:
+    """Ask the reference driver of the landings on which the quick answers differ."""
+    path = folder / "doubtful.json"
+    known: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
+    rows: dict[int, list[int]] = {}
+    for found in summary(folder, count)["differ"]:
+        if f"{found['piece']}:{found['row']}" not in known and "reference" not in found:
+            rows.setdefault(found["piece"], []).append(found["row"])
+    for piece, which in rows.items():
+        words = answers(piece, count, "reference", which)
+        known |= {f"{piece}:{row}": word for row, word in zip(which, words, strict=True)}
+        path.write_text(json.dumps(known))
+
+
 def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
     """How many landings were asked of each engine, and where two of them differ."""
     known = {
         asked: {int(f.stem[-4:]): f for f in folder.glob(f"{asked}-*.json")} for asked in ENGINES
     }
+    path = folder / "doubtful.json"
+    doubtful: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
     differ: list[dict[str, Any]] = []
     words: dict[str, int] = {}
     for piece in sorted(known["default"]):
@@ -140,6 +160,8 @@ def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
             words[row[0]] = words.get(row[0], 0) + 1
             if len(set(row)) > 1:
                 differ.append(dict(piece=piece, row=i, **dict(zip(found, row, strict=True))))
+                own = doubtful.get(f"{piece}:{i}")
+                differ[-1] |= {"reference": own} if own else {}
                 differ[-1]["phases"] = len({phases(word) for word in row}) > 1
     asked = {name: count * len(files) for name, files in known.items()}
     return dict(landings=asked, itineraries=words, differ=differ)
@@ -148,10 +170,6 @@ def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
 def phases(word: str) -> str:
     """An itinerary without its passes through zero slip, which on a line are events or very sharp turns."""
     return re.sub(r"(\* )+\*", "*", word)
-
-
-def _rounds(pieces: int) -> Iterator[tuple[int, str]]:
-    yield from ((piece, asked) for asked in ENGINES for piece in range(pieces))
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -166,9 +184,15 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     if not options.report:
         with ProcessPoolExecutor(options.workers) as pool:
-            rounds = _rounds(options.count // options.piece)
-            done = [pool.submit(_ask, *r, options.piece, options.folder) for r in rounds]
-            for future in done:
+            *rounds, last = (
+                [(piece, asked) for piece in range(options.count // options.piece)]
+                for asked in ENGINES
+            )
+            own = (options.piece, options.folder)
+            for future in [pool.submit(_ask, *r, *own) for part in rounds for r in part]:
+                future.result()
+            pool.submit(_ask_doubtful, *own).result()
+            for future in [pool.submit(_ask, *r, *own) for r in last]:
                 future.result()
     found = summary(options.folder, options.piece)
     print(f"landings: {found['landings']}")

@@ -336,3 +336,22 @@ def test_a_set_is_reached_whatever_the_unit_of_time(size, skew, engine):
     assert run.itinerary == "* s" and run.status is ns.Status.REACHED_END
     assert abs(run.events[0].t * c / (size * 2**0.5) - 1) < 1e-11
     assert abs(complex(*run.x[-1][:2]) - place) < 1e-11 * abs(place)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+@pytest.mark.parametrize("k", [2, 3])
+@pytest.mark.parametrize("seed", range(2))
+def test_a_set_is_left_however_much_friction_depends_on_direction(seed, k, engine):
+    """A load t a grows until |M^-1 a| t = 1, with friction up to a hundred times stronger in one direction."""
+    rng = np.random.default_rng(seed)
+    axes = np.linalg.qr(rng.normal(size=(k, k)))[0]
+    m = axes @ np.diag(10 ** rng.uniform(-2, 0, k)) @ axes.T
+    lam = rng.normal(size=k)
+    a = m @ (lam / np.linalg.norm(lam))
+    h, force, t = ca.SX.sym("h", k), ca.SX.sym("lam", k), ca.SX.sym("t")
+    system = ns.FilippovSystem(
+        ca.vertsplit(h), field=t * a - m @ force, surfaces=[h], multipliers=[force], time=t
+    )
+    run = ns.simulate(system, np.zeros(k), 1.5, engine=engine, tol=1e-12)
+    assert run.itinerary == "s *" and run.status is ns.Status.REACHED_END
+    assert run.events[0].t == pytest.approx(1.0, abs=1e-12)

@@ -96,9 +96,12 @@ static int solve_block(const double *m, int stride, int k, double shift, const d
   return solve(a, y, k);
 }
 
-/* The direction u with (M + s) u = a, |u| = 1 and the largest s: Newton's method from the right. */
+/* The direction u with (M + s) u = a, |u| = 1 and the largest s, which is not negative: Newton's method from the
+ * left, where it is monotone (1/|(M + s)^-1 a| is concave). */
 static int leaving_direction(const double *a, const double *m, int stride, int k, double *u) {
-  double d[3], w[3], s = length_of(a, k);
+  double d[3], w[3], s = 0;
+  for (int i = 0; i < k; i++) for (int j = 0; j < k; j++) s += m[i * stride + j] * m[i * stride + j];
+  s = larger(0, length_of(a, k) - sqrt(s));
   for (int again = 0; again < 100; again++) {
     if (!solve_block(m, stride, k, s, a, d) || !solve_block(m, stride, k, s, d, w)) return 0;
     double n = length_of(d, k), slope = 0;

@@ -157,7 +157,7 @@ GOLF = {
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
         "flight Flight Air rebound Rebound side_rebound SideRebound axis_spin AxisSpin play Run Bounce "
-        "Glide landing_map",
+        "Glide landing_map SideState side_flight SideFlight side_play SideRun SideBounce SideGlide",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

@@ -5,6 +5,8 @@ import math
 
 import numpy as np
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 import bounce
 import nonsmooth as ns
@@ -61,13 +63,57 @@ def test_in_the_plane_bounces_come_closer(eta, mu, load):
     assert np.all(distances(ends, eta, 0.4) <= before * (1 + 1e-9) + 1e-12)
 
 
-def test_in_3d_bounces_come_closer():
-    rng = np.random.default_rng(2)
-    v, w, x = rng.uniform(-1, 1, (3, 2, 8, 2))
-    off = bounce.lift_off(TURF.in_3d(), v, -1.0, w, x, tol=1e-7)
+#: Friction of every kind takes part as -mu load lambda . h, of which the multiplier is a subgradient.
+FRICTIONS = {
+    "isotropic": {},
+    "elliptical": dict(friction_ratio=0.4, grain=0.7),
+    "drilling": dict(drilling_radius=0.3),
+    "both, on a side slope": dict(
+        friction_ratio=0.7, grain=-0.4, drilling_radius=0.1, side_slope=0.2
+    ),
+}
+
+
+def come_closer(friction, eta, mu, load, seed, size, pairs):
+    """Two landings each, apart by a part of their size, are no farther apart in friction's metric."""
+    model = TURF.replace(load=load).in_3d(**FRICTIONS[friction])
+    rng = np.random.default_rng(seed)
+    n = 3 if model.drilling else 2
+    v, x = rng.uniform(-1.5, 1.5, (2, 2, pairs, 2))
+    w = rng.uniform(-1.5, 1.5, (2, pairs, n))
+    for array in (v, w, x):
+        array[1] = array[0] + size * array[1]
+    work = ns.Work(progress=False, threads=1)
+    values = dict(eta=eta, mu=mu)
+    off = bounce.lift_off(model, v, -1.0, w, x, parameters=values, tol=1e-12, work=work)
     ends = {name: getattr(off, name) for name in ("xdot", "omega", "x")}
     assert np.all(off.complete)
-    assert np.all(distances(ends, 0.5, 0.4) < distances(dict(xdot=v, omega=w, x=x), 0.5, 0.4))
+    before = distances(dict(xdot=v, omega=w, x=x), eta, 0.4)
+    assert np.all(np.sqrt(distances(ends, eta, 0.4)) <= np.sqrt(before) * (1 + 1e-12) + 1e-10)
+
+
+TURFS_3D = dict(
+    eta=st.floats(0.05, 4.0),
+    mu=st.floats(0.05, 1.5),
+    load=st.sampled_from(["contact", "net"]),
+    seed=st.integers(0, 2**31),
+    size=st.sampled_from([1.0, 1e-2, 1e-5]),
+)
+
+
+@pytest.mark.parametrize("friction", FRICTIONS)
+@settings(max_examples=3)
+@given(**TURFS_3D)
+def test_in_3d_bounces_come_closer(friction, eta, mu, load, seed, size):
+    come_closer(friction, eta, mu, load, seed, size, 15)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("friction", FRICTIONS)
+@settings(max_examples=12)
+@given(**TURFS_3D)
+def test_in_3d_many_bounces_come_closer(friction, eta, mu, load, seed, size):
+    come_closer(friction, eta, mu, load, seed, size, 400)
 
 
 @pytest.mark.parametrize("xdot, spin", [(0.2, 0.5505198965), (2.0, 1.5971891199)])

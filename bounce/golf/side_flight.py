@@ -167,7 +167,7 @@ def side_flight(
     start: tuple[float, float, float] = (0.0, 0.0, 0.0),
     tol: float = 1e-10,
 ) -> SideFlight:
-    """Fly a ball with side spin until it comes down to y = 0.
+    """Fly a ball with side spin until it comes down to $y = 0$.
 
     Parameters
     ----------

@@ -71,6 +71,7 @@ class SideGlide:
     Attributes
     ----------
     mode : str
+        Whether the ball slips or rolls.
     t, time : float
         Its start and duration, s.
     run : nonsmooth.Trajectory

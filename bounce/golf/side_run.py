@@ -59,7 +59,7 @@ class SideBounce:
 
     @property
     def kick(self) -> float:
-        """By how much it turns the direction of travel, rad in (-pi, pi], right positive."""
+        """By how much it turns the direction of travel, rad, right positive."""
         turn = self.lift_off.heading - self.landing.heading
         return math.atan2(math.sin(turn), math.cos(turn))
 

@@ -3,7 +3,8 @@
 On a curve of grazing-sliding the touching is of higher order (L11 = 0), or at a two-fold (L2 = 0), or a
 multiplier with contact is 1 or -1, or a second place touches; on one of crossing- or switching-sliding
 L11 = 0 turns one into the other. On a curve of Neimark-Sacker points the angle is resonant; where the pair
-meets at 1 or -1 the curve ends, as the numbers beyond are a neutral saddle's.
+meets at 1 or -1 the curve ends, as the numbers beyond are a neutral saddle's. There and on curves of period
+doublings the cubic coefficient of the normal form may vanish.
 
 Source: Kowalczyk, di Bernardo, Champneys et al. 2006 (Int. J. Bifurcation Chaos 16, 601); Kuznetsov 2004,
 ch. 9.
@@ -19,6 +20,7 @@ from ..model.variational import guarded_field, variational_field
 from .boundary import BoundaryProblem, Evaluation
 from .conditions import Condition, minima
 from .far_side import contact_at, contact_numbers, touched
+from .map_derivatives import normal_form
 from .multipliers import return_map
 
 #: Resonances by the cosine of their angle.
@@ -44,12 +46,24 @@ def degenerate(
     p : ndarray
     """
     if name == "Neimark-Sacker":
-        return _resonances(problem, at)
+        return _resonances(problem, at) | _cubic(problem, at, p, name)
+    if name in ("period doubling", "pitchfork"):
+        return _cubic(problem, at, p, name)
     if condition is None or condition.guard is None:
         return {}
     if condition.what == "interior":
         return _touches(problem, condition, at, p)
     return _beginnings(problem, condition, at, p) if condition.what == "start" else {}
+
+
+def _cubic(problem: BoundaryProblem, at: Evaluation, p: Array, name: str) -> dict[str, float]:
+    """The coefficient of the normal form: where it vanishes a curve of folds begins."""
+    word = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
+    try:
+        found = normal_form(problem, at, p, name)
+    except np.linalg.LinAlgError:  # another multiplier is 1
+        return {}
+    return {word: next(iter(found.values()))} if found else {}
 
 
 def _resonances(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:

@@ -78,6 +78,15 @@ class Equilibria(BranchCurve):
         except (NonsmoothError, np.linalg.LinAlgError):
             return float("nan")
 
+    def bautin(self, u: Array) -> Mapping[str, float]:
+        """The first Lyapunov coefficient, which vanishes at a Bautin point on a curve of Hopf points."""
+        values = self.eigenvalues(u)
+        k, l = np.triu_indices(values.size, 1)
+        near = int(np.argmin(np.abs(values[k] + values[l])))
+        frequency = float(abs(values[k[near]].imag))
+        value = self.lyapunov(u, frequency) if frequency else np.nan
+        return {"Bautin": value} if np.isfinite(value) else {}
+
     def double_zero(self, u: Array) -> bool:
         sizes = np.sort(np.abs(self.eigenvalues(u)))
         # a double zero is known to the square root of rounding
@@ -188,6 +197,8 @@ class EquilibriumCurve(Equilibria):
         return found
 
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        if name == "Hopf":
+            return self.bautin(u)
         return self.boundary_numbers(u, self.k) if name == "boundary equilibrium" else {}
 
     def _boundary_of(self, surface: int) -> str:
@@ -260,6 +271,8 @@ class PseudoEquilibriumCurve(Equilibria):
         return found
 
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        if name == "Hopf":
+            return self.bautin(u)
         return self.boundary_numbers(u, int(name[-1])) if name.startswith("alpha") else {}
 
     def ends(self, name: str) -> bool:

@@ -191,3 +191,41 @@ def test_a_sliding_flow_on_a_bent_surface_has_the_coefficient_of_its_flow_in_the
     (event,) = ns.continue_equilibrium(plane, [0.0, 0.0], "r", bounds=(-1, 1)).events
     values.append(event.coefficients["first Lyapunov coefficient"])
     assert values == pytest.approx([values[-1]] * 3, rel=1e-9)
+
+
+def test_a_curve_of_hopf_points_has_its_bautin_point():
+    """r' = r (mu + nu r^2 - r^4): the coefficient of the Hopf point at mu = 0 is nu, and cycles fold at
+    mu = -nu^2/4 where nu > 0."""
+    mu, nu = symbols("mu nu")
+    square = X * X + Y * Y
+    growth = mu + nu * square - square**2
+    system = ns.FilippovSystem(
+        [X, Y], field=[growth * X - 2 * Y, growth * Y + 2 * X], parameters={mu: -0.3, nu: 0.5}
+    )
+    branch = ns.continue_equilibrium(system, [0.0, 0.0], "mu", bounds=(-1, 1))
+    (event,) = branch.events
+    assert event.far_side.verdict.endswith("(subcritical)")
+    # |z|^2 = r^2/2 for an eigenvector of length one, and l1 is over the frequency
+    assert event.coefficients["first Lyapunov coefficient"] == pytest.approx(0.5 * 2 / 2, rel=1e-9)
+    curve = ns.continue_bifurcation(event, ("mu", "nu"), bounds=[(-1, 1), (-1, 1)])
+    ((kind, values),) = [(point.kind, point.values) for point in curve.special]
+    assert kind == "Bautin" and np.abs(values).max() < 1e-12
+    (fold,) = ns.continue_orbit(event, "mu", bounds=(-1, 1)).events
+    assert fold.kind == "fold" and fold.parameter == pytest.approx(-(0.5**2) / 4, rel=1e-9)
+
+
+def test_a_curve_of_doublings_has_the_point_where_it_becomes_subcritical():
+    """x -> -(1 + m) x + n x^3 - x^5: c = n along m = 0."""
+    m, n = symbols("m n")
+    system = ns.FilippovSystem(
+        [X, C],
+        field=[0 * X, 1],
+        resets=ns.Reset(C - 1, [-(1 + m) * X + n * X**3 - X**5, 0], 1, "tick"),
+        parameters={m: -0.2, n: 0.5},
+    )
+    orbit = fixed(system, [0.0])
+    (event,) = ns.continue_orbit(orbit, "m", bounds=(-0.5, 0.5)).events
+    assert event.coefficients["cubic coefficient"] == pytest.approx(0.5, rel=1e-8)
+    curve = ns.continue_bifurcation(event, ("m", "n"), bounds=[(-1, 1), (-1, 1)])
+    ((kind, values),) = [(point.kind, point.values) for point in curve.special]
+    assert kind == "degenerate period doubling" and np.abs(values).max() < 1e-8

@@ -1,8 +1,10 @@
 """Named systems with known answers: problems that every method for nonsmooth systems must solve.
 
 Each function returns a :class:`Problem`: system, parameters, start, end time, and the values known
-for it as :class:`Reference`. The top floor of ``nonsmooth``: tests and the manual read from it.
+for it as :class:`Reference`. Tests and the manual read from them.
 
+Examples
+--------
 >>> import nonsmooth.textbook as textbook
 >>> problem = textbook.bouncing_ball()
 >>> problem["first impact"].agrees(problem.run().events[0].t)

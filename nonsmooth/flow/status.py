@@ -47,7 +47,8 @@ ADVICE: dict[Status, str] = {
     Status.INCONSISTENT: "A constraint cannot hold here: the state is behind it, or no reaction (or "
     "more than one) keeps the contact (Painleve's paradox); look at the gaps and at friction.",
     Status.STEP_TOO_SMALL: "The solution has a singularity here, or the tolerance is below "
-    "rounding: loosen tol or look at the fields near the last state.",
+    "rounding: loosen tol (atol alone where states are large) or look at the fields near the last "
+    "state.",
     Status.NOT_FINITE: "A field or a switching function is not a finite number here: check "
     "logarithms, roots and divisions at the last state.",
     Status.TOO_MANY_EVENTS: "Raise max_events if this many are expected; otherwise the motion "

@@ -355,3 +355,17 @@ def test_a_set_is_left_however_much_friction_depends_on_direction(seed, k, engin
     run = ns.simulate(system, np.zeros(k), 1.5, engine=engine, tol=1e-12)
     assert run.itinerary == "s *" and run.status is ns.Status.REACHED_END
     assert run.events[0].t == pytest.approx(1.0, abs=1e-12)
+
+
+def test_a_tolerance_below_rounding_says_what_to_do():
+    """Slip of 1e8 that winds into zero is known to 1e-8 of a second, and so to more than 1e-10 of its unit."""
+    x, lam = ca.SX.sym("x", 4), ca.SX.sym("lam", 2)
+    force = -2.943 * ca.vertcat(lam[0] - 2 * lam[1], 2 * lam[0] + lam[1])
+    block = ns.FilippovSystem(
+        ca.vertsplit(x), field=ca.vertcat(x[2:], force), surfaces=[x[2:]], multipliers=[lam]
+    )
+    run = ns.simulate(block, [0.0, 0.0, 1e8, 1e8], 5e8)
+    assert run.status is ns.Status.STEP_TOO_SMALL and "atol alone" in run.message
+    run = ns.simulate(block, [0.0, 0.0, 1e8, 1e8], 5e8, atol=1e-4)
+    place = 2e16 / 2.943 * np.exp(0.25j * np.pi) / (2 + 2j)
+    assert run.itinerary == "* s" and abs(complex(*run.x[-1, :2]) / place - 1) < 1e-11

@@ -1,5 +1,5 @@
-"""Friction in the plane: bounces in 3-D beside planar ones; a block on an incline, a block on a turning disc and
-a sphere on a turntable beside Siconos.
+"""Friction in the plane: a block on an incline, a block on a turning disc and a sphere on a turntable beside
+Siconos. Bounces in 3-D are in ``space.py``.
 
 ``python -m benchmarks.plane`` prints all; ``BENCH_SICONOS_PYTHON`` names an interpreter with Siconos.
 """
@@ -20,20 +20,18 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-import bounce
 import nonsmooth as ns
 
 Array = NDArray[np.float64]
 
 VARIABLE = "BENCH_SICONOS_PYTHON"
-TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 STEPS = (1e-2, 1e-3, 1e-4)
 TOLERANCES = (1e-4, 1e-9)
 TURN = np.array([[0.0, -1.0], [1.0, 0.0]])
 
 
 def rate(follow: Callable[[], object], count: int, turns: int = 3) -> float:
-    """Bounces in a second of processor time, the fastest of some turns."""
+    """Runs in a second of processor time, the fastest of some turns."""
     seconds = []
     follow()
     for _ in range(turns):
@@ -41,18 +39,6 @@ def rate(follow: Callable[[], object], count: int, turns: int = 3) -> float:
         follow()
         seconds.append(time.process_time() - begin)
     return count / min(seconds)
-
-
-def bounces(count: int = 4000, tol: float = 1e-9) -> tuple[float, float]:
-    """Rates of bounces in 3-D and in the plane, one thread."""
-    rng = np.random.default_rng(0)
-    v, w = rng.uniform(-1, 1, (2, count, 2))
-    work = ns.Work(progress=False, threads=1)
-    many = 50 * count
-    one, other = rng.uniform(-1, 1, (2, many))
-    space = rate(lambda: bounce.lift_off(TURF.in_3d(), v, -1.0, w, tol=tol, work=work), count)
-    plane = rate(lambda: bounce.lift_off(TURF, one, -1.0, other, tol=tol, work=work), many)
-    return space, plane
 
 
 @dataclass(frozen=True)
@@ -182,8 +168,6 @@ def theirs(
 
 def main() -> None:
     """Print all tables."""
-    space, plane = bounces()
-    print(f"bounces: {space:.0f} in 3-D, {plane:.0f} in the plane a second: {space / plane:.4f}")
     for ride in RIDES:
         for tol in TOLERANCES:
             error, seconds = ride.ours(tol)

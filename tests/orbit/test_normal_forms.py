@@ -229,3 +229,26 @@ def test_a_curve_of_doublings_has_the_point_where_it_becomes_subcritical():
     curve = ns.continue_bifurcation(event, ("m", "n"), bounds=[(-1, 1), (-1, 1)])
     ((kind, values),) = [(point.kind, point.values) for point in curve.special]
     assert kind == "degenerate period doubling" and np.abs(values).max() < 1e-8
+
+
+def test_orbits_without_the_symmetry_part_as_the_coefficient_of_the_pitchfork_foretells():
+    """Duffing's oscillator: half the distance e of a state from the mirror image of that half a period later
+    obeys c e^2 = -1 - (multiplier of the half map of the symmetric orbit)."""
+    t, F = symbols("t F")
+    system = ns.FilippovSystem(
+        [X, Y], field=[Y, -0.2 * Y - X**3 + F * ca.cos(t)], parameters={F: 2.3}, time=t
+    )
+    run = ns.simulate(system, [1.0, 0.0], 200.0)
+    orbit = ns.periodic_orbit(system, run, symmetry="odd")
+    branch = ns.continue_orbit(orbit, "F", bounds=(2.2, 2.6))
+    (event,) = branch.events
+    assert event.kind == "pitchfork" and event.far_side.verdict.endswith("(supercritical, stable)")
+    parted = ns.continue_orbit(event, "F", bounds=(2.2, 2.6))
+    errors = []
+    for beyond in (0.01, 0.0025):
+        found = parted.at(event.parameter + beyond)[0].trajectory
+        half = (found(found.t[0]) + found(found.t[0] + np.pi)) / 2
+        smallest = branch[event.parameter + beyond].half_multipliers.real.min()
+        foretold = (-1 - smallest) / event.coefficients["cubic coefficient"]
+        errors.append(abs(half @ half / foretold - 1))
+    assert errors[1] < 0.3 * errors[0] < 0.003

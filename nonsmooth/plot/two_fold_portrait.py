@@ -224,7 +224,7 @@ def _along(ax: Axes, m: float, end: Array, name: str, color: str) -> None:
     """Write a name along an eigenline in Dr, on the side with more room."""
     angle = math.atan(m)
     normal = np.array([-math.sin(angle), math.cos(angle)]) * (1 if m >= 1 else -1)
-    place = -0.7 * end + 0.055 * normal
+    place = -0.62 * end + 0.055 * normal
     style.write(
         ax,
         place,

@@ -110,7 +110,7 @@ def diabolo() -> Figure:
         figure = look.new_figure(7.0, 3.4)
         # Axes in space are square: taller than the figure, so that they are as wide.
         figure.set_layout_engine("none")
-        place = (0, 0.57 - 3.5 / 3.4, 1, 7 / 3.4)
+        place = (0, 0.55 - 3.5 / 3.4, 1, 7 / 3.4)
         ax = figure.add_axes(place, projection="3d", computed_zorder=False)
         plane = 0.8 * np.array([[-1, -1], [1, -1], [1, 1], [-1, 1], [-1, -1]]).T
         ax.plot(*_turned(np.zeros(5), *plane), color=look.GREY, linewidth=0.8, zorder=1)
@@ -133,11 +133,14 @@ def diabolo() -> Figure:
             shown = [np.where(side * x >= 0, c, np.nan) for c in _turned(x, y, z)]
             ax.plot(*shown, color=color, linewidth=2.0, zorder=5)
         ax.plot([0], [0], [0], "o", color="black", markersize=5, zorder=6)
-        for at, words in (((1.25, 0.2, 0), "$D_a$"), ((-1.25, -0.2, 0), "$D_r$")):
-            ax.text(*at, words, ha="center", fontsize=10, zorder=7, path_effects=look.halo())
+        for at, words, side in (
+            ((1.2, 0.2, 0), "$D_a$", "right"),
+            ((-1.25, -0.2, 0), "$D_r$", "left"),
+        ):
+            ax.text(*at, words, ha=side, fontsize=10, zorder=7, path_effects=look.halo())
         ax.set_axis_off()
         ax.view_init(elev=16, azim=-78)
-        ax.set_box_aspect((2, 1.4, 0.62), zoom=1.38)
+        ax.set_box_aspect((2, 1.4, 0.62), zoom=1.24)
         handles = [
             Patch(color=look.BLUE, alpha=0.4, label="orbits fall in"),
             Patch(color=look.ORANGE, alpha=0.4, label="orbits come out"),

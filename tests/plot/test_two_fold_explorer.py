@@ -224,6 +224,28 @@ def test_keys_move_the_point_and_everything_follows(browser, page):
 
 
 @pytest.mark.browser
+def test_classes_have_the_colours_of_the_atlas_and_boundaries_of_many_are_listed(browser, page):
+    from nonsmooth.plot.two_fold_atlas import FILLS
+
+    browser.open(page, hash="folds=VI&nu=-1,1")
+    assert shown(browser)["label"].endswith("between mix-0, mix-S, mix-C and mix-F")
+    fills = browser.run(
+        """
+        return Object.fromEntries(given[0].map((label) => {
+          const shape = document.createElementNS("http://www.w3.org/2000/svg", "path");
+          shape.setAttribute("class", `class-${label}`);
+          document.querySelector("svg").append(shape);
+          const fill = getComputedStyle(shape).fill.match(/\\d+/g).map(Number);
+          shape.remove();
+          return [label, "#" + fill.map((v) => v.toString(16).padStart(2, "0")).join("").toUpperCase()];
+        }));
+        """,
+        list(FILLS),
+    )
+    assert fills == {label: color for label, (color, _) in FILLS.items()}
+
+
+@pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     for words in ("folds=toString&nu=a,b", "folds=XX&nu=1", "nu=NaN,1", "%E0%A4%A"):
         browser.open(page, hash=words)

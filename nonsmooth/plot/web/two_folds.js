@@ -431,7 +431,7 @@
   function drawWords(f, found) {
     const boundary = Boolean(found.between);
     const label = say(
-      found.label.replace(/^boundary ([^:]*): (.*)$/, "$1, between $2").replaceAll("|", " and "),
+      found.label.replace(/^boundary ([^:]*): (.*)$/, "$1, between $2").replaceAll(/[|](?=.*[|])/g, ", ").replace("|", " and "),
     );
     byId("label").textContent = `${boundary ? "On a boundary: " : "Class "}${label}`;
     byId("determinism").textContent = boundary

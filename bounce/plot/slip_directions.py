@@ -116,8 +116,9 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
                 *vortex.omega, "o", color="white", markeredgecolor="black", markersize=8, zorder=6
             )
             style.write(
-                ax, tuple(vortex.omega), f"  {vortex.winding:+d}", ha="left", va="bottom", zorder=7
-            )
+                ax, tuple(vortex.omega), f"{vortex.winding:+d}  ", ha="right", va="bottom", zorder=7,
+                fontweight="bold", path_effects=style.halo(3.0),
+            )  # fmt: skip
         ax.set_xlabel(r"lateral spin, $\omega_z$ (backspin)")
         ax.set_ylabel(r"axial spin, $-\omega_x$ (slips to the right)")
         v = directions.xdot

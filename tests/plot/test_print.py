@@ -86,6 +86,15 @@ def saddle_manifold():
     return ns.manifold(system, saddle, stable=True, length=1.0)
 
 
+def proof():
+    pytest.importorskip("flint")
+    y, z = ca.SX.sym("y"), ca.SX.sym("z")
+    above, below = [-y, 1, -mu], [z, -1, 1 + 0.1 * y]
+    system = ns.FilippovSystem([x, y, z], surface=x, above=above, below=below, parameters={mu: 2})
+    fold = ns.find_two_fold(system, near=[0.0, 0.1, -0.1])
+    return ns.certify(fold, parameters={"mu": (0.5, 3)}, max_pieces=32)
+
+
 def harvest():
     return ns.textbook.harvested_prey_predator().system
 
@@ -106,6 +115,7 @@ DRAWN = {
     "multipliers": [lambda: ns.plot.multipliers(ns.periodic_orbit(BLOCK, run()))],
     "periodic_orbit": [lambda: ns.plot.periodic_orbit(ns.periodic_orbit(BLOCK, run()))],
     "phase_portrait": [lambda: ns.plot.phase_portrait(harvest(), (0.0, 1.1, 0.5, 1.5))],
+    "proof_map": [lambda: ns.plot.proof_map(proof())],
     "sliding_portrait": [
         lambda: ns.plot.sliding_portrait(ns.textbook.two_fold("mix-S").system, (-1, 1, -1, 1))
     ],

@@ -193,11 +193,10 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
     if count < 2:
         return 1  # nothing to divide
     while True:
-        x, p = starts.rows(np.linspace(0, count - 1, k).astype(np.int64))
-        began = time.perf_counter()
-        run_chunk(job, x, p)
-        spent = time.perf_counter() - began
-        if spent > _PROBE or 64 * k > count:
+        spent = _probe(job, starts, k)
+        if _PROBE < spent < _WORTH and 64 * k <= count:
+            spent = min(spent, _probe(job, starts, k))  # another process may have had the processor
+        if spent > _PROBE or 64 * k > count or (k >= _LEAST and 8 * spent > _PROBE):
             break
         k *= 8
     every = max(spent / k, 1e-9)
@@ -205,6 +204,14 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
         return max(count, 1)
     size = min(_SECONDS / every, count / (4 * workers), _LARGEST)
     return max(math.ceil(size), min(_LEAST, math.ceil(count / workers)) if every < 1e-3 else 1)
+
+
+def _probe(job: Job, starts: Starts, k: int) -> float:
+    """Seconds that k of the trajectories take."""
+    x, p = starts.rows(np.linspace(0, starts.count - 1, k).astype(np.int64))
+    began = time.perf_counter()
+    run_chunk(job, x, p)
+    return time.perf_counter() - began
 
 
 #: The number of a chunk, its starts and parameters, the arrays for its results.

@@ -226,3 +226,22 @@ def test_a_worker_that_is_lost_costs_its_chunk(whole, tmp_path):
         found = ns.ensemble(BLOCK, STARTS, work=work, **OPTIONS)
         assert killed and killed[0] not in client.run(os.getpid).values()
     assert_same(found, whole)
+
+
+def test_an_interrupted_probe_does_not_make_small_chunks(monkeypatch):
+    """Another process has the processor while the first trajectory is timed; it takes 1e-6 s."""
+    clock, calls = [0.0], []
+
+    def run(job, x, p):
+        calls.append(len(x))
+        clock[0] += 1e-6 * len(x) + (0.01 if len(calls) == 1 else 0.0)
+
+    monkeypatch.setattr(work_module, "run_chunk", run)
+    monkeypatch.setattr(work_module.time, "perf_counter", lambda: clock[0])
+
+    class Many:
+        count = 200_000
+        rows = staticmethod(lambda index: (index, None))
+
+    assert size_of_chunk(None, Many, 1) == 50_000
+    assert sum(calls) < 0.01 * Many.count

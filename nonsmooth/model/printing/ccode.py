@@ -234,7 +234,7 @@ class _Graph:
             for k, j in enumerate(row):
                 stores.setdefault(j, []).append(f"{array}[{k}]")
         lines = []
-        reachable = self._reachable(list(stores), moving=True)
+        reachable = self._early(outputs)
         divisors = self.divisors & {
             self.nodes[j].args[1] for j in reachable if self.nodes[j].op == "div"
         }
@@ -271,6 +271,18 @@ class _Graph:
                 found.add(j)
                 pending += [a for a in self._arguments(j) if self.moving[a] == moving]
         return sorted(found)
+
+    def _early(self, outputs: Sequence[Sequence[int]]) -> list[int]:
+        """Nodes in an order for their statements: what only later outputs need follows what it is made of.
+
+        At the end, where their numbers put them, all of that would have to be read again.
+        """
+        first = self._reachable(list(outputs[0]), moving=True)
+        key = {j: j for j in first}
+        for j in self._reachable([j for row in outputs for j in row], moving=True):
+            if j not in key:
+                key[j] = max((key[a] for a in self._arguments(j) if a in key), default=-1)
+        return sorted(key, key=lambda j: (key[j], j))
 
     def _arguments(self, j: int) -> list[int]:
         """Arguments of the statement that a node is printed as: a choice skips its halves."""

@@ -49,7 +49,10 @@ def in_span(
     table = np.array([[form.get(m, 0.0) for m in monomials] for form in bent])
     table = table.reshape(len(bent), len(monomials))
     basis, result = table[: len(rows)].T, []
-    for target in table[len(rows) :]:
+    for function, target in zip(functions, table[len(rows) :], strict=True):
+        if not target.any() and not ca.is_linear(function, variables):
+            result.append(False)  # its coefficients are below the least number
+            continue
         weights = np.linalg.lstsq(basis, target, rcond=None)[0] if basis.size else np.zeros(0)
         left = target - basis @ weights if basis.size else target
         result.append(bool(np.abs(left).max(initial=0.0) <= _LEFT * np.abs(target).max(initial=0)))

@@ -87,9 +87,16 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
 def _checked(
     system: FilippovSystem, fields: list[ca.SX]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Rows of the field that are not affine in every mode, and guards that show more than they."""
+    """Rows of the field that are not affine in every mode, without combinations of the others, and
+    guards that show more than they.
+    """
     x, p = system.extended_states, system.parameter_symbols
-    rows = tuple(i for i in range(x.numel()) if not all(ca.is_linear(f[i], x) for f in fields))
+    rows = [i for i in range(x.numel()) if not all(ca.is_linear(f[i], x) for f in fields)]
+    modes = [motion(system, mode).field for mode in ("+-s" if system.surface_count else ("",))]
+    for i in reversed(rows):
+        others = [j for j in rows if j != i]
+        if all(in_span([f[i]], [f[j] for j in others], x, p)[0] for f in modes):
+            rows = others
     stops = ca.vertsplit(system.definition.guards) if system.definition.guards.numel() else []
     if not system.surface_count:
         wanted = [(k, stop, "") for k, stop in enumerate(stops)]
@@ -104,7 +111,7 @@ def _checked(
         bent = [field[i] for i in range(x.numel()) if not ca.is_linear(field[i], x)]
         if not ca.is_linear(function, x) and not in_span([function], bent, x, p)[0]:
             slots.add(slot)
-    return rows, tuple(sorted(slots))
+    return tuple(rows), tuple(sorted(slots))
 
 
 def _side_fields(system: FilippovSystem, lam: ca.SX) -> list[ca.SX]:

@@ -16,7 +16,7 @@ from .compiled.tape import tape_for
 from .facts import HAND_OVER, KINDS
 from .options import Options
 from .reference.driver import Driver
-from .results import Chunk, Stopped
+from .results import Chunk, Stopped, kinds_of
 from .section import Times
 from .status import Status
 from .view import sampled
@@ -82,7 +82,7 @@ def run_chunk(
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(len(x), bool)
     start = np.where(bad[:, None], np.nan, x) if bad.any() else x
     times = None if job.times is None else job.times.of(p)
-    chunk = out or Chunk.empty(len(x), system.dimension, job.at is not None, job.room)
+    chunk = out or Chunk.empty(len(x), system, job.at is not None, job.room)
     if job.engine == "reference":
         _refuse(chunk, system, start, job.options)
     else:
@@ -126,7 +126,7 @@ def _refuse(chunk: Chunk, system: FilippovSystem, x: Array, options: Options) ->
     chunk.x[bad], chunk.t[bad] = x[bad, : system.dimension], options.t_start
     chunk.status[:] = np.where(bad, Status.NOT_FINITE, HAND_OVER)
     chunk.itinerary[:] = chunk.kinds[:] = 0
-    chunk.kinds[bad, KINDS.index("end")] = 1
+    chunk.kinds[bad, -1] = 1
     chunk.forget()
     chunk.words.append("")
 
@@ -148,10 +148,11 @@ def _run_reference(
     chunk.itinerary[i] = code
     chunk.kinds[i] = 0
     chunk.part(i, i + 1).forget()
+    names = kinds_of(system)
     for event in run.events:
-        kind = KINDS.index(event.kind)
-        chunk.kinds[i, kind] += 1
-        if job.at == (kind, chunk.kinds[i, kind]) and chunk.at_x is not None:
+        column = names.index(event.kind)
+        chunk.kinds[i, column] += 1
+        if job.at == (KINDS.index(event.kind), chunk.kinds[i, column]) and chunk.at_x is not None:
             assert chunk.at_t is not None
             chunk.at_x[i], chunk.at_t[i] = event.x, event.t
     if chunk.sample_t is not None and chunk.sample_x is not None:

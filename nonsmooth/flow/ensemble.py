@@ -140,10 +140,9 @@ def _run(job: Job, starts: Starts, work: Work) -> Ensemble:
     saved = work.saved(lambda: _problem(system, starts, job), size)
     arrays, codes = None, None
     if isinstance(saved, Stored):
-        arrays = saved.arrays(Chunk.empty(0, system.dimension, job.at is not None, job.room), count)
+        arrays = saved.arrays(Chunk.empty(0, system, job.at is not None, job.room), count)
         codes = saved.codes(count)
-    names, keeps = system.state_names, job.at is not None
-    results = Collected(system.dimension, starts.shape, keeps, job.room, names, arrays)
+    results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
     run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved)
     return results.ensemble(codes)
 

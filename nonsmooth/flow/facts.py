@@ -101,6 +101,9 @@ OVERFLOW = 1e280
 #: Kinds of events, by number in ensembles and in C.
 KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
 
+#: So many of them, the first and the last, can happen without resets and impacts.
+SIMPLE_KINDS = 5
+
 #: Kinds of guards, by number in C, and which is served first among simultaneous ones.
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),

@@ -10,23 +10,50 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import Array
+from ..model import Array, FilippovSystem
 from ..model.cards import card
 from . import tables
-from .facts import KINDS
+from .facts import KINDS, SIMPLE_KINDS
 from .saving import Savable
 from .status import Status
+
+#: Results smaller than this (bytes) are in one piece of memory.
+_LARGE = 1 << 25
 
 
 class Stopped(Exception):
     """The work was told to stop before it was done."""
 
 
+def kinds_of(system: FilippovSystem) -> tuple[str, ...]:
+    """Kinds of events that a system can have: what cannot happen is not counted."""
+    if system.resets or system.impacts:
+        return KINDS
+    return (*KINDS[: SIMPLE_KINDS - 1], KINDS[-1])
+
+
+def _block(arrays: Mapping[str, tuple[tuple[int, ...], type]]) -> dict[str, Any]:
+    """Arrays of some shapes and types, large numbers first, in one piece of memory unless they are large.
+
+    The C library gives free memory back to the system when it is twice its largest piece, and pages that
+    were given back take long to get again.
+    """
+    sizes = [math.prod(shape) * np.dtype(kind).itemsize for shape, kind in arrays.values()]
+    if sum(sizes) > _LARGE:
+        return {name: np.empty(shape, kind) for name, (shape, kind) in arrays.items()}
+    block, used, result = np.empty(sum(sizes), np.uint8), 0, {}
+    for size, (name, (shape, kind)) in zip(sizes, arrays.items(), strict=True):
+        result[name] = np.ndarray(shape, kind, block.data, used)
+        used += size
+    return result
+
+
 @dataclass
 class Chunk:
     """Results of some trajectories; itineraries as numbers into ``words``, which are sorted.
 
-    ``totals``: steps, events and trajectories handed over by the lanes.
+    ``kinds`` are events by kind, a column for each of ``kinds_of``; ``totals``: steps, events and
+    trajectories handed over by the lanes.
     """
 
     x: Array
@@ -42,19 +69,23 @@ class Chunk:
     totals: NDArray[np.int64] = field(default_factory=lambda: np.zeros(4, np.int64))
 
     @classmethod
-    def empty(cls, count: int, n: int, at: bool, room: int | None = None) -> Chunk:
-        """Arrays without values for ``count`` trajectories of ``n`` states, ``room`` samples each."""
+    def empty(cls, count: int, system: FilippovSystem, at: bool, room: int | None = None) -> Chunk:
+        """Arrays without values for ``count`` trajectories of a system, ``room`` samples each."""
+        n, kinds = system.dimension, len(kinds_of(system))
+        shapes: dict[str, tuple[tuple[int, ...], type]] = {
+            "x": ((count, n), np.float64),
+            "t": ((count,), np.float64),
+            "kinds": ((count, kinds), np.int32),
+            "itinerary": ((count,), np.int32),
+            "status": ((count,), np.int8),
+        }
         return cls(
-            x=np.empty((count, n)),
-            t=np.empty(count),
-            status=np.empty(count, np.int8),
-            itinerary=np.empty(count, np.int32),
             words=[],
-            kinds=np.empty((count, len(KINDS)), np.int32),
             at_x=np.empty((count, n)) if at else None,
             at_t=np.empty(count) if at else None,
             sample_t=None if room is None else np.empty((count, room)),
             sample_x=None if room is None else np.empty((count, room, n)),
+            **_block(shapes),
         )
 
     def part(self, first: int, last: int) -> Chunk:
@@ -94,7 +125,7 @@ class Chunk:
         table = np.zeros(max(words, default=0) + 1, np.int32)
         for code, word in words.items():
             table[code] = number[word]
-        self.itinerary[:] = table[self.itinerary]
+        self.itinerary[:] = table.take(self.itinerary)
 
 
 @dataclass(frozen=True, repr=False)
@@ -198,31 +229,27 @@ class Collected:
 
     Parameters
     ----------
-    dimension : int
-        Number of states.
+    system : FilippovSystem
     shape : tuple of int
         Of the broadcast starts and parameters.
     at : bool
         Whether the state at an event is kept.
     room : int or None
         Samples kept of each trajectory.
-    names : tuple of str
-        Of the states.
     arrays : Chunk, optional
         Where the results go; new arrays in memory unless given.
     """
 
     def __init__(
         self,
-        dimension: int,
+        system: FilippovSystem,
         shape: tuple[int, ...],
         at: bool,
         room: int | None = None,
-        names: tuple[str, ...] = (),
         arrays: Chunk | None = None,
     ):
-        self.shape, self.names = shape, names
-        self.all = Chunk.empty(math.prod(shape), dimension, at, room) if arrays is None else arrays
+        self.system, self.shape = system, shape
+        self.all = Chunk.empty(math.prod(shape), system, at, room) if arrays is None else arrays
         self._words: dict[str, int] = {}
         self._parts: list[tuple[int, int, NDArray[np.int32]]] = []
 
@@ -230,7 +257,7 @@ class Collected:
         """Take a chunk that begins with trajectory ``first``; its arrays may be a part of these."""
         whole = self.all.arrays()
         for name, array in chunk.arrays().items():
-            if array.base is not whole[name]:
+            if not np.may_share_memory(array, whole[name]):
                 whole[name][first : first + len(array)] = array
         numbers = [self._words.setdefault(w, len(self._words)) for w in chunk.words]
         self._parts.append((first, first + len(chunk.t), np.array(numbers, np.int32)))
@@ -241,9 +268,9 @@ class Collected:
         place = np.empty(len(words), np.int32)
         for k, word in enumerate(words):
             place[self._words[word]] = k
-        code = np.empty(len(every.t), np.int32) if codes is None else codes
+        code = every.itinerary if codes is None else codes
         for first, last, numbers in self._parts:
-            code[first:last] = place[numbers][every.itinerary[first:last]]
+            code[first:last] = place[numbers].take(every.itinerary[first:last])
         n, shape = every.x.shape[1], self.shape
         return Ensemble(
             x=every.x.reshape(*shape, n),
@@ -251,7 +278,7 @@ class Collected:
             status=every.status.reshape(shape),
             itineraries=tuple(words),
             itinerary_code=code.reshape(shape),
-            events={kind: every.kinds[:, k].reshape(shape) for k, kind in enumerate(KINDS)},
+            events=self._events(),
             event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
             event_t=None if every.at_t is None else every.at_t.reshape(shape),
             sample_x=None
@@ -260,5 +287,11 @@ class Collected:
             sample_t=None
             if every.sample_t is None
             else every.sample_t.reshape(*shape, *every.sample_t.shape[1:]),
-            state_names=self.names,
+            state_names=self.system.state_names,
         )
+
+    def _events(self) -> dict[str, NDArray[np.int32]]:
+        """Numbers of events by kind; all kinds that cannot happen share one zero."""
+        never, kinds = np.broadcast_to(np.int32(0), self.shape), kinds_of(self.system)
+        counted = {kind: self.all.kinds[:, k].reshape(self.shape) for k, kind in enumerate(kinds)}
+        return {kind: counted.get(kind, never) for kind in KINDS}

@@ -52,6 +52,7 @@ class BatchStructure(ctypes.Structure):
         *[(name, _POINTER) for name in ("kinds", "at_x", "at_t", "totals")],
         *[(name, _I64) for name in ("room", "times_stride")],
         *[(name, _POINTER) for name in ("times", "sample_t", "sample_x")],
+        ("kinds_width", _I64),
     ]
 
 
@@ -290,9 +291,10 @@ def options_of(
         count,
         int(dense),
     )
-    made.kept = _named(system, o.hits)
-    made.hit_named, made.hit_width, made.hit_every = address(made.kept), made.kept.shape[1], 1
+    made.hit_every = 1
     if o.hits is not None:
+        made.kept = _named(system, o.hits)
+        made.hit_named, made.hit_width = address(made.kept), made.kept.shape[1]
         made.hit_after, made.hit_skip, made.hit_every = int(o.hits.after), o.hits.skip, o.hits.every
         made.hit_kinds = sum(1 << i for i, kind in enumerate(KINDS) if kind in o.hits.kinds)
         made.hit_count = o.hits.count or 0
@@ -300,7 +302,7 @@ def options_of(
     return made
 
 
-def _named(system: FilippovSystem, hits: Hits | None) -> NDArray[np.int8]:
+def _named(system: FilippovSystem, hits: Hits) -> NDArray[np.int8]:
     """Whether the guards of each kind have a name that is looked for."""
     names = {
         **dict.fromkeys(("surface", "near"), system.surface_names),
@@ -312,7 +314,7 @@ def _named(system: FilippovSystem, hits: Hits | None) -> NDArray[np.int8]:
     width = max(1, *map(len, names.values()))
     named = np.zeros((len(GUARDS), width), np.int8)
     for row, kind in zip(named, GUARDS, strict=True):
-        if hits is None or hits.names is None:
+        if hits.names is None:
             row[:] = 1
         else:
             own = names.get(kind, ())
@@ -336,8 +338,9 @@ def batch_of(
     arrays = [address(a) for a in (which, x, p, *results, *kept)]
     room = 0 if chunk.sample_t is None else chunk.sample_t.shape[1]
     times_stride = 0 if times is None or times.ndim == 1 else times.shape[1]
+    width = chunk.kinds.shape[1]
     samples = [address(a) for a in (times, chunk.sample_t, chunk.sample_x)]
-    return BatchStructure(count, stride, t_start, *arrays, room, times_stride, *samples)
+    return BatchStructure(count, stride, t_start, *arrays, room, times_stride, *samples, width)
 
 
 def words_of(

@@ -34,6 +34,7 @@ typedef struct {
   int64_t room, times_stride; /* samples of each trajectory; times are NULL where hits are kept */
   const double *times;
   double *sample_t, *sample_x;
+  int64_t kinds_width; /* kinds that are counted: the first ones, and the last */
 } Batch;
 
 /* Sizes of what Python and C share, compared when a library is loaded. */

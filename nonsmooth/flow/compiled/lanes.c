@@ -21,7 +21,7 @@
 
 typedef struct {
   T x[N], q[NQ], t, lambda, last_event, shortest, length; /* of the step before in the same mode, or 0 */
-  I slides, above, drop, live, steps, events, kinds[KINDS], shrinking;
+  I slides, above, drop, live, steps, events, kinds[LAST_KIND], shrinking;
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
   double size; /* of states at which both tolerances are as large */
@@ -79,49 +79,50 @@ static void note_modes(Lanes *s, Work *w, I which) {
 static void store(Lanes *s, Work *w, int l, int status) {
   const Batch *b = w->b;
   int64_t i = s->index[l];
-  LANE_I(s->live, l) = 0;
   w->alive--;
   b->totals[0] += LANE_I(s->steps, l);
   b->totals[1] += LANE_I(s->events, l);
-  int finite = 1;
-  for (int k = 0; k < ND; k++) finite &= isfinite(LANE(s->x[k], l)) != 0;
-  if (!finite) status = HAND_OVER;
   b->status[i] = (int8_t)status;
   if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
   b->itinerary[i] = itinerary(s, w, l);
-  for (int k = 0; k < KINDS; k++) b->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
-  b->kinds[i * KINDS + END] += status == REACHED_END;
+  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
+  for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
+  kinds[LAST_KIND] = status == REACHED_END;
 }
+
+/* The runs of these lanes end. */
+static void finish_lanes(Lanes *s, Work *w, I which, int status) {
+  which &= s->live;
+  s->live &= ~which;
+  for EACH(l, which) store(s, w, l, status);
+}
+
+static void hand_over(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
 
 static void refuse(const Batch *b, int64_t i) {
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
   b->t[i] = b->t0;
   b->status[i] = NOT_FINITE;
   b->itinerary[i] = 0;
-  memset(b->kinds + i * KINDS, 0, KINDS * sizeof(int32_t));
-  b->kinds[i * KINDS + END] = 1;
+  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
+  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
 }
 
-/* Put the next start into a lane; 0 if there is none. */
-static int load(Lanes *s, Work *w, int l) {
+/* Put the next start into a lane; 0 if there is none. Vectors are written whole: what is written in parts
+ * cannot be read soon. */
+static int load(Lanes *s, Work *w, int l, I mine) {
   const Batch *b = w->b;
   while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
   if (w->next >= b->count) return 0;
   int64_t i = w->next++;
-  for (int k = 0; k < N; k++) LANE(s->x[k], l) = b->x0[i * N + k];
+  UNROLL for (int k = 0; k < N; k++) s->x[k] = SELECT(mine, BC(b->x0[i * N + k]), s->x[k]);
   if (b->p_stride) {
     double q[NQ];
     prepare(b->p + i * b->p_stride, q);
-    for (int k = 0; k < NQ; k++) LANE(s->q[k], l) = q[k];
+    for (int k = 0; k < NQ; k++) s->q[k] = SELECT(mine, BC(q[k]), s->q[k]);
   }
-  LANE(s->t, l) = LANE(s->last_event, l) = b->t0;
-  LANE(s->shortest, l) = 1e-3;
-  LANE(s->length, l) = 0;
-  LANE_I(s->live, l) = -1;
-  LANE_I(s->code, l) = LANE_I(s->steps, l) = LANE_I(s->events, l) = LANE_I(s->shrinking, l) = LANE_I(s->drop, l) = 0;
-  for (int k = 0; k < KINDS; k++) LANE_I(s->kinds[k], l) = 0;
   s->index[l] = i;
   s->base[l] = 0;
   w->alive++;
@@ -129,13 +130,25 @@ static int load(Lanes *s, Work *w, int l) {
 }
 
 static I refill(Lanes *s, Work *w) {
-  I fresh = {0};
-  for EACH(l, ~s->live) if (load(s, w, l)) LANE_I(fresh, l) = -1;
+  I fresh = {0}, number;
+  UNROLL for (int l = 0; l < W; l++) number[l] = l;
+  for EACH(l, ~s->live) {
+    I mine = number == (int64_t)l;
+    if (!load(s, w, (int)l, mine)) break;
+    fresh |= mine;
+  }
+  s->t = SELECT(fresh, BC(w->b->t0), s->t);
+  s->last_event = SELECT(fresh, s->t, s->last_event);
+  s->shortest = SELECT(fresh, BC(1e-3), s->shortest);
+  s->length = SELECT(fresh, BC(0), s->length);
+  s->live |= fresh;
+  s->code &= ~fresh;
+  s->steps &= ~fresh;
+  s->events &= ~fresh;
+  s->shrinking &= ~fresh;
+  s->drop &= ~fresh;
+  for (int k = 0; k < LAST_KIND; k++) s->kinds[k] &= ~fresh;
   return fresh;
-}
-
-static void hand_over(Lanes *s, Work *w, I which) {
-  for EACH(l, which & s->live) store(s, w, l, HAND_OVER);
 }
 
 /* The surface -------------------------------------------------------------------------------- */
@@ -151,7 +164,7 @@ INLINE I project(Lanes *s, I which) {
     T h, g[N], size = BC(0);
     surface_values(s->x, s->q, s->slides, s->above, s->lambda, &h, g);
     UNROLL for (int i = 0; i < ND; i++) size += g[i] * g[i];
-    T step = SELECT(which & (I)(h != 0), h / size, BC(0));
+    T step = SELECT(which & (I)(h != 0), h * QUICK_INVERSE(size), BC(0));
     UNROLL for (int i = 0; i < ND; i++) s->x[i] -= step * g[i];
   }
   if (CURVED) {
@@ -400,7 +413,7 @@ INLINE void polish_guards(Guards *v, T margin) {
     T a[P + 1], end = BC(0), guess = BC(INFINITY), d = BC(0);
     I mine[S1];
     UNROLL for (int j = 0; j < SLOTS; j++) {
-      T g = v->a[j][0] / (v->a[j][0] - v->end[j]);
+      T g = MIN(v->a[j][0] * ROUGH_INVERSE(v->a[j][0] - v->end[j]), BC(1));
       mine[j] = v->one[j] & (g < guess);
       guess = SELECT(mine[j], g, guess);
       for (int i = 0; i < j; i++) mine[i] &= ~mine[j];
@@ -446,7 +459,7 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *
   UNROLL for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
   if (any(hard)) resolve(&v);
   T tie = NEAR * MAX(BC(1), ABS(s->t));
-  if (SLOTS > 0) polish_guards(&v, tie / h);
+  if (SLOTS > 0) polish_guards(&v, tie * QUICK_INVERSE(h));
   T best = BC(INFINITY), second = BC(INFINITY);
   *slot = (I){0};
   UNROLL for (int j = 0; j < SLOTS; j++) {
@@ -549,8 +562,8 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
   check_values(x, s->q, s->slides, s->above, s->lambda, f, guard);
   UNROLL for (int m = 0; m < ROWS; m++) {
     const T *row = c[ROW[m]];
-    T d = degree * row[degree];
-    UNROLL for (int k = degree - 1; k >= 1; k--) d = d * at + k * row[k];
+    T v = row[degree], d = v; /* the slope comes with the value */
+    UNROLL for (int k = degree - 1; k >= 1; k--) { v = v * at + row[k]; d = d * at + v; }
     wrong |= ~(I)(ABS(f[m] - d) * dt <= WRONG * allowed[ROW[m]] + VANISHES * dt * ABS(d));
   }
   UNROLL for (int m = 0; m < GUARDS; m++) {
@@ -586,10 +599,6 @@ INLINE I unchecked(Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 1], co
   return wrong;
 }
 
-static void finish_lanes(Lanes *s, Work *w, I which, int status) {
-  for EACH(l, which & s->live) store(s, w, l, status);
-}
-
 /* Lanes where a stop was passed between two steps: rounding hid it from the first. */
 INLINE I passed_between(Lanes *s, T g[S1][P + 1]) {
   I passed = {0};
@@ -601,6 +610,12 @@ INLINE I passed_between(Lanes *s, T g[S1][P + 1]) {
     s->above_stop[j] = above;
   }
   return passed;
+}
+
+INLINE I finite_lanes(const Lanes *s) {
+  T sum = BC(0);
+  UNROLL for (int i = 0; i < ND; i++) sum += s->x[i] - s->x[i];
+  return sum == 0;
 }
 
 static void step(Lanes *s, Work *w) {
@@ -641,6 +656,7 @@ static void step(Lanes *s, Work *w) {
 #endif
   s->t = SELECT(live & last & (I)(dt == left), BC(o->t_end), s->t);
   last &= live & (slot == 0);
+  unclear |= ~finite_lanes(s);
   hand_over(s, w, unclear);
   finish_lanes(s, w, stopped & ~unclear, STOPPED);
   finish_lanes(s, w, last & ~unclear, REACHED_END);

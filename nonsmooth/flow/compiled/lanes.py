@@ -89,7 +89,7 @@ class Lanes:
         Stopped
         CompilerError
         """
-        chunk = out or Chunk.empty(len(x), self.system.dimension, at is not None)
+        chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
         c_options = options_of(self.system, options, dense=False, at=at)

@@ -1,5 +1,6 @@
 /* Polynomials of degree P on [0, 1], W at once: whether they have a root there, and where. */
 #define HEAD 5 /* below P, which is 6 at least */
+#define NEXT (P < 8 ? P : 8) /* terms after the head that are bounded apart from the last */
 #define MODEL (P < 8 ? P : 8)
 
 /* Power coefficients of degree n on [0, 1] to Bernstein coefficients, in place. */
@@ -15,14 +16,15 @@ INLINE void to_bernstein(T *b, int n) {
  * below zero and falls throughout, is concave or is convex, so it has exactly one root.
  * ``unresolved``: the series does not converge well within the step. */
 INLINE void screen(const T *a, I *none, I *one, I *unresolved, T *end) {
-  T tail = BC(0), tail1 = BC(0), tail2 = BC(0), sum = BC(0), b[HEAD + 1];
+  T near = BC(0), far = BC(0), sum = BC(0), b[HEAD + 1];
   UNROLL for (int k = HEAD + 1; k <= P; k++) {
-    T c = ABS(a[k]);
-    tail += c;
-    tail1 += (double)k * c;
-    tail2 += (double)(k * (k - 1)) * c;
+    if (k <= NEXT) near += ABS(a[k]);
+    else far += ABS(a[k]);
     sum += a[k];
   }
+  T tail = near + far; /* and of the derivatives, by the largest factor of each part */
+  T tail1 = (double)NEXT / HEAD * near + (double)P / HEAD * far;
+  T tail2 = (NEXT * (NEXT - 1.0) / (HEAD * (HEAD - 1))) * near + (P * (P - 1.0) / (HEAD * (HEAD - 1))) * far;
   T noise = tail;
   UNROLL for (int k = 0; k <= HEAD; k++) { b[k] = a[k]; noise += ABS(a[k]); }
   to_bernstein(b, HEAD);
@@ -36,8 +38,6 @@ INLINE void screen(const T *a, I *none, I *one, I *unresolved, T *end) {
   }
   *end = b[HEAD] + sum;
   *unresolved = MAX(ABS(a[P]), ABS(a[P - 1])) > RESOLVED * noise;
-  tail1 *= 1.0 / HEAD;
-  tail2 *= 1.0 / (HEAD * (HEAD - 1));
   I simple = (steepest + tail1 < 0) | (I)(most + tail2 < 0), positive = *end > -ROUNDING * noise;
   *none = (low > tail) | (simple & positive);
   *one = (simple | (I)(least > tail2)) & ~positive;
@@ -73,9 +73,23 @@ INLINE I converged(const T *f, T third, T step) {
   return (ABS(step) <= 2e-6) & (I)(error <= 1e-16 * (f[1] * f[1]));
 }
 
+/* In a bracket, or it goes to another root. */
+INLINE I within(T next, T lo, T hi) { return (next >= lo - 4 * EPSILON) & (next <= hi + 4 * EPSILON); }
+
+/* After a step of Halley's iteration one of Newton's, with the slope where it ended from the coefficients where
+ * it began. Lanes where this leaves less than rounding get its end and that slope. */
+INLINE I corrected(const T *a, const T *f, T third, T step, T lo, T hi, T *next, T *slope) {
+  T there = f[1] - 2.0 * step * f[2], more = values_at(a, P, *next, *next * *next) * QUICK_INVERSE(there);
+  T end = *next - more, error = ABS(more) * (ABS(more * f[2]) + 3.0 * third * (step * step));
+  I good = (ABS(step) <= 1e-2) & (I)(ABS(more) <= 1e-8) & (I)(error <= 1e-16 * ABS(there)) & within(end, lo, hi);
+  *next = SELECT(good, end, *next);
+  *slope = SELECT(good, there, *slope);
+  return good;
+}
+
 /* The root of a polynomial with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
  * not move any more. It starts from the root of a parabola with the same end, improved once on a
- * polynomial of degree MODEL with the same end: one full iteration is then enough as a rule. */
+ * polynomial of degree MODEL with the same end: one full iteration, corrected, is then enough as a rule. */
 INLINE T polish(const T *a, T end, I active, T *slope) {
   T lo = BC(0), hi = BC(1), f[3], top = end;
   T disc = a[1] * a[1] - 4.0 * a[0] * (end - a[0] - a[1]);
@@ -89,16 +103,16 @@ INLINE T polish(const T *a, T end, I active, T *slope) {
   T third = ABS(a[3]) + s * (4.0 * ABS(a[4]) + s * (10.0 * ABS(a[5]) + s * (20.0 * ABS(a[6]))));
   for (int it = 0; it < 60; it++) {
     expand(a, P, a[P], s, f);
-    T step = f[0] * f[1] / (f[1] * f[1] - f[0] * f[2]), next = s - step;
+    T step = f[0] * f[1] * INVERSE(f[1] * f[1] - f[0] * f[2]), next = s - step, at_end = f[1];
     I positive = f[0] > 0;
     lo = SELECT(positive & active, s, lo);
     hi = SELECT(positive | ~active, hi, s);
-    I held = (next >= lo - 4 * EPSILON) & (next <= hi + 4 * EPSILON); /* or it goes to another root */
-    I small = (converged(f, third, step) & held) | (I)(hi - lo <= 4 * EPSILON);
     I inside = (next > lo) & (next < hi);
+    I small = (converged(f, third, step) & within(next, lo, hi)) | (I)(hi - lo <= 4 * EPSILON);
+    if (any(active & ~small)) small |= inside & ~small & corrected(a, f, third, step, lo, hi, &next, &at_end);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
-    *slope = SELECT(active, f[1], *slope);
+    *slope = SELECT(active, at_end, *slope);
     active &= ~small;
     if (!any(active)) break;
   }

@@ -26,7 +26,7 @@ enum { OFF, ON, LEAVING, POOLS };
 /* All members are vectors, so that a trajectory is a column of words. */
 typedef struct {
   T x[N], t, last_event, shortest, length, left_at, lam[K]; /* when the set was left, and in which direction */
-  I behind, live, steps, events, kinds[KINDS], shrinking, code, base, index;
+  I behind, live, steps, events, kinds[LAST_KIND], shrinking, code, base, index;
   I above_stop[STOPS > 0 ? STOPS : 1];
   T q[NQ];
 } Lanes;
@@ -99,8 +99,9 @@ static void store(Lanes *s, Work *w, int pool, int l, int status) {
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
   b->itinerary[i] = itinerary(s, w, l);
-  for (int k = 0; k < KINDS; k++) b->kinds[i * KINDS + k] = (int32_t)LANE_I(s->kinds[k], l);
-  b->kinds[i * KINDS + END] += status == REACHED_END;
+  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
+  for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
+  kinds[LAST_KIND] = status == REACHED_END;
 }
 
 static void finish_lanes(Lanes *s, Work *w, int pool, I which, int status) {
@@ -112,8 +113,8 @@ static void refuse(const Batch *b, int64_t i) {
   b->t[i] = b->t0;
   b->status[i] = NOT_FINITE;
   b->itinerary[i] = 0;
-  memset(b->kinds + i * KINDS, 0, KINDS * sizeof(int32_t));
-  b->kinds[i * KINDS + END] = 1;
+  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
+  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
 }
 
 /* Put the next start into a lane; 0 if there is none. */

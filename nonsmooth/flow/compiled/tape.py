@@ -359,7 +359,7 @@ class TapeEngine:
 
         As ``Engine.run_many``, which is faster where many trajectories share a system.
         """
-        chunk = out or Chunk.empty(len(x), self.system.dimension, at is not None)
+        chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x = np.ascontiguousarray(x, float)
         p = np.ascontiguousarray(np.append(p, np.zeros((*p.shape[:-1], 1)), axis=-1), float)

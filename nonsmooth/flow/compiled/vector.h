@@ -1,8 +1,14 @@
+/* What is moved to where it may be needed fills registers, and vectors are written here by hand. */
+#if defined(__GNUC__) && !defined(__clang__)
+#pragma GCC optimize("no-tree-pre", "no-gcse", "no-tree-vectorize")
+#endif
+
 /* W doubles at once with the vector extensions of GCC and Clang; masks are all ones or all zeros. */
 typedef double T __attribute__((vector_size(8 * W)));
 typedef int64_t I __attribute__((vector_size(8 * W)));
 
 #define BC(v) ((T){0} + (double)(v))
+#define LAST_KIND (SIMPLE_KINDS - 1) /* the end of a run; events of the kinds before it are counted */
 #define SELECT(m, a, b) ((T)(((I)(a) & (m)) | ((I)(b) & ~(m))))
 #define INLINE static inline __attribute__((always_inline))
 #define FUNCTION static __attribute__((noinline)) void
@@ -71,6 +77,11 @@ INLINE T QUICK_INVERSE(T a) {
   T y = ROUGH_INVERSE(a);
   return y * (2.0 - a * y);
 }
+/* To rounding, or NaN there. */
+INLINE T INVERSE(T a) {
+  T y = QUICK_INVERSE(a);
+  return y * (2.0 - a * y);
+}
 INLINE T QUICK_ROOT(T a) {
   T y = (T)__builtin_ia32_rsqrt14pd512_mask(a, BC(0), -1), root = a * y;
   return root * (1.5 - 0.5 * (root * y));
@@ -82,5 +93,6 @@ INLINE T ROUGH_INVERSE(T a) {
   return y * (2.0 - a * y);
 }
 INLINE T QUICK_INVERSE(T a) { return 1.0 / a; }
+INLINE T INVERSE(T a) { return 1.0 / a; }
 INLINE T QUICK_ROOT(T a) { return SQRT_(a); }
 #endif

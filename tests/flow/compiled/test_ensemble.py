@@ -18,6 +18,7 @@ from nonsmooth.flow import work as work_module
 from nonsmooth.flow.checkpoint import Checkpoint
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.ensemble import ensemble
+from nonsmooth.flow.facts import KINDS
 from nonsmooth.flow.work import Work
 from nonsmooth.model import (
     FilippovSystem,
@@ -25,6 +26,7 @@ from nonsmooth.model import (
     OptionError,
     ParameterError,
     PointError,
+    Reset,
     Stop,
 )
 
@@ -383,3 +385,19 @@ def test_what_lanes_hand_over_has_no_itineraries_of_its_own():
     assert len(set(many.itineraries)) == len(many.itineraries) and "" not in many.itineraries
     single = [simulate(system, start, 20.0).itinerary for start in starts[::40]]
     assert many.itinerary[::40].tolist() == single
+
+
+@pytest.mark.parametrize(("engine", "count"), [("reference", 3), ("auto", 3), ("auto", 100)])
+def test_events_that_cannot_happen_are_none(engine, count):
+    """A relay enters sliding once; a saw is set back by 1 whenever it reaches 5."""
+    x, starts = ca.SX.sym("x"), np.linspace(-1.0, 4.0, count)[:, None]
+    relay = FilippovSystem([x], surface=x, above=[-1], below=[2], stops=Stop(x - 5, 1))
+    many = ensemble(relay, starts, 10.0, engine=engine)
+    assert list(many.events) == list(KINDS)
+    for kind, number in pickle.loads(pickle.dumps(many)).events.items():
+        assert number.shape == (count,) and np.all(number == (kind in ("entry", "end"))), kind
+    saw = ensemble(
+        FilippovSystem([x], field=[1], resets=Reset(x - 5, [x - 1], 1)), starts, 9.7, engine=engine
+    )
+    assert np.array_equal(saw.events["reset"], np.floor(5.7 + starts[:, 0]))
+    assert np.all(saw.events["end"] == 1) and not saw.events["stop"].any()

@@ -99,8 +99,9 @@ static void keep(Run *r, const Batch *b, int64_t i) {
   b->t[i] = r->t;
   b->status[i] = (int8_t)r->status;
   b->itinerary[i] = final_itinerary(r);
-  for (int j = 0; j < KINDS; j++) b->kinds[i * KINDS + j] = (int32_t)r->kinds[j];
-  b->kinds[i * KINDS + END] += r->status != STOPPED;
+  int32_t *kinds = b->kinds + i * b->kinds_width, last = (int32_t)b->kinds_width - 1;
+  for (int j = 0; j < last; j++) kinds[j] = (int32_t)r->kinds[j];
+  kinds[last] = (int32_t)r->kinds[END] + (r->status != STOPPED);
   if (b->at_x) { memcpy(b->at_x + i * nd, r->at_x, nd * sizeof(double)); b->at_t[i] = r->at_t; }
   b->totals[0] += r->step_count;
   b->totals[1] += r->event_count;

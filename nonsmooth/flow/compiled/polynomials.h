@@ -78,10 +78,10 @@ INLINE I within(T next, T lo, T hi) { return (next >= lo - 4 * EPSILON) & (next 
 
 /* After a step of Halley's iteration one of Newton's, with the slope where it ended from the coefficients where
  * it began. Lanes where this leaves less than rounding get its end and that slope. */
-INLINE I corrected(const T *a, const T *f, T third, T step, T lo, T hi, T *next, T *slope) {
+INLINE I corrected(const T *a, const T *f, T third, T step, T lo, T hi, I which, T *next, T *slope) {
   T there = f[1] - 2.0 * step * f[2], more = values_at(a, P, *next, *next * *next) * QUICK_INVERSE(there);
   T end = *next - more, error = ABS(more) * (ABS(more * f[2]) + 3.0 * third * (step * step));
-  I good = (ABS(step) <= 1e-2) & (I)(ABS(more) <= 1e-8) & (I)(error <= 1e-16 * ABS(there)) & within(end, lo, hi);
+  I good = which & (I)(ABS(step) <= 1e-2) & (I)(ABS(more) <= 1e-8) & (I)(error <= 1e-16 * ABS(there)) & within(end, lo, hi);
   *next = SELECT(good, end, *next);
   *slope = SELECT(good, there, *slope);
   return good;
@@ -109,7 +109,8 @@ INLINE T polish(const T *a, T end, I active, T *slope) {
     hi = SELECT(positive | ~active, hi, s);
     I inside = (next > lo) & (next < hi);
     I small = (converged(f, third, step) & within(next, lo, hi)) | (I)(hi - lo <= 4 * EPSILON);
-    if (any(active & ~small)) small |= inside & ~small & corrected(a, f, third, step, lo, hi, &next, &at_end);
+    I rest = active & ~small; /* the others stay, whatever their neighbours need */
+    if (any(rest)) small |= corrected(a, f, third, step, lo, hi, rest & inside, &next, &at_end);
     next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
     s = SELECT(active, next, s);
     *slope = SELECT(active, at_end, *slope);

@@ -126,7 +126,7 @@ def test_help(command):
     [
         ("shot", ["natural", "none", "0.131", "golf", "Coulomb"]),
         ("flight", ["smits-smith", "0.131", "golf"]),
-        ("map", ["natural", "region", "speed=5m/s:40m/s:100", "spin=2500rpm"]),
+        ("map", ["natural", "region", "angle=5deg:75deg:150", "speed=28m/s"]),
         ("fit", ["16", "natural"]),
     ],
 )

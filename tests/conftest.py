@@ -7,10 +7,12 @@ ones, and many more, to look for a counterexample.
 """
 
 import os
+from collections.abc import Iterator
 
 import pytest
 from hypothesis import settings
 
+from nonsmooth.flow.compiled import tape
 from tests.browser import opened
 
 os.environ["MPLBACKEND"] = "Agg"
@@ -25,3 +27,13 @@ settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
 def browser():
     """A headless Chromium (tests/browser.py); tests without it are skipped with the reason."""
     yield from opened()
+
+
+@pytest.fixture(autouse=True)
+def in_c(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
+    """What asks for ``engine="compiled"`` gets the driver in C; the program of the system, which has the same
+    bits (test_special) and takes seconds to compile, among the slow tests only."""
+    slow = request.node.get_closest_marker("slow") is not None
+    if not slow and request.module.__name__.rpartition(".")[2] != "test_special":
+        monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
+    yield

@@ -24,13 +24,21 @@ _spec.loader.exec_module(generate)
 PERIOD = 6.736837191765135
 
 
+#: Programs that take seconds: they run among the slow tests.
+DEAR = {"atlas", "belt", "friction_drive", "harvest", "plane_friction", "relay", "walker"}
+EACH = [
+    pytest.param(name, marks=[pytest.mark.slow] if name in DEAR else [])
+    for name in generate.GALLERY
+]
+
+
 @cache
 def ran(name):
     """What a program of the gallery defines."""
     return generate.run_example(name)
 
 
-@pytest.mark.parametrize("name", generate.GALLERY)
+@pytest.mark.parametrize("name", EACH)
 def test_program_draws(name, tmp_path):
     figure = ran(name)["figure"]
     assert isinstance(figure, Figure)
@@ -38,7 +46,7 @@ def test_program_draws(name, tmp_path):
     assert (tmp_path / "picture.svg").stat().st_size > 5_000
 
 
-@pytest.mark.parametrize("name", generate.GALLERY)
+@pytest.mark.parametrize("name", EACH)
 def test_picture_is_legible_on_a_page(name):
     """As wide as a page at most, text of 8 points, nothing cut off."""
     assert faults(ran(name)["figure"]) == []
@@ -61,6 +69,7 @@ def test_diabolo():
     assert found["time_to_fold"] == pytest.approx(1 + 2 * math.sqrt(2), abs=1e-11)
 
 
+@pytest.mark.slow
 def test_atlas_counts_canards():
     counts = {k: (c.canards, c.faux_canards) for k, c in ran("atlas")["classes"].items()}
     inf = math.inf
@@ -85,6 +94,7 @@ def test_funnel_begins_where_the_canard_meets_the_two_fold():
     assert {d.side for d in found["futures"].departures} == {"+", "-", "s"}
 
 
+@pytest.mark.slow
 def test_limit_directions_of_plane_friction():
     found = ran("plane_friction")
     assert [d.rate for d in found["directions"]] == pytest.approx([-0.4, -1.6], abs=1e-12)
@@ -131,6 +141,7 @@ def test_leine_oscillator():
     assert found["problem"]["stick time"].agrees(found["stick_time"])
 
 
+@pytest.mark.slow
 def test_harvest_has_a_saddle_and_a_node():
     found = ran("harvest")
     saddle, node = found["pseudo"]
@@ -208,6 +219,7 @@ def test_buck_converter_doubles_where_its_closed_form_flows_say():
     assert len(found["doublings"]) == 3 and np.all(np.diff(found["doublings"]) > 0)
 
 
+@pytest.mark.slow
 def test_forced_friction_is_den_hartogs():
     """Amplitudes of motions without a stop, and where the first stop is, from their closed forms."""
     found = ran("friction_drive")
@@ -228,6 +240,7 @@ def test_forced_friction_is_den_hartogs():
         assert np.abs(friction - found["first_stop"](W)).max() < 1e-10
 
 
+@pytest.mark.slow
 def test_chaos_beyond_the_touch_grows_in_proportion():
     found = ran("belt")
     touch = found["touch"]
@@ -240,6 +253,7 @@ def test_chaos_beyond_the_touch_grows_in_proportion():
     assert "chaos of size linear" in touch.far_side.verdict
 
 
+@pytest.mark.slow
 def test_the_relay_slides_as_often_as_runs_do():
     """Runs beside two of its bifurcations, beyond their transients: slides in a period."""
     found = ran("relay")
@@ -258,6 +272,7 @@ def test_the_relay_slides_as_often_as_runs_do():
     assert all("stable" in orbit.stability for orbit in branch.orbits)
 
 
+@pytest.mark.slow
 def test_the_walker_alternates_where_the_multiplier_of_its_step_is_minus_one():
     """By differences of simulated steps; between its first two doublings walks take the steps of the branch."""
     found = ran("walker")

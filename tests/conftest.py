@@ -8,6 +8,7 @@ ones, and many more, to look for a counterexample.
 
 import os
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 from hypothesis import settings
@@ -21,6 +22,21 @@ settings.register_profile("quick", derandomize=True, deadline=None, max_examples
 settings.register_profile("whole", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, max_examples=2000, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))
+
+
+#: Tests that are marked slow beside those that say so themselves.
+DEAR = {
+    line
+    for line in Path(__file__).with_name("dear.txt").read_text(encoding="utf-8").splitlines()
+    if not line.startswith("#")
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Mark what is dear."""
+    for item in items:
+        if item.nodeid in DEAR:
+            item.add_marker(pytest.mark.slow)
 
 
 @pytest.fixture(scope="session")

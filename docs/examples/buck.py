@@ -1,8 +1,9 @@
 """A buck converter, its period doublings and the chaos beyond
 
-The voltage of a converter that is switched by a ramp, at each tick of its clock, as the input voltage grows.
-Branches of one, two and four ticks are continued and switched at their doublings; broken where they are
-unstable. Dots: long runs, beyond their transients. The wide attractor begins all at once at about 32.3 V.
+The voltage of a converter that is switched by a ramp, at each tick of its clock, as the input voltage
+grows. Branches of one, two and four ticks are continued and switched at their doublings; broken where they
+are unstable. Squares: the doublings. Dots: long runs, beyond their transients. The wide attractor begins
+all at once at about 32.3 V.
 """
 
 import numpy as np

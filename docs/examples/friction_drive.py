@@ -1,9 +1,10 @@
 """Forced dry friction: Den Hartog's amplitudes and Shaw's sticking
 
 An oscillator with Coulomb friction under a sinusoidal drive. Den Hartog (1931) found its symmetric motion
-without a stop in closed form (dots); with more friction, or slower, it stops twice a period. Left: the
-largest displacement, continued in the frequency through its resonance and through the first stop. Right:
-where it stops for the first time, in the plane of frequency and friction, beside the closed form.
+without a stop in closed form (dots); with more friction, or slower, it stops twice a period, first at the
+triangles. Left: the largest displacement, continued in the frequency through its resonance and through the
+first stop. Right: where it stops for the first time, in the plane of frequency and friction, beside the
+closed form.
 """
 
 import numpy as np

@@ -2,8 +2,8 @@
 
 The simplest walking model on ever steeper slopes. Its two gaits, of long and of short steps, are born
 together on level ground; the long one is stable until its steps begin to alternate, and then falls into
-chaos by further doublings. Lines are continued, broken where they are unstable; dots are walks of a hundred
-steps, beyond their transients.
+chaos by further doublings. Lines are continued, broken where they are unstable, with squares at the
+doublings; dots are walks of a hundred steps, beyond their transients.
 """
 
 import numpy as np

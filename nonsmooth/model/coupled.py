@@ -284,8 +284,12 @@ class Coupled:
         return self._column_function.copied(self._inputs(x, multipliers, none), p)[0]
 
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
-        scaled = np.array([*self.scaled, *[False] * (self.count - self._surfaces)], bool)
+        scaled = self._scaled
         return np.concatenate([x, multipliers + np.where(scaled, 0.0, unknowns), unknowns[scaled]])
+
+    @cached_property
+    def _scaled(self) -> NDArray[np.bool_]:
+        return np.array([*self.scaled, *[False] * (self.count - self._surfaces)], bool)
 
     def values(
         self, x: Array, multipliers: Array, unknowns: Array, p: Array

@@ -20,7 +20,7 @@ import casadi as ca
 
 from .economy import economise
 from .graph import depends_on, instructions, operation
-from .rules import Rule, lower
+from .rules import Rule, entered, lower
 
 Coefficient: TypeAlias = "ca.SX | None"  # None is a structural zero
 
@@ -183,6 +183,7 @@ class Expansion:
         self._rows, self._still, self._on = rows, still, arithmetic
         self.series: list[list[Any]] = [[] for _ in rules]
         self._moving: Sequence[Any] = ()
+        self._moves = entered(rules, lambda _: True)
         self._recurrences = [self._recurrence(j, rule) for j, rule in enumerate(rules)]
 
     def restart(self, still: Sequence[Any]) -> None:
@@ -194,8 +195,8 @@ class Expansion:
     def advance(self, k: int, moving: Sequence[Any]) -> list[list[Any]]:
         """Expand everything to order k, given coefficient k of vector 0; the outputs' coefficients."""
         self._moving = moving
-        for c, recurrence in zip(self.series, self._recurrences, strict=True):
-            c.append(recurrence(k))
+        for c, recurrence, moves in zip(self.series, self._recurrences, self._moves, strict=True):
+            c.append(recurrence(k) if moves or not k else None)
         return self.outputs(k)
 
     def again(self, k: int, moving: Sequence[Any], which: Sequence[int]) -> list[list[Any]]:
@@ -275,7 +276,12 @@ class Expansion:
     def _twice(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:
         return lambda k: self._sum(u[k], u[k])
 
-    def _mul(self, _: Rule, __: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+    def _mul(self, rule: Rule, _: list[Any], u: list[Any], v: list[Any]) -> Callable[[int], Any]:
+        moves, other = (self._moves[a] for a in rule.args)
+        if not moves:
+            return lambda k: self._product(u[0], v[k])
+        if not other:
+            return lambda k: self._product(u[k], v[0])
         return lambda k: self._convolve(u, v, k, 0, k)
 
     def _sq(self, _: Rule, __: list[Any], u: list[Any]) -> Callable[[int], Any]:

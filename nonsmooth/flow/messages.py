@@ -48,6 +48,14 @@ def indefinite(name: str) -> str:
     )
 
 
+def undetermined(names: Sequence[str]) -> str:
+    """No one multiplier of a set holds or lets go."""
+    return (
+        f"On {' and '.join(names)} = 0 no one multiplier follows: the matrix M = -dh/dx df/dlambda is "
+        "singular there, or close to it (friction that does not act in some direction)."
+    )
+
+
 def several_directions(count: int) -> str:
     """A set can be left in several ways."""
     return f"The set h = 0 can be left in {count} directions: M is far from symmetric."

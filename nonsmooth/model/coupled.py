@@ -56,6 +56,7 @@ class Coupled:
         lam = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in range(self._surfaces)])
         field, factors, unknowns = with_factors(system, lam)
         self.scaled = tuple(not f.is_one() for f in factors)
+        self._scaled = np.array([*self.scaled, *[False] * len(system.impacts)], bool)
         #: Impacts whose reaction a surface's multiplier is multiplied with: friction at a contact.
         self.carriers = tuple(
             [j for j in range(len(system.impacts)) if ca.depends_on(f, d.reactions[j])]
@@ -286,10 +287,6 @@ class Coupled:
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
         scaled = self._scaled
         return np.concatenate([x, multipliers + np.where(scaled, 0.0, unknowns), unknowns[scaled]])
-
-    @cached_property
-    def _scaled(self) -> NDArray[np.bool_]:
-        return np.array([*self.scaled, *[False] * (self.count - self._surfaces)], bool)
 
     def values(
         self, x: Array, multipliers: Array, unknowns: Array, p: Array

@@ -172,6 +172,22 @@ def test_friction_that_pushes_has_no_unique_future():
     assert moving.x[-1, 2:] == pytest.approx([3.6, 4.8], abs=1e-12)
 
 
+@pytest.mark.parametrize("engine", ["compiled", "reference"])
+@pytest.mark.parametrize(("k", "pull"), [(2, 0.0), (2, 0.3), (3, 0.0)])
+def test_friction_that_misses_a_direction_leaves_its_multiplier_open(k, pull, engine):
+    h, lam = ca.SX.sym("h", k), ca.SX.sym("lam", k)
+    system = ns.FilippovSystem(
+        h, field=pull - ca.vertcat(lam[0], ca.SX(k - 1, 1)), surfaces=[h], multipliers=[lam]
+    )
+    run = ns.simulate(system, np.eye(1, k)[0], 5.0, engine=engine)
+    if pull:
+        assert run.itinerary == "*"
+        return
+    assert run.status == ns.Status.NON_UNIQUE
+    assert "singular" in run.message
+    assert run.events[-1].t == pytest.approx(1.0, abs=1e-12)
+
+
 @pytest.mark.parametrize(
     ("pull", "itinerary", "speed"), [(0.3, "s", 0.0), (0.6, "*", 0.2), (-0.6, "*", -0.2)]
 )

@@ -188,6 +188,7 @@ static int rests(const Run *r, const int8_t *letter) {
 /* What is to be said of a point without a motion. */
 static int no_motion(Run *r, int contacts) {
   if (contacts) finish(r, INCONSISTENT, NO_REACTION, 0);
+  else if (meets_sets(r)) finish(r, HAND_OVER, NO_REASON, 0); /* M is singular, or nearly */
   else if (r->active_count == 2 && n_of(r) == 2) finish(r, HAND_OVER, NO_REASON, 0); /* orbits may spiral in */
   else if (r->active_count > 1) finish(r, INTERSECTION, NO_STABLE_MOTION, 0);
   else finish(r, HAND_OVER, NO_REASON, 0); /* a degenerate tangency: other programs tell zeros apart */

@@ -118,8 +118,8 @@ def decide(
     if contacts:
         names = [stepper.system.impacts[j] for j in contacts]
         return Decision(None, Status.INCONSISTENT, messages.no_reaction(names))
-    names = stepper.system.surface_names
-    of_sets = [names[i] for i, members in units.items() if i in active and i == members[0]]
+    called = stepper.system.surface_names
+    of_sets = [called[i] for i, members in units.items() if i in active and i == members[0]]
     if of_sets:
         return Decision(None, Status.NON_UNIQUE, messages.undetermined(of_sets))
     if len(active) == 2 and stepper.modes.spirals_in(mode, x, active):

@@ -102,7 +102,7 @@ TASKS = {
         "Every future of a point whose future is not unique, and the orbits that come to a special "
         "point or leave it.",
         "nonsmooth",
-        "funnel orbit.Funnel manifold orbit.Manifold",
+        "funnel orbit.Funnel manifold orbit.Manifold orbit.DividingCurves orbit.DividingArc",
     ),
     "proofs": _task(
         "Prove",

@@ -29,7 +29,7 @@ from ..errors import ModelError
 from ..parameters import number
 from ..shot.single import State
 from .shooting import Shooting
-from .tracing import Arc, Landings, Tracer, landing_at
+from .tracing import Arc, arcs_from_rest, landing_at
 
 Array = NDArray[np.float64]
 
@@ -114,11 +114,13 @@ class DividingCurve:
         """
         speeds = np.asarray(xdot, dtype=float)
         shooting = Shooting(self.model, self.ydot, tol=_integration(self.tol))
-        curves: dict[str, Landings] = {}
+        curves: dict[str, ns.orbit.StartCurve] = {}
         values = [self._omega(float(v), shooting, curves) for v in speeds.ravel()]
         return np.array(values).reshape(speeds.shape)
 
-    def _omega(self, xdot: float, shooting: Shooting, curves: dict[str, Landings]) -> float:
+    def _omega(
+        self, xdot: float, shooting: Shooting, curves: dict[str, ns.orbit.StartCurve]
+    ) -> float:
         for sign in (1.0, -1.0) if self.mirrored else (1.0,):
             for arc in (*self.arcs, *self.reverse):
                 found = _bracket(arc.points[:, 0], sign * xdot)
@@ -129,7 +131,7 @@ class DividingCurve:
                 if weight in (0.0, 1.0):
                     return sign * float(guess[1])
                 word = arc.itinerary.replace(" ", "")
-                curve = curves.setdefault(word, Landings(shooting, word, tol=1e-15))
+                curve = curves.setdefault(word, ns.orbit.StartCurve(shooting, word, tol=1e-15))
                 guess[0] = sign * xdot
                 root = curve.correct(guess, np.array([1.0, 0.0]), max_iterations=30)
                 if root is not None:
@@ -257,7 +259,7 @@ def dividing_curve(
     _require_two_fold(shooting)
     mirrored = _symmetric(shooting)
     halves = [
-        tuple(Tracer(shooting, mode, mirrored, checked["reach"], checked["step"]).arcs())
+        arcs_from_rest(shooting, mode, mirrored, checked["reach"], checked["step"])
         for mode in ("+" if mirrored else "+-")
     ]
     return DividingCurve(model, speed, halves[0], (*halves, ())[1], mirrored, checked["tol"])
@@ -312,7 +314,7 @@ def critical_eta(
         shooting = Shooting(model.replace(**{name: value}), ydot)
         k = 1.0 / model.values["inertia"]
         rolling = xdot * k / (1 + k)  # slip ends at once: xdot - omega/k... is conserved
-        return shooting.shoot(np.array([rolling, -rolling]), "s").pull / rolling
+        return shooting.passage(np.array([rolling, -rolling]), "s").value / rolling
 
     grid = np.linspace(*bounds, 60)
     values = [pull(v) for v in grid]
@@ -364,7 +366,8 @@ def _require_two_fold(shooting: Shooting) -> None:
     who = type(shooting.model).__name__
     u = -0.3 * shooting.ydot * np.ones(2)
     phase = shooting.first_phase(u)
-    above, below, *_ = shooting.numbers(phase(0.5 * (phase.t[0] + phase.t[-1])))
+    middle = 0.5 * (float(phase.t[0]) + float(phase.t[-1]))
+    above, below = shooting.numbers(phase(middle), middle).lie
     law = type(shooting.model.friction).__name__
     if not below > above:
         raise ns.DegenerateError(
@@ -373,10 +376,10 @@ def _require_two_fold(shooting: Shooting) -> None:
             "is a smooth level: find it with scipy from bounce.lift_off."
         )
     slip = shooting.slip(u)
-    rate = shooting.numbers(slip.x[-1])[6]
-    middle = shooting.numbers(slip(0.5 * (slip.t[0] + slip.t[-1])))[5]
+    rate = shooting.load(slip.x[-1])[1]
+    load = shooting.load(slip(0.5 * (slip.t[0] + slip.t[-1])))[0]
     duration = float(slip.t[-1] - slip.t[0])
-    if not abs(rate) * duration > 1e-3 * abs(middle):
+    if not abs(rate) * duration > 1e-3 * abs(load):
         raise ns.DegenerateError(
             f"{who}: expected a load that falls through zero at lift-off at a nonzero rate, received "
             f"rate {rate:.3g} (dLambda_N/dY = 0 there, as for Hertz's law without gravity). Then "

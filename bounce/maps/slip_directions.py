@@ -331,7 +331,7 @@ def _polished(shooting: Shooting, speed: float, spin: float, near: float) -> flo
     word = word[: word.rindex("s") + 1]
 
     def pull(value: float) -> float:
-        return shooting.shoot(np.array([speed, value]), word).pull
+        return float(shooting.passage(np.array([speed, value]), word).corner[1])
 
     one, other = beside, spin - _BESIDE * near
     at_one, at_other = pull(one), pull(other)

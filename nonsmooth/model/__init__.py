@@ -28,6 +28,7 @@ from .reading import Parameters
 from .regularise import regularise
 from .reversal import reversed_system
 from .sections import SECTION, surface_of, with_section
+from .start_maps import StartMap
 from .switches import Guard
 from .system import FilippovSystem
 from .values import Array
@@ -59,6 +60,7 @@ __all__ = [
     "PointError",
     "Reset",
     "Resets",
+    "StartMap",
     "Stop",
     "Surfaces",
     "Yardsticks",

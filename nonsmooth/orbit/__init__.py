@@ -9,6 +9,9 @@ from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifur
 from .branch import Branch, BranchEnd, BranchEvent, FarSide
 from .canards import Path, Slider, paths_from
 from .connections import Connection, find_homoclinic
+from .dividing import DividingCurves
+from .dividing_arcs import DividingArc, DividingTracer, Passage, StartCurve, joint_root
+from .dividing_passages import EventPassages
 from .find_periodic import VirtualOrbitError, periodic_orbit
 from .follow_equilibria import continue_equilibrium
 from .follow_orbits import continue_orbit
@@ -19,10 +22,8 @@ from .lyapunov import (
     LyapunovSpectrum,
     lyapunov_spectrum,
 )
-from .manifold import (
-    Manifold,
-    manifold,
-)
+from .manifold import manifold
+from .manifold_growth import Manifold
 from .periodic import PeriodicOrbit
 from .poincare import (
     PoincareOrbit,
@@ -42,17 +43,23 @@ __all__ = [
     "CodimensionTwo",
     "Connection",
     "Departure",
+    "DividingArc",
+    "DividingCurves",
+    "DividingTracer",
+    "EventPassages",
     "FarSide",
     "FixedItinerary",
     "Funnel",
     "Gradient",
     "LyapunovSpectrum",
     "Manifold",
+    "Passage",
     "Path",
     "PeriodicOrbit",
     "PoincareOrbit",
     "Sensitivity",
     "Slider",
+    "StartCurve",
     "TraceError",
     "VirtualOrbitError",
     "basins",
@@ -63,6 +70,7 @@ __all__ = [
     "find_homoclinic",
     "funnel",
     "gradient",
+    "joint_root",
     "lyapunov_spectrum",
     "manifold",
     "paths_from",

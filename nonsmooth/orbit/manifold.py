@@ -1,103 +1,82 @@
-"""Stable and unstable manifolds of saddles and pseudo-saddles, and the orbits through visible folds."""
+"""Stable and unstable manifolds of saddles and pseudo-saddles, orbits through folds, dividing surfaces."""
 
 from __future__ import annotations
 
-import math
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
-from functools import partial
-from typing import Any
+from typing import Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
 
 from ..flow.progress import progress_bar
-from ..flow.saving import Savable
 from ..local import Equilibrium, Fold, FoldFold, PseudoEquilibrium
-from ..local.regions import Region
 from ..local.two_fold import TwoFold
 from ..model import (
-    Array,
-    DegenerateError,
     FilippovSystem,
     OptionError,
     Parameters,
-    Surfaces,
     explain,
     real,
     require_system,
+    reversed_system,
     whole,
 )
-from .arcs import Arc, Follower, lengths
-from .bundles import bundle, triangles
-from .manifold_seeds import canard_curve, orbit_seeds
+from .arcs import Follower
+from .dividing import DividingCurves, dividing_curves, plane_of
+from .manifold_growth import Grower, Manifold
 from .periodic import PeriodicOrbit
 
-#: Seeds are so far from the point, as a part of the length: the error is the square of it.
-_NEAR = 1e-6
+#: A length that is positive.
+_LEAST = float(np.finfo(float).tiny)
 
-#: Eigenvalues with a real part below this, relative to the largest, decide nothing.
-_HYPERBOLIC = 1e-9
-
-_FIRST = 16  # arcs of a bundle at the beginning
+Point = Equilibrium | PseudoEquilibrium | Fold | FoldFold | TwoFold | PeriodicOrbit
 
 
-@dataclass(frozen=True, eq=False, repr=False)
-class Manifold(Savable):
-    """Points that go to a point forward (stable) or backward (unstable) in time.
-
-    Attributes
-    ----------
-    stable : bool
-        Whether orbits come to the point (True) or leave it.
-    point : ndarray (n,)
-        Of the saddle, pseudo-saddle or fold.
-    dimension : int
-        1: curves; 2: surfaces.
-    arcs : list of Arc
-        The curves; of a surface the orbits that sweep it.
-    points : ndarray (k, n)
-        Of a surface.
-    triangles : ndarray of int (q, 3)
-        Of a surface, as rows of ``points``. There are holes where neighbours part faster than
-        ``max_orbits`` allows, or for good.
-    complete : bool
-        False if the computation was interrupted.
-    """
-
-    stable: bool
-    point: Array
-    dimension: int
-    arcs: list[Arc]
-    points: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    triangles: NDArray[np.int64] = field(default_factory=lambda: np.zeros((0, 3), np.int64))
-    complete: bool = True
-
-    def __repr__(self) -> str:
-        what = "stable" if self.stable else "unstable"
-        of = (
-            f"{len(self.arcs)} curves"
-            if self.dimension == 1
-            else f"{len(self.arcs)} orbits, {len(self.triangles)} triangles"
-        )
-        cut = "" if self.complete else "; interrupted"
-        point = self.point.round(6).tolist()
-        return f"Manifold({what}, of {point}, dimension {self.dimension}: {of}{cut})"
-
-
+@overload
 def manifold(
     system: FilippovSystem,
-    of: Equilibrium | PseudoEquilibrium | Fold | FoldFold | TwoFold | PeriodicOrbit,
+    of: Point,
     *,
     stable: bool = True,
     length: float,
     spacing: float | None = None,
     parameters: Parameters | None = None,
-    tol: float = 1e-10,
+    tol: float | None = None,
     max_orbits: int = 400,
     progress: bool = False,
-) -> Manifold:
-    """Follow the stable or unstable manifold of a point through switches.
+) -> Manifold: ...
+
+
+@overload
+def manifold(
+    system: FilippovSystem,
+    of: TwoFold,
+    *,
+    starts: Any,
+    box: Any,
+    duration: float,
+    stable: bool = True,
+    spacing: float | None = None,
+    parameters: Parameters | None = None,
+    tol: float | None = None,
+    progress: bool = False,
+) -> DividingCurves: ...
+
+
+def manifold(
+    system: FilippovSystem,
+    of: Point,
+    *,
+    stable: bool = True,
+    length: float | None = None,
+    starts: Any = None,
+    box: Any = None,
+    duration: float | None = None,
+    spacing: float | None = None,
+    parameters: Parameters | None = None,
+    tol: float | None = None,
+    max_orbits: int = 400,
+    progress: bool = False,
+) -> Manifold | DividingCurves:
+    """Follow the stable or unstable manifold of a point through switches, or cut it by a plane of starts.
 
     Parameters
     ----------
@@ -113,11 +92,22 @@ def manifold(
     stable : bool, optional
         Whether orbits that come to the point are asked for (True) or those that leave it.
     length : float
-        Of the orbits on it.
+        Of the orbits on it. Not with ``starts``.
+    starts : array_like (3, n) or callable, optional
+        Of a two-fold of n states: a plane of starts, as a point and two directions, or as a function of
+        two coordinates that returns n expressions. The dividing surface is cut by it.
+    box : array_like (2, 2)
+        With ``starts``: the range of either coordinate.
+    duration : float
+        With ``starts``: how long orbits are looked at. By then they are to have left the two-folds
+        to one side of the switching surface or the other.
     spacing : float, optional
-        Of points along orbits and between them; a hundredth of the length unless given.
-    parameters, tol : optional
+        Of points along orbits and between them; a hundredth of the length unless given. With ``starts``
+        the largest distance of points on bent curves, relative to half of the box; 0.05 unless given.
+    parameters : optional
         As in :func:`simulate`.
+    tol : float, optional
+        As in :func:`simulate`; 1e-10, and with ``starts`` 1e-13, unless given.
     max_orbits : int, optional
         Of a surface.
     progress : bool, optional
@@ -129,11 +119,15 @@ def manifold(
         Curves where the manifold has one dimension, a surface where it has two. Backward it ends
         where it meets sliding: what arrives there comes from a whole neighbourhood. Ctrl-C ends it
         with the orbits that it has (``complete`` is false then).
+    DividingCurves
+        With ``starts``: curves in the plane that divide orbits, made of arcs that slide into a two-fold
+        and arcs that just touch the surface, their junctions, and why they end.
 
     Raises
     ------
     DegenerateError
-        No such manifold, or one of more than two dimensions.
+        No such manifold, or one of more than two dimensions; with ``starts`` a two-fold that parts no
+        orbits, or none of the box, or a system with resets, impacts or several surfaces.
     OptionError
         ``of`` is none of these points; explicit time; a length, spacing or number that is not positive.
     ParameterError
@@ -147,6 +141,11 @@ def manifold(
     the orbits of both fields that end on it, exactly: they start at the point itself. Other manifolds
     start at a distance of a millionth of ``length`` along eigenvectors.
 
+    In n states two-folds fill a set of dimension n - 3, and the orbits that slide into it a surface of
+    dimension n - 1. A plane of starts meets it in curves. On either side orbits slide close to a two-fold
+    and leave it to different sides. A curve goes on where orbits no longer slide but touch the surface at a
+    visible fold beyond the two-folds: to one side they miss it, to the other they cross it.
+
     Examples
     --------
     The orbits that end at a pseudo-saddle of the plane divide what slides to the left and right:
@@ -158,6 +157,16 @@ def manifold(
     >>> found = ns.manifold(system, saddle, length=2.0)
     >>> found.dimension, [arc.itinerary for arc in found.arcs], found.arcs[0].points[0].round(9) + 0.0
     (1, ['+', '-'], array([0., 0.]))
+
+    Starts at the height 0.3 that pass a visible two-fold of three states on either side:
+
+    >>> x, y, z = (ca.SX.sym(name) for name in "xyz")
+    >>> system = ns.FilippovSystem([x, y, z], surface=x, above=[y, 1, 0.5], below=[z, 0.3, -1])
+    >>> fold = ns.find_two_fold(system, near=[0.0, 0.0, 0.0])
+    >>> found = ns.manifold(system, fold, starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)],
+    ...                     duration=6.0)
+    >>> [arc.itinerary for arc in found.arcs], found.junctions.round(9)
+    (['+', '+ s'], array([[-0.77459667, -0.38729833]]))
     """
     require_system(system)
     if system.time_dependent:
@@ -176,224 +185,53 @@ def manifold(
                 "periodic_orbit.",
             )
         )
-    length = real(length, "length", expected="a positive number", low=np.finfo(float).tiny)
     if spacing is not None:
-        spacing = real(spacing, "spacing", expected="a positive number", low=np.finfo(float).tiny)
+        spacing = real(spacing, "spacing", expected="a positive number", low=_LEAST)
     given = of.parameters | dict(parameters or {}) if isinstance(of, PeriodicOrbit) else parameters
     p = dict(zip(system.parameter_names, system.parameter_vector(given).tolist(), strict=True))
-    follower = Follower(system, p, not stable, length, spacing or length / 100, tol)
+    if starts is not None:
+        return _cut(system, of, stable, starts, box, duration, spacing or 0.05, p, tol, progress)
+    long = real(length, "length", expected="a positive number", low=_LEAST)
+    follower = Follower(system, p, not stable, long, spacing or long / 100, tol or 1e-10)
     most, bar = whole(max_orbits, "max_orbits"), progress_bar(None, progress, "orbit")
     try:
-        return _Grower(follower, of, stable, most, bar.update).grow()
+        return Grower(follower, of, stable, most, bar.update).grow()
     finally:
         bar.close()
 
 
-class _Grower:
-    """Local directions of a manifold and what grows from them."""
-
-    def __init__(
-        self, follower: Follower, of: Any, stable: bool, most: int, report: Callable[[], object]
-    ):
-        self.follower, self.of, self.stable, self.most = follower, of, stable, most
-        self.report = report
-        self.system = follower.system
-        self.point = np.asarray(of.start if isinstance(of, PeriodicOrbit) else of.point, float)
-        self.step = _NEAR * follower.length
-        self.rates, self.node = np.ones(1), False  # of the eigenspace: two real eigenvalues
-
-    def grow(self) -> Manifold:
-        if isinstance(self.of, (Fold, FoldFold)):
-            return self._curves([partial(self._leave, mode) for mode in "+-"])
-        if isinstance(self.of, TwoFold):
-            return self._of_two_fold()
-        if isinstance(self.of, PeriodicOrbit):
-            seeds = orbit_seeds(self.of, self.follower, self.stable)
-            return self._surfaces(seeds)
-        if isinstance(self.of, Equilibrium):
-            return self._of_equilibrium()
-        return self._of_pseudo_equilibrium()
-
-    # kinds of points -----------------------------------------------------------------------------
-
-    def _of_equilibrium(self) -> Manifold:
-        if self.of.status != "real":
-            raise DegenerateError(
-                f"of: expected an equilibrium on its own side, received a {self.of.status} one at "
-                f"{self.point.tolist()}. It has no manifolds in the system."
-            )
-        basis = self._directions(self.of.mode)
-        if basis.shape[1] == 1:
-            return self._curves([partial(self._arc, s * basis[:, 0]) for s in (1, -1)])
-        return self._circle(basis, None)
-
-    def _of_pseudo_equilibrium(self) -> Manifold:
-        of = self.of
-        if of.status != "real" or of.region is Region.MIXED or of.mode.count("s") != 1:
-            raise DegenerateError(
-                f"of: expected a real pseudo-equilibrium on one surface, received {of}. Its manifolds "
-                "are not made of orbits of the system."
-            )
-        basis = self._directions(of.mode)
-        collects = (of.region is Region.ATTRACTING) == self.stable
-        sides = [of.mode.replace("s", side) for side in "+-"]
-        if collects and basis.shape[1] == 0:
-            return self._curves([partial(self._leave, mode) for mode in sides])
-        if collects and basis.shape[1] == 1:
-            return self._sheets(basis[:, 0], sides)
-        if collects:
-            raise DegenerateError(
-                f"of: expected a manifold of at most two dimensions, received one of "
-                f"{basis.shape[1] + 1}: all that slides to it, and what comes to that."
-            )
-        if basis.shape[1] == 1:
-            return self._curves([partial(self._arc, s * basis[:, 0], of.mode) for s in (1, -1)])
-        return self._circle(basis, of.mode)
-
-    def _directions(self, mode: str) -> Array:
-        """Orthonormal basis (n, d) of the stable or unstable eigenspace."""
-        system, p = self.system, self.follower.parameters
-        f, n = system.mode_field(mode), system.dimension
-        rows = [system.evaluate(system.gradient(f[i]), self.point, p).ravel() for i in range(n)]
-        values, vectors = np.linalg.eig(np.array(rows))
-        edge = _HYPERBOLIC * float(np.abs(values).max(initial=0.0))
-        chosen = values.real < -edge if self.stable else values.real > edge
-        count = int(chosen.sum())
-        self.rates = np.abs(values[chosen].real)
-        real_ones = bool(np.all(values[chosen].imag == 0.0))
-        apart = count == 2 and real_ones and self.rates.max() > 1.01 * self.rates.min()
-        u, _, _ = np.linalg.svd(np.column_stack([vectors[:, chosen].real, vectors[:, chosen].imag]))
-        if not count and isinstance(self.of, Equilibrium):
-            kind = "stable" if self.stable else "unstable"
-            raise DegenerateError(
-                f"of: expected a point with {kind} directions, received {self.of.kind!r} with the "
-                f"eigenvalues {values.round(6).tolist()}."
-            )
-        self.node = apart
-        return np.asarray(vectors[:, chosen].real if apart else u[:, :count])
-
-    # what grows ----------------------------------------------------------------------------------
-
-    def _leave(self, mode: str) -> Arc | None:
-        """The orbit of one mode from the point itself."""
-        return self.follower.arc(self.point, mode)
-
-    def _arc(self, direction: Array, mode: str | None = None) -> Arc | None:
-        return self.follower.arc(self.point + self.step * direction, mode)
-
-    def _curves(self, orbits: Sequence[Callable[[], Arc | None]]) -> Manifold:
-        found, complete = list[Arc](), True
-        try:
-            for orbit in orbits:
-                arc = orbit()
-                if arc is not None and len(arc.points) > 1:
-                    found.append(arc)
-                self.report()
-        except KeyboardInterrupt:
-            if not found:
-                raise
-            complete = False
-        if not found:
-            kind = "comes to" if self.stable else "leaves"
-            raise DegenerateError(f"of: expected a point that an orbit {kind}, received {self.of}.")
-        return Manifold(self.stable, self.point, 1, found, complete=complete)
-
-    def _circle(self, basis: Array, mode: str | None) -> Manifold:
-        """A surface of the orbits that start on a small circle."""
-        if basis.shape[1] > 2:
-            raise DegenerateError(
-                f"of: expected a manifold of at most two dimensions, received {basis.shape[1]}."
-            )
-
-        def seed(u: float) -> Arc | None:
-            return self._arc(basis @ self._around(u), mode)
-
-        return self._surface(seed, True)
-
-    def _around(self, u: float) -> Array:
-        """A direction in the eigenspace, by a parameter from 0 to 1 that goes round once.
-
-        With two real eigenvalues nearly all orbits leave along the strong direction; those that come
-        far along the weak one start beside it, at angles that differ by factors.
-        """
-        if not self.node:
-            return np.array([np.cos(2 * np.pi * u), np.sin(2 * np.pi * u)])
-        quarter, part = divmod(4.0 * u, 1.0)
-        spread = min(60.0, 4.0 - math.log(_NEAR) * (self.rates.max() / self.rates.min() - 1.0))
-        tangent = math.exp(spread * (2.0 * part - 1.0)) if part else 0.0
-        x, y = 1.0 / math.hypot(1.0, tangent), tangent / math.hypot(1.0, tangent)
-        turned = [(x, y), (-y, x), (-x, -y), (y, -x)][int(quarter) % 4]
-        return np.array(turned)
-
-    def _sheets(self, direction: Array, sides: list[str]) -> Manifold:
-        """A surface of the orbits of both fields that end on the curve that slides to the point."""
-        return self._from_curve(self._sliding_curve(direction), sides)
-
-    def _of_two_fold(self) -> Manifold:
-        """The orbits of both fields that end on the canard, or leave it."""
-        if self.system.dimension != 3 or self.system.surface_count != 1:
-            raise DegenerateError(
-                f"of: expected a two-fold of three states on one surface, received {self.system!r}. The "
-                "orbits that come to its canards are no surface."
-            )
-        return self._from_curve(canard_curve(self.of, self.follower, self.stable), ["+", "-"])
-
-    def _from_curve(self, curve: Callable[[float], Array], sides: list[str]) -> Manifold:
-        def orbit(mode: str, u: float) -> Arc | None:
-            return self.follower.arc(curve(u), mode)
-
-        return self._surfaces([partial(orbit, mode) for mode in sides])
-
-    def _surfaces(self, seeds: Sequence[Callable[[float], Arc | None]]) -> Manifold:
-        """Several surfaces as one."""
-        parts, complete = list[Manifold](), True
-        try:
-            for seed in seeds:
-                if complete:
-                    parts.append(self._surface(seed, False))
-                    complete = parts[-1].complete
-        except KeyboardInterrupt:
-            if not parts:
-                raise
-            complete = False
-        offsets = np.cumsum([0, *[len(part.points) for part in parts]])
-        return Manifold(
-            self.stable,
-            self.point,
-            2,
-            [arc for part in parts for arc in part.arcs],
-            np.concatenate([part.points for part in parts]),
-            np.concatenate([p.triangles + k for p, k in zip(parts, offsets, strict=False)]),
-            complete,
+def _cut(
+    system: FilippovSystem,
+    of: Point,
+    stable: bool,
+    starts: Any,
+    box: Any,
+    duration: float | None,
+    step: float,
+    parameters: dict[str, float],
+    tol: float | None,
+    progress: bool,
+) -> DividingCurves:
+    """The dividing surface of a two-fold, cut by a plane of starts."""
+    if not isinstance(of, TwoFold):
+        raise OptionError(
+            f"of: expected a TwoFold with starts=, received {of!r}. Find one with find_two_fold, or "
+            "leave starts out."
         )
-
-    def _sliding_curve(self, direction: Array) -> Callable[[float], Array]:
-        """Points of the curve that slides to the point, by a parameter from 0 to 1."""
-        surfaces, mode = Surfaces(self.system), self.of.mode
-        p = self.system.parameter_vector(self.follower.parameters)
-        halves = []
-        for s in (-1, 1):
-            found = self.follower.run(self.point + s * self.step * direction, mode)
-            if found is not None:
-                halves.append((found[0], *lengths(found[0])))
-
-        def point(u: float) -> Array:
-            run, t, s = halves[0 if u < 0.5 else -1]
-            most = min(float(s[-1]), self.follower.length)
-            x = run(np.interp(abs(2.0 * u - 1.0) * most, s, t))
-            return np.asarray(surfaces.project(x, p, [mode.index("s")]))
-
-        if not halves:
-            raise DegenerateError(f"of: expected a point that orbits slide to, received {self.of}.")
-        return point
-
-    def _surface(self, seed: Any, closed: bool) -> Manifold:
-        f = self.follower
-        arcs, complete = bundle(seed, closed, f.spacing, _FIRST, self.most, self.report)
-        if len(arcs) < 2:
-            raise DegenerateError(
-                f"of: expected a point with orbits around it, received {self.of}."
-            )
-        points, table = triangles(arcs, closed, f.spacing)
-        found = [arc for _, arc in arcs]
-        return Manifold(self.stable, self.point, 2, found, points, table, complete)
+    plane = plane_of(system, starts, box)
+    span = real(duration, "duration", expected="a positive number", low=_LEAST)
+    bar = progress_bar(None, progress, "arc")
+    try:
+        return dividing_curves(
+            system if stable else reversed_system(system),
+            of,
+            plane,
+            stable=stable,
+            duration=span,
+            step=step,
+            parameters=parameters,
+            tol=tol or 1e-13,
+            report=bar.update,
+        )
+    finally:
+        bar.close()

@@ -157,7 +157,8 @@ class _Tracing:
 
     def _shorten(self, last: Point, fault: str, bend: float, failed: bool) -> None:
         """Halve a step that failed; end the arc where what ends it can be solved for."""
-        self.closing = self.closing or bool(fault) or (failed and not self.curve.exact)
+        lost = failed and (self.curve.snaps or not self.curve.exact)
+        self.closing = self.closing or bool(fault) or lost
         if self.closing:
             snapped = self.curve.snap(last.u, last.tangent, 2 * self.size)
             if snapped is not None:

@@ -60,6 +60,9 @@ class Curve:
         The unknown whose turning points are looked for, under the name ``"fold"``.
     branching : bool
         Whether branch points are looked for, under the name ``"branch point"``.
+    snaps : bool
+        Whether the end is solved for (``snap``) also where corrections fail, as they do for equations
+        that are not defined beyond it; without derivatives always.
 
     Examples
     --------
@@ -80,6 +83,7 @@ class Curve:
     exact: bool = True
     parameter: int | None = None
     branching: bool = False
+    snaps: bool = False
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         """Return the values of the equations and their Jacobian; what a subclass must give.

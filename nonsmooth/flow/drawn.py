@@ -52,6 +52,8 @@ class Grid:
         Lengths of the axes, in the order of the states.
     dimension : int
         Number of states n.
+    axes : tuple of ndarray () or (k,)
+        The values.
 
     Raises
     ------
@@ -82,6 +84,11 @@ class Grid:
     def dimension(self) -> int:
         """Number of states n."""
         return len(self._axes)
+
+    @property
+    def axes(self) -> tuple[Array, ...]:
+        """Values () or (k,) of each state."""
+        return tuple(self._axes)
 
     def at(self, index: Index) -> Array:
         """Return some of the starts.

@@ -15,6 +15,7 @@ from .compiled.lanes import lanes_for
 from .compiled.tape import library, tape_for
 from .drawn import Drawn
 from .facts import KINDS
+from .on_device import CHUNK, require_device, run_there
 from .options import Options
 from .results import Chunk, Collected, Ensemble
 from .select import compiled_or_none, use_compiled
@@ -47,6 +48,7 @@ def ensemble(
     at: Any = None,
     work: Work | None = None,
     engine: str = "auto",
+    device: str | None = None,
 ) -> Ensemble:
     """Integrate many trajectories and keep their ends.
 
@@ -75,6 +77,9 @@ def ensemble(
         Threads or an executor, size of a chunk, progress bar, checkpoint; see :class:`Work`.
     engine : {"auto", "reference", "compiled"}
         Which driver: ``"auto"`` takes the compiled one where there is a compiler.
+    device : {None, "cuda"}, optional
+        ``"cuda"`` runs on an NVIDIA card; what is rare still runs here, by ``engine``. Needs the packages
+        of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns
     -------
@@ -93,6 +98,8 @@ def ensemble(
         ``system`` is none; a ``start_mode`` that it does not have.
     CompilerError
         ``engine="compiled"`` where nothing compiles.
+    DeviceError
+        ``device="cuda"`` without a card, its driver or the packages.
 
     Examples
     --------
@@ -128,22 +135,29 @@ def ensemble(
             "at: expected count= with a section at events in an ensemble, received none. It says how "
             "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
         )
-    step = view.room is None and t_end > t_start
+    step = view.room is None and t_end > t_start and device is None
     chosen = _engine(system, options, engine, starts.count, step)
     job = Job(system, options, number, view.times, view.room, chosen)
-    return _run(job, starts, work)
+    if device is not None:
+        require_device(job, device, work.executor is not None)
+    return _run(job, starts, work, device)
 
 
-def _run(job: Job, starts: Starts, work: Work) -> Ensemble:
+def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     system, count = starts.system, starts.count
-    size = lambda: work.chunk or size_of_chunk(job, starts, work.workers)
-    saved = work.saved(lambda: _problem(system, starts, job), size)
+    there = (
+        None if device is None else lambda first, out: run_there(job, device, starts, first, out)
+    )
+    size = lambda: (
+        work.chunk or (size_of_chunk(job, starts, work.workers) if there is None else CHUNK)
+    )
+    saved = work.saved(lambda: _problem(system, starts, job, device), size)
     arrays, codes = None, None
     if isinstance(saved, Stored):
         arrays = saved.arrays(Chunk.empty(0, system, job.at is not None, job.room), count)
         codes = saved.codes(count)
     results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
-    run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved)
+    run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)
     return results.ensemble(codes)
 
 
@@ -183,8 +197,9 @@ def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:
     )
 
 
-def _problem(system: FilippovSystem, starts: Starts, job: Job) -> str:
+def _problem(system: FilippovSystem, starts: Starts, job: Job, device: str | None) -> str:
     code = hashlib.sha256(system.content_hash().encode())
-    code.update(repr((job.options, job.at, job.times, job.engine)).encode())
+    engine = job.engine if device is None else (job.engine, device)
+    code.update(repr((job.options, job.at, job.times, engine)).encode())
     code.update(starts.digest().encode())
     return code.hexdigest()

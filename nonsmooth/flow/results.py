@@ -118,6 +118,16 @@ class Chunk:
         )
         return {name: a for name in names if (a := getattr(self, name)) is not None}
 
+    def replace(self, rows: NDArray[np.intp], chunk: Chunk) -> None:
+        """Put the results of another chunk, and its steps and events, in the place of some rows."""
+        for name, array in chunk.arrays().items():
+            self.arrays()[name][rows] = array
+        self.itinerary[rows] += len(self.words)
+        words = [*self.words, *chunk.words]
+        used = np.flatnonzero(np.bincount(self.itinerary)).tolist()
+        self.rename({code: words[code] for code in used})
+        self.totals[:2] += chunk.totals[:2]
+
     def rename(self, words: Mapping[int, str]) -> None:
         """Number the itineraries in the order of their words, those in use only."""
         self.words = sorted(set(words.values()))

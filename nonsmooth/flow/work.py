@@ -139,7 +139,13 @@ def _require_path(name: str, value: object) -> None:
 
 
 def run_all(
-    job: Job, starts: Starts, results: Collected, work: Work, size: int, saved: Checkpoint | None
+    job: Job,
+    starts: Starts,
+    results: Collected,
+    work: Work,
+    size: int,
+    saved: Checkpoint | None,
+    there: Callable[[int, Chunk], Chunk] | None = None,
 ) -> None:
     """Run all trajectories, chunk by chunk, except those that are kept.
 
@@ -154,6 +160,9 @@ def run_all(
         Of a chunk.
     saved : Checkpoint or None
         Where finished chunks are kept.
+    there : callable, optional
+        Runs the trajectories from a number on that a chunk has rows for, one chunk after the other, in
+        the place of this processor.
     """
     bar = progress_bar(starts.count, work.progress)
     missing = []
@@ -167,10 +176,14 @@ def run_all(
             results.put(first, done)
             bar.update(len(done.t))
     ends = ((k, k * size, min((k + 1) * size, starts.count)) for k in missing)
-    pieces = ((k, *starts.part(a, b), results.all.part(a, b)) for k, a, b in ends)
     workers = min(work.threads or _processors(), len(missing))
     try:
-        with closing(_chunks(job, pieces, workers, work.executor)) as finished:
+        if there is not None:
+            chunks = ((k, there(a, results.all.part(a, b))) for k, a, b in ends)
+        else:
+            pieces = ((k, *starts.part(a, b), results.all.part(a, b)) for k, a, b in ends)
+            chunks = _chunks(job, pieces, workers, work.executor)
+        with closing(chunks) as finished:
             for number, chunk in finished:
                 results.put(number * size, chunk)
                 if saved is not None:

@@ -115,13 +115,46 @@ def _driver(sizes: str, values: str, series: str) -> str:
 
 def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
     """C source of the engine for ``width`` trajectories in step."""
+    head, program = _lanes_head(system, order)
+    texts = map(driver_text, ("common.h", "vector.h", "polynomials.h"))
+    return "".join(
+        [
+            f"#define W {width}\n",
+            head,
+            *texts,
+            program,
+            driver_text("lanes.c"),
+            driver_text("batch.c"),
+        ]
+    )
+
+
+def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
+    """C++ source of the same engine with a trajectory for each thread, as CUDA or for any compiler.
+
+    Parameters
+    ----------
+    threads : int
+        Threads of a block.
+    resident : int, optional
+        Blocks that a multiprocessor is to hold at once at least; more leave fewer registers to each.
+    """
+    head, program = _lanes_head(system, order)
+    sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
+    texts = map(driver_text, ("common.h", "device/lane.h", "polynomials.h"))
+    parts = [driver_text("device/head.h"), sizes, head, *texts, program]
+    return "".join([*parts, driver_text("lanes.c"), driver_text("device/kernel.c")])
+
+
+def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
+    """What the lanes' text asks to be defined before it, and the functions of a system."""
     program, blend = lanes_program(system, order)
     (rows, checked), affine = blend.checked, blend.affine
     slots = 2 * system.surface_count + len(system.stops)
     cancelled = system.surface_count == 0 or motion(system, "s").regular
     directions = ", ".join(str(d) for _, d in system.stops) or "0"
     defines = (
-        f"#define W {width}\n#define SLOTS {slots}\n#define STOPS {len(system.stops)}\n"
+        f"#define SLOTS {slots}\n#define STOPS {len(system.stops)}\n"
         f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(rows)}\n"
         f"#define GUARDS {len(checked)}\n"
         f"#define CURVED {int(bool(affine) and not is_flat(system))}\n"
@@ -130,18 +163,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
         f"static const int ROW[] = {{{_list(rows) or 0}}}, SLOT[] = {{{_list(checked) or 0}}};\n"
         f"static const int AFFINE[] = {{{', '.join(str(int(a)) for a in affine) or '1'}}};\n"
     )
-    return "".join(
-        [
-            facts_header(),
-            _sizes(system, order),
-            defines,
-            driver_text("common.h"),
-            driver_text("vector.h"),
-            driver_text("polynomials.h"),
-            program,
-            driver_text("lanes.c"),
-        ]
-    )
+    return facts_header() + _sizes(system, order) + defines, program
 
 
 def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:

@@ -4,10 +4,12 @@
  * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); P the
  * order or more, MODES a number of modes or more.
  */
+#ifndef ON_DEVICE
 #include <math.h>
 #include <stdint.h>
 #include <stdlib.h>
 #include <string.h>
+#endif
 
 typedef struct {
   double t_end, rtol, atol, max_step;
@@ -37,9 +39,11 @@ typedef struct {
   int64_t kinds_width; /* kinds that are counted: the first ones, and the last */
 } Batch;
 
+#ifndef ON_DEVICE
 /* Sizes of what Python and C share, compared when a library is loaded. */
 int64_t options_size(void) { return sizeof(Options); }
 int64_t batch_size(void) { return sizeof(Batch); }
+#endif
 
 /* a * b + c rounded once where the processor does that at once. Drivers are compiled without contraction: what
  * is fused is written so, and the same text gives the same bits whatever surrounds it. */
@@ -241,6 +245,7 @@ static inline int finite_all(const double *a, int n) {
   return s == 0;
 }
 
+#ifndef ON_DEVICE
 /* Modes met, as a tree: a node is an itinerary, its parent the itinerary without the last mode. With
  * few modes a node has its children by number, else a list of them. */
 #define FEW_MODES (MODES <= 4)
@@ -280,3 +285,4 @@ void tree_read(const Tree *tree, int32_t *parent, int32_t *mode) {
   }
 }
 void tree_free(Tree *tree) { free(tree->node); free(tree); }
+#endif

@@ -17,10 +17,11 @@
 #define FIRST_STOP (SLOTS - STOPS)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
-#define MEMORY 256
 
 typedef struct {
-  T x[N], q[NQ], t, lambda, last_event, shortest, length; /* of the step before in the same mode, or 0 */
+  T x[N];
+  OWN(T, q, NQ); /* prepared from the parameters */
+  T t, lambda, last_event, shortest, length; /* of the step before in the same mode, or 0 */
   I slides, above, drop, live, steps, events, kinds[LAST_KIND], shrinking;
   I code; /* modes since the itinerary ``base``, base 4 with digits from 1, the last one lowest */
   I above_stop[STOPS > 0 ? STOPS : 1]; /* where the guard of a stop was at the start of the step before */
@@ -29,67 +30,17 @@ typedef struct {
   int32_t base[W];
 } Lanes;
 
-/* A batch, and how far it is; nodes of the tree by code, as a memory of the last ones. */
-typedef struct {
-  const Batch *b;
-  const Options *o;
-  Tree *tree;
-  int64_t next, known_code[MEMORY];
-  int32_t known_node[MEMORY];
-  int alive;
-} Work;
-
-#define LANE(v, l) (((double *)&(v))[l])
-#define LANE_I(v, l) (((int64_t *)&(v))[l])
-
-/* Itineraries ------------------------------------------------------------------------------------ */
-
-static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
-  for (int shift = 60; shift >= 0; shift -= 2)
-    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
-  return node;
-}
-
-static int32_t itinerary(const Lanes *s, Work *w, int l) {
-  int64_t code = LANE_I(s->code, l);
-  if (s->base[l]) return walk(w->tree, s->base[l], code);
-  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
-  if (w->known_code[slot] != code) {
-    w->known_code[slot] = code;
-    w->known_node[slot] = walk(w->tree, 0, code);
-  }
-  return w->known_node[slot];
-}
-
-static __attribute__((noinline)) void shorten_codes(Lanes *s, Work *w) {
-  for EACH(l, s->code >= LONG_CODE) {
-    s->base[l] = walk(w->tree, s->base[l], LANE_I(s->code, l));
-    LANE_I(s->code, l) = 0;
-  }
-}
+/* What feeds the lanes and takes their results: batch.c, or device.c on a GPU. */
+typedef struct Work Work;
+INLINE const Options *limits(const Work *w);
+static void store(Lanes *s, Work *w, int l, int status);
+static void shorten_codes(Lanes *s, Work *w);
+INLINE void keep_event(const Lanes *s, Work *w, int kind, I which);
 
 static void note_modes(Lanes *s, Work *w, I which) {
   I digit = 1 + ((s->slides & 2) | (~s->slides & ~s->above & (M > 0)));
   s->code = (s->code & ~which) | (((s->code << 2) + digit) & which);
   if (any(s->code >= LONG_CODE)) shorten_codes(s, w);
-}
-
-/* Loading and storing -------------------------------------------------------------------------- */
-
-static void store(Lanes *s, Work *w, int l, int status) {
-  const Batch *b = w->b;
-  int64_t i = s->index[l];
-  w->alive--;
-  b->totals[0] += LANE_I(s->steps, l);
-  b->totals[1] += LANE_I(s->events, l);
-  b->status[i] = (int8_t)status;
-  if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
-  for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
-  b->t[i] = LANE(s->t, l);
-  b->itinerary[i] = itinerary(s, w, l);
-  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
-  for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
-  kinds[LAST_KIND] = status == REACHED_END;
 }
 
 /* The runs of these lanes end. */
@@ -100,56 +51,6 @@ static void finish_lanes(Lanes *s, Work *w, I which, int status) {
 }
 
 static void hand_over(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
-
-static void refuse(const Batch *b, int64_t i) {
-  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
-  b->t[i] = b->t0;
-  b->status[i] = NOT_FINITE;
-  b->itinerary[i] = 0;
-  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
-  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
-}
-
-/* Put the next start into a lane; 0 if there is none. Vectors are written whole: what is written in parts
- * cannot be read soon. */
-static int load(Lanes *s, Work *w, int l, I mine) {
-  const Batch *b = w->b;
-  while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
-  if (w->next >= b->count) return 0;
-  int64_t i = w->next++;
-  UNROLL for (int k = 0; k < N; k++) s->x[k] = SELECT(mine, BC(b->x0[i * N + k]), s->x[k]);
-  if (b->p_stride) {
-    double q[NQ];
-    prepare(b->p + i * b->p_stride, q);
-    for (int k = 0; k < NQ; k++) s->q[k] = SELECT(mine, BC(q[k]), s->q[k]);
-  }
-  s->index[l] = i;
-  s->base[l] = 0;
-  w->alive++;
-  return 1;
-}
-
-static I refill(Lanes *s, Work *w) {
-  I fresh = {0}, number;
-  UNROLL for (int l = 0; l < W; l++) number[l] = l;
-  for EACH(l, ~s->live) {
-    I mine = number == (int64_t)l;
-    if (!load(s, w, (int)l, mine)) break;
-    fresh |= mine;
-  }
-  s->t = SELECT(fresh, BC(w->b->t0), s->t);
-  s->last_event = SELECT(fresh, s->t, s->last_event);
-  s->shortest = SELECT(fresh, BC(1e-3), s->shortest);
-  s->length = SELECT(fresh, BC(0), s->length);
-  s->live |= fresh;
-  s->code &= ~fresh;
-  s->steps &= ~fresh;
-  s->events &= ~fresh;
-  s->shrinking &= ~fresh;
-  s->drop &= ~fresh;
-  for (int k = 0; k < LAST_KIND; k++) s->kinds[k] &= ~fresh;
-  return fresh;
-}
 
 /* The surface -------------------------------------------------------------------------------- */
 
@@ -264,7 +165,7 @@ INLINE void guard_ratios(const Lanes *s, const Options *o, const T *allowed, T *
     UNROLL for (int i = 0; i < ND; i++) a += ABS(gradient[j][i]) * allowed[i];
     of_guards[j] = a - (1 - SAFETY) * o->rtol * ABS(g[j][0]);
     T r = ROUGH_INVERSE(a), p = ABS(g[j][P]) * r, b = ABS(g[j][P - 1]) * r;
-    I counts = M > 0 && j == 1 ? s->slides : ~(I){0};
+    I counts = M > 0 && j == 1 ? s->slides : ~NONE;
     counts &= a > 1e-280;
     *sum += SELECT(counts, p + b, BC(0));
     *last = MAX(*last, SELECT(counts, p, BC(0)));
@@ -292,6 +193,7 @@ INLINE T step_size(const Lanes *s, const Options *o, T c[N][P + 1], T g[S1][P + 
 
 /* Roots: polynomials.h --------------------------------------------------------------------------- */
 
+#if RARE_CASES_HERE
 /* The root of one lane of any polynomial: isolation by subdivision. */
 static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, int flipped,
                                                   double *slope) {
@@ -306,6 +208,7 @@ static __attribute__((noinline)) double hard_root(const T *a, int l, int slot, i
   int direction = DIRECTION[slot - FIRST_STOP];
   return first_crossing(c, P, 1, flipped ? -direction : direction);
 }
+#endif
 
 /* After a crossing the guard's first coefficient is zero, after a fold its first two. */
 INLINE void drop_zeros(const Lanes *s, T *a) {
@@ -317,6 +220,7 @@ INLINE void drop_zeros(const Lanes *s, T *a) {
   }
 }
 
+#if RARE_CASES_HERE
 /* Shorten steps until the series of all guards converge within them, as in the interpreter. */
 static __attribute__((noinline)) void resolve_steps(const Lanes *s, T g[S1][P + 1], I which, T *h) {
   for (int j = 0; j < SLOTS; j++) {
@@ -331,6 +235,7 @@ static __attribute__((noinline)) void resolve_steps(const Lanes *s, T g[S1][P + 
     }
   }
 }
+#endif
 
 /* Guards scaled to [0, 1] with their lanes sorted: no root, one root to be polished, or a hard case,
  * whose root is found here. */
@@ -342,8 +247,8 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
   I counts = s->live, flipped = {0}, wrong_way = {0}, none, unresolved, unclear = {0};
   v->root[j] = BC(INFINITY);
   v->slope[j] = BC(0);
-  v->one[j] = (I){0};
-  v->hard[j] = v->flipped[j] = v->wrong_way[j] = (I){0};
+  v->one[j] = NONE;
+  v->hard[j] = v->flipped[j] = v->wrong_way[j] = NONE;
   if (M > 0 && j == 1 && !any(counts &= s->slides)) return unclear;
   a[0] = g[0];
   UNROLL for (int k = 1; k <= P; k++) a[k] = g[k] * power[k];
@@ -369,17 +274,18 @@ INLINE I sort_guard(const Lanes *s, Guards *v, const T *g, const T *power, int j
 }
 
 /* Hard cases: sign changes of all Bernstein coefficients, one slot of each lane at a time; what has
- * several goes to hard_root. */
-static __attribute__((noinline)) void resolve(Guards *v) {
+ * several goes to hard_root, or is returned. */
+SELDOM I resolve(Guards *v) {
+  I lost = NONE;
   for (;;) {
-    I rest = ~(I){0}, mine[S1], all = {0};
+    I rest = ~NONE, mine[S1], all = {0};
     UNROLL for (int j = 0; j < SLOTS; j++) {
       mine[j] = v->hard[j] & rest;
       rest &= ~mine[j];
       all |= mine[j];
       v->hard[j] &= ~mine[j];
     }
-    if (!any(all)) return;
+    if (!any(all)) return lost;
     T b[P + 1];
     UNROLL for (int k = 0; k <= P; k++) b[k] = v->a[SLOTS - 1][k];
     for (int j = 0; j < SLOTS - 1; j++)
@@ -396,10 +302,14 @@ static __attribute__((noinline)) void resolve(Guards *v) {
       I one = mine[j] & first & (changes == 1) & ~v->wrong_way[j];
       I deep = mine[j] & ~one & ~(first & (changes == 0));
       v->one[j] |= one;
+#if RARE_CASES_HERE
       for EACH(l, deep) {
         double r = hard_root(v->a[j], l, j, LANE_I(v->flipped[j], l) != 0, &LANE(v->slope[j], l));
         if (r >= 0) LANE(v->root[j], l) = r;
       }
+#else
+      lost |= deep;
+#endif
     }
   }
 }
@@ -426,7 +336,7 @@ INLINE void polish_guards(Guards *v, T margin) {
       end = SELECT(mine[j], v->end[j], end);
     }
     T s = polish(a, end, all, &d), later = s + margin;
-    all = (I){0};
+    all = NONE;
     UNROLL for (int j = 0; j < SLOTS; j++) {
       v->root[j] = SELECT(mine[j], s, v->root[j]);
       v->slope[j] = SELECT(mine[j], d, v->slope[j]);
@@ -446,7 +356,11 @@ INLINE I sort_guards(const Lanes *s, Guards *v, T g[S1][P + 1], T *h) {
     UNROLL for (int k = 2; k <= P; k++) power[k] = power[k / 2] * power[k - k / 2];
     UNROLL for (int j = 0; j < SLOTS; j++) unclear |= sort_guard(s, v, g[j], power, j, &too_long);
     if (!first || !any(too_long)) return unclear;
+#if RARE_CASES_HERE
     resolve_steps(s, g, too_long, h);
+#else
+    return unclear | too_long;
+#endif
   }
 }
 
@@ -457,11 +371,11 @@ INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *
   T h = *steps;
   I hard = {0};
   UNROLL for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
-  if (any(hard)) resolve(&v);
+  if (any(hard)) unclear |= resolve(&v);
   T tie = NEAR * MAX(BC(1), ABS(s->t));
   if (SLOTS > 0) polish_guards(&v, tie * QUICK_INVERSE(h));
   T best = BC(INFINITY), second = BC(INFINITY);
-  *slot = (I){0};
+  *slot = NONE;
   UNROLL for (int j = 0; j < SLOTS; j++) {
     I first = v.root[j] < best;
     second = SELECT(first, best, MIN(second, v.root[j]));
@@ -489,13 +403,7 @@ INLINE I watch_intervals(Lanes *s, I which) {
 INLINE void count(Lanes *s, Work *w, int kind, I which) {
   s->kinds[kind] -= which;
   s->events -= which;
-  const Batch *b = w->b;
-  if (w->o->at_kind != kind || !b->at_x) return;
-  I now = which & (s->kinds[kind] == w->o->at_count);
-  for EACH(l, now) {
-    b->at_t[s->index[l]] = LANE(s->t, l);
-    UNROLL for (int i = 0; i < ND; i++) b->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
-  }
+  keep_event(s, w, kind, which);
 }
 
 #if M > 0
@@ -506,7 +414,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   lie(s, value, scale);
   I ends = up | down, was = s->slides, unclear = {0};
   I steep = slope < -1e-10 * MAX(scale[0], scale[1]);
-  double clear = CANCELLED ? VANISHES : 2 * (w->o->rtol + TANGENT); /* not an exit at a two-fold */
+  double clear = CANCELLED ? VANISHES : 2 * (limits(w)->rtol + TANGENT); /* not an exit at a two-fold */
   I attracts = (up & (I)(value[1] > clear * scale[1])) | (down & (I)(value[0] < -clear * scale[0]));
   unclear |= ends & ~(steep & attracts);
   I was_above = s->above;
@@ -522,7 +430,7 @@ INLINE I change_modes(Lanes *s, Work *w, I met, I up, I down, T slope) {
   count(s, w, CROSSING, changed & ~ends & ~entered);
   unclear |= watch_intervals(s, all);
   s->length = SELECT(all, BC(0), s->length);
-  unclear |= s->events >= w->o->max_events;
+  unclear |= s->events >= limits(w)->max_events;
   set_lambda(s);
   note_modes(s, w, all & ~unclear);
   return unclear;
@@ -550,7 +458,7 @@ INLINE void advance(Lanes *s, const T *x, T dt) {
   s->t += dt;
   if (TIMED) s->x[N - 1] = s->t;
   s->steps += 1;
-  s->drop = (I){0};
+  s->drop = NONE;
 }
 
 #if ROWS + GUARDS > 0
@@ -570,7 +478,7 @@ INLINE I disagrees(const Lanes *s, T c[N][P + 1], T g[S1][P + 1], const T *x, co
     int j = SLOT[m];
     T v = g[j][degree];
     UNROLL for (int k = degree - 1; k >= 0; k--) v = v * at + g[j][k];
-    I counts = M > 0 && j == 1 ? s->slides : ~(I){0};
+    I counts = M > 0 && j == 1 ? s->slides : ~NONE;
     wrong |= counts & ~(I)(ABS(guard[m] - v) <= WRONG * of_guards[j]);
   }
   return wrong;
@@ -619,7 +527,7 @@ INLINE I finite_lanes(const Lanes *s) {
 }
 
 static void step(Lanes *s, Work *w) {
-  const Options *o = w->o;
+  const Options *o = limits(w);
   T c[N][P + 1], g[S1][P + 1], dt, slope = BC(0), allowed[N], of_guards[S1];
   I finite, slot;
   jet(s->x, s->q, s->slides, s->above, s->lambda, &c[0][0], &g[0][0]);
@@ -660,33 +568,4 @@ static void step(Lanes *s, Work *w) {
   hand_over(s, w, unclear);
   finish_lanes(s, w, stopped & ~unclear, STOPPED);
   finish_lanes(s, w, last & ~unclear, REACHED_END);
-}
-
-typedef struct { Lanes lanes; Work work; int begun; } Many;
-
-int64_t many_size(void) { return sizeof(Many); }
-
-/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
- * is zero before the first, and aligned like a vector. */
-int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
-  Lanes *s = &many->lanes;
-  Work *w = &many->work;
-  if (!many->begun) {
-    double q[NQ];
-    w->b = b;
-    w->o = o;
-    w->tree = tree;
-    s->size = o->atol / o->rtol;
-    prepare(b->p, q);
-    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
-    many->begun = 1;
-  }
-  for (;;) {
-    I fresh = {0};
-    if (w->alive < W && w->next < b->count) fresh = refill(s, w);
-    if (any(fresh)) { begin(s, w, fresh); continue; }
-    if (!w->alive) return 0;
-    if (--budget < 0) return 1;
-    step(s, w);
-  }
 }

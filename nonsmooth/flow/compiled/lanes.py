@@ -119,14 +119,7 @@ class Lanes:
         if not rest.size or tape is None:
             return
         own = p if p.ndim == 1 else p[rest]
-        chunk = tape.run_many(x[rest], own, options, at, None, stop)
-        for name, array in chunk.arrays().items():
-            out.arrays()[name][rest] = array
-        out.itinerary[rest] += len(out.words)
-        words = [*out.words, *chunk.words]
-        used = np.flatnonzero(np.bincount(out.itinerary)).tolist()
-        out.rename({code: words[code] for code in used})
-        out.totals[:2] += chunk.totals[:2]
+        out.replace(rest, tape.run_many(x[rest], own, options, at, None, stop))
 
 
 def _call(

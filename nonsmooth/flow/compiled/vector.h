@@ -8,10 +8,16 @@ typedef double T __attribute__((vector_size(8 * W)));
 typedef int64_t I __attribute__((vector_size(8 * W)));
 
 #define BC(v) ((T){0} + (double)(v))
+#define NONE ((I){0})
+#define LANE(v, l) (((double *)&(v))[l])
+#define LANE_I(v, l) (((int64_t *)&(v))[l])
+#define OWN(type, name, size) type name[size] /* what each lane has a copy of */
+#define RARE_CASES_HERE 1
 #define LAST_KIND (SIMPLE_KINDS - 1) /* the end of a run; events of the kinds before it are counted */
 #define SELECT(m, a, b) ((T)(((I)(a) & (m)) | ((I)(b) & ~(m))))
 #define INLINE static inline __attribute__((always_inline))
 #define FUNCTION static __attribute__((noinline)) void
+#define SELDOM static __attribute__((noinline))
 #define UNROLL _Pragma("GCC unroll 32")
 
 #define LANEWISE(NAME, f) \

@@ -1,0 +1,147 @@
+/* Batches on this processor: W lanes that are refilled, itineraries as nodes of a tree. After lanes.c. */
+#define MEMORY 256
+
+/* A batch, and how far it is; nodes of the tree by code, as a memory of the last ones. */
+struct Work {
+  const Batch *b;
+  const Options *o;
+  Tree *tree;
+  int64_t next, known_code[MEMORY];
+  int32_t known_node[MEMORY];
+  int alive;
+};
+
+INLINE const Options *limits(const Work *w) { return w->o; }
+
+/* Itineraries ------------------------------------------------------------------------------------ */
+
+static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
+  for (int shift = 60; shift >= 0; shift -= 2)
+    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
+  return node;
+}
+
+static int32_t itinerary(const Lanes *s, Work *w, int l) {
+  int64_t code = LANE_I(s->code, l);
+  if (s->base[l]) return walk(w->tree, s->base[l], code);
+  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
+  if (w->known_code[slot] != code) {
+    w->known_code[slot] = code;
+    w->known_node[slot] = walk(w->tree, 0, code);
+  }
+  return w->known_node[slot];
+}
+
+static __attribute__((noinline)) void shorten_codes(Lanes *s, Work *w) {
+  for EACH(l, s->code >= LONG_CODE) {
+    s->base[l] = walk(w->tree, s->base[l], LANE_I(s->code, l));
+    LANE_I(s->code, l) = 0;
+  }
+}
+
+/* Loading and storing -------------------------------------------------------------------------- */
+
+static void store(Lanes *s, Work *w, int l, int status) {
+  const Batch *b = w->b;
+  int64_t i = s->index[l];
+  w->alive--;
+  b->totals[0] += LANE_I(s->steps, l);
+  b->totals[1] += LANE_I(s->events, l);
+  b->status[i] = (int8_t)status;
+  if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
+  b->t[i] = LANE(s->t, l);
+  b->itinerary[i] = itinerary(s, w, l);
+  int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
+  for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
+  kinds[LAST_KIND] = status == REACHED_END;
+}
+
+static void refuse(const Batch *b, int64_t i) {
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
+  b->t[i] = b->t0;
+  b->status[i] = NOT_FINITE;
+  b->itinerary[i] = 0;
+  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
+  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
+}
+
+/* Put the next start into a lane; 0 if there is none. Vectors are written whole: what is written in parts
+ * cannot be read soon. */
+static int load(Lanes *s, Work *w, int l, I mine) {
+  const Batch *b = w->b;
+  while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
+  if (w->next >= b->count) return 0;
+  int64_t i = w->next++;
+  UNROLL for (int k = 0; k < N; k++) s->x[k] = SELECT(mine, BC(b->x0[i * N + k]), s->x[k]);
+  if (b->p_stride) {
+    double q[NQ];
+    prepare(b->p + i * b->p_stride, q);
+    for (int k = 0; k < NQ; k++) s->q[k] = SELECT(mine, BC(q[k]), s->q[k]);
+  }
+  s->index[l] = i;
+  s->base[l] = 0;
+  w->alive++;
+  return 1;
+}
+
+static I refill(Lanes *s, Work *w) {
+  I fresh = {0}, number;
+  UNROLL for (int l = 0; l < W; l++) number[l] = l;
+  for EACH(l, ~s->live) {
+    I mine = number == (int64_t)l;
+    if (!load(s, w, (int)l, mine)) break;
+    fresh |= mine;
+  }
+  s->t = SELECT(fresh, BC(w->b->t0), s->t);
+  s->last_event = SELECT(fresh, s->t, s->last_event);
+  s->shortest = SELECT(fresh, BC(1e-3), s->shortest);
+  s->length = SELECT(fresh, BC(0), s->length);
+  s->live |= fresh;
+  s->code &= ~fresh;
+  s->steps &= ~fresh;
+  s->events &= ~fresh;
+  s->shrinking &= ~fresh;
+  s->drop &= ~fresh;
+  for (int k = 0; k < LAST_KIND; k++) s->kinds[k] &= ~fresh;
+  return fresh;
+}
+
+INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
+  const Batch *b = w->b;
+  if (w->o->at_kind != kind || !b->at_x) return;
+  I now = which & (s->kinds[kind] == w->o->at_count);
+  for EACH(l, now) {
+    b->at_t[s->index[l]] = LANE(s->t, l);
+    UNROLL for (int i = 0; i < ND; i++) b->at_x[s->index[l] * ND + i] = LANE(s->x[i], l);
+  }
+}
+
+typedef struct { Lanes lanes; Work work; int begun; } Many;
+
+int64_t many_size(void) { return sizeof(Many); }
+
+/* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
+ * is zero before the first, and aligned like a vector. */
+int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
+  Lanes *s = &many->lanes;
+  Work *w = &many->work;
+  if (!many->begun) {
+    double q[NQ];
+    w->b = b;
+    w->o = o;
+    w->tree = tree;
+    s->size = o->atol / o->rtol;
+    prepare(b->p, q);
+    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
+    many->begun = 1;
+  }
+  for (;;) {
+    I fresh = {0};
+    if (w->alive < W && w->next < b->count) fresh = refill(s, w);
+    if (any(fresh)) { begin(s, w, fresh); continue; }
+    if (!w->alive) return 0;
+    if (--budget < 0) return 1;
+    step(s, w);
+  }
+}

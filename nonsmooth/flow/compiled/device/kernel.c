@@ -1,0 +1,154 @@
+/* The lanes' side of a GPU: each thread makes or reads starts, runs them one after the other, and writes their ends.
+ * After lanes.c. Numbers are counted from 0 over the whole call; arrays hold those from ``first`` on.
+ */
+
+/* Where starts come from: rows; axes whose last runs fastest, of a length or 0 for a single number; a box. */
+enum { ROWS_OF_STATES, GRID, BOX };
+
+struct Given {
+  int64_t count, first, kind;
+  uint64_t seed;
+  const double *values;
+  const int64_t *lengths;
+  const double *q;
+  int64_t q_stride;
+  double t0;
+};
+
+struct Results {
+  double *x, *t;
+  int32_t *status, *kinds, *steps;
+  int64_t *code;
+  double *at_x, *at_t;
+};
+
+struct Work {
+  Options o;
+  Given given;
+  Results out;
+  int64_t next, stride;
+  int alive;
+};
+
+INLINE const Options *limits(const Work *w) { return &w->o; }
+
+/* Output ``number`` of SplitMix64. */
+static inline uint64_t split_mix(uint64_t seed, uint64_t number) {
+  uint64_t z = seed + (number + 1) * 0x9e3779b97f4a7c15ULL;
+  z = (z ^ (z >> 30)) * 0xbf58476d1ce4e5b9ULL;
+  z = (z ^ (z >> 27)) * 0x94d049bb133111ebULL;
+  return z ^ (z >> 31);
+}
+
+/* State k of start i; ``left`` is what remains of a grid's number, to be read from the last state on. */
+static inline double start_of(const Given *g, int64_t i, int k, int64_t *left) {
+  if (g->kind == ROWS_OF_STATES) return g->values[i * ND + k];
+  if (g->kind == BOX) {
+    double low = g->values[k], part = (double)(split_mix(g->seed, (uint64_t)(ND * (g->first + i) + k)) >> 11);
+    return sum(low, product(sum(g->values[ND + k], -low), part * (1.0 / 9007199254740992.0)));
+  }
+  int64_t place = 0, before = 0, length = g->lengths[k];
+  if (length) {
+    place = *left % length;
+    *left /= length;
+  }
+  for (int j = 0; j < k; j++) before += g->lengths[j] ? g->lengths[j] : 1;
+  return g->values[before + place];
+}
+
+static inline void store(Lanes *s, Work *w, int, int status) {
+  const Results *out = &w->out;
+  int64_t i = s->index[0];
+  w->alive = 0;
+  UNROLL for (int k = 0; k < ND; k++) out->x[i * ND + k] = s->x[k].v;
+  out->t[i] = s->t.v;
+  out->status[i] = status;
+  out->code[i] = s->code.v;
+  UNROLL for (int k = 0; k < LAST_KIND; k++) out->kinds[i * SIMPLE_KINDS + k] = (int32_t)s->kinds[k].v;
+  out->kinds[i * SIMPLE_KINDS + LAST_KIND] = status == REACHED_END;
+  out->steps[i] = (int32_t)s->steps.v;
+}
+
+/* More modes than a number holds. */
+static inline void shorten_codes(Lanes *s, Work *w) { hand_over(s, w, I(-1)); }
+
+INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
+  if (w->o.at_kind != kind || !w->out.at_x || !any(which & (s->kinds[kind] == w->o.at_count))) return;
+  int64_t i = s->index[0];
+  w->out.at_t[i] = s->t.v;
+  UNROLL for (int k = 0; k < ND; k++) w->out.at_x[i * ND + k] = s->x[k].v;
+}
+
+/* Put the next start into the lane; 0 if there is none. */
+static inline int load(Lanes *s, Work *w) {
+  const Given *g = &w->given;
+  if (w->next >= g->count) return 0;
+  int64_t i = w->next, left = g->first + i;
+  w->next += w->stride;
+  T wrong = BC(0);
+  UNROLL for (int k = ND - 1; k >= 0; k--) {
+    s->x[k] = BC(start_of(g, i, k, &left));
+    wrong += s->x[k] - s->x[k];
+  }
+  if (TIMED) s->x[N - 1] = BC(g->t0);
+  s->q = (const T *)(g->q + i * g->q_stride);
+  s->t = s->last_event = BC(g->t0);
+  s->shortest = BC(1e-3);
+  s->length = BC(0);
+  s->code = s->steps = s->events = s->shrinking = s->drop = s->slides = s->above = I(0);
+  s->lambda = BC(0);
+  UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] = I(0);
+  UNROLL for (int k = 0; k < STOPS; k++) s->above_stop[k] = I(0);
+  s->index[0] = i;
+  s->live = I(-1);
+  w->alive = 1;
+  if (w->out.at_x) {
+    w->out.at_t[i] = NAN;
+    UNROLL for (int k = 0; k < ND; k++) w->out.at_x[i * ND + k] = NAN;
+  }
+  if (!any(wrong == 0)) {
+    finish_lanes(s, w, s->live, NOT_FINITE);
+    w->out.kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
+  }
+  return 1;
+}
+
+static inline void run_all(Work *w) {
+  Lanes s;
+  s.size = w->o.atol / w->o.rtol;
+  w->alive = 0;
+  for (;;) {
+    if (w->alive) { step(&s, w); continue; }
+    if (!load(&s, w)) return;
+    if (w->alive) begin(&s, w, s.live);
+  }
+}
+
+/* Numbers are of 64 bits each, so that what launches this needs no structure. */
+KERNEL BOUNDS trajectories(
+    int64_t count, int64_t first, int64_t kind, int64_t seed, const double *values, const int64_t *lengths,
+    const double *q, int64_t q_stride, double t0, double t_end, double rtol, double atol, double max_step,
+    int64_t max_steps, int64_t max_events, int64_t at_kind, int64_t at_count, double *x, double *t, int32_t *status,
+    int32_t *kinds, int32_t *steps, int64_t *code, double *at_x, double *at_t) {
+  Work w;
+  w.o.t_end = t_end;
+  w.o.rtol = rtol;
+  w.o.atol = atol;
+  w.o.max_step = max_step;
+  w.o.max_steps = max_steps;
+  w.o.max_events = max_events;
+  w.o.at_kind = (int32_t)at_kind;
+  w.o.at_count = at_count;
+  w.given = {count, first, kind, (uint64_t)seed, values, lengths, q, q_stride, t0};
+  w.out = {x, t, status, kinds, steps, code, at_x, at_t};
+  w.next = (int64_t)blockIdx.x * blockDim.x + threadIdx.x;
+  w.stride = (int64_t)gridDim.x * blockDim.x;
+  run_all(&w);
+}
+
+/* What the parameters alone decide, for each row of them. */
+KERNEL parameters(int64_t count, int64_t size, const double *p, double *q) {
+  int64_t stride = (int64_t)gridDim.x * blockDim.x;
+  for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride)
+    prepare(p + i * size, q + i * NQ);
+}

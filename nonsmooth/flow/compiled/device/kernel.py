@@ -1,0 +1,186 @@
+"""A system's trajectories on a GPU, from Python: where starts come from, and what comes back."""
+
+from __future__ import annotations
+
+import re
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....model import Array, FilippovSystem
+from ...facts import HAND_OVER, SIMPLE_KINDS
+from ...options import Options
+from ...results import Chunk
+from ..codegen import device_source
+from .machine import Machine
+
+#: Kinds of starts, by number in kernel.c.
+_ROWS, _GRID, _BOX = 0, 1, 2
+
+#: What may count without end, in a number of 64 bits.
+_MOST = 2**62
+
+
+@dataclass(frozen=True)
+class Source:
+    """Where the starts of a kernel come from.
+
+    Attributes
+    ----------
+    kind, seed : int
+    values : ndarray
+        Rows of states; the axes of a grid one after the other; both corners of a box.
+    lengths : ndarray of int64
+        Of the axes of a grid, 0 for a single number.
+    """
+
+    kind: int
+    seed: int
+    values: Array
+    lengths: NDArray[np.int64]
+
+    @classmethod
+    def rows(cls, x: Array) -> Source:
+        """Starts given one by one (m, n)."""
+        return cls(_ROWS, 0, np.ascontiguousarray(x, float), np.zeros(1, np.int64))
+
+    @classmethod
+    def grid(cls, axes: Sequence[Array]) -> Source:
+        """All combinations of values; those of the last axis run fastest."""
+        lengths = np.array([len(a) if a.ndim else 0 for a in axes], np.int64)
+        return cls(_GRID, 0, np.concatenate([np.atleast_1d(a) for a in axes]), lengths)
+
+    @classmethod
+    def box(cls, low: Array, high: Array, seed: int) -> Source:
+        """Random starts between two corners."""
+        signed = seed - (1 << 64) if seed >= 1 << 63 else seed
+        return cls(_BOX, signed, np.concatenate([low, high]), np.zeros(1, np.int64))
+
+
+class Kernel:
+    """What runs a system's trajectories on a machine, compiled when first needed.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        One that ``supports_lanes``.
+    order : int
+    machine : Machine
+    """
+
+    def __init__(self, system: FilippovSystem, order: int, machine: Machine):
+        self.system, self.order, self.machine = system, order, machine
+        self._compiled: tuple[Any, int] | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def compiled(self) -> tuple[Any, int]:
+        """The kernels, and how many numbers are prepared from the parameters."""
+        with self._lock:
+            if self._compiled is None:
+                source = device_source(self.system, self.order, self.machine.threads)
+                size = re.search(r"^#define NQ (\d+)$", source, re.MULTILINE)
+                assert size is not None
+                self._compiled = self.machine.compile(source), int(size[1])
+            return self._compiled
+
+    def run(
+        self,
+        source: Source,
+        first: int,
+        count: int,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+        out: Chunk,
+    ) -> None:
+        """Run ``count`` trajectories, the first of which has the number ``first`` in its source.
+
+        Those that are rare keep the status HAND_OVER and have no results.
+
+        Parameters
+        ----------
+        p : ndarray (np,) or (count, np)
+        at : (kind, count) or None
+            Event whose state is kept.
+        out : Chunk
+            Its arrays are filled.
+
+        Raises
+        ------
+        CompilerError
+        """
+        machine, n = self.machine, self.system.dimension
+        kernels, width = self.compiled
+        rows = np.atleast_2d(np.ascontiguousarray(p, float))
+        q = machine.empty(8 * width * len(rows))
+        given = [len(rows), rows.shape[1], machine.write(rows), q]
+        machine.launch(kernels, "parameters", given)
+        found = _results(count, n, at is not None)
+        memory = {name: machine.empty(array.nbytes) for name, array in found.items()}
+        kind, number = at or (-1, 0)
+        arguments = [
+            *(count, first, source.kind, source.seed),
+            *(machine.write(source.values), machine.write(source.lengths)),
+            *(q, width if p.ndim > 1 else 0, options.t_start, options.t_end),
+            *(options.rtol, options.atol, options.max_step),
+            *(min(limit, _MOST) for limit in (options.max_steps, options.max_events)),
+            *(kind, number),
+            *(memory.get(name) for name in _ORDER),
+        ]
+        machine.launch(kernels, "trajectories", arguments)
+        for name, array in found.items():
+            machine.read(memory[name], array)
+        _fill(out, found, self.system.modes)
+
+
+#: Results, in the order in which the kernel takes them.
+_ORDER = ("x", "t", "status", "kinds", "steps", "code", "at_x", "at_t")
+
+
+def _results(count: int, n: int, at: bool) -> dict[str, NDArray[Any]]:
+    """Arrays for what a kernel writes."""
+    found: dict[str, NDArray[Any]] = {
+        "x": np.empty((count, n)),
+        "t": np.empty(count),
+        "status": np.empty(count, np.int32),
+        "kinds": np.empty((count, SIMPLE_KINDS), np.int32),
+        "steps": np.empty(count, np.int32),
+        "code": np.empty(count, np.int64),
+    }
+    return found | ({"at_x": np.empty((count, n)), "at_t": np.empty(count)} if at else {})
+
+
+def _fill(out: Chunk, found: dict[str, NDArray[Any]], modes: Sequence[str]) -> None:
+    """Put results into a chunk, with the itineraries as words."""
+    for name in ("x", "t", "status", "kinds"):
+        getattr(out, name)[...] = found[name]
+    if out.at_x is not None and out.at_t is not None:
+        out.at_x[...], out.at_t[...] = found["at_x"], found["at_t"]
+    handed = out.status == HAND_OVER
+    code = np.where(handed, 0, found["code"])
+    codes, place = np.unique(code, return_inverse=True)
+    out.itinerary[...] = place.reshape(-1)
+    out.rename({k: word_of(c, modes) for k, c in enumerate(codes.tolist())})
+    out.totals[0] += int(found["steps"].sum(dtype=np.int64))
+    out.totals[1] += int(found["kinds"][:, :-1].sum(dtype=np.int64))
+    out.totals[2] += int(handed.sum())
+
+
+def word_of(code: int, modes: Sequence[str]) -> str:
+    """Return an itinerary from its code: digits from 1 to base 4, the last mode lowest.
+
+    Examples
+    --------
+    >>> word_of(0b011110, ("+", "-", "s"))
+    '+ s -'
+    """
+    letters = []
+    while code:
+        letters.append(modes[(code & 3) - 1] or "o")
+        code >>= 2
+    return " ".join(reversed(letters))

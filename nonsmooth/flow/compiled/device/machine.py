@@ -1,0 +1,89 @@
+"""What a GPU must do for us: compile, hold arrays, launch. ``card.py`` does it, and ``shim.py`` on this processor."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ....model import NonsmoothError, OptionError
+
+#: What a kernel takes: numbers of 64 bits, memory, or none.
+Argument = Any
+
+DEVICES = ("cuda",)
+
+
+class DeviceError(NonsmoothError, RuntimeError):
+    """There is no GPU to run on, or what drives it is missing; the message says what to install."""
+
+
+class Machine(Protocol):
+    """Where kernels run."""
+
+    @property
+    def name(self) -> str:
+        """What runs them, in words."""
+        ...
+
+    @property
+    def threads(self) -> int:
+        """Threads of a block."""
+        ...
+
+    @property
+    def blocks(self) -> int:
+        """Blocks that keep all of it busy."""
+        ...
+
+    def compile(self, source: str) -> Any:
+        """Return the kernels of a source."""
+        ...
+
+    def empty(self, size: int) -> Any:
+        """Return memory of so many bytes."""
+        ...
+
+    def write(self, array: NDArray[Any]) -> Any:
+        """Return memory with the numbers of an array."""
+        ...
+
+    def read(self, memory: Any, array: NDArray[Any]) -> None:
+        """Fill an array from memory, after all that was launched."""
+        ...
+
+    def launch(self, kernels: Any, name: str, arguments: Sequence[Argument]) -> None:
+        """Run one of some kernels on all threads of all blocks."""
+        ...
+
+
+def numbers(arguments: Sequence[Argument]) -> list[Argument]:
+    """Arguments with their widths: integers and floats of 64 bits, 0 for no memory."""
+    made: list[Argument] = []
+    for a in arguments:
+        if a is None:
+            made.append(np.int64(0))
+        elif isinstance(a, int):
+            made.append(np.int64(a))
+        else:
+            made.append(np.float64(a) if isinstance(a, float) else a)
+    return made
+
+
+def machine_for(device: str) -> Machine:
+    """Return what runs ``device="cuda"``.
+
+    Raises
+    ------
+    OptionError
+        Another device.
+    DeviceError
+        No card, no driver, or no packages that drive it.
+    """
+    if device not in DEVICES:
+        raise OptionError(f"device: expected None or one of {DEVICES}, received {device!r}.")
+    from .card import card
+
+    return card()

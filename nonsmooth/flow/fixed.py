@@ -136,7 +136,7 @@ def legs_program(
     """
     return LegsProgram(
         [program_of(field) for field in fields],
-        [None if event is None else _evaluated(event) for event in events],
+        [None if event is None else values_program(event) for event in events],
         parameters,
     )
 
@@ -161,13 +161,14 @@ def followed_program(
     dimensions : tuple of int
         States with the time, and without; parameters.
     """
-    own = [[_evaluated(event) for event in each] for each in (events, plain)]
+    own = [[values_program(event) for event in each] for each in (events, plain)]
     rows, directions = zip(*ends, strict=True)
     programs = [program_of(field) for field in fields]
     return FollowedProgram(programs, rows, directions, own[0], own[1], dimensions)
 
 
-def _evaluated(event: Evaluated) -> ValuesProgram:
+def values_program(event: Evaluated) -> ValuesProgram:
+    """Expressions as the interpreter takes them, written once."""
     made: ValuesProgram | None = _PROGRAMS.get(event)
     return made or _PROGRAMS.setdefault(event, ValuesProgram(event.values))
 

@@ -7,13 +7,22 @@ is overlooked.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cached_property
 
 import numpy as np
 
 from ..model import Array
 from ..model.variational import GuardedField
-from .compiled.smooth import watch_legs
-from .fixed import MOST_STEPS, TOLERANCE, has_interpreter, program_of, steps_for, stuck
+from .compiled.smooth import WatchProgram
+from .fixed import (
+    MOST_STEPS,
+    TOLERANCE,
+    flow_for,
+    has_interpreter,
+    program_of,
+    steps_for,
+    stuck,
+)
 from .reference.polynomial import first_crossing, first_root, sign_changes
 
 
@@ -52,42 +61,63 @@ def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: fl
     return found
 
 
-def watched_legs(
-    fields: Sequence[GuardedField], starts: Sequence[Array], p: Array, durations: Array, ends: float
-) -> tuple[list[Array], list[Array]]:
-    """The same of many legs at once; legs of no positive duration are not followed.
+class LegsWatch:
+    """Guards along many legs at once; legs of no positive duration are not followed.
 
     Parameters
     ----------
     fields : sequence of GuardedField
-    starts : sequence of ndarray (N,)
-    p : ndarray
-    durations : ndarray (L,)
-    ends : float
-        Part of a leg's duration beside its ends that is left out.
-
-    Returns
-    -------
-    list of ndarray (m, 4 + N), list of ndarray (N + g, 4)
-        Rows of each leg, and first coefficients of states and guards at its start.
-
-    Raises
-    ------
-    ConvergenceError
-        The field is not finite on the way.
+        Of each leg.
     """
-    if has_interpreter():
-        programs = [program_of(field) for field in fields]
-        found = watch_legs(programs, starts, p, durations, TOLERANCE, MOST_STEPS, ends)
-        if found.failed >= 0:
-            raise stuck(float(durations[found.failed]), found.left, starts[found.failed])
-        return found.rows, found.begins
-    rows, begins = list[Array](), list[Array]()
-    for field, y, duration in zip(fields, starts, durations.tolist(), strict=True):
-        begins.append(np.vstack([part[:, :4] for part in field.starts.copied(y, p)]))
-        seen = _watched(field, y, p, duration, ends * duration) if duration > 0.0 else None
-        rows.append(np.zeros((0, 4 + len(y))) if seen is None else seen)
-    return rows, begins
+
+    def __init__(self, fields: Sequence[GuardedField]):
+        self._fields = list(fields)
+
+    @cached_property
+    def _program(self) -> WatchProgram:
+        return WatchProgram([program_of(field) for field in self._fields])
+
+    def __call__(
+        self, starts: Sequence[Array], p: Array, durations: Array, ends: float
+    ) -> tuple[list[Array], list[Array], list[Array]]:
+        """Watch them.
+
+        Parameters
+        ----------
+        starts : sequence of ndarray (N,)
+        p : ndarray
+        durations : ndarray (L,)
+        ends : float
+            Part of a leg's duration beside its ends that is left out.
+
+        Returns
+        -------
+        rows : list of ndarray (m, 4 + N)
+            Of each leg, as of ``watched``.
+        begins : list of ndarray (N + g, 4)
+            First coefficients of states and guards at its start.
+        values : list of ndarray (g,)
+            Of the guards at its end, if it is followed.
+
+        Raises
+        ------
+        ConvergenceError
+            The field is not finite on the way.
+        """
+        if has_interpreter():
+            found = self._program(starts, p, durations, TOLERANCE, MOST_STEPS, ends)
+            if found.failed >= 0:
+                raise stuck(float(durations[found.failed]), found.left, starts[found.failed])
+            return found.rows, found.begins, found.values
+        rows, begins, values = list[Array](), list[Array](), list[Array]()
+        for field, y, duration in zip(self._fields, starts, durations.tolist(), strict=True):
+            begins.append(np.vstack([part[:, :4] for part in field.starts.copied(y, p)]))
+            rows.append(np.zeros((0, 4 + len(y))))
+            values.append(np.zeros(len(field.motion.guards)))
+            if duration > 0.0:
+                rows[-1] = _watched(field, y, p, duration, ends * duration)
+                values[-1] = field.starts.copied(flow_for(field, y, p, duration), p)[1][:, 0]
+        return rows, begins, values
 
 
 def _watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:

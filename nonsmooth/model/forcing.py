@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import cached_property
+
 import casadi as ca
 import numpy as np
 
@@ -9,6 +11,7 @@ from .checks import is_real
 from .errors import OptionError, explain
 from .evaluators import Evaluator
 from .periods import read_period
+from .printing.tape import Values, values_of
 from .system import FilippovSystem
 from .values import Array
 
@@ -48,8 +51,15 @@ class Forcing:
             )
         self.expression = ca.SX(period)
         p = system.parameter_symbols
-        outputs = [ca.densify(e) for e in (self.expression, ca.jacobian(self.expression, p))]
-        self._function = Evaluator(ca.Function("period", [ca.SX(0, 1), p], outputs))
+        slope = ca.jacobian(self.expression, p)
+        self._outputs = [ca.densify(e) for e in (self.expression, slope)]
+        self._inputs = [ca.SX(0, 1), p]
+        self._function = Evaluator(ca.Function("period", self._inputs, self._outputs))
+
+    @cached_property
+    def values(self) -> Values:
+        """The period and its derivatives as a graph."""
+        return values_of(self._inputs, self._outputs)
 
     def __call__(self, p: Array) -> tuple[float, Array]:
         """The period, and its derivatives by all parameters."""

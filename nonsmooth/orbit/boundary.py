@@ -18,19 +18,20 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from functools import cached_property, lru_cache
-from typing import Any, NamedTuple
+from functools import cached_property
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from ..flow.compiled.shooting import SolvedOrbit
 from ..flow.fixed import TOLERANCE
 from ..model import Array, FilippovSystem
 from ..model.event_maps import AtEvent, surface_map
 from ..model.forcing import Forcing
+from .demands import demands_of
 from .flight import Flight, Flights, flights_of
 from .legs import Flown, Leg, fly
+from .places import places_of
 
 #: Up to so many unknowns a dense solution is faster than elimination in Python.
 _DENSE = 60
@@ -46,10 +47,8 @@ class Evaluation:
     Attributes
     ----------
     residual : ndarray (m,)
-    jacobian : ndarray (m, m)
-        By the unknowns.
-    by_parameters : ndarray (m, q)
-        By the chosen parameters.
+    whole : ndarray (m, m + q)
+        Derivatives by the unknowns, then by the chosen parameters.
     flight : Flight
         The legs, with the events at their ends; for a leg without an event the identity and the phase
         condition.
@@ -58,11 +57,20 @@ class Evaluation:
     """
 
     residual: Array
-    jacobian: Array
-    by_parameters: Array
+    whole: Array
     flight: Flight
     starts: Array
     durations: Array
+
+    @property
+    def jacobian(self) -> Array:
+        """By the unknowns, (m, m)."""
+        return self.whole[:, : len(self.whole)]
+
+    @property
+    def by_parameters(self) -> Array:
+        """By the chosen parameters, (m, q)."""
+        return self.whole[:, len(self.whole) :]
 
     @property
     def flown(self) -> tuple[Flown, ...]:
@@ -169,8 +177,15 @@ class BoundaryProblem:
         ConvergenceError, DegenerateError
             A leg cannot be flown.
         """
-        starts, durations = self.split(u)
         columns = list(chosen)
+        if self.is_direct:
+            free = np.concatenate([u[: self.size], p[columns]])
+            wrap = None if self.symmetry is None else self.wrap
+            demands = demands_of(self.forcing, self.periods)
+            found = self.flights(chosen).evaluated(free, p, wrap, tol, demands)
+            if found is not None:
+                return self.evaluation(*found)
+        starts, durations = self.split(u)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
             return self._assembled(self.flights(chosen)(starts, durations, p, tol), u, p, columns)
 
@@ -183,7 +198,7 @@ class BoundaryProblem:
             after, by_end, by_p = after.copy(), by_end.copy(), by_p
             after[-1], by_end[-1] = self.wrap @ after[-1], self.wrap @ by_end[-1]
             by_p[-1] = self.wrap @ by_p[-1]
-        at, flat = _places(count, n), np.zeros(size * size)
+        at, flat = places_of(count, n), np.zeros(size * size)
         residual, by_parameters = np.empty(size), np.empty((size, len(columns)))
         residual[: count * n] = (after - starts[at.next_leg]).ravel()
         residual[count * n :] = flight.value
@@ -203,7 +218,18 @@ class BoundaryProblem:
             self._phased(residual, jacobian, by_parameters, flight, starts[0])
         if self.kept:
             self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
-        return Evaluation(residual, jacobian, by_parameters, flight, starts, durations)
+        whole = np.hstack([jacobian, by_parameters])
+        return Evaluation(residual, whole, flight, starts, durations)
+
+    @cached_property
+    def is_direct(self) -> bool:
+        """Whether the equations can be had in one call."""
+        return self.phase is None and not self.kept and self.flights().is_direct
+
+    def evaluation(self, solved: SolvedOrbit, flight: Flight) -> Evaluation:
+        """The equations as one call gives them."""
+        starts, durations = self.split(solved.unknowns)
+        return Evaluation(solved.residual, solved.jacobian, flight, starts, durations)
 
     def exact_residual(self, u: Array, p: Array) -> Array | None:
         """Residual with errors far below those of doubles; None where there is no such one.
@@ -222,7 +248,7 @@ class BoundaryProblem:
         after, rest, value = found
         if self.symmetry is not None:
             after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
-        gap = after - starts[_places(*starts.shape).next_leg]
+        gap = after - starts[places_of(*starts.shape).next_leg]
         gap[-1, -1] -= self.advance(p)[0]
         gap += rest
         return np.concatenate([gap.ravel(), value])
@@ -361,31 +387,3 @@ class BoundaryProblem:
 
 #: Legs of a problem ready to be flown, by the chosen parameters.
 _FLIGHTS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], Flights]] = WeakKeyDictionary()
-
-
-class _Places(NamedTuple):
-    """Where entries of the Jacobian are in it, row after row: states by starts (own and following),
-    states by durations, events by starts and by durations; and the number of the next leg."""
-
-    blocks: NDArray[Any]
-    following: NDArray[Any]
-    by_duration: NDArray[Any]
-    event_rows: NDArray[Any]
-    event_durations: NDArray[Any]
-    next_leg: NDArray[Any]
-
-
-@lru_cache(maxsize=256)
-def _places(count: int, n: int) -> _Places:
-    size = count * (n + 1)
-    places = np.arange(size * size).reshape(size, size)
-    rows = np.arange(count * n).reshape(count, n)
-    times = np.arange(count * n, size)
-    return _Places(
-        places[rows[:, :, None], rows[:, None, :]].ravel(),
-        places[rows, np.roll(rows, -1, axis=0)].ravel(),
-        places[rows, times[:, None]].ravel(),
-        places[times[:, None], rows].ravel(),
-        places[times, times].ravel(),
-        np.roll(np.arange(count), -1),
-    )

@@ -9,16 +9,20 @@ Each test is a smooth function along the branch, which goes on, virtual, beyond 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..model import Array, Evaluator, FilippovSystem, Guard
 from ..model.variational import guarded_field, variational_field
 from .boundary import BoundaryProblem, Evaluation
-from .guards import Approach, near_and_first, watch
+from .guards import LegGuards, watch
 from .legs import Leg
-from .multipliers import return_map
+from .multipliers import finite_return_map
 
 _SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
 
@@ -42,7 +46,7 @@ class Condition:
     leg: int
     guard: Guard | None = None
 
-    @property
+    @cached_property
     def name(self) -> str:
         """A name that is the same along the branch."""
         of = f" {self.guard.name} {self.guard.side}" if self.guard is not None else ""
@@ -58,21 +62,16 @@ def conditions_of(
     problem: BoundaryProblem, at: Evaluation, p: Array, known: dict[str, Condition]
 ) -> dict[str, float]:
     """All tests of an orbit; what they are about is added to ``known``."""
-    found: dict[str, float] = {}
     system, legs = problem.system, problem.legs
-    seen = near_and_first(system, legs, at.starts, at.durations, p)
-    for i, (leg, (approaches, first)) in enumerate(zip(legs, seen, strict=True)):
-        rows = [
-            (Condition("duration", i), float(at.durations[i])),
-            *_at_start(system, i, leg, legs[i - 1], first),
-            *_at_end(problem, i, at, p),
-            *_interior(i, approaches),
-        ]
-        for test, value in rows:
-            known.setdefault(test.name, test)
-            found[test.name] = value
-    found.update(smooth_tests(problem, at))
-    return {name: value for name, value in found.items() if np.isfinite(value)}
+    tests: _Tests = system.cached(("tests of legs", legs), lambda: _Tests(system, legs))
+    found: dict[str, float] = {}
+    for condition, value in tests(at, p):
+        name = condition.name
+        known.setdefault(name, condition)
+        if np.isfinite(value):
+            found[name] = value
+    found.update((name, v) for name, v in smooth_tests(problem, at).items() if np.isfinite(v))
+    return found
 
 
 def condition_row(
@@ -94,8 +93,9 @@ def condition_row(
             leg, before = problem.legs[i], problem.legs[i - 1]
             y = variational_field(problem.system, leg.mode).states_at(x, q)
             first = guarded_field(problem.system, leg.mode).starts.copied(y, q)[1]
-            rows = _at_start(problem.system, i, leg, before, first)
-            return dict((test.name, v) for test, v in rows).get(condition.name, np.nan)
+            rows = _starting(problem.system, i, leg, before)
+            found = {test.name: float(first[k, order]) for k, order, test in rows}
+            return found.get(condition.name, np.nan)
         values = minima(problem.system, problem.legs[i], condition, x, duration, q)
         return min(values, key=abs, default=np.nan)  # the one that touches, not the least
 
@@ -116,30 +116,68 @@ def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
 
     An eigenvalue -1 of the half map of a symmetric orbit breaks its symmetry: a pitchfork.
     """
+    reduced = finite_return_map(problem, at)
+    if reduced is None or not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
+        return {}
     with np.errstate(all="ignore"):
-        reduced = return_map(problem, at)
-        if not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
-            return {}
-        flip = float(np.linalg.det(reduced + np.eye(len(reduced))))
         values = np.linalg.eigvals(reduced)
-        k, l = np.triu_indices(values.size, 1)
-        torus = float(np.prod(values[k] * values[l] - 1.0).real)
+        k, l = _pairs(values.size)
+        torus = float(np.multiply.reduce(values[k] * values[l] - 1.0).real)
+        flip = float(np.multiply.reduce(values + 1.0).real)
     name = "period doubling" if problem.symmetry is None else "pitchfork"
     return {name: flip, "Neimark-Sacker": torus}
 
 
-def _at_start(
-    system: FilippovSystem, i: int, leg: Leg, before: Leg, first: Array
-) -> list[tuple[Condition, float]]:
-    """First Taylor coefficient, at the start of a leg, of each guard that is not zero by construction,
-    of those to order 3."""
-    field = guarded_field(system, leg.mode)
-    orders = [_order(system, guard, before) for guard in field.motion.guards]
-    return [
-        (Condition("start", i, guard), float(first[k, order]))
-        for k, (guard, order) in enumerate(zip(field.motion.guards, orders, strict=True))
-        if order is not None
-    ]
+@lru_cache(maxsize=64)
+def _pairs(count: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    return np.triu_indices(count, 1)
+
+
+class _Tests:
+    """What is watched of the legs of an orbit, and by which guards.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    legs : tuple of Leg
+    """
+
+    def __init__(self, system: FilippovSystem, legs: tuple[Leg, ...]):
+        self.system, self.legs, self.guards = system, legs, LegGuards(system, legs)
+        own = [field.motion.guards for field in self.guards.fields]
+        self.durations = [Condition("duration", i) for i in range(len(legs))]
+        self.starts = [_starting(system, i, leg, legs[i - 1]) for i, leg in enumerate(legs)]
+        self.ends = [_ending(i, leg, own[i]) for i, leg in enumerate(legs)]
+        self.inside = [[(Condition("interior", i, g), g) for g in own[i]] for i in range(len(legs))]
+
+    def __call__(self, at: Evaluation, p: Array) -> list[tuple[Condition, float]]:
+        durations, found = at.durations.tolist(), list[tuple[Condition, float]]()
+        speeds = (at.flight.gradient * at.flight.rate).sum(axis=1).tolist()
+        watched = zip(*self.guards(at.starts, p, at.durations), strict=True)
+        for i, (rows, begin, values) in enumerate(watched):
+            first = begin[len(begin) - len(self.inside[i]) :].tolist()
+            found.append((self.durations[i], durations[i]))
+            found += [(condition, first[k][order]) for k, order, condition in self.starts[i]]
+            met, sign, others = self.ends[i]
+            if met is not None:
+                found.append((met, sign * speeds[i]))
+            if others:
+                if not durations[i] > 0.0:
+                    state = at.flown[i].end
+                    values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
+                found += [(condition, float(values[k])) for k, condition in others]
+            found += _interior(self.inside[i], rows)
+        return found
+
+
+def _starting(
+    system: FilippovSystem, i: int, leg: Leg, before: Leg
+) -> list[tuple[int, int, Condition]]:
+    """Guards that are not zero by construction at the start of a leg, of those to order 3: number and order
+    of the first Taylor coefficient."""
+    guards = guarded_field(system, leg.mode).motion.guards
+    orders = [(k, guard, _order(system, guard, before)) for k, guard in enumerate(guards)]
+    return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
 
 
 def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
@@ -169,23 +207,17 @@ def surface_of(system: FilippovSystem, leg: Leg) -> int:
     return -1
 
 
-def _at_end(
-    problem: BoundaryProblem, i: int, at: Evaluation, p: Array
-) -> list[tuple[Condition, float]]:
-    """How fast a leg's event is met, and guards of sliding that end together with it."""
-    leg, system = problem.legs[i], problem.system
-    field = guarded_field(system, leg.mode)
-    own = [g for g in field.motion.guards if g.name == leg.name and leg.side in (0, g.side)]
+def _ending(
+    i: int, leg: Leg, guards: Sequence[Guard]
+) -> tuple[Condition | None, int, list[tuple[int, Condition]]]:
+    """How fast a leg's event is met, with the sign of that; guards of sliding that end together with it."""
+    own = [g for g in guards if g.name == leg.name and leg.side in (0, g.side)]
     if not own:
-        return []
-    speed = float(at.events[i].gradient @ at.flown[i].rate)
+        return None, 0, []
     sign = own[0].side if own[0].kind in ("stop", "reset") and own[0].side else -1
-    rows = [(Condition("transversality", i, own[0]), speed * sign)]
-    others = [k for k, g in enumerate(field.motion.guards) if g.kind == "exit" and g is not own[0]]
-    if others:
-        values = guard_values(system, leg.mode)(at.flown[i].end, p)[1]
-        rows += [(Condition("end", i, field.motion.guards[k]), float(values[k, 0])) for k in others]
-    return rows
+    others = [(k, g) for k, g in enumerate(guards) if g.kind == "exit" and g is not own[0]]
+    rows = [(k, Condition("end", i, g)) for k, g in others]
+    return Condition("transversality", i, own[0]), sign, rows
 
 
 def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
@@ -194,19 +226,24 @@ def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
     return system.cached(("guard values", mode), lambda: Evaluator(motion.value_function()))
 
 
-def _interior(i: int, approaches: list[Approach]) -> list[tuple[Condition, float]]:
+def _interior(
+    guards: Sequence[tuple[Condition, Guard]], rows: Array
+) -> list[tuple[Condition, float]]:
     """Smallest minimum of each guard inside a leg."""
-    least: dict[Guard, float] = {}
-    for near in approaches:
-        value = _signed(near)
-        least[near.guard] = min(value, least.get(near.guard, np.inf))
-    return [(Condition("interior", i, guard), value) for guard, value in least.items()]
+    least: dict[int, float] = {}
+    for number, _, value, bend in rows[:, :4].tolist():
+        k = int(number)
+        guard = guards[k][1]
+        if bend > 0.0 or (bend and guard.kind in ("stop", "reset")):
+            value = _signed(guard, value)
+            least[k] = min(value, least.get(k, np.inf))
+    return [(guards[k][0], value) for k, value in least.items()]
 
 
-def _signed(near: Approach) -> float:
+def _signed(guard: Guard, value: float) -> float:
     """A guard's extremum, positive as long as it is not passed."""
-    sign = -near.guard.side if near.guard.kind in ("stop", "reset") else 1
-    return (sign or 1) * near.value
+    sign = -guard.side if guard.kind in ("stop", "reset") else 1
+    return (sign or 1) * value
 
 
 def minima(
@@ -216,7 +253,7 @@ def minima(
     if duration <= 0.0:
         return []
     seen = watch(system, leg.mode, x, duration, p).approaches
-    return [_signed(near) for near in seen if near.guard == condition.guard]
+    return [_signed(near.guard, near.value) for near in seen if near.guard == condition.guard]
 
 
 def touching(

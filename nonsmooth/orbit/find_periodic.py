@@ -23,11 +23,12 @@ from ..model import (
     whole,
 )
 from .boundary import BoundaryProblem, Evaluation
+from .demands import CLOSE, COARSE, FINAL, ROUNDING
 from .guess import Itinerary, Start, mirror_of, start_of
 from .legs import Leg, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 from .rounds import once_round
-from .shooting import CLOSE, COARSE, FINAL, ROUNDING, shot
+from .shooting import shot
 
 #: A period below this part of the guess is that of a point.
 _POINT = 1e-9

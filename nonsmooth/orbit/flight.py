@@ -148,13 +148,14 @@ class Flights:
     @cached_property
     def _orbit_program(self) -> OrbitProgram | None:
         """Newton's method on an orbit of these legs, where each ends by one event."""
-        if self.chosen or len(set(self.sizes)) > 1 or not has_interpreter():
+        if len(set(self.sizes)) > 1 or not has_interpreter():
             return None
         if self._plain_program is None:
             return None
         n, q = self._most, len(self.system.parameter_names)
         start, fixed, ours, theirs = self._template
-        return OrbitProgram(self._program, self._plain_program, n, q, ours, theirs, start, fixed)
+        legs, plain = self._program, self._plain_program
+        return OrbitProgram(legs, plain, n, q, self.chosen, ours, theirs, start, fixed)
 
     @cached_property
     def _followed_program(self) -> FollowedProgram | None:
@@ -209,17 +210,47 @@ class Flights:
         """
         program = self._orbit_program
         found = program.newton(u, p, scales, wrap, demands) if program is not None else None
-        if found is None:
+        return None if found is None else (found, self._flight_of(found, p.size))
+
+    def evaluated(
+        self, u: Array, p: Array, wrap: Array | None, tol: float, demands: Demands
+    ) -> tuple[SolvedOrbit, Flight] | None:
+        """Their equations at starts, durations and chosen parameters (m + k,); as ``newton``."""
+        program = self._orbit_program
+        found = program.evaluate(u, p, wrap, tol, demands) if program is not None else None
+        return None if found is None else (found, self._flight_of(found, p.size))
+
+    def corrected(
+        self,
+        u: Array,
+        p: Array,
+        scales: Array,
+        wrap: Array | None,
+        across: Array,
+        demands: Demands,
+    ) -> tuple[SolvedOrbit, Flight] | None:
+        """Their solution with one chosen parameter across a direction in units ``scales``; as ``newton``."""
+        program = self._orbit_program
+        if program is None:
             return None
+        found = program.correct(u, p, scales, wrap, across, demands)
+        return None if found is None else (found, self._flight_of(found, p.size))
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether ``newton``, ``evaluated`` and ``corrected`` are to be had."""
+        return self._orbit_program is not None
+
+    def _flight_of(self, found: SolvedOrbit, parameters: int) -> Flight:
         n, whole = self._most, found.whole
-        return found, Flight(
+        return Flight(
             self.sizes,
             whole[:, :, 0],
             found.before[:, :n],
             found.after[:, :n],
-            whole[:, :, 1:],
-            np.zeros((len(self.legs), n, 0)),
-            *self._events(found.results, n, p.size),
+            whole[:, :, 1 : 1 + n],
+            whole[:, :, 1 + n :],
+            *self._events(found.results, n, parameters),
         )
 
     @cached_property

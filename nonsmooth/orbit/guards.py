@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..flow.watched import passing, watched, watched_legs
+from ..flow.watched import LegsWatch, passing, watched
 from ..model import Array, FilippovSystem, Guard
 from ..model.variational import GuardedField, guarded_field, variational_field
 from .legs import Leg, leg_name
@@ -93,25 +93,31 @@ def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
     return found
 
 
-def near_and_first(
-    system: FilippovSystem, legs: Sequence[Leg], starts: Array, durations: Array, p: Array
-) -> list[tuple[list[Approach], Array]]:
-    """Of each leg: approaches of guards inside it, and first coefficients (g, 4) of the guards at its start.
+class LegGuards:
+    """The guards of legs that follow each other, to be watched again and again.
 
-    Legs of no positive duration have no inside.
+    Parameters
+    ----------
+    system : FilippovSystem
+    legs : sequence of Leg
+
+    Attributes
+    ----------
+    fields : list of GuardedField
+        Of each leg.
     """
-    fields = [guarded_field(system, leg.mode) for leg in legs]
-    rows, begins = watched_legs(fields, _states(system, legs, starts, p), p, durations, _ENDS)
-    return [
-        (_approaches(field, own, p), begin[len(begin) - len(field.motion.guards) :])
-        for field, own, begin in zip(fields, rows, begins, strict=True)
-    ]
 
+    def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
+        self.fields = [guarded_field(system, leg.mode) for leg in legs]
+        self._plain = [variational_field(system, leg.mode) for leg in legs]
+        self._watch = LegsWatch(self.fields)
 
-def _states(system: FilippovSystem, legs: Sequence[Leg], starts: Array, p: Array) -> list[Array]:
-    """Starts of legs with the multipliers that are states."""
-    plain = [variational_field(system, leg.mode) for leg in legs]
-    return [field.states_at(x, p) for field, x in zip(plain, starts, strict=True)]
+    def __call__(
+        self, starts: Array, p: Array, durations: Array
+    ) -> tuple[list[Array], list[Array], list[Array]]:
+        """As of LegsWatch; legs of no positive duration have no inside."""
+        states = [field.states_at(x, p) for field, x in zip(self._plain, starts, strict=True)]
+        return self._watch(states, p, durations, _ENDS)
 
 
 def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
@@ -243,8 +249,8 @@ def faults_along(
     closes : bool
         Whether the first leg follows the last one as it is.
     """
-    fields = [guarded_field(system, leg.mode) for leg in legs]
-    rows, begins = watched_legs(fields, _states(system, legs, starts, p), p, durations, _ENDS)
+    guards = LegGuards(system, legs)
+    fields, (rows, begins, _) = guards.fields, guards(starts, p, durations)
     result, count = list[str](), len(legs)
     for i, leg in enumerate(legs):
         if durations[i] <= 0.0:

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flow.compiled.shooting import reduced_map
+from ..flow.compiled.shooting import reduced_map, whole_map
 from ..flow.fixed import has_interpreter
 from ..model import Array
 from ..model.event_maps import surface_map
@@ -119,6 +119,17 @@ def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
     for step in leg_maps(problem, at):
         product = step @ product
     return product
+
+
+def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
+    """As ``return_map``; None where it is not finite, as an event is grazed."""
+    if has_interpreter():
+        flight, wrap = at.flight, None if problem.symmetry is None else problem.wrap
+        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
+        return whole_map(legs, wrap, np.ones(problem.dimension))
+    with np.errstate(all="ignore"):
+        found = return_map(problem, at)
+    return found if np.isfinite(found).all() else None
 
 
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:

@@ -17,7 +17,7 @@ import numpy as np
 from ..local.newton import converge
 from ..local.read_only import ReadOnly
 from ..model import Array, NonsmoothError
-from .boundary import BoundaryProblem, Evaluation
+from .boundary import BoundaryProblem
 from .branch import BranchEnd, BranchEvent, FarSide
 from .branch_curves import BranchCurve
 from .codimension_two import ENDS, degenerate
@@ -25,11 +25,11 @@ from .conditions import Condition, condition_row, conditions_of, is_smooth
 from .connection_curves import homoclinic_end
 from .continuation import Departure, Point, Zero
 from .edits import Edited, edited, kind_of
-from .elimination import applies, eliminated
 from .far_side import far_side
 from .growing_legs import grown
 from .hopf_ends import hopf_point
 from .legs import fly
+from .orbit_equations import OrbitEquations
 from .periodic import PeriodicOrbit, faults_of, named
 from .rounds import once_round
 from .smooth_events import smooth_side
@@ -40,9 +40,6 @@ _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
 #: Relative growth of a long period, over a change of the parameter by its bounds, that diverges.
 _STEEP = 30.0
 
-#: Equations of more unknowns are solved from leg to leg.
-_MANY = 24
-
 #: What names an event of which several conditions vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 
@@ -51,76 +48,12 @@ _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 _OBLIQUE, _LEFT = 0.9, 0.5
 
 
-class OrbitCurve(BranchCurve):
-    """Periodic orbits of one itinerary in the unknowns (starts, durations, parameters).
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    p : ndarray
-        All parameters.
-    free : tuple of int
-        Those that vary.
-    scale : ndarray
-    longest : float
-        Where the period counts as divergent.
-    """
-
-    def __init__(
-        self,
-        problem: BoundaryProblem,
-        p: Array,
-        free: tuple[int, ...],
-        widths: Array,
-        u: Array,
-        longest: float,
-    ):
-        self.problem, self.p, self.free, self.longest = problem, p, free, longest
-        self.system, self.widths = problem.system, widths
-        self.scale = np.append(problem.scales(u, p), widths)
-        self.known: dict[str, Condition] = {}
-        self._many = problem.size > _MANY and applies(problem)
-        self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
-
-    # equations ----------------------------------------------------------------------------------
-
-    def parameters_at(self, u: Array) -> Array:
-        p = self.p.copy()
-        p[list(self.free)] = u[-len(self.free) :]
-        return p
-
-    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
-        p, unknowns = self.parameters_at(u), u[: self.problem.size]
-        curve = OrbitCurve(self.problem, p, free, widths, unknowns, self.longest)
-        curve.known = self.known
-        return curve, np.append(unknowns, p[list(free)])
+class OrbitCurve(OrbitEquations):
+    """Periodic orbits of one itinerary, with what is watched along them and what happens where it ends."""
 
     def with_problem(self, problem: BoundaryProblem, u: Array) -> OrbitCurve:
         """The same parameters with another itinerary."""
         return OrbitCurve(problem, self.p, self.free, self.widths, u, self.longest)
-
-    def evaluation(self, u: Array) -> Evaluation:
-        """The equations at a point, computed once."""
-        key = u.tobytes()
-        if key not in self._found:
-            p, unknowns = self.parameters_at(u), u[: self.problem.size]
-            self._found.pop(self._last, None)
-            self._found[key], self._last = self.problem.evaluate(unknowns, p, self.free), key
-        return self._found[key]
-
-    def equations(self, u: Array) -> tuple[Array, Array]:
-        at = self.evaluation(u)
-        return at.residual, np.hstack([at.jacobian, at.by_parameters])
-
-    def solve(self, matrix: Array, right: Array) -> Array:
-        if not self._many:
-            return super().solve(matrix, right)
-        return eliminated(self.problem, matrix, right).solution()
-
-    def determinant(self, matrix: Array) -> float:
-        if not self._many:
-            return super().determinant(matrix)
-        return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
 
     def tests(self, point: Point) -> Mapping[str, float]:
         at, p, self._last = self.evaluation(point.u), self.parameters_at(point.u), b""

@@ -129,7 +129,12 @@ def test_doubled_orbits_between_two_doublings_are_followed_once():
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.5], 600.0))
     branch = ns.continue_orbit(orbit, "A", bounds=(0.05, 3.0))
     kinds = [event.kind for event in branch.events]
-    assert kinds.count("period doubling") == 2 and len(kinds) == 4 and len(branch) < 100
+    # of the subcritical doubled orbits A falls, of those beyond it rises: they turn
+    doubling, switching = "period doubling", "switching-sliding"
+    assert kinds == [doubling, switching, "fold", switching, doubling] and len(branch) < 100
+    turn = branch.events[2]
+    assert turn.parameter < branch.events[1].parameter
+    assert np.abs(turn.orbit.multipliers - 1).min() < 1e-8
     assert branch.ends == (ns.BranchEnd.EVENT,) * 2
     ends = [event for event in branch.events if event.kind == "period doubling"]
     single = ns.continue_orbit(ends[0].orbit, "A", bounds=(0.4, 0.6))

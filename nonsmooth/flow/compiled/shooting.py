@@ -21,8 +21,8 @@ _I64, _D, _POINTER = ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
 class _Orbit(ctypes.Structure):
     _fields_ = [
-        *[(name, _I64) for name in ("n", "parameters", "moving")],
-        *[(name, _POINTER) for name in ("legs", "plain", "own", "row", "start", "fixed")],
+        *[(name, _I64) for name in ("n", "parameters", "moving", "free")],
+        *[(name, _POINTER) for name in ("legs", "plain", "own", "row", "chosen", "start", "fixed")],
         *[(name, _I64) for name in ("of_legs", "of_plain")],
     ]
 
@@ -57,15 +57,16 @@ class Demands(ctypes.Structure):
         Steps that do not change derivatives, and those that do not change the orbit.
     longest : float
         No leg may last longer.
-    advance : float
-        Time by which the legs advance the last state.
+    periods, period : float, int or None
+        The legs advance the last state by so many periods, which a program at this address gives.
     most, most_steps : int
         Of Newton's method, and along a leg.
     """
 
     _fields_ = [
         *[(name, _D) for name in ("tol", "noise", "finest", "coarse", "extended")],
-        *[(name, _D) for name in ("final", "rounding", "longest", "advance")],
+        *[(name, _D) for name in ("final", "rounding", "longest", "periods")],
+        ("period", _POINTER),
         *[(name, _I64) for name in ("most", "most_steps")],
     ]
 
@@ -75,9 +76,10 @@ class SolvedOrbit(NamedTuple):
 
     Attributes
     ----------
-    unknowns, residual, jacobian : ndarray (m,), (m,), (m, m)
-    whole : ndarray (L, n, 1 + n)
-        States at the ends, and their derivatives by the starts.
+    unknowns, residual, jacobian : ndarray (m + k,), (m,), (m, m + k)
+        With k free parameters.
+    whole : ndarray (L, n, 1 + n + k)
+        States at the ends, and their derivatives by the starts and by the free parameters.
     before, after : ndarray (L, width)
         Fields at the starts and at the ends.
     results : ndarray (L, results)
@@ -103,11 +105,18 @@ def _library() -> ctypes.CDLL:
     require_size(made.returns_size, _Returns)
     require_size(made.followed_size, _Followed)
     made.orbit_work.restype = made.orbit_newton.restype = made.reduced_map.restype = _I64
+    made.whole_map.restype = _I64
+    made.whole_map.argtypes = [_POINTER, _POINTER]
     made.follow_legs.restype = _I64
     made.follow_legs.argtypes = [*[_POINTER] * 4, _D, _D, _I64, _POINTER]
     made.orbit_work.argtypes = [_POINTER]
     made.reduced_map.argtypes = [_POINTER, _I64, _D, _D, _POINTER]
     made.orbit_newton.argtypes = [_POINTER] * 5
+    made.orbit_evaluate.restype = made.orbit_correct.restype = _I64
+    made.orbit_evaluate.argtypes = [_POINTER, _POINTER, _POINTER, _D, _POINTER]
+    made.orbit_correct.argtypes = [_POINTER] * 6
+    made.bordered_direction.restype = _I64
+    made.bordered_direction.argtypes = [_POINTER, _POINTER, _I64, _POINTER, _POINTER]
     return made
 
 
@@ -117,13 +126,15 @@ class OrbitProgram:
     Parameters
     ----------
     legs, plain : LegsProgram
-        With derivatives by the starts, and the states alone.
+        With derivatives by the starts and by free parameters, and the states alone.
     n, parameters : int
         States of a start, and parameters.
+    chosen : tuple of int
+        The free ones.
     own, row : ndarray of int
-        Entries of (x, X) that move: places in ``start``, and in the rows of ``legs``.
-    start, fixed : ndarray (L, 1 + n, n)
-        Matrices (x, X) at the starts, transposed, and those of the entries that do not move.
+        Entries of (x, X, P) that move: places in ``start``, and in the rows of ``legs``.
+    start, fixed : ndarray (L, 1 + n + k, n)
+        Matrices (x, X, P) at the starts, transposed, and those of the entries that do not move.
     """
 
     def __init__(
@@ -132,18 +143,20 @@ class OrbitProgram:
         plain: LegsProgram,
         n: int,
         parameters: int,
+        chosen: tuple[int, ...],
         own: NDArray[Any],
         row: NDArray[Any],
         start: Array,
         fixed: Array,
     ):
-        arrays = [own.astype(np.int32), row.astype(np.int32), start, fixed]
-        kept = [np.ascontiguousarray(array) for array in arrays]
+        numbers = [np.array(part, np.int32) for part in (own, row, chosen)]
+        kept = [np.ascontiguousarray(array) for array in (*numbers, start, fixed)]
         self._kept, self._legs = (legs, plain, *kept), legs
         pointers = (legs.pointer, plain.pointer, *[address(array) for array in kept])
-        self._c = _Orbit(n, parameters, len(own), *pointers, legs.size, plain.size)
+        counts = (n, parameters, len(own), len(chosen))
+        self._c = _Orbit(*counts, *pointers, legs.size, plain.size)
         self._pointer = ctypes.addressof(self._c)
-        self._count, self._n = len(start), n
+        self._count, self._n, self._free = len(start), n, len(chosen)
         work = int(_library().orbit_work(self._pointer))
         self._parameters = work, work + legs.size
         self._size = work + legs.size + plain.size
@@ -156,7 +169,7 @@ class OrbitProgram:
         Parameters
         ----------
         u : ndarray (m,)
-            Starts of the legs, then durations.
+            Starts of the legs, then durations; no parameter is free.
         p : ndarray
         scales : ndarray (m,)
             Sizes of the unknowns.
@@ -164,11 +177,7 @@ class OrbitProgram:
             Symmetry that maps the end of the last leg.
         demands : Demands
         """
-        memory, size, n = np.zeros(self._size), len(u), self._n
-        memory[:size] = u
-        for at in self._parameters:
-            memory[at : at + len(p)] = p
-        scales = np.ascontiguousarray(scales)
+        memory, scales = self._memory(u, p), np.ascontiguousarray(scales)
         wrap = None if wrap is None else np.ascontiguousarray(wrap, float)
         steps = _library().orbit_newton(
             self._pointer,
@@ -177,15 +186,83 @@ class OrbitProgram:
             address(wrap),
             address(memory),
         )
-        if not steps:
-            return None
-        jacobian = memory[2 * size : (2 + size) * size].reshape(size, size)
-        at = 5 * size + 2 * size * size + n * n
-        whole = memory[at : at + self._count * n * (n + 1)].reshape(self._count, n + 1, n)
-        parts = self._legs.parts(memory[self._parameters[0] :])
-        rows = [part.reshape(self._count, -1) for part in parts[3:6]]
-        found = memory[:size], memory[size : 2 * size], jacobian, whole.swapaxes(1, 2)
-        return SolvedOrbit(*found, rows[0], rows[1], rows[2], steps)
+        return self._solved(memory, steps) if steps else None
+
+    def evaluate(
+        self, u: Array, p: Array, wrap: Array | None, tol: float, demands: Demands
+    ) -> SolvedOrbit | None:
+        """The equations at unknowns (m + k,); None where a leg cannot be flown."""
+        memory = self._memory(u, p)
+        failed = _library().orbit_evaluate(
+            self._pointer, ctypes.addressof(demands), address(wrap), tol, memory.ctypes.data
+        )
+        return self._solved(memory, 0) if failed < 0 else None
+
+    def correct(
+        self,
+        u: Array,
+        p: Array,
+        scales: Array,
+        wrap: Array | None,
+        across: Array,
+        demands: Demands,
+    ) -> SolvedOrbit | None:
+        """The branch near a guess (m + 1,) across a direction in units ``scales``; None where that fails."""
+        memory = self._memory(u, p)
+        scales, across = np.ascontiguousarray(scales), np.ascontiguousarray(across)
+        steps = _library().orbit_correct(
+            self._pointer,
+            ctypes.addressof(demands),
+            scales.ctypes.data,
+            address(wrap),
+            across.ctypes.data,
+            memory.ctypes.data,
+        )
+        return self._solved(memory, steps) if steps else None
+
+    def _memory(self, u: Array, p: Array) -> Array:
+        memory = np.empty(self._size)
+        memory[: len(u)] = u
+        for at in self._parameters:
+            memory[at : at + len(p)] = p
+        return memory
+
+    def _solved(self, memory: Array, steps: int) -> SolvedOrbit:
+        """What is found, copied: the room for work is many times as large."""
+        n, free, count = self._n, self._free, self._count
+        size, columns = count * (n + 1), 1 + n + free
+        wide = size + free
+        first = memory[: (2 + size) * wide].copy()
+        at = 5 * wide + size * wide + wide * wide + n * n
+        whole = memory[at : at + count * n * columns].copy().reshape(count, columns, n)
+        rows = self._legs.found(memory[self._parameters[0] :])
+        jacobian = first[2 * wide :].reshape(size, wide)
+        found = first[:wide], first[wide : wide + size], jacobian, whole.swapaxes(1, 2)
+        return SolvedOrbit(*found, *rows, steps)
+
+
+def bordered_direction(jacobian: Array, before: Array) -> tuple[Array, float] | None:
+    """Direction in which equations stay as they are, and the determinant of their bordered Jacobian.
+
+    Parameters
+    ----------
+    jacobian : ndarray (N - 1, N)
+    before : ndarray (N,)
+        A direction near the one that is looked for.
+
+    Returns
+    -------
+    direction, determinant : ndarray (N,), float
+        Of length 1; with the direction as last row. None where the Jacobian bordered by ``before`` is
+        singular.
+    """
+    wide, found = before.size, ctypes.c_double()
+    jacobian, before = np.ascontiguousarray(jacobian), np.ascontiguousarray(before)
+    memory = np.empty(wide * (wide + 2))
+    done = _library().bordered_direction(
+        jacobian.ctypes.data, before.ctypes.data, wide, ctypes.addressof(found), memory.ctypes.data
+    )
+    return (memory[:wide], found.value) if done else None
 
 
 class FollowedProgram:
@@ -271,15 +348,36 @@ def reduced_map(
     -------
     ndarray (r, r)
     """
+    given, kept = _returns(legs, wrap, units)
     count, n, s = legs[3].shape
-    kept = [np.ascontiguousarray(rows, float) for rows in (*legs, wrap, units) if rows is not None]
-    pointers = [address(rows) for rows in kept]
-    if wrap is None:
-        pointers.insert(4, None)
-    given = _Returns(count, n, s, *pointers)
     memory = np.empty((2 * count + 5) * n * n + s * n)
     memory[: basis.size] = basis.ravel()
     r = _library().reduced_map(
         ctypes.addressof(given), basis.shape[1], grazing, lost, address(memory)
     )
+    del kept
     return None if r < 0 else memory[: r * r].reshape(r, r).copy()
+
+
+def whole_map(
+    legs: tuple[Array, Array, Array, Array], wrap: Array | None, units: Array
+) -> Array | None:
+    """The return map (N, N) across the flow, as ``reduced_map``; None where it is not finite."""
+    given, kept = _returns(legs, wrap, units)
+    _, n, s = legs[3].shape
+    memory = np.empty(n * (4 * n + 2 * s))
+    done = _library().whole_map(ctypes.addressof(given), memory.ctypes.data)
+    del kept
+    return memory[: n * n].reshape(n, n) if done else None
+
+
+def _returns(
+    legs: tuple[Array, Array, Array, Array], wrap: Array | None, units: Array
+) -> tuple[_Returns, list[Array]]:
+    """What C reads, and what must live as long."""
+    rows = [*legs, *([] if wrap is None else [wrap]), units]
+    kept = [np.ascontiguousarray(part, float) for part in rows]
+    pointers: list[int | None] = [part.ctypes.data for part in kept]
+    if wrap is None:
+        pointers.insert(4, None)
+    return _Returns(*legs[3].shape, *pointers), kept

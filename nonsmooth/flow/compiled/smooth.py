@@ -214,13 +214,20 @@ class LegsProgram:
         failed = _library().fly_legs(
             ctypes.byref(self._c), memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
-        rows = [part.reshape(self._count, -1) for part in (parts[1], parts[3], parts[4], parts[5])]
-        return FlownLegs(rows[0], rows[1], rows[2], rows[3], failed, left.value)
+        ends = parts[1].reshape(self._count, -1).copy()
+        return FlownLegs(ends, *self.found(memory), failed, left.value)
 
     def parts(self, memory: Array) -> list[Array]:
         """Parameters, states, durations, fields before and after, and results in the memory of a call."""
         at = self._places
         return [memory[at[k] : at[k + 1]] for k in range(6)]
+
+    def found(self, memory: Array) -> tuple[Array, Array, Array]:
+        """Fields before and after (L, width), and results (L, results), copied out of the memory of a call."""
+        at, count = self._places, self._count
+        copied, first = memory[at[3] : at[6]].copy(), at[3]
+        before, after, results = (copied[at[k] - first : at[k + 1] - first] for k in (3, 4, 5))
+        return before.reshape(count, -1), after.reshape(count, -1), results.reshape(count, -1)
 
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
         memory = np.empty(self.size)
@@ -260,6 +267,8 @@ class WatchedLegs(NamedTuple):
         state.
     begins : list of ndarray (N + g, 4)
         First coefficients of the states and of the functions at the starts.
+    values : list of ndarray (g,)
+        Of the functions at the ends of legs of positive duration.
     failed : int
         Number of a leg that fails, or -1.
     left : float
@@ -268,46 +277,65 @@ class WatchedLegs(NamedTuple):
 
     rows: list[Array]
     begins: list[Array]
+    values: list[Array]
     failed: int
     left: float
 
 
-def watch_legs(
-    fields: Sequence[SmoothProgram],
-    z: Sequence[Array],
-    p: Array,
-    durations: Array,
-    tol: float,
-    most_steps: int,
-    ends: float,
-) -> WatchedLegs:
-    """Watch the functions of many flows in one call; those of no positive duration have their starts alone."""
-    legs, width = len(fields), max(f.size for f in fields)
-    rows = [f.size + f.watched for f in fields]
-    begin, work = 4 * max(rows), max(f.work for f in fields)
-    pointers = (_POINTER * legs)(*[f.pointer for f in fields])
-    counts, left, room = np.empty(legs, np.int64), ctypes.c_double(), _ROOM + 16 * legs
-    durations, p = np.ascontiguousarray(durations, float), np.append(p, 0.0)
-    while True:
-        states = np.empty((legs, width))
-        for i, y in enumerate(z):
-            states[i, : len(y)] = y
-        memory = np.empty(legs * begin + work)
-        found, at = np.empty(room * (4 + width)), memory.ctypes.data
-        failed = _library().watch_legs(
-            *(ctypes.addressof(pointers), legs, width, p.ctypes.data, states.ctypes.data),
-            *(durations.ctypes.data, tol, most_steps, ends, found.ctypes.data, room),
-            *(counts.ctypes.data, at, begin, ctypes.addressof(left), at + 8 * legs * begin),
-        )
-        if failed != -2:
-            break
-        room *= 8
-    if failed >= 0:
-        return WatchedLegs([], [], failed, left.value)
-    own, begins, place = list[Array](), list[Array](), 0
-    for i, (f, count) in enumerate(zip(fields, counts.tolist(), strict=True)):
-        size = count * (4 + f.size)
-        own.append(found[place : place + size].reshape(count, 4 + f.size))
-        begins.append(memory[i * begin : i * begin + 4 * rows[i]].reshape(rows[i], 4))
-        place += size
-    return WatchedLegs(own, begins, -1, 0.0)
+class WatchProgram:
+    """Flows of which functions are watched, all in one call.
+
+    Parameters
+    ----------
+    fields : sequence of SmoothProgram
+        Of each.
+    """
+
+    def __init__(self, fields: Sequence[SmoothProgram]):
+        self._fields, self._count = list(fields), len(fields)
+        self._width = max(f.size for f in fields)
+        self._rows = [f.size + f.watched for f in fields]
+        self._begin = max(4 * r + f.watched for r, f in zip(self._rows, fields, strict=True))
+        self._work = max(f.work for f in fields)
+        self._pointers = (_POINTER * self._count)(*[f.pointer for f in fields])
+
+    def __call__(
+        self,
+        z: Sequence[Array],
+        p: Array,
+        durations: Array,
+        tol: float,
+        most_steps: int,
+        ends: float,
+    ) -> WatchedLegs:
+        """Watch them; those of no positive duration have their starts alone."""
+        legs, width, begin, room = self._count, self._width, self._begin, _ROOM + 16 * self._count
+        counts, left = np.empty(legs, np.int64), ctypes.c_double()
+        durations, p = np.ascontiguousarray(durations, float), np.append(p, 0.0)
+        pointers = ctypes.addressof(self._pointers)
+        while True:
+            states = np.empty((legs, width))
+            for i, y in enumerate(z):
+                states[i, : len(y)] = y
+            memory, found = np.empty(legs * begin + self._work), np.empty(room * (4 + width))
+            at = memory.ctypes.data
+            failed = _library().watch_legs(
+                *(pointers, legs, width, p.ctypes.data, states.ctypes.data),
+                *(durations.ctypes.data, tol, most_steps, ends, found.ctypes.data, room),
+                *(counts.ctypes.data, at, begin, ctypes.addressof(left), at + 8 * legs * begin),
+            )
+            if failed != -2:
+                break
+            room *= 8
+        if failed >= 0:
+            return WatchedLegs([], [], [], failed, left.value)
+        own, begins, values, place = list[Array](), list[Array](), list[Array](), 0
+        for i, (f, rows, count) in enumerate(
+            zip(self._fields, self._rows, counts.tolist(), strict=True)
+        ):
+            size, first = count * (4 + f.size), i * begin
+            own.append(found[place : place + size].reshape(count, 4 + f.size))
+            begins.append(memory[first : first + 4 * rows].reshape(rows, 4))
+            values.append(memory[first + 4 * rows : first + 4 * rows + f.watched])
+            place += size
+        return WatchedLegs(own, begins, values, -1, 0.0)

@@ -7,6 +7,7 @@ is searched for the zero. An interrupt ends the arc; what was computed is return
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
@@ -143,7 +144,7 @@ class _Tracing:
         fault = "" if trial is None else curve.fault(trial)
         new = None
         if trial is not None and not fault and bend <= BEND:
-            length = float(np.linalg.norm(chord))
+            length = math.sqrt(float(chord @ chord))
             new = curve.point(trial, tangent, chord / length, last.arclength + length)
         if new is not None and curve.exact:
             bend = max(bend, angle(new.tangent, tangent))
@@ -218,9 +219,9 @@ class _Tracing:
     def _closed(self, last: Point, new: Point) -> str:
         """Whether this step passes the start again."""
         first = self.arc.points[self.started]
-        back, step = (first.u - last.u) / self.curve.scale, (new.u - last.u) / self.curve.scale
         if len(self.arc.points) - self.started < 5 or first.tangent @ new.tangent < 0.5:
             return ""
+        back, step = (first.u - last.u) / self.curve.scale, (new.u - last.u) / self.curve.scale
         along = float(back @ step) / float(step @ step)
         across = float(np.linalg.norm(back - along * step))
         return "closed" if 0 < along <= 1 and across < 0.3 * float(np.linalg.norm(step)) else ""
@@ -253,13 +254,15 @@ def ahead(rows: Sequence[Array], size: float, tangent: Array) -> Array:
     last = np.array(rows)
     if len(last) < 3:
         return np.asarray(last[-1] + size * tangent)
-    s = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(last, axis=0), axis=1))])
-    nodes = s - s[-1]
-    weights = [np.prod([(size - b) / (a - b) for b in nodes if b != a]) for a in nodes]
+    chords = last[1:] - last[:-1]
+    s = np.concatenate([[0.0], np.cumsum(np.sqrt((chords * chords).sum(axis=1)))])
+    nodes = (s - s[-1]).tolist()
+    weights = [math.prod((size - b) / (a - b) for b in nodes if b != a) for a in nodes]
     return np.asarray(weights @ last)
 
 
 def angle(step: Array, direction: Array) -> float:
     """Angle of a step with a direction of length 1; pi for none."""
-    length = float(np.linalg.norm(step))
-    return float(np.arccos(np.clip(step @ direction / length, -1, 1))) if length else np.pi
+    length = math.sqrt(float(step @ step))
+    # what is not a number stays so
+    return math.acos(max(min(float(step @ direction) / length, 1.0), -1.0)) if length else math.pi

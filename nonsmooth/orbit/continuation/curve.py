@@ -263,7 +263,7 @@ class Curve:
             plain = Point(u, chord, arclength)
             return Point(u, chord, arclength, tests=dict(self.tests(plain)))
         try:
-            _, jacobian = self.scaled(u / self.scale)
+            jacobian = self.equations(u)[1] * self.scale
             tangent, sign = self.along(jacobian, before)
             tests: dict[str, float] = {}
             if self.parameter is not None:

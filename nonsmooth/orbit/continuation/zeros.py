@@ -54,7 +54,8 @@ def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
     lost = [n for n in lost if not segment.jumps(n)]
     if lost:
         end = segment.before(lost)
-        zeros = [z for z in zeros if curve.ends(z.name)]
+        before = end.arclength  # others that are located there are beyond doubt
+        zeros = [z for z in zeros if curve.ends(z.name) or z.point.arclength < before]
         zeros += [Zero(name, end, segment.slope(name)) for name in lost]
     near = 1e-6 * (b.arclength - a.arclength)
     zeros = [

@@ -170,8 +170,18 @@ double fixed_watch(const Field *f, const double *p, double *z, double duration, 
   return w.left;
 }
 
+/* Values of what is watched at a state. */
+static void watched_at(Flow *w, const double *z, double *values) {
+  const Field *f = w->field;
+  const Series *t = &f->series;
+  int64_t stride = f->order + 1;
+  series_rules(t, t->moving, t->moving_count, 0, stride, z, w->rules);
+  for (int j = 0; j < f->watched; j++) values[j] = w->rules[t->output[f->n + j] * stride];
+}
+
 /* The same of many, with the margin ``ends`` times the duration: rows of all with the same width, their numbers in
- * ``counts``, and first coefficients. Those whose duration is not positive have these alone. The number of a flow
+ * ``counts``, first coefficients, and behind those of a leg values at its end. Those whose duration is not positive
+ * have coefficients alone. The number of a flow
  * that fails, with what is left of it, or -1; -2 where there was not enough room. */
 int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, const double *p, double *z,
                    const double *durations, double tol, int64_t most_steps, double ends, double *found, int64_t room,
@@ -185,6 +195,7 @@ int64_t watch_legs(const Field *const *fields, int64_t legs, int64_t width, cons
       *left = w.left;
       if (w.left > 0 || w.left != w.left) return i;
       if (counts[i] == room) return -2;
+      watched_at(&w, z + i * width, begins + i * begin_width + 4 * (f->n + f->watched));
     } else {
       expand_flow(&w, z + i * width);
       first_terms(&w, begins + i * begin_width);

@@ -47,6 +47,20 @@ static int leg_map(const Returns *r, int64_t i, double grazing, double *work, do
   return 1;
 }
 
+/* The return map (n, n) across the flow, in units of the states, in ``memory``, which has room for 4 n n + s n. 0 where
+ * an event is grazed. */
+int64_t whole_map(const Returns *r, double *memory) {
+  int64_t n = r->n, square = n * n;
+  double *map = memory + square, *next = map + square, *work = next + square;
+  for (int64_t i = 0; i < r->count; i++) {
+    if (!leg_map(r, i, 0, work, i ? map : memory)) return 0;
+    if (!i) continue;
+    product(map, memory, n, n, n, next);
+    memcpy(memory, next, sizeof(double) * square);
+  }
+  return finite_all(memory, square);
+}
+
 /* Orthonormal basis of the range of a (n, m) in its place, column beside column, without what is lost beside
  * ``size``: Gram and Schmidt, the largest first, each twice. Columns that remain. */
 static int64_t range_of(double *a, int64_t n, int64_t m, double size, double lost) {

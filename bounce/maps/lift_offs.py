@@ -35,6 +35,7 @@ def lift_off(
     t_max: float = 100.0,
     work: ns.Work | None = None,
     engine: str = "auto",
+    device: str | None = None,
 ) -> LiftOffs: ...
 
 
@@ -52,6 +53,7 @@ def lift_off(
     t_max: float = 100.0,
     work: ns.Work | None = None,
     engine: str = "auto",
+    device: str | None = None,
 ) -> LiftOffs3D: ...
 
 
@@ -68,6 +70,7 @@ def lift_off(
     t_max: float = 100.0,
     work: ns.Work | None = None,
     engine: str = "auto",
+    device: str | None = None,
 ) -> LiftOffs | LiftOffs3D:
     """Bounce many balls: inputs and model parameters broadcast against each other.
 
@@ -86,6 +89,8 @@ def lift_off(
         Threads, executor, chunk, bar and checkpoint of :func:`nonsmooth.ensemble`; by default no bar.
     engine : {"auto", "reference", "compiled"}
         Which driver: ``"auto"`` takes the compiled one where there is a compiler.
+    device : {None, "cuda"}, optional
+        ``"cuda"`` runs landings in the plane on an NVIDIA card, as :func:`nonsmooth.ensemble` does.
 
     Returns
     -------
@@ -101,7 +106,7 @@ def lift_off(
     ModelError
         No contact model.
     nonsmooth.OptionError
-        A tolerance, a time, work or an engine out of its range.
+        A tolerance, a time, work or an engine out of its range; a ``device`` for landings in 3-D.
 
     Warns
     -----
@@ -125,7 +130,7 @@ def lift_off(
     """
     if not isinstance(model, (ContactModel, Contact3D)):
         raise ModelError(f"model: expected a ContactModel, received {model!r}.")
-    follow = dict(t_max=t_max, work=work, options=dict(tol=tol, engine=engine))
+    follow = dict(t_max=t_max, work=work, options=dict(tol=tol, engine=engine, device=device))
     if isinstance(model, Contact3D):
         batch = Batch(model, states_3d(model, xdot, ydot, omega, x, y), parameters)
         return _in_3d(batch, model.drilling, follow)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from . import orbits, space, theorems
+from . import gpu, orbits, space, theorems
 
 #: What the project asks of itself, and whether more or less is better.
 TARGETS = {
@@ -324,6 +324,7 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "theorems": theorems.markdown,
     "orbits": lambda section: orbits.markdown(section, table),
     space.NAME: lambda section: space.markdown(section, table),
+    gpu.NAME: lambda section: gpu.markdown(section, table),
     "correctness": _correct,
 }
 

@@ -16,6 +16,7 @@ from benchmarks import (
     bounces,
     chain,
     correctness,
+    gpu,
     measure,
     orbits,
     ours,
@@ -34,6 +35,7 @@ from benchmarks.peers import (
     scipy_dop853,
     scipy_shooting,
 )
+from nonsmooth.flow import on_device
 
 NAMES = ("linear", "nonlinear")
 
@@ -238,3 +240,29 @@ def test_bounces_in_space_are_those_of_the_library_and_their_parts_are_told():
     assert "| nonlinear, in 3-D | 20 | 20 | 0.20 |" in report.markdown(
         {space.NAME: section, "machine": {}}
     )
+
+
+def test_the_gpu_section_says_that_there_is_no_card(monkeypatch, capsys):
+    def none(fused):
+        raise gpu.DeviceError("device: expected an NVIDIA card")
+
+    monkeypatch.setattr(gpu, "card", none)
+    section = gpu.run(quick=True)
+    assert "no card: device: expected an NVIDIA card" in capsys.readouterr().out
+    assert gpu.markdown(section, report.table).startswith("No card")
+
+
+@pytest.mark.slow
+def test_the_gpu_section_compares_bits_and_rates(monkeypatch):
+    """On the shim in the card's place: the same bits as itself, and a table."""
+    shim = gpu.Shim(fused=False)
+    monkeypatch.setattr(on_device, "machine_for", lambda device: shim)
+    bits = gpu.compared("linear", 300, shim, gpu.Shim(fused=False))
+    assert bits["same bits"] == bits["same itinerary"] == 300
+    assert bits["handed over"] < 15
+    rates = gpu.rates("linear", 200, shim, 1)
+    text = gpu.markdown(
+        {"card": shim.name, "bits": {"linear": bits}, "rates": {"linear": rates}, "diffrax": None},
+        report.table,
+    )
+    assert "| linear |" in text and shim.name in text

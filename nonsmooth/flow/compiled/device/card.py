@@ -95,6 +95,10 @@ class Card:
         staged.close()
         array[...] = own
 
+    def wait(self) -> None:
+        """Return when all that was launched is done."""
+        self._stream.sync()
+
     def launch(self, kernels: Any, name: str, arguments: Sequence[Argument]) -> None:
         """Run one of some kernels on all threads of all blocks."""
         config = self._core.LaunchConfig(grid=self.blocks, block=self.threads)

@@ -114,14 +114,30 @@ class Kernel:
         ------
         CompilerError
         """
+        memory = self.start(source, first, count, p, options, at)
+        found = _results(count, self.system.dimension, at is not None)
+        for name, array in found.items():
+            self.machine.read(memory[name], array)
+        _fill(out, found, self.system.modes)
+
+    def start(
+        self,
+        source: Source,
+        first: int,
+        count: int,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+    ) -> dict[str, Any]:
+        """Launch them, as :meth:`run` does, and return the memory where their results will be."""
         machine, n = self.machine, self.system.dimension
         kernels, width = self.compiled
         rows = np.atleast_2d(np.ascontiguousarray(p, float))
         q = machine.empty(8 * width * len(rows))
         given = [len(rows), rows.shape[1], machine.write(rows), q]
         machine.launch(kernels, "parameters", given)
-        found = _results(count, n, at is not None)
-        memory = {name: machine.empty(array.nbytes) for name, array in found.items()}
+        sizes = {name: array.nbytes for name, array in _results(count, n, at is not None).items()}
+        memory = {name: machine.empty(size) for name, size in sizes.items()}
         kind, number = at or (-1, 0)
         arguments = [
             *(count, first, source.kind, source.seed),
@@ -133,9 +149,7 @@ class Kernel:
             *(memory.get(name) for name in _ORDER),
         ]
         machine.launch(kernels, "trajectories", arguments)
-        for name, array in found.items():
-            machine.read(memory[name], array)
-        _fill(out, found, self.system.modes)
+        return memory
 
 
 #: Results, in the order in which the kernel takes them.

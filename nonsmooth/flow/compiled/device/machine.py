@@ -54,6 +54,10 @@ class Machine(Protocol):
         """Fill an array from memory, after all that was launched."""
         ...
 
+    def wait(self) -> None:
+        """Return when all that was launched is done."""
+        ...
+
     def launch(self, kernels: Any, name: str, arguments: Sequence[Argument]) -> None:
         """Run one of some kernels on all threads of all blocks."""
         ...

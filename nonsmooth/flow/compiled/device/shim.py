@@ -63,6 +63,9 @@ class Shim:
         """Fill an array from the beginning of memory."""
         array[...] = memory[: array.nbytes].view(array.dtype).reshape(array.shape)
 
+    def wait(self) -> None:
+        """All that was launched is done."""
+
     def launch(self, kernels: ctypes.CDLL, name: str, arguments: Sequence[Argument]) -> None:
         """Run one of some kernels as each thread of each block in turn."""
         values: list[Any] = []

@@ -20,6 +20,8 @@ _NO_NUMBER = (str, bytes, bool, np.bool_, complex, np.complexfloating)
 
 def is_real(value: Any) -> bool:
     """Whether a value is one finite real number (NumPy's and CasADi's scalars included)."""
+    if type(value) is float:
+        return math.isfinite(value)
     if isinstance(value, (ca.DM, ca.SX)):
         return value.numel() == 1 and _finite(value)
     if isinstance(value, np.ndarray) and (value.ndim or value.dtype.kind not in "iuf"):

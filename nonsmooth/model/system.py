@@ -397,4 +397,4 @@ class FilippovSystem(Structure):
         """
         values = state_values(self.state_names, point)
         moment = real(t, "time", error=PointError)
-        return np.append(values, moment) if self.time_dependent else values
+        return np.array([*values, moment]) if self.time_dependent else values

@@ -80,7 +80,7 @@ def state_values(names: Sequence[str], point: ArrayLike) -> Array:
                 advice="Give one number for each state.",
             )
         )
-    if not np.all(np.isfinite(values)):
+    if not np.isfinite(values).all():
         raise PointError(
             explain(
                 "point",

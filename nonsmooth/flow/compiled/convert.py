@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from ...model import Array, FilippovSystem
 from .. import messages
 from ..facts import KINDS, REASONS
@@ -76,7 +74,7 @@ def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
     t_last, shown = float(run.t[-1]), [system.spelled(letters) for letters in run.letters]
     if not len(run.modes):
         return [Segment(shown[run.mode], t_last, t_last, 0, 0)]
-    changes = np.flatnonzero(np.diff(run.modes)) + 1
+    changes = (run.modes[1:] != run.modes[:-1]).nonzero()[0] + 1
     bounds = [0, *changes.tolist(), len(run.modes)]
     ends = [*(float(run.starts[k]) for k in changes), t_last]
     return [

@@ -21,7 +21,6 @@ from .arrays import (
     BURST,
     BatchStructure,
     OptionsStructure,
-    Output,
     Run,
     address,
     batch_of,
@@ -32,6 +31,7 @@ from .arrays import (
 from .background import Background
 from .build import build
 from .codegen import MOST_ORDER, interpreter_source, special_source, supports_special
+from .output import Output, rooms_of
 
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
 
@@ -169,7 +169,7 @@ class TapeEngine:
         self.guards = lru_cache(maxsize=4096)(self._guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
-        self._steps, self._special = 0, None
+        self._steps, self._special, self._rooms = 0, None, rooms_of((0, 0, 0))
         if supports_special(tape, order):
             source = lambda: special_source(tape, self.coupled, order)
             self._special = Background(source, _declared)
@@ -264,8 +264,8 @@ class TapeEngine:
 
     def run(self, x: Array, p: Array, options: Options) -> Run:
         """Run one trajectory from an extended start, dense output kept."""
-        output = Output(self.system.extended_dimension, self.order)
-        x, p = np.array(x, float), np.append(np.array(p, float), 0.0)
+        output = Output(self.system.extended_dimension, self.order, self._rooms)
+        x, p = np.array(x, float), np.array([*p, 0.0], float)
         start = self._start_mode(options)
         with self._table() as table, self._state(table) as state:
             c_options = ctypes.byref(options_of(self.system, options, dense=True))
@@ -281,14 +281,15 @@ class TapeEngine:
                     break
                 output.grow(counts[7:10])
                 library().run_resume(state, output.pointer)
-            self._steps += int(counts[5]) - bursts
-            modes, words = self._words(table, [int(counts[4])])
+            self._steps += counts[5] - bursts
+            self._rooms = rooms_of(counts[7:10])  # of the next run, which is often a similar one
+            modes, words = self._words(table, [counts[4]])
         return Run.of(
             output.filled(counts[7:10]),
             self.system.dimension,
             numbers=numbers,
             counts=counts,
-            itinerary=words[int(counts[4])],
+            itinerary=words[counts[4]],
             letters=modes,
             guards=self.guards,
             active=active,
@@ -318,13 +319,12 @@ class TapeEngine:
         finally:
             library().run_free(state)
 
-    def _read(self, state: int) -> tuple[Array, NDArray[np.int64], list[int], list[int]]:
-        numbers, counts = np.empty(3), np.empty(12, np.int64)
+    def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int]]:
+        numbers, counts = (_D * 3)(), (_I64 * 12)()
         width = self.system.surface_count + len(self.system.impacts)
-        active, several = np.empty(width + 1, np.int32), np.empty(16, np.int32)
-        arrays = (numbers, counts, active, several)
-        library().run_read(state, *[address(a) for a in arrays])
-        return numbers, counts, active[: counts[10]].tolist(), several[: counts[11]].tolist()
+        active, several = (_I32 * (width + 1))(), (_I32 * 16)()
+        library().run_read(state, numbers, counts, active, several)
+        return numbers[:], counts[:], active[: counts[10]], several[: counts[11]]
 
     def _words(self, table: int, nodes: list[int]) -> tuple[list[str], Mapping[int, str]]:
         """Modes that were met, and itineraries of some nodes of their tree."""

@@ -41,7 +41,7 @@ class Arc:
         Modes in the order in which they were met.
     end : str
         ``"length"`` reached, or why it is shorter: ``"rest"``, ``"sliding"`` (backward: what arrives
-        there comes from everywhere beside it), or the name of a status.
+        there comes from everywhere beside it), ``"interrupted"``, or the name of a status.
     """
 
     points: Array
@@ -52,6 +52,15 @@ class Arc:
     def __repr__(self) -> str:
         length = float(np.linalg.norm(np.diff(self.points, axis=0), axis=1).sum())
         return f"Arc(length {length:.4g}, itinerary {self.itinerary!r}, ends by {self.end})"
+
+
+class InterruptedOrbit(KeyboardInterrupt):
+    """Ctrl-C while an orbit was followed; ``run`` is what there is of it, and ``arc`` its curve."""
+
+    def __init__(self, run: Trajectory):
+        super().__init__()
+        self.run = run
+        self.arc: Arc | None = None
 
 
 @dataclass(frozen=True)
@@ -77,8 +86,18 @@ class Follower:
     tol: float
 
     def arc(self, start: Array, mode: str | None = None) -> Arc | None:
-        """Follow the orbit from a start; None where it cannot leave in the mode asked for."""
-        found = self.run(start, mode)
+        """Follow the orbit from a start; None where it cannot leave in the mode asked for.
+
+        Raises
+        ------
+        InterruptedOrbit
+            With the part of the curve that was followed.
+        """
+        try:
+            found = self.run(start, mode)
+        except InterruptedOrbit as stopped:
+            stopped.arc = self._resampled(stopped.run, "interrupted")
+            raise
         return None if found is None else self._resampled(*found)
 
     def run(self, start: Array, mode: str | None = None) -> tuple[Trajectory, str] | None:
@@ -87,16 +106,21 @@ class Follower:
         pieces, x, t, grown, end = list[Trajectory](), start, 0.0, 0.0, "length"
         span = 1e9
         while grown < self.length:
-            part = simulate(
-                system,
-                x,
-                t + span,
-                t_start=t,
-                parameters=self.parameters,
-                tol=self.tol,
-                start_mode=mode,
-                max_steps=_CHUNK,
-            )
+            try:
+                part = simulate(
+                    system,
+                    x,
+                    t + span,
+                    t_start=t,
+                    parameters=self.parameters,
+                    tol=self.tol,
+                    start_mode=mode,
+                    max_steps=_CHUNK,
+                )
+            except KeyboardInterrupt:
+                if not pieces:
+                    raise
+                raise InterruptedOrbit(join(pieces)) from None
             far = float(lengths(part)[1][-1]) if len(part.steps) else 0.0
             if not far <= _FAR * self.length:  # steps of a simple field are as long as one likes
                 span = (

@@ -16,7 +16,7 @@ from ..local import Equilibrium, Fold, FoldFold
 from ..local.regions import Region
 from ..local.two_fold import TwoFold
 from ..model import Array, DegenerateError, Surfaces
-from .arcs import Arc, Follower, lengths
+from .arcs import Arc, Follower, InterruptedOrbit, lengths
 from .bundles import bundle, triangles
 from .manifold_seeds import canard_curve, orbit_seeds
 from .periodic import PeriodicOrbit
@@ -173,7 +173,10 @@ class Grower:
                 if arc is not None and len(arc.points) > 1:
                     found.append(arc)
                 self.report()
-        except KeyboardInterrupt:
+        except KeyboardInterrupt as stopped:
+            part = stopped.arc if isinstance(stopped, InterruptedOrbit) else None
+            if part is not None and len(part.points) > 1:
+                found.append(part)
             if not found:
                 raise
             complete = False

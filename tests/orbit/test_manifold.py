@@ -151,6 +151,33 @@ def test_an_interrupted_curve_keeps_its_other_half(monkeypatch):
         ns.manifold(system, saddle, length=1.0)
 
 
+def test_an_interrupted_first_curve_is_kept_as_far_as_it_was_followed(monkeypatch):
+    """A separatrix of sin(x) in many steps; the interrupt comes when some of them are done."""
+    system = ns.FilippovSystem(
+        [x, y], surface=y + 9, above=[y, ca.sin(x)], below=[y, ca.sin(x) + 0 * y]
+    )
+    saddle = ns.find_equilibrium(system, [0.1, 0.1], side="+")
+    whole = ns.manifold(system, saddle, length=30.0, spacing=0.1)
+    module, calls = sys.modules[Follower.__module__], []
+    plain = module.simulate
+
+    def simulate(*args, **given):
+        calls.append(1)
+        if len(calls) > 2:
+            raise KeyboardInterrupt
+        return plain(*args, **given)
+
+    monkeypatch.setattr(module, "simulate", simulate)
+    found = ns.manifold(system, saddle, length=30.0, spacing=0.1)
+    assert not found.complete and len(found.arcs) == 1
+    (arc,) = found.arcs
+    assert arc.end == "interrupted" and 5 < len(arc.points) < len(whole.arcs[0].points)
+    energy = arc.points[:, 1] ** 2 / 2 + np.cos(arc.points[:, 0])
+    assert np.abs(energy - 1.0).max() < 1e-7
+    same = len(arc.points) - 1  # the last one is where it was interrupted
+    assert np.allclose(arc.points[:same], whole.arcs[0].points[:same], rtol=0, atol=0.05)
+
+
 @pytest.mark.parametrize("more", [0, 1, 5])
 def test_an_interrupted_second_sheet_leaves_the_first_one(monkeypatch, more):
     """Orbits of both fields end on the line that slides to 0: one sheet above it, one below."""

@@ -27,7 +27,7 @@ from .reference.polynomial import first_crossing, first_root, sign_changes
 
 
 def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:
-    """Extrema of the guards of a mode along its flow, and their values at the ends of its steps.
+    """Extrema of the guards of a mode along its flow, and their values at the ends of its steps and beside its own.
 
     Parameters
     ----------
@@ -38,7 +38,7 @@ def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: fl
     duration : float
         Positive.
     margin : float
-        What is nearer than this to either end of the flow is left out.
+        What is nearer than this to either end of the flow is left out; values at this distance are given.
 
     Returns
     -------
@@ -129,12 +129,14 @@ def _watched(field: GuardedField, y: Array, p: Array, duration: float, margin: f
         slopes = rows[:, 1:] * degrees[1:]
         changes = sign_changes(slopes, h).tolist() if len(rows) else []
         points = [(s, k) for k, c in enumerate(changes) if c for s in _extrema(slopes[k], h, c)]
-        points += [(h, k) for k in range(len(rows)) if t + h < duration - margin]
-        for s, k in points:
-            if not margin < t + s < duration - margin:
-                continue
+        points = [(s, k) for s, k in points if margin < t + s < duration - margin]
+        extrema = len(points)
+        last = duration - margin - t if t + h >= duration - margin else h
+        for s in (last, margin) if t == 0.0 else (last,):
+            points += [(s, k) for k in range(len(rows)) if 0.0 < s <= h]
+        for i, (s, k) in enumerate(points):
             powered = s**degrees
-            bend = 0.0 if s == h else float(slopes[k, 1:] * degrees[1:-1] @ powered[:-2])
+            bend = float(slopes[k, 1:] * degrees[1:-1] @ powered[:-2]) if i < extrema else 0.0
             at = end if s == h else states @ powered
             found.append(np.array([k, t + s, rows[k] @ powered, bend, *at]))
         t += h

@@ -30,8 +30,8 @@ from .growing_legs import grown
 from .hopf_ends import hopf_point
 from .legs import fly
 from .orbit_equations import OrbitEquations
+from .partings import as_doubling, as_pitchfork
 from .periodic import PeriodicOrbit, faults_of, named
-from .rounds import once_round
 from .smooth_events import smooth_side
 
 #: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
@@ -77,8 +77,8 @@ class OrbitCurve(OrbitEquations):
 
     def ends_at(self, zero: Zero) -> bool:
         """As by name; and where doubled orbits become one, as beyond are the same, a round later."""
-        halves = zero.name == "branch point" and self._halved(zero) is not None
-        return halves or self.ends(zero.name)
+        doubled = zero.name == "branch point" and as_doubling(self, zero) is not None
+        return doubled or self.ends(zero.name)
 
     def singular(self, name: str) -> bool:
         """At a Hopf point the equations hold for the equilibrium with any duration."""
@@ -219,27 +219,12 @@ class OrbitCurve(OrbitEquations):
         if zero.name == "Hopf":
             return self._hopf(zero)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
-        halved = self._halved(zero) if zero.name == "branch point" else None
-        if halved is not None:
-            return halved
+        if zero.name == "branch point":
+            parting = as_doubling(self, zero) or as_pitchfork(self, zero)
+            if parting is not None:
+                return self._event(*parting)
         side = smooth_side(self.problem, at, p, zero.name)
         return None if side is None else self._event(zero.name, self, zero.point, zero.name, side)
-
-    def _halved(self, zero: Zero) -> BranchEvent | None:
-        """Two rounds that become one: the period doubling of the shorter orbit, met from the doubled ones."""
-        u, p = zero.point.u, self.parameters_at(zero.point.u)
-        problem, once = once_round(self.problem, u[: self.problem.size], p)
-        whole = float(self.problem.split(u)[1].sum())
-        if round(whole / float(problem.split(once)[1].sum())) != 2:
-            return None
-        curve = self.with_problem(problem, once)
-        v = np.append(once, u[-len(self.free) :])
-        tangent = np.linalg.svd(curve.scaled(v / curve.scale)[1])[2][-1]
-        point = curve.point(v, tangent, tangent, 0.0)
-        side = smooth_side(problem, curve.evaluation(v), p, "period doubling")
-        if point is None or side is None:
-            return None
-        return self._event("period doubling", curve, point, "period doubling", side)
 
     def _hopf(self, zero: Zero) -> BranchEvent:
         """The orbit shrinks: where its equilibrium has two imaginary eigenvalues."""

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import product
 
 import numpy as np
 
@@ -13,6 +15,12 @@ from .mirrors import mirrored
 
 #: An orbit without an event is asked whether it goes round up to so many times.
 _MOST_ROUNDS = 60
+
+#: Halves of an orbit that are each other's image to this part of it are so at a branch point.
+_MIRRORED = 1e-6
+
+#: States of which the mirrors are tried one by one.
+_MOST_STATES = 8
 
 #: Starts of legs that are as near as this, relative to the orbit, are one.
 _SAME = 1e-7
@@ -62,3 +70,38 @@ def _leg_once(
             once = replace(problem, periods=problem.periods / k)
             return once, once.pack(x, np.array([duration / k]))
     return problem, problem.pack(x, np.array([duration]))
+
+
+def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[BoundaryProblem, Array]]:
+    """The same orbit as a half, for every reflection of coordinates that maps this to the other half.
+
+    Whether the system has that symmetry too is not asked.
+    """
+    n, count = problem.system.dimension, len(problem.legs)
+    single = not problem.legs[-1].name
+    if problem.symmetry is not None or n > _MOST_STATES or (not single and count % 2):
+        return
+    starts, durations = problem.split(u)
+    k = count if single else count // 2
+    spans = durations / 2 if single else durations[:k]
+    if single:
+        other = fly(problem.system, problem.legs[0], starts[0], float(spans[0]), p).end[None, :]
+    else:
+        other = starts[k:]
+        if np.abs(durations[k:] - spans).max() > _MIRRORED * np.abs(durations).sum():
+            return
+    size = np.abs(starts[:, :n]).max() or 1.0
+    close = _MIRRORED * size
+    if (np.abs(np.abs(other[:, :n]) - np.abs(starts[:k, :n])) > close).any():
+        return
+    for signs in product((-1.0, 1.0), repeat=n):
+        mirror = np.diag(signs)
+        if (np.abs(other[:, :n] @ mirror - starts[:k, :n]) > close).any() or min(signs) > 0.0:
+            continue
+        half = replace(problem, legs=problem.legs[:k], symmetry=mirror, periods=problem.periods / 2)
+        if not single and any(
+            mirrored(half, leg) != then
+            for leg, then in zip(half.legs, problem.legs[k:], strict=True)
+        ):
+            continue
+        yield half, half.pack(starts[:k], spans)

@@ -64,6 +64,32 @@ def test_legs_are_judged_together_as_one_by_one(monkeypatch):
     assert together == expected and len(together) >= 5
     assert sum("is violated" in fault for fault in together) >= 1
     assert sum("begins after it" in fault for fault in together) >= 1
-    assert sum("'out' is met" in fault for fault in together) == 1
+    assert sum("'out' is met" in fault for fault in together) == 2  # from 7 to 8, and from 0 to 9
     monkeypatch.setattr(watched, "has_interpreter", lambda: False)
     assert faults_along(system, legs, starts, durations, speeds, p, True) == together
+
+
+@pytest.mark.parametrize("interpreted", [True, False])
+@pytest.mark.parametrize("kind", ["stop", "reset"])
+@pytest.mark.parametrize("duration", [1.0, 3.0, 40.0])
+def test_what_is_passed_inside_a_step_is_seen(monkeypatch, interpreted, kind, duration):
+    """x - 0.9 rises all along a leg of one step, x = t or of many: it has no extremum and one zero."""
+    if not interpreted:
+        monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    given = (
+        {"stops": ns.Stop(x - 0.9, 1, "out")}
+        if kind == "stop"
+        else {"resets": ns.Reset(x - 0.9, [0, y], 1, "out")}
+    )
+    turn = ca.sin(y) if duration > 3 else 0  # many steps
+    system = ns.FilippovSystem(
+        [x, y], surface=y + 99, above=[1, 1 + 0.1 * turn], below=[1, 1 + 0 * y], **given
+    )
+    p = np.zeros(0)
+    (fault,) = watch(system, "+", np.array([0.0, 0.0]), duration, p).faults
+    assert fault.startswith(f"{kind} 'out' is met ")
+    assert watch(system, "+", np.array([0.91, 0.0]), duration, p).faults == []
+    late = np.array([0.9 - duration, 0.0])  # met at the very end, as by what ends the leg
+    assert watch(system, "+", late, duration, p).faults == []
+    assert watch(system, "+", np.array([0.9, 0.0]), duration, p).faults == []

@@ -252,3 +252,11 @@ def test_orbits_without_the_symmetry_part_as_the_coefficient_of_the_pitchfork_fo
         foretold = (-1 - smallest) / event.coefficients["cubic coefficient"]
         errors.append(abs(half @ half / foretold - 1))
     assert errors[1] < 0.3 * errors[0] < 0.003
+    # from orbits without the symmetry, and from symmetric ones that were not solved for as halves
+    for near in (parted.at(event.parameter + 0.01)[0], ns.periodic_orbit(system, run)):
+        met = ns.continue_orbit(near, "F", bounds=(2.25, 2.45)).events
+        again = next(e for e in met if abs(e.parameter - event.parameter) < 1e-4)
+        assert again.kind == "pitchfork" and again.orbit.symmetric
+        assert again.parameter == pytest.approx(event.parameter, abs=1e-7)
+        assert again.far_side.verdict == event.far_side.verdict
+    assert ns.continue_orbit(again, "F", bounds=(2.2, 2.6)).at(event.parameter + 0.01)

@@ -156,7 +156,7 @@ def test_a_run_of_many_rounds_gives_the_orbit_once(symmetry):
 
 
 @pytest.mark.slow
-def test_lorenz_orbits_lose_their_symmetry_at_a_branch_point():
+def test_lorenz_orbits_lose_their_symmetry_at_a_pitchfork():
     x, y, z, r = symbols("x y z r")
     system = ns.FilippovSystem(
         [x, y, z], field=[10 * (y - x), r * x - y - x * z, x * y - 8 / 3 * z], parameters={r: 160.0}
@@ -166,7 +166,7 @@ def test_lorenz_orbits_lose_their_symmetry_at_a_branch_point():
     whole, half = (ns.periodic_orbit(system, run, symmetry=s) for s in (None, flip))
     assert abs(whole.period - half.period) < 1e-10
     branches = [ns.continue_orbit(orbit, "r", bounds=(150, 163)) for orbit in (whole, half)]
-    assert [kinds(branch) for branch in branches] == [["branch point"], ["pitchfork"]]
+    assert [kinds(branch) for branch in branches] == [["pitchfork"], ["pitchfork"]]
     places = [branch.events[0].parameter for branch in branches]
     assert abs(places[0] - places[1]) < 1e-8 and abs(places[0] - 154.4) < 0.1  # Sparrow 1982
     split = ns.continue_orbit(branches[1].events[0], "r", bounds=(150, 163))

@@ -131,14 +131,14 @@ static void first_terms(const Flow *w, double *begin) {
   for (int64_t i = 0; i < rows; i++) memcpy(begin + 4 * i, w->states + i * stride, 4 * sizeof(double));
 }
 
-/* Values of what is watched at its extrema and at the ends of steps, further than ``margin`` from both ends of the
- * flow. Rows of ``found``: number, time, value, second derivative (0 at the end of a step), state; their number,
- * which stops at ``room``, is returned. First coefficients at the start go to ``begin``, if it is given. */
+/* Values of what is watched at its extrema and at the ends of steps, no nearer than ``margin`` to both ends of the
+ * flow, and at that distance from them. Rows of ``found``: number, time, value, second derivative (0 where it is
+ * no extremum), state; their number, which stops at ``room``, is returned. First coefficients at the start go to ``begin``, if it is given. */
 static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin, double *found, int64_t room,
                           double *begin) {
   const Field *f = w->field;
   int64_t stride = f->order + 1, width = 4 + f->n, count = 0;
-  double root[P + 1];
+  double root[P + 2];
   for (int64_t step = 0; step < most_steps && w->left > 0; step++) {
     double h = expand_flow(w, z) ? flow_step(w) : 0, t = w->whole - w->left, slope;
     if (step == 0 && begin) first_terms(w, begin);
@@ -146,11 +146,12 @@ static int64_t watch_flow(Flow *w, double *z, int64_t most_steps, double margin,
     for (int j = 0; j < f->watched; j++) {
       const double *c = w->watched + j * stride;
       int many = extrema(c, f->order, h, root, P);
-      root[many] = h;
-      for (int k = 0; k <= many; k++) {
+      root[many] = t + h >= w->whole - margin ? w->whole - margin - t : h;
+      root[many + 1] = margin;
+      for (int k = 0; k <= many + (step == 0); k++) {
         double s = root[k], bend = 0, *row = found + count * width;
-        if (k == many && t + h >= w->whole - margin) continue;
-        if (!(margin < t + s && t + s < w->whole - margin) || count == room) continue;
+        int inside = k < many ? margin < t + s && t + s < w->whole - margin : 0 < s && s <= h;
+        if (!inside || count == room) continue;
         for (int i = f->order; i >= 2 && k < many; i--) bend = bend * s + i * (i - 1) * c[i];
         row[0] = j; row[1] = t + s; row[2] = horner(c, f->order, s, &slope); row[3] = bend;
         for (int i = 0; i < f->n; i++) row[4 + i] = horner(w->states + i * stride, f->order, s, &slope);

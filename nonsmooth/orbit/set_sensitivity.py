@@ -53,8 +53,8 @@ def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
     )
 
 
-#: A state is close to a set that it hits at this part of the |h| that it had after the last event.
-_NEAR = 1e-6
+#: Down to this part of the largest |h| since the last event the steps carry derivatives towards a hit.
+_NEAR = 1e-2
 
 
 #: Switching functions of a set that was held are zero at this part of what they are made of.
@@ -197,19 +197,12 @@ class _Passage:
     def _time_of_hit(
         self, mode: str, met: tuple[int, ...], before: Sequence[tuple[Array, Array]]
     ) -> Array:
-        """Derivatives of the time of a hit: from two states close to it, for what is between them and the set
-        counts in proportion to |h|."""
+        """Derivatives of the time of a hit: from a state at some distance, where h has all its digits."""
         r = [float(np.linalg.norm(self.law.at(x).heights.value[list(met)])) for x, _ in before]
-        near = [k for k, size in enumerate(r) if 0.0 < size <= _NEAR * r[0]][:2]
-        if len(near) < 2:
-            near = [k for k, size in enumerate(r) if size > 0.0][-2:]
-        found = [self.law.time_of_hit(mode, met, *before[k]) for k in near]
-        if not found:
+        far = [k for k, size in enumerate(r) if size > _NEAR * max(r)]
+        if not far:
             return np.full(self.y.shape[1], np.nan)
-        if len(found) == 1 or r[near[0]] == r[near[1]]:
-            return found[-1]
-        one, other = (r[k] for k in near)
-        return np.asarray((one * found[1] - other * found[0]) / (one - other))
+        return self.law.time_of_hit(mode, met, *before[far[-1]])
 
     def _jump(self, mode: str, following: str, event: Event) -> None:
         """Saltation, and the sets onto which a reset or impact leads."""

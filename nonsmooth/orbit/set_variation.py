@@ -16,21 +16,22 @@ B. At the end of sliding the field is continuous and dx+ = dx.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from functools import lru_cache
+from itertools import pairwise
 
 import numpy as np
 
 from ..model import Array, DegenerateError, FilippovSystem, multiplier_enters, sliding_multipliers
 from ..model.frozen import Frozen
 from ..model.limit_directions import leaving_direction
-from ..model.mode_derivatives import AtMode, mode_derivatives
+from ..model.mode_derivatives import AtMode, Derived, mode_derivatives
 
 #: Nodes of the collocation on each step.
 _NODES = 10
 
-#: A matrix of friction this close to a multiple of 1 is one.
-_ISOTROPIC = 1e-9
+#: Part of |h| from which a set is still reached, in a time that adds nothing.
+_GONE = 1e-16
 
 #: Steps of Newton's method for multipliers that do not enter linearly together.
 _TURNS = 30
@@ -239,16 +240,77 @@ class Variation:
         return np.asarray(y - here.field.a[:, columns] @ back)
 
     def time_of_hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
-        """Derivatives of the time at which a set is reached, from close by; NaN if M is anisotropic."""
-        here, _, _ = self.moving(mode, x)
-        own = list(members)
-        u, law = self.acting[own], self.frozen(mode, members, x, self.acting)
-        a, c = law.a, float(np.trace(law.m)) / len(own)
-        if np.abs(law.m - c * np.eye(len(own))).max() > _ISOTROPIC * c:
-            return np.full(y.shape[1], np.nan)
-        dh = here.heights.x[own] @ y
-        dh[:, len(x) :] += here.heights.p[own]
-        return np.asarray((c * u + a) @ dh / (c * c - a @ a))
+        """Derivatives of the time at which a set is reached, from some way off; any M.
+
+        With u = h/|h| and dt = |h| ds the state, u and log |h| have a regular equation up to the set, and so
+        have their derivatives: u' = (1 - u u^T) h', (log |h|)' = u . h' with h' by the time.
+        """
+        from scipy.integrate import solve_ivp  # here: it is not needed to import the library
+
+        own, n, k, count = list(members), len(x), len(members), y.shape[1]
+        shapes: list[tuple[int, ...]]
+        shapes = [(n,), (k,), (1,), (n, count), (k, count), (count,), (count,)]
+        edges = np.cumsum([0, *[math.prod(shape) for shape in shapes]])
+
+        def split(z: Array) -> list[Array]:
+            parts = zip(pairwise(edges), shapes, strict=True)
+            return [z[a:b].reshape(shape) for (a, b), shape in parts]
+
+        def rates(_: float, z: Array) -> Array:
+            x, u, log_r, dx, du, dlog = split(z)[:-1]
+            u = u / math.hypot(*u)  # an error of its length would grow as 1/|h|^2
+            du = du - np.outer(u, u @ du)
+            here, change = self._towards(mode, own, x, u, dx, du)
+            f, df = here.field.value, change(here.field)
+            g, dg, r = here.rates.value[own], change(here.rates)[own], math.exp(log_r[0])
+            grows, dgrows = u @ g, u @ dg + g @ du
+            turns = dg - np.outer(u, dgrows) - du * grows
+            moves = r * (df + np.outer(f, dlog))
+            parts = [r * f, g - u * grows, np.array([grows]), moves, turns, dgrows, r * dlog]
+            return np.concatenate([part.ravel() for part in parts])
+
+        start = self.at(x).heights
+        r0 = math.hypot(*start.value[own])
+        u, dh = start.value[own] / r0, start.x[own] @ y
+        dh[:, n:] += start.p[own]
+        du, size = (dh - np.outer(u, u @ dh)) / r0, r0 * _GONE
+        whole: list[Array]
+        whole = [x, u, np.array([math.log(r0)]), y, du, u @ dh / r0, np.zeros(count)]
+        arrived = lambda _, z: z[n + k] - math.log(size)
+        arrived.terminal = True  # type: ignore[attr-defined]
+        found = solve_ivp(
+            rates,
+            (0.0, np.inf),
+            np.concatenate([part.ravel() for part in whole]),
+            method="DOP853",
+            rtol=1e-11,
+            atol=1e-13,
+            events=arrived,
+        )
+        return np.asarray(split(found.y[:, -1])[-1])
+
+    def _towards(
+        self, mode: str, own: Sequence[int], x: Array, u: Array, dx: Array, du: Array
+    ) -> tuple[AtMode, Callable[[Derived], Array]]:
+        """Values where a set's multiplier is u, and what changes of the state and of u make of them."""
+        slip = self.at(x).heights.value
+        slip[own] = u
+        here, by_state, by_p = self.moving(mode, x, slip)
+        acting = by_state @ dx
+        acting[:, len(x) :] += by_p
+        acting[own] = du
+        sliding, columns = self._sliding(mode)
+
+        def change(of: Derived) -> Array:
+            changed = of.x @ dx + of.a @ acting
+            changed[:, len(x) :] += of.p
+            return np.asarray(changed)
+
+        if sliding:
+            acting[columns] = 0.0
+            slope = here.rates.a[np.ix_(sliding, columns)]
+            acting[columns] = -np.linalg.solve(slope, change(here.rates)[sliding])
+        return here, change
 
     def time_of_exit(self, mode: str, which: Sequence[int], x: Array, y: Array) -> Array:
         """Derivatives of the time at which |lambda| of a set or surface reaches 1, or a reaction 0."""

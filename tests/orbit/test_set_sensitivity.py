@@ -133,3 +133,17 @@ def test_gradients_are_products_of_the_derivatives():
     )
     back = ns.vjp(run, row)
     assert back[0] == pytest.approx(row @ s.dx_dx0) and back[1] == pytest.approx(row @ s.dx_dp)
+
+
+def test_the_time_of_a_hit_where_friction_depends_on_direction():
+    # T(s h) = s T(h), and T falls by dt along the motion: two equations for two derivatives.
+    h, lam = ca.SX.sym("h", 2), ca.SX.sym("lam", 2)
+    m = np.array([[0.8, 0.25], [0.1, 1.3]])
+    pull, start = np.array([0.2, -0.3]), np.array([0.7, 1.1])
+    system = ns.FilippovSystem(h, field=pull - m @ lam, surfaces=[h], multipliers=[lam])
+    run = ns.simulate(system, start, 5.0, tol=1e-13)
+    by_start = ns.sensitivity(run).dt_dx0[0]
+    hit, rate = run.events[0].t, pull - m @ start / np.linalg.norm(start)
+    assert run.itinerary == "* s"
+    assert by_start @ start == pytest.approx(hit, rel=1e-10)
+    assert by_start @ rate == pytest.approx(-1.0, rel=1e-10)

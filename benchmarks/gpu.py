@@ -64,7 +64,7 @@ def seconds(work: Any, turns: int) -> float:
 
 
 def rates(name: str, count: int, machine: Machine, turns: int) -> dict[str, float]:
-    """Bounces a second: of the kernel alone, starts made there; and of an ensemble, results here."""
+    """Bounces a second, starts made there: of the kernel alone, reduced there, and with all results here."""
     system, p = bounce_system(name), bounce_system(name).parameter_vector()
     kernel, box = Kernel(system, OPTIONS.order, machine), Source.box(LOW, HIGH, 0)
 
@@ -75,8 +75,10 @@ def rates(name: str, count: int, machine: Machine, turns: int) -> dict[str, floa
     starts = ns.RandomStarts(count, LOW, HIGH)
     work = ns.Work(progress=False)
     whole = lambda: ns.ensemble(system, starts, T_MAX, device="cuda", work=work)
+    reduced = lambda: ns.outcomes(system, starts, T_MAX, device="cuda", work=work)
     return {
         "kernel alone": count / seconds(alone, turns),
+        "outcomes": count / seconds(reduced, turns),
         "ensemble": count / seconds(whole, turns),
     }
 
@@ -113,13 +115,14 @@ def markdown(section: dict[str, Any], table: Any) -> str:
     if "none" in section:
         return f"No card: {section['none']}"
     rows = [
-        [name, *(f"{r[k]:,.0f}" for k in ("kernel alone", "ensemble"))]
+        [name, *(f"{r[k]:,.0f}" for k in ("kernel alone", "outcomes", "ensemble"))]
         + [f"{section['bits'][name][k]:,}" for k in ("bounces", "same bits", "handed over")]
         for name, r in section["rates"].items()
     ]
     head = [
         "bounces",
         "a second, kernel",
+        "a second, outcomes",
         "a second, ensemble",
         "compared",
         "same bits",

@@ -56,7 +56,7 @@ TASKS = {
         "Arrays of starts or of parameters, in threads, on a cluster, with checkpoints; and which "
         "attractor each start goes to.",
         "nonsmooth",
-        "ensemble Ensemble Grid RandomStarts Work basins orbit.Basins",
+        "ensemble Ensemble Grid RandomStarts Work outcomes Outcomes basins orbit.Basins",
     ),
     "points": _task(
         "Ask what a point is",

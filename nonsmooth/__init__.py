@@ -34,6 +34,7 @@ from .flow import (
     Ensemble,
     Event,
     Grid,
+    Outcomes,
     RandomStarts,
     Section,
     Segment,
@@ -45,6 +46,7 @@ from .flow import (
     first_root,
     follow,
     load,
+    outcomes,
     simulate,
 )
 from .local import (
@@ -160,6 +162,7 @@ __all__ = [
     "NotSmoothError",
     "OptionError",
     "OrbitProof",
+    "Outcomes",
     "ParameterError",
     "PeriodicOrbit",
     "PointError",
@@ -212,6 +215,7 @@ __all__ = [
     "lyapunov_spectrum",
     "manifold",
     "orbit",
+    "outcomes",
     "periodic_orbit",
     "plot",
     "poincare",

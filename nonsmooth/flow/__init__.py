@@ -22,6 +22,7 @@ The contract of events, the same in every engine (``tests/flow/test_contract.py`
 from .drawn import Grid, RandomStarts
 from .ensemble import ensemble
 from .follow import follow
+from .outcomes import Outcomes, outcomes
 from .reference.polynomial import first_crossing, first_root
 from .results import Ensemble
 from .saving import load
@@ -35,6 +36,7 @@ __all__ = [
     "Ensemble",
     "Event",
     "Grid",
+    "Outcomes",
     "RandomStarts",
     "Section",
     "Segment",
@@ -46,5 +48,6 @@ __all__ = [
     "first_root",
     "follow",
     "load",
+    "outcomes",
     "simulate",
 ]

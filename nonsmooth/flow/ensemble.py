@@ -136,7 +136,7 @@ def ensemble(
             "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
         )
     step = view.room is None and t_end > t_start and device is None
-    chosen = _engine(system, options, engine, starts.count, step)
+    chosen = engine_for(system, options, engine, starts.count, step)
     job = Job(system, options, number, view.times, view.room, chosen)
     if device is not None:
         require_device(job, device, work.executor is not None)
@@ -161,10 +161,21 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     return results.ensemble(codes)
 
 
-def _engine(system: FilippovSystem, options: Options, engine: str, count: int, step: bool) -> str:
-    """Which of ``chunks.ENGINES`` runs; few trajectories are not worth generating a program.
+def engine_for(
+    system: FilippovSystem, options: Options, engine: str, count: int, step: bool
+) -> str:
+    """Return which of ``chunks.ENGINES`` runs; few trajectories are not worth generating a program.
 
     It is compiled here, so that all chunks run the same one.
+
+    Parameters
+    ----------
+    system, options, engine
+        As of an ensemble.
+    count : int
+        How many trajectories there are.
+    step : bool
+        Whether they may run in step.
     """
     lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
     if not use_compiled(engine, tape is not None) or tape is None:

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..model import FilippovSystem, OptionError
+from ..model import Array, FilippovSystem, OptionError
 from .chunks import Job, run_chunk
 from .compiled.codegen import supports_lanes
-from .compiled.device.kernel import Kernel, Source
+from .compiled.device.kernel import Bins, Kernel, Reduced, Source
 from .compiled.device.machine import machine_for
 from .drawn import Grid, RandomStarts
 from .facts import HAND_OVER
@@ -82,16 +82,33 @@ def run_there(job: Job, device: str, starts: Starts, first: int, out: Chunk) -> 
     if drawn is not None:
         kernel.run(drawn, first, count, starts.p, job.options, job.at, out)
     else:
-        n = starts.system.dimension
-        x, p = starts.part(first, first + count)
-        bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(count, bool)
-        own = Source.rows(np.where(bad[:, None], np.nan, x[:, :n]))
+        own, p, x = _rows(starts, first, count)
         kernel.run(own, 0, count, p, job.options, job.at, out)
-        out.x[bad] = x[bad, :n]
+        refused = np.isnan(own.values).any(axis=1)
+        out.x[refused] = x[refused]
     rest = np.flatnonzero(out.status == HAND_OVER)
     if rest.size:
         out.replace(rest, run_chunk(job, *starts.rows(first + rest)))
     return out
+
+
+def reduced_there(
+    job: Job, device: str, starts: Starts, first: int, count: int, bins: Bins
+) -> Reduced:
+    """Run some trajectories and return what becomes of them, with the numbers of those left for here."""
+    kernel, drawn = _kernel(job, device), _drawn(starts)
+    if drawn is not None:
+        return kernel.reduced(drawn, first, count, starts.p, job.options, bins)
+    own, p, _ = _rows(starts, first, count)
+    return kernel.reduced(own, 0, count, p, job.options, bins)
+
+
+def _rows(starts: Starts, first: int, count: int) -> tuple[Source, Array, Array]:
+    """Starts one by one, their parameters, and their states as given: NaN goes where a parameter is no number."""
+    n = starts.system.dimension
+    x, p = starts.part(first, first + count)
+    bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(count, bool)
+    return Source.rows(np.where(bad[:, None], np.nan, x[:, :n])), p, x[:, :n]
 
 
 def _drawn(starts: Starts) -> Source | None:

@@ -263,6 +263,10 @@ class Collected:
         self._words: dict[str, int] = {}
         self._parts: list[tuple[int, int, NDArray[np.int32]]] = []
 
+    def part(self, first: int, last: int) -> Chunk:
+        """Return the arrays of some trajectories, to be written in place."""
+        return self.all.part(first, last)
+
     def put(self, first: int, chunk: Chunk) -> None:
         """Take a chunk that begins with trajectory ``first``; its arrays may be a part of these."""
         whole = self.all.arrays()

@@ -10,7 +10,7 @@ from collections.abc import Callable, Generator, Iterator
 from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..model import Array, OptionError, explain
 from .checkpoint import Checkpoint
 from .chunks import Job, run_chunk, shipped
 from .progress import progress_bar
-from .results import Chunk, Collected
+from .results import Chunk
 from .starts import Starts
 from .stored import Stored
 
@@ -138,10 +138,22 @@ def _require_path(name: str, value: object) -> None:
         )
 
 
+class Sink(Protocol):
+    """What takes finished chunks."""
+
+    def part(self, first: int, last: int) -> Chunk:
+        """Return arrays for the results of some trajectories."""
+        ...
+
+    def put(self, first: int, chunk: Chunk) -> None:
+        """Take a chunk that begins with a trajectory."""
+        ...
+
+
 def run_all(
     job: Job,
     starts: Starts,
-    results: Collected,
+    results: Sink,
     work: Work,
     size: int,
     saved: Checkpoint | None,
@@ -153,8 +165,8 @@ def run_all(
     ----------
     job : Job
     starts : Starts
-    results : Collected
-        Filled.
+    results : Sink
+        Takes what is finished.
     work : Work
     size : int
         Of a chunk.
@@ -168,7 +180,7 @@ def run_all(
     missing = []
     for number in range(math.ceil(starts.count / size)):
         first = number * size
-        like = results.all.part(first, min(first + size, starts.count))
+        like = results.part(first, min(first + size, starts.count))
         done = saved.load(number, like) if saved is not None else None
         if done is None:
             missing.append(number)
@@ -179,9 +191,9 @@ def run_all(
     workers = min(work.threads or _processors(), len(missing))
     try:
         if there is not None:
-            chunks = ((k, there(a, results.all.part(a, b))) for k, a, b in ends)
+            chunks = ((k, there(a, results.part(a, b))) for k, a, b in ends)
         else:
-            pieces = ((k, *starts.part(a, b), results.all.part(a, b)) for k, a, b in ends)
+            pieces = ((k, *starts.part(a, b), results.part(a, b)) for k, a, b in ends)
             chunks = _chunks(job, pieces, workers, work.executor)
         with closing(chunks) as finished:
             for number, chunk in finished:

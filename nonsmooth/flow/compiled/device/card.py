@@ -85,10 +85,12 @@ class Card:
         return memory
 
     def read(self, memory: Any, array: NDArray[Any]) -> None:
-        """Fill an array from memory of its size, after all that was launched."""
+        """Fill an array from the beginning of memory, after all that was launched."""
         if not array.nbytes:
             return
-        own, staged = np.empty_like(array, order="C"), self._pinned.allocate(memory.size)
+        own, staged = np.empty_like(array, order="C"), self._pinned.allocate(array.nbytes)
+        if array.nbytes < memory.size:
+            memory = self._core.Buffer.from_handle(memory.handle, array.nbytes, owner=memory)
         staged.copy_from(memory, stream=self._stream)
         self._stream.sync()
         ctypes.memmove(own.ctypes.data, int(staged.handle), own.nbytes)

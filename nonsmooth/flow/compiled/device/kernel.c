@@ -152,3 +152,47 @@ KERNEL parameters(int64_t count, int64_t size, const double *p, double *q) {
   for (int64_t i = (int64_t)blockIdx.x * blockDim.x + threadIdx.x; i < count; i += stride)
     prepare(p + i * size, q + i * NQ);
 }
+
+/* Results reduced where they are ------------------------------------------------------------------ */
+
+typedef unsigned long long Count;
+
+/* Count a code in a table of a power of two places, 0 for an empty one; 0 if there is no room. */
+static inline int counted(int64_t code, int64_t size, Count *keys, Count *counts) {
+  Count key = (Count)code + 1, at = key * 0x9e3779b97f4a7c15ULL >> 20;
+  for (int64_t tried = 0; tried < size; tried++, at++) {
+    int64_t place = (int64_t)(at & (Count)(size - 1));
+    Count found = atomicCAS(keys + place, 0ULL, key);
+    if (found != 0 && found != key) continue;
+    atomicAdd(counts + place, 1ULL);
+    return 1;
+  }
+  return 0;
+}
+
+/* Statuses and itineraries counted; states and times of runs that are complete summed, their squares too, by each
+ * thread for itself, and put into bins. Those of ``rest``, which are
+ * ``left``, are another's. */
+KERNEL outcomes(int64_t count, const double *x, const double *t, const int32_t *status, const int64_t *code,
+                int64_t bins, const double *low, const double *high, Count *histogram, double *sums, int64_t size,
+                Count *keys, Count *counts, Count *statuses, Count *left, int64_t *rest) {
+  int64_t thread = (int64_t)blockIdx.x * blockDim.x + threadIdx.x, stride = (int64_t)gridDim.x * blockDim.x;
+  double *own = sums + thread * 2 * (ND + 1);
+  for (int k = 0; k < 2 * (ND + 1); k++) own[k] = 0;
+  for (int64_t i = thread; i < count; i += stride) {
+    if (status[i] == HAND_OVER || !counted(code[i], size, keys, counts)) {
+      rest[atomicAdd(left, 1ULL)] = i;
+      continue;
+    }
+    atomicAdd(statuses + status[i], 1ULL);
+    if (status[i] != REACHED_END && status[i] != STOPPED) continue;
+    for (int k = 0; k <= ND; k++) {
+      double v = k < ND ? x[i * ND + k] : t[i];
+      own[2 * k] += v;
+      own[2 * k + 1] += v * v;
+      double place = product(sum(v, -low[k]), (double)bins / sum(high[k], -low[k]));
+      if (v == high[k]) place = (double)(bins - 1);
+      if (place >= 0 && place < (double)bins) atomicAdd(histogram + k * bins + (int64_t)place, 1ULL);
+    }
+  }
+}

@@ -15,6 +15,7 @@ from ....model import Array, FilippovSystem
 from ...facts import HAND_OVER, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk
+from ...status import Status
 from ..codegen import device_source
 from .machine import Machine
 
@@ -59,6 +60,40 @@ class Source:
         """Random starts between two corners."""
         signed = seed - (1 << 64) if seed >= 1 << 63 else seed
         return cls(_BOX, signed, np.concatenate([low, high]), np.zeros(1, np.int64))
+
+
+@dataclass(frozen=True)
+class Bins:
+    """Bins of equal width for the states and the time.
+
+    Attributes
+    ----------
+    count : int
+    low, high : ndarray (n + 1,)
+    """
+
+    count: int
+    low: Array
+    high: Array
+
+    def places(self, k: int, values: Array) -> NDArray[np.int64]:
+        """Numbers of the bins that some values of column k lie in; those that lie in one."""
+        low, high = self.low[k], self.high[k]
+        place = (values - low) * (self.count / (high - low))
+        place = np.where(values == high, self.count - 1, place)
+        return place[(place >= 0) & (place < self.count)].astype(np.int64)
+
+
+@dataclass(frozen=True)
+class Reduced:
+    """What became of some runs: numbers by itinerary and status, sums of the ends and of their squares
+    (n + 1, 2), numbers in bins (n + 1, bins), and which runs are left to another engine."""
+
+    words: dict[str, int]
+    status: dict[int, int]
+    sums: Array
+    histogram: NDArray[np.int64]
+    rest: NDArray[np.int64]
 
 
 class Kernel:
@@ -151,6 +186,47 @@ class Kernel:
         machine.launch(kernels, "trajectories", arguments)
         return memory
 
+    def reduced(
+        self, source: Source, first: int, count: int, p: Array, options: Options, bins: Bins
+    ) -> Reduced:
+        """Run trajectories as :meth:`run` does, and return what becomes of them."""
+        machine, n, kernels = self.machine, self.system.dimension, self.compiled[0]
+        memory = self.start(source, first, count, p, options, None)
+        sums = np.empty((machine.blocks * machine.threads, n + 1, 2))
+        arrays: dict[str, NDArray[Any]] = {
+            "histogram": np.zeros((n + 1, bins.count), np.int64),
+            "keys": np.zeros(PLACES, np.int64),
+            "counts": np.zeros(PLACES, np.int64),
+            "status": np.zeros(len(Status), np.int64),
+            "left": np.zeros(1, np.int64),
+        }
+        there = {name: machine.write(array) for name, array in arrays.items()}
+        there["sums"], there["rest"] = machine.empty(sums.nbytes), machine.empty(8 * count)
+        results = [memory[name] for name in ("x", "t", "status", "code")]
+        ranges = [bins.count, machine.write(bins.low), machine.write(bins.high)]
+        table = [PLACES, *(there[name] for name in ("keys", "counts", "status", "left", "rest"))]
+        arguments = [count, *results, *ranges, there["histogram"], there["sums"], *table]
+        machine.launch(kernels, "outcomes", arguments)
+        arrays["sums"] = sums
+        for name, array in arrays.items():
+            machine.read(there[name], array)
+        rest = np.empty(int(arrays["left"][0]), np.int64)
+        machine.read(there["rest"], rest)
+        used = np.flatnonzero(arrays["counts"])
+        codes, counts = arrays["keys"][used] - 1, arrays["counts"][used]
+        modes = self.system.modes
+        words = zip(codes.tolist(), counts.tolist(), strict=True)
+        return Reduced(
+            words={word_of(code, modes): number for code, number in words},
+            status={k: m for k, m in enumerate(arrays["status"].tolist()) if m},
+            sums=sums.sum(axis=0),
+            histogram=arrays["histogram"],
+            rest=np.sort(rest),
+        )
+
+
+#: Different itineraries that a card counts at once, a power of two; what finds no room runs elsewhere.
+PLACES = 1 << 14
 
 #: Results, in the order in which the kernel takes them.
 _ORDER = ("x", "t", "status", "kinds", "steps", "code", "at_x", "at_t")

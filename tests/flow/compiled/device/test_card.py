@@ -34,9 +34,18 @@ class Buffer:
     def close(self, stream=None):
         self.bytes = None
 
+    @classmethod
+    def from_handle(cls, ptr, size, *, owner):
+        made = cls(0)
+        made.bytes, made.size = (ctypes.c_uint8 * size).from_buffer(owner.bytes), size
+        assert made.handle == ptr
+        return made
+
 
 class Core:
     """As much of ``cuda.core`` 1.2 as is used, with its signatures, on the shim."""
+
+    Buffer = Buffer
 
     def __init__(self):
         self.shim = Shim(fused=False)
@@ -100,3 +109,13 @@ def test_an_ensemble_by_way_of_cuda_core(monkeypatch):
     assert np.array_equal(there.itinerary, here.itinerary)
     np.testing.assert_allclose(there.x, here.x, rtol=0, atol=1e-7)
     np.testing.assert_allclose(there.event_t, here.event_t, rtol=0, atol=1e-7)
+    found = ns.outcomes(system, starts, device="cuda", t_end=4.0, tol=1e-5)
+    assert found.itineraries == ns.outcomes(system, starts, t_end=4.0, tol=1e-5).itineraries
+    assert found.mean["x"] == pytest.approx(here.x[:, 0].mean(), rel=0, abs=1e-7)
+
+
+def test_the_beginning_of_memory_is_read():
+    card, own = Card(Core()), np.empty((1, 2))
+    card.read(card.write(np.arange(5.0)), own)
+    assert own.tolist() == [[0.0, 1.0]]
+    card.read(card.write(np.zeros(0)), np.zeros(0))

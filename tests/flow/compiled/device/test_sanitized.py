@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[4]
 #: Bounces of starts of all sources, with shared and with own parameters; an event is kept.
 PROGRAM = """
 import numpy as np
-from nonsmooth.flow.compiled.device.kernel import Kernel, Source
+from nonsmooth.flow.compiled.device.kernel import Bins, Kernel, Source
 from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
@@ -23,6 +23,7 @@ from benchmarks.problems import bounce_system, random_starts
 checks = ("-fsanitize=address,undefined,float-cast-overflow", "-fno-sanitize-recover=all", "-O1")
 options, wide = Options(t_end=100.0), Options(t_end=100.0, max_events=2, max_steps=9)
 axes = [np.array(0.0), np.linspace(0, 2, 20), np.array(0.0), np.array(-1.0), np.linspace(-2, 1, 20)]
+bins = Bins(7, np.full(6, -1.0), np.full(6, 1.0))
 for name in ("linear", "nonlinear"):
     system, x = bounce_system(name), random_starts(400, seed=2)
     x[3], x[5] = np.nan, 0.0
@@ -34,6 +35,8 @@ for name in ("linear", "nonlinear"):
                 chunk = Chunk.empty(400, system, True)
                 kernel.run(source, 0, 400, own, limits, (1, 1), chunk)
                 assert chunk.totals[0] > 400
+            found = kernel.reduced(source, 0, 400, own, options, bins)
+            assert sum(found.status.values()) + len(found.rest) == 400
 print("done")
 """
 

@@ -27,7 +27,10 @@ PICTURES = [(name, picture) for name, paper in PAPERS.items() for picture in pap
 
 
 #: Claims and figures that take over a second: with the slow tests, and by `make reproduce`.
-DEAR_CLAIMS = {"jeffrey_colombo_2009": ["single_quantity"], "colombo_jeffrey_2011": ["portraits"]}
+DEAR_CLAIMS = {
+    "jeffrey_colombo_2009": ["single_quantity", "repelling_before"],
+    "colombo_jeffrey_2011": ["portraits", "open_sets"],
+}
 DEAR_FIGURES = {
     "welander_1982-portraits",
     "welander_1982-diagram",

@@ -7,6 +7,7 @@ import importlib
 import inspect
 import re
 import subprocess
+from functools import cache
 from pathlib import Path
 
 import pytest
@@ -69,6 +70,12 @@ def sources(*folders, suffixes=(".py",)):
     return sorted(p for f in folders for p in (ROOT / f).rglob("*") if p.suffix in suffixes)
 
 
+@cache
+def nodes(path):
+    """The syntax of a source file, node by node."""
+    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+
+
 def test_nonsmooth_has_no_words_of_the_ball():
     textbook = ROOT / "nonsmooth" / "textbook"
     files = sources("nonsmooth", suffixes=(".py", ".c", ".h"))
@@ -116,7 +123,7 @@ def undocumented(name, thing):
 def test_no_function_is_longer_than_a_screen():
     long = []
     for path in sources("nonsmooth", "bounce", "papers"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        for node in nodes(path):
             if isinstance(node, (ast.FunctionDef, ast.AsyncFunctionDef)):
                 lines = node.end_lineno - node.lineno + 1
                 if ast.get_docstring(node, clean=False) is not None:
@@ -145,10 +152,10 @@ def is_private(name):
     return name.startswith("_") and not name.endswith("__")
 
 
-def private_uses(tree):
+def private_uses(nodes):
     """Names with an underscore that a module imports, or takes from a module that it imported."""
     modules = set()
-    for node in ast.walk(tree):
+    for node in nodes:
         if isinstance(node, ast.Import):
             modules |= {(a.asname or a.name).split(".")[0] for a in node.names}
         if isinstance(node, ast.ImportFrom):
@@ -164,11 +171,16 @@ def test_nothing_private_is_used_in_another_module():
     found = [
         f"{path.relative_to(ROOT)}:{line}: {name}"
         for path in sources("nonsmooth", "bounce", "papers", "benchmarks", "docs")
-        for line, name in private_uses(ast.parse(path.read_text(encoding="utf-8")))
+        for line, name in private_uses(nodes(path))
     ]
     assert not found, "\n".join(found)
 
 
 def test_what_counts_as_private():
     text = "from a import _b\nimport c\nc._d\nfrom . import e\ne._f, e.__doc__, self._g\nfrom ._h import i"
-    assert [name for _, name in private_uses(ast.parse(text))] == ["_b", "_h", "c._d", "e._f"]
+    assert [name for _, name in private_uses(ast.walk(ast.parse(text)))] == [
+        "_b",
+        "_h",
+        "c._d",
+        "e._f",
+    ]

@@ -20,7 +20,7 @@ TOLERANCES = dict(
 ENGINES = ("reference", "tape", "lanes")
 
 #: Systems of each size, and in the short version.
-COUNT, FEW = 42, 4
+COUNT, FEW = 42, 3
 
 #: Statuses of runs that the independent integrator ends early.
 EARLY = {ns.Status.INTERSECTION, ns.Status.NON_UNIQUE}
@@ -90,7 +90,7 @@ def compare(found: Sample, engine: str) -> None:
     assert decided >= 0.9 * len(results)
 
 
-@pytest.mark.parametrize("size", [Size(2, 1), Size(3, 2), Size(4, 1), Size(3, 3)], ids=str)
+@pytest.mark.parametrize("size", [Size(2, 1), Size(3, 3)], ids=str)
 def test_a_few_random_systems_agree_with_an_independent_integrator(size):
     compare(sample(size, FEW), "reference")
 

@@ -6,11 +6,11 @@ import dataclasses
 import casadi as ca
 import numpy as np
 import pytest
-from matplotlib.figure import Figure
 
 import bounce
 import nonsmooth as ns
 from nonsmooth.orbit import Basins
+from nonsmooth.plot.print_figure import PrintFigure
 from papers.pictures import faults
 
 x, v, mu = (ca.SX.sym(name) for name in ("x", "v", "mu"))
@@ -181,5 +181,5 @@ def test_every_function_that_draws_is_here():
 )
 def test_picture_is_fit_for_print(draw):
     figure = draw()
-    assert isinstance(figure, Figure)
+    assert isinstance(figure, PrintFigure)  # whose fonts are TrueType (test_palette.py)
     assert faults(figure) == []

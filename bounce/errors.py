@@ -23,6 +23,37 @@ class LandingError(ns.PointError):
     """The state at touch-down is not a landing: not finite, above the ground, or moving away."""
 
 
+def require(value: Any, kinds: type | tuple[type, ...], name: str, advice: str) -> None:
+    """Refuse what is of another kind than the one that is asked for.
+
+    Parameters
+    ----------
+    value : object
+        What was given.
+    kinds : type or tuple of type
+        What is expected.
+    name : str
+        Of the argument.
+    advice : str
+        Where one gets what is expected.
+
+    Raises
+    ------
+    nonsmooth.OptionError
+
+    Examples
+    --------
+    >>> require(3, (int, float), "size", "Count it.")
+    >>> require("x", (int, float), "size", "Count it.")
+    Traceback (most recent call last):
+        ...
+    nonsmooth.model.errors.OptionError: size: expected int or float, received 'x'. Count it.
+    """
+    if not isinstance(value, kinds):
+        names = " or ".join(k.__name__ for k in (kinds if isinstance(kinds, tuple) else (kinds,)))
+        raise ns.OptionError(f"{name}: expected {names}, received {value!r}. {advice}")
+
+
 class LiftOffError(ns.NonsmoothError, RuntimeError):
     """The ball did not lift off.
 

@@ -22,6 +22,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
+from ..errors import require
 from ..parameters import LIMITS, number
 from ..units import GOLF, GRAVITY, Ball, Landing
 
@@ -204,6 +205,7 @@ def flight(
     >>> f"{drive.range:.0f} m, lands at {math.degrees(drive.landing.angle):.0f} deg"
     '215 m, lands at 39 deg'
     """
+    require(launch, Landing, "launch", "bounce.Landing(xdot, ydot, omega) is one, in SI units.")
     tilt = number(slope, "slope", ns.OptionError)
     if not LIMITS["in (-pi/2, pi/2)"](tilt):
         raise ns.OptionError(f"slope: expected radians in (-pi/2, pi/2), received {slope!r}.")

@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
+from ..errors import require
 from ..parameters import LIMITS, number, numbers
 from ..units import GOLF, GRAVITY, Ball, Landing
 from .flight import Air
@@ -207,6 +208,7 @@ def side_flight(
     >>> f"{fade.range:.0f} m, {fade.side:.0f} m to the right"
     '212 m, 19 m to the right'
     """
+    require(launch, SideState, "launch", "bounce.golf.SideState.of(landing, side=...) is one.")
     gravity = pull(slope, side_slope)
     place = np.array([number(value, "start", ns.PointError) for value in start])
     up, height = float(launch.velocity[1]), float(place[1])

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..parameters import number
+from ..parameters import number, numbers
 from .law import BounceLaw, RigidShot, checked_landings
 from .rigid import Restitution, RigidBounce
 
@@ -150,7 +150,7 @@ def penner_restitution(speed: ArrayLike) -> Array:
     >>> penner_restitution([1.0, 10.0, 16.07, 30.0]).round(3)
     array([0.473, 0.225, 0.141, 0.12 ])
     """
-    v = np.asarray(speed, dtype=float)
+    v = numbers(speed, "speed")
     return np.where(v <= 20.0, 0.510 - 0.0375 * v + 0.000903 * v**2, 0.120)
 
 
@@ -184,7 +184,7 @@ def penner_tilt(speed: ArrayLike, angle: ArrayLike) -> Array:
     '28.01'
     """
     measured = math.radians(15.4) / (18.6 * math.radians(44.4))
-    return measured * np.asarray(speed, dtype=float) * (math.pi / 2 - np.asarray(angle, float))
+    return measured * numbers(speed, "speed") * (math.pi / 2 - numbers(angle, "angle"))
 
 
 class PennerBounce(BounceLaw):

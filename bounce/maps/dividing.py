@@ -25,8 +25,8 @@ from numpy.typing import ArrayLike, NDArray
 import nonsmooth as ns
 
 from ..contact.model import ContactModel
-from ..errors import ModelError
 from ..parameters import number
+from ..shot.landing import require_model
 from ..shot.single import State
 from .shooting import Shooting
 from .tracing import Arc, arcs_from_rest, landing_at
@@ -247,8 +247,7 @@ def dividing_curve(
     >>> f"{curve.omega(2.0):.9f}"
     '1.596825491'
     """
-    if not isinstance(model, ContactModel):
-        raise ModelError(f"model: expected a ContactModel, received {model!r}.")
+    require_model(model)
     speed = number(ydot, "ydot", ns.OptionError)
     numbers = dict(reach=reach, step=step, tol=tol)
     checked = {k: number(v, k, ns.OptionError) for k, v in numbers.items()}
@@ -297,6 +296,8 @@ def critical_eta(
 
     Raises
     ------
+    ModelError
+        What is no contact model.
     nonsmooth.ConvergenceError
         No change of sign within the bounds.
 
@@ -307,7 +308,7 @@ def critical_eta(
     >>> f"{bounce.critical_eta(turf):.6f}"
     '1.19...'
     """
-
+    require_model(model)
     from scipy.optimize import brentq  # slow to import
 
     def pull(value: float) -> float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
+from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
 
@@ -115,6 +116,7 @@ def outcome_map(
     """
     if quantity not in _QUANTITIES:
         raise ns.OptionError(f"quantity: expected one of {_QUANTITIES}, received {quantity!r}.")
+    require(outcomes, OutcomeMap, "outcomes", "bounce.outcome_map returns one.")
     if curve is not None and outcomes.names not in (("xdot", "omega"), ("omega", "xdot")):
         raise ns.OptionError(
             f"curve: expected a map over xdot and omega, received one over {outcomes.names}."

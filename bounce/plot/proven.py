@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import nonsmooth as ns
 
+from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.proven import OUTCOMES, ProvenMap
 from .outcomes import draw_curve
@@ -55,6 +56,7 @@ def proven_map(
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Patch, Rectangle
 
+    require(found, ProvenMap, "found", "bounce.proven_map returns one.")
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
         for k, name in enumerate(OUTCOMES):

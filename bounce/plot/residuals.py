@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import nonsmooth as ns
 
+from ..errors import require
 from ..golf.fit_result import FitResult
 
 if TYPE_CHECKING:
@@ -36,6 +37,7 @@ def residuals(found: FitResult) -> Figure:
     >>> bounce.plot.residuals(found).axes[0].get_title()
     'rms 0.00629'
     """
+    require(found, FitResult, "found", "bounce.golf.fit returns one.")
     names = list(found.residuals)
     unit = " [m/s]" if found.measurements.si else ""
     with style.settings():

@@ -10,7 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
+from ..errors import require
 from ..maps.slip_directions import SlipMap
+from ..parameters import numbers
 
 style = ns.plot.style
 
@@ -60,7 +62,7 @@ def direction_colours(angle: ArrayLike) -> Array:
     >>> bool(light > 0.8), bool(dark < 0.35)
     (True, True)
     """
-    turned = np.asarray(angle, dtype=float)
+    turned = numbers(angle, "angle")
     lightness = _LIGHTNESS + _SWING * np.cos(turned)
     f_y = (lightness + 16) / 116
     f = np.stack([f_y, f_y, f_y - _YELLOW * np.sin(turned) / 200], axis=-1)
@@ -102,6 +104,7 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     >>> [key.get_text() for key in figure.axes[0].child_axes[0].get_xticklabels()]
     ['forward', 'right', 'reverse', 'left']
     """
+    require(directions, SlipMap, "directions", "bounce.slip_map returns one.")
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
         lateral, axial = directions.omega

@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
+from ..errors import require
 from .single import Shot
 from .space import Shot3D
 
@@ -75,6 +76,8 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
 
     Raises
     ------
+    nonsmooth.OptionError
+        What is no shot.
     nonsmooth.ParameterError
         A name that is neither a parameter nor a component of the landing.
 
@@ -92,6 +95,7 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
     >>> f"{s.state[3, 1]:.10f}", f"{-r(0.1):.10f}", bool(abs(s.state[3, 2]) < 1e-12)
     ('-0.7440793977', '-0.7440793977', True)
     """
+    require(shot, (Shot, Shot3D), "shot", "bounce.simulate returns one.")
     model = shot.model
     landing = _landing(shot)
     known = [*model.values, *landing]

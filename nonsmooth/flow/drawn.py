@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Any, Protocol, runtime_checkable
 
@@ -71,6 +71,8 @@ class Grid:
     """
 
     def __init__(self, axes: Sequence[ArrayLike]):
+        if not isinstance(axes, Iterable):
+            raise PointError(f"axes: expected values for each state, received {axes!r}.")
         self._axes = [_axis(values, i) for i, values in enumerate(axes)]
         if not self._axes:
             raise PointError("axes: expected values for each state, received none.")

@@ -14,6 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from .errors import OptionError
 from .values import Array
 
 #: Columns from which on, and in blocks of which, memory is shared with a function mapped over columns.
@@ -51,6 +52,11 @@ def call(function: ca.Function, *values: ArrayLike) -> list[Array]:
     >>> ns.call(f, [[1.0, 2.0, 3.0], [4.0, 5.0, 6.0]], 2.0)[1]
     array([[5., 7., 9.]])
     """
+    if not isinstance(function, ca.Function):
+        raise OptionError(
+            f"function: expected a casadi.Function, received {function!r}. "
+            'ca.Function("f", [x], [expression]) makes one.'
+        )
     columns = [_column(v) for v in values]
     count = max((v.shape[1] for v in columns), default=1)
     block = _block(function) if count >= _MANY else None

@@ -27,7 +27,7 @@ from ..flow.trajectory import Trajectory
 from ..local.numbers import Numbers
 from ..local.place import Place
 from ..local.regions import coincide
-from ..model import Array, Surfaces
+from ..model import Array, OptionError, Surfaces
 
 #: Where a path along an eigenline begins, and where one of a node is taken to be at s: times, and
 #: values of L2 - L1, relative to those of the problem. Errors are of second order in it.
@@ -115,6 +115,8 @@ def paths_from(s: Array, t: float, slider: Slider, samples: int) -> list[Path]:
     -------
     list of Path
     """
+    if not isinstance(slider, Slider):
+        raise OptionError(f"slider: expected a Slider, received {slider!r}.")
     numbers = slider.where.at(s)
     if coincide(numbers, 1e-9):
         return _through(slider, s, t, numbers)

@@ -63,7 +63,7 @@ def manifold(
     >>> both = [ns.manifold(system, saddle, stable=s, length=1.0) for s in (True, False)]
     >>> figure = ns.plot.manifold(both, names=["x", "y"])
     """
-    several = [found] if isinstance(found, Manifold) else list(found)
+    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
     spatial = _dimension(several) == 3
     with style.settings():
         if ax is None and spatial:

@@ -49,7 +49,7 @@ def offline_page(
     Raises
     ------
     OptionError
-        Data that JSON cannot hold, such as NaN.
+        Data that JSON cannot hold, such as NaN; a title or a body that is no text.
 
     Examples
     --------
@@ -57,6 +57,9 @@ def offline_page(
     >>> page.count("<script"), "https" in page
     (2, False)
     """
+    for name, text in (("title", title), ("body", body)):
+        if not isinstance(text, str):
+            raise OptionError(f"{name}: expected a text, received {text!r}.")
     sheets = "\n".join([_shared("page.css"), *styles])
     blocks = [_data(name, value) for name, value in (data or {}).items()]
     blocks += [f"<script>\n{text}</script>" for text in (_shared("controls.js"), *scripts)]

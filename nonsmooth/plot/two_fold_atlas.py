@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -106,7 +106,7 @@ def two_fold_atlas(
     >>> len(figure.axes)
     4
     """
-    chosen = list(CASES) if cases is None else list(cases)
+    chosen = list(CASES) if cases is None else list(cases) if isinstance(cases, Iterable) else []
     unknown = [name for name in chosen if name not in CASES]
     if unknown or not chosen or isinstance(cases, str):
         raise OptionError(

@@ -246,7 +246,12 @@ def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> f
     2.0
     """
     sign = 1.0 if direction == 0 else -float(direction)
-    c = [sign * float(v) for v in coefficients]
+    try:
+        c = [sign * float(v) for v in coefficients]
+    except (TypeError, ValueError) as error:
+        raise OptionError(
+            f"coefficients: expected numbers in increasing powers of t, received {coefficients!r}."
+        ) from error
     while c and c[0] == 0.0:
         c.pop(0)
     if not c:

@@ -146,7 +146,7 @@ def test_version(command):
 
 
 def test_as_a_process():
-    argv = [sys.executable, "-m", "bounce.cli", *SHOT, "--turf", "artificial"]
+    argv = [sys.executable, "-m", "bounce", *SHOT, "--turf", "artificial"]
     done = subprocess.run(argv, capture_output=True, text=True, timeout=120, check=False)
     assert done.returncode == 0 and done.stdout.startswith("lift-off"), done.stderr
     assert "Error" not in done.stderr and "Warning" not in done.stderr

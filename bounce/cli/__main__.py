@@ -1,7 +1,0 @@
-"""``python -m bounce.cli`` is ``bounce``."""
-
-import sys
-
-from .main import main
-
-sys.exit(main())

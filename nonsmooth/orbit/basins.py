@@ -169,7 +169,7 @@ def basins(
         A time, a number of samples or rounds or a section out of its range; no period, though the
         system depends on time.
     PointError
-        Starts or attractors of a wrong shape, or not finite.
+        Starts or attractors of a wrong shape; no finite start, or an attractor that is not finite.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
 
@@ -202,11 +202,31 @@ def basins(
         tol=tol,
         work=checked_work(work),
     )
-    for points in attractors:
-        search.known(np.atleast_2d(real_array(points, "attractors")))
+    for points in _listed(system, attractors):
+        search.known(points)
     complete = search.run()
     labels = search.labels.reshape(starts.shape[:-1])
     return Basins(labels, search.found, starts, axes, system.state_names, complete)
+
+
+def _listed(system: FilippovSystem, attractors: Sequence[ArrayLike]) -> list[Array]:
+    """Points (m, n) of attractors that are known."""
+    n = system.dimension
+    try:
+        found = [np.atleast_2d(real_array(points, "attractors")) for points in attractors]
+    except TypeError:  # one that is no sequence
+        found = [np.zeros((0, 0))]
+    for points in found:
+        if points.ndim != 2 or points.shape[1] != n or not np.isfinite(points).all():
+            raise PointError(
+                explain(
+                    "attractors",
+                    expected=f"points (m, {n}) that are finite, for each attractor",
+                    received=repr(attractors),
+                    advice="For example attractors=[[0.0, 1.0], [2.0, 0.0]] are two, of a point each.",
+                )
+            )
+    return found
 
 
 def _starts(

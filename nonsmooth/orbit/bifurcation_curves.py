@@ -9,7 +9,7 @@ the accuracy is that of the test itself.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -249,7 +249,8 @@ def continue_bifurcation(
     DefinitionError
         No event of a branch that two parameters unfold; parameters that are not two of the system.
     OptionError
-        Bounds in the wrong order, or without the event; ``step`` or ``max_points`` out of its range.
+        Bounds in the wrong order, or without the event; ``step`` or ``max_points`` out of its range;
+        parameters that break the symmetry by which half of an orbit is solved for.
     ConvergenceError
         The event does not solve the equations of its curve.
 
@@ -304,6 +305,8 @@ def continue_bifurcation(
         bar.close()
     points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
     zeros = [*reversed(halves[0].zeros), *(halves[1].zeros if len(halves) > 1 else ())]
+    for u in (points[0], points[-1]):
+        base.require_valid(u)
     return BifurcationCurve(
         kind=event.kind,
         parameters=names,
@@ -328,8 +331,9 @@ def _checked(
             )
         )
     known = event.curve.system.parameter_names
-    names = [str(name) for name in parameters] if not isinstance(parameters, str) else [parameters]
-    if len(set(names)) != 2 or not set(names) <= set(known):
+    given = [parameters] if isinstance(parameters, str) else parameters
+    names = [str(name) for name in given] if isinstance(given, Iterable) else []
+    if len(names) != 2 or len(set(names)) != 2 or not set(names) <= set(known):
         raise DefinitionError(
             explain(
                 "parameters",
@@ -338,7 +342,7 @@ def _checked(
                 advice="Parameters that do not vary keep their value at the event.",
             )
         )
-    if len(bounds) != 2:
+    if not isinstance(bounds, (Sequence, np.ndarray)) or len(bounds) != 2:
         raise OptionError(f"bounds: expected two pairs of numbers, received {bounds!r}.")
     assert event.point is not None
     values = event.curve.parameters_at(event.point.u)

@@ -81,6 +81,9 @@ class BranchCurve(Curve):
         """Whether two eigenvalues vanish together at a point, not one beside an imaginary pair."""
         return False
 
+    def require_valid(self, u: Array) -> None:
+        """Refuse a point at which what the equations take for granted does not hold."""
+
     def describe(self, u: Array) -> Any:
         """The solution at a point of the curve."""
         raise NotImplementedError
@@ -183,7 +186,11 @@ def follow_branch(
         halves.append(_half(way, through, options))
     if bar is not None:
         bar.close()
-    return _joined(name, *halves)
+    branch = _joined(name, *halves)
+    for at, point in (branch.nodes[0], branch.nodes[-1]):
+        assert isinstance(at, BranchCurve)
+        at.require_valid(point.u)
+    return branch
 
 
 def progress_bar(progress: bool) -> Any:

@@ -24,11 +24,12 @@ from ..model import (
 )
 from .boundary import BoundaryProblem, Evaluation
 from .demands import CLOSE, COARSE, FINAL, ROUNDING
-from .guess import Itinerary, Start, mirror_of, start_of
+from .guess import Itinerary, Start, start_of
 from .legs import Leg, leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 from .rounds import once_round
 from .shooting import shot
+from .symmetric import mirror_of, require_symmetric
 
 #: A period below this part of the guess is that of a point.
 _POINT = 1e-9
@@ -138,6 +139,7 @@ def periodic_orbit(
     faults = tuple(faults_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
     _require_simple(orbit)
+    require_symmetric(orbit)
     if faults and not virtual:
         raise _virtual(orbit)
     return orbit

@@ -69,7 +69,8 @@ def continue_orbit(
     DefinitionError
         Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
     OptionError
-        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range.
+        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range; a
+        parameter that breaks the symmetry by which half of the orbit is solved for.
 
     Examples
     --------

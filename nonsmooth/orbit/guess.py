@@ -8,7 +8,6 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..flow.fixed import flow_for
 from ..flow.simulate import simulate
@@ -25,10 +24,11 @@ from ..model import (
     explain,
     real_array,
 )
-from ..model.forcing import Forcing, frequencies
+from ..model.forcing import Forcing
 from ..model.variational import plain_field
 from .boundary import BoundaryProblem
 from .flight import flights_of
+from .forced import forcing_of, span_of
 from .guards import march
 from .itinerary import leg_between, read_word
 from .legs import Leg, fly, leg_name
@@ -61,65 +61,6 @@ class Start:
     p: Array
 
 
-def mirror_of(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array | None:
-    n = system.dimension
-    if symmetry is None:
-        return None
-    if isinstance(symmetry, str):
-        if symmetry != "odd":
-            raise OptionError(
-                f"symmetry: expected 'odd' or a matrix ({n}, {n}), received {symmetry!r}."
-            )
-        return -np.eye(n)
-    matrix = real_array(symmetry, "symmetry")
-    if matrix.shape != (n, n) or np.abs(matrix @ matrix - np.eye(n)).max() > 1e-9:
-        raise OptionError(
-            explain(
-                "symmetry",
-                expected=f"'odd' or a matrix ({n}, {n}) whose square is 1",
-                received=f"shape {matrix.shape}",
-                advice="R maps half of the orbit to the other half.",
-            )
-        )
-    return matrix
-
-
-def _forcing(system: FilippovSystem, period: Any) -> Forcing | None:
-    """The period of the forcing as a function of the parameters; None for autonomous systems."""
-    if not system.time_dependent:
-        return None
-    if period is None:
-        found = system.cached("frequencies", lambda: frequencies(system))
-        if len(found) != 1:
-            raise OptionError(
-                explain(
-                    "period",
-                    expected="the period of the forcing, as a number or an expression in parameters",
-                    received=f"none, with {len(found)} frequencies {found} in sines and cosines",
-                    advice="Give period=2*pi/w.",
-                )
-            )
-        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / found[0], True))
-    return Forcing(system, period)
-
-
-def _span(forcing: Forcing | None, p: Array) -> float | None:
-    """The forcing period at some parameters."""
-    if forcing is None:
-        return None
-    span = forcing(p)[0]
-    if not (math.isfinite(span) and span > 0.0):
-        raise OptionError(
-            explain(
-                "period",
-                expected="a positive time",
-                received=f"{span:.6g}",
-                advice="It is the period of the forcing, as a number or an expression in parameters.",
-            )
-        )
-    return span
-
-
 def start_of(
     system: FilippovSystem,
     guess: Any,
@@ -134,14 +75,14 @@ def start_of(
     if isinstance(guess, Trajectory):
         given = {**guess.parameters, **_by_name(parameters)}
         p = system.parameter_vector(given)
-        forcing = _forcing(system, period)
-        found = recurrence(guess, symmetry=mirror, period=_span(forcing, p), first=False)
+        forcing = forcing_of(system, period)
+        found = recurrence(guess, symmetry=mirror, period=span_of(forcing, p), first=False)
         if found is None or found.distance > CLOSE:
             raise refused(guess, found)
         return _from_recurrence(system, found, forcing, mirror, p)
     p = system.parameter_vector(parameters)
-    forcing = _forcing(system, period)
-    span = _span(forcing, p)
+    forcing = forcing_of(system, period)
+    span = span_of(forcing, p)
     x = system.extended_point(real_array(guess, "guess"), t_start)
     if itinerary is not None:
         return _from_word(system, x, itinerary, forcing, mirror, p)
@@ -279,7 +220,7 @@ def _from_word(
 
 def _word_legs(system: FilippovSystem, itinerary: Itinerary, mirrored: bool) -> tuple[Leg, ...]:
     """The legs of an itinerary, of which the first follows the last one, or its mirror image does."""
-    word: Any = itinerary if isinstance(itinerary, str) else tuple(itinerary)
+    word: Any = itinerary if isinstance(itinerary, str) else _listed(itinerary)
 
     def read() -> tuple[Leg, ...]:
         modes = read_word(system, word) if isinstance(word, str) or not word else word
@@ -294,6 +235,27 @@ def _word_legs(system: FilippovSystem, itinerary: Itinerary, mirrored: bool) -> 
         return system.cached(("word", word, mirrored), read)
     except TypeError:  # of lists, which are no keys
         return read()
+
+
+def _listed(itinerary: Any) -> tuple[Any, ...]:
+    """Modes, or pairs of a mode and a name, as they were given."""
+    try:
+        word = tuple(itinerary)
+    except TypeError:
+        word = (None,)
+    for entry in word:
+        names = (entry,) if isinstance(entry, str) else entry
+        pair = isinstance(names, (tuple, list)) and len(names) in (1, 2)
+        if not pair or not all(isinstance(name, str) for name in names):
+            raise OptionError(
+                explain(
+                    "itinerary",
+                    expected="modes, such as '+ s -', or pairs of a mode and the name of its event",
+                    received=repr(itinerary),
+                    advice="Write for example '+ s -' or [('', 'floor')].",
+                )
+            )
+    return tuple(e if isinstance(e, str) else tuple(e) for e in word)
 
 
 def _followed(
@@ -394,5 +356,5 @@ def _natural_time(system: FilippovSystem, x: Array, p: Array, mode: str | None =
     """The time in which the state changes by its size."""
     field = Leg(_letters(system, x, p) if mode is None else mode).field(system)
     rate = field.rate.copied(field.states_at(x, p), p)[0][: system.dimension, 0]
-    size, speed = float(np.linalg.norm(x[: system.dimension])), float(np.linalg.norm(rate))
+    size, speed = math.hypot(*x[: system.dimension]), math.hypot(*rate)
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

@@ -33,6 +33,7 @@ from .orbit_equations import OrbitEquations
 from .partings import as_doubling, as_pitchfork
 from .periodic import PeriodicOrbit, faults_of, named
 from .smooth_events import smooth_side
+from .symmetric import require_symmetric
 
 #: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
@@ -139,6 +140,12 @@ class OrbitCurve(OrbitEquations):
     def faults(self, u: Array) -> list[str]:
         """What the guards contradict."""
         return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
+
+    def require_valid(self, u: Array) -> None:
+        """Refuse half orbits of a system whose symmetry the parameter breaks."""
+        if self.problem.symmetry is not None:
+            virtual = tuple(self.faults(u))
+            require_symmetric(replace(self.describe(u), faults=virtual))
 
     # results ------------------------------------------------------------------------------------
 

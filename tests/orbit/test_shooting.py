@@ -10,7 +10,8 @@ import nonsmooth as ns
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.orbit import find_periodic, flight, guess, shooting
 from nonsmooth.orbit.flight import flights_of
-from nonsmooth.orbit.guess import mirror_of, start_of
+from nonsmooth.orbit.guess import start_of
+from nonsmooth.orbit.symmetric import mirror_of
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

@@ -62,6 +62,26 @@ def numbers(
         raise error(f"{what}: expected numbers, received {value!r}.") from cause
 
 
+def require_positive(**options: Any) -> None:
+    """Refuse options that are no positive numbers.
+
+    Raises
+    ------
+    nonsmooth.OptionError
+
+    Examples
+    --------
+    >>> require_positive(min_height=0.005)
+    >>> require_positive(min_height=0)
+    Traceback (most recent call last):
+      ...
+    nonsmooth.model.errors.OptionError: min_height: expected a positive number, received 0.
+    """
+    for name, value in options.items():
+        if not number(value, name, ns.OptionError) > 0:
+            raise ns.OptionError(f"{name}: expected a positive number, received {value!r}.")
+
+
 class Parametrised:
     """An immutable object with named numbers, compared and hashed by value.
 

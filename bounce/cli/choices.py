@@ -28,6 +28,7 @@ from ..contact.models import (
     NormalKelvinVoigt,
     Tsuji,
 )
+from ..golf import AIRS
 from ..laws import TURFS, BounceLaw, CrossBounce, PennerBounce, RigidBounce, TiltedBounce
 from ..units import BALLS, Ball, Scaling
 from .values import SYSTEMS, assignment, in_si, number
@@ -144,6 +145,12 @@ def chosen_model(args: argparse.Namespace) -> Chosen:
     friction = FRICTION[args.friction]
     own = {n: values.pop(n) for n in list(values) if n in friction.declared()}
     return Chosen(CONTACT_MODELS[args.model](friction=friction(**own), **values), ball, scaling)
+
+
+def surroundings(args: argparse.Namespace) -> dict[str, Any]:
+    """The air and the slope of the ground, as the verbs of ``bounce.golf`` take them."""
+    air = None if args.air == "none" else AIRS[args.air]
+    return dict(air=air, slope=args.slope.si(args.units))
 
 
 def require_scale(args: argparse.Namespace, chosen: Chosen) -> None:

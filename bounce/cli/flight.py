@@ -7,7 +7,7 @@ from typing import Any
 
 from ..golf import AIRS, Flight, Run, SideFlight, SideRun, flight
 from ..units import Landing
-from .choices import Chosen, chosen_model, ground_arguments, require_scale
+from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
 from .report import Units, in_words, opening, polar, print_json, tabulate
 from .shot import UNVALIDATED, run_arguments, run_lines, run_report, to_rest
 from .side import (
@@ -68,8 +68,7 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _fly(args: argparse.Namespace, chosen: Chosen, launch: Landing) -> tuple[Flight, Run | None]:
-    air = None if args.air == "none" else AIRS[args.air]
-    path = flight(launch, chosen.ball, air=air, slope=args.slope.si(args.units))
+    path = flight(launch, chosen.ball, **surroundings(args))
     to_ground = args.turf is not None or args.model is not None
     return path, to_rest(args, chosen, path.landing) if to_ground else None
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideRebound, SideRun, play, rebound
 from ..units import Landing
-from .choices import Chosen, chosen_model, ground_arguments, require_scale
+from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
 from .report import Units, in_words, opening, polar, print_json, tabulate
 from .side import (
     asked_for_side,
@@ -122,8 +122,7 @@ def to_rest(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> Run:
         landing,
         chosen.ball,
         scaling=chosen.scaling,
-        air=None if args.air == "none" else AIRS[args.air],
-        slope=args.slope.si(args.units),
+        **surroundings(args),
         rolling_friction=args.rolling_friction,
     )
 

@@ -8,7 +8,6 @@ from typing import Any
 import nonsmooth as ns
 
 from ..golf import (
-    AIRS,
     SideFlight,
     SideRebound,
     SideRun,
@@ -19,7 +18,7 @@ from ..golf import (
     side_rebound,
 )
 from ..units import Landing
-from .choices import Chosen
+from .choices import Chosen, surroundings
 from .report import Units, in_words, polar
 from .values import quantity
 
@@ -111,8 +110,7 @@ def side_to_rest(args: argparse.Namespace, chosen: Chosen, landing: SideState) -
         landing,
         chosen.ball,
         scaling=chosen.scaling,
-        air=None if args.air == "none" else AIRS[args.air],
-        slope=args.slope.si(args.units),
+        **surroundings(args),
         side_slope=_side_slope(args),
         rolling_friction=args.rolling_friction,
     )
@@ -123,8 +121,7 @@ def side_carry(args: argparse.Namespace, chosen: Chosen, launch: Landing) -> Sid
     return side_flight(
         side_state(args, launch),
         chosen.ball,
-        air=None if args.air == "none" else AIRS[args.air],
-        slope=args.slope.si(args.units),
+        **surroundings(args),
         side_slope=_side_slope(args),
     )
 

@@ -15,7 +15,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -239,20 +239,67 @@ def _parabola(launch: Landing, slope: float, x0: float, y0: float) -> Flight:
 def _through_air(
     launch: Landing, ball: Ball, air: Air, slope: float, x0: float, y0: float, tol: float
 ) -> Flight:
-    from scipy.integrate import solve_ivp
+    start = [x0, y0, launch.xdot, launch.ydot, launch.omega]
+    in_vacuum = _parabola(launch, slope, x0, y0).time
+    fall = fly(_field(ball, air, slope), start, 2, in_vacuum, tol)
+    x, _, xdot, ydot, omega = (float(value) for value in fall.end)
+    landing = Landing(xdot, ydot, omega)
+    return Flight(launch, landing, fall.time, (x0, y0), x - x0, fall.height, fall.path)
 
-    field = _field(ball, air, slope)
+
+class Fall(NamedTuple):
+    """A flight through air in numbers.
+
+    Attributes
+    ----------
+    end : ndarray
+        The state on the ground.
+    time : float
+    height : float
+        The greatest.
+    path : callable
+        The place at times.
+    """
+
+    end: Array
+    time: float
+    height: float
+    path: Callable[[Array], Array]
+
+
+def fly(
+    field: Callable[[float, Any], Any], start: ArrayLike, axes: int, in_vacuum: float, tol: float
+) -> Fall:
+    """Integrate a flight through air until the ball is on the ground.
+
+    Parameters
+    ----------
+    field : callable
+        Rate of the state: the place, then the velocity, then the spin; the second axis is up.
+    start : array_like
+        The state at first.
+    axes : int
+        Of the place.
+    in_vacuum : float
+        How long it would fly there, s.
+    tol : float
+        Relative and absolute tolerance.
+
+    Raises
+    ------
+    nonsmooth.OptionError
+        It does not come down.
+    """
+    from scipy.integrate import solve_ivp
 
     def ground(t: float, z: Any) -> float:
         return float(z[1])
 
     def apex(t: float, z: Any) -> float:
-        return float(z[3])
+        return float(z[axes + 1])
 
     ground.terminal, ground.direction = True, -1  # type: ignore[attr-defined]
     apex.direction = -1  # type: ignore[attr-defined]
-    start = [x0, y0, launch.xdot, launch.ydot, launch.omega]
-    in_vacuum = _parabola(launch, slope, x0, y0).time
     run = solve_ivp(
         field,
         (0.0, 10 * in_vacuum + 10.0),
@@ -269,15 +316,12 @@ def _through_air(
             f"air: expected a ball that comes down, received {run.message} after {run.t[-1]:g} s. Are "
             "the coefficients of drag and lift sensible?"
         )
-    x, _, xdot, ydot, omega = (float(value) for value in run.y[:, -1])
-    tops = [float(state[1]) for state in run.y_events[1]]
-    time = float(run.t[-1])
 
     def path(t: Array) -> Array:
-        return np.moveaxis(run.sol(t.ravel())[:2].reshape(2, *t.shape), 0, -1)
+        return np.moveaxis(run.sol(t.ravel())[:axes].reshape(axes, *t.shape), 0, -1)
 
-    landing = Landing(xdot, ydot, omega)
-    return Flight(launch, landing, time, (x0, y0), x - x0, max([y0, *tops]), path)
+    tops = [float(state[1]) for state in run.y_events[1]]
+    return Fall(run.y[:, -1], float(run.t[-1]), max([float(run.y[1, 0]), *tops]), path)
 
 
 def _field(ball: Ball, air: Air, slope: float) -> Callable[[float, Any], list[float]]:

@@ -7,6 +7,8 @@ from abc import ABC, abstractmethod
 from dataclasses import dataclass
 from typing import Any
 
+import nonsmooth as ns
+
 from ..contact.model import ContactModel
 from ..errors import ModelError
 from ..laws import BounceLaw
@@ -73,6 +75,19 @@ class Ground(ABC):
     def slope(self) -> float | None:
         """Slope that is in its equations, rad; None where it holds on any."""
         return None
+
+    def require_slope(self, slope: float) -> None:
+        """Refuse a run on another slope than that of the equations.
+
+        Raises
+        ------
+        nonsmooth.OptionError
+        """
+        if self.slope not in (None, slope):
+            raise ns.OptionError(
+                f"slope: expected that of the model, {self.slope!r}, received {slope!r}. Use "
+                f"model.replace(slope={slope!r})."
+            )
 
 
 @dataclass(frozen=True)

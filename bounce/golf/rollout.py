@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..parameters import LIMITS, number
+from ..parameters import LIMITS, number, require_positive
 from ..units import GOLF, GRAVITY, Ball, Landing, Scaling
 from .flight import Air, Flight, flight
 from .ground import ExtrapolationWarning, Model, Rebound, ground
@@ -246,18 +246,11 @@ def play(
     >>> bounce.golf.play(bounce.laws.TURFS["natural"].law, drive)
     Run(13 bounces, first 2.14 m high, bounced 23 m, rolled 0.183 m, run-out 23.19 m in 4.94 s)
     """
-    options = dict(rolling_friction=rolling_friction, min_height=min_height)
-    for name, value in options.items():
-        if not number(value, name, ns.OptionError) > 0:
-            raise ns.OptionError(f"{name}: expected a positive number, received {value!r}.")
+    require_positive(rolling_friction=rolling_friction, min_height=min_height)
     if not LIMITS["in (-pi/2, pi/2)"](number(slope, "slope", ns.OptionError)):
         raise ns.OptionError(f"slope: expected radians in (-pi/2, pi/2), received {slope!r}.")
     turf = ground(model, ball, scaling, tol)
-    if turf.slope not in (None, slope):
-        raise ns.OptionError(
-            f"slope: expected that of the model, {turf.slope!r}, received {slope!r}. Use "
-            f"model.replace(slope={slope!r})."
-        )
+    turf.require_slope(slope)
     bounces: list[Bounce] = []
     t, x = 0.0, 0.0
     while True:

@@ -14,7 +14,6 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,7 +23,7 @@ import nonsmooth as ns
 from ..errors import require
 from ..parameters import LIMITS, number, numbers
 from ..units import GOLF, GRAVITY, Ball, Landing
-from .flight import Air
+from .flight import Air, fly
 
 Array = NDArray[np.float64]
 
@@ -245,47 +244,12 @@ def _through_air(
     in_vacuum: float,
     tol: float,
 ) -> SideFlight:
-    from scipy.integrate import solve_ivp
-
-    def ground(t: float, z: Any) -> float:
-        return float(z[1])
-
-    def apex(t: float, z: Any) -> float:
-        return float(z[4])
-
-    ground.terminal, ground.direction = True, -1  # type: ignore[attr-defined]
-    apex.direction = -1  # type: ignore[attr-defined]
-    run = solve_ivp(
-        _field(ball, air, gravity),
-        (0.0, 10 * in_vacuum + 10.0),
-        np.concatenate([place, launch.velocity, launch.spin]),
-        method="DOP853",
-        rtol=max(tol, 1e-13),
-        atol=max(tol, 1e-13),
-        events=(ground, apex),
-        dense_output=True,
-        max_step=in_vacuum / 20,  # no step over a whole hop
-    )
-    if run.status != 1:
-        raise ns.OptionError(
-            f"air: expected a ball that comes down, received {run.message} after {run.t[-1]:g} s. Are "
-            "the coefficients of drag and lift sensible?"
-        )
-
-    def path(t: Array) -> Array:
-        return np.moveaxis(run.sol(t.ravel())[:3].reshape(3, *t.shape), 0, -1)
-
-    end, tops = run.y[:, -1], [float(state[1]) for state in run.y_events[1]]
-    way, start = end[:3] - place, (float(place[0]), float(place[1]), float(place[2]))
+    begin = np.concatenate([place, launch.velocity, launch.spin])
+    fall = fly(_field(ball, air, gravity), begin, 3, in_vacuum, tol)
+    way, start = fall.end[:3] - place, (float(place[0]), float(place[1]), float(place[2]))
+    landing = SideState(fall.end[3:6], fall.end[6:])
     return SideFlight(
-        launch,
-        SideState(end[3:6], end[6:]),
-        float(run.t[-1]),
-        start,
-        float(way[0]),
-        float(way[2]),
-        max([start[1], *tops]),
-        path,
+        launch, landing, fall.time, start, float(way[0]), float(way[2]), fall.height, fall.path
     )
 
 

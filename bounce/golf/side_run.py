@@ -21,7 +21,7 @@ import nonsmooth as ns
 from ..contact.model import ContactModel
 from ..contact.space import Contact3D
 from ..laws import BounceLaw
-from ..parameters import number
+from ..parameters import require_positive
 from ..units import GOLF, Ball, Scaling
 from .flight import Air
 from .ground import ExtrapolationWarning, ground
@@ -212,17 +212,10 @@ def side_play(
     >>> side_play(bounce.laws.RigidBounce(mu=0.5, restitution=0.3), landing, rolling_friction=0.25)
     SideRun(4 bounces, the first kicks 4.81 deg, rests 17.12 m on and 1.44 m to the right after 4.74 s)
     """
-    options = dict(rolling_friction=rolling_friction, min_height=min_height)
-    for name, value in options.items():
-        if not number(value, name, ns.OptionError) > 0:
-            raise ns.OptionError(f"{name}: expected a positive number, received {value!r}.")
+    require_positive(rolling_friction=rolling_friction, min_height=min_height)
     gravity, state = pull(slope, side_slope), landing
     turf = ground(model.model if isinstance(model, Contact3D) else model, ball, scaling, tol)
-    if turf.slope not in (None, slope):
-        raise ns.OptionError(
-            f"slope: expected that of the model, {turf.slope!r}, received {slope!r}. Use "
-            f"model.replace(slope={slope!r})."
-        )
+    turf.require_slope(slope)
     bounces: list[SideBounce] = []
     extrapolated, t, place = 0, 0.0, np.zeros(2)
     while True:

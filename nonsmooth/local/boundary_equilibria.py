@@ -18,8 +18,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
-from .checks import MARGIN, positive, relative_difference, require_autonomous, require_linear
+from ..model import Array, FilippovSystem, Parameters, PointError, explain
+from .checks import (
+    MARGIN,
+    parameter_index,
+    positive,
+    relative_difference,
+    require_autonomous,
+    require_linear,
+)
 from .equilibria import equilibrium_distance
 from .place import Place, on_surface, place
 from .read_only import ReadOnly
@@ -356,16 +363,8 @@ def find_boundary_equilibrium(
     k = side_index(side)
     require_autonomous(system, "boundary equilibrium")
     where, x = place(system, near, parameters, 0.0, surface, mode)
-    if vary not in system.parameter_names:
-        raise DefinitionError(
-            explain(
-                "vary",
-                expected=f"a parameter among {list(system.parameter_names)}",
-                received=repr(vary),
-                advice="An equilibrium is on the surface at isolated values of a parameter.",
-            )
-        )
-    j, n = system.parameter_names.index(vary), x.size
+    advice = "An equilibrium is on the surface at isolated values of a parameter."
+    j, n = parameter_index(system, vary, "vary", advice), x.size
 
     def at(value: float) -> Place:
         p = where.parameters.copy()

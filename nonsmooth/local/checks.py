@@ -62,6 +62,28 @@ def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
         )
 
 
+def parameter_index(
+    system: FilippovSystem, name: str, what: str = "parameter", advice: str = "Give its name."
+) -> int:
+    """Return which of its parameters a system calls by a name.
+
+    Raises
+    ------
+    DefinitionError
+        None of them.
+    """
+    if name not in system.parameter_names:
+        raise DefinitionError(
+            explain(
+                what,
+                expected=f"a parameter among {list(system.parameter_names)}",
+                received=repr(name),
+                advice=advice,
+            )
+        )
+    return system.parameter_names.index(name)
+
+
 def relative_difference(u: float, v: float) -> float:
     """|u - v| relative to |u| + |v|."""
     return abs(u - v) / (abs(u) + abs(v))

@@ -7,16 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..local.checks import positive, require_autonomous, require_linear
+from ..local.checks import parameter_index, positive, require_autonomous, require_linear
 from ..local.equilibria import find_equilibrium
 from ..local.place import place
 from ..local.pseudo_equilibria import find_pseudo_equilibrium
 from ..local.sides import Side
 from ..model import (
-    DefinitionError,
     FilippovSystem,
     Parameters,
-    explain,
     require_system,
     whole,
 )
@@ -109,17 +107,8 @@ def continue_equilibrium(
     require_autonomous(system, "continuation of equilibria")
     positive(step, "step")
     whole(max_points, "max_points", least=2)
-    if parameter not in system.parameter_names:
-        raise DefinitionError(
-            explain(
-                "parameter",
-                expected=f"a parameter among {list(system.parameter_names)}",
-                received=repr(parameter),
-                advice="Give its name.",
-            )
-        )
+    index = parameter_index(system, parameter)
     where, _ = place(system, near, parameters, 0.0, surface, mode, smooth=side is not None)
-    index = system.parameter_names.index(parameter)
     value = float(where.parameters[index])
     low, high = check_bounds(bounds, value, parameter)
     given: dict[str, Any] = dict(parameters=parameters, surface=surface, mode=mode)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..local.checks import positive
+from ..local.checks import parameter_index, positive
 from ..model import Array, DefinitionError, explain, whole
 from .branch import Branch, BranchEvent
 from .branch_curves import check_bounds, follow_branch
@@ -119,16 +119,7 @@ def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCur
             )
         )
     system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
-    if parameter not in system.parameter_names:
-        raise DefinitionError(
-            explain(
-                "parameter",
-                expected=f"a parameter among {list(system.parameter_names)}",
-                received=repr(parameter),
-                advice="Give its name.",
-            )
-        )
-    free = (system.parameter_names.index(parameter),)
+    free = (parameter_index(system, parameter),)
     if isinstance(orbit, BranchEvent):
         return switched(orbit, free)
     p, u = orbit.parameter_vector, orbit.unknowns

@@ -8,6 +8,7 @@
 | adding-sliding | s | s b s |
 | impact grazing | a | a impact a |
 | corner | two events at one time, in the other order | |
+| corner that adds legs | a b | a c d b, past a second surface and back |
 
 A new leg begins with the duration 0, which the smooth flow of its mode accepts.
 """
@@ -15,69 +16,19 @@ A new leg begins with the duration 0, which the smooth flow of its mode accepts.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
 from ..model import Array, Guard
+from ..model.variational import guarded_field
 from .boundary import BoundaryProblem, Evaluation
+from .chains import Chain, Edited, mode_after, rotated, with_letter
 from .conditions import Condition, surface_of, touching
+from .corners import cut_corner, round_corner, swapped
 from .itinerary import leg_between
 from .legs import Leg, fly
-from .mirrors import TURNED, mirrored, neighbours
-
-
-@dataclass(frozen=True, eq=False)
-class Edited:
-    """An itinerary on the other side of a bifurcation.
-
-    Attributes
-    ----------
-    problem : BoundaryProblem
-    u : ndarray (m,)
-        Unknowns of the same orbit in it.
-    origin : tuple of int
-        For each leg its number before; -1 for a new one, -2 for one that grows from zero.
-    test : str
-        In an itinerary with fewer legs the condition that vanishes there; else empty.
-    """
-
-    problem: BoundaryProblem
-    u: Array
-    origin: tuple[int, ...]
-    test: str = ""
-
-    @property
-    def fresh(self) -> tuple[int, ...]:
-        """The legs that grow from zero; several in an orbit that is symmetric."""
-        return tuple(i for i, before in enumerate(self.origin) if before == -2)
-
-
-class _Chain:
-    """The legs of a problem while they are edited."""
-
-    def __init__(self, problem: BoundaryProblem, u: Array, origin: Sequence[int]):
-        self.problem, self.legs, self.origin = problem, list(problem.legs), list(origin)
-        starts, durations = problem.split(u)
-        self.starts, self.durations = [np.array(x) for x in starts], durations.tolist()
-
-    def insert(self, k: int, leg: Leg, start: Array) -> None:
-        """A new leg of no duration."""
-        self.legs.insert(k, leg)
-        self.starts.insert(k, start)
-        self.durations.insert(k, 0.0)
-        self.origin.insert(k, -1)
-
-    def remove(self, k: int) -> None:
-        for rows in (self.legs, self.starts, self.durations, self.origin):
-            del rows[k]
-
-    def done(self, fresh: int = -1, test: Condition | None = None) -> Edited:
-        whole = replace(self.problem, legs=tuple(self.legs))
-        u = whole.pack(np.array(self.starts), np.array(self.durations))
-        if fresh >= 0:
-            self.origin[fresh] = -2
-        return Edited(whole, u, tuple(self.origin), "" if test is None else test.name)
+from .mirrors import TURNED, neighbours
 
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
@@ -133,20 +84,6 @@ def _grazed(
     return "grazing-sliding" if float(gradient @ rate) > 0.0 else "grazing, escaping"
 
 
-def mode_after(leg: Leg) -> str:
-    """The mode that follows the event of a leg, where its letters tell it; else empty."""
-    if leg.kind not in ("crossing", "entry", "exit"):
-        return ""
-    if leg.name.startswith("L_"):
-        k = leg.mode.index("s")
-        letter = "+" if leg.name == "L_F1 h" else "-"
-    else:
-        k = int(leg.name.removeprefix("lambda").removeprefix("h"))
-        turned = leg.mode[k].translate(TURNED)
-        letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
-    return leg.mode[:k] + letter + leg.mode[k + 1 :]
-
-
 def edited(
     problem: BoundaryProblem, kind: str, conditions: Sequence[Condition], u: Array, p: Array
 ) -> Edited | None:
@@ -178,9 +115,11 @@ def edited(
 
 
 def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
-    chain, i = _Chain(before.problem, before.u, before.origin), at.leg
+    chain, i = Chain(before.problem, before.u, before.origin), at.leg
     if kind in ("crossing-sliding", "switching-sliding"):
         return _inserted(chain, kind, i, p)
+    if kind == "corner" and at.what == "start" and at.guard is not None:
+        return round_corner(chain, i, at.guard, p)
     if at.guard is None or at.what != "interior" or kind == "grazing, escaping":
         return None
     problem = before.problem
@@ -204,10 +143,10 @@ def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None
         chain.insert(i + 1 + k, new, start)
     chain.legs[i], chain.durations[i] = between[0], t
     chain.durations[i + len(states)] = duration - t
-    return chain.done(i + 1 if len(states) > 1 else -1)
+    return chain.done(*([i + 1] if len(states) > 1 else []))
 
 
-def _inserted(chain: _Chain, kind: str, i: int, p: Array) -> Edited:
+def _inserted(chain: Chain, kind: str, i: int, p: Array) -> Edited:
     """A short leg between a crossing or entry and leg ``i``."""
     system, k = chain.problem.system, (i - 1) % len(chain.legs)
     before = chain.legs[k]
@@ -216,12 +155,12 @@ def _inserted(chain: _Chain, kind: str, i: int, p: Array) -> Edited:
     start = before.at_end(system, flown.end, p).after
     if kind == "crossing-sliding":
         chain.legs[k] = replace(before, kind="entry")
-        slide = _with(before.mode, surface, "s")
+        slide = with_letter(before.mode, surface, "s")
         new = leg_between(system, slide, mode_after(before))
     else:
         chain.legs[k] = replace(before, kind="crossing")
-        far = _with(before.mode, surface, before.mode[surface].translate(TURNED))
-        new = leg_between(system, far, _with(far, surface, "s"))
+        far = with_letter(before.mode, surface, before.mode[surface].translate(TURNED))
+        new = leg_between(system, far, with_letter(far, surface, "s"))
     chain.insert(k + 1, new, start)
     return chain.done(k + 1)
 
@@ -232,10 +171,10 @@ def _added(
     """Legs that come before the rest of a leg that is touched, and the starts after the first."""
     system = problem.system
     if kind == "grazing-sliding":
-        slide = _with(leg.mode, guard.index, "s")
+        slide = with_letter(leg.mode, guard.index, "s")
         return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
     if kind == "adding-sliding":
-        free = _with(leg.mode, guard.index, "+" if guard.side > 0 else "-")
+        free = with_letter(leg.mode, guard.index, "+" if guard.side > 0 else "-")
         return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
     if guard.kind in ("impact", "reset"):
         hit = Leg(leg.mode, guard.name, guard.kind)
@@ -249,9 +188,13 @@ def _added(
 def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
     if kind in ("impact grazing", "grazing of a reset"):
         return _missed(before, at.leg, p)
+    if kind == "corner" and at.what == "duration":
+        cut = cut_corner(before, at.leg, p)
+        if cut is not None:
+            return cut
     turned = _turned(before, at.leg, p)
     i = turned.origin.index(before.origin[at.leg])
-    chain = _Chain(turned.problem, turned.u, turned.origin)
+    chain = Chain(turned.problem, turned.u, turned.origin)
     legs = chain.legs
     if i == 0:
         return None
@@ -272,15 +215,15 @@ def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | Non
         chain.remove(i + 1)
         chain.remove(i)
         return chain.done(test=Condition("interior", i - 1, guard))
-    return _swapped(chain, i) if kind == "corner" and at.what == "duration" else None
+    return swapped(chain, i) if kind == "corner" and at.what == "duration" else None
 
 
 def _missed(before: Edited, i: int, p: Array) -> Edited:
     """An impact or reset that is only touched, left out."""
     count = len(before.problem.legs)
-    turned = _rotated(before, i, p) if i + 1 == count > 1 else before
+    turned = rotated(before, i, p) if i + 1 == count > 1 else before
     i = 0 if turned is not before else i
-    chain = _Chain(turned.problem, turned.u, turned.origin)
+    chain = Chain(turned.problem, turned.u, turned.origin)
     if count == 1:
         return _smooth(chain, p)
     guard = _guard(turned.problem, chain.legs[i])
@@ -290,7 +233,7 @@ def _missed(before: Edited, i: int, p: Array) -> Edited:
     return chain.done(test=Condition("interior", i, guard))
 
 
-def _smooth(chain: _Chain, p: Array) -> Edited:
+def _smooth(chain: Chain, p: Array) -> Edited:
     """An orbit that no event is left of: its one leg gets a phase condition."""
     problem, leg, period = chain.problem, chain.legs[0], sum(chain.durations)
     guard, n = _guard(problem, leg), problem.dimension
@@ -307,18 +250,6 @@ def _smooth(chain: _Chain, p: Array) -> Edited:
     return Edited(whole, u, (chain.origin[0],), Condition("interior", 0, guard).name)
 
 
-def _swapped(chain: _Chain, i: int) -> Edited | None:
-    """Two events at one time in the other order."""
-    system, (first, second) = chain.problem.system, chain.legs[i - 1 : i + 1]
-    a, b = surface_of(system, first), surface_of(system, second)
-    if a < 0 or b < 0 or a == b:
-        return None
-    between = _with(first.mode, b, mode_after(second)[b])
-    chain.legs[i - 1] = leg_between(system, first.mode, between)
-    chain.legs[i] = leg_between(system, between, _with(between, a, second.mode[a]))
-    return chain.done(i)
-
-
 def _guard(problem: BoundaryProblem, leg: Leg) -> Guard:
     own = leg.map(problem.system)
     assert own is not None
@@ -327,8 +258,6 @@ def _guard(problem: BoundaryProblem, leg: Leg) -> Guard:
 
 def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard:
     """The guard that fails where leg ``i`` vanishes: of the leg after it."""
-    from ..model.variational import guarded_field
-
     removed, after = legs[i], legs[(i + 1) % len(legs)]
     mode = after.mode if i + 1 < len(legs) else mode_after(removed)
     surface = surface_of(problem.system, removed)
@@ -344,27 +273,9 @@ def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard
 # shared ------------------------------------------------------------------------------------------
 
 
-def _with(mode: str, surface: int, letter: str) -> str:
-    return mode[:surface] + letter + mode[surface + 1 :]
-
-
 def _turned(before: Edited, i: int, p: Array) -> Edited:
     """The same orbit from another leg, so that leg ``i`` has neighbours on both sides."""
     count = len(before.problem.legs)
     if 0 < i < count - 1 or (count == 2 and i == 1) or count == 1:
         return before
-    return _rotated(before, 1 if count == 2 else (i - 1) % count, p)
-
-
-def _rotated(before: Edited, k: int, p: Array) -> Edited:
-    """The same orbit from leg ``k``; legs moved to the end are those of the next round."""
-    problem, (starts, durations) = before.problem, before.problem.split(before.u)
-    legs = (*problem.legs[k:], *(mirrored(problem, leg) for leg in problem.legs[:k]))
-    shift = np.zeros(problem.dimension)
-    if problem.forcing is not None:
-        shift[-1] = problem.advance(p)[0]
-    back = np.linalg.inv(problem.wrap)
-    moved = [*starts[k:], *(back @ (x + shift) for x in starts[:k])]
-    whole = replace(problem, legs=legs)
-    u = whole.pack(np.array(moved), np.concatenate([durations[k:], durations[:k]]))
-    return Edited(whole, u, (*before.origin[k:], *before.origin[:k]))
+    return rotated(before, 1 if count == 2 else (i - 1) % count, p)

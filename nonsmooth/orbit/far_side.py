@@ -38,8 +38,8 @@ _VERDICTS = {
     "grazing of a stop": "the orbit ends at the stop",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
     "two-fold": "the orbit passes a two-fold, where the future is not unique",
-    "corner": "two events at one time; the itinerary beyond is not known here: simulate there and "
-    "continue what is found",
+    "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
+    "simulate there and continue what is found",
 }
 
 
@@ -78,7 +78,12 @@ def far_side(
             return FarSide(word, _verdict(numbers, "with either order"), ReadOnly(numbers))
     except (NonsmoothError, np.linalg.LinAlgError) as error:
         return FarSide(word, f"not classified: {error}")
-    return FarSide(word, _VERDICTS.get(kind, ""))
+    verdict = _VERDICTS.get(kind, "")
+    if kind == "corner":
+        i = test.leg
+        other = problem.legs[i].name if test.guard is None else test.guard.name
+        verdict = verdict.format(one=problem.legs[i - 1].name, other=other)
+    return FarSide(word, verdict)
 
 
 def _root(

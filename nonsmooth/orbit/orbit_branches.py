@@ -193,7 +193,9 @@ class OrbitCurve(OrbitEquations):
             side = FarSide(word, "not located on the side with fewer legs")
             return self._event(kind, self, zero.point, conditions[0].name, side)
         at, p = curve.evaluation(point.u), curve.parameters_at(point.u)
-        side = far_side(curve.problem, kind, curve.known[beyond.test], at, p, word)
+        test = curve.known[beyond.test]
+        back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
+        side = far_side(curve.problem, kind, test, at, p, word, back)
         return self._event(kind, curve, point, beyond.test, side)
 
     def _vanishing(self, zero: Zero) -> list[Condition]:

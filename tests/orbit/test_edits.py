@@ -6,8 +6,9 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.boundary import BoundaryProblem
-from nonsmooth.orbit.edits import mirrored, mode_after
+from nonsmooth.orbit.chains import mode_after
 from nonsmooth.orbit.legs import Leg
+from nonsmooth.orbit.mirrors import mirrored
 
 x, y, lam, kap = (ca.SX.sym(s) for s in ("x", "y", "lam", "kap"))
 RELAY = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[-1, -x])

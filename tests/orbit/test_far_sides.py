@@ -155,3 +155,64 @@ def test_a_symmetric_orbit_that_grazes_two_walls_at_once_is_not_classified():
     event = max(branch.events, key=lambda e: e.parameter)
     assert event.kind == "impact grazing"
     assert "another event is grazed" in event.far_side.verdict and not event.coefficients
+
+
+def peaked():
+    """The velocity is highest where x - 0.3 is crossed: past a corner it crosses y - k before and after."""
+    k, l1, l2 = symbols("k l1 l2")
+    return ns.FilippovSystem(
+        [X, V],
+        surfaces=[X - 0.3, V - k],
+        multipliers=[l1, l2],
+        field=[-X + 2 * ca.cos(T) - 0.1 * l2, -V - 2 * l1 + 0.2 * l2 + 0.3 * X],
+        time=T,
+        parameters={k: 3.0},
+    )
+
+
+@pytest.mark.parametrize("k", [1.2, 2.0])
+def test_a_corner_that_adds_legs_is_passed_from_either_side(k):
+    """The branch goes on in the itinerary that simulations have, and its multipliers jump as stated."""
+    system = peaked()
+    run = ns.simulate(system, [0.0, 0.0], 100.0, parameters={"k": k})
+    branch = ns.continue_orbit(
+        ns.periodic_orbit(system, run, parameters={"k": k}), "k", bounds=(1.0, 2.2)
+    )
+    assert branch.ends == (ns.BranchEnd.REACHED_BOUND, ns.BranchEnd.REACHED_BOUND)
+    (event,) = branch.events
+    assert event.kind == "corner" and event.far_side.verdict == "persistence"
+    orbit = event.orbit.trajectory
+    states = np.array([e.x for e in orbit.events])
+    assert np.abs(states - [0.3, event.parameter]).max(axis=1).min() < 1e-9
+    for side, legs, at in ((1, 2, "o"), (-1, 4, "i")):
+        (near,) = branch.at(event.parameter + side * 1e-7)
+        assert len(near.legs) == legs and not near.is_virtual
+        stated = event.coefficients[f"det(I - A_{at})"]
+        assert np.prod(1 - near.multipliers).real == pytest.approx(stated, abs=1e-6)
+        far = event.parameter + side * 0.1
+        other = ns.simulate(system, [0.0, 0.0], 100.0, parameters={"k": far})
+        alike = ns.periodic_orbit(system, other, parameters={"k": far})
+        assert sorted(alike.itinerary.split()) == sorted(branch[far].itinerary.split())
+        assert (
+            np.abs(
+                np.sort(np.abs(alike.multipliers)) - np.sort(np.abs(branch[far].multipliers))
+            ).max()
+            < 1e-10
+        )
+
+
+def test_a_corner_beyond_which_nothing_is_known_names_its_events():
+    """A reset is reached just where a surface is crossed: what comes first decides what the reset sees."""
+    k, phase = symbols("k phase")
+    system = ns.FilippovSystem(
+        [X, phase],
+        surface=X - k,
+        above=[1.0, 1],
+        below=[2.0, 1],
+        resets=ns.Reset(phase - 1, [0.4 * X - 1, 0], 1, "tick"),
+        parameters={k: 1.0},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.0, 0.0], 60.0))
+    branch = ns.continue_orbit(orbit, "k", bounds=(-1.0, 3.0))
+    verdicts = [e.far_side.verdict for e in branch.events if e.kind == "corner"]
+    assert verdicts and all("h0" in v and "tick" in v for v in verdicts), branch.events

@@ -78,6 +78,7 @@ class Chosen(NamedTuple):
 
 def ground_arguments(parser: argparse.ArgumentParser, turf: str | None = "natural") -> None:
     """Add what chooses ground, ball and units."""
+    parser.set_defaults(usual_turf=turf)
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--turf", choices=list(TURFS), help=f"a published law{_default(turf)}")
     which.add_argument("--model", choices=[*CONTACT_MODELS, *LAWS], help="a law or contact model")

@@ -97,11 +97,14 @@ def _map(args: argparse.Namespace, chosen: Chosen) -> OutcomeMap:
     over = {s.name: s.values(args.units) for s in spans}
     values = {name: in_si(name, typed, args.units) for name, typed in fixed.items()}
     if isinstance(model, ContactModel) and not physical:
+        if "ydot" not in {*over, *values}:
+            args.fix = [*args.fix, assignment("ydot=-1")]  # the map's own default, to be reported
         return outcome_map(model, over, values, work=ns.Work())
     for text in _USUAL:
         name, typed = assignment(text)
-        if name not in over:
-            values.setdefault(name, in_si(name, typed, args.units))
+        if name not in {*over, *values}:
+            values[name] = in_si(name, typed, args.units)
+            args.fix = [*args.fix, (name, typed)]
     require_scale(args, chosen)
     options: dict[str, Any] = {} if isinstance(model, BounceLaw) else dict(work=ns.Work())
     return landing_map(model, over, values, chosen.ball, scaling=chosen.scaling, **options)

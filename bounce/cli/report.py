@@ -17,7 +17,7 @@ from ..units import Landing
 from .values import SYSTEMS, Quantity, Span, factor
 
 #: What argparse keeps that is no input of the computation.
-_NO_INPUTS = ("run", "json", "command", "output")
+_NO_INPUTS = ("run", "json", "command", "output", "usual_turf")
 
 
 #: What the names of a report measure.
@@ -82,6 +82,8 @@ def in_words(state: Landing, units: Units) -> str:
 def opening(args: argparse.Namespace) -> dict[str, Any]:
     """Return what every JSON report begins with: version, command, and every input with its unit."""
     given = {name: value for name, value in vars(args).items() if name not in _NO_INPUTS}
+    if given.get("turf") is None and given.get("model") is None and "turf" in given:
+        given["turf"] = args.usual_turf
     system = given.get("units", "golf")
     inputs = {name: _plain(value, system) for name, value in given.items()}
     return dict(version=ns.__version__, command=args.command, inputs=inputs)

@@ -204,10 +204,15 @@ def _field(figure: Figure, ax: Axes, outcomes: OutcomeMap, quantity: str) -> Non
     values = np.where(outcomes.lift_offs.complete, values, np.nan)
     options: dict[str, Any] = dict(cmap="viridis")
     label = "angle above +x at lift-off (rad)"
+    if quantity == "lift_off_angle" and _golf(outcomes):
+        values, label = np.degrees(values), "angle above +x at lift-off (deg)"
     if quantity in ("slip", "omega"):
         bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
         options = dict(cmap="PuOr_r", vmin=-bound, vmax=bound)
-        label = "slip at lift-off $H_F$" if quantity == "slip" else r"spin at lift-off $\Omega_F$"
+        spin = (
+            r"spin at lift-off $R\,\omega_F$" if _golf(outcomes) else r"spin at lift-off $\Omega_F$"
+        )
+        label = "slip at lift-off $H_F$" if quantity == "slip" else spin
         label += " (m/s)" if _golf(outcomes) else ""
     elif quantity == "spin_reversal":
         options, label = dict(cmap="cividis", vmin=0, vmax=1), "spin reverses"
@@ -218,17 +223,30 @@ def _field(figure: Figure, ax: Axes, outcomes: OutcomeMap, quantity: str) -> Non
 
 
 def _contour(ax: Axes, outcomes: OutcomeMap) -> None:
-    """The border between forward and reverse slip, from the map's last phases."""
-    last = [{"+": 1.0, "-": -1.0}.get(name[-1], 0.0) for name in outcomes.regions]
-    sign = np.array([*last, np.nan])[outcomes.code]
-    if np.any(sign < 0) and np.any(sign > 0):
-        ax.contour(*_axes(outcomes), sign, levels=[0.0], colors="black", linewidths=1.6)
+    """Where the slip at lift-off changes its sign; what rolls at lift-off has none."""
+    slip = np.where(outcomes.lift_offs.complete, outcomes.slip, np.nan)
+    rolls = np.array([*(name.endswith("R") for name in outcomes.regions), False])[outcomes.code]
+    size = np.abs(np.nan_to_num(slip)).max()
+    slip = np.where(rolls | (np.abs(slip) < 1e-12 * size), 0.0, slip)
+    if np.any(slip < 0) and np.any(slip > 0):
+        lines = ax.contour(*_axes(outcomes), slip, levels=[0.0], colors="black", linewidths=1.6)
+        lines.set(path_effects=style.halo(3.0))
+        _key(ax, {"slip at lift-off $H_F=0$": lines.legend_elements()[0][0]})
+
+
+def _key(ax: Axes, lines: dict[str, Any]) -> None:
+    """Say what lines are, in an artist of its own: the axes' legend may hold the narrow regions."""
+    from matplotlib.legend import Legend
+
+    key = Legend(
+        ax, list(lines.values()), list(lines), loc="lower right", fontsize=8,
+        frameon=True, framealpha=0.95,
+    )  # fmt: skip
+    ax.add_artist(key)
 
 
 def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> None:
     """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``."""
-    from matplotlib.legend import Legend
-
     order = [("xdot", "omega").index(name) for name in names]
     styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
     lines: dict[str, Any] = {}
@@ -241,21 +259,17 @@ def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> None:
         for sign in (1, -1) if curve.mirrored else (1,):
             point = sign * curve.junction[order]
             ax.plot(*point, "o", color="white", markeredgecolor="black", markersize=6, zorder=8)
-    # An artist of its own: the axes' legend may hold the narrow regions.
-    ax.add_artist(
-        Legend(
-            ax, list(lines.values()), list(lines), loc="lower right", fontsize=8, framealpha=0.95
-        )
-    )
+    _key(ax, lines)
 
 
 def _title(outcomes: OutcomeMap) -> str:
-    values = {**outcomes.model.values, **outcomes.fixed}
+    options = {n: v for n, v in outcomes.model.options().items() if isinstance(v, float)}
+    values = {**outcomes.model.values, **options, **outcomes.fixed}
     unchanged = dict(x=0.0, y=0.0, G=0.0, slope=0.0, inertia=0.4)
     shown = {n: v for n, v in values.items() if n not in outcomes.names and unchanged.get(n) != v}
     parts = []
     for name, value in shown.items():
-        _, unit, size = _GOLF.get(name, ("", "", 1.0))
+        _, unit, size = _GOLF.get("angle" if name == "tilt" else name, ("", "", 1.0))
         parts.append(f"{name} = {value / size:g} {unit}".rstrip())
     return f"{type(outcomes.model).__name__}: " + ", ".join(parts)
 

@@ -79,5 +79,8 @@ def proven_map(
             for name, share in found.area.items()
             if share > 0
         ]
-        ax.legend(handles=handles, loc="upper left", fontsize=8, title="proven", title_fontsize=8)
+        ax.legend(  # beside the map, not on its pieces
+            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
+            frameon=False, fontsize=8, title="proven, share", title_fontsize=8,
+        )  # fmt: skip
     return figure

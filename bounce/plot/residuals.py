@@ -35,7 +35,7 @@ def residuals(found: FitResult) -> Figure:
     >>> data = dict(xdot=u, ydot=-u, omega=0 * u, lift_off_ydot=0.5 * u + [0.01, 0, -0.01, 0, 0])
     >>> found = bounce.golf.fit(law, data, parameters=["restitution"], starts=0)
     >>> bounce.plot.residuals(found).axes[0].get_title()
-    'rms 0.00629'
+    'rms (dashed) 0.00629'
     """
     require(found, FitResult, "found", "bounce.golf.fit returns one.")
     names = list(found.residuals)
@@ -54,5 +54,5 @@ def residuals(found: FitResult) -> Figure:
             ax.set_xlabel(f"measured {label}{unit}", fontsize=9)
             if ax is axes[0]:
                 ax.set_ylabel(f"predicted less measured{unit}", fontsize=9)
-            ax.set_title(f"rms {rms:.3g}{' m/s' if found.measurements.si else ''}")
+            ax.set_title(f"rms (dashed) {rms:.3g}{' m/s' if found.measurements.si else ''}")
     return figure

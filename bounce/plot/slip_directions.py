@@ -172,3 +172,8 @@ def _wheel(ax: Axes) -> None:
         [0.0, math.pi / 2, math.pi, 3 * math.pi / 2], labels=["forward", "right", "reverse", "left"]
     )
     ring.tick_params(pad=0, labelsize=8)
+    # Beside the ring: the sides of a polar axis have their labels on it without a distance.
+    for label, side in zip(
+        ring.get_xticklabels(), ("center", "left", "center", "right"), strict=True
+    ):
+        label.set_horizontalalignment(side)

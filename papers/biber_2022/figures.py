@@ -31,6 +31,11 @@ def visible_invisible() -> Figure:
     return ns.plot.two_fold_3d(((1, 1), (0.0, 0.5)))
 
 
+_SPACE = (
+    " Grey lines: the orbits above the surface, projected on it. Dots: where an orbit that crossed comes "
+    "to slide."
+)
+
 PICTURES: tuple[Picture, ...] = (
     Picture(
         "setting_notation",
@@ -51,7 +56,8 @@ PICTURES: tuple[Picture, ...] = (
         "Simulated, not measured: the measurements are not public. Slip at lift-off against slip at "
         "touch-down, for 256 landings spread evenly over the ranges of table ics. Circles: the "
         "paper's linear compliant model (d1 = .1, eta = .5, G = 0, with the r and mu that the "
-        "companion experiments fitted). Crosses: the rigid law with the same r and mu. Of the two "
+        "companion experiments fitted). Crosses: the rigid law with the same r and mu; ticks: where it "
+        "rolls at lift-off. Of the two "
         "classes that the paper describes, small negative slip appears in the compliant model on "
         "both surfaces, and never in the rigid law. Large positive slip appears in the rigid law "
         "on both, for few landings (at up to 1061/s on astroturf and 1767/s on turf). In the "
@@ -75,7 +81,9 @@ PICTURES: tuple[Picture, ...] = (
     Picture(
         "filippov_convexity",
         "filippov_convexity",
-        "F_s is the point of the line between the tips of F_1 and F_2 that lies in the surface.",
+        "F_s is the point of the line between the tips of F_1 and F_2 that lies in the surface. Drawn for "
+        "attracting sliding: each field points at the surface, so F_1, which holds above it, points "
+        "down, behind it.",
         figures_schematic.filippov_convexity,
     ),
     Picture(
@@ -111,19 +119,20 @@ PICTURES: tuple[Picture, ...] = (
         "two_fold_a",
         "2-fold (a)",
         "The ball's visible two-fold with the lift-off surface. Thick: the only rolling orbit that "
-        "reaches s. Orange: H > 0; blue, dashed: H < 0; black: rolling.",
+        "reaches s. Orange: H > 0; blue, dashed: H < 0; black: rolling. Diamonds: lift-off, where every "
+        "orbit but that one ends. Pale: behind or below a surface.",
         figures_space.two_fold_visible,
     ),
     Picture(
         "two_fold_b",
         "2-fold (b)",
-        "An invisible two-fold, nu = (-.5, -.5).",
+        "An invisible two-fold, nu = (-.5, -.5), which the library calls II-F." + _SPACE,
         invisible,
     ),
     Picture(
         "two_fold_c",
         "2-fold (c)",
-        "A visible-invisible two-fold, nu = (0, .5).",
+        "A visible-invisible two-fold, nu = (0, .5), which the library calls mix-0." + _SPACE,
         visible_invisible,
     ),
     Picture(

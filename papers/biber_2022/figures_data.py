@@ -70,7 +70,7 @@ def trajectories() -> Figure:
         roll = np.array([(0.0, -0.67), (0.0, r)])
         axes.plot(*roll.T, color=look.BLACK, linewidth=2.4, zorder=3)
         look.arrowhead(axes, roll, 0.62, look.BLACK, mutation_scale=15, zorder=8)
-        axes.text(0.07, 0.3, "roll", va="center", path_effects=look.halo(), zorder=6)
+        axes.text(0.07, -0.12, "roll", va="center", path_effects=look.halo(), zorder=6)
         axes.axhline(0, color="0.5", linewidth=0.8, zorder=0)
         axes.axvline(0, color="0.5", linewidth=0.8, zorder=0)
         axes.set(
@@ -197,7 +197,12 @@ def _scatter(axes: Axes, surface: str) -> None:
     h0, compliant, rigid = predictions(surface)
     axes.axhline(0, color="0.6", linewidth=0.8, zorder=0)
     axes.axvline(0, color="0.6", linewidth=0.8, zorder=0)
-    axes.plot(h0, rigid, "x", color=look.BLUE, markersize=5, label="rigid bounce")
+    slips = rigid != 0
+    for chosen, mark, words in (
+        (slips, "x", "rigid bounce, slips to lift-off"),
+        (~slips, "|", "rigid bounce, rolls at lift-off"),
+    ):
+        axes.plot(h0[chosen], rigid[chosen], mark, color=look.BLUE, markersize=5, label=words)
     axes.plot(
         h0,
         compliant,
@@ -207,7 +212,7 @@ def _scatter(axes: Axes, surface: str) -> None:
         markerfacecolor="none",
         label="compliant in both directions",
     )
-    axes.set_title(_NAMES[surface])
+    axes.set_title(f"{_NAMES[surface]}, simulated")
     axes.set_xlabel(r"slip at touch-down $H_0$ (1/s)")
     axes.spines[["top", "right"]].set_visible(False)
 
@@ -220,5 +225,5 @@ def tangential_velocity() -> Figure:
         for axes, surface in zip(panels, FITS, strict=True):
             _scatter(axes, surface)
         panels[0].set_ylabel(r"slip at lift-off $H_F$ (1/s)")
-        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=2)
+        figure.legend(*panels[0].get_legend_handles_labels(), loc="outside lower center", ncols=3)
     return figure

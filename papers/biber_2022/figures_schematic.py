@@ -181,12 +181,12 @@ def filippov_convexity() -> Figure:
         axes.text(*(put(-0.55, -0.75, 0)), r"$H(p)=0$", va="bottom")
         tips = [put(*v) for v in (first, second, slide)]
         styles = (
-            (look.ABOVE, "$F_1$", "-", (0.08, -0.06)),
-            (look.BELOW, "$F_2$", "-", (0.08, 0.04)),
-            (look.BLACK, "$F_s$", "-", (0.1, -0.1)),
+            (look.ABOVE, "$F_1$", 0.5, (0.08, -0.06)),  # below the surface, which hides it
+            (look.BELOW, "$F_2$", 4, (0.08, 0.04)),
+            (look.BLACK, "$F_s$", 4, (0.1, -0.1)),
         )
-        for tip, (color, name, style, offset) in zip(tips, styles, strict=True):
-            look.arrow(axes, put(*start), tip, color, linewidth=2.2, linestyle=style, zorder=4)
+        for tip, (color, name, order, offset) in zip(tips, styles, strict=True):
+            look.arrow(axes, put(*start), tip, color, linewidth=2.2, zorder=order)
             axes.text(
                 *(tip + offset),
                 name,
@@ -197,7 +197,8 @@ def filippov_convexity() -> Figure:
                 path_effects=look.halo(),
                 zorder=6,
             )
-        axes.plot(*np.array(tips[:2]).T, color="0.25", linestyle=look.DASHED, zorder=3)
+        for ends, order in (((tips[0], tips[2]), 0.5), ((tips[2], tips[1]), 3)):
+            axes.plot(*np.array(ends).T, color="0.25", linestyle=look.DASHED, zorder=order)
         axes.plot(*put(*start), "o", color="black", zorder=6)
         axes.text(-0.08, 0.1, "$p$", ha="right")
         axes.text(-1.3, 1.5, "$H>0$", color=look.ABOVE)

@@ -146,16 +146,37 @@ class Scene:
             z = run(np.linspace(segment.t_start, segment.t_end, 80))
             long = segment.t_end - segment.t_start > 0.25
             self.curve(z, color, order, style, width, at=(0.55,) if long else ())
-        order = ABOVE + 1 if run.x[-1, 0] >= 0 else FRONT_BELOW + 0.5
+        self.lift_off(run.x[-1])
+        return run
+
+    def lift_off(self, z: Array) -> None:
+        """Mark the end of an orbit."""
+        order = ABOVE + 1 if z[0] >= 0 else FRONT_BELOW + 0.5
         self.axes.plot(
-            *project(run.x[-1]),
+            *project(z),
             "D",
             color="white",
             markeredgecolor="black",
             markersize=6,
             zorder=order,
+            gid="lift-off",
         )
-        return run
+
+    def grazing(self, side: str, centre: float) -> None:
+        """Draw the orbit that touches a visible fold at ``centre``, to lift-off."""
+        flow = fold_of("linear")
+        n1, n2 = flow.nu
+        if side == "+":
+            end = flow.phi * centre / (1 / flow.phi - flow.phi * n1)  # where the load is zero
+            t = np.linspace(-0.45, end, 60)
+            z = np.column_stack([t**2 / 2, -t, centre + n1 * t])
+            self.curve(z, look.ABOVE, ABOVE, width=1.6, at=(0.25, 0.75))
+        else:
+            end = centre / flow.phi / (flow.phi - n2 / flow.phi)
+            t = np.linspace(-0.45, end, 60)
+            z = np.column_stack([-(t**2) / 2, centre + n2 * t, -t])
+            self.curve(z, look.BELOW, FRONT_BELOW, look.DASHED, 1.6, at=(0.25, 0.75))
+        self.lift_off(z[-1])
 
 
 def geometries() -> Figure:
@@ -210,21 +231,20 @@ def _ball_labels(axes: Axes, scene: Scene) -> None:
         color=look.BELOW,
     )
     scene.text(
-        [-0.05, -0.16, 1.06 * a],
+        [-0.11, -0.16, 1.06 * a],
         "$F_1\\cdot\\nabla H=0$\n" r"$\alpha=0$",
         ha="left",
         va="top",
         color=look.ABOVE,
     )
     scene.text([0, 0.62 * a, 0.93 * a], r"$H=0$: rolling")
-    axes.text(-1.9, 0.95, "$H>0$: forward slip, $F_1$", color=look.ABOVE)
+    axes.text(0.2, 0.95, "$H>0$: forward slip, $F_1$", color=look.ABOVE)
     axes.text(-1.9, -1.22, "$H<0$: reverse slip, $F_2$", color=look.BELOW)
 
 
 def two_fold_visible() -> Figure:
     """Figure 2-fold (a): the ball's visible two-fold with the lift-off surface."""
     flow = fold_of("linear")
-    (_, _), (n1, n2) = flow.sigma, flow.nu
     with look.settings():
         figure, axes = look.canvas(7.0, 5.3)
         scene = Scene(axes, 1.25)
@@ -238,12 +258,9 @@ def two_fold_visible() -> Figure:
         scene.curve(canard[1:], look.CANARD, BEHIND + 0.6, width=3.0, at=(0.6,))
         for start in ((0, 1.2, 0.55), (0, 1.2, 0.9), (0, 0.55, 1.2), (0, 0.9, 1.2)):
             scene.run(start, width=1.4)
-        t = np.linspace(-0.55, 0.55, 60)
-        for centre in (0.62, 0.95):
-            above = np.column_stack([t**2 / 2, -t, centre + n1 * t])
-            below = np.column_stack([-(t**2) / 2, centre + n2 * t, -t])
-            scene.curve(above, look.ABOVE, ABOVE, width=1.6, at=(0.25, 0.85))
-            scene.curve(below, look.BELOW, FRONT_BELOW, look.DASHED, 1.6, at=(0.25, 0.85))
+        for centre in (0.42, 0.85):
+            scene.grazing("+", centre)
+            scene.grazing("-", centre)
         _axis_of_slip(axes, scene, 0.85)
         _region_labels(scene)
         scene.text([-0.3, -0.92, 0.92], r"lift-off, $\Lambda_N=0$", fontsize=9.5)
@@ -260,5 +277,5 @@ def _region_labels(scene: Scene) -> None:
         [0, 1.05 * a, -0.05], "$z_3=0$\n" r"$\alpha=1$", ha="right", va="top", color=look.BELOW
     )
     scene.text(
-        [0, -0.05, 1.03 * a], "$z_2=0$\n" r"$\alpha=0$", ha="left", va="top", color=look.ABOVE
+        [-0.06, -0.05, 1.03 * a], "$z_2=0$\n" r"$\alpha=0$", ha="left", va="top", color=look.ABOVE
     )

@@ -240,3 +240,15 @@ def test_the_report_opens_with_what_changes_and_shows_evidence_once():
     for e in found:
         assert all(text.count(str(check)) <= 1 for check in e.checks if len(str(check)) > 60)
     assert not [label for label in places.EQUATIONS if f"({label})" in text and "_" in label]
+
+
+def test_orbits_of_the_visible_two_fold_end_where_the_load_is_zero(monkeypatch):
+    from papers.biber_2022.errata_general import fold_of
+    from papers.biber_2022.figures_space import Scene
+
+    flow, ends = fold_of("linear"), []
+    monkeypatch.setattr(Scene, "lift_off", lambda self, z: ends.append(z))
+    next(p for p in figures.PICTURES if p.name == "two_fold_a").draw()
+    assert len(ends) == 8  # four that roll into a fold, two that touch each from its side
+    assert [z[1] / flow.phi + flow.phi * z[2] for z in ends] == pytest.approx([0.0] * 8, abs=1e-9)
+    assert all(np.abs(z[0]) > 1e-3 for z in ends)  # not in the surface

@@ -190,8 +190,8 @@ def _dress(ax: Axes, v: V) -> None:
         ax.plot(x, y, color="black", linewidth=1.6, linestyle=look.DASHED)
     if v[0] * v[1] > 1:
         names = (
-            (look.GREEN, "orbits come out", (-0.52, 0.38)),
-            (look.CANARD, "fall in", (-0.42, 0.8)),
+            (look.GREEN, "come out", (-0.71, 0.13)),
+            (look.CANARD, "fall in", (-0.5, 0.86)),
         )
         for slope, (color, words, place) in zip(ns.two_folds.diabolo_slopes(v), names, strict=True):
             look.write(ax, place, words, color=color, path_effects=look.halo(), rotation=0)
@@ -237,15 +237,19 @@ def eigenvalues() -> Figure:
             values = np.linalg.eigvals(ns.two_folds.return_matrix((-p, -1.0)))
             color = look.BLUE if p < 1 else look.VERMILLION
             left.plot(values.real, values.imag, "o" if p < 1 else "D", color=color, markersize=5)
+            at = complex(values.real.max(), abs(values.imag[0]))
+            away = at / abs(at) if p < 1 else complex(0.5, 0.75)  # outwards from the circle
             left.annotate(
                 f"{p:g}",
-                (values.real.max(), abs(values.imag[0])),
-                xytext=(5, 5),
+                (at.real, at.imag),
+                xytext=(11 * away.real, 10 * away.imag),
                 fontsize=8,
                 textcoords="offset points",
+                ha="center" if p < 1 else "left",
+                va="center",
             )
         left.set(xlabel="Re", ylabel="Im", title="eigenvalues, labelled by $V^+V^-$")
-        left.set(xlim=(-1.3, 3.0), ylim=(-1.4, 1.4))
+        left.set(xlim=(-1.6, 3.0), ylim=(-1.4, 1.4))
         left.set_aspect("equal")
         p = np.linspace(0, 2.5, 501)
         root = np.sqrt((p - 1).astype(complex))
@@ -289,8 +293,9 @@ PICTURES: tuple[Picture, ...] = (
         "regions",
         "regions of attraction",
         "How many flights an orbit makes that starts on the surface, by simulation. Before the "
-        "bifurcation everything comes to slide; after it only what starts inside the diabolo "
-        "(violet line), and all of that reaches the singularity.",
+        "bifurcation everything comes to slide; after it only what starts inside the surface on "
+        "which orbits fall in (violet lines), and all of that reaches the singularity. Green: the "
+        "surface on which they come out of it.",
         regions,
     ),
     Picture(
@@ -302,7 +307,8 @@ PICTURES: tuple[Picture, ...] = (
     Picture(
         "eigenvalues",
         "return map",
-        "Eigenvalues of the return map move round the unit circle and meet at 1 as V+ V- reaches 1.",
+        "Eigenvalues of the return map move round the unit circle and meet at 1 as V+ V- reaches 1. Of "
+        "each pair one is labelled; the other is its conjugate, or on the right of 1 its inverse.",
         eigenvalues,
     ),
 )

@@ -38,17 +38,21 @@ _STAR: dict[str, Any] = {
 Box = tuple[float, float, float, float]
 
 
-def _legend() -> list[Line2D]:
-    return [
+def _legend(*missing: str) -> list[Line2D]:
+    """What lines are, without those that a picture does not have."""
+    lines = [
         look.line(look.BLACK, "sliding", 3.4),
         look.line(look.GREY, "crossing", 1.2),
         look.line(look.GREEN, "orbit through a visible fold", 1.6),
         look.line(look.CANARD, "separatrix", 1.8),
     ]
+    return [line for line in lines if line.get_label() not in missing]
 
 
-def _around(levels: tuple[float, float, float], boxes: Callable[[float], Box], x1: float) -> Figure:
-    """Portraits before, at and after a bifurcation, which happens at x1."""
+def _around(
+    levels: tuple[float, float, float], boxes: Callable[[float], Box], x1: float, *missing: str
+) -> Figure:
+    """Portraits before, at and after a bifurcation, which happens at x1; without the missing lines."""
     with look.settings():
         figure = look.new_figure(7.0, 6.2)
         *axes, key = figure.subplots(2, 2).ravel()
@@ -67,7 +71,7 @@ def _around(levels: tuple[float, float, float], boxes: Callable[[float], Box], x
         axes[1].plot(x1, levels[1], "*", **_STAR, zorder=9)
         star = Line2D([], [], ls="none", marker="*", **_STAR, label="the bifurcation")
         key.set_axis_off()
-        key.legend(handles=[*_legend(), star], loc="center")
+        key.legend(handles=[*_legend(*missing), star], loc="center")
     return figure
 
 
@@ -80,7 +84,12 @@ def focus() -> Figure:
 def node() -> Figure:
     """Around the boundary node."""
     levels = (BOUNDARY_NODE - 0.02, BOUNDARY_NODE, BOUNDARY_NODE + 0.02)
-    return _around(levels, lambda alpha: (0.55, 0.85, alpha - 0.06, alpha + 0.06), HARVESTED_FOLD)
+    return _around(
+        levels,
+        lambda alpha: (0.55, 0.85, alpha - 0.06, alpha + 0.06),
+        HARVESTED_FOLD,
+        "separatrix",
+    )
 
 
 def saddle_node() -> Figure:
@@ -90,6 +99,8 @@ def saddle_node() -> Figure:
         levels,
         lambda alpha: (0.15, 0.55, alpha - 0.15, alpha + 0.15),
         pseudo_equilibria(SADDLE_NODE - 1e-15)[0],
+        "crossing",
+        "orbit through a visible fold",
     )
 
 

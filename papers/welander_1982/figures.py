@@ -137,10 +137,10 @@ def diagram() -> Figure:
 def _names(ax: Axes, levels: Array, warmest: Array) -> None:
     """Name the curves of the diagram beside them."""
     labels = look.Labels(ax)
-    for low, high, color, name in (
-        (MIXED[0], MERGING, look.BLACK, "pseudo-saddle"),
-        (MERGING, FOLD_FOLD[0], look.ORANGE, "unstable pseudo-node"),
-        (FOLD_FOLD[0], RESTING[0], look.BLACK, "stable pseudo-node"),
+    for low, high, color, name in (  # names of the unstable ones left of the cycle
+        (0.9 * MIXED[0] + 0.1 * MERGING, 0.5 * (MIXED[0] + MERGING), look.BLACK, "pseudo-\nsaddle"),
+        (MERGING + 0.05, MERGING + 0.2, look.REPELLING, "unstable\npseudo-\nnode"),
+        (FOLD_FOLD[0] + 0.05, RESTING[0], look.BLACK, "stable pseudo-node"),
     ):
         branch = np.linspace(low, high, 30)
         labels.name(name, np.column_stack([threshold_of(branch), branch]), color)

@@ -87,6 +87,9 @@ def test_inputs_are_echoed(command, tmp_path):
     speed = report["inputs"]["over"][0]
     assert speed == dict(name="speed", low=40.0, high=70.0, points=4, unit="mph")
     assert report["version"] and report["command"] == "map"
+    assert report["inputs"]["fix"] == [{"spin": dict(value=2500.0, unit="rpm")}]  # by default
+    contact = json.loads(command("map", *KV, "--json", "--output", tmp_path / "m.npz")[1])
+    assert contact["inputs"]["fix"] == [{"ydot": -1.0}] and "usual_turf" not in contact["inputs"]
 
 
 @pytest.mark.parametrize("turf", [*bounce.laws.TURFS, None])

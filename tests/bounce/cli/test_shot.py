@@ -31,6 +31,16 @@ def test_shot_is_play(command):
     assert command(*SHOT)[1].startswith("lift-off  10.71 m/s, 37.3 deg")
 
 
+def test_the_turf_that_was_not_typed_is_an_input_too(command):
+    shot = json.loads(command(*SHOT, "--json")[1])
+    assert shot["inputs"]["turf"] == "natural"
+    assert json.loads(command(*SHOT, "--turf", "penner", "--json")[1])["inputs"]["turf"] == "penner"
+    contact = json.loads(command(*SHOT, *KV, "--stiffness", "2e4", "--first-only", "--json")[1])
+    assert contact["inputs"]["turf"] is None and contact["inputs"]["model"] == "KelvinVoigt"
+    flight = "flight --speed 20 --angle 45 --spin 0 --json".split()
+    assert json.loads(command(*flight)[1])["inputs"]["turf"] is None  # it has no ground
+
+
 def test_units_are_two_views_of_one_shot(command):
     golf = json.loads(command(*SHOT, "--json")[1])
     argv = ["shot", "--speed", 28.5, "--angle", np.radians(37.3), "--spin", 2094 * np.pi / 30]

@@ -3,7 +3,9 @@
 import matplotlib.colors
 import numpy as np
 import pytest
+from matplotlib.contour import ContourSet
 from matplotlib.text import Text
+from scipy.interpolate import RegularGridInterpolator
 
 import bounce
 import nonsmooth as ns
@@ -33,6 +35,41 @@ def test_narrow_regions_are_in_the_legend_or_beside_their_names():
     assert legend is not None
     names = {t.get_text() for t in axes.findobj(Text)}
     assert set(m.regions) <= names and len(legend.get_texts()) <= 6
+
+
+def golf_map(law):
+    """A map of a law over landings as golfers read them."""
+    over = dict(angle=np.radians(np.linspace(5, 75, 40)), spin=np.linspace(-1000, 1000, 50))
+    with pytest.warns(bounce.golf.ExtrapolationWarning):
+        return bounce.golf.landing_map(bounce.laws.TURFS[law].law, over, dict(speed=28.0))
+
+
+@pytest.mark.parametrize("law", ["kelvin-voigt", "natural"])
+def test_the_line_is_where_the_slip_at_lift_off_is_zero_and_says_so(outcomes, law):
+    m = outcomes if law == "kelvin-voigt" else golf_map(law)
+    axes = bounce.plot.outcome_map(m, "slip").axes[0]
+    (lines,) = [one for one in axes.collections if isinstance(one, ContourSet)]
+    units = (1, 1) if m is outcomes else (np.pi / 180, np.pi / 30)
+    points = np.vstack([path.vertices for path in lines.get_paths()]) * units
+    slip = RegularGridInterpolator(m.axes[::-1], m.slip)
+    assert len(points) >= 3
+    assert np.abs(slip(points[:, ::-1])).max() < 1e-9 * np.abs(m.slip).max()
+    assert "slip at lift-off $H_F=0$" in {text.get_text() for text in axes.findobj(Text)}
+
+
+def test_no_line_where_no_bounce_leaves_in_reverse_slip():
+    axes = bounce.plot.outcome_map(golf_map("natural-rigid")).axes[0]
+    assert not [one for one in axes.collections if isinstance(one, ContourSet)]
+
+
+def test_maps_of_golfers_are_in_degrees_and_say_all_of_the_law():
+    m = golf_map("natural")
+    figure = bounce.plot.outcome_map(m, "lift_off_angle")
+    assert figure.axes[1].get_ylabel() == "angle above +x at lift-off (deg)"
+    shown = figure.axes[0].collections[0].get_array()
+    np.testing.assert_allclose(np.reshape(shown, m.slip.shape), np.degrees(m.lift_off_angle))
+    title = figure.axes[0].get_title(loc="left")
+    assert "mu = 0.998, restitution = 0.147, tilt = 18.4 deg, speed = 28 m/s" in title
 
 
 @pytest.mark.parametrize("quantity", ["slip", "spin_reversal", "lift_off_angle"])

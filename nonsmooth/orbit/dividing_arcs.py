@@ -112,8 +112,9 @@ class DividingArc:
         States there: points of the two-fold set, or where the surface is touched.
     begin, end : str
         Why the arc begins and ends where it does: ``"junction"`` with an arc of the other kind,
-        ``"bound"`` of the box, ``"closed"``, ``"interrupted"``, or what ceases to hold. ``begin`` is
-        empty where the curve was begun.
+        ``"bound"`` of the box, ``"closed"``, ``"interrupted"``, ``"lost"`` where no orbit of the
+        itinerary is found beyond (starts cross the surface there, say, and another arc follows), or
+        what ceases to hold. ``begin`` is empty where the curve was begun.
     starts : ndarray (k, n)
         The states of ``points``, where they are asked for.
     """

@@ -308,3 +308,28 @@ def test_what_cannot_be_cut_is_refused():
     )
     with pytest.raises(ns.DegenerateError, match="one canard"):
         ns.manifold(teixeira, ns.find_two_fold(teixeira, near=[0.0, 0.1, -0.1]), **good)
+
+
+@pytest.mark.slow
+def test_a_curve_goes_on_where_starts_change_sides():
+    """On either side of it orbits leave the two-fold to different sides, also where it meets the surface."""
+    system, fold = plain()
+    start = lambda a, b: [a, b, 0.6 - 0.3 * b]
+    box = [(-0.8, 0.83), (-2.1, 1.07)]
+    found = ns.manifold(system, fold, starts=start, box=box, duration=6.0, spacing=0.4)
+    (curve,) = found.curves
+    assert sorted(arc.itinerary for arc in curve) == ["+ s", "-", "- s"]
+    # - touches the surface at a time t with z - t = 0 and x + z t - t^2/2 = 0: z^2 = -2 x; the junction
+    # also has y + 0.3 t = 0 there
+    b = -0.18 / (1 - 0.09)
+    z = 0.6 - 0.3 * b
+    assert found.junctions == pytest.approx(np.array([[-z * z / 2, b]]), abs=1e-12)
+    for arc in curve:
+        for before, at, after in zip(arc.points, arc.points[1:], arc.points[2:], strict=False):
+            along = (after - before) / np.linalg.norm(after - before)
+            across = 1e-4 * np.array([-along[1], along[0]])
+            ends = {
+                ns.simulate(system, start(*u), 6.0).itinerary[-1]
+                for u in (at + across, at - across)
+            }
+            assert ends == {"+", "-"}

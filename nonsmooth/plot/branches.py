@@ -14,6 +14,7 @@ from ..local import Equilibrium
 from ..model import Array, DefinitionError, OptionError, explain
 from ..orbit import BifurcationCurve, Branch, BranchEvent, Connection, PeriodicOrbit
 from . import style
+from .branch_line import Sample, line_of
 from .labels import Labels
 
 #: Marker and fill of each kind of event; shape tells them apart without colour.
@@ -111,9 +112,10 @@ def branch(
         marks: dict[str, Any] = {}
         labels = list[tuple[str, Any]]()
         for one in several:
-            values = np.array([measure(solution) for solution in one.solutions])
-            for (name, look), part in _parts(one):
-                axes.plot(one.values[part], values[part], zorder=3, gid=name, **look)
+            samples = line_of(one, measure, (axes.bbox.width, axes.bbox.height))
+            points = np.array([[sample.value, sample.height] for sample in samples])
+            for (name, look), part in _parts(samples):
+                axes.plot(*points[part].T, zorder=3, gid=name, **look)
                 looks[name] = style.line(look["color"], name, look["linewidth"], look["linestyle"])
             for event in one.events:
                 shape, fill = MARKERS.get(event.kind, _OTHER)
@@ -202,13 +204,16 @@ def samples(orbit: PeriodicOrbit) -> Array:
     return np.asarray(run(np.linspace(run.t[0], run.t[-1], _SAMPLES)))
 
 
-def _parts(one: Branch) -> Iterator[tuple[tuple[str, dict[str, Any]], slice]]:
-    """Stretches of one look, each with a node of the next so that lines join."""
-    names = [_look(solution)[0] for solution in one.solutions]
+def _parts(samples: list[Sample]) -> Iterator[tuple[tuple[str, dict[str, Any]], slice]]:
+    """Stretches of one look, each up to where the next one begins."""
+    looks = [None if s.solution is None else _look(s.solution) for s in samples]
+    for k in reversed(range(len(looks) - 1)):
+        looks[k] = looks[k] or looks[k + 1]  # an event looks like what comes after it
     first = 0
-    for _, group in groupby(names):
+    for _, group in groupby(look[0] if look else "" for look in looks):
         last = first + len(list(group))
-        yield _look(one.solutions[first]), slice(first, min(last + 1, len(names)))
+        if look := looks[first]:
+            yield look, slice(first, min(last + 1, len(looks)))
         first = last
 
 

@@ -12,6 +12,7 @@ from matplotlib.figure import Figure
 from ..model import DefinitionError, OptionError, explain
 from ..orbit import Branch, PeriodicOrbit
 from . import style
+from .labels import Labels
 from .trajectory import draw_surfaces
 
 _MODES: dict[str, tuple[str, Any, float]] = {
@@ -203,9 +204,12 @@ def multipliers(
         structural = [0.0] * bool(orbits[-1].floquet.zeros)
         structural += [1.0] * (not orbits[-1].system.time_dependent)
         axes.plot(structural, np.zeros(len(structural)), "x", color=style.BLACK, zorder=5)
+        labels = Labels(axes)
+        for value in structural:
+            labels.name("of the flow" if value else "of sliding", (value, 0.0))
         if isinstance(found, Branch):
-            figure.colorbar(drawn, ax=axes, label=found.parameter, shrink=0.8)
+            figure.colorbar(drawn, ax=axes, label=found.parameter)
         axes.set(xlabel="Re μ", ylabel="Im μ", title=title or "")
-        axes.set_aspect("equal")
+        axes.set_aspect("equal", adjustable="datalim")
         axes.margins(0.08)
     return figure

@@ -38,7 +38,8 @@ def test_every_solution_is_on_a_line_and_every_event_on_a_marker(takens):
     lines = [line for line in ax.lines if not str(line.get_gid()).startswith("event")]
     drawn = {(float(u), float(v)) for line in lines for u, v in zip(*line.get_data(), strict=True)}
     wanted = {(v, s.point[0]) for v, s in zip(takens.values, takens.solutions, strict=True)}
-    assert drawn == wanted
+    assert wanted < drawn
+    assert_allclose([u - v + v**2 for u, v in drawn], 0.0, atol=1e-9)  # nothing between is made up
     for event in takens.events:
         (mark,) = [line for line in ax.lines if line.get_gid() == f"event {event.kind}"]
         assert_allclose([d[0] for d in mark.get_data()], [event.parameter, event.solution.point[0]])
@@ -49,6 +50,31 @@ def test_stable_and_unstable_solutions_differ_without_colour(takens):
     styles = {line.get_gid(): line.get_linestyle() for line in ax.lines}
     assert styles["stable equilibrium of +"] == "-"
     assert styles["unstable equilibrium of +"] == "--"
+
+
+def test_a_line_changes_its_look_at_the_event_and_not_at_the_node_after_it(takens):
+    ax = ns.plot.branch(takens).axes[0]
+    lines = [line for line in ax.lines if not str(line.get_gid()).startswith("event")]
+    ends = {float(v) for line in lines for v in line.get_xdata()[[0, -1]]}
+    assert {event.kind for event in takens.events} == {"fold", "Hopf"}
+    assert {float(event.parameter) for event in takens.events} <= ends
+
+
+def test_a_line_has_no_corners_where_the_branch_is_smooth():
+    system = ns.FilippovSystem(
+        [x, y], surface=y, above=[a - x**2, 1 - y], below=[1, 1], parameters={a: 0.5}
+    )
+    fold = ns.continue_equilibrium(system, [0.7, 1.0], "a", bounds=(-1, 1))
+    ax = ns.plot.branch(fold).axes[0]
+    for line in ax.lines:
+        if str(line.get_gid()).startswith("event"):
+            continue
+        points = np.column_stack(line.get_data())
+        assert_allclose(points[:, 0], points[:, 1] ** 2, atol=1e-9)
+        steps = np.diff(points / np.ptp(fold.values), axis=0)
+        steps = steps[np.linalg.norm(steps, axis=1) > 0.008]
+        turn = np.abs(np.diff(np.unwrap(np.arctan2(*steps.T[::-1]))))
+        assert np.degrees(turn.max()) < 8.0
 
 
 def test_orbits_are_drawn_by_their_largest_state_or_as_one_asks(relay):
@@ -136,3 +162,16 @@ def test_multipliers_are_where_they_are_and_along_a_branch_coloured(relay):
 def test_bad_input(takens, call, error, words):
     with pytest.raises(error, match=words):
         call(takens)
+
+
+def test_structural_multipliers_are_named():
+    block = ns.FilippovSystem(
+        [x, y],
+        surface=y - 0.5,
+        above=[y, -x - 1 + 0.2 * (y - 0.5)],
+        below=[y, -x + 1 + 0.2 * (y - 0.5)],
+    )
+    orbit = ns.periodic_orbit(block, ns.simulate(block, [0.3, 0.4], 30))
+    ax = ns.plot.multipliers(orbit).axes[0]
+    names = [text.get_text() for part in ax.artists for text in part.get_children()]
+    assert sorted(names) == ["of sliding", "of the flow"]

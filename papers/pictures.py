@@ -75,7 +75,7 @@ def faults(figure: Figure) -> list[str]:
         entries = [text.get_text() for text in legend.get_texts()]
         if len(entries) > LISTED:
             found.append(f"a legend has {len(entries)} entries: label the things themselves.")
-    found += _overlaps(figure)
+    found += _overlaps(figure) + _across_frames(figure)
     paper = figure.bbox.padded(1.0)  # pixel
     for text in _texts(figure):
         if text.get_fontsize() < SMALLEST - 0.01:
@@ -99,6 +99,23 @@ def _overlaps(figure: Figure) -> list[str]:
         for other, b in shapes[k + 1 :]
         if a.get_extents().overlaps(b.get_extents()) and a.intersects_path(b, filled=True)
     ]
+
+
+def _across_frames(figure: Figure) -> list[str]:
+    """Texts in axes that begin inside of the frame and end outside."""
+    found = list[str]()
+    for axes in figure.axes:
+        if not (axes.get_visible() and axes.axison):
+            continue
+        within = [child for part in axes.artists for child in part.get_children()]
+        for text in [*axes.texts, *(t for t in within if isinstance(t, Text))]:
+            if isinstance(text, Text3D) or not (text.get_visible() and text.get_text().strip()):
+                continue
+            box = text.get_window_extent().padded(-2.0)
+            inside = axes.bbox.contains(*box.p0) and axes.bbox.contains(*box.p1)
+            if axes.bbox.overlaps(box) and not inside:
+                found.append(f"{text.get_text()!r} is across the frame.")
+    return found
 
 
 def _shape(text: Text) -> MplPath:

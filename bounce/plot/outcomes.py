@@ -72,6 +72,7 @@ _LABELS = {
 #: How many regions without room for their name are listed, the largest first; a few more have it beside
 #: them, but not where there are dozens.
 _LISTED, _BESIDE = 5, 8
+_POINTS = 9.0  # of the names of regions
 _QUANTITIES = ("itinerary", "slip", "omega", "spin_reversal", "lift_off_angle")
 
 
@@ -184,16 +185,21 @@ def _named(
     ax: Axes, outcomes: OutcomeMap, inside: NDArray[np.bool_], name: str, colour: str
 ) -> bool:
     """Write a region's name where it is widest, if there is room for it."""
-    from scipy.ndimage import distance_transform_edt
+    from scipy.ndimage import distance_transform_edt, minimum_filter
 
     room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
+    letters = np.array([1.3, 0.72 * len(name)]) * _POINTS  # height and width of the name
+    frame = np.array([ax.bbox.height, ax.bbox.width]) * 72 / ax.figure.dpi
+    cells = np.ceil(letters / frame * inside.shape).astype(int)
+    fits = minimum_filter(inside, size=tuple(cells), mode="constant", cval=0)
+    room = np.where(fits, room, 0.0)
     row, column = np.unravel_index(int(np.argmax(room)), room.shape)
-    if room.max() < max(0.03, 0.006 * len(name)) * min(inside.shape):
+    if room.max() < 0.03 * min(inside.shape):
         return False
     x, y = _axes(outcomes)
     place = (x[column], y[row])
     text = "white" if _luminance(colour) < 0.2 else "black"
-    style.write(ax, place, name, color=text, zorder=6, fontsize=9, fontweight="bold")
+    style.write(ax, place, name, color=text, zorder=6, fontsize=_POINTS, fontweight="bold")
     return True
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -10,6 +10,7 @@ import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.lines import Line2D
+from matplotlib.patches import FancyArrowPatch
 from matplotlib.text import Text
 from matplotlib.transforms import IdentityTransform
 from numpy.typing import ArrayLike
@@ -26,10 +27,17 @@ _TEXT, _FAR = (
     40.0,
     0.02,
 )  # costs, in shares of a name's area: on other texts; for a point of distance
+_HEAD = 14.0  # points: arrowheads are shorter
+_ASTRAY = 4.0  # the cost of a name that is nowhere where it may be
+_SPOTS = np.array([(a, b) for a in (-1.0, 0.0, 1.0) for b in (-1.0, 1.0)] + [(0.0, 0.0)])
 _DIRECTIONS = np.array(
     [(a, b) for a in (-1.0, 0.0, 1.0) for b in (-1.0, 0.0, 1.0) if (a, b) != (0.0, 0.0)]
     + [(a, b) for a in (-0.5, 0.5) for b in (-1.0, 1.0)]
 )
+
+
+#: Whether points (m, 2), in data coordinates, are where a name may be.
+Keep = Callable[[Array], Any]
 
 
 @dataclass
@@ -38,6 +46,7 @@ class _Name:
     leader: Line2D
     anchors: Array
     inside: bool
+    keep: Keep | None
 
 
 class Labels(Artist):
@@ -76,6 +85,7 @@ class Labels(Artist):
         color: str = style.BLACK,
         *,
         inside: bool = False,
+        keep: Keep | None = None,
         **options: Any,
     ) -> None:
         """Name a thing.
@@ -90,20 +100,23 @@ class Labels(Artist):
             The colour of the thing.
         inside : bool, optional
             Put the name on a point instead, as for a region.
+        keep : callable, optional
+            Of points (m, 2) in data coordinates whether the name may cover them, for example that
+            they are in the region in which the thing is.
         **options
             Of ``matplotlib.text.Text``.
         """
         points = np.atleast_2d(np.asarray(anchors, dtype=float))
         step = max(1, -(-len(points) // _ANCHORS))
         look = {"fontsize": 8.0, "ha": "center", "va": "center", "color": color, "linespacing": 1.0}
-        artist = Text(0, 0, text, path_effects=style.halo(2.5), **{**look, **options})
+        artist = Text(0, 0, text, **{**look, **options})
         leader = Line2D([], [], color=color, linewidth=0.6, path_effects=style.halo(1.6))
         for part in (artist, leader):
             part.axes = self.home
             part.set_figure(self.home.figure)
             part.set_transform(IdentityTransform())
             part.set_in_layout(False)
-        self.names.append(_Name(artist, leader, points[step // 2 :: step], inside))
+        self.names.append(_Name(artist, leader, points[step // 2 :: step], inside, keep))
 
     def get_children(self) -> list[Artist]:
         """The texts."""
@@ -116,8 +129,10 @@ class Labels(Artist):
         self._arrange(renderer)
         for name in self.names:
             name.leader.draw(renderer)
-        for name in self.names:
-            name.text.draw(renderer)
+        for name in self.names:  # a line of text over the halo of the next one, not under it
+            for effects in ([style.halo(2.5)[0]], []):
+                name.text.set_path_effects(effects)
+                name.text.draw(renderer)
         self.stale = False
 
     def _arrange(self, renderer: Any) -> None:
@@ -128,7 +143,7 @@ class Labels(Artist):
         if seen == self.seen:
             return
         self.seen = seen
-        room = _Room(axes, renderer, _CELL * point, set(map(id, self.get_children())))
+        room = _Room(axes, renderer, _CELL * point, self)
         for name in sorted(self.names, key=lambda n: len(n.anchors)):
             name.text.set_position((0.0, 0.0))
             box = name.text.get_window_extent(renderer)
@@ -144,8 +159,12 @@ class Labels(Artist):
             offsets = [_DIRECTIONS * (size / 2 + gap * point) for gap in gaps]
             offset = np.zeros((1, 2)) if name.inside else np.vstack(offsets)
             far = np.repeat(gaps, len(offset) // len(gaps))
-            tried = (anchors[:, None] + offset).reshape(-1, 2)
-            cost = room.cost(tried, size) + _FAR * np.tile(far, len(anchors))
+            wanted = (anchors[:, None] + offset).reshape(-1, 2)
+            tried = room.within(wanted, size)
+            moved = np.linalg.norm(tried - wanted, axis=1) / point
+            cost = room.cost(tried, size) + _FAR * (np.tile(far, len(anchors)) + moved)
+            if name.keep is not None:
+                cost += _ASTRAY * self._astray(tried, size, name.keep)
             k = int(np.argmin(cost))
             name.text.set_position(tuple(tried[k] - middle))
             room.take(tried[k], size)
@@ -158,11 +177,17 @@ class Labels(Artist):
             leads = far[k % len(offset)] > _LEADER
             name.leader.set_data(*(ends.T if leads else ([], [])))
 
+    def _astray(self, middles: Array, size: Array, keep: Keep) -> Array:
+        """How much of rectangles (m, 2) is where a name may not be, of their corners and middles."""
+        spots = middles[:, None] + _SPOTS * size / 2
+        data = self.home.transData.inverted().transform(spots.reshape(-1, 2))
+        return np.mean(~np.asarray(keep(data), dtype=bool).reshape(len(middles), -1), axis=1)
+
 
 class _Room:
     """What is drawn in axes, as numbers on a grid of cells: lines, and texts and marks."""
 
-    def __init__(self, ax: Axes, renderer: Any, cell: float, own: set[int]):
+    def __init__(self, ax: Axes, renderer: Any, cell: float, mine: Labels):
         box = ax.get_window_extent(renderer)
         self.corner, self.cell = np.array([box.x0, box.y0]), cell
         self.size = np.array([box.width, box.height])
@@ -170,11 +195,17 @@ class _Room:
         self.lines, self.texts = np.zeros((nx, ny)), np.zeros((nx, ny))
         for line in ax.lines:
             self._line(line, renderer)
+        for patch in ax.patches:
+            if isinstance(patch, FancyArrowPatch):
+                self._arrow(patch, renderer)
         for text in ax.texts:
-            if text.get_visible() and id(text) not in own:
+            if text.get_visible():
                 frame = text.get_bbox_patch()
                 extent = (frame or text).get_window_extent(renderer)
                 self.take(np.mean(extent.get_points(), axis=0), np.array(extent.size))
+        for other in ax.artists:
+            if isinstance(other, Labels) and other is not mine:
+                self._names(other, renderer)
         legend = ax.get_legend()
         if legend is not None:
             extent = legend.get_window_extent(renderer)
@@ -184,6 +215,12 @@ class _Room:
         """Whether points (m, 2) are in the axes, in pixels."""
         share = (points - self.corner) / self.size
         return np.all((share >= -1e-9) & (share <= 1 + 1e-9), axis=1)
+
+    def within(self, middles: Array, size: Array) -> Array:
+        """Middles (m, 2) of rectangles of a size, moved so that they are in the axes."""
+        low = self.corner + size / 2 + self.cell / 2
+        high = np.maximum(self.corner + self.size - size / 2 - self.cell / 2, low)
+        return np.clip(middles, low, high)
 
     def _line(self, line: Line2D, renderer: Any) -> None:
         if not line.get_visible():
@@ -203,6 +240,23 @@ class _Room:
             side = renderer.points_to_pixels(line.get_markersize() + 2.0)
             for point in points[self.contains(points)]:
                 self.take(point, np.full(2, side))
+
+    def _names(self, other: Labels, renderer: Any) -> None:
+        """Names that were placed before."""
+        for name in other.names:
+            if name.text.get_visible():
+                extent = name.text.get_window_extent(renderer)
+                self.take(np.mean(extent.get_points(), axis=0), np.array(extent.size))
+
+    def _arrow(self, patch: FancyArrowPatch, renderer: Any) -> None:
+        """An arrowhead; long arrows are lines, which have their own."""
+        extent = patch.get_window_extent(renderer)
+        middle = np.mean(extent.get_points(), axis=0)
+        if max(extent.width, extent.height) > renderer.points_to_pixels(_HEAD):
+            return
+        if self.contains(middle[None])[0]:
+            (a, b), (c, d) = (np.array(self._cells(p[None])).T[0] for p in extent.get_points())
+            self.lines[a : c + 1, b : d + 1] = 2.0
 
     def _cells(self, points: Array) -> tuple[Any, Any]:
         at = ((points - self.corner) / self.cell).astype(int)

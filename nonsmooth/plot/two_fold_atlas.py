@@ -14,6 +14,7 @@ from matplotlib.patches import Patch, Polygon
 
 from ..model import Array, OptionError, explain
 from . import style
+from .two_fold_marks import line_names, portrait_of
 from .two_fold_portrait import two_fold
 from .two_fold_space import two_fold_3d
 
@@ -66,8 +67,8 @@ _NAMES = {
     "VI": {
         "mix-0": (1.7, 1.5),
         "mix-S": (-2.1, 2.1),
-        "mix-C": (-2.45, 0.13),
-        "mix-F": (-0.13, 2.6),
+        "mix-C": (-2.47, 0.02),
+        "mix-F": (0.18, 2.72),
     },
 }
 #: Of the maps: nu1 and nu2 from -REACH to REACH.
@@ -132,7 +133,8 @@ def two_fold_atlas(
             row, column = divmod(k, columns)
             flat = parts[0].add_subplot(grid[row, 2 * column])
             space = parts[0].add_subplot(grid[row, 2 * column + 1])
-            two_fold(CASES[name], ax=flat, legend=False, labels=True, orbits=6)
+            two_fold(CASES[name], ax=flat, legend=False, orbits=6)
+            line_names(flat, portrait_of(CASES[name], "two_fold_atlas"), passages=False)
             two_fold_3d(CASES[name], ax=space, legend=False, labels=True, title="")
         parts[0].legend(handles=_legend(), loc="outside upper center", ncols=3 * columns)
         if maps:
@@ -188,12 +190,12 @@ def two_fold_map(
         handles = _boundaries(axes, kind)
         for name, place in places(kind).items():
             box = {
-                "boxstyle": "round,pad=0.15",
+                "boxstyle": "round,pad=0.1",
                 "facecolor": "white",
                 "edgecolor": "none",
                 "alpha": 0.85,
             }
-            style.write(axes, place, name, fontsize=11, bbox=box, zorder=6)
+            style.write(axes, place, name, fontsize=9, bbox=box, zorder=6)
         for x, y in (([-REACH, REACH], [0, 0]), ([0, 0], [-REACH, REACH])):
             axes.plot(x, y, color=style.GREY, linewidth=0.5, zorder=1)
         axes.set(
@@ -218,8 +220,8 @@ def _legend() -> list[Line2D | Patch]:
             facecolor="white", edgecolor="#9A9A9A", hatch="////", label="all $D_a\\to s\\to D_r$"
         ),
         Patch(facecolor="white", edgecolor="#9A9A9A", hatch="...", label="all $D_r\\to s\\to D_a$"),
-        style.line(style.ABOVE, "orbits above, $F_1$", 1.2, "-"),
-        style.line(style.BELOW, "orbits below, $F_2$", 1.2, (0, (3.5, 1.3))),
+        style.line(style.ABOVE, "orbits above; grey: shadow", 1.2, "-"),
+        style.line(style.BELOW, "orbits below", 1.2, (0, (3.5, 1.3))),
     ]
 
 

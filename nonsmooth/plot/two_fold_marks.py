@@ -7,12 +7,14 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from ..local import TwoFold
 from ..local.two_folds import Classification, ReducedFlow, classify_two_fold
 from ..local.two_folds.reduced_flow import Sector, eigenlines
 from ..model import Array, DefinitionError, explain
 from . import style
+from .labels import Labels
 
 #: An eigenvalue that the decision table counts as zero.
 ZERO = 1e-9
@@ -133,3 +135,44 @@ def to_box(angle: float) -> Array:
 
 def number(value: float) -> str:
     return f"{value:.4g}".replace("-", "−")
+
+
+def line_names(ax: Axes, portrait: Portrait, passages: bool = True) -> None:
+    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside them.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+        With the portrait.
+    portrait : Portrait
+    passages : bool, optional
+        Whether to name the two parts of the crossing orbits.
+    """
+    labels, flow, along = Labels(ax), portrait.flow, np.linspace(0.1, 0.98, 23)
+    both = np.concatenate([-along[::-1], along])
+    for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):
+        seen = "visible" if flow.folds[k] == "V" else "invisible"
+        points = np.zeros((len(both), 2))
+        points[:, 1 - k] = both
+        labels.name(f"fold of ${name}$,\n{seen}", points, color)
+    names = {"diabolo 0": "diabolo,\nflights grow", "diabolo 1": "diabolo,\nflights shrink"}
+    names["virtual eigenline"] = "virtual\neigenline"
+    for gid, text in names.items():
+        lines = [line for line in ax.lines if line.get_gid() == gid]
+        if lines:
+            ends = np.vstack([line.get_xydata() for line in lines])
+            points = np.vstack([end * along[:, None] for end in ends if np.any(end)])
+            labels.name(text, points, str(lines[0].get_color()), keep=_crossing)
+    if not passages:
+        return
+    before, after = (
+        [line for line in ax.lines if line.get_gid() == f"crosses {n}"] for n in (0, 1)
+    )
+    for lines, text in ((before, "below"), (after, "above")):  # those of C1
+        middles = [np.mean(np.asarray(line.get_xydata()), axis=0) for line in lines]
+        labels.name(text, middles, str(lines[0].get_color()), keep=_crossing)
+
+
+def _crossing(points: Array) -> Array:
+    """Whether points of the z2-z3 plane are where orbits cross."""
+    return np.asarray(points[:, 0] * points[:, 1] <= 0.0)

@@ -19,11 +19,11 @@ from ..local.two_folds.flights import has_diabolo
 from ..local.two_folds.reduced_flow import Sector, eigenlines, sectors
 from ..model import Array, OptionError
 from . import style
-from .labels import Labels
 from .two_fold_marks import (
     TINTS,
     ZERO,
     Portrait,
+    line_names,
     line_style,
     name_places,
     number,
@@ -51,8 +51,8 @@ def two_fold(
     """Draw the sliding portrait of a two-fold in normal-form coordinates.
 
     The regions are attracting sliding (Da), repelling sliding (Dr) and crossing up (C1) and down
-    (C2). Orbits are exact for the leading order; arrows show the direction of real time. Hatching
-    marks the sliding orbits that connect to the two-fold where whole sectors of them do.
+    (C2). Orbits are exact for the leading order; arrows show the direction of real time. Eigenlines
+    of the sliding field are virtual outside of sliding. Hatching marks the sliding orbits that connect to the two-fold where whole sectors of them do.
 
     Parameters
     ----------
@@ -109,7 +109,7 @@ def two_fold(
         if legend:
             _legend(axes, parts)
         if legend if labels is None else labels:
-            _line_names(axes, portrait)
+            line_names(axes, portrait)
     return figure
 
 
@@ -327,31 +327,6 @@ def _frame(ax: Axes, title: str) -> None:
     ax.set_aspect("equal")
     ax.set_xticks([-1, -0.5, 0, 0.5, 1])
     ax.set_yticks([-1, -0.5, 0, 0.5, 1])
-
-
-def _line_names(ax: Axes, portrait: Portrait) -> None:
-    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside them."""
-    labels, flow, along = Labels(ax), portrait.flow, np.linspace(0.1, 0.98, 23)
-    both = np.concatenate([-along[::-1], along])
-    for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):
-        seen = "visible" if flow.folds[k] == "V" else "invisible"
-        points = np.zeros((len(both), 2))
-        points[:, 1 - k] = both
-        labels.name(f"fold of ${name}$,\n{seen}", points, color)
-    names = {"diabolo 0": "diabolo,\nflights grow", "diabolo 1": "diabolo,\nflights shrink"}
-    names["virtual eigenline"] = "eigenline\noutside sliding"
-    for gid, text in names.items():
-        lines = [line for line in ax.lines if line.get_gid() == gid]
-        if lines:
-            ends = np.vstack([line.get_xydata() for line in lines])
-            points = np.vstack([end * along[:, None] for end in ends if np.any(end)])
-            labels.name(text, points, str(lines[0].get_color()))
-    before, after = (
-        [line for line in ax.lines if line.get_gid() == f"crosses {n}"] for n in (0, 1)
-    )
-    for lines, text in ((before, "below"), (after, "above")):  # those of C1
-        middles = [np.mean(np.asarray(line.get_xydata()), axis=0) for line in lines]
-        labels.name(text, middles, str(lines[0].get_color()))
 
 
 def _legend(ax: Axes, parts: list[Sector]) -> None:

@@ -36,6 +36,7 @@ from .two_fold_marks import (
 )
 
 _HEIGHT = 0.75  # of what is drawn above and below the unit square of the surface
+_SHADOW = "#B5B5B5"  # of orbits above, on the surface
 _REACH = 1.08  # of what is drawn, in z2 and z3
 
 
@@ -235,12 +236,7 @@ class _Scene:
 
     def names(self) -> None:
         """Regions, axes and the two-fold."""
-        box = {
-            "boxstyle": "round,pad=0.15",
-            "facecolor": "white",
-            "edgecolor": "none",
-            "alpha": 0.75,
-        }
+        box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
         for name, (a, b) in name_places(sectors(self.flow)).items():
             style.write(
                 self.ax,
@@ -248,7 +244,7 @@ class _Scene:
                 name,
                 fontsize=12,
                 zorder=self.TEXT,
-                bbox=box,
+                bbox={**box, "alpha": 0.75},
             )
         self.ax.plot(
             *self.camera([0.0, 0.0, 0.0]), "o", color="black", markersize=4.5, zorder=self.TEXT
@@ -289,6 +285,8 @@ class _Scene:
             style.line(style.ATTRACTING, "sliding, attracting", 0.9),
             style.line(style.REPELLING, "sliding, repelling", 0.9),
         ]
+        if any(line.get_gid() == "shadow" for line in self.ax.lines):
+            handles.append(style.line(_SHADOW, "shadows on the surface", 1.0))
         self.ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
     def line_names(self) -> None:
@@ -310,6 +308,9 @@ class _Scene:
             if points:
                 labels.name(f"diabolo,\n{gid}", np.vstack(points), color)
 
+        for line in (line for line in self.ax.lines if line.get_gid() == "landing"):
+            labels.name("slides from here", np.asarray(line.get_xydata()))
+
     # strokes -----------------------------------------------------------------------------------
 
     def _through(self, z: Array, side: Side) -> None:
@@ -330,13 +331,8 @@ class _Scene:
             z = (flight_above if side == "+" else flight_below)(z, self.flow.nu)
             side = other(side)
             if z[0] * z[1] >= 0:
-                self.ax.plot(
-                    *self.camera([0.0, *z]),
-                    ".",
-                    color="black",
-                    markersize=4,
-                    zorder=self.SLIDING + 0.5,
-                )
+                look: Any = {"color": style.BLACK, "markersize": 4, "zorder": self.SLIDING + 0.5}
+                self.ax.plot(*self.camera([0.0, *z]), ".", gid="landing", **look)
                 return
 
     def _off(self, curve: Array, side: Side, color: str | None = None, gid: str = "arc") -> None:
@@ -364,7 +360,8 @@ class _Scene:
         if order == self.ABOVE:
             for piece in style.inside(curve[:, 1:], (-1.0, 1.0, -1.0, 1.0)):
                 shadow = self.camera(self._flat(piece))
-                self.ax.plot(*shadow.T, color="#B5B5B5", linewidth=1.0, zorder=self.SURFACE + 0.2)
+                look: Any = {"color": _SHADOW, "lw": 1.0, "zorder": self.SURFACE + 0.2}
+                self.ax.plot(*shadow.T, gid="shadow", **look)
         self.ax.plot(
             *points.T,
             color=color,

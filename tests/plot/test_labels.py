@@ -87,3 +87,32 @@ def test_names_are_placed_again_for_another_resolution(axes, tmp_path):
     axes.figure.savefig(tmp_path / "picture.pdf")
     labels.set_visible(False)
     axes.figure.draw_without_rendering()
+
+
+def test_a_name_at_the_edge_is_inside_of_the_frame(axes):
+    labels = Labels(axes)
+    labels.name("a region at the edge", [[0.99, 0.5]], inside=True)
+    (box,) = boxes(axes, labels)
+    frame = axes.get_window_extent()
+    assert frame.contains(*box.p0) and frame.contains(*box.p1)
+
+
+def test_a_name_is_in_the_region_of_its_thing(axes):
+    """Where there are lines, although another region is empty."""
+    labels, x = Labels(axes), np.linspace(0, 1, 40)
+    for height in np.linspace(0.05, 0.45, 9):
+        axes.plot(x, 0 * x + height)
+    labels.name(
+        "a line", np.column_stack([x, 0 * x + 0.47]), keep=lambda points: points[:, 1] < 0.5
+    )
+    (box,) = boxes(axes, labels)
+    assert axes.transData.inverted().transform(box.p1)[1] < 0.5
+
+
+def test_names_of_two_sets_do_not_meet(axes):
+    first, second = Labels(axes), Labels(axes)
+    axes.plot(0.5, 0.5, "o")
+    for labels in (first, second):
+        labels.name("a point", (0.5, 0.5))
+    (one,), (other,) = boxes(axes, first), boxes(axes, second)
+    assert not one.overlaps(other)

@@ -12,11 +12,12 @@ from ..local.plane_scan import PlaneScan
 from ..local.regions import Region
 from ..local.sides import SIDES
 from ..model import Array, FilippovSystem, Stop
-from .spacing import Cut, evenly_spaced, polyline
+from .spacing import Cut, evenly_spaced, polyline, until_rest
 
 _TOLERANCE = 1e-8  # far below what a picture resolves
 _CHUNK, _LONGEST = 12, 600  # steps between looks at an orbit, and of all of it
 _EVENTS = 200
+_PASSES = 40.0  # of the box by a typical orbit, in the longest time
 _NEAR = 1e-4  # in units of the box: of a saddle's manifolds at their start, of an orbit that closed
 
 
@@ -35,6 +36,12 @@ class PlaneOrbits:
     def __init__(self, scan: PlaneScan, t_end: float | None = None):
         self.scan = scan
         self.t_end = _duration(scan) if t_end is None else t_end
+
+    @cached_property
+    def rests(self) -> list[Array]:
+        """Where orbits rest."""
+        found = [at.point for at in self.scan.equilibria]
+        return found + [at.point for at in self.scan.pseudo_equilibria]
 
     @cached_property
     def _systems(self) -> dict[bool, FilippovSystem]:
@@ -108,14 +115,12 @@ class PlaneOrbits:
         They go from where they begin to where they end, if that is in the box: sliding or rest.
         """
         follow = partial(self.follow, landing=True)
-        rests = [at.point for at in self.scan.equilibria]
-        rests += [at.point for at in self.scan.pseudo_equilibria]
         curves = evenly_spaced(
             self.scan.box,
             count,
             follow,
             avoid=avoid,
-            rests=rests,
+            rests=self.rests,
             switch=lambda points: self.scan.at(points).h,
         )
         for _, curve in curves:
@@ -145,7 +150,13 @@ class PlaneOrbits:
                     yield "separatrix", self._from(rest.point, ahead, side)
 
     def _from(self, start: Array, ahead: bool, mode: str | None = None) -> Array:
-        return self.follow(start, ahead, mode=mode)[:: 1 if ahead else -1]
+        """An orbit to where it ends, a focus that it winds into too, in the direction of time."""
+        curve = self.follow(start, ahead, self._to_rest, mode=mode)
+        return curve[:: 1 if ahead else -1]
+
+    def _to_rest(self, curve: Array) -> Array:
+        rested = until_rest(curve, self.rests, self.scan.box.size)
+        return curve if rested is None else rested
 
 
 def _mode_at_end(run: Trajectory) -> str | None:
@@ -181,4 +192,4 @@ def _duration(scan: PlaneScan) -> float:
     fields = np.where(values.h[:, None] > 0, values.fields[:, 0], values.fields[:, 1])
     speed = np.linalg.norm(fields / scan.box.size, axis=1)
     speed = speed[np.isfinite(speed) & (speed > 0)]
-    return 8.0 / float(np.quantile(speed, 0.25)) if speed.size else 1.0
+    return _PASSES / float(np.quantile(speed, 0.25)) if speed.size else 1.0

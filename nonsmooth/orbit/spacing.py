@@ -63,6 +63,26 @@ def polyline(
     return np.vstack([run(np.concatenate(times)), last])
 
 
+def until_rest(curve: Array, rests: Sequence[Array], size: Array) -> Array | None:
+    """Part of a curve to the equilibrium that it comes to, if it does; not the one it starts in.
+
+    Parameters
+    ----------
+    curve : ndarray (m, 2)
+    rests : sequence of ndarray (2,)
+        Equilibria.
+    size : ndarray (2,)
+        Of the box.
+    """
+    found = None
+    for rest in rests:
+        near = np.linalg.norm((curve - rest) / size, axis=1) < _AT_REST
+        after = np.flatnonzero(near & (np.cumsum(~near) > 0))
+        if after.size and (found is None or after[0] + 1 < len(found)):
+            found = np.vstack([curve[: after[0]], rest])
+    return found
+
+
 class Spacing:
     """Where orbits have been, and what else no orbit shall start close to.
 
@@ -132,7 +152,7 @@ class Spacing:
             if cell in self._taken or distinct - first.setdefault(cell, distinct) > _AGAIN:
                 close = k
                 break
-        rested = self._rested(curve)
+        rested = until_rest(curve, self._rests, self.box.size)
         if rested is not None and len(rested) <= close + 1:
             return rested
         if close == len(curve):
@@ -159,16 +179,6 @@ class Spacing:
                 j = int(changes[0])
                 return curve[: k + j + 1 + int(abs(h[j + 1]) < abs(h[j]))]
         return curve[: k + 1]
-
-    def _rested(self, curve: Array) -> Array | None:
-        """Part of a curve to the equilibrium that it comes to, if it does; not the one it starts in."""
-        found = None
-        for rest in self._rests:
-            near = np.linalg.norm((curve - rest) / self.box.size, axis=1) < _AT_REST
-            after = np.flatnonzero(near & (np.cumsum(~near) > 0))
-            if after.size and (found is None or after[0] + 1 < len(found)):
-                found = np.vstack([curve[: after[0]], rest])
-        return found
 
     def add(self, curve: Array) -> None:
         """Keep other orbits away from a curve."""

@@ -227,6 +227,8 @@ class _Portrait:
             return
         for start in starts:
             self._draw(self.flow.follow(start), style.BLACK, 1.0, "orbit")
+            self.ax.plot(*start, ".", color=style.BLACK, markersize=5, zorder=2.2, gid="start")
+            self.drawn.add("start")
 
     def surface(self) -> None:
         """The surface in its pieces, with the direction of sliding."""
@@ -287,6 +289,8 @@ class _Portrait:
             if any(piece.kind == kind for piece in self.scan.pieces)
         ]
         handles.append(style.line(_ORBIT, "orbits", 0.9))
+        if "start" in self.drawn:
+            handles.append(style.marker(".", "where they start", size=5))
         if "separatrix" in self.drawn:
             handles.append(style.line(_SEPARATRIX, "separatrices", 1.8))
         if "fold orbit" in self.drawn:

@@ -56,6 +56,28 @@ def test_drawn_orbits_follow_the_fields():
         assert np.all(np.sum(step * field, axis=1)[clear] > 0.995 * size[clear])
 
 
+def test_orbits_that_wind_out_of_a_focus_are_followed_to_it():
+    """Slowly: an orbit that stops half-way seems to come from a cycle that is not there."""
+    damping = 0.05
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y - 0.5,
+        above=[y, -x - 1 + 2 * damping * y],
+        below=[y, -x + 1 + 2 * damping * y],
+    )
+    ax = ns.plot.phase_portrait(system, (-3, 3, -2.5, 2.5)).axes[0]
+    (before, _) = [
+        np.column_stack(line.get_data()) for line in ax.lines if line.get_gid() == "fold orbit"
+    ]
+    assert_allclose(before[[0, -1]], [[1.0, 0.0], [1.0 + 2 * damping * 0.5, 0.5]], atol=1e-6)
+    # half a turn of x'' - 2 d x' + x = 1 makes its amplitude exp(pi d / sqrt(1 - d^2)) times as large
+    turns = np.flatnonzero(before[1:-2, 1] * before[2:-1, 1] < 0) + 1
+    sizes = np.abs(before[turns, 0] - 1.0)
+    want = np.exp(np.pi * damping / np.sqrt(1 - damping**2))
+    assert len(turns) > 15
+    assert_allclose(sizes[4:-1] / sizes[3:-2], want, rtol=0.02)
+
+
 def test_given_starts_and_parameters_are_used():
     level = ca.SX.sym("level")
     system = ns.FilippovSystem(

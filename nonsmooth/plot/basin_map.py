@@ -20,6 +20,7 @@ COLORS = ("#9ecae1", "#fdd0a2", "#9fdf5f", "#7f7fff", "#df7f7f", "#5f9fdf", "#ff
 _LISTED = (
     4  # attractors in a legend, beside what else may become of a start; more are named on the map
 )
+_ENTRIES = 6  # of a legend
 _OTHERS = {0: "#ffffff", -1: "#252525", -2: "#737373", -3: "#bdbdbd", -4: "#969696"}
 
 
@@ -129,7 +130,7 @@ def _legend(axes: Axes, found: Basins) -> None:
     attractors = [k for k in parts if k > 0]
     order = [k for k in parts if k <= 0]
     order = order if len(attractors) > _LISTED else [*attractors, *order]
-    handles = [
+    handles: list[Any] = [
         Patch(
             facecolor=_color(k),
             edgecolor=style.GREY,
@@ -137,9 +138,14 @@ def _legend(axes: Axes, found: Basins) -> None:
         )
         for k in order
     ]
+    if attractors and len(handles) < _ENTRIES:
+        handles.append(style.marker("o", "attractor", size=5.0, markeredgewidth=0.0))
     if handles:
         axes.legend(
-            handles=handles[:6], loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0
+            handles=handles[:_ENTRIES],
+            loc="upper left",
+            bbox_to_anchor=(1.01, 1.0),
+            borderaxespad=0.0,
         )
 
 

@@ -134,4 +134,7 @@ def _legend(axes: Any, several: list[Manifold]) -> None:
         for s in (True, False)
         if any(m.stable == s for m in several)
     ]
+    handles.append(
+        style.marker("X", "its point" if len(several) == 1 else "their points", size=5.0)
+    )
     axes.legend(handles=handles, loc="upper left")

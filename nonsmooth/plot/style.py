@@ -5,7 +5,7 @@ For pictures of one's own beside those of the library. The palette is that of Ok
 By what they mean: ``ABOVE`` and ``BELOW`` for the fields F1 and F2 (``FIELDS`` has them by the letter
 of the side), ``ATTRACTING`` and ``REPELLING`` for sliding orbits, ``TINT_ATTRACTING``,
 ``TINT_REPELLING`` and ``TINT_CROSSING`` for regions, ``CANARD`` and ``FAUX_CANARD``. Dashes:
-``DASHED`` (invisible folds), ``LONG_DASH``, ``DASH_DOT``, ``DOTS``.
+``DASHED`` (invisible folds), ``LONG_DASH``, ``DASH_DOT``, ``DOTS``. ``CLOUD``: points of long runs.
 
 Nothing here touches matplotlib's global settings: pictures are built inside ``settings()`` on
 figures that pyplot does not know. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
@@ -61,6 +61,8 @@ DASHED: Any = (0, (5, 2.5))
 DASH_DOT: Any = (0, (4, 1.5, 1, 1.5))
 DOTS: Any = (0, (1.2, 1.6))
 LONG_DASH: Any = (0, (7, 1.0))
+#: Points of long runs: as large on paper as on a screen, where "," is a pixel of either.
+CLOUD: Any = dict(color="0.35", linestyle="none", marker=".", markersize=1.3, mew=0.0, zorder=0)
 
 _SETTINGS: Any = {
     "font.family": "sans-serif",
@@ -250,14 +252,8 @@ def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str = BLACK, **opti
         Of ``matplotlib.patches.FancyArrowPatch``.
     """
     options = {"arrowstyle": "-|>", "mutation_scale": 11, "linewidth": 1.0, **options}
-    patch = FancyArrowPatch(
-        tuple(np.asarray(start, float)),
-        tuple(np.asarray(end, float)),
-        shrinkA=0,
-        shrinkB=0,
-        color=color,
-        **options,
-    )
+    ends = [tuple(np.asarray(point, float)) for point in (start, end)]
+    patch = FancyArrowPatch(*ends, shrinkA=0, shrinkB=0, color=color, **options)
     patch.set_clip_on(True)
     ax.add_patch(patch)
 

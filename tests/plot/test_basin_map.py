@@ -23,7 +23,8 @@ def test_cells_marks_and_legend():
     marks = np.array([line.get_xydata()[0] for line in axes.lines])
     assert np.allclose(marks, [a.points[0] for a in found.attractors])
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert words[0].startswith("attractor 1: ") and words[-1].startswith("not unique: ")
+    assert words[0].startswith("attractor 1: ") and words[-2].startswith("not unique: ")
+    assert words[-1] == "attractor"
     colours = {mesh.cmap(mesh.norm(k)) for k in range(len(present))}
     assert len(colours) == len(present)
 

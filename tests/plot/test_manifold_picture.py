@@ -22,7 +22,8 @@ def test_curves_in_the_plane():
     assert all(np.array_equal(a, b) for a, b in zip(arcs, drawn, strict=True))
     assert len({line.get_color() for line in axes.lines}) == 3
     words = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert words == ["stable manifold", "unstable manifold"] and axes.get_xlabel() == "x"
+    assert words == ["stable manifold", "unstable manifold", "their points"]
+    assert axes.get_xlabel() == "x"
 
 
 def test_a_surface_in_space():

@@ -102,7 +102,8 @@ def funnel(count: int) -> Iterator[Figure]:
             after = np.linspace(futures.t, t, 80)
             for states, departure in zip(futures(after), futures.departures, strict=True):
                 colour = {"+": STYLE.ABOVE, "-": STYLE.BELOW, "s": "black"}[departure.side]
-                axes.plot(after, states[:, 0], color=colour, linewidth=0.9)
+                order = 3 if departure.side == "s" else 2  # what leaves late slides until then
+                axes.plot(after, states[:, 0], color=colour, linewidth=0.9, zorder=order)
         axes.axvline(futures.t, color="0.7", linewidth=0.8)
         axes.set(xlim=(0.0, futures.t + 1.0), ylim=(-0.5, 0.5))
         axes.set(xlabel="time", ylabel="height over the surface")

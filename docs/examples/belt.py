@@ -8,7 +8,6 @@ once every four forcing periods.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -27,8 +26,8 @@ def strobe(nu, rounds, skip):
     return run.sample_x[:, 0]
 
 
-values = np.linspace(1.7055, 1.7085, 46)
-clouds = [strobe(nu, 260, 100) for nu in values]
+values = np.linspace(1.7055, 1.7085, 121)
+clouds = [strobe(nu, 220, 100) for nu in values]
 
 
 def start(orbit):
@@ -37,10 +36,10 @@ def start(orbit):
     return float(run(run.t[0] + (-run.t[0]) % (run.t[-1] - run.t[0]))[0])
 
 
-figure = Figure(figsize=(6.6, 4.2), layout="constrained")
+figure = ns.plot.style.new_figure((6.6, 4.2))
 ax = figure.subplots()
 for nu, cloud in zip(values, clouds, strict=True):
-    ax.plot(np.full(len(cloud), nu), cloud, ",", color="0.35", zorder=0)
+    ax.plot(np.full(len(cloud), nu), cloud, **ns.plot.style.CLOUD)
 ns.plot.branch(branch, against=start, ax=ax, legend=False)
 ax.set(xlabel="forcing frequency nu", ylabel="displacement u every four periods")
 ax.annotate(

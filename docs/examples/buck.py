@@ -7,7 +7,6 @@ all at once at about 32.3 V.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -32,18 +31,22 @@ def tick(k):
     return volts
 
 
-figure = Figure(figsize=(6.6, 4.4), layout="constrained")
+figure = ns.plot.style.new_figure((6.6, 4.4))
 ax = figure.subplots()
-for E in np.linspace(22.0, 33.5, 93):
+for E in [*np.linspace(22.0, 32.0, 41), *np.linspace(32.02, 33.5, 75)]:
     long = ns.simulate(
         system, buck.start, 0.13, parameters={"E": E}, at=ns.Section("clock", skip=240)
     )
-    ax.plot(np.full(len(long.sample_x), E), long.sample_x[:, 0], ",", color="0.35", zorder=0)
+    ax.plot(np.full(len(long.sample_x), E), long.sample_x[:, 0], **ns.plot.style.CLOUD)
 for rounds, branch in zip((1, 2, 4), branches, strict=True):
     for k in range(rounds):
         ns.plot.branch(branch, against=tick(k), ax=ax, legend=False)
 ax.set_xlabel("input voltage E in V")
 ax.set_ylabel("v at the ticks of the clock, in V")
+ax.set_xlim(22.0, 33.5)
+for line in ax.lines:
+    if str(line.get_gid()).startswith("event"):
+        line.set_markersize(5)
 ax.set_title("Buck converter: doublings and chaos")
 
 if __name__ == "__main__":

@@ -8,7 +8,6 @@ closed form.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -16,7 +15,7 @@ system = ns.textbook.forced_dry_friction().system
 shares = (0.2, 0.6, 0.75)
 families = []
 for friction in shares:
-    for W, bounds in ((0.7, (0.5, 0.96)), (1.3, (1.04, 1.8))):  # the resonance has no bound
+    for W, bounds in ((0.7, (0.5, 0.97)), (1.3, (1.02, 1.8))):  # the resonance has no bound
         at = {"f": friction, "W": W}
         run = ns.simulate(system, [1.5, 0.0], 260.0, parameters=at)
         orbit = ns.periodic_orbit(system, run, symmetry="odd", parameters=at)
@@ -53,21 +52,24 @@ def largest(orbit):
     return float(np.abs([leg.start[0] for leg in orbit.legs]).max())
 
 
-figure = Figure(figsize=(6.6, 4.2), layout="constrained")
+figure = ns.plot.style.new_figure((6.6, 4.2))
 left, right = figure.subplots(1, 2)
 for family in families:
     ns.plot.branch(family, against=largest, ax=left, legend=False)
-for friction, W, height in ((0.2, 1.27, 1.65), (0.6, 1.2, 0.62), (0.75, 0.66, 1.0)):
+for friction, W, height in ((0.2, 1.3, 1.65), (0.6, 1.5, 1.2), (0.75, 0.55, 0.95)):
     grid = np.concatenate([np.arange(0.5, 0.95, 0.03), np.arange(1.06, 1.8, 0.06)])
     grid = grid[friction < first_stop(grid)]
     left.plot(grid, amplitude(grid, friction), "o", markersize=2.4, color="black", zorder=4)
-    left.text(W, height, f"f = {friction:g}", ha="left" if W > 1 else "center")
-left.set(ylim=(0.0, 4.0), xlabel="frequency W", ylabel="largest x", title="response")
+    left.text(W, height, f"f = {friction:g}")
+left.plot([1.305, 1.49], [0.79, 1.2], color="0.4", linewidth=0.6)
+left.set(
+    xlim=(0.5, 1.8), ylim=(0.0, 4.0), xlabel="frequency W", ylabel="largest x", title="response"
+)
 ns.plot.bifurcation_curves(curves, ax=right, legend=False)
 grid = np.concatenate([np.arange(0.56, 0.96, 0.04), np.arange(1.04, 1.8, 0.05)])
 right.plot(grid, first_stop(grid), "o", markersize=2.4, color="black", zorder=4)
 right.set(xlabel="frequency W", ylabel="friction f", title="the first stop")
-right.set_ylim(0.3, 0.95)
+right.set(xlim=(0.55, 1.8), ylim=(0.3, 0.95))
 right.text(1.2, 0.45, "never stops", ha="center")
 right.text(1.4, 0.8, "stops twice a period", ha="center")
 

@@ -33,7 +33,9 @@ figure.legend(handles=legend.legend_handles, loc="outside lower center", ncols=3
 legend.remove()
 
 merged = ((1 - problem.parameters["b"]) / 2, values["pseudo-saddle-node"])
-panels["pseudo-saddle-node"].plot(*merged, "ks", fillstyle="left", markersize=8, zorder=9)
+last = panels["pseudo-saddle-node"]
+last.plot(*merged, "ks", fillstyle="left", markersize=8, zorder=9)
+ns.plot.labels.Labels(last).name("pseudo-saddle-node", merged)
 
 pseudo = [
     ns.find_pseudo_equilibrium(problem.system, near=[x1, 1.06], parameters={"alpha": 1.06})

@@ -22,9 +22,12 @@ block = ns.FilippovSystem(
     parameters={a1: 0.6, a2: 0.0, m1: 1.0, m2: 1.0},
 )
 
-figure = ns.plot.style.new_figure((7.0, 6.0))
-blown, paths, astroid, nothing = figure.subplots(2, 2).flat
-nothing.remove()
+STYLE = ns.plot.style
+RESTS = dict(color=STYLE.ABOVE, linewidth=0.9)
+GOES = dict(color=STYLE.BELOW, linewidth=0.9, linestyle="--")
+figure = STYLE.new_figure((7.0, 6.0))
+panels = figure.subplot_mosaic([["blown", "paths"], ["astroid", "astroid"]])
+blown, paths, astroid = (panels[name] for name in ("blown", "paths", "astroid"))
 angles = np.linspace(0.0, 2 * np.pi, 16, endpoint=False) + np.pi / 16
 for angle in angles:
     start = [np.cos(angle), np.sin(angle)]
@@ -32,14 +35,21 @@ for angle in angles:
     stop = run.events[0].t
     h = run(stop * (1 - np.logspace(0, -5, 200)))
     phi = np.degrees(np.unwrap(np.arctan2(h[:, 1], h[:, 0])))
-    blown.plot(phi, np.linalg.norm(h, axis=1), color=ns.plot.style.ABOVE, linewidth=0.9)
-    paths.plot(*h.T, color=ns.plot.style.ABOVE, linewidth=0.9)
-    slips = ns.simulate(block, start, 3.0, parameters={"a1": 1.5})
-    paths.plot(
-        *slips(np.linspace(0, 3.0, 200)).T, color=ns.plot.style.BELOW, linewidth=0.9, linestyle="--"
+    blown.plot(phi, np.linalg.norm(h, axis=1), **RESTS)
+    paths.plot(*h.T, **RESTS)
+    slips = ns.simulate(block, start, 6.0, parameters={"a1": 1.5})
+    goes = slips(np.linspace(0, 6.0, 400))
+    paths.plot(*goes.T, **GOES)
+    STYLE.arrowhead(paths, h, 0.4, STYLE.ABOVE, mutation_scale=9)
+    STYLE.arrowhead(
+        paths, STYLE.inside(goes, (-2, 2.1, -2, 2))[0], 0.5, STYLE.BELOW, mutation_scale=9
     )
-blown.plot(0, 0, "k.", markersize=10, clip_on=False)
-blown.plot([-180, 180], [0, 0], "ko", markerfacecolor="white", clip_on=False)
+    half = np.column_stack([phi, np.linalg.norm(h, axis=1)])
+    STYLE.arrowhead(blown, half, 0.3, STYLE.ABOVE, scale=(360.0, 1.0), mutation_scale=9)
+blown.plot(0, 0, "k.", markersize=10, clip_on=False, zorder=5)
+blown.plot([-180, 180], [0, 0], "ko", markerfacecolor="white", clip_on=False, zorder=5)
+blown.annotate("attracts", (0, 0), (8, 6), textcoords="offset points", path_effects=STYLE.halo())
+blown.annotate("repels", (-180, 0), (8, 6), textcoords="offset points", path_effects=STYLE.halo())
 blown.set(
     xlabel="direction of slip, degrees from the load",
     ylabel="slip |h|",
@@ -47,9 +57,9 @@ blown.set(
 )
 blown.set(xlim=(-180, 180), ylim=(0, 1))
 directions = ns.limit_directions(block, [0.0, 0.0])
-paths.plot([], [], color=ns.plot.style.ABOVE, label="a = 0.6 c: comes to rest")
-paths.plot([], [], color=ns.plot.style.BELOW, linestyle="--", label="a = 1.5 c: goes on")
-paths.plot(0, 0, "k.")
+paths.plot([], [], label="a = 0.6 c: comes to rest", **RESTS)
+paths.plot([], [], label="a = 1.5 c: goes on", **GOES)
+paths.plot(0, 0, "k.", zorder=5)
 paths.set(xlabel="h1", ylabel="h2", xlim=(-1.1, 2.1), ylim=(-1.2, 1.6))
 paths.legend(loc="upper left", frameon=False, fontsize=8)
 
@@ -68,17 +78,21 @@ t = np.linspace(0, 2 * np.pi, 400)
 width = strengths["m1"] - strengths["m2"]
 astroid.contourf(loads, loads, counts, levels=[0, 3, 5], colors=["white", "0.85"])
 astroid.plot(
-    width * np.cos(t) ** 3, width * np.sin(t) ** 3, "k", label="astroid: 4 inside, 2 outside"
+    width * np.cos(t) ** 3,
+    width * np.sin(t) ** 3,
+    "k",
+    solid_joinstyle="round",
+    label="astroid: 4 inside, 2 outside",
 )
 astroid.plot(
     2.0 * np.cos(t),
     0.6 * np.sin(t),
-    color=ns.plot.style.BELOW,
+    color=STYLE.BELOW,
     linestyle="--",
     label="sliding inside",
 )
-astroid.set(xlabel="a1", ylabel="a2", aspect="equal", ylim=(-2, 2.6))
-astroid.legend(loc="upper left", frameon=False, fontsize=8)
+astroid.set(xlabel="a1", ylabel="a2", aspect="equal", xlim=(-2.3, 2.3), ylim=(-1.7, 1.7))
+astroid.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, fontsize=8)
 
 if __name__ == "__main__":
     print(directions)

@@ -7,7 +7,6 @@ orbit is followed through all of these, stable all along.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -16,9 +15,11 @@ run = relay.run({"w": 29.0}, t_end=60.0)
 orbit = ns.periodic_orbit(relay.system, run, symmetry="odd", parameters={"w": 29.0})
 branch = ns.continue_orbit(orbit, "w", bounds=(27.0, 37.0), step=0.1)
 
-figure = Figure(figsize=(6.6, 4.6), layout="constrained")
+figure = ns.plot.style.new_figure((6.6, 4.6))
 above, below = figure.subplots(2, 1, sharex=True, height_ratios=(2, 1))
-for w, at in zip(branch.values, branch.solutions, strict=True):
+solutions = list(zip(branch.values, branch.solutions, strict=True))
+solutions += [(w, at) for w in np.linspace(27.01, 36.99, 160) for at in branch.at(w)]
+for w, at in solutions:
     slides = [leg.duration for leg in at.legs if leg.mode == "s"]
     above.semilogy(np.full(len(slides), w), slides, ".", markersize=2.2, color=ns.plot.style.BLUE)
 for event in branch.events:
@@ -27,10 +28,10 @@ for event in branch.events:
     for ax in (above, below):
         ax.axvline(event.parameter, color=color, linewidth=0.9, linestyle="-" if orange else "--")
 ns.plot.branch(branch, ax=below, legend=False)
-above.text(27.7, 4e-6, "adding-sliding")
-above.text(29.98, 4e-6, "grazing-sliding")
+above.text(31.15, 2e-5, "adding-sliding", rotation=90, ha="right", va="bottom")
+above.text(33.7, 2e-5, "grazing-sliding", rotation=90, va="bottom")
 above.set(ylabel="durations of slides", title="slides of one period")
-below.set(xlabel="frequency w", ylabel="period")
+below.set(xlim=(27.0, 37.0), xlabel="frequency w", ylabel="period")
 
 if __name__ == "__main__":
     print(branch)

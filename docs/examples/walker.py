@@ -7,7 +7,6 @@ doublings; dots are walks of a hundred steps, beyond their transients.
 """
 
 import numpy as np
-from matplotlib.figure import Figure
 
 import nonsmooth as ns
 
@@ -44,11 +43,11 @@ for slope in slopes:
     if len(walk.sample_x) == 100:
         near = walk(walk.t[-1] - 1.0)
 
-figure = Figure(figsize=(6.6, 4.2), layout="constrained")
+figure = ns.plot.style.new_figure((6.6, 4.2))
 whole, close = figure.subplots(1, 2)
 for ax in (whole, close):
     for slope, angles in zip(slopes, walks, strict=True):
-        ax.plot(np.full(len(angles), slope), angles, ",", color="0.35", zorder=0)
+        ax.plot(np.full(len(angles), slope), angles, **ns.plot.style.CLOUD)
     for rounds, gait in zip((1, 1, 2, 4, 8), gaits, strict=True):
         for k in range(rounds):
             ns.plot.branch(gait, against=stance(k), ax=ax, legend=False)
@@ -60,8 +59,8 @@ whole.set_title("two gaits")
 whole.text(0.0088, 0.21, "long steps", ha="right")
 whole.text(0.0092, 0.183, "short steps")
 close.set(title="the long one doubles", xlim=(0.0146, 0.0192), ylim=(0.2315, 0.2685))
-close.text(0.01625, 0.253, "steps alternate", ha="right")
-close.text(0.0184, 0.2508, "chaos", ha="right")
+close.text(0.01475, 0.2545, "steps\nalternate")
+close.text(0.0191, 0.2325, "chaos", ha="right")
 
 if __name__ == "__main__":
     print(doublings)

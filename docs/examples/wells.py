@@ -30,6 +30,9 @@ threshold = float(np.polyval(np.polyfit(near[:, 1], near[:, 0], 4), 0.0))
 
 figure = ns.plot.basins(found, size=(6.6, 5.0))
 ns.plot.manifold(edge, ax=figure.axes[0], legend=False)
+names = ns.plot.labels.Labels(figure.axes[0])
+names.name("two-fold", (0.0, 0.0))
+names.name("the boundary:\nends at the two-fold", outward, ns.plot.style.BLUE)
 
 if __name__ == "__main__":
     print(found, edge, f"first threshold {threshold:.9f}")

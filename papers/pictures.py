@@ -105,7 +105,8 @@ def _across_frames(figure: Figure) -> list[str]:
     """Texts in axes that begin inside of the frame and end outside."""
     found = list[str]()
     for axes in figure.axes:
-        if not (axes.get_visible() and axes.axison):
+        framed = any(spine.get_visible() for spine in axes.spines.values())
+        if not (axes.get_visible() and axes.axison and framed):
             continue
         within = [child for part in axes.artists for child in part.get_children()]
         for text in [*axes.texts, *(t for t in within if isinstance(t, Text))]:

@@ -27,7 +27,7 @@ def strobe(nu, rounds, skip):
 
 
 values = np.linspace(1.7055, 1.7085, 121)
-clouds = [strobe(nu, 220, 100) for nu in values]
+clouds = [strobe(nu, 260, 100) for nu in values]
 
 
 def start(orbit):

@@ -14,6 +14,7 @@ from ..model import OptionError
 from ..orbit import Basins
 from . import style
 from .labels import Labels
+from .legends import beside
 
 #: Of attractors, in turn: told apart by deuteranopes too, light enough for dark marks.
 COLORS = ("#9ecae1", "#fdd0a2", "#9fdf5f", "#7f7fff", "#df7f7f", "#5f9fdf", "#ffdf3f", "#7f9f3f")
@@ -141,12 +142,7 @@ def _legend(axes: Axes, found: Basins) -> None:
     if attractors and len(handles) < _ENTRIES:
         handles.append(style.marker("o", "attractor", size=5.0, markeredgewidth=0.0))
     if handles:
-        axes.legend(
-            handles=handles[:_ENTRIES],
-            loc="upper left",
-            bbox_to_anchor=(1.01, 1.0),
-            borderaxespad=0.0,
-        )
+        beside(axes, handles[:_ENTRIES], bbox_to_anchor=(1.01, 1.0))
 
 
 def _names(axes: Axes, found: Basins) -> None:

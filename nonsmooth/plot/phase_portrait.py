@@ -18,6 +18,7 @@ from ..model import Array, DefinitionError, FilippovSystem, Parameters, PointErr
 from ..orbit.plane_orbits import PlaneOrbits
 from . import style
 from .labels import Labels
+from .legends import beside
 
 _ORBIT, _SEPARATRIX, _FOLD_ORBIT = "#444444", style.CANARD, style.GREEN
 _PIECES: dict[str, tuple[str, float, Any, str]] = {
@@ -295,9 +296,7 @@ class _Portrait:
             handles.append(style.line(_SEPARATRIX, "separatrices", 1.8))
         if "fold orbit" in self.drawn:
             handles.append(style.line(_FOLD_ORBIT, "orbits through visible folds", 1.5))
-        self.ax.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0
-        )
+        beside(self.ax, handles)
 
     def names(self) -> None:
         """Name the sides of the surface and the special points, beside them."""

@@ -20,6 +20,7 @@ from ..model import Array, DefinitionError, FilippovSystem, OptionError, Paramet
 from ..orbit.sliding_orbits import SlidingOrbits
 from . import style
 from .labels import Labels
+from .legends import beside
 
 _ATTRACTING, _REPELLING = REGIONS.index(Region.ATTRACTING), REGIONS.index(Region.REPELLING)
 _NAMES = ("$D_a$", "$D_r$", "$C_1$", "$C_2$")
@@ -307,9 +308,7 @@ class _Portrait:
             handles.append(style.line(style.ATTRACTING, "sliding orbits in $D_a$", 0.9))
         if np.any(self.scan.regions == _REPELLING):
             handles.append(style.line(style.REPELLING, "sliding orbits in $D_r$", 0.9))
-        self.ax.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0
-        )
+        beside(self.ax, handles)
 
     def line_names(self) -> None:
         """Name folds, canards, manifolds and special points beside them."""

@@ -134,7 +134,7 @@ def _draw(
         if plane:
             ax = figure.add_subplot(grid[1:, columns])
             _phase_plane(ax, run, parts, looks)
-        _explain(figure, _title(run), _legend(run, looks, plane), len(looks))
+        _explain(figure, _title(run, figure), _legend(run, looks, plane), len(looks))
     return figure
 
 
@@ -238,6 +238,7 @@ def _time_column(
 def _strip(ax: Axes, run: Trajectory, looks: dict[str, tuple[str, Any, float, str]]) -> None:
     """Bar with the letter of each segment's mode, where there is room for it."""
     span = abs(run.t[-1] - run.t[0]) or 1.0
+    letter = 0.11 * ax.get_figure(root=True).dpi / ax.bbox.width  # type: ignore[union-attr]
     for segment in run.segments:
         low, high = sorted((segment.t_start, segment.t_end))
         color = looks[segment.mode][0]
@@ -253,7 +254,7 @@ def _strip(ax: Axes, run: Trajectory, looks: dict[str, tuple[str, Any, float, st
             hatch=hatch,
         )
         ax.add_patch(box)
-        if (high - low) / span > 0.028 * max(len(segment.mode), 1):
+        if (high - low) / span > letter * max(len(segment.mode), 1):
             ax.text(
                 (low + high) / 2,
                 0.45,
@@ -333,29 +334,32 @@ def draw_surfaces(
             )
 
 
-def _title(run: Trajectory) -> str:
+def _title(run: Trajectory, figure: Figure) -> str:
     itinerary = run.itinerary.replace("-", "−")
-    if len(itinerary) > 48:
-        itinerary = itinerary[:44].rstrip() + " …"
-    return f"itinerary: {itinerary}   status: {run.status}"
+    room = min(48, int(12 * figure.get_figwidth()) - 12)  # letters in a line
+    if len(itinerary) > room:
+        itinerary = itinerary[: room - 4].rstrip() + " …"
+    gap = "   " if figure.get_figwidth() > 4.6 else "\n"
+    return f"itinerary: {itinerary}{gap}status: {run.status}"
 
 
 def _explain(figure: Figure, title: str, handles: list[Line2D | Patch], modes: int) -> None:
     """A title and a legend, or where it would be long one of modes, above, and one of marks."""
+    columns = min(4, max(1, int(figure.get_figwidth() / 1.25)))
     if len(handles) <= _LISTED:
         figure.suptitle(title, fontsize=10, fontfamily="monospace")
-        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), 4))
+        figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), columns))
         return
     upper = figure.legend(
         handles=_shortened(handles[:modes]),
         loc="outside upper center",
-        ncols=min(modes, 4),
+        ncols=min(modes, columns),
         title=title,
     )
     upper.get_title().set_fontproperties(FontProperties(family="monospace", size=10))
     rest = _shortened(handles[modes:])
     if rest:
-        figure.legend(handles=rest, loc="outside lower center", ncols=min(len(rest), 4))
+        figure.legend(handles=rest, loc="outside lower center", ncols=min(len(rest), columns))
 
 
 def _shortened(handles: list[Line2D | Patch]) -> list[Line2D | Patch]:
@@ -377,18 +381,7 @@ def _legend(
         present = {run.events[-1].kind}
     for kind, (marker, face, text) in MARKERS.items():
         if kind in present:
-            handles.append(
-                Line2D(
-                    [],
-                    [],
-                    linestyle="none",
-                    marker=marker,
-                    markerfacecolor=face,
-                    markeredgecolor=style.BLACK,
-                    markersize=5,
-                    label=text,
-                )
-            )
+            handles.append(style.marker(marker, text, face, size=5))
     if plane:
         handles.append(
             Line2D([], [], linestyle="none", marker="o", color=style.GREEN, label="start")

@@ -19,6 +19,7 @@ from ..local.two_folds.flights import has_diabolo
 from ..local.two_folds.reduced_flow import Sector, eigenlines, sectors
 from ..model import Array, OptionError
 from . import style
+from .legends import beside, is_narrow
 from .two_fold_marks import (
     TINTS,
     ZERO,
@@ -103,13 +104,14 @@ def two_fold(
         for part in parts:
             _orbits(axes, part, orbits)
         _folds(axes, portrait.flow)
-        _eigenlines(axes, portrait, legend)
+        wide = not is_narrow(axes)
+        _eigenlines(axes, portrait, legend and wide)
         _names(axes, parts)
         _frame(axes, title if title is not None else title_of(portrait))
         if legend:
             _legend(axes, parts)
         if legend if labels is None else labels:
-            line_names(axes, portrait)
+            line_names(axes, portrait, passages=wide)
     return figure
 
 
@@ -342,7 +344,7 @@ def _legend(ax: Axes, parts: list[Sector]) -> None:
     if any(part.orbit.comes_from == "s" for part in parts):
         text = "dotted: all $D_r \\to s \\to D_a$"
         handles.append(Patch(facecolor="white", edgecolor="#9A9A9A", hatch="...", label=text))
-    ax.legend(handles=handles, loc="upper left", bbox_to_anchor=(1.02, 1.0), borderaxespad=0.0)
+    beside(ax, handles)
 
 
 def _circle(inner: str, text: str) -> Line2D:

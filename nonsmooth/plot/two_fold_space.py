@@ -26,6 +26,7 @@ from ..model import Array, OptionError
 from . import style
 from .camera import Camera, azimuth_of, stretch_of
 from .labels import Labels
+from .legends import beside
 from .two_fold_marks import (
     TINTS,
     Portrait,
@@ -287,7 +288,7 @@ class _Scene:
         ]
         if any(line.get_gid() == "shadow" for line in self.ax.lines):
             handles.append(style.line(_SHADOW, "shadows on the surface", 1.0))
-        self.ax.legend(handles=handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
+        beside(self.ax, handles, loc="center left", bbox_to_anchor=(1.0, 0.5))
 
     def line_names(self) -> None:
         """Name folds, eigenlines and the diabolo beside them."""

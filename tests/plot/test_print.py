@@ -183,3 +183,24 @@ def test_picture_is_fit_for_print(draw):
     figure = draw()
     assert isinstance(figure, PrintFigure)  # whose fonts are TrueType (test_palette.py)
     assert faults(figure) == []
+
+
+COLUMN = (3.4, 4.4)
+
+
+@pytest.mark.parametrize(
+    "draw",
+    [
+        lambda: ns.plot.phase_portrait(harvest(), (0.0, 1.1, 0.5, 1.5), size=COLUMN),
+        lambda: ns.plot.two_fold(ns.textbook.TWO_FOLDS["VV-C1"], size=COLUMN),
+        lambda: ns.plot.two_fold_3d(ns.textbook.TWO_FOLDS["mix-C"], size=COLUMN),
+        lambda: ns.plot.trajectory(run(), size=COLUMN),
+        lambda: ns.plot.basins(basins(2), size=COLUMN),
+    ],
+    ids=["phase_portrait", "two_fold", "two_fold_3d", "trajectory", "basins"],
+)
+def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
+    """The legend is below the picture there, which fills the column."""
+    figure = draw()
+    assert faults(figure) == []
+    assert max(ax.bbox.width for ax in figure.axes) > 0.3 * figure.bbox.width  # two side by side

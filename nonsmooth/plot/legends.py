@@ -1,0 +1,48 @@
+"""Legends beside what they explain, or below it where a figure is as narrow as a column of a journal."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from matplotlib.axes import Axes
+
+_NARROW = 4.6  # inches: beside a legend little of the picture would be left
+_SHORT = 20  # letters of entries of which two are side by side in a column
+
+
+def is_narrow(ax: Axes) -> bool:
+    """Whether axes fill a figure as narrow as a column."""
+    figure: Any = ax.get_figure(root=True)
+    return bool(figure.get_figwidth() < _NARROW and len(figure.axes) == 1)
+
+
+def beside(ax: Axes, handles: list[Any], **options: Any) -> None:
+    """Explain what is drawn to the right of the axes, or below them where they fill a narrow figure.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    handles : list
+        Of the legend.
+    **options
+        Of the legend beside the axes, instead of its upper end.
+
+    Examples
+    --------
+    >>> from nonsmooth.plot import style
+    >>> wide, narrow = (style.new_figure((w, 3)).add_subplot() for w in (7, 3.4))
+    >>> for ax in (wide, narrow):
+    ...     beside(ax, [style.line("black", "a line")])
+    >>> wide.get_legend() is None, len(wide.figure.legends)
+    (False, 0)
+    >>> narrow.get_legend() is None, len(narrow.figure.legends)
+    (True, 1)
+    """
+    if is_narrow(ax):
+        figure: Any = ax.get_figure(root=True)
+        longest = max((len(str(handle.get_label())) for handle in handles), default=0)
+        columns = 2 if longest <= _SHORT and len(handles) > 2 else 1
+        figure.legend(handles=handles, loc="outside lower center", ncols=columns)
+        return
+    look = {"loc": "upper left", "bbox_to_anchor": (1.02, 1.0), "borderaxespad": 0.0}
+    ax.legend(handles=handles, **{**look, **options})

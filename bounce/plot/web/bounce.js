@@ -342,7 +342,7 @@
     const small = [];
     for (const { code, name, share } of shares) {
       const words = name.replaceAll("-", "−");
-      const place = Maps.label(outcomes, code, rooms[code], (8 * words.length) / map.box.width);
+      const place = Maps.label(outcomes, code, rooms[code], (9.5 * words.length + 8) / map.box.width);
       if (place && rooms[code].room > 0.03 * outcomes.count) {
         const fill = luminance(colourOf(name)) < 0.2 ? "#ffffff" : "#000000";
         const label = map.label(

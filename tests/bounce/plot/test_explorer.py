@@ -245,6 +245,23 @@ def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, w
     assert browser.faults() == {} and browser.unnamed() == []
 
 
+INSIDE = """
+const frame = document.querySelector("#map .frame").getBoundingClientRect();
+return [...document.querySelectorAll("#map .region-name")].filter((e) => {
+  const box = e.getBoundingClientRect();
+  return box.left < frame.left + 1 || box.right > frame.right - 1;
+}).map((e) => e.textContent);
+"""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", WIDTHS)
+def test_names_of_regions_are_not_cut_by_the_frame(browser, page, width):
+    browser.open(page, width)
+    browser.run(FINE)
+    assert browser.run(INSIDE) == []
+
+
 @pytest.mark.browser
 def test_keys_and_fields_move_everything(browser, page):
     from selenium.webdriver.common.by import By

@@ -338,3 +338,17 @@ def test_an_event_at_the_first_leg_of_a_half_orbit_is_that_of_its_own_mode():
     again = ns.periodic_orbit(problem.system, late, parameters={"w": 31.8}, symmetry="odd")
     assert branch[31.8].period == pytest.approx(again.period, rel=1e-12)
     assert len(branch[31.8].legs) == len(again.legs)
+
+
+def test_an_event_at_which_the_equations_are_singular_is_where_the_branch_is_lost():
+    """With the belt's speed b a stick-slip orbit shrinks as b does, x - 1 = b u(t), to a point at b = 0."""
+    x, v, b = (ca.SX.sym(name) for name in "xvb")
+    slip = v - b
+    push = [[v, -x - s + 0.2 * slip] for s in (1, -1)]
+    system = ns.FilippovSystem(
+        [x, v], surface=slip, above=push[0], below=push[1], parameters={b: 0.5}
+    )
+    orbit = ns.periodic_orbit(system, [1.0, 0.5])
+    branch = ns.continue_orbit(orbit, "b", bounds=(-0.5, 1.0))
+    assert len(branch.events) == 1 and 0 < branch.events[0].parameter < 1e-7
+    assert branch[1e-3].period == pytest.approx(orbit.period, rel=1e-11)

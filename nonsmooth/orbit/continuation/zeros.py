@@ -9,6 +9,7 @@ import numpy as np
 from ...model import Array
 from .curve import Curve, Point
 
+_HALVINGS = 30  # of what is left of a step in which a curve is lost
 _NODES = 8  # points from which what is singular at a branch point is interpolated
 
 
@@ -116,13 +117,27 @@ class _Segment:
         return len(values) > 20 and min(map(abs, values)) > 0.1 * ends
 
     def before(self, names: list[str]) -> Point:
-        """The last point known before any of some tests changes its sign."""
-        good = [
-            (weight, p)
-            for weight, p in self.known.items()
-            if p is not None and all(p.tests.get(n, 0.0) * self.a.tests[n] > 0 for n in names)
-        ]
-        return max(good, key=lambda entry: entry[0])[1]
+        """The last point before any of some tests changes its sign, or the curve is lost."""
+        good, bad = 0.0, 1.0
+        for weight in sorted(self.known):
+            good = weight if self._precedes(weight, names) else good
+        bad = min((w for w in self.known if w > good), default=1.0)
+        for _ in range(_HALVINGS):
+            middle = 0.5 * (good + bad)
+            if self._precedes(middle, names):
+                good = middle
+            else:
+                bad = middle
+        point = self.at(good)
+        assert point is not None
+        return point
+
+    def _precedes(self, weight: float, names: list[str]) -> bool:
+        """Whether there is a point of the curve at which some tests have the signs of the start."""
+        p = self.at(weight)
+        if p is None:
+            return False
+        return all(p.tests.get(n, 0.0) * self.a.tests[n] > 0 for n in names)
 
     def at(self, weight: float) -> Point | None:
         """The point of the curve across the chord at a fraction of it."""

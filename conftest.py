@@ -45,11 +45,11 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 def few_compilations(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[None]:
-    """The driver in C for what asks for ``engine="compiled"`` and for long runs; lanes compiled at once."""
+    """The driver in C for what asks for ``engine="compiled"`` and for all but very long runs; lanes compiled at once."""
     slow = request.node.get_closest_marker("slow") is not None
     if not slow and request.path.name != "test_special.py":
         monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
-        monkeypatch.setattr(tape, "_LONG", 10**15)
+        monkeypatch.setattr(tape, "_LONG", 500_000)
     if not slow and HERE / "tests" / "flow" / "compiled" not in request.path.parents:
         monkeypatch.setattr(lanes, "FLAGS", (*lanes.FLAGS, "-O0"))
     yield

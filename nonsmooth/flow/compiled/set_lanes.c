@@ -19,6 +19,8 @@
 #define CLOSE 1e-8 /* only where |h| is this much of its terms its time to zero is asked for */
 #define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
 #define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the interpreter sees to it */
+#define TURNED 1e-7 /* to this at least the direction is known in which a set is left */
+#define THIRD 10 /* what the last way leaves out is so many times what its terms suggest, or less */
 #define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
 
 enum { OFF, ON, LEAVING, POOLS };
@@ -246,6 +248,86 @@ INLINE T time_left(const T *a, const T *m, const T *h, T radius, I exact, T c) {
   return SELECT(exact, (c * radius + along) / (c * c - square), straight);
 }
 
+/* What remains of the way to h = 0 where M is isotropic, to second order in its length.
+ *
+ * With dt = |h| ds states and h have the rates |h| f(x, 0) + B(x) h, |h| has a.h - c |h|: linear in (h, |h|), with
+ * coefficients that change by as much as the states. Their integrals to h = 0 follow order by order from the frozen
+ * solution and its products; derivatives along the way are differences. What is left out is of third order. */
+typedef struct { T one[N], two[N], time, later; } Rest; /* by frozen a and M, what their change adds; times */
+
+/* y of L y = (b, t) with L = (-c, a; a, -c). */
+INLINE void solve_frozen(const T *a, T c, T per, const T *b, T *y) {
+  T along = c * b[K];
+  UNROLL for (int i = 0; i < K; i++) along += a[i] * b[i];
+  y[K] = -along * per;
+  UNROLL for (int i = 0; i < K; i++) y[i] = (a[i] * y[K] - b[i]) / c;
+}
+
+/* Integrals of products of two components of the frozen solution (h, |h|), which decays at rates c and c -+ |a|. */
+INLINE void frozen_products(const T *a, T c, const T *h, T radius, T p[K + 1][K + 1]) {
+  T size = length_of(a), u[K], across[K], along = BC(0);
+  UNROLL for (int i = 0; i < K; i++) {
+    u[i] = SELECT(size > 1e-100, a[i] / size, h[i] / radius);
+    along += u[i] * h[i];
+  }
+  UNROLL for (int i = 0; i < K; i++) across[i] = h[i] - along * u[i];
+  T slow = 0.5 * (along + radius), fast = 0.5 * (along - radius); /* of (u, 1) and of (u, -1) */
+  T ss = slow * slow / (2.0 * (c - size)), ff = fast * fast / (2.0 * (c + size)), sf = slow * fast / (2.0 * c);
+  T s = slow / (2.0 * c - size), f = fast / (2.0 * c + size);
+  UNROLL for (int i = 0; i < K; i++) {
+    UNROLL for (int j = 0; j < K; j++)
+      p[i][j] = u[i] * u[j] * (ss + ff + 2.0 * sf) + (u[i] * across[j] + across[i] * u[j]) * (s + f) + across[i] * across[j] / (2.0 * c);
+    p[i][K] = p[K][i] = u[i] * (ss - ff) + across[i] * (s - f);
+  }
+  p[K][K] = ss + ff - 2.0 * sf;
+}
+
+INLINE void second_order(const Lanes *s, const T *h, T radius, const T *a, T c, Rest *rest) {
+  T way[K + 1], p[K + 1][K + 1], g[K + 1][N], square = BC(0), along = c * radius, change[K + 1] = {BC(0)}, more[K + 1];
+  UNROLL for (int i = 0; i < K; i++) { square += a[i] * a[i]; along += a[i] * h[i]; }
+  T per = 1.0 / (c * c - square), back = -1.0 / radius;
+  way[K] = along * per;
+  UNROLL for (int i = 0; i < K; i++) way[i] = (h[i] + a[i] * way[K]) / c;
+  UNROLL for (int j = 0; j <= K; j++) {
+    T unit[K + 1];
+    UNROLL for (int i = 0; i <= K; i++) unit[i] = BC(i == j);
+    flow_values(s->x, s->q, UNPACK(unit), unit[K], g[j]);
+  }
+  frozen_products(a, c, h, radius, p);
+  UNROLL for (int n = 0; n < N; n++) {
+    rest->one[n] = rest->two[n] = BC(0);
+    UNROLL for (int j = 0; j <= K; j++) rest->one[n] += g[j][n] * way[j];
+  }
+  UNROLL for (int j = 0; j <= K; j++) { /* the change of all as the state moves along one component */
+    T b[K + 1], y[K + 1], w[K + 1], x[N], f[N], a1[K], m1[K * K], c1 = BC(0), turned = BC(0);
+    UNROLL for (int i = 0; i <= K; i++) { b[i] = BC(i == j); w[i] = p[i][j] - (j < K ? h[j] : radius) * way[i]; }
+    solve_frozen(a, c, per, b, y);
+    UNROLL for (int n = 0; n < N; n++) {
+      T direction = BC(0);
+      UNROLL for (int i = 0; i <= K; i++) direction += y[i] * g[i][n];
+      x[n] = s->x[n] - radius * direction;
+    }
+    flow_values(x, s->q, UNPACK(w), w[K], f);
+    frozen_values(x, s->q, LAMBDA(s->lam), a1, m1);
+    UNROLL for (int i = 0; i < K; i++) c1 += m1[i * K + i] * (1.0 / K);
+    UNROLL for (int i = 0; i < K; i++) {
+      change[i] += ((a1[i] - a[i]) * w[K] - (c1 - c) * w[i]) * back;
+      turned += (a1[i] - a[i]) * w[i];
+    }
+    change[K] += (turned - (c1 - c) * w[K]) * back;
+    UNROLL for (int n = 0; n < N; n++) {
+      T before = BC(0);
+      UNROLL for (int i = 0; i <= K; i++) before += w[i] * g[i][n];
+      rest->two[n] += (f[n] - before) * back;
+    }
+  }
+  solve_frozen(a, c, per, change, more);
+  UNROLL for (int n = 0; n < N; n++)
+    UNROLL for (int j = 0; j <= K; j++) rest->two[n] -= g[j][n] * more[j];
+  rest->time = way[K];
+  rest->later = -more[K];
+}
+
 /* Newton steps of the states onto h = 0; lanes that they do not lead there. */
 INLINE I project(Lanes *s, const Work *w, I which) {
   T h[K], g[K][N];
@@ -322,17 +404,29 @@ static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear)
   UNROLL for (int i = 0; i < K; i++) bend += ABS(later[i] - a[i]);
   UNROLL for (int i = 0; i < K * K; i++) bend += ABS(than[i] - m[i]);
   bend *= dt;
-  /* What turning could still do; in the exact case, what a change of a and M could. */
-  UNROLL for (int i = 0; i < K; i++) u[i] = SELECT(isotropic, mean[i] + bend / c, u[i]);
-  field_values(s->x, s->q, LAMBDA(u), other);
-  UNROLL for (int i = 0; i < N; i++) turn[i] = ABS(field[i] - other[i]);
-  field_values(end, s->q, LAMBDA(mean), other);
-  I close = bend <= REACHED * radius;
-  UNROLL for (int i = 0; i < N; i++) {
-    T allowed = EPSILON * (w->size + ABS(s->x[i]));
-    T whole = i < ND ? SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i])) : BC(0);
-    allowed += SELECT(isotropic, whole, REACHED * whole);
-    close &= (turn[i] + ABS(field[i] - other[i])) * dt <= allowed;
+  I close = bend <= REACHED * radius, exact = holds & isotropic;
+  if (any(which & exact)) {
+    Rest rest;
+    second_order(s, h, radius, a, c, &rest);
+    T part = THIRD * bend / radius, first = part * bend / radius; /* of the second order, and of the first */
+    T late = part * ABS(rest.later) + first * rest.time;
+    UNROLL for (int i = 0; i < N; i++) {
+      T whole = i < ND ? SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i])) : BC(0);
+      T third = MAX(part * ABS(rest.two[i]) + first * ABS(rest.one[i]), late * ABS(field[i]));
+      close &= ~exact | (I)(third <= whole + EPSILON * (w->size + ABS(s->x[i])));
+      end[i] = SELECT(exact, s->x[i] + (rest.one[i] + rest.two[i]), end[i]);
+    }
+    dt = SELECT(exact, rest.time + rest.later, dt);
+  }
+  if (any(which & ~exact)) {
+    field_values(s->x, s->q, LAMBDA(u), other);
+    UNROLL for (int i = 0; i < N; i++) turn[i] = ABS(field[i] - other[i]);
+    field_values(end, s->q, LAMBDA(mean), other);
+    UNROLL for (int i = 0; i < N; i++) {
+      T allowed = EPSILON * (w->size + ABS(s->x[i]));
+      T whole = i < ND ? SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i])) : BC(0);
+      close &= exact | (I)((turn[i] + ABS(field[i] - other[i])) * dt <= allowed + REACHED * whole);
+    }
   }
   met &= close | floor;
   *unclear |= met & ((I)(dt > left) | (floor & ~(I)(bend <= radius)));

@@ -3,7 +3,7 @@
 /* Coefficients of a step. */
 typedef struct {
   T c[N][P + 1], g[SLOTS][P + 1], unknowns[K][P + 1]; /* unknowns on the set; the direction when leaving it */
-  T allowed[N];
+  T allowed[N], level; /* of states, and of |h| */
   T radius, stretch, fall; /* |h|, or friction's limit; 1 over the time to a branch point; part that |h| may fall to */
 } Step;
 
@@ -60,6 +60,7 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   height_values(s->x, s->q, LAMBDA(s->lam), h, &gradient[0][0]);
   UNROLL for (int i = 0; i < K; i++) sum += weighed(gradient[i], e->allowed);
   const T *g = e->g[0];
+  e->level = sum;
   e->fall = SELECT(e->radius * (SAFETY * o->rtol) > LEFT * sum, BC(FALLEN), BC(FALL));
   if (mode == OFF) bound(g[P], g[P - 1], 1.0 / (sum / e->radius + o->rtol * ABS(g[0])), last, before);
   if (mode == LEAVING) bound(g[P - 2], g[P - 3], 1.0 / sum, last, before);
@@ -82,10 +83,17 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
 #endif
 }
 
+/* Where the last two terms, of a degree higher by ``more``, are 1. */
+INLINE T size_of(T last, T before, int more) {
+  T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / (P + more)), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1 + more));
+  return EXP2(MIN(h1, h2));
+}
+
 /* The coefficients of a step, and the size that they allow. */
 INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
   const Options *o = w->o;
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0), ends[4 * K], per = BC(1.0 / (SAFETY * o->rtol));
+  T turn = BC(1e-300), turn_before = BC(1e-300);
   e->stretch = mode == OFF ? stretch_of(s) : BC(0);
   if (mode == OFF) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], ends, &e->radius);
   if (mode == ON) on_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
@@ -103,7 +111,8 @@ INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite
     T one = mode == OFF ? ends[2 * i + 1] : e->unknowns[i][P], two = mode == OFF ? ends[2 * i] : e->unknowns[i][P - 1];
     sum += one + two;
     if (mode == OFF) { one = SELECT(s->behind, one, BC(0)); two = SELECT(s->behind, two, BC(0)); }
-    bound(one, two, per, &last, &before);
+    if (mode == LEAVING) bound(one, two, BC(1), &turn, &turn_before);
+    else bound(one, two, per, &last, &before);
   }
   *finite = ABS(sum) < INFINITY;
   if (mode == OFF) e->g[0][0] -= e->fall;
@@ -114,8 +123,13 @@ INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite
     UNROLL for (int k = 1; k <= P; k++) g[k] = SELECT(moves, g[k] * first, BC(0));
     g[0] = BC(1 - LIMIT_FALL);
   }
-  T h1 = LOG2(MIN(last, BC(1e300))) * (-1.0 / P), h2 = LOG2(MIN(before, BC(1e300))) * (-1.0 / (P - 1));
-  return EXP2(MIN(h1, h2));
+  T h = size_of(last, before, 0);
+  if (mode != LEAVING) return h;
+  /* Where the set is far behind at the end h has to be known to the tolerance, nearer its direction. */
+  T rate = e->g[0][0], part = rate / e->level;
+  T far = MIN(size_of(turn * (1 / TURNED), turn_before * (1 / TURNED), 0), size_of(turn * part, turn_before * part, 2));
+  far = SELECT((rate > 0) & (rate * far * far * (SAFETY * o->rtol) > LEFT * e->level), far, BC(0));
+  return MIN(h, MAX(far, size_of(turn * per, turn_before * per, 0)));
 }
 
 /* Roots ------------------------------------------------------------------------------------------ */
@@ -363,7 +377,8 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
   if (mode == OFF) {
     T height[K], g[K][N], scale = heights(s, w, height, g), radius = length_of(height);
     if (any(s->behind)) s->behind &= radius <= LEFT * scale;
-    I near = met | (live & ~stopped & ~last & (radius <= CLOSE * scale));
+    I small = (radius <= CLOSE * scale) | ((e.stretch > 0) & (radius * radius * radius <= o->rtol * scale * scale * scale));
+    I near = met | (live & ~stopped & ~last & small);
     if (any(near)) {
       gone = reach(s, w, near, &unclear) & ~unclear;
       if (any(gone)) unclear |= change_mode(s, w, gone, ENTRY, 1);

@@ -33,7 +33,8 @@ class SetProgram:
     ----------
     text : str
         C of ``off_jet``, ``on_jet``, ``leave_jet``, ``heights``, ``frozen_values``, ``field_values``,
-        ``stop_values``, ``slip_values``, ``off_check``, ``on_check``.
+        ``flow_values`` (|h| times the field, in h and |h|), ``stop_values``, ``slip_values``, ``off_check``,
+        ``on_check``.
     rows, on_rows : tuple of int
         Rows of the field that are not affine off the set and on it, which a step is checked with.
     bent_slip, bent_stops : bool
@@ -88,6 +89,9 @@ class _Writer:
         rates = ca.substitute(self.off_layer, self.lam, ca.SX.zeros(k, 1))
         program.add("frozen_values", a=rates, m=-self.pull)
         program.add("field_values", f=self.off_field)
+        own = ca.substitute(self.off_field, self.lam, ca.SX.zeros(k, 1))
+        flow = self.stretch * own + ca.jacobian(self.off_field, self.lam) @ self.lam
+        program.add("flow_values", f=flow)
         program.add("stop_values", value=self.stops, gradient=_gradient(self.stops, x))
         used = ca.vertcat(self.nu_at, self.factor)
         program.add("slip_values", value=used, gradient=_gradient(used, x))
@@ -226,10 +230,10 @@ class _Writer:
         """The next coefficients of states, from those of (1 - w s/3)^2 times the field: what is known
         early stands apart from the last, which everything waits for."""
         w, per = self.stretch, 1.0 / len(fields)
-        weights = (1.0, w * (-2 / 3), w * w * (1 / 9))
+        weights = (per, w * (-2 / 3 * per), w * w * (1 / 9 * per))
         result = []
         for row in zip(*reversed(fields[-3:]), strict=True):
-            terms = [per * (weights[i] * value_of(c)) for i, c in enumerate(row) if c is not None]
+            terms = [weights[i] * value_of(c) for i, c in enumerate(row) if c is not None]
             result.append(clean(sum(terms[1:], terms[0])) if terms else None)
         return result
 

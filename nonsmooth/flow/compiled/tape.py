@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import fields, replace
 from functools import lru_cache
 from typing import Any
@@ -144,6 +143,19 @@ def values_structure(v: Values, kept: list[NDArray[Any]]) -> ValuesStructure:
     kept += arrays
     sizes = (len(v.op), len(v.still), len(v.moving), len(v.free), len(v.outputs), 0)
     return ValuesStructure(*sizes, *[a.ctypes.data for a in arrays])
+
+
+class _Held:
+    """Something of C's that is freed when a block ends."""
+
+    def __init__(self, pointer: int, free: Callable[[int], Any]):
+        self.pointer, self.free = pointer, free
+
+    def __enter__(self) -> int:
+        return self.pointer
+
+    def __exit__(self, *_: object) -> None:
+        self.free(self.pointer)
 
 
 #: Steps of a system, in all its runs, after which a program is generated for it.
@@ -301,23 +313,16 @@ class TapeEngine:
             return None
         return np.array([*self.system.parse_letters(options.start_mode), 0], np.int8)
 
-    @contextmanager
-    def _table(self) -> Iterator[int]:
-        table = library().table_new(self.system.surface_count + len(self.system.impacts))
-        try:
-            yield table
-        finally:
-            library().table_free(table)
+    def _table(self) -> _Held:
+        made, width = library(), self.system.surface_count + len(self.system.impacts)
+        return _Held(made.table_new(width), made.table_free)
 
-    @contextmanager
-    def _state(self, table: int) -> Iterator[int]:
-        state = library().run_new(ctypes.byref(self._c), table)
+    def _state(self, table: int) -> _Held:
+        made = library()
+        state = made.run_new(ctypes.byref(self._c), table)
         if not state:
             raise MemoryError("the compiled engine: no memory for a run of this system")
-        try:
-            yield state
-        finally:
-            library().run_free(state)
+        return _Held(state, made.run_free)
 
     def _read(self, state: int) -> tuple[list[float], list[int], list[int], list[int]]:
         numbers, counts = (_D * 3)(), (_I64 * 12)()

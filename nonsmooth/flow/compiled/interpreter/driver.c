@@ -335,8 +335,8 @@ static void serve(Run *r, int row) {
 static int advance(Run *r, const Expansion *e, double dt) {
   int n = n_of(r), stride = stride_of(r), kept = 0;
   double *x = r->at_work;
-  for (int i = 0; i < n; i++) x[i] = value_at(e->states + (int64_t)i * stride, order_of(r), dt);
-  if (!finite_all(x, n)) { finish(r, NOT_FINITE, STATE, 0); return 0; }
+  for (int i = 0; i < dimension_of(r); i++) x[i] = value_at(e->states + (int64_t)i * stride, order_of(r), dt);
+  if (!finite_all(x, dimension_of(r))) { finish(r, NOT_FINITE, STATE, 0); return 0; }
   if (r->o.dense) {
     int64_t k = r->out.steps++;
     r->out.start[k] = r->t;
@@ -344,7 +344,7 @@ static int advance(Run *r, const Expansion *e, double dt) {
     memcpy(r->out.coefficients + k * n * stride, e->states, sizeof(double) * n * stride);
   }
   if (r->times) sample_step(r, e, dt);
-  memcpy(r->x, x, sizeof(double) * n);
+  memcpy(r->x, x, sizeof(double) * dimension_of(r));
   r->t += dt;
   r->step_count++;
   r->segment_steps++;

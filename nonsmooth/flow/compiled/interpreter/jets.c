@@ -160,7 +160,7 @@ static void jets(Run *r, Expansion *e) {
 static int is_finite(const Run *r, const Expansion *e) {
   int order = order_of(r), stride = stride_of(r);
   double one = 0, two = 0, three = 0;
-  for (int i = 0; i < n_of(r); i++) {
+  for (int i = 0; i < dimension_of(r); i++) {
     const double *c = e->states + (int64_t)i * stride;
     one += 0 * c[order]; two += 0 * c[order - 1]; three += 0 * c[1];
   }

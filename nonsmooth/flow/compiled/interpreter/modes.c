@@ -169,9 +169,12 @@ static void guard_sums(Run *r, const Expansion *e, const double *vector, int fin
 /* The values that an expansion's yardsticks are made of; its sets are aimed at. */
 static void weigh_point(Run *r, Expansion *e, const double *x, const double *unknowns) {
   if (e->l.is_free) {
-    set_inputs(r, x, held_of(r, e->l.letter), unknowns);
+    const double *held = held_of(r, e->l.letter);
     r->stamp++;
-    run_free_point(&r->s->point, r->input, r->p, r->point);
+    if (r->s->point.free_count) {
+      set_inputs(r, x, held, unknowns);
+      run_free_point(&r->s->point, r->input, r->p, r->point);
+    }
   } else yardsticks(r, x, held_of(r, e->l.letter), unknowns);
   e->stamp = r->stamp;
 }

@@ -189,6 +189,8 @@ static double guard_root(Run *r, Expansion *e, int row, int drop, double h) {
     if (value == 0) return -1;
     c = g + drop;
   }
+  /* Most guards have no root, and all their terms: that is seen here, with the length known. */
+  if (!drop && c[0] > rest_of(c, order_of(r), h)) return -1;
   double dt = first_root(c, order_of(r) - drop, h);
   return kind == SLIP_GUARD && dt > 0 ? slip_root(r, e, row, dt, h) : dt; /* squares lose digits */
 }

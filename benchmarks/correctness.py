@@ -62,7 +62,7 @@ def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, 
     mpmath is the judge of every start; the engine at a tight tolerance, which found the boundaries,
     is not, since it may be wrong in the same way.
     """
-    low, high, a, b = _pairs(name, starts, codes, each)
+    low, high, a, b = pairs(name, starts, codes, each, GAP)
     solve = ours.make(name, DEFAULT)
     keys = [
         " | ".join(sorted((letters(int(u)), letters(int(v))))) for u, v in zip(a, b, strict=True)
@@ -83,11 +83,14 @@ def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, 
     return result
 
 
-def _pairs(name: str, starts: Array, codes: Codes, each: int) -> tuple[Array, Array, Codes, Codes]:
-    """Bisect segments between starts of different itineraries until their ends are GAP apart.
+def pairs(
+    name: str, starts: Array, codes: Codes, each: int, gap: float
+) -> tuple[Array, Array, Codes, Codes]:
+    """Bisect segments between starts of different itineraries until their ends are ``gap`` apart.
 
-    A third itinerary met on the way replaces one end, so that what is left are neighbours. An end may
-    lie anywhere within GAP of the boundary, also in a sliver far thinner than GAP.
+    With a gap of zero they are neighbours: no number lies between them. A third itinerary met on the way
+    replaces one end, so that what is left are neighbours. An end may lie anywhere within the gap of the
+    boundary, also in a sliver far thinner than that.
     """
     rng = np.random.default_rng(6)
     low, high = [], []
@@ -98,10 +101,12 @@ def _pairs(name: str, starts: Array, codes: Codes, each: int) -> tuple[Array, Ar
     x, y = np.concatenate(low), np.concatenate(high)
     solve = ours.make(name, TIGHT)
     a, b = solve(x).itinerary, solve(y).itinerary
-    while np.abs(x - y).max() > GAP:
+    while True:
         middle = landings(0.5 * (x[:, 1] + y[:, 1]), 0.5 * (x[:, 4] + y[:, 4]))
+        between = (middle != x).any(axis=1) & (middle != y).any(axis=1)
+        if not (between & (np.abs(x - y).max(axis=1) > gap)).any():
+            return x, y, a, b
         c = solve(middle).itinerary
         left = c != a
         y[left], b[left] = middle[left], c[left]
         x[~left] = middle[~left]
-    return x, y, a, b

@@ -13,6 +13,7 @@ from ..flow.simulate import simulate
 from ..model import Array, FilippovSystem, NonsmoothError, OptionError, explain
 from ..model.checks import real_array
 from ..model.variational import plain_field, variational_field
+from .mirrors import mirrored
 from .periodic import PeriodicOrbit
 
 #: The other half may miss the mirror image of the first by this part of the orbit, and of what it magnifies.
@@ -67,7 +68,7 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
     ------
     OptionError
     """
-    if not orbit.symmetric:
+    if not orbit.symmetric or _fields_agree(orbit):
         return
     try:
         closed = any("c" in leg.mode for leg in orbit.legs)  # which contact that is, a run says
@@ -88,6 +89,37 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
             advice="Leave symmetry= out: the whole orbit is solved for then.",
         )
     )
+
+
+def _fields_agree(orbit: PeriodicOrbit) -> bool:
+    """Whether the fields of all modes are those of their mirror images, beside the orbit.
+
+    That is enough where nothing jumps, and far quicker than to fly; where they are not, flying decides.
+    """
+    problem, p, system = orbit.problem, orbit.parameter_vector, orbit.system
+    legs, wrap, n = problem.legs, problem.wrap, system.dimension
+    if system.impacts or system.resets or problem.symmetry is None:
+        return False
+    key = ("modes and their mirror images", problem.symmetry.tobytes(), legs)
+    modes = system.cached(
+        key, lambda: {leg.mode: (i, mirrored(problem, leg).mode) for i, leg in enumerate(legs)}
+    )
+    sizes = problem.scales(orbit.unknowns)[: problem.dimension]
+    away = 0.1 * sizes * np.cos(1.0 + np.arange(sizes.size))
+    try:
+        for mode, (i, other) in modes.items():
+            x = orbit.evaluation.starts[i] + away
+            image = wrap @ x
+            image[-1] += problem.advance(p)[0]
+            one, two = variational_field(system, mode), variational_field(system, other)
+            here = one.rate.copied(one.states_at(x, p), p)[0][:n, 0]
+            there = two.rate.copied(two.states_at(image, p), p)[0][:n, 0]
+            miss, rates = np.abs(there - wrap[:n, :n] @ here), np.abs(here) + np.abs(there)
+            if not (miss <= 1e-10 * (rates + rates.max() * sizes[:n] / sizes[:n].max())).all():
+                return False
+    except NonsmoothError:
+        return False
+    return True
 
 
 def _miss_of_legs(orbit: PeriodicOrbit) -> tuple[float, str]:

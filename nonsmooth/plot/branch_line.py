@@ -65,7 +65,7 @@ def line_of(
     ...                       parameters={mu: 0.5})
     >>> fold = ns.continue_equilibrium(s, [0.7, 1.0], "mu", bounds=(-1, 1))
     >>> samples = line_of(fold, lambda at: at.point[0])
-    >>> max(abs(sample.value - sample.height**2) for sample in samples) < 1e-12
+    >>> all(abs(sample.value - sample.height**2) < 1e-12 for sample in samples)
     True
     """
     nodes = [

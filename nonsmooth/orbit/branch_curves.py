@@ -167,6 +167,8 @@ def follow_branch(
 
     With ``away`` one way only, from an event.
     """
+    if not isinstance(through, (bool, np.bool_)):
+        raise OptionError(f"through: expected True or False, received {through!r}.")
     bar = progress_bar(progress)
 
     def report(point: Point) -> None:

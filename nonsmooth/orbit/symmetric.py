@@ -5,6 +5,9 @@ The equations of a half are solved whether or not the system has the symmetry, s
 
 from __future__ import annotations
 
+from itertools import pairwise
+
+import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -12,6 +15,7 @@ from ..flow.fixed import flow_for
 from ..flow.simulate import simulate
 from ..model import Array, FilippovSystem, NonsmoothError, OptionError, explain
 from ..model.checks import real_array
+from ..model.evaluators import Evaluator
 from ..model.variational import plain_field, variational_field
 from .mirrors import mirrored
 from .periodic import PeriodicOrbit
@@ -68,7 +72,10 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
     ------
     OptionError
     """
-    if not orbit.symmetric or _fields_agree(orbit):
+    if not orbit.symmetric:
+        return
+    surface = _surface_missed(orbit)
+    if not surface and _fields_agree(orbit):
         return
     try:
         closed = any("c" in leg.mode for leg in orbit.legs)  # which contact that is, a run says
@@ -78,17 +85,44 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
             miss, where = _miss_of_run(orbit), "its end"
     except NonsmoothError as error:
         miss, where = np.inf, str(error)
-    if miss <= _MISS:
+    if miss <= _MISS and not surface:
         return
+    received = f"one for which the other half of the orbit is off by {miss:.2g} of it ({where})"
+    if surface:
+        received = f"one for which events of the other half of the orbit are not on {surface} = 0"
     later = " half a forcing period later" if orbit.system.time_dependent else ""
     raise OptionError(
         explain(
             "symmetry",
             expected=f"a matrix that maps motions of the system to motions{later}",
-            received=f"one for which the other half of the orbit is off by {miss:.2g} of it ({where})",
+            received=received,
             advice="Leave symmetry= out: the whole orbit is solved for then.",
         )
     )
+
+
+def _surface_missed(orbit: PeriodicOrbit) -> str:
+    """Name of a surface on which events of the other half should be and are not; empty for none."""
+    system, p, m = orbit.system, orbit.parameter_vector, orbit.system.surface_count
+    legs, count = orbit.legs, len(orbit.problem.legs)
+    units = orbit.problem.scales(orbit.unknowns)[: system.dimension]
+    surfaces = system.cached("surfaces and their gradients", lambda: _surfaces(system))
+    for leg, after in pairwise([*legs[count - 1 :], legs[0]]):
+        on = [k for k in range(m) if leg.mode[k] != after.mode[k] or after.mode[k] == "s"]
+        if not on or leg.kind in ("reset", "impact"):
+            continue
+        h, gradient = surfaces.copied(system.extended_point(after.start, after.t), p)
+        allowed = _MISS * np.abs(gradient[:, : units.size]) @ units
+        for k in on:
+            if not abs(h[k, 0]) <= allowed[k]:
+                return system.surface_names[k]
+    return ""
+
+
+def _surfaces(system: FilippovSystem) -> Evaluator:
+    h = ca.vertcat(*[system.surface_function(k) for k in range(system.surface_count)])
+    gradient = lambda: [h, ca.jacobian(h, system.extended_states)]
+    return Evaluator(system.function("surfaces and their gradients", gradient))
 
 
 def _fields_agree(orbit: PeriodicOrbit) -> bool:

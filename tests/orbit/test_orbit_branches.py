@@ -352,3 +352,9 @@ def test_an_event_at_which_the_equations_are_singular_is_where_the_branch_is_los
     branch = ns.continue_orbit(orbit, "b", bounds=(-0.5, 1.0))
     assert len(branch.events) == 1 and 0 < branch.events[0].parameter < 1e-7
     assert branch[1e-3].period == pytest.approx(orbit.period, rel=1e-11)
+
+
+def test_through_is_a_truth_value():
+    half = ns.periodic_orbit(scalar_relay(), [0.5])
+    with pytest.raises(ns.OptionError, match="through: expected True or False, received 'no'"):
+        ns.continue_orbit(half, "A", bounds=(1.0, 4.0), through="no")

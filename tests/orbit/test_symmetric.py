@@ -54,3 +54,18 @@ def test_walls_that_are_no_mirror_images_are_refused_and_others_are_not():
 def test_a_matrix_that_is_no_reflection_is_refused(matrix):
     with pytest.raises(ns.OptionError, match=r"a matrix \(1, 1\) whose square is 1"):
         ns.periodic_orbit(scalar_relay(), [0.5], symmetry=matrix)
+
+
+@pytest.mark.parametrize("level", [0.0, 0.2])
+def test_a_surface_that_is_no_mirror_image_is_refused(level):
+    """Forced friction on a belt of velocity ``level``: the fields are odd, the surface only at rest."""
+    slides = [[V, 2 * ca.cos(1.3 * T) - X - 0.2 * V + sign * 0.3] for sign in (-1, 1)]
+    system = ns.FilippovSystem([X, V], surface=V - level, above=slides[0], below=slides[1], time=T)
+    half = lambda: ns.periodic_orbit(system, [3.2, 0.0], itinerary="-", symmetry="odd")
+    if not level:
+        assert half().itinerary == "- +"
+        return
+    with pytest.raises(
+        ns.OptionError, match="events of the other half of the orbit are not on h0 = 0"
+    ):
+        half()

@@ -1,7 +1,7 @@
 """What tests run under besides what is said in the conftest.py above: property tests that repeat.
 
 The default hypothesis profile draws the same examples every time, so a clone passes or fails like
-any other: 30 of each property, or as many as hypothesis finds good (100) with
+any other: 15 of each property, or as many as hypothesis finds good (100) with
 `HYPOTHESIS_PROFILE=whole`, which `make check` and CI take. `HYPOTHESIS_PROFILE=explore` draws new
 ones, and many more, to look for a counterexample.
 """
@@ -13,7 +13,7 @@ from hypothesis import settings
 
 from tests.browser import opened
 
-settings.register_profile("quick", derandomize=True, deadline=None, max_examples=30)
+settings.register_profile("quick", derandomize=True, deadline=None, max_examples=15)
 settings.register_profile("whole", derandomize=True, deadline=None)
 settings.register_profile("explore", deadline=None, max_examples=2000, print_blob=True)
 settings.load_profile(os.environ.get("HYPOTHESIS_PROFILE", "quick"))

@@ -7,6 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from nonsmooth.plot import style
+from nonsmooth.plot.labels import Labels
+
 from . import gpu, orbits, space, theorems
 
 #: What the project asks of itself, and whether more or less is better.
@@ -351,30 +354,29 @@ def pictures(results: dict[str, Any], folder: Path) -> list[Path]:
     bounces = results.get("bounces", {})
     if not bounces:
         return []
-    from matplotlib.figure import Figure
-
-    figure = Figure(figsize=(9.0, 4.2), dpi=110, layout="constrained")
+    figure = style.new_figure((7.0, 3.6))
     axes = figure.subplots(1, len(bounces), sharey=True, squeeze=False)[0]
     for axis, (name, section) in zip(axes, bounces.items(), strict=True):
         _work_precision(axis, name, section)
     axes[0].set_ylabel("processor time per bounce [s]")
-    figure.legend(
-        *axes[0].get_legend_handles_labels(), loc="outside lower center", ncols=3, fontsize=8
+    figure.supxlabel(
+        "largest error, drawn at most at $10^{-4}$; circled: wrong itineraries", fontsize=9
     )
     path = folder / "work_precision.png"
-    figure.savefig(path)
+    figure.savefig(path, dpi=200)
     return [path]
 
 
+#: Name, colour and mark of each solver in the picture.
 _MARKS = {
-    "nonsmooth": ("C0", "o"),
-    "nonsmooth, reference driver": ("C0", "x"),
-    MODES: ("C1", "s"),
-    "heyoka, one integrator and callbacks": ("C1", "^"),
-    "heyoka, 8 lanes per mode": ("C1", "v"),
-    "scipy DOP853": ("C2", "D"),
-    "scipy DOP853, numba": ("C2", "+"),
-    "diffrax Dopri8": ("C3", "*"),
+    "nonsmooth": ("nonsmooth", style.BLUE, "o"),
+    "nonsmooth, reference driver": ("reference driver", style.BLUE, "x"),
+    MODES: ("heyoka, each mode", style.VERMILLION, "s"),
+    "heyoka, one integrator and callbacks": ("heyoka, callbacks", style.VERMILLION, "^"),
+    "heyoka, 8 lanes per mode": ("heyoka, 8 lanes", style.VERMILLION, "v"),
+    "scipy DOP853": ("scipy", style.GREEN, "D"),
+    "scipy DOP853, numba": ("scipy, numba", style.GREEN, "+"),
+    "diffrax Dopri8": ("diffrax", style.PURPLE, "*"),
 }
 
 
@@ -383,19 +385,21 @@ _WORST = 1e-4
 
 
 def _work_precision(axis: Any, name: str, section: dict[str, Any]) -> None:
-    """Time against the largest error; rows with wrong itineraries are hollow."""
+    """Time against the largest error; rows with wrong itineraries are circled."""
+    labels = Labels(axis)
     for label, s in section["solvers"].items():
         if "rows" not in s:
             continue
-        colour, mark = _MARKS.get(label, ("grey", "."))
+        called, colour, mark = _MARKS.get(label, (label, style.GREY, "."))
         rows = sorted(s["rows"], key=lambda r: -r["tolerance"])
         x, y = [min(r["error"], _WORST) for r in rows], [1 / r["rate"] for r in rows]
-        axis.loglog(x, y, color=colour, marker=mark, ms=4, lw=0.8, label=label)
+        axis.loglog(x, y, color=colour, marker=mark, ms=4, lw=0.8)
+        right = [(e, t) for e, t, r in zip(x, y, rows, strict=True) if not r["wrong"]]
+        labels.name(called, right or [*zip(x, y, strict=True)], colour)
         wrong = [(e, t) for e, t, r in zip(x, y, rows, strict=True) if r["wrong"]]
         if wrong:
-            axis.loglog(*zip(*wrong, strict=True), "o", color=colour, ms=9, mfc="none", lw=0)
-    axis.axvline(section["target"], color="grey", lw=0.6, ls=":")
+            axis.loglog(*zip(*wrong, strict=True), "o", color=colour, ms=8, mfc="none", lw=0)
+    axis.axvline(section["target"], color=style.GREY, lw=0.6, ls=":")
     axis.invert_xaxis()
-    axis.set_title(f"{name} bounce", fontsize=10)
-    axis.set_xlabel("largest error, or 1e-4 (circled: wrong itineraries)")
+    axis.set_title(f"{name} bounce")
     axis.grid(True, which="major", lw=0.3)

@@ -17,7 +17,7 @@ from ..maps.outcomes import OutcomeMap, outcome_map
 from .choices import Chosen, chosen_model, ground_arguments, require_scale
 from .report import opening, print_json
 from .starts import NAMES
-from .values import assignment, in_si, span
+from .values import SYSTEMS, assignment, in_si, span
 
 HELP = "what becomes of landings over two inputs, to a file"
 ABOUT = "Map the itinerary, or a quantity at lift-off, of one bounce over two inputs."
@@ -72,7 +72,9 @@ def run(args: argparse.Namespace) -> int:
         from ..plot import outcome_map as draw
 
         curve = _curve(result) if args.show == "region" else None
-        draw(result, _QUANTITIES[args.show], curve=curve).savefig(args.output, dpi=150)
+        speeds = SYSTEMS[args.units]["speed"]
+        picture = draw(result, _QUANTITIES[args.show], curve=curve, speeds=speeds)
+        picture.savefig(args.output, dpi=150)
     shares = {name: round(share, 6) for name, share in result.share().items()}
     if not result.lift_offs.complete.all():
         shares["no lift-off"] = round(1.0 - float(result.lift_offs.complete.mean()), 6)

@@ -112,7 +112,7 @@ def _look_at_range(law: BounceLaw, xdot: Array, ydot: Array, spin: Array) -> Non
     inside = law.covers.holds(xdot, ydot, spin)
     if not np.all(inside):
         warnings.warn(
-            f"{type(law).__name__}: {1 - np.mean(inside):.0%} of the landings are outside those that it "
+            f"{type(law).__name__}: {np.size(inside) - np.sum(inside)} of {np.size(inside)} landings are outside those that it "
             "was fitted to; their rebounds are extrapolations.",
             ExtrapolationWarning,
             stacklevel=3,

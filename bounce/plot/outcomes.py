@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,8 +14,11 @@ import nonsmooth as ns
 from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
+from ..units import UNITS
 
 style = ns.plot.style
+Array = NDArray[np.float64]
+Units = Mapping[str, tuple[str, str, float]]
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -57,7 +60,6 @@ _GOLF = {
     "spin": ("backspin", "rpm", math.pi / 30),
 }
 _LABELS = {
-    **{name: f"{what} ({unit})" for name, (what, unit, _) in _GOLF.items()},
     "xdot": r"speed $\dot X_0$",
     "ydot": r"normal speed $\dot Y_0$",
     "omega": r"spin $\Omega_0$",
@@ -81,6 +83,7 @@ def outcome_map(
     quantity: str = "itinerary",
     *,
     curve: DividingCurve | None = None,
+    speeds: str = "m/s",
     ax: Axes | None = None,
 ) -> Figure:
     """Draw a map of outcomes: regions by name, or a quantity at lift-off.
@@ -93,6 +96,8 @@ def outcome_map(
         ``omega`` is the spin at lift-off.
     curve : DividingCurve, optional
         Drawn over a map of ``xdot`` and ``omega`` instead of the contour $H_F = 0$ of the map.
+    speeds : {"m/s", "km/h", "mph", "ft/s"}
+        Unit of speeds on a map of golfers' landings.
     ax : matplotlib Axes, optional
         Draw here instead of in a new figure.
 
@@ -104,7 +109,7 @@ def outcome_map(
     Raises
     ------
     nonsmooth.OptionError
-        Another quantity, or a curve over other axes.
+        Another quantity or unit, or a curve over other axes.
 
     Examples
     --------
@@ -122,26 +127,28 @@ def outcome_map(
         raise ns.OptionError(
             f"curve: expected a map over xdot and omega, received one over {outcomes.names}."
         )
+    units = _golfers(speeds)
+    x, y = _axes(outcomes, units)
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
         if quantity == "itinerary":
-            _regions(ax, outcomes)
+            _regions(ax, outcomes, x, y)
         else:
-            _field(figure, ax, outcomes, quantity)
+            _field(figure, ax, outcomes, quantity, x, y, units)
         if curve is not None:
             draw_curve(ax, outcomes.names, curve)
         else:
-            _contour(ax, outcomes)
+            _contour(ax, outcomes, x, y)
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
-            axis.set_label_text(_LABELS.get(name, name))
-        x, y = _axes(outcomes)
+            what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
+            axis.set_label_text(f"{what} ({unit})" if unit else what)
         ax.set_xlim(*_ends(x))
         ax.set_ylim(*_ends(y))
-        ax.set_title(_title(outcomes), fontsize=9, loc="left", color="0.3")
+        ax.set_title(_title(outcomes, units), fontsize=9, loc="left", color="0.3")
     return figure
 
 
-def _regions(ax: Axes, outcomes: OutcomeMap) -> None:
+def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> None:
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -149,13 +156,11 @@ def _regions(ax: Axes, outcomes: OutcomeMap) -> None:
     colours = [COLOURS.get(name) or next(spare) for name in outcomes.regions]
     palette = ListedColormap(["#FFFFFF", *colours])
     limits: dict[str, Any] = dict(vmin=-1.5, vmax=len(colours) - 0.5)
-    ax.pcolormesh(
-        *_axes(outcomes), outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits
-    )
+    ax.pcolormesh(x, y, outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits)
     narrow: list[tuple[int, Patch, NDArray[np.bool_]]] = []
     for code, (name, colour) in enumerate(zip(outcomes.regions, colours, strict=True)):
         inside = outcomes.code == code
-        if not _named(ax, outcomes, inside, name, colour):
+        if not _named(ax, x, y, inside, name, colour):
             patch = Patch(facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name))
             narrow.append((int(inside.sum()), patch, inside))
     narrow.sort(key=lambda entry: -entry[0])
@@ -165,7 +170,7 @@ def _regions(ax: Axes, outcomes: OutcomeMap) -> None:
         if len(rest) > _BESIDE:
             handles.append(Patch(alpha=0, label=f"and {len(rest)} more"))
             rest = []
-        labels, (x, y) = ns.plot.labels.Labels(ax), _axes(outcomes)
+        labels = ns.plot.labels.Labels(ax)
         for _, patch, inside in rest:
             row, column = np.nonzero(inside)
             labels.name(str(patch.get_label()), np.column_stack([x[column], y[row]]))
@@ -181,9 +186,7 @@ def _short(name: str) -> str:
     return name if len(phases) <= 8 else " ".join([*phases[:6], "..", phases[-1]])
 
 
-def _named(
-    ax: Axes, outcomes: OutcomeMap, inside: NDArray[np.bool_], name: str, colour: str
-) -> bool:
+def _named(ax: Axes, x: Array, y: Array, inside: NDArray[np.bool_], name: str, colour: str) -> bool:
     """Write a region's name where it is widest, if there is room for it."""
     from scipy.ndimage import distance_transform_edt, minimum_filter
 
@@ -196,14 +199,21 @@ def _named(
     row, column = np.unravel_index(int(np.argmax(room)), room.shape)
     if room.max() < 0.03 * min(inside.shape):
         return False
-    x, y = _axes(outcomes)
     place = (x[column], y[row])
     text = "white" if _luminance(colour) < 0.2 else "black"
     style.write(ax, place, name, color=text, zorder=6, fontsize=_POINTS, fontweight="bold")
     return True
 
 
-def _field(figure: Figure, ax: Axes, outcomes: OutcomeMap, quantity: str) -> None:
+def _field(
+    figure: Figure,
+    ax: Axes,
+    outcomes: OutcomeMap,
+    quantity: str,
+    x: Array,
+    y: Array,
+    units: Units,
+) -> None:
     from_lift_off = outcomes.lift_offs.omega if quantity == "omega" else None
     values = from_lift_off if from_lift_off is not None else getattr(outcomes, quantity)
     values = np.asarray(values, dtype=float)
@@ -213,29 +223,31 @@ def _field(figure: Figure, ax: Axes, outcomes: OutcomeMap, quantity: str) -> Non
     if quantity == "lift_off_angle" and _golf(outcomes):
         values, label = np.degrees(values), "angle above +x at lift-off (deg)"
     if quantity in ("slip", "omega"):
-        bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
-        options = dict(cmap="PuOr_r", vmin=-bound, vmax=bound)
         spin = (
             r"spin at lift-off $R\,\omega_F$" if _golf(outcomes) else r"spin at lift-off $\Omega_F$"
         )
         label = "slip at lift-off $H_F$" if quantity == "slip" else spin
-        label += " (m/s)" if _golf(outcomes) else ""
+        if _golf(outcomes):
+            _, unit, size = units["speed"]
+            values, label = values / size, f"{label} ({unit})"
+        bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
+        options = dict(cmap="PuOr_r", vmin=-bound, vmax=bound)
     elif quantity == "spin_reversal":
         options, label = dict(cmap="cividis", vmin=0, vmax=1), "spin reverses"
-    mesh = ax.pcolormesh(*_axes(outcomes), values, shading="nearest", rasterized=True, **options)
+    mesh = ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
     bar = figure.colorbar(mesh, ax=ax, label=label)
     if quantity == "spin_reversal":
         bar.set_ticks([0, 1], labels=["no", "yes"])
 
 
-def _contour(ax: Axes, outcomes: OutcomeMap) -> None:
+def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> None:
     """Where the slip at lift-off changes its sign; what rolls at lift-off has none."""
     slip = np.where(outcomes.lift_offs.complete, outcomes.slip, np.nan)
     rolls = np.array([*(name.endswith("R") for name in outcomes.regions), False])[outcomes.code]
     size = np.abs(np.nan_to_num(slip)).max()
     slip = np.where(rolls | (np.abs(slip) < 1e-12 * size), 0.0, slip)
     if np.any(slip < 0) and np.any(slip > 0):
-        lines = ax.contour(*_axes(outcomes), slip, levels=[0.0], colors="black", linewidths=1.6)
+        lines = ax.contour(x, y, slip, levels=[0.0], colors="black", linewidths=1.6)
         lines.set(path_effects=style.halo(3.0))
         _key(ax, {"slip at lift-off $H_F=0$": lines.legend_elements()[0][0]})
 
@@ -268,14 +280,14 @@ def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> None:
     _key(ax, lines)
 
 
-def _title(outcomes: OutcomeMap) -> str:
+def _title(outcomes: OutcomeMap, units: Units) -> str:
     options = {n: v for n, v in outcomes.model.options().items() if isinstance(v, float)}
     values = {**outcomes.model.values, **options, **outcomes.fixed}
     unchanged = dict(x=0.0, y=0.0, G=0.0, slope=0.0, inertia=0.4)
     shown = {n: v for n, v in values.items() if n not in outcomes.names and unchanged.get(n) != v}
     parts = []
     for name, value in shown.items():
-        _, unit, size = _GOLF.get("angle" if name == "tilt" else name, ("", "", 1.0))
+        _, unit, size = units.get("angle" if name == "tilt" else name, ("", "", 1.0))
         parts.append(f"{name} = {value / size:g} {unit}".rstrip())
     return f"{type(outcomes.model).__name__}: " + ", ".join(parts)
 
@@ -285,9 +297,17 @@ def _golf(outcomes: OutcomeMap) -> bool:
     return bool({*outcomes.names, *outcomes.fixed} & set(_GOLF))
 
 
-def _axes(outcomes: OutcomeMap) -> list[NDArray[np.float64]]:
+def _golfers(speeds: str) -> Units:
+    """Golfers' axes with speeds in a unit."""
+    known = UNITS["speed"]
+    if speeds not in known:
+        raise ns.OptionError(f"speeds: expected one of {tuple(known)}, received {speeds!r}.")
+    return {**_GOLF, "speed": (_GOLF["speed"][0], speeds, known[speeds])}
+
+
+def _axes(outcomes: OutcomeMap, units: Units) -> list[Array]:
     """Axes in the units of their labels."""
-    sizes = [_GOLF.get(name, ("", "", 1.0))[2] for name in outcomes.names]
+    sizes = [units.get(name, ("", "", 1.0))[2] for name in outcomes.names]
     return [values / size for values, size in zip(outcomes.axes, sizes, strict=True)]
 
 

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import bounce
+import nonsmooth as ns
 
 KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5".split()
 
@@ -17,6 +18,27 @@ def test_map_pictures(command, tmp_path, show):
     over = ["--over", "xdot=-2:2:20", "--over", "omega=-4:4:20"]
     code, out, _ = command("map", *KV, *over, "--show", show, "--output", path)
     assert code == 0 and path.stat().st_size > 5000 and "S+ R S-" in out
+
+
+def test_a_map_is_drawn_in_the_units_asked_for(command, tmp_path, monkeypatch):
+    asked = []
+    drawn = bounce.plot.outcome_map
+    monkeypatch.setattr(
+        bounce.plot, "outcome_map", lambda *a, **k: asked.append(drawn(*a, **k)) or asked[-1]
+    )
+    over = ["--over", "speed=40mph:80mph:12", "--over", "angle=20deg:60deg:9"]
+    code, *_ = command("map", *over, "--units", "us", "--output", tmp_path / "map.png")
+    ax = asked[0].axes[0]
+    assert code == 0 and ax.get_xlabel() == "landing speed (mph)"
+    assert ax.get_xlim() == pytest.approx((40.0, 80.0))
+    with pytest.raises(ns.OptionError, match="speeds: expected one of"):
+        drawn(
+            bounce.outcome_map(
+                bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5),
+                {"xdot": [0, 1], "omega": [0, 1]},
+            ),
+            speeds="knots",
+        )
 
 
 def test_map_arrays(command, tmp_path):
@@ -32,7 +54,7 @@ def test_its_own_default_is_a_turf(command, tmp_path):
     path = tmp_path / "map.png"
     code, out, err = command("map", "--output", path)
     assert code == 0 and path.stat().st_size > 5000 and "III+" in out
-    assert "of the landings are outside" in err
+    assert "landings are outside those that it was fitted to" in err
 
 
 @pytest.mark.parametrize("turf", bounce.laws.TURFS)
@@ -68,8 +90,8 @@ def test_regions_have_colours_that_differ_and_the_dividing_curve_is_drawn(
 ):
     seen = {}
 
-    def keep(result, quantity, curve=None):
-        seen.update(curve=curve, figure=draw(result, quantity, curve=curve))
+    def keep(result, quantity, curve=None, **options):
+        seen.update(curve=curve, figure=draw(result, quantity, curve=curve, **options))
         return seen["figure"]
 
     draw = bounce.plot.outcome_map
@@ -105,8 +127,8 @@ def test_the_default_landings_show_several_kinds_of_bounce(command, tmp_path, tu
 def test_a_kind_of_bounce_has_one_colour_on_every_map(command, tmp_path, monkeypatch):
     drawn = []
 
-    def keep(result, quantity, curve=None):
-        drawn.append((result.regions, draw(result, quantity, curve=curve)))
+    def keep(result, quantity, curve=None, **options):
+        drawn.append((result.regions, draw(result, quantity, curve=curve, **options)))
         return drawn[-1][1]
 
     draw = bounce.plot.outcome_map

@@ -7,15 +7,13 @@ from __future__ import annotations
 
 from itertools import pairwise
 
-import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..flow.fixed import flow_for
 from ..flow.simulate import simulate
-from ..model import Array, FilippovSystem, NonsmoothError, OptionError, explain
+from ..model import Array, FilippovSystem, NonsmoothError, OptionError, Surfaces, explain
 from ..model.checks import real_array
-from ..model.evaluators import Evaluator
 from ..model.variational import plain_field, variational_field
 from .mirrors import mirrored
 from .periodic import PeriodicOrbit
@@ -106,23 +104,17 @@ def _surface_missed(orbit: PeriodicOrbit) -> str:
     system, p, m = orbit.system, orbit.parameter_vector, orbit.system.surface_count
     legs, count = orbit.legs, len(orbit.problem.legs)
     units = orbit.problem.scales(orbit.unknowns)[: system.dimension]
-    surfaces = system.cached("surfaces and their gradients", lambda: _surfaces(system))
+    surfaces = system.cached("surfaces of symmetric orbits", lambda: Surfaces(system))
     for leg, after in pairwise([*legs[count - 1 :], legs[0]]):
         on = [k for k in range(m) if leg.mode[k] != after.mode[k] or after.mode[k] == "s"]
         if not on or leg.kind in ("reset", "impact"):
             continue
-        h, gradient = surfaces.copied(system.extended_point(after.start, after.t), p)
+        h, gradient = surfaces.values(system.extended_point(after.start, after.t), p)
         allowed = _MISS * np.abs(gradient[:, : units.size]) @ units
         for k in on:
-            if not abs(h[k, 0]) <= allowed[k]:
+            if not abs(h[k]) <= allowed[k]:
                 return system.surface_names[k]
     return ""
-
-
-def _surfaces(system: FilippovSystem) -> Evaluator:
-    h = ca.vertcat(*[system.surface_function(k) for k in range(system.surface_count)])
-    gradient = lambda: [h, ca.jacobian(h, system.extended_states)]
-    return Evaluator(system.function("surfaces and their gradients", gradient))
 
 
 def _fields_agree(orbit: PeriodicOrbit) -> bool:

@@ -102,9 +102,12 @@ def require_symmetric(orbit: PeriodicOrbit) -> None:
 def _surface_missed(orbit: PeriodicOrbit) -> str:
     """Name of a surface on which events of the other half should be and are not; empty for none."""
     system, p, m = orbit.system, orbit.parameter_vector, orbit.system.surface_count
+    surfaces = system.cached("surfaces of symmetric orbits", lambda: Surfaces(system))
+    here, there = (np.sort(np.abs(surfaces.values(x, p)[0])) for x in _beside(orbit, 0))
+    if (np.abs(here - there) <= 1e-10 * here).all():
+        return ""  # far quicker than to look at the events, which decide where units differ
     legs, count = orbit.legs, len(orbit.problem.legs)
     units = orbit.problem.scales(orbit.unknowns)[: system.dimension]
-    surfaces = system.cached("surfaces of symmetric orbits", lambda: Surfaces(system))
     for leg, after in pairwise([*legs[count - 1 :], legs[0]]):
         on = [k for k in range(m) if leg.mode[k] != after.mode[k] or after.mode[k] == "s"]
         if not on or leg.kind in ("reset", "impact"):
@@ -115,6 +118,16 @@ def _surface_missed(orbit: PeriodicOrbit) -> str:
             if not abs(h[k]) <= allowed[k]:
                 return system.surface_names[k]
     return ""
+
+
+def _beside(orbit: PeriodicOrbit, i: int) -> tuple[Array, Array]:
+    """A point beside the start of a leg, and its mirror image."""
+    problem = orbit.problem
+    sizes = problem.scales(orbit.unknowns)[: problem.dimension]
+    x = orbit.evaluation.starts[i] + 0.1 * sizes * np.cos(1.0 + np.arange(sizes.size))
+    image = problem.wrap @ x
+    image[-1] += problem.advance(orbit.parameter_vector)[0]
+    return x, image
 
 
 def _fields_agree(orbit: PeriodicOrbit) -> bool:
@@ -131,12 +144,9 @@ def _fields_agree(orbit: PeriodicOrbit) -> bool:
         key, lambda: {leg.mode: (i, mirrored(problem, leg).mode) for i, leg in enumerate(legs)}
     )
     sizes = problem.scales(orbit.unknowns)[: problem.dimension]
-    away = 0.1 * sizes * np.cos(1.0 + np.arange(sizes.size))
     try:
         for mode, (i, other) in modes.items():
-            x = orbit.evaluation.starts[i] + away
-            image = wrap @ x
-            image[-1] += problem.advance(p)[0]
+            x, image = _beside(orbit, i)
             one, two = variational_field(system, mode), variational_field(system, other)
             here = one.rate.copied(one.states_at(x, p), p)[0][:n, 0]
             there = two.rate.copied(two.states_at(image, p), p)[0][:n, 0]

@@ -1,4 +1,4 @@
-"""Landings whose lift-off has H = 0, from rest outward: what the dividing curve of a bounce begins with."""
+"""Landings whose lift-off has H = 0, from rest outward: ``ns.manifold`` of the two-fold at lift-off."""
 
 from __future__ import annotations
 
@@ -66,21 +66,35 @@ def arcs_from_rest(
     step : float
         Distance of neighbouring points on bent arcs, in the same units.
     """
-    size = -shooting.ydot
+    size, first = -shooting.ydot, _first(shooting, mode, rest)
+    words = [mode + "s"] * len(first)
+    if rest:
+        words[0] = "s"
+    far = reach * size
+    found = ns.manifold(
+        shooting.system,
+        _two_fold(shooting, first[-1], mode),
+        starts=ns.orbit.ComputedStarts(shooting.land, size),
+        box=[(-far, far), (-3 * far, 3 * far)],
+        duration=shooting.t_max,
+        until="lift-off",
+        begin=list(zip(words, first, strict=True)),
+        spacing=step,
+        parameters=shooting.model.values,
+        tol=shooting.tol,
+    )
+    if not found.complete:
+        raise KeyboardInterrupt
+    ends = {"bound": "reach", "closed": "rest"}
+    return tuple(
+        Arc(a.itinerary, a.points, a.entry, a.decided, ends.get(a.end, a.end)) for a in found.arcs
+    )
 
-    def out(u: Array) -> str:
-        if np.linalg.norm(u) < 1e-6 * size:
-            return "rest"
-        far = abs(u[0]) >= reach * size or abs(u[1]) >= 3 * (reach * size)
-        return "reach" if far else ""
 
-    tracer = ns.orbit.DividingTracer(shooting, step, out, lambda u: 0.2 * _length(u) / size)
-    found = list[Arc]()
-    for arc in tracer.arcs(mode + "s", _first(shooting, mode, rest), "s" if rest else None):
-        if arc.end == "interrupted":
-            raise KeyboardInterrupt
-        found.append(Arc(arc.itinerary, arc.points, arc.entry, arc.decided, arc.end))
-    return tuple(found)
+def _two_fold(shooting: Shooting, u: Array, mode: str) -> ns.local.TwoFold:
+    """The two-fold at lift-off that a landing rolls into."""
+    x = shooting.passage(u, mode + "s").x
+    return ns.find_two_fold(shooting.system, near=x, parameters=shooting.model.values)
 
 
 def _first(shooting: Shooting, mode: str, rest: bool) -> list[Array]:

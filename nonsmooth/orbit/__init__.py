@@ -11,7 +11,7 @@ from .canards import Path, Slider, paths_from
 from .connections import Connection, find_homoclinic
 from .dividing import DividingCurves
 from .dividing_arcs import DividingArc, DividingTracer, Passage, StartCurve, joint_root
-from .dividing_passages import EventPassages
+from .dividing_passages import ComputedStarts, EventPassages
 from .find_periodic import VirtualOrbitError, periodic_orbit
 from .follow_equilibria import continue_equilibrium
 from .follow_orbits import continue_orbit
@@ -41,6 +41,7 @@ __all__ = [
     "BranchEnd",
     "BranchEvent",
     "CodimensionTwo",
+    "ComputedStarts",
     "Connection",
     "Departure",
     "DividingArc",

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise, product
 from typing import Any
@@ -20,9 +20,9 @@ from ..model import (
     StartMap,
     explain,
 )
-from .continuation import depart, directions
+from .continuation import depart
 from .dividing_arcs import DividingArc, DividingTracer, StartCurve, common_start, last_side
-from .dividing_passages import Start, TwoFoldPassages
+from .dividing_passages import ComputedStarts, EventPassages, Start, TwoFoldPassages
 from .two_fold_sheet import TwoFoldSheet
 
 #: Cells across the box between whose corners curves are looked for, and halvings of an edge.
@@ -33,6 +33,10 @@ _ROWS = ("points", "entry", "t", "decided")
 
 #: The first point beside the one where a curve is met, in scaled coordinates.
 _BESIDE = 1e-3
+
+#: A curve whose begin is given takes first steps of so much of the distance from there, and is closed
+#: this near to it.
+_FIRST, _APART = 0.2, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -89,23 +93,25 @@ class Plane:
 
     Attributes
     ----------
-    map : StartMap
+    start : callable
+        Where the orbit of coordinates (2,) begins.
     box : ndarray (2, 2)
         Least and largest value of each coordinate.
+    scale : ndarray (2,) or float
+        Sizes of the coordinates: half of the box, or what comes with starts that are computed.
+    exact : bool
+        Whether ``start`` gives derivatives.
     """
 
-    map: StartMap
+    start: Callable[[Array], Start]
     box: Array
-
-    @property
-    def scale(self) -> Array:
-        """Half of the box."""
-        return np.asarray(self.box[:, 1] - self.box[:, 0]) / 2
+    scale: Any
+    exact: bool
 
     @property
     def size(self) -> float:
         """Of the box in the phase space."""
-        corners = np.array([self.map(np.array(u))[0] for u in product(*self.box)])
+        corners = np.array([self.start(np.array(u))[1] for u in product(*self.box)])
         return float(np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()) or 1.0
 
 
@@ -129,7 +135,11 @@ def plane_of(system: FilippovSystem, starts: Any, box: Any) -> Plane:
                 advice="For example box=[(-1, 1), (0, 2)].",
             )
         )
-    return Plane(StartMap(system, starts), limits)
+    if isinstance(starts, ComputedStarts):
+        return Plane(starts, limits, starts.scale, exact=False)
+    states = StartMap(system, starts)
+    half = np.asarray(limits[:, 1] - limits[:, 0]) / 2
+    return Plane(lambda u: (0.0, *states(u)), limits, half, exact=True)
 
 
 def dividing_curves(
@@ -140,6 +150,8 @@ def dividing_curves(
     stable: bool,
     duration: float,
     step: float,
+    until: str | None,
+    begin: Sequence[tuple[str, Array]],
     parameters: dict[str, float],
     tol: float,
     report: Callable[[], object],
@@ -156,6 +168,10 @@ def dividing_curves(
     duration : float
     step : float
         In scaled coordinates.
+    until : str, optional
+        Name of the event at which orbits end.
+    begin : sequence of (str, ndarray)
+        Points of the one curve that is followed, with their itineraries; none to look for curves.
     parameters, tol
     report : callable
         Called with every arc.
@@ -166,18 +182,27 @@ def dividing_curves(
         The two-fold parts no orbits, or none of the box.
     """
     _require_plain(system)
-    sheet = TwoFoldSheet(system, fold.point, plane.size, parameters)
-
-    def start(u: Array) -> Start:
-        return 0.0, *plane.map(u)
-
-    passages = TwoFoldPassages(
-        system, sheet, start, plane.scale, duration, parameters=parameters, tol=tol
-    )
-    search = _Search(plane, passages, step)
+    passages: TwoFoldPassages | EventPassages
+    if until is None:
+        sheet = TwoFoldSheet(system, fold.point, plane.size, parameters)
+        passages = TwoFoldPassages(
+            system, sheet, plane.start, plane.scale, duration, parameters=parameters, tol=tol
+        )
+    else:
+        passages = EventPassages(
+            system,
+            until,
+            plane.start,
+            plane.scale,
+            parameters=parameters,
+            tol=tol,
+            t_max=duration,
+            exact=plane.exact,
+        )
+    search = _Search(plane, passages, step, begin)
     curves, complete = list[list[DividingArc]](), True
     try:
-        for curve in search.curves():
+        for curve in search.begun() if begin else search.curves():
             curves.append([_with_starts(arc, plane) for arc in curve])
             for _ in curve:
                 report()
@@ -198,7 +223,7 @@ def dividing_curves(
 
 
 def _with_starts(arc: DividingArc, plane: Plane) -> DividingArc:
-    return replace(arc, starts=np.array([plane.map(u)[0] for u in arc.points]))
+    return replace(arc, starts=np.array([plane.start(u)[1] for u in arc.points]))
 
 
 def _require_plain(system: FilippovSystem) -> None:
@@ -215,12 +240,38 @@ def _require_plain(system: FilippovSystem) -> None:
 class _Search:
     """Looks for curves between the corners of cells and follows them."""
 
-    def __init__(self, plane: Plane, passages: TwoFoldPassages, step: float):
-        self.plane, self.passages = plane, passages
+    def __init__(
+        self,
+        plane: Plane,
+        passages: TwoFoldPassages | EventPassages,
+        step: float,
+        begin: Sequence[tuple[str, Array]] = (),
+    ):
+        self.plane, self.passages, self.begin = plane, passages, begin
         bounds = [(k, float(low), float(high)) for k, (low, high) in enumerate(plane.box)]
         self.tracer = DividingTracer(passages, step, bounds=bounds)
+        if begin:
+            self.tracer.out = lambda u: "closed" if self._from_begin(u) < _APART else ""
+            self.tracer.first = lambda u: _FIRST * self._from_begin(u)
         self.traced: list[Array] = []
         self.interrupted = False
+
+    def _from_begin(self, u: Array) -> float:
+        return float(np.linalg.norm((u - self.begin[0][1]) / self.plane.scale))
+
+    def begun(self) -> Iterator[list[DividingArc]]:
+        """The curve of which points are given, from the last of them on."""
+        words, rows = [word for word, _ in self.begin], [u for _, u in self.begin]
+        arcs = list[DividingArc]()
+        try:
+            for arc in self.tracer.arcs(words[-1], rows, words[0]):
+                arcs.append(arc)
+        except KeyboardInterrupt:
+            if not arcs:
+                raise
+            self.interrupted = True
+        self.interrupted = self.interrupted or arcs[-1].end == "interrupted"
+        yield arcs
 
     def curves(self) -> Iterator[list[DividingArc]]:
         """Curves that cross edges between corners whose orbits end on different sides."""
@@ -248,7 +299,9 @@ class _Search:
     def _met(self, one: tuple[Array, str], other: tuple[Array, str]) -> list[DividingArc]:
         """The curve that crosses an edge; none where the change of sides is not at a two-fold."""
         edge = (other[0] - one[0]) / self.plane.scale
-        edge /= float(np.linalg.norm(edge))
+        across = np.array([-edge[1], edge[0]]) / float(
+            np.linalg.norm(edge)
+        )  # corrected on the edge
         for _ in range(_HALVINGS):
             middle = 0.5 * (one[0] + other[0])
             label = self.passages.simulated(middle)
@@ -266,10 +319,10 @@ class _Search:
         try:
             self.passages.seed(one[0], word)
             curve = StartCurve(self.passages, word)
-            u = curve.correct(middle, edge)
+            u = curve.correct(middle, across)
             if u is None or curve.fault(u):
                 return []
-            return self._both_ways(curve, u, directions(curve, u))
+            return self._both_ways(curve, u, curve.directions(u))
         except NonsmoothError:
             return []
 

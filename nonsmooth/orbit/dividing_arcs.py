@@ -16,7 +16,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..flow.saving import savable
-from ..model import Array
+from ..model import Array, NonsmoothError
 from .continuation import (
     Arc,
     Curve,
@@ -77,12 +77,10 @@ class Passages(Protocol):
     @property
     def scale(self) -> Any:
         """Sizes of the coordinates of the plane: a number, or one for each of the two."""
-        ...
 
     @property
     def exact(self) -> bool:
         """Whether passages come with derivatives."""
-        ...
 
     def passage(self, u: Array, word: str) -> Passage:
         """The orbit from a start (2,) with a fixed itinerary, one letter for each leg."""
@@ -319,16 +317,20 @@ class DividingTracer:
         """The next arc: its itinerary, first two points and tangent."""
         assert isinstance(before.curve, StartCurve)
         word, u, tangent = before.curve.word, arc.points[-1].u, arc.points[-1].tangent
-        options: Iterator[tuple[str, Array]] = self._round(u, tangent)
-        if arc.end == "junction":
-            joined = word[:-1] if word.endswith("s") else word + "s"
-            ways = self._curve(joined).directions(u)
-            options = chain([(joined, d) for d in ways], options)
-        for new, direction in options:
+        joined = word[:-1] if word.endswith("s") else word + "s"
+        ways = self._ways(joined, u) if arc.end == "junction" else []
+        for new, direction in chain(((joined, d) for d in ways), self._round(u, tangent)):
             found = depart(self._curve(new), u, direction, _CIRCLE, tangent)
             if found is not None:
                 return found
         return None
+
+    def _ways(self, word: str, u: Array) -> list[Array]:
+        """Directions of an arc at its junction; none if its last leg cannot be flown there."""
+        try:
+            return self._curve(word).directions(u)
+        except NonsmoothError:
+            return []
 
     def _round(self, u: Array, tangent: Array) -> Iterator[tuple[str, Array]]:
         """Itineraries and directions in which the curve leaves a point, by a small circle."""

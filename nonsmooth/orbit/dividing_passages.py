@@ -12,7 +12,7 @@ Two ways in which a plane of starts is divided:
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -22,7 +22,7 @@ from ..flow.simulate import simulate
 from ..local.numbers import Numbers
 from ..local.place import place
 from ..model import Array, ConvergenceError, FilippovSystem, Parameters
-from .dividing_arcs import Passage
+from .dividing_arcs import Passage, last_side
 from .guards import change_fault
 from .itinerary import Arrival, FixedItinerary, leg_between
 from .two_fold_sheet import Meeting, TwoFoldSheet
@@ -30,6 +30,34 @@ from .two_fold_sheet import Meeting, TwoFoldSheet
 #: Time and state (n,) at which an orbit begins, and the derivatives of the state by the coordinates
 #: of the plane (n, 2), if they are known.
 Start = tuple[float, Array, Array | None]
+
+
+@dataclass(frozen=True)
+class ComputedStarts:
+    """Starts of orbits that no formula gives, such as the ends of other runs.
+
+    Attributes
+    ----------
+    function : callable
+        Takes coordinates (2,) and returns the time and the state (n,) at which an orbit begins.
+    scale : float
+        Size of the coordinates: the unit of spacings, and of steps for differences.
+
+    Examples
+    --------
+    Starts that a body comes to after a flight of the duration 1 without friction:
+
+    >>> starts = ComputedStarts(lambda u: (1.0, [u[0], u[1] - 1.0, 0.0]), scale=1.0)
+    >>> starts(np.array([0.5, 3.0]))
+    (1.0, array([0.5, 2. , 0. ]), None)
+    """
+
+    function: Callable[[Array], Any]
+    scale: float = 1.0
+
+    def __call__(self, u: Array) -> Start:
+        t, x = self.function(u)
+        return float(t), np.asarray(x, dtype=float), None
 
 
 class EventPassages:
@@ -100,7 +128,19 @@ class EventPassages:
         itinerary = self.itinerary(word)
         arrival = itinerary.arrive(x, t)
         by_start = None if slope is None else itinerary.derivative(arrival)[1] @ slope
-        return self.decided(arrival, word, by_start)
+        found = self.decided(arrival, word, by_start)
+        if last_side(word[0]) * self.numbers(x, t).h < 0.0:
+            return replace(found, fault="the start is on the other side of the surface")
+        return found
+
+    def seed(self, u: Array, word: str) -> None:
+        """Nothing has to be known of an itinerary before its passages are computed.
+
+        Parameters
+        ----------
+        u : ndarray (2,)
+        word : str
+        """
 
     def decided(self, arrival: Arrival, word: str, by_start: Array | None = None) -> Passage:
         """Describe the end of an orbit; one that slid there must be at a visible two-fold.

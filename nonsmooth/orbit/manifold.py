@@ -21,6 +21,7 @@ from ..model import (
 )
 from .arcs import Follower
 from .dividing import DividingCurves, dividing_curves, plane_of
+from .dividing_events import read_begin, require_event
 from .manifold_growth import Grower, Manifold
 from .periodic import PeriodicOrbit
 
@@ -53,6 +54,8 @@ def manifold(
     starts: Any,
     box: Any,
     duration: float,
+    until: str | None = None,
+    begin: Any = None,
     stable: bool = True,
     spacing: float | None = None,
     parameters: Parameters | None = None,
@@ -70,6 +73,8 @@ def manifold(
     starts: Any = None,
     box: Any = None,
     duration: float | None = None,
+    until: str | None = None,
+    begin: Any = None,
     spacing: float | None = None,
     parameters: Parameters | None = None,
     tol: float | None = None,
@@ -93,17 +98,27 @@ def manifold(
         Whether orbits that come to the point are asked for (True) or those that leave it.
     length : float
         Of the orbits on it. Not with ``starts``.
-    starts : array_like (3, n) or callable, optional
+    starts : array_like (3, n), callable or orbit.ComputedStarts, optional
         Of a two-fold of n states: a plane of starts, as a point and two directions, or as a function of
-        two coordinates that returns n expressions. The dividing surface is cut by it.
+        two coordinates that returns n expressions. The dividing surface is cut by it. With ``until``
+        also starts that are computed, with times of their own.
     box : array_like (2, 2)
         With ``starts``: the range of either coordinate.
     duration : float
         With ``starts``: how long orbits are looked at. By then they are to have left the two-folds
-        to one side of the switching surface or the other.
+        to one side of the switching surface or the other. With ``until`` the longest duration of a leg.
+    until : str, optional
+        With ``starts``: the name of a stop at which orbits end, and both fields have the same component
+        across the surface, as a contact has that opens: with the load its friction vanishes. Then ``of``
+        is a two-fold there, and what is divided are ends on either side of the surface.
+    begin : sequence of (str, (float, float)), optional
+        With ``starts``: points of one curve, each with its itinerary, that is followed from the last of
+        them on, up to the box, until it ends, or comes back to the first. Otherwise curves are looked for
+        in all of the box.
     spacing : float, optional
         Of points along orbits and between them; a hundredth of the length unless given. With ``starts``
-        the largest distance of points on bent curves, relative to half of the box; 0.05 unless given.
+        the largest distance of points on bent curves, relative to half of the box or to the scale of
+        computed starts; 0.05 unless given.
     parameters : optional
         As in :func:`simulate`.
     tol : float, optional
@@ -190,7 +205,12 @@ def manifold(
     given = of.parameters | dict(parameters or {}) if isinstance(of, PeriodicOrbit) else parameters
     p = dict(zip(system.parameter_names, system.parameter_vector(given).tolist(), strict=True))
     if starts is not None:
-        return _cut(system, of, stable, starts, box, duration, spacing or 0.05, p, tol, progress)
+        end = (duration, until, begin)
+        return _cut(system, of, stable, starts, box, end, spacing or 0.05, p, tol, progress)
+    if until is not None or begin is not None:
+        raise OptionError(
+            "until, begin: expected with starts=, a plane of starts, received without."
+        )
     long = real(length, "length", expected="a positive number", low=_LEAST)
     follower = Follower(system, p, not stable, long, spacing or long / 100, tol or 1e-10)
     most, bar = whole(max_orbits, "max_orbits"), progress_bar(None, progress, "orbit")
@@ -206,7 +226,7 @@ def _cut(
     stable: bool,
     starts: Any,
     box: Any,
-    duration: float | None,
+    end: tuple[float | None, str | None, Any],
     step: float,
     parameters: dict[str, float],
     tol: float | None,
@@ -218,7 +238,18 @@ def _cut(
             f"of: expected a TwoFold with starts=, received {of!r}. Find one with find_two_fold, or "
             "leave starts out."
         )
+    duration, until, begin = end
     plane = plane_of(system, starts, box)
+    if not plane.exact and until is None:
+        raise OptionError(
+            "starts: expected with until= where they are computed, received without. Give expressions."
+        )
+    if until is not None:
+        require_event(system, until, of, parameters)
+        if not stable:
+            raise OptionError(
+                "stable: expected True with until=, received False. Stops are not met backward in time."
+            )
     span = real(duration, "duration", expected="a positive number", low=_LEAST)
     bar = progress_bar(None, progress, "arc")
     try:
@@ -229,6 +260,8 @@ def _cut(
             stable=stable,
             duration=span,
             step=step,
+            until=until,
+            begin=read_begin(system, begin),
             parameters=parameters,
             tol=tol or 1e-13,
             report=bar.update,

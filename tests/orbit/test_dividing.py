@@ -5,8 +5,6 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.dividing_arcs import DividingTracer, StartCurve
-from nonsmooth.orbit.dividing_passages import EventPassages
 from nonsmooth.orbit.two_fold_sheet import TwoFoldSheet
 
 X, Y, Z, W = (ca.SX.sym(name) for name in "XYZW")
@@ -211,28 +209,94 @@ def test_backward_the_same_surface_divides_what_leaves():
     assert not found.stable
 
 
-def test_orbits_that_end_where_both_fields_agree():
+def test_curves_along_a_coordinate_are_found_too():
+    """Edges of cells meet them at right angles: the arc that touches has one speed at the start."""
+    system, fold = plain()
+    start = lambda a, b: [0.3, a, b]
+    found = ns.manifold(
+        system, fold, starts=start, box=[(-1.2, -0.5), (-1, -0.7)], duration=6.0, spacing=0.4
+    )
+    (arc,) = found.arcs
+    assert (arc.itinerary, arc.begin, arc.end) == ("+", "bound", "bound")
+    assert np.abs(arc.points[:, 0] - TOUCHES).max() < 1e-13
+
+
+def opening():
     """A rolling body leaves a ground whose load falls as 1 - T; the pull A = Y decides how."""
     t = ca.SX.sym("T")
-    # h = X, X' = Y -+ (1 - T), Y' = 1: sliding keeps X = 0, and Y = Y0 + T at the stop T = 1.
+    # h = X, X' = Y -+ (1 - T), Y' = 1/2: sliding keeps X = 0, and Y = Y0 + T/2 at the stop T = 1.
     system = ns.FilippovSystem(
         [X, Y, t],
         surface=X,
         above=[Y - (1 - t), 0.5, 1],
         below=[Y + (1 - t), 0.5, 1],
-        stops=[ns.Stop(t - 1, name="open")],
+        stops=[ns.Stop(t - 1, name="open"), ns.Stop(t - 5, name="never")],
     )
-    start = lambda u: (0.0, np.array([u[0], u[1], 0.0]), np.eye(3)[:, :2])
-    passages = EventPassages(system, "open", start, 1.0)
-    curve = StartCurve(passages, "+s")
-    u = curve.correct(np.array([0.1, -0.4]), np.array([1.0, 0.0]))
-    assert u == pytest.approx([0.1, -0.5], abs=1e-13)  # Y0 + 1/2 = 0
-    tracer = DividingTracer(passages, 0.2, bounds=[(0, 0.01, 1.0), (1, -2.0, 2.0)])
-    arcs = list(tracer.arcs("+s", [u, u + np.array([1e-3, 0.0])]))
-    assert [arc.itinerary for arc in arcs] == ["+ s", "+"]
-    # + comes to the stop with X = X0 + Y0 + 1/4 - 1/2, at the junction with Y = Y0 + 1/2 = 0
-    assert arcs[0].points[-1] == pytest.approx([0.75, -0.5], abs=1e-11)
-    assert np.abs(arcs[1].points.sum(axis=1) - 0.25).max() < 1e-11
+    return system, ns.find_two_fold(system, near=[0.0, 0.0, 1.0])
+
+
+@pytest.mark.parametrize("computed", [False, True])
+def test_orbits_that_end_where_both_fields_agree(computed):
+    system, fold = opening()
+    start = lambda a, b: [a, b, 0.0]
+    if computed:
+        start = ns.orbit.ComputedStarts(lambda u: (7.0, [*u, 0.0]))
+    box = [(-1.1, 1.03), (-2.07, 2.0)]
+    found = ns.manifold(
+        system, fold, starts=start, box=box, duration=5.0, until="open", spacing=0.4
+    )
+    kinds = {arc.itinerary for arc in found.arcs}
+    assert kinds == {"+", "+ s", "- s", "-"}
+    for arc in found.arcs:
+        a, b = arc.points.T
+        assert np.abs(arc.t - (8.0 if computed else 1.0)).max() < 1e-12
+        assert np.abs(arc.starts[:, :2] - arc.points).max() == 0.0
+        if arc.kind == "two-fold":
+            assert np.abs(b + 0.5).max() < 1e-12  # Y0 + 1/2 = 0
+        else:  # it comes to the stop with X = X0 + Y0 + 1/4 -+ 1/2 = 0
+            assert np.abs(a + b + 0.25 - (0.5 if arc.itinerary == "+" else -0.5)).max() < 1e-12
+    corners = np.array([[-0.25, -0.5], [0.75, -0.5]])
+    near = [np.abs(found.junctions - corner).max(axis=1).min() for corner in corners]
+    assert max(near) < 1e-11
+
+
+def test_a_curve_is_followed_from_points_of_it():
+    system, fold = opening()
+    found = ns.manifold(
+        system,
+        fold,
+        starts=lambda a, b: [a, b, 0.0],
+        box=[(-1.0, 1.0), (-2.0, 2.0)],
+        duration=5.0,
+        until="open",
+        spacing=0.4,
+        begin=[("s", (0.0, -0.5)), ("+ s", (0.1, -0.5)), ("+ s", (0.2, -0.5))],
+    )
+    assert [(arc.itinerary, arc.end) for arc in found.arcs] == [("+ s", "junction"), ("+", "bound")]
+    assert found.arcs[0].points[:3, 0].tolist() == [0.0, 0.1, 0.2]
+    assert found.junctions == pytest.approx(np.array([[0.75, -0.5]]), abs=1e-11)
+    assert found.arcs[1].points[-1] == pytest.approx([1.0, -0.75], abs=1e-13)
+
+
+def test_ends_at_an_event_that_does_not_fit_are_refused():
+    system, fold = opening()
+    good = dict(starts=lambda a, b: [a, b, 0.0], box=[(-1, 1), (-2, 2)], duration=5.0)
+    with pytest.raises(
+        ns.OptionError, match=r"until: expected the name of a stop .*'open', 'never'"
+    ):
+        ns.manifold(system, fold, until="lift-off", **good)
+    with pytest.raises(ns.DegenerateError, match="expected a two-fold at the event 'never'"):
+        ns.manifold(system, fold, until="never", **good)
+    with pytest.raises(ns.OptionError, match="Stops are not met backward"):
+        ns.manifold(system, fold, until="open", stable=False, **good)
+    with pytest.raises(ns.OptionError, match="starts: expected with until="):
+        starts = ns.orbit.ComputedStarts(lambda u: (0.0, [*u, 0.0]))
+        ns.manifold(system, fold, **{**good, "starts": starts})
+    for begin in (5, [("+ s", (0.1, -0.5))], [("+ s", (0.1,))] * 2, [("+ s", "no")] * 2):
+        with pytest.raises(ns.OptionError, match="begin: expected two points or more"):
+            ns.manifold(system, fold, until="open", begin=begin, **good)
+    with pytest.raises(ns.OptionError, match="until, begin: expected with starts="):
+        ns.manifold(system, fold, until="open", length=1.0)
 
 
 # interruption and refusals ---------------------------------------------------------------------------

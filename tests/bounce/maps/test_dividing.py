@@ -166,6 +166,29 @@ def test_other_contact_models_have_it_too(model):
     assert all(pair == ["+", "-"] for pair in letters)
 
 
+def test_landings_given_by_expressions_lead_to_the_same_curve(curve):
+    """The general verb looks for it in a box, with exact derivatives instead of differences."""
+    model = NO_GRAVITY  # its contact begins at touch-down
+    reference = bounce.dividing_curve(model)
+    system = bounce.contact.equations.contact_system(model.blueprint())
+    fold = ns.find_two_fold(system, near=reference.arcs[0].lift_off[5], parameters=model.values)
+    found = ns.manifold(
+        system,
+        fold,
+        starts=lambda xdot, omega: [0.0, xdot, 0.0, -1.0, omega],
+        box=[(0.11, 1.5), (0.17, 2.0)],
+        duration=100.0,
+        until="lift-off",
+        spacing=0.2,
+        parameters=model.values,
+    )
+    assert [arc.itinerary for arc in found.arcs] == ["+ s", "+"]
+    assert np.abs(found.junctions[0] - reference.junction).max() < 1e-12
+    for arc in found.arcs:
+        xdot, omega = arc.points.T
+        assert np.abs(reference.omega(xdot) - omega).max() < 1e-11
+
+
 def test_on_a_slope_both_halves_are_traced():
     curve = bounce.dividing_curve(MODELS[-2], reach=1.0)
     assert not curve.mirrored

@@ -187,6 +187,7 @@ def test_a_failed_check_is_reported(tmp_path, monkeypatch, capsys):
     claim = results.rigid_limit()
     broken = results.Claim(**{**claim.__dict__, "checks": (results.Check("2 is 3", False),)})
     monkeypatch.setattr(results, "ALL", (lambda: broken,))
+    monkeypatch.setattr(theorems, "ALL", ())
     monkeypatch.setattr(errata, "ALL", ())
     monkeypatch.setattr(figures, "PICTURES", ())
     monkeypatch.setattr(equations, "ALL", ())

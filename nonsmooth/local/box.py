@@ -88,4 +88,9 @@ class Box:
 
     def length(self, curve: Array) -> float:
         """Length of a polyline (m, 2) in units of the box."""
-        return float(np.linalg.norm(np.diff(curve, axis=0) / self.size, axis=1).sum())
+        return float(self.lengths(curve)[-1]) if len(curve) else 0.0
+
+    def lengths(self, curve: Array) -> Array:
+        """Lengths (m,) of a polyline (m, 2) to each of its points, in units of the box."""
+        steps = np.linalg.norm(np.diff(curve, axis=0) / self.size, axis=1)
+        return np.concatenate([[0.0], np.cumsum(steps)])

@@ -7,8 +7,8 @@ the box) can be missed: a scan is no proof. Names follow Kuznetsov, Rinaldi & Gr
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
 from itertools import pairwise
 from typing import Any
 
@@ -30,6 +30,7 @@ from .sides import SIDES, Side
 _GRID = 161  # for the surface
 _CELLS = 61  # for equilibria
 _MOST = 100  # starts of one search
+_ON_SURFACE = 1e-3  # an equilibrium closer to its field's fold, in units of the box, is drawn on it
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,8 +117,8 @@ class PlaneScan:
         return [f for f in found if self.box.contains(f.point)]
 
     @cached_property
-    def folds(self) -> list[Fold]:
-        """Folds of both fields."""
+    def tangencies(self) -> list[Fold]:
+        """Where a field is tangent to the surface or zero: folds, and boundary equilibria."""
         return [fold for k, side in enumerate(SIDES) for fold in self._folds(k, side)]
 
     def _folds(self, k: int, side: Side) -> list[Fold]:
@@ -127,6 +128,33 @@ class PlaneScan:
             return find_fold(where.system, x, side=side, parameters=where.values, max_order=3)
 
         return self._from_curves(lambda numbers: numbers.lie[:, k], look)
+
+    @cached_property
+    def boundary_equilibria(self) -> list[Equilibrium]:
+        """Equilibria of a field on the surface, or too close to it for a picture of the box.
+
+        There the field is not only tangent but zero: it has no visible or invisible fold, and no
+        pseudo-equilibrium beside it.
+        """
+        found = list[Equilibrium]()
+        for fold in self.tangencies:
+            for at in find_all(partial(self._equilibrium, side=fold.side), fold.point[None, :]):
+                if self._close(at.point, fold.point):
+                    found.append(replace(at, status="boundary"))
+        return found
+
+    def _close(self, one: Array, other: Array) -> bool:
+        return float(np.linalg.norm((one - other) / self.box.size)) < _ON_SURFACE
+
+    def _apart(self, points: list[Any]) -> list[Any]:
+        """Those that are not boundary equilibria."""
+        rests = [at.point for at in self.boundary_equilibria]
+        return [f for f in points if not any(self._close(f.point, at) for at in rests)]
+
+    @cached_property
+    def folds(self) -> list[Fold]:
+        """Folds of both fields."""
+        return self._apart(self.tangencies)
 
     @cached_property
     def pseudo_equilibria(self) -> list[PseudoEquilibrium]:
@@ -140,7 +168,8 @@ class PlaneScan:
         def look(x: Array) -> PseudoEquilibrium:
             return find_pseudo_equilibrium(where.system, x, parameters=where.values)
 
-        return [e for e in self._from_curves(along, look) if e.status == "real"]
+        found = self._from_curves(along, look)
+        return self._apart([e for e in found if e.status == "real"])
 
     @cached_property
     def equilibria(self) -> list[Equilibrium]:
@@ -149,16 +178,16 @@ class PlaneScan:
         return [e for k, side in enumerate(SIDES) for e in self._equilibria(numbers, k, side)]
 
     def _equilibria(self, numbers: ManyNumbers, k: int, side: Side) -> list[Equilibrium]:
-        where = self.where
         field = numbers.fields[:, k].reshape(_CELLS, _CELLS, 2)
         components = [field[:, :, 0], field[:, :, 1]]
         starts = middle_of_sign_changes(self.box.lines(_CELLS), components)
 
-        def look(x: Array) -> Equilibrium:
-            return find_equilibrium(where.system, x, side=side, parameters=where.values)
+        found = find_all(partial(self._equilibrium, side=side), starts[:_MOST])
+        found = [e for e in found if e.status == "real" and self.box.contains(e.point)]
+        return self._apart(found)
 
-        found = find_all(look, starts[:_MOST])
-        return [e for e in found if e.status == "real" and self.box.contains(e.point)]
+    def _equilibrium(self, near: Array, side: Side) -> Equilibrium:
+        return find_equilibrium(self.where.system, near, side=side, parameters=self.where.values)
 
     def eigenvectors(self, found: Equilibrium) -> Array:
         """Real eigenvectors of a saddle as rows: the stable one, then the unstable one; (2, 2)."""
@@ -171,7 +200,7 @@ def _pieces(scan: PlaneScan, curve: Array) -> list[Piece]:
     """Cut a polyline of the surface at the folds and name the pieces."""
     near = [
         fold.point
-        for fold in scan.folds
+        for fold in scan.tangencies
         if np.min(np.linalg.norm((curve - fold.point) / scan.box.size, axis=1)) < 2 / _GRID
     ]
     full = inserted(curve, np.reshape(near, (-1, 2)))

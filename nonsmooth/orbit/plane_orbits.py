@@ -12,7 +12,7 @@ from ..local.plane_scan import PlaneScan
 from ..local.regions import Region
 from ..local.sides import SIDES
 from ..model import Array, FilippovSystem, Stop
-from .spacing import Cut, evenly_spaced, polyline, until_rest
+from .spacing import Cut, SpacedOrbit, evenly_spaced, polyline, until_rest
 
 _TOLERANCE = 1e-8  # far below what a picture resolves
 _CHUNK, _LONGEST = 12, 600  # steps between looks at an orbit, and of all of it
@@ -40,7 +40,7 @@ class PlaneOrbits:
     @cached_property
     def rests(self) -> list[Array]:
         """Where orbits rest."""
-        found = [at.point for at in self.scan.equilibria]
+        found = [at.point for at in [*self.scan.equilibria, *self.scan.boundary_equilibria]]
         return found + [at.point for at in self.scan.pseudo_equilibria]
 
     @cached_property
@@ -109,22 +109,13 @@ class PlaneOrbits:
         gaps = (np.array(events[:-2]) - events[-1]) / self.scan.box.size
         return bool(np.min(np.linalg.norm(gaps, axis=1)) < _NEAR)
 
-    def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[Array]:
-        """Orbits (m, 2) in the direction of time, about evenly spaced; none starts beside ``avoid``.
+    def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[SpacedOrbit]:
+        """Orbits in the direction of time, about evenly spaced; none starts beside ``avoid``.
 
         They go from where they begin to where they end, if that is in the box: sliding or rest.
         """
         follow = partial(self.follow, landing=True)
-        curves = evenly_spaced(
-            self.scan.box,
-            count,
-            follow,
-            avoid=avoid,
-            rests=self.rests,
-            switch=lambda points: self.scan.at(points).h,
-        )
-        for _, curve in curves:
-            yield curve
+        return evenly_spaced(self.scan.box, count, follow, avoid=avoid, rests=self.rests)
 
     def separatrices(self) -> Iterator[tuple[str, Array]]:
         """Names and curves (m, 2), in the direction of time.

@@ -19,7 +19,7 @@ from ..local.sides import SIDES
 from ..local.surface_scan import SurfaceScan
 from ..local.two_fold import TwoFold
 from ..model import Array, FilippovSystem, Stop
-from .spacing import Cut, evenly_spaced, polyline
+from .spacing import Cut, SpacedOrbit, evenly_spaced, polyline
 
 _TOLERANCE = 1e-8
 _CHUNK, _LONGEST = 10, 300  # steps between looks at an orbit, and of all of it
@@ -116,8 +116,10 @@ class SlidingOrbits:
             x = part.x[-1]
         return curve
 
-    def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[tuple[Array, bool]]:
-        """Orbits (m, 2) in the direction of time, about evenly spaced, and whether attracting.
+    def spaced(
+        self, count: int = 12, avoid: Sequence[Array] = ()
+    ) -> Iterator[tuple[SpacedOrbit, bool]]:
+        """Orbits in the direction of time, about evenly spaced, and whether they attract.
 
         None starts beside the curves ``avoid``.
         """
@@ -129,9 +131,9 @@ class SlidingOrbits:
         rests = [scan.flat(at.point) for at in scan.two_folds]
         rests += [scan.flat(at.point) for at in scan.pseudo_equilibria]
         found = evenly_spaced(scan.box, count, orbit, shortest=_SHORTEST, avoid=avoid, rests=rests)
-        for flat, curve in found:
-            l1, l2 = scan.where.at(scan.lift(flat[None, :])[0]).lie
-            yield curve, bool(l1 < l2)
+        for one in found:
+            l1, l2 = scan.where.at(scan.lift(one.start[None, :])[0]).lie
+            yield one, bool(l1 < l2)
 
     def manifolds(self, found: PseudoEquilibrium) -> Iterator[Array]:
         """Manifolds (m, 2) of a saddle of the sliding flow, in the direction of time.

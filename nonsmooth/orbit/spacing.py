@@ -2,13 +2,15 @@
 
 After Jobard & Lefer 1997, "Creating evenly-spaced streamlines of arbitrary density", with cells of a
 grid for distances. Their streamlines end where they come close to another; here that would be short of
-the equilibrium or the surface at which they meet, so an orbit goes on until it touches the other, comes to
-rest, or has gone too far beside it.
+the equilibrium or the surface at which they meet, so an orbit goes on until it touches the other or comes
+to rest. Where it would go beside the other for too long it is left, and drawn thinner and thinner there,
+as they do.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from typing import NamedTuple
 
 import numpy as np
 
@@ -21,14 +23,32 @@ _APART = 0.55  # from a start to the next orbit, in units of the box over the nu
 _AGAIN = 8  # a curve that has left a cell for so many others and comes back has closed
 _FINE = 12  # cells across one of those: curves in one of them are one line to the eye
 _BESIDE = 0.7  # how far a curve goes on beside another, in units of the box
+_ON = 0.1  # how much of that is drawn, thinner and thinner, in units of the box
 _AT_REST = 4e-3  # of an equilibrium that a curve has come to, in units of the box
 
 #: Part of a curve (m, 2) that is wanted.
 Cut = Callable[[Array], Array]
-#: Values (m,) at points (m, 2) of a function that is zero on the switching surface.
-Switch = Callable[[Array], Array]
 #: From a start (2,), forward in time or backward, to where the cut says: the curve (m, 2).
 Follow = Callable[[Array, bool, Cut], Array]
+
+
+class SpacedOrbit(NamedTuple):
+    """One of many orbits through a box.
+
+    Attributes
+    ----------
+    start : ndarray (2,)
+        From where it was followed both ways.
+    curve : ndarray (m, 2)
+        In the direction of time.
+    thins : (bool, bool)
+        Whether its beginning, and its end, are not where the orbit ends: it goes on beside another, and
+        is drawn thinner and thinner there.
+    """
+
+    start: Array
+    curve: Array
+    thins: tuple[bool, bool] = (False, False)
 
 
 def polyline(
@@ -95,19 +115,17 @@ class Spacing:
         Curves that orbits may cross, but do not start beside.
     rests : sequence of ndarray (2,)
         Equilibria: an orbit that comes to one ends in it.
-    switch : callable, optional
-        Orbits that would go beside others for too long end where they cross its zeros.
+
+    Attributes
+    ----------
+    thins : bool
+        Whether the part that ``until_met`` kept last goes on beside another curve.
     """
 
     def __init__(
-        self,
-        box: Box,
-        count: int,
-        avoid: Sequence[Array] = (),
-        rests: Sequence[Array] = (),
-        switch: Switch | None = None,
+        self, box: Box, count: int, avoid: Sequence[Array] = (), rests: Sequence[Array] = ()
     ):
-        self.switch = switch
+        self.thins = False
         self.box, self.count = box, count
         self._cells_across = max(round(_CELLS * count / 12), 1)
         self._taken: set[tuple[int, int]] = set()
@@ -141,7 +159,8 @@ class Spacing:
         return cells, [*index.tolist(), len(at) - 1]
 
     def until_met(self, curve: Array) -> Array:
-        """Part of a curve until it rests, touches another or itself, or has been beside it for long."""
+        """Part of a curve until it rests or touches another or itself; where that is far, a little on."""
+        self.thins = False
         first: dict[tuple[int, int], int] = {}
         distinct, close = 0, len(curve)
         last: tuple[int, int] | None = None
@@ -164,21 +183,9 @@ class Spacing:
         kept = curve if touches == len(beside) else curve[: close + touches + 2]
         if rested is not None and len(rested) <= len(kept):
             kept = rested
-        far = self.box.length(kept[close:]) > _BESIDE
-        return self._to_surface(curve, close) if far else kept
-
-    def _to_surface(self, curve: Array, k: int) -> Array:
-        """Part of a curve to where it crosses the surface, if it soon does after point k; to k if not."""
-        if self.switch is not None:
-            beside = curve[k:]
-            lengths = np.linalg.norm(np.diff(beside, axis=0) / self.box.size, axis=1).cumsum()
-            beside = beside[: 1 + int(np.searchsorted(lengths, _BESIDE))]
-            h = self.switch(beside)
-            changes = np.flatnonzero(h[1:] * h[:-1] <= 0)
-            if changes.size:
-                j = int(changes[0])
-                return curve[: k + j + 1 + int(abs(h[j + 1]) < abs(h[j]))]
-        return curve[: k + 1]
+        lengths = self.box.lengths(kept[close:])
+        self.thins = bool(lengths[-1] > _BESIDE)
+        return kept[: close + 1 + int(np.searchsorted(lengths, _ON))] if self.thins else kept
 
     def add(self, curve: Array) -> None:
         """Keep other orbits away from a curve."""
@@ -195,8 +202,7 @@ def evenly_spaced(
     shortest: float = 0.09,
     avoid: Sequence[Array] = (),
     rests: Sequence[Array] = (),
-    switch: Switch | None = None,
-) -> Iterator[tuple[Array, Array]]:
+) -> Iterator[SpacedOrbit]:
     """Follow orbits both ways from middles of count x count cells that are still free.
 
     Parameters
@@ -211,22 +217,22 @@ def evenly_spaced(
         Curves that orbits may cross, but do not start beside.
     rests : sequence of ndarray (2,), optional
         Equilibria: an orbit that comes to one ends in it.
-    switch : callable, optional
-        Orbits that would go beside others for too long end where they cross its zeros.
 
     Yields
     ------
-    start : ndarray (2,)
-    curve : ndarray (m, 2)
-        In the direction of time.
+    SpacedOrbit
     """
-    spacing = Spacing(box, count, avoid, rests, switch)
+    spacing = Spacing(box, count, avoid, rests)
+
+    def along(start: Array, ahead: bool) -> tuple[Array, bool]:
+        spacing.thins = False
+        return follow(start, ahead, spacing.until_met), spacing.thins
+
     for start in np.random.default_rng(0).permutation(box.middles(count)):
         if not spacing.free(start):
             continue
-        ahead = follow(start, True, spacing.until_met)
-        behind = follow(start, False, spacing.until_met)
+        (ahead, end), (behind, begin) = along(start, True), along(start, False)
         whole = np.vstack([behind[:0:-1], ahead])
         if box.length(whole) > shortest:
             spacing.add(whole)
-            yield start, whole
+            yield SpacedOrbit(start, whole, (begin, end))

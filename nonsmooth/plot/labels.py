@@ -19,7 +19,7 @@ from ..model import Array
 from . import style
 
 _CELL = 1.5  # points, of the grid on which room is looked for
-_GAPS = (4.0, 9.0, 16.0, 25.0)  # points, from a thing to its name
+_GAPS = (4.0, 9.0, 16.0, 25.0, 36.0)  # points, from a thing to its name
 _LEADER = 8.0  # points: over a longer gap a thin line leads to the thing
 _MARK = 3.5  # points: from the middle of a mark to where that line ends
 _ANCHORS = 24  # places along a thing that are tried
@@ -27,7 +27,11 @@ _TEXT, _FAR = (
     40.0,
     0.02,
 )  # costs, in shares of a name's area: on other texts; for a point of distance
+_APART = 5.0  # points, between names
 _HEAD = 14.0  # points: arrowheads are shorter
+_OWN = 7.5  # points: as far from the middle of a mark may be its corner
+_CROSSED = 6.0  # the cost of a line to the thing that lies on other marks or names
+_CONFUSED = 1.0  # the cost of a name that is closer to another named point
 _ASTRAY = 4.0  # the cost of a name that is nowhere where it may be
 _SPOTS = np.array([(a, b) for a in (-1.0, 0.0, 1.0) for b in (-1.0, 1.0)] + [(0.0, 0.0)])
 _DIRECTIONS = np.array(
@@ -47,6 +51,24 @@ class _Name:
     anchors: Array
     inside: bool
     keep: Keep | None
+
+
+@dataclass
+class _Spot:
+    """A place of a name, what it costs, and the ends of the line that leads to it, if one does."""
+
+    name: _Name
+    cost: float = 0.0
+    place: tuple[float, float] | None = None
+    leader: Array | None = None
+
+    def use(self) -> None:
+        """Put the name there; away if it has no place."""
+        for part in (self.name.text, self.name.leader):
+            part.set_visible(self.place is not None)
+        if self.place is not None:
+            self.name.text.set_position(self.place)
+            self.name.leader.set_data(*([], []) if self.leader is None else self.leader.T)
 
 
 class Labels(Artist):
@@ -144,38 +166,58 @@ class Labels(Artist):
             return
         self.seen = seen
         room = _Room(axes, renderer, _CELL * point, self)
-        for name in sorted(self.names, key=lambda n: len(n.anchors)):
-            name.text.set_position((0.0, 0.0))
-            box = name.text.get_window_extent(renderer)
-            size = np.array([box.width, box.height]) + 2.0 * point
-            middle = np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2
-            anchors = axes.transData.transform(name.anchors)
-            anchors = anchors[room.contains(anchors)]
-            for part in (name.text, name.leader):
-                part.set_visible(bool(len(anchors)))
-            if not len(anchors):
-                continue
-            gaps: Sequence[float] = (0.0,) if name.inside else _GAPS
-            offsets = [_DIRECTIONS * (size / 2 + gap * point) for gap in gaps]
-            offset = np.zeros((1, 2)) if name.inside else np.vstack(offsets)
-            far = np.repeat(gaps, len(offset) // len(gaps))
-            wanted = (anchors[:, None] + offset).reshape(-1, 2)
-            tried = room.within(wanted, size)
-            moved = np.linalg.norm(tried - wanted, axis=1) / point
-            cost = room.cost(tried, size) + _FAR * (np.tile(far, len(anchors)) + moved)
-            if name.keep is not None:
-                cost += _ASTRAY * self._astray(tried, size, name.keep)
-            k = int(np.argmin(cost))
-            name.text.set_position(tuple(tried[k] - middle))
-            room.take(tried[k], size)
-            anchor = anchors[k // len(offset)]
-            near = np.clip(anchor, tried[k] - size / 2, tried[k] + size / 2)
-            mark = anchor + (near - anchor) * min(
-                1.0, _MARK * point / np.hypot(*(near - anchor) + 1e-9)
-            )
-            ends = np.array([mark, near])
-            leads = far[k % len(offset)] > _LEADER
-            name.leader.set_data(*(ends.T if leads else ([], [])))
+        free, found = room.texts, list[tuple[float, list[_Spot]]]()
+        for order in _orders(self.names):
+            room.texts = free.copy()
+            spots = [self._best(name, room, renderer) for name in order]
+            found.append((sum(spot.cost for spot in spots), spots))
+        for spot in min(found, key=lambda tried: tried[0])[1]:
+            spot.use()
+
+    def _best(self, name: _Name, room: _Room, renderer: Any) -> _Spot:
+        """Where a name is best put, which is taken from the room."""
+        point = room.point
+        name.text.set_position((0.0, 0.0))
+        box = name.text.get_window_extent(renderer)
+        size = np.array([box.width, box.height]) + 2.0 * point
+        anchors = self.home.transData.transform(name.anchors)
+        anchors = anchors[room.contains(anchors)]
+        if not len(anchors):
+            return _Spot(name)
+        gaps: Sequence[float] = (0.0,) if name.inside else _GAPS
+        offsets = [_DIRECTIONS * (size / 2 + gap * point) for gap in gaps]
+        offset = np.zeros((1, 2)) if name.inside else np.vstack(offsets)
+        far = np.repeat(gaps, len(offset) // len(gaps))
+        wanted = (anchors[:, None] + offset).reshape(-1, 2)
+        tried = room.within(wanted, size)
+        moved = np.linalg.norm(tried - wanted, axis=1) / point
+        cost = room.cost(tried, size) + _FAR * (np.tile(far, len(anchors)) + moved)
+        if not name.inside:
+            own = np.repeat(anchors, len(offset), 0)
+            cost += _CROSSED * room.crossed(own, tried, size)
+            cost += _CONFUSED * self._confused(name, own, tried, size)
+        if name.keep is not None:
+            cost += _ASTRAY * self._astray(tried, size, name.keep)
+        k = int(np.argmin(cost))
+        room.take(tried[k], size + _APART * point)
+        anchor = anchors[k // len(offset)]
+        near = np.clip(anchor, tried[k] - size / 2, tried[k] + size / 2)
+        mark = anchor + (near - anchor) * min(
+            1.0, _MARK * point / np.hypot(*(near - anchor) + 1e-9)
+        )
+        ends = np.array([mark, near]) if far[k % len(offset)] > _LEADER else None
+        middle = np.array([box.x0 + box.x1, box.y0 + box.y1]) / 2
+        return _Spot(name, float(cost[k]), tuple(tried[k] - middle), ends)
+
+    def _confused(self, name: _Name, own: Array, middles: Array, size: Array) -> Array:
+        """Whether rectangles (m, 2) are closer to the point of another name than to their own (m, 2)."""
+        others = [n.anchors for n in self.names if n is not name and len(n.anchors) == 1]
+        others = [at for at in others if not np.array_equal(at, name.anchors)]
+        if not others:
+            return np.zeros(len(middles))
+        points = self.home.transData.transform(np.vstack(others))
+        gaps = _gaps(middles[:, None], points, size).min(axis=1)
+        return np.asarray(gaps < _gaps(middles, own, size) - 1e-6, dtype=float)
 
     def _astray(self, middles: Array, size: Array, keep: Keep) -> Array:
         """How much of rectangles (m, 2) is where a name may not be, of their corners and middles."""
@@ -184,12 +226,25 @@ class Labels(Artist):
         return np.mean(~np.asarray(keep(data), dtype=bool).reshape(len(middles), -1), axis=1)
 
 
+def _orders(names: list[_Name]) -> list[list[_Name]]:
+    """In which names are placed: those of points first, these one way and another."""
+    few = sorted(names, key=lambda name: len(name.anchors))
+    points = [name for name in few if len(name.anchors) == 1]
+    rest = few[len(points) :]
+    if len(points) < 2:
+        return [few]
+    across = [sorted(points, key=lambda name: float(name.anchors[0, k])) for k in (0, 1)]
+    ways = [points, points[::-1], *across, *(way[::-1] for way in across)]
+    return [[*way, *rest] for way in ways]
+
+
 class _Room:
     """What is drawn in axes, as numbers on a grid of cells: lines, and texts and marks."""
 
     def __init__(self, ax: Axes, renderer: Any, cell: float, mine: Labels):
         box = ax.get_window_extent(renderer)
         self.corner, self.cell = np.array([box.x0, box.y0]), cell
+        self.point = cell / _CELL
         self.size = np.array([box.width, box.height])
         nx, ny = np.maximum(np.ceil(self.size / cell).astype(int), 1)
         self.lines, self.texts = np.zeros((nx, ny)), np.zeros((nx, ny))
@@ -233,7 +288,7 @@ class _Room:
             limit = self.size.max()
             low, high = self.corner - limit, self.corner + self.size + limit
             dense = _dense(np.clip(points, low, high), self.cell)
-            weight = max(1.0, float(line.get_linewidth()) / 1.5)
+            weight = max(1.0, (float(line.get_linewidth()) / 1.5) ** 3)
             i, j = self._cells(dense[self.contains(dense)])
             self.lines[i, j] = np.maximum(self.lines[i, j], weight)
         if line.get_marker() not in ("None", "none", "", " ", None):
@@ -270,6 +325,16 @@ class _Room:
         (a, b), (c, d) = np.maximum(low, 0), np.maximum(high, 0)
         self.texts[a:c, b:d] = 1.0
 
+    def crossed(self, anchors: Array, middles: Array, size: Array) -> Array:
+        """Share of lines from anchors (m, 2) to rectangles (m, 2) that is on texts and marks of others."""
+        ways = np.clip(anchors, middles - size / 2, middles + size / 2) - anchors
+        points = anchors[:, None] + np.linspace(0.0, 1.0, 12)[:, None] * ways[:, None]
+        others = np.linalg.norm(points - anchors[:, None], axis=2) > _OWN * self.point
+        i, j = self._cells(points.reshape(-1, 2))
+        return np.asarray(
+            np.mean((self.texts[i, j] * others.ravel()).reshape(len(ways), -1), axis=1)
+        )
+
     def cost(self, middles: Array, size: Array) -> Array:
         """What rectangles (m, 2) would hide, as shares of their area; infinite outside of the axes."""
         low = np.round((middles - size / 2 - self.corner) / self.cell).astype(int)
@@ -285,6 +350,12 @@ class _Room:
             (a, b), (c, d) = low.T, high.T
             found += weight * (total[c, d] - total[a, d] - total[c, b] + total[a, b]) / area
         return found
+
+
+def _gaps(middles: Array, points: Array, size: Array) -> Array:
+    """Distances of rectangles of a size from points, in pixels."""
+    away = np.maximum(np.abs(points - middles) - size / 2, 0.0)
+    return np.asarray(np.linalg.norm(away, axis=-1))
 
 
 def _dense(points: Array, step: float) -> Array:

@@ -19,6 +19,7 @@ from ..orbit.plane_orbits import PlaneOrbits
 from . import style
 from .labels import Labels
 from .legends import beside
+from .thin_ends import draw_orbit
 
 _ORBIT, _SEPARATRIX, _FOLD_ORBIT = "#444444", style.CANARD, style.GREEN
 _PIECES: dict[str, tuple[str, float, Any, str]] = {
@@ -182,6 +183,7 @@ class _Portrait:
         self.ax, self.scan = ax, scan
         self.flow = PlaneOrbits(scan, t_end)
         self.special: list[Special] = [*scan.equilibria, *scan.folds, *scan.pseudo_equilibria]
+        self.special += scan.boundary_equilibria
         self.drawn: set[str] = set()
 
     def draw(self, starts: Array | None, separatrices: bool) -> None:
@@ -223,8 +225,8 @@ class _Portrait:
     def orbits(self, starts: Array | None, avoid: list[Array]) -> None:
         """Orbits from given starts, or evenly spaced ones through the box."""
         if starts is None:
-            for curve in self.flow.spaced(avoid=avoid):
-                self._draw(curve, _ORBIT, 0.9, "orbit")
+            for orbit in self.flow.spaced(avoid=avoid):
+                self._draw(orbit.curve, _ORBIT, 0.9, "orbit", orbit.thins)
             return
         for start in starts:
             self._draw(self.flow.follow(start), style.BLACK, 1.0, "orbit")
@@ -273,7 +275,7 @@ class _Portrait:
             self.ax.plot(
                 *found.point,
                 marker=shape,
-                markersize=5.5 if isinstance(found, Fold) else 8,
+                markersize=5.5 if isinstance(found, Fold) else 12 if shape == "*" else 8,
                 linestyle="none",
                 markeredgecolor=edge,
                 markerfacecolor=fill,
@@ -312,12 +314,20 @@ class _Portrait:
             for point in points:
                 labels.name(name, point)
 
-    def _draw(self, curve: Array, color: str, width: float, name: str) -> None:
+    def _draw(
+        self,
+        curve: Array,
+        color: str,
+        width: float,
+        name: str,
+        thins: tuple[bool, bool] = (False, False),
+    ) -> None:
         if len(curve) < 2:
             return
         self.drawn.add(name)
         order = 2.0 if name == "orbit" else 3.0
-        self.ax.plot(*curve.T, color=color, linewidth=width, zorder=order, gid=name)
+        look: Any = {"color": color, "zorder": order, "gid": name}
+        draw_orbit(self.ax, curve, thins, self.scan.box, width, **look)
         for piece in style.inside(curve, self.scan.box.limits):
             if self.scan.box.length(piece) > 0.1:
                 style.arrowhead(
@@ -346,14 +356,19 @@ def _name(found: Special) -> str:
     """What a special point is called in the legend."""
     if isinstance(found, Fold):
         return f"{found.kind} fold" if found.order == 2 else found.kind
-    if isinstance(found, Equilibrium) and found.kind == "degenerate":
-        return "centre" if np.any(np.imag(found.eigenvalues)) else found.kind
-    return found.kind
+    name = found.kind
+    if isinstance(found, Equilibrium) and name == "degenerate" and np.any(found.eigenvalues.imag):
+        name = "centre"
+    if isinstance(found, Equilibrium) and found.status == "boundary":
+        name = f"boundary {name.rpartition(' ')[2]}"
+    return name
 
 
 def _look(found: Special) -> tuple[str, str]:
     """Marker and fill of a special point: full where visible or stable, and equilibria that are saddles;
     a pseudo-saddle is on a thick line, on which a black one would be lost."""
     name = _name(found)
+    if name.startswith("boundary") and isinstance(found, Equilibrium):
+        return "*", style.BLACK if np.all(found.eigenvalues.real < 0) else "white"
     full = name.startswith(("visible", "stable")) or name == "saddle"
     return _MARKERS[name.rpartition(" ")[2]], style.BLACK if full else "white"

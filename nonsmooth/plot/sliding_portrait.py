@@ -21,6 +21,7 @@ from ..orbit.sliding_orbits import SlidingOrbits
 from . import style
 from .labels import Labels
 from .legends import beside
+from .thin_ends import draw_orbit
 
 _ATTRACTING, _REPELLING = REGIONS.index(Region.ATTRACTING), REGIONS.index(Region.REPELLING)
 _NAMES = ("$D_a$", "$D_r$", "$C_1$", "$C_2$")
@@ -164,6 +165,7 @@ class _Portrait:
     def __init__(self, ax: Axes, scan: SurfaceScan):
         self.ax, self.scan = ax, scan
         self.flow = SlidingOrbits(scan)
+        self.labels = Labels(ax)
         self.named: dict[str, Array] = {}
         self.separated: list[Array] = []
 
@@ -232,11 +234,12 @@ class _Portrait:
 
     def orbits(self, count: int) -> None:
         """Sliding orbits, about evenly spaced."""
-        for curve, attracting in self.flow.spaced(count, self.separated):
+        for orbit, attracting in self.flow.spaced(count, self.separated):
             color = style.ATTRACTING if attracting else style.REPELLING
-            self.ax.plot(*curve.T, color=color, linewidth=0.9, zorder=2, gid="orbit")
-            if self.scan.box.length(curve) > 0.1:
-                style.arrowhead(self.ax, curve, 0.55, color, mutation_scale=10, zorder=2.1)
+            look: Any = {"color": color, "zorder": 2, "gid": "orbit"}
+            draw_orbit(self.ax, orbit.curve, orbit.thins, self.scan.box, 0.9, **look)
+            if self.scan.box.length(orbit.curve) > 0.1:
+                style.arrowhead(self.ax, orbit.curve, 0.55, color, mutation_scale=10, zorder=2.1)
 
     def marks(self) -> None:
         """Cusps, two-folds and pseudo-equilibria."""
@@ -246,15 +249,9 @@ class _Portrait:
         for found in self.scan.two_folds:
             place = self.scan.flat(found.point)
             self._mark(place, "o", style.BLACK, gid="two-fold")
-            self.ax.annotate(
-                found.label.removeprefix("boundary ").replace("Delta", "Δ").replace("nu", "ν"),
-                (float(place[0]), float(place[1])),
-                xytext=(7, -13),
-                textcoords="offset points",
-                fontsize=9,
-                zorder=8,
-                path_effects=style.halo(3.0),
-            )
+            name = found.label.removeprefix("boundary ")
+            name = name.replace("Delta", "Δ").replace("nu", "ν")
+            self.labels.name(name, place, fontsize=9)
         for rest in self.scan.pseudo_equilibria:
             marker = _MARKERS.get(rest.kind.rpartition("-")[2], "P")
             fill = style.BLACK if rest.stable or "saddle" in rest.kind else "white"
@@ -312,7 +309,6 @@ class _Portrait:
 
     def line_names(self) -> None:
         """Name folds, canards, manifolds and special points beside them."""
-        labels = Labels(self.ax)
         for side, name in (("+", "F_1"), ("-", "F_2")):
             for visible, word in ((True, "visible"), (False, "invisible")):
                 pieces = [
@@ -323,11 +319,11 @@ class _Portrait:
                 ]
                 if pieces:
                     text = f"fold of ${name}$,\n{word}"
-                    labels.name(text, np.vstack(pieces), style.FIELDS[side])
+                    self.labels.name(text, np.vstack(pieces), style.FIELDS[side])
         for name, curve in self.named.items():
-            labels.name(name, curve, _SPECIAL[name][0])
+            self.labels.name(name, curve, _SPECIAL[name][0])
         for fold in self.scan.folds:
             for cusp in fold.cusps:
-                labels.name("cusp", cusp)
+                self.labels.name("cusp", cusp)
         for found in self.scan.pseudo_equilibria:
-            labels.name(found.kind, self.scan.flat(found.point))
+            self.labels.name(found.kind, self.scan.flat(found.point))

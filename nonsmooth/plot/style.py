@@ -60,7 +60,7 @@ CANARD, FAUX_CANARD = "#A8005C", GREEN
 DASHED: Any = (0, (5, 2.5))
 DASH_DOT: Any = (0, (4, 1.5, 1, 1.5))
 DOTS: Any = (0, (1.2, 1.6))
-LONG_DASH: Any = (0, (7, 1.0))
+LONG_DASH: Any = (0, (6, 1.4))
 #: Points of long runs: as large on paper as on a screen, where "," is a pixel of either.
 CLOUD: Any = dict(color="0.35", linestyle="none", marker=".", markersize=1.3, mew=0.0, zorder=0)
 
@@ -234,7 +234,8 @@ def halo(width: float = 2.5, color: str = "white") -> list[Any]:
     list
         For ``path_effects=``.
     """
-    return [effects.Stroke(linewidth=width, foreground=color), effects.Normal()]
+    whole: Any = {"dash_offset": 0, "dash_list": None}  # nothing shows through the gaps of dashes
+    return [effects.Stroke(linewidth=width, foreground=color, dashes=whole), effects.Normal()]
 
 
 def arrow(ax: Axes, start: ArrayLike, end: ArrayLike, color: str = BLACK, **options: Any) -> None:

@@ -118,12 +118,12 @@ def line_style(value: float, flow: ReducedFlow) -> tuple[str, str, Any]:
 def name_places(parts: list[Sector]) -> dict[str, Array]:
     """Where the names of the regions stand, in the z2-z3 plane: away from the eigenlines."""
     widest = max(parts, key=lambda part: part.high - part.low)
-    middle = 0.86 * to_box((widest.low + widest.high) / 2)
+    middle = 0.84 * to_box((widest.low + widest.high) / 2)
     return {
         r"$D_a$": middle,
         r"$D_r$": -middle,
-        r"$C_1$": np.array([-0.88, 0.88]),
-        r"$C_2$": np.array([0.88, -0.88]),
+        r"$C_1$": np.array([-0.85, 0.85]),
+        r"$C_2$": np.array([0.85, -0.85]),
     }
 
 

@@ -142,3 +142,21 @@ def test_where_a_field_is_undefined_the_scan_goes_on():
     p = plane([ca.sqrt(x), y - x], [1, 1], box=(-1.0, 1.0, -1.0, 1.0))
     assert all(e.side == "+" for e in p.equilibria)
     assert len(p.curves) == 1
+
+
+def test_an_equilibrium_on_the_surface_is_no_fold_and_no_pseudo_equilibrium():
+    """The prey's level where the equilibrium with harvest meets the threshold: a boundary node, also
+    to the digits of a rounded level; far from it a fold, visible or not."""
+    level = 0.801355280327832
+    for off in (0.0, 1e-7, -1e-7):
+        p = PlaneScan.of(harvest(level + off), {}, Box(0.0, 1.1, 0.3, 1.3))
+        (node,) = p.boundary_equilibria
+        assert (node.side, node.status, node.kind) == ("+", "boundary", "stable node")
+        assert_allclose(node.point, [0.7208612440191388, level], atol=1e-6)
+        assert [f.side for f in p.folds] == ["-"]
+        assert p.equilibria == p.pseudo_equilibria == []
+        assert [piece.kind for piece in p.pieces] == ["crossing", "attracting", "crossing"]
+    for off, kind in ((0.02, "invisible"), (-0.02, "visible")):
+        p = PlaneScan.of(harvest(level + off), {}, Box(0.0, 1.1, 0.3, 1.3))
+        assert p.boundary_equilibria == []
+        assert [f.kind for f in p.folds if f.side == "+"] == [kind]

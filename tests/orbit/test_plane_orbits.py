@@ -79,7 +79,7 @@ def test_no_picture_waits_for_a_compiler_or_for_what_nobody_looks_at(monkeypatch
     flow.follow(np.array([1.0, 0.0]))
     assert sum(len(run.t) for run in runs) < 700  # 1600 turns would take 10000
     runs.clear()
-    for curve in flow.spaced(8):
+    for _, curve, _ in flow.spaced(8):
         assert np.all(np.isfinite(curve))
     assert max(len(run.t) for run in runs) < 30
     assert sum(len(run.t) for run in runs) < 3000
@@ -117,7 +117,7 @@ def test_orbits_through_visible_folds_and_into_pseudo_saddles():
 
 def test_evenly_spaced_orbits_fill_the_box_both_ways():
     flow = orbits([1.0, -0.5 * y], [1.0, -0.5 * y], surface=y + 5)
-    curves = list(flow.spaced(6))
+    curves = [orbit.curve for orbit in flow.spaced(6)]
     assert len(curves) >= 5
     assert curves[0][0, 0] < -1.9 and curves[0][-1, 0] > 1.9
     for curve in curves:
@@ -145,7 +145,7 @@ def test_every_orbit_goes_to_where_it_ends():
     prey = x * (1 - x) - psi * y
     above, below = [prey, psi * y - d * y - effort * y], [prey, psi * y - d * y]
     flow = orbits(above, below, surface=y - 1.06, box=(0.0, 1.1, 0.3, 1.4))
-    curves = list(flow.spaced())
+    curves = [orbit.curve for orbit in flow.spaced()]
     rests = [e.point for e in [*flow.scan.equilibria, *flow.scan.pseudo_equilibria]]
     ends = list(ends_in_the_box(flow, curves, rests))
     assert len(curves) > 20 and len(ends) > 15
@@ -155,9 +155,32 @@ def test_every_orbit_goes_to_where_it_ends():
 def test_orbits_end_in_a_node_and_spirals_in_a_focus():
     for field in ([-x, -2 * y], [y - 0.8 * x, -x - 0.8 * y]):
         flow = orbits(field, field, surface=y + 1.9, t_end=1e3)
-        ends = list(ends_in_the_box(flow, list(flow.spaced(6)), [np.zeros(2)]))
+        ends = list(ends_in_the_box(flow, [o.curve for o in flow.spaced(6)], [np.zeros(2)]))
         assert len(ends) > 5 and all(met for _, met in ends)
         assert sum(bool(np.all(np.abs(end) < 1e-12)) for end, _ in ends) > 2
+
+
+def test_no_orbit_ends_in_mid_air_unless_it_thins_out():
+    """A limit cycle through a surface that is crossed: where orbits crowd, and nothing ends on it."""
+    smooth = 0.5 * (1 - x**2) * y - x
+    flow = orbits([y, smooth - 0.3], [y, smooth + 0.3], surface=x, box=(-3, 3, -3, 3))
+    spaced = list(flow.spaced())
+    assert any(thins[1] for _, _, thins in spaced)
+    for k, (_, curve, thins) in enumerate(spaced):
+        others = np.vstack([o.curve for j, o in enumerate(spaced) if j != k])
+        for end, thin, own in (
+            (curve[0], thins[0], curve[60:]),
+            (curve[-1], thins[1], curve[:-60]),
+        ):
+            gaps = np.linalg.norm((np.vstack([others, own]) - end) / flow.scan.box.size, axis=1)
+            assert (
+                thin
+                or gaps.min() < 1 / 150
+                or not flow.scan.box.contains(end)
+                or (
+                    np.linalg.norm(end) < 0.1  # the fused foci, around which it would wind for ever
+                )
+            )
 
 
 def test_an_orbit_may_end_where_it_begins_to_slide():

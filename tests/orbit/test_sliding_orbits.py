@@ -115,7 +115,7 @@ def test_evenly_spaced_orbits_keep_apart_and_say_their_region():
     sliding = two_fold("mix-S")
     curves = list(sliding.spaced(8))
     assert len(curves) > 6
-    for curve, attracting in curves:
+    for (_, curve, _), attracting in curves:
         assert np.all(curve >= -1e-8) if attracting else np.all(curve <= 1e-8)
     starts = list(sliding.spaced(8, avoid=[np.column_stack([np.linspace(0, 1, 99)] * 2)]))
     assert len(starts) < len(curves)

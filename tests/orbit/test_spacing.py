@@ -48,7 +48,7 @@ def test_straight_orbits_are_as_many_as_asked_and_apart(count):
         x = np.linspace(start[0], end, 100)
         return cut(np.column_stack([x, np.full(100, start[1])]))
 
-    curves = [curve for _, curve in evenly_spaced(BOX, count, follow)]
+    curves = [curve for _, curve, _ in evenly_spaced(BOX, count, follow)]
     heights = np.sort([curve[0, 1] for curve in curves])
     assert len(curves) == count
     assert_allclose(np.diff(heights), 1 / count)
@@ -64,7 +64,7 @@ def test_what_is_avoided_is_met_but_nothing_starts_beside_it():
 
     found = list(evenly_spaced(BOX, 8, follow, avoid=[line]))
     assert found
-    for start, curve in found:
+    for start, curve, _ in found:
         assert start[1] > 1 / 8  # the row of starts on the line is left out
         assert curve[0, 1] == 0.0  # but orbits run through it
 
@@ -93,15 +93,26 @@ def test_a_curve_that_comes_to_an_equilibrium_ends_in_it():
     assert len(spacing.until_met(away)) == 100  # it starts there
 
 
-def test_a_curve_that_stays_beside_another_ends_at_the_surface():
+def test_a_curve_that_stays_beside_another_thins_out_there():
     box = Box(0.0, 4.0, 0.0, 2.0)
-    line = np.linspace(0, 4, 800)
-    beside = np.column_stack([line, np.maximum(1.4 - line, 1.015)])
-    beside = np.vstack([beside, np.column_stack([line[::-1], np.full(800, 1.025)])])
-    ends = []
-    for switch in (lambda points: points[:, 0] - 1.5, None):
-        spacing = Spacing(box, 12, switch=switch)
-        spacing.add(np.column_stack([line, np.full(800, 1.0)]))
-        ends.append(spacing.until_met(beside)[-1, 0])
-    assert ends[0] == pytest.approx(1.5, abs=0.006)
-    assert ends[1] < 0.5  # without a surface, where they came close
+    line, spacing = np.linspace(0, 4, 800), Spacing(box, 12)
+    spacing.add(np.column_stack([line, np.full(800, 1.0)]))
+    kept = spacing.until_met(np.column_stack([line, np.maximum(1.4 - line, 1.015)]))
+    assert spacing.thins
+    assert 0.3 < kept[-1, 0] < 1.0  # where they came close, and a little on
+    spacing.until_met(np.column_stack([line, np.full(800, 1.4)]))
+    assert not spacing.thins  # far from it all the way
+    meets = spacing.until_met(np.column_stack([line, 1.4 - 0.4 * line]))
+    assert not spacing.thins and meets[-1, 1] == pytest.approx(1.0, abs=0.01)
+
+
+def test_orbits_say_at_which_end_they_thin_out():
+    box = Box(0.0, 4.0, 0.0, 2.0)
+
+    def follow(start, ahead, cut):
+        """Along hyperbolas that crowd at one edge."""
+        x = np.linspace(start[0], 4.0 if ahead else 0.0, 300)
+        return cut(np.column_stack([x, 1 + (start[1] - 1) * np.exp(0.7 * (start[0] - x))]))
+
+    ends = [thins for _, _, thins in evenly_spaced(box, 12, follow)]
+    assert any(end for _, end in ends) and not any(begin for begin, _ in ends)

@@ -116,3 +116,29 @@ def test_names_of_two_sets_do_not_meet(axes):
         labels.name("a point", (0.5, 0.5))
     (one,), (other,) = boxes(axes, first), boxes(axes, second)
     assert not one.overlaps(other)
+
+
+def test_names_of_two_points_side_by_side_are_not_taken_for_each_other(axes):
+    """Each is closer to its own point, and no line to a point passes another."""
+    places = np.array([(0.5, 0.5), (0.53, 0.5)])
+    axes.plot([0, 0.5], [0.5, 0.5], color="black", linewidth=3.4)
+    for y in np.linspace(0.52, 0.98, 12):
+        axes.plot([0.5, 1.0], [0.5, y], color="black")
+    axes.plot(*places.T, "s", color="black", markersize=8, linestyle="none")
+    labels = Labels(axes)
+    for text, place in zip(("a stable node", "an invisible fold"), places, strict=True):
+        labels.name(text, place)
+    points = axes.transData.transform(places)
+    for k, box in enumerate(boxes(axes, labels)):
+        assert gap(box, points[k : k + 1]) <= gap(box, points[1 - k : 2 - k])
+        assert not box.contains(points[0, 0] - 60, points[0, 1])  # the thick line is not hidden
+
+
+def test_names_keep_a_distance_in_which_they_are_not_read_as_one(axes):
+    labels = Labels(axes)
+    for k in range(4):
+        axes.plot(0.5, 0.5 + 0.01 * k, "o", color="black")
+        labels.name(f"number {k}", (0.5, 0.5 + 0.01 * k))
+    found = boxes(axes, labels)
+    for k, box in enumerate(found):
+        assert not any(box.padded(2.0).overlaps(other) for other in found[k + 1 :])

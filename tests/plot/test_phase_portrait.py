@@ -1,5 +1,7 @@
 """Portraits of planar systems draw the objects of the planar theory, and refuse other systems."""
 
+from itertools import pairwise
+
 import casadi as ca
 import matplotlib
 import numpy as np
@@ -132,3 +134,27 @@ def test_other_systems_and_boxes_are_refused():
             ns.plot.phase_portrait(harvest(1.0), wrong)
     with pytest.raises(ns.PointError, match="starts: expected finite numbers of shape"):
         ns.plot.phase_portrait(harvest(1.0), box, starts=[1, 2])
+
+
+def test_an_orbit_that_goes_on_beside_another_thins_out():
+    pendulum = ns.FilippovSystem(
+        [x, y], surface=y, above=[y, -ca.sin(x) - 0.3], below=[y, -ca.sin(x) + 0.3]
+    )
+    ax = ns.plot.phase_portrait(pendulum, (-4, 4, -3, 3)).axes[0]
+    ends = [c for c in ax.collections if c.get_gid() == "orbit"]
+    assert ends
+    lines = [line.get_xydata() for line in ax.lines if line.get_gid() == "orbit"]
+    for end in ends:
+        widths, parts = end.get_linewidths(), end.get_segments()
+        assert np.all(np.diff(widths) > 0) and widths[0] < 0.05 and widths[-1] == 0.9
+        for part, following in pairwise(parts):
+            assert_allclose(part[-1], following[0])
+        joins = [line[k] for line in lines for k in (0, -1)]
+        assert min(np.linalg.norm(parts[-1][-1] - join) for join in joins) < 1e-12
+
+
+def test_an_equilibrium_on_the_surface_has_the_name_that_it_has():
+    """Not that of a fold, which is visible or not by rounding."""
+    ax = ns.plot.phase_portrait(harvest(0.80135528), (0.0, 1.2, 0.3, 1.5)).axes[0]
+    named = {text.get_text() for text in ax.findobj(Text)}
+    assert "boundary node" in named and "visible fold" not in named

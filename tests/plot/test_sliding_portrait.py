@@ -3,9 +3,11 @@
 import casadi as ca
 import numpy as np
 import pytest
+from matplotlib.text import Text
 from numpy.testing import assert_allclose
 
 import nonsmooth as ns
+from papers.pictures import faults
 
 x, y, z = (ca.SX.sym(name) for name in "xyz")
 BOX = (-1.0, 1.0, -1.0, 1.0)
@@ -37,7 +39,7 @@ def test_normal_form_has_its_folds_on_the_axes_and_its_class(label, words):
             seen[int(np.argmin(np.abs(points).max(axis=0)))] = word
             assert np.abs(points).min(axis=1).max() < 1e-14
     assert seen == {0: words[0], 1: words[1]}  # z2 = 0 is the fold of F1
-    assert [t.get_text() for t in figure.axes[0].texts if "fold" not in t.get_text()].count(label)
+    assert [t.get_text() for t in figure.axes[0].findobj(Text)].count(label) == 1
     assert len(drawn(figure, "two-fold")) == 1
     canards = {"VV-C1": 2, "II-C": 2, "mix-S": 2}[label]  # halves, in Da and in Dr
     assert len(drawn(figure, "canard")) == canards
@@ -116,3 +118,10 @@ def test_each_region_is_named_once():
 def test_bad_input_is_refused_with_advice(call, error, words):
     with pytest.raises(error, match=words):
         call(ns.textbook.two_fold("II-C").system)
+
+
+@pytest.mark.parametrize("box", [(-1, 0.05, -1, 1), (-1, 1, -0.02, 1), (-0.03, 1, -1, 0.04)])
+def test_the_name_of_a_class_is_inside_of_a_narrow_frame(box):
+    system = ns.textbook.two_fold("VV-C1").system
+    figure = ns.plot.sliding_portrait(system, box, size=(3.4, 4.4))
+    assert [fault for fault in faults(figure) if "VV-C1" in fault] == []

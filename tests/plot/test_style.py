@@ -3,6 +3,7 @@
 import matplotlib
 import numpy as np
 import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 from matplotlib.patches import FancyArrowPatch
 from numpy.testing import assert_allclose
@@ -86,3 +87,20 @@ def test_pieces_inside_a_box():
     pieces = style.inside(np.column_stack([2 * np.cos(turns), np.sin(turns)]), (-1, 1, -2, 2))
     assert len(pieces) == 2
     assert all(np.abs(piece[:, 0]).max() <= 1 for piece in pieces)
+
+
+def test_nothing_shows_through_the_gaps_of_a_dashed_line():
+    figure = Figure(figsize=(3, 1))
+    ax = figure.add_axes((0, 0, 1, 1))
+    for at in np.linspace(0.05, 0.95, 40):
+        ax.plot([at, at], [0, 1], color="black", linewidth=1.0, zorder=2)
+    look = {"color": style.GREEN, "linewidth": 2.4, "linestyle": style.LONG_DASH}
+    ax.plot([0, 1], [0.5, 0.5], zorder=3, path_effects=style.halo(4.0), **look)
+    ax.set(xlim=(0, 1), ylim=(0, 1))
+    ax.set_axis_off()
+    figure.canvas = FigureCanvasAgg(figure)
+    figure.canvas.draw()
+    pixels = np.asarray(figure.canvas.buffer_rgba())[..., :3].astype(int)
+    middle = pixels[len(pixels) // 2]
+    assert middle.sum(axis=1).min() > 200  # green or white; black is 0
+    assert np.sum(middle.sum(axis=1) > 700) > 20  # and there are gaps

@@ -33,6 +33,7 @@ def run(quick: bool) -> dict[str, Any]:
     repeats = 1 if quick else 7
     cases: dict[str, tuple[str, bool]] = {
         "import nonsmooth": ("import nonsmooth", False),
+        "nonsmooth.simulate, one bounce, the driver compiled": (_SIMULATE, True),
         "nonsmooth.simulate, one bounce": (_SIMULATE, False),
         "nonsmooth.simulate, compiled, cold": (_COMPILED, True),
         "nonsmooth.simulate, compiled, cached": (_COMPILED, False),

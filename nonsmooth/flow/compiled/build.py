@@ -72,9 +72,10 @@ class Compilation:
                 process.kill()
 
     def call(self, command: list[str]) -> str:
-        """Compilation a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
+        """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
         if self.stopped:
             return "stopped"
+        name = "ziglang" if "ziglang" in command[:3] else command[0]
         try:
             process = subprocess.Popen(
                 command,
@@ -92,7 +93,7 @@ class Compilation:
             try:
                 if self.stopped:
                     self.stop()
-                errors = process.communicate()[1] if self.quiet else _finished(process)
+                errors = process.communicate()[1] if self.quiet else _finished(process, name)
             except BaseException:
                 process.kill()
                 raise
@@ -221,11 +222,11 @@ def _compile(
         files.replace(library, sealed(library.name, output.read_bytes()))
 
 
-def _finished(process: subprocess.Popen[str]) -> str:
+def _finished(process: subprocess.Popen[str], name: str) -> str:
     try:
         return process.communicate(timeout=_QUIET)[1]
     except subprocess.TimeoutExpired:
-        _say("nonsmooth: compiling a fast engine (once; it is kept) ... ")
+        _say(f"nonsmooth: compiling a fast engine with {name} (once; it is kept) ... ")
         errors = process.communicate()[1]
         _say("failed\n" if process.returncode else "done\n")
         return errors

@@ -20,8 +20,7 @@ FLAGS = (
 ).split()
 
 ADVICE = (
-    "Install one (gcc or clang from the system, or `pip install nonsmooth-dynamics[compiler]`), or "
-    "set CC."
+    "Install one (gcc or clang from the system, or `python -m pip install ziglang`), or set CC."
 )
 
 Command = tuple[str, ...]

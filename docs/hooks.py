@@ -27,7 +27,7 @@ from papers import mathematics  # noqa: E402
 
 PICTURES = DOCS.parent / "build" / "gallery"
 #: A list of exceptions in brackets, and a dash before a description that is not there.
-_LISTED = re.compile(r"(?<=<code>)\(((?:<a [^>]*>\w+</a>(?:, )?)+)\)(?=</code>)")
+_LISTED = re.compile(r"(?<=<code>)\(((?:<(a|autoref) [^>]*>\w+</\2>(?:, )?)+)\)(?=</code>)")
 _NOTHING = re.compile(r"\s*–\s*<div class=\"doc-md-description\">\s*</div>")
 _ROLE = re.compile(r":(?:class|func|meth|mod|attr):(?=<code>|`)")
 
@@ -79,7 +79,7 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
     read = typeset.formula
     if page.file.src_uri.startswith("api/"):
         read = mathematics.formula  # docstrings have formulas as plain text
-        html = _LISTED.sub(lambda found: found[1].replace(", <a", "</code>, <code><a"), html)
+        html = _LISTED.sub(lambda found: found[1].replace(">, <", "></code>, <code><"), html)
         html = _NOTHING.sub("", html)
     if page.file.src_uri.startswith(("papers/", "benchmarks")):  # plain text, for terminals too
         html = mathematics.typeset_page(html)

@@ -216,3 +216,37 @@ def test_overview_says_what_each_name_is():
         assert f"[{api.place(package, path.removeprefix(package + '.'))}] | " in overview
         first = (thing.__doc__ or "").partition("\n")[0]
         assert textwrap.shorten(first, 400), path
+
+
+# What the pages make of docstrings ------------------------------------------------------------------
+
+
+def neighbour(name):
+    """A module of docs, which is no package."""
+    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
+def test_parameters_described_together_show_their_own_types():
+    griffe = pytest.importorskip("griffe", reason="comes with the extra docs")
+    found = griffe.load(
+        "nonsmooth.local.regions",
+        search_paths=[DOCS.parent],
+        docstring_parser="numpy",
+        extensions=griffe.load_extensions(str(DOCS / "shared_entries.py")),
+    )["alpha"]
+    (section,) = [s for s in found.docstring.parsed if s.kind.value == "parameters"]
+    shown = {p.name: str(p.annotation) for p in section.value}
+    signature = {p.name: str(p.annotation) for p in found.parameters}
+    assert shown == signature
+    assert shown["system"] == "FilippovSystem" and shown["tol"] == "float"
+
+
+def test_errors_listed_together_are_shown_one_by_one():
+    pytest.importorskip("mkdocs", reason="comes with the extra docs")
+    listed = neighbour("hooks")._LISTED
+    link = '<autoref identifier="nonsmooth.A" optional hover>A</autoref>'
+    assert listed.search(f"<code>({link}, {link})</code>")
+    assert not listed.search(f"<code>({link} or {link})</code>")

@@ -50,7 +50,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Examples
     --------
     >>> main("shot --speed 28.5 --angle 37.3 --spin 2094 --turf natural".split())
-    lift-off  10.71 m/s, 37.3 deg, -4536 rpm, slip -1.61 m/s (III+)
+    lift-off  10.71 m/s, 37.3 deg, -4536 rpm, slip -1.61 m/s (III+: slips, then rolls from
+        compression on)
     run       23.19 m in 4.94 s: 13 bounces (10 of them outside the fit), the first 2.14 m high, over
         23.00 m; rolls 0.18 m
     0

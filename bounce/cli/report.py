@@ -79,6 +79,24 @@ def in_words(state: Landing, units: Units) -> str:
     return ", ".join(units.say(name, value, digits[name]) for name, value in polar(state).items())
 
 
+def in_course(itinerary: str) -> str:
+    """An itinerary of modes, or the case of a rigid impact, with what it means in words."""
+    cases = itinerary.rstrip("+-").split("/")
+    if all(case in _CASES for case in cases):
+        return f"{itinerary}: {' or '.join(_CASES[case] for case in cases)}"
+    return f"{itinerary}: {', '.join(_MODES.get(mode, mode) for mode in itinerary.split())}"
+
+
+#: What the letters of a mode and the cases of a rigid impact mean.
+_MODES = {"+": "slips forward", "-": "slips in reverse", "*": "slips", "s": "rolls"}
+_CASES = {
+    "I": "slips throughout",
+    "II": "slips, then rolls from restitution on",
+    "III": "slips, then rolls from compression on",
+    "grip": "slips, then grips the ground",
+}
+
+
 def opening(args: argparse.Namespace) -> dict[str, Any]:
     """Return what every JSON report begins with: version, command, and every input with its unit."""
     given = {name: value for name, value in vars(args).items() if name not in _NO_INPUTS}

@@ -8,7 +8,7 @@ from typing import Any
 from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideRebound, SideRun, play, rebound
 from ..units import Landing
 from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
-from .report import Units, in_words, opening, polar, print_json, tabulate
+from .report import Units, in_course, in_words, opening, polar, print_json, tabulate
 from .side import (
     asked_for_side,
     side_arguments,
@@ -158,7 +158,9 @@ def run_report(rest: Run) -> dict[str, float]:
 def _lines(hit: Rebound, rest: Run | None, chosen: Chosen, units: Units) -> list[str]:
     slip = hit.lift_off.xdot + chosen.ball.radius * hit.lift_off.omega
     shown = f"{units.show('speed', slip):.3g} {units.names['speed']}"
-    lines = [f"lift-off  {in_words(hit.lift_off, units)}, slip {shown} ({hit.itinerary})"]
+    lines = [
+        f"lift-off  {in_words(hit.lift_off, units)}, slip {shown} ({in_course(hit.itinerary)})"
+    ]
     if hit.time:
         lines.append(f"contact   {1e3 * hit.time:.3g} ms")
     return lines if rest is None else [*lines, *run_lines(rest, units)]

@@ -19,7 +19,7 @@ from ..golf import (
 )
 from ..units import Landing
 from .choices import Chosen, surroundings
-from .report import Units, in_words, polar
+from .report import Units, in_course, in_words, polar
 from .values import quantity
 
 _NAMES = ("side_spin", "axis_tilt", "launch_angle", "side_slope")
@@ -174,7 +174,7 @@ def side_lines(hit: SideRebound, units: Units) -> list[str]:
     digits = 4 if units.names["angle"] == "rad" else 1
     towards = "right" if hit.kick > 0 else "left" if hit.kick < 0 else "to neither side"
     return [
-        f"lift-off  {in_words(hit.lift_off, units)} ({hit.itinerary})",
+        f"lift-off  {in_words(hit.lift_off, units)} ({in_course(hit.itinerary)})",
         f"kick      {units.say('angle', abs(hit.kick), digits)} {towards}, side spin "
         f"{units.say('spin', hit.side_spin, 0)} before, {units.say('spin', hit.side_spin_after, 0)} after",
     ]

@@ -220,7 +220,9 @@ class Branch:
         return self.at(value)[0]
 
     def table(self) -> str:
-        """The events as lines of text."""
+        """The events as lines of text; empty if there are none."""
+        if not self.events:
+            return ""
         rows = [f"{self.parameter:>18}  event"]
         rows += [f"{e.parameter:18.12g}  {e.kind}; {e.far_side}" for e in self.events]
         return "\n".join(rows)
@@ -229,8 +231,8 @@ class Branch:
         low, high = self.values.min(), self.values.max()
         return (
             f"Branch of {len(self)} points, {self.parameter} from {low:.10g} to {high:.10g}, "
-            f"ends {self.ends[0]} and {self.ends[1]}, {len(self.events)} events\n" + self.table()
-        )
+            f"ends {self.ends[0]} and {self.ends[1]}, {len(self.events)} events\n{self.table()}"
+        ).rstrip()
 
     def _repr_html_(self) -> str:
         """How a notebook shows the branch: its range, its ends, its events."""

@@ -16,6 +16,15 @@ def test_list_names_every_problem(capsys):
     assert all(len(line.split()) > 2 for line in lines)
 
 
+def test_a_reader_that_has_enough_is_no_error():
+    ours = subprocess.Popen(
+        [sys.executable, "-m", "nonsmooth", "list"], stdout=subprocess.PIPE, stderr=subprocess.PIPE
+    )
+    ours.stdout.close()  # as `head` does
+    assert (ours.stderr.read(), ours.wait()) == (b"", 0)
+    ours.stderr.close()
+
+
 @pytest.mark.parametrize("name", textbook.PROBLEMS)
 def test_show_prints_values_and_status(name, capsys):
     assert main(["show", name]) == 0

@@ -31,6 +31,19 @@ def test_shot_is_play(command):
     assert command(*SHOT)[1].startswith("lift-off  10.71 m/s, 37.3 deg")
 
 
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ("--turf natural", "(III+: slips, then rolls from compression on)"),
+        ("--turf natural-rigid --angle 10", "(I+: slips throughout)"),
+        ("--model KelvinVoigt --stiffness 2e4", "(+ s -: slips forward, rolls, slips in reverse)"),
+    ],
+)
+def test_what_the_ball_does_on_the_ground_is_said_in_words(command, options, said):
+    extra = " --set mu=0.3 --set d1=0.1 --set d2=0.1 --set eta=0.5" * ("Kelvin" in options)
+    assert said in command(*SHOT, *options.split(), *extra.split())[1]
+
+
 def test_the_turf_that_was_not_typed_is_an_input_too(command):
     shot = json.loads(command(*SHOT, "--json")[1])
     assert shot["inputs"]["turf"] == "natural"

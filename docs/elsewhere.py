@@ -106,7 +106,7 @@ def measured() -> str:
         (
             "first answer of a new process",
             f"{cached:.2g} s",
-            f"{cold:.2g} s the first time, with a compilation",
+            f"{cold:.2g} s with the compilation of its system",
         ),
     ]
     head = "| what | measured | conditions |\n| --- | --- | --- |\n"

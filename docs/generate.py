@@ -152,9 +152,9 @@ def regions() -> str:
         ns.Region.TANGENT_BELOW: "$L_2 = 0$",
         ns.Region.TWO_FOLD: "$L_1 = L_2 = 0$",
         ns.Region.MIXED: "on an intersection of surfaces",
-        ns.Region.SLIDING: "$|M^{-1} a| < 1$, on a set",
-        ns.Region.CROSSING: "$|M^{-1} a| > 1$, on a set",
-        ns.Region.BOUNDARY: "$|M^{-1} a| = 1$, on a set",
+        ns.Region.SLIDING: "on a set of codimension two or three, where friction can hold",
+        ns.Region.CROSSING: "on such a set, where friction cannot hold",
+        ns.Region.BOUNDARY: "on such a set, between these two",
     }
     return table(
         ("where", "region", "name"), ((when[r], str(r), f"`Region.{r.name}`") for r in ns.Region)

@@ -123,7 +123,8 @@ TABLE: tuple[Row, ...] = (
         out_of="none",
         determinism="Determinism breaks on an open set: every orbit of a sector of Da reaches s in "
         "finite time, and from s a sector of Dr is open (infinitely many canards); the strong "
-        "canard of kappa_- bounds the sector. The other orbits leave through the visible fold.",
+        "canard, of the faster eigenvalue, bounds the sector. The other orbits leave through the "
+        "visible fold.",
     ),
     Row(
         "mix-F",

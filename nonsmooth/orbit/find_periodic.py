@@ -18,24 +18,22 @@ from ..model import (
     DegenerateError,
     FilippovSystem,
     NonsmoothError,
+    OptionError,
     Parameters,
     require_system,
     whole,
 )
+from .acceptance import require_duration, require_motion, require_simple
 from .boundary import BoundaryProblem, Evaluation
 from .demands import CLOSE, COARSE, FINAL, ROUNDING
-from .guess import Itinerary, Start, start_of
-from .legs import Leg, leg_name
+from .forced import about_of
+from .guess import start_of
+from .legs import leg_name
 from .periodic import PeriodicOrbit, faults_of, named
 from .rounds import once_round
 from .shooting import shot
 from .symmetric import mirror_of, require_symmetric
-
-#: A period below this part of the guess is that of a point.
-_POINT = 1e-9
-
-#: What moves by no more than this part of its size rests.
-_STILL = 1e-6
+from .words import Itinerary
 
 #: No leg may grow to so many times the guess of the whole orbit.
 _LONGEST = 10.0
@@ -70,7 +68,9 @@ def periodic_orbit(
         ends it; with a state as the guess.
     period : expression in parameters or float, optional
         The period of the forcing, if the system depends on time. Found by itself where the time only
-        enters sines and cosines of one frequency. The orbit may take several.
+        enters sines and cosines of one frequency. The orbit may take several. Of a system without
+        time about how long the whole orbit takes: shorter and longer ones, by more than a factor of
+        1.5, are passed over in the guess and refused as the result.
     symmetry : "odd" or array_like (n, n), optional
         R, if R x solves the equations when x does (half a forcing period later, if there is one): the
         orbit is looked for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
@@ -99,7 +99,9 @@ def periodic_orbit(
     DefinitionError
         ``system`` is none, or has vector multipliers; a mode of the itinerary that it does not have.
     OptionError
-        No period, though the system depends on time and none is found; a symmetry that is none.
+        No period, though the system depends on time and none is found, or one that is no positive
+        time; a symmetry that is none; with a run or an orbit as the guess an itinerary, a ``t_start``,
+        or what contradicts it.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     PointError
@@ -128,6 +130,8 @@ def periodic_orbit(
     """
     require_system(system)
     max_iterations = whole(max_iterations, "max_iterations")
+    if not isinstance(virtual, (bool, np.bool_)):
+        raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
     mirror = mirror_of(system, symmetry)
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     solver = _Solver(start.problem, start.p)
@@ -135,10 +139,11 @@ def periodic_orbit(
     problem, once = once_round(start.problem, u, start.p)
     if problem is not start.problem:
         u, at = _Solver(problem, start.p).solve(once, max_iterations)
-    _require_motion(at, start)
+    require_motion(problem, at, start)
+    require_duration(problem, at, about_of(system, period, start.p))
     faults = tuple(faults_of(problem, at, start.p))
     orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
-    _require_simple(orbit)
+    require_simple(orbit)
     require_symmetric(orbit)
     if faults and not virtual:
         raise _virtual(orbit)
@@ -296,43 +301,6 @@ class _Solver:
             residual=size,
             point=u,
         )
-
-
-def _require_motion(at: Evaluation, start: Start) -> None:
-    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
-    guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
-    period, x = float(np.abs(at.durations).sum()), at.starts[0]
-    way = float(np.abs(at.flight.rate[0]).max()) * period
-    rests = not start.problem.legs[-1].name and not start.problem.system.time_dependent
-    if period > _POINT * guess and not (rests and way <= _STILL * max(1.0, np.abs(x).max())):
-        return
-    n = start.problem.system.dimension
-    raise ConvergenceError(
-        f"periodic orbit: expected a period near {guess:.6g}, received {period:.2g}: Newton's method "
-        f"shrank the orbit to a point, {x[:n].tolist()}. It is an equilibrium, or a point "
-        "where legs vanish: start closer to the orbit.",
-        point=x[:n],
-    )
-
-
-def _require_simple(orbit: PeriodicOrbit) -> None:
-    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
-    system, p = orbit.system, orbit.parameter_vector
-    for i, leg in enumerate(orbit.problem.legs):
-        if leg.kind != "exit" or system.coupled:
-            continue
-        other = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}[leg.name]
-        flight = orbit.evaluation.flight
-        end = flight.end[i, : flight.sizes[i]]
-        at = Leg(leg.mode, other, "exit").at_end(system, end, p)
-        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
-        if abs(at.value) <= 1e-9 * size:
-            raise DegenerateError(
-                f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
-                f"{leg_name(leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
-                f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
-            )
-    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
 
 
 class VirtualOrbitError(ConvergenceError):

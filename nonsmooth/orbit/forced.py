@@ -60,3 +60,26 @@ def span_of(forcing: Forcing | None, p: Array) -> float | None:
             )
         )
     return span
+
+
+def about_of(system: FilippovSystem, period: Any, p: Array) -> float | None:
+    """About how long an orbit takes, in a system without time; None if that was not said.
+
+    Raises
+    ------
+    OptionError
+        Neither a positive time nor an expression in parameters.
+    """
+    if period is None or system.time_dependent:
+        return None
+    span = Forcing(system, period)(p)[0]
+    if not (math.isfinite(span) and span > 0.0):
+        raise OptionError(
+            explain(
+                "period",
+                expected="a positive time",
+                received=f"{span:.6g}",
+                advice="In a system without time it says about how long the orbit takes.",
+            )
+        )
+    return span

@@ -18,22 +18,21 @@ from ..model import (
     ConvergenceError,
     FilippovSystem,
     NonsmoothError,
-    OptionError,
     Parameters,
     Surfaces,
-    explain,
     real_array,
 )
 from ..model.forcing import Forcing
 from ..model.variational import plain_field
 from .boundary import BoundaryProblem
 from .flight import flights_of
-from .forced import forcing_of, span_of
+from .forced import about_of, forcing_of, span_of
 from .guards import march
-from .itinerary import leg_between, read_word
+from .guess_checks import require_alone, require_of, require_period, require_same
 from .legs import Leg, fly, leg_name
 from .periodic import PeriodicOrbit, named
-from .recurrence import CLOSE, Recurrence, recurrence, refused
+from .recurrence import CLOSE, Recurrence, recurrence, refused, require_steady
+from .words import Itinerary, word_legs
 
 _MOST_EVENTS = 2000
 
@@ -43,13 +42,8 @@ _LONGEST = 200.0
 #: A run that comes back as near as this, relative to its size, is not simulated further.
 _GOOD = 0.02
 
-#: Fields that differ by this part after a period have another one.
-_OTHER = 1e-6
-
 #: A state that may be one after a reset is left by this part of that time.
 _LATER = 0.05
-
-Itinerary = str | Sequence[str] | Sequence[tuple[str, str]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,13 +64,20 @@ def start_of(
     parameters: Parameters | None,
     t_start: float,
 ) -> Start:
+    if isinstance(guess, (PeriodicOrbit, Trajectory)):
+        require_of(system, guess.system)
     if isinstance(guess, PeriodicOrbit):
-        return _from_orbit(system, guess, parameters)
+        require_alone(guess, itinerary=itinerary, t_start=t_start or None)
+        return _from_orbit(system, guess, period, mirror, parameters)
     if isinstance(guess, Trajectory):
+        require_alone(guess, itinerary=itinerary, t_start=t_start or None)
         given = {**guess.parameters, **_by_name(parameters)}
         p = system.parameter_vector(given)
-        forcing = forcing_of(system, period)
-        found = recurrence(guess, symmetry=mirror, period=span_of(forcing, p), first=False)
+        forcing, about = forcing_of(system, period), _half(about_of(system, period, p), mirror)
+        found = recurrence(
+            guess, symmetry=mirror, period=span_of(forcing, p), first=False, about=about
+        )
+        require_steady(guess)
         if found is None or found.distance > CLOSE:
             raise refused(guess, found)
         return _from_recurrence(system, found, forcing, mirror, p)
@@ -86,10 +87,15 @@ def start_of(
     x = system.extended_point(real_array(guess, "guess"), t_start)
     if itinerary is not None:
         return _from_word(system, x, itinerary, forcing, mirror, p)
-    hint = span if forcing else None if period is None else float(period)
-    found = _simulated(system, x, mirror, hint, forcing is not None, p)
+    about = _half(about_of(system, period, p), mirror)
+    found = _simulated(system, x, mirror, about or span, forcing is not None, p)
     start = _from_recurrence(system, found, forcing, mirror, p)
     return start if forcing is None or mirror is not None else _nearest(start, x, forcing(p)[0])
+
+
+def _half(about: float | None, mirror: Array | None) -> float | None:
+    """The time that what is looked for takes: with a symmetry half of the orbit."""
+    return about if about is None or mirror is None else 0.5 * about
 
 
 def _nearest(start: Start, x: Array, span: float) -> Start:
@@ -114,10 +120,16 @@ def _by_name(parameters: Parameters | None) -> dict[str, Any]:
 
 
 def _from_orbit(
-    system: FilippovSystem, orbit: PeriodicOrbit, parameters: Parameters | None
+    system: FilippovSystem,
+    orbit: PeriodicOrbit,
+    period: Any,
+    mirror: Array | None,
+    parameters: Parameters | None,
 ) -> Start:
+    """The equations of an orbit, which say its period of the forcing and its symmetry."""
     p = system.parameter_vector({**orbit.parameters, **_by_name(parameters)})
-    return Start(orbit.problem, orbit.unknowns, p)
+    require_same(orbit.problem, period, mirror, p)
+    return Start(replace(orbit.problem, system=system), orbit.unknowns, p)
 
 
 def _from_recurrence(
@@ -136,37 +148,6 @@ def _from_recurrence(
     return _problem(system, legs, starts, durations, found.periods, forcing, mirror, p)
 
 
-def _require_period(
-    system: FilippovSystem,
-    legs: Sequence[Leg],
-    starts: Array,
-    durations: Array,
-    span: float,
-    p: Array,
-) -> None:
-    """Refuse a period after which the fields are not what they were.
-
-    A field may jump where a leg begins; so it counts what is within.
-    """
-    for leg, x, duration in zip(legs, starts, durations, strict=True):
-        field = leg.field(system)
-        y = flow_for(plain_field(system, leg.mode), field.states_at(x, p), p, 0.5 * float(duration))
-        later = y.copy()
-        later[system.dimension] += span
-        here, there = (field.rate.copied(z, p)[0][:, 0] for z in (y, later))
-        miss = float(np.abs(here - there).max())
-        if miss > _OTHER * float(np.abs(here).max()):
-            raise OptionError(
-                explain(
-                    "period",
-                    expected="a time after which the field is the same again",
-                    received=f"{span:.10g}, after which it differs by {miss:.2g} in mode {leg.mode!r} "
-                    f"at {y[: system.dimension].tolist()}",
-                    advice="Give the period of the forcing, or leave it out.",
-                )
-            )
-
-
 def _problem(
     system: FilippovSystem,
     legs: tuple[Leg, ...],
@@ -179,7 +160,7 @@ def _problem(
 ) -> Start:
     phase = reference = None
     if forcing is not None and not forcing.found:
-        _require_period(system, legs, starts, durations, forcing(p)[0], p)
+        require_period(system, legs, starts, durations, forcing(p)[0], p)
     if not legs[-1].name:
         phase = np.zeros(system.extended_dimension)
         if system.time_dependent:  # from time 0, which is the same phase of every forcing period
@@ -208,7 +189,7 @@ def _from_word(
     p: Array,
 ) -> Start:
     """Follow the legs of an itinerary, each to its event."""
-    legs = _word_legs(system, itinerary, mirror is not None)
+    legs = word_legs(system, itinerary, mirror is not None)
     found = flights_of(system, legs).followed(x, p, _LONGEST)
     starts, durations = found or _followed(system, legs, x, p)
     periods = 0.0
@@ -218,53 +199,14 @@ def _from_word(
     return _problem(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
 
 
-def _word_legs(system: FilippovSystem, itinerary: Itinerary, mirrored: bool) -> tuple[Leg, ...]:
-    """The legs of an itinerary, of which the first follows the last one, or its mirror image does."""
-    word: Any = itinerary if isinstance(itinerary, str) else _listed(itinerary)
-
-    def read() -> tuple[Leg, ...]:
-        modes = read_word(system, word) if isinstance(word, str) or not word else word
-        pairs = [(e, "") if isinstance(e, str) else e for e in modes]
-        following = [mode for mode, _ in pairs[1:]] + [pairs[0][0]]
-        if mirrored:
-            following[-1] = following[-1].translate(str.maketrans("+-", "-+"))
-        told = zip(pairs, following, strict=True)
-        return tuple(leg_between(system, mode, then, name) for (mode, name), then in told)
-
-    try:
-        return system.cached(("word", word, mirrored), read)
-    except TypeError:  # of lists, which are no keys
-        return read()
-
-
-def _listed(itinerary: Any) -> tuple[Any, ...]:
-    """Modes, or pairs of a mode and a name, as they were given."""
-    try:
-        word = tuple(itinerary)
-    except TypeError:
-        word = (None,)
-    for entry in word:
-        names = (entry,) if isinstance(entry, str) else entry
-        pair = isinstance(names, (tuple, list)) and len(names) in (1, 2)
-        if not pair or not all(isinstance(name, str) for name in names):
-            raise OptionError(
-                explain(
-                    "itinerary",
-                    expected="modes, such as '+ s -', or pairs of a mode and the name of its event",
-                    received=repr(itinerary),
-                    advice="Write for example '+ s -' or [('', 'floor')].",
-                )
-            )
-    return tuple(e if isinstance(e, str) else tuple(e) for e in word)
-
-
 def _followed(
     system: FilippovSystem, legs: Sequence[Leg], x: Array, p: Array
 ) -> tuple[Array, Array]:
     """Starts and durations of legs that are followed one after the other."""
-    starts, durations = list[Array](), list[float]()
-    for k, leg in enumerate(legs):
-        duration = march(system, leg, x, p, _LONGEST * _natural_time(system, x, p, leg.mode))
+    starts, durations, natural = list[Array](), list[float](), 0.0
+    for k, leg in enumerate(legs):  # a state near zero says little of how long a leg may take
+        natural = max(natural, _natural_time(system, x, p, leg.mode))
+        duration = march(system, leg, x, p, _LONGEST * natural)
         if duration is None:
             n, t = system.dimension, float(x[-1]) if system.time_dependent else sum(durations)
             raise ConvergenceError(
@@ -310,6 +252,7 @@ def _simulated(
         if best is not None and best.distance < _GOOD:
             break
     assert run is not None
+    require_steady(run)
     if best is None or best.distance > CLOSE:
         raise refused(run, best)
     return best
@@ -327,6 +270,7 @@ def _comes_back(
     n, values = system.dimension, named(system, p)
     t = float(x[-1]) if system.time_dependent else 0.0
     best: Recurrence | None = None
+    told = {"period": hint, "about": None} if forced else {"period": None, "about": hint}
     for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
         run = simulate(
             system,
@@ -338,7 +282,7 @@ def _comes_back(
             max_events=_MOST_EVENTS,
         )
         for first in (True, False):
-            found = recurrence(run, symmetry=mirror, period=hint if forced else None, first=first)
+            found = recurrence(run, symmetry=mirror, first=first, **told)
             if found is not None and (best is None or found.distance < 0.3 * best.distance):
                 best = found
         if (best is not None and best.distance < _GOOD) or run.status is not Status.REACHED_END:

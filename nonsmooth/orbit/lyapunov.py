@@ -35,6 +35,15 @@ _LOST = 1e-12
 #: smaller one is lost in rounding.
 _RATIO = 1e6
 
+#: Logarithms of the growths at an event add up to that of its determinant to this.
+_MISSED = 1e-6
+
+#: Derivatives beyond this are those of a run that diverges.
+_HUGE = 1e100
+
+#: A run that ends so many times as far away as it began, or as 1, diverges.
+_FAR = 1e6
+
 #: Stretches of equal length from which the standard errors are taken.
 _BLOCKS = 32
 
@@ -181,11 +190,19 @@ def lyapunov_spectrum(
         max_steps=100_000_000,
     )
     if run.status is not Status.REACHED_END:
-        raise DegenerateError(
-            f"run: expected one to t_end = {t_end:g}, received one that ended at t = "
-            f"{run.t[-1]:.10g} with status {run.status}. {run.message}"
-        )
+        raise DegenerateError(_ended(run, t_end))
     return _Frame(run, count, t_start + wait).follow(progress)
+
+
+def _ended(run: Trajectory, t_end: float) -> str:
+    """Message for a run that ended before, with its last state where that is far away."""
+    size = float(np.abs(run.x[-1]).max())
+    away = not size < _FAR * max(1.0, float(np.abs(run.x[0]).max()))
+    words = f"The run diverges: its last state is {run.x[-1].tolist()}. " if away else ""
+    return (
+        f"run: expected one to t_end = {t_end:g}, received one that ended at t = {run.t[-1]:.10g} with "
+        f"status {run.status}. {words}{run.message}"
+    )
 
 
 class _Frame:
@@ -259,13 +276,33 @@ class _Frame:
         if event is None or part.leg.kind == "end" or not self.q.shape[1]:
             return
         matrix = event.matrix[: self.n, : self.n]
+        if not np.abs(matrix).max() < _HUGE:
+            raise self._diverging(matrix, part)
         q, r = np.linalg.qr(matrix @ self.q)
         growth = np.abs(np.diag(r))
         kept = growth > _LOST * np.linalg.norm(matrix)
+        if not kept.all() and _regular(matrix):  # too small to be seen, but not lost
+            q, growth = self._spread(matrix, part)
+            kept = np.full(growth.shape, True)
         if self._block(self.t) >= 0:
             size = abs(float(np.linalg.det(matrix)))
             self.volume += math.log(size) if kept.all() and size else math.nan
         self._count(q[:, kept], growth[kept], self.t)
+
+    def _spread(self, matrix: Array, part: Stretch) -> tuple[Array, Array]:
+        """Directions and growths of an event that loses none, though QR sees them vanish."""
+        found = _spread(matrix, self.q)
+        if found is None:
+            raise self._diverging(matrix, part)
+        return found
+
+    def _diverging(self, matrix: Array, part: Stretch) -> DegenerateError:
+        return DegenerateError(
+            f"{part.leg.name!r} at t = {self.t:.10g}: expected an event that carries neighbours on with "
+            f"digits that are left, received derivatives up to {np.abs(matrix).max():.2g} that lose no "
+            "direction. The run diverges, or its states need other units: the last one is "
+            f"{part.end[: self.n].tolist()}."
+        )
 
     def _count(self, q: Array, growth: Array, t: float) -> None:
         self.q = q
@@ -315,6 +352,41 @@ class _Frame:
         return LyapunovSpectrum(
             exponents[order], errors[order], blocks[:, order], length, check, complete
         )
+
+
+def _spread(matrix: Array, q: Array) -> tuple[Array, Array] | None:
+    """Directions after a regular map and growths, also where these differ by more than rounding allows.
+
+    With M Q = Q' R the inverse map has M^-T Q = Q' R^-T: its QR from the last column to the first has
+    the smallest growths without cancellation, as the QR of M Q has the largest. None where growths
+    between are seen by neither: all of them have the product |det M|.
+    """
+    m, whole = q.shape[1], np.linalg.qr(q, mode="complete")[0]
+    forward, r = np.linalg.qr(matrix @ whole)
+    backward, s = np.linalg.qr(np.linalg.solve(matrix.T, whole)[:, ::-1])
+    growth, shrinking = np.abs(np.diag(r)), np.abs(np.diag(s))[::-1]
+    large = growth > math.sqrt(_LOST) * growth.max()
+    if not (np.where(large, growth, shrinking) > 0.0).all():
+        return None
+    logs = np.where(large, np.log(growth, where=large, out=np.zeros(len(large))), 0.0)
+    logs -= np.log(shrinking, where=~large, out=np.zeros(len(large)))
+    if not abs(logs.sum() - np.linalg.slogdet(matrix)[1]) < _MISSED:
+        return None
+    turned = np.linalg.qr(np.where(large, forward, backward[:, ::-1]))[0]
+    return turned[:, :m], np.exp(logs[:m])
+
+
+def _regular(matrix: Array) -> bool:
+    """Whether a square matrix has an inverse, in whatever units its rows and columns are."""
+    scaled = np.abs(matrix)
+    signs = np.sign(matrix)
+    for axis in (1, 0, 1, 0):
+        largest = scaled.max(axis=axis, keepdims=True)
+        if not (np.isfinite(largest) & (largest > 0.0)).all():
+            return False
+        scaled = scaled / largest
+    values = np.linalg.svd(signs * scaled, compute_uv=False)
+    return bool(values[-1] > _LOST * values[0])
 
 
 def _resolved(growth: Array) -> bool:

@@ -21,6 +21,7 @@ from ..model import (
     is_real,
     periods,
     read_period,
+    real,
     require_system,
     whole,
 )
@@ -77,7 +78,8 @@ class PoincareOrbit(Savable):
         DegenerateError
             The run grazes a surface, or meets two at one instant.
         """
-        since = k - 1 if since is None else since
+        k = whole(k, "k", least=0)
+        since = k - 1 if since is None else whole(since, "since", least=-1)
         if not -1 <= since < k < len(self.t):
             raise OptionError(
                 f"k: expected hits from 0 to {len(self.t) - 1}, the earlier one from -1, received "
@@ -205,7 +207,7 @@ def poincare(
     (np.float64(0.533488091), np.float64(0.53348809...))
     """
     require_system(system)
-    count = whole(count, "count")
+    count, t_start = whole(count, "count"), real(t_start, "t_start")
     if isinstance(section, Section):
         wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))
     else:

@@ -11,12 +11,28 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..flow.status import Status
 from ..flow.trajectory import Trajectory
 from ..model import Array, ConvergenceError
 from .legs import Stretch, stretches
 
 #: A run that comes back to within this part of its size may be near a periodic orbit.
 CLOSE = 0.25
+
+
+#: An orbit takes about as long as it is said to within this factor.
+_ABOUT = 1.5
+
+#: Times between events that fall below this part of what they were at half of a run go on falling.
+_FALLING = 0.7
+
+#: Runs of fewer events are not asked whether they chatter.
+_MANY = 200
+
+
+def is_about(duration: float, about: float) -> bool:
+    """Whether a time is near another one, from two thirds to one and a half times it."""
+    return about / _ABOUT <= duration <= about * _ABOUT
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +59,7 @@ def recurrence(
     symmetry: Array | None,
     period: float | None,
     first: bool,
+    about: float | None = None,
 ) -> Recurrence | None:
     """The legs of a run that nearly close, None if it has none.
 
@@ -54,35 +71,30 @@ def recurrence(
         Of the forcing.
     first : bool
         Take the first recurrence of the run, not the last.
+    about : float, optional
+        How long it takes (see ``is_about``).
     """
     parts = [part for part in stretches(run) if part.duration > 0.0]
     closed = [k for k, part in enumerate(parts) if part.leg.name and part.leg.kind != "stop"]
     # legs between two events: start k is after the event that ends part k - 1
     starts = [k + 1 for k in closed if k + 1 < len(parts)]
     if len(starts) < 2:
-        return _without_events(run, parts, symmetry, period, first)
+        return _without_events(run, parts, symmetry, period, first, about)
     scale = _scales(run)
     anchor = starts[0] if first else starts[-1]
     others = [k for k in starts if (k > anchor if first else k < anchor)]
     if symmetry is None:
         others = [k for k in others if _key(parts, k) == _key(parts, anchor)]
+    if about is not None:
+        others = [k for k in others if is_about(abs(parts[k].t - parts[anchor].t), about)]
     if not others:
         return None
     distances, periods = _distances(run, parts, anchor, others, scale, symmetry, period)
-    found = [
-        Recurrence(tuple(parts[min(anchor, k) : max(anchor, k)]), count, distance)
-        for k, distance, count in zip(others, distances, periods, strict=True)
-    ]
-    return _shortest(found)
-
-
-def _shortest(found: Sequence[Recurrence]) -> Recurrence | None:
-    """The shortest of those that close about as well as the best."""
-    if not found:
-        return None
-    best = min(r.distance for r in found)
-    good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]
-    return min(good, key=lambda r: len(r.parts))
+    best = min(distances)  # of those that close about as well as the best the shortest
+    good = [i for i, apart in enumerate(distances) if apart <= max(3.0 * best, 1e-9)]
+    i = min(good, key=lambda i: abs(others[i] - anchor))
+    low, high = sorted((anchor, others[i]))
+    return Recurrence(tuple(parts[low:high]), periods[i], distances[i])
 
 
 def _key(parts: Sequence[Stretch], k: int) -> tuple[str, str]:
@@ -125,17 +137,20 @@ def _without_events(
     symmetry: Array | None,
     period: float | None,
     first: bool,
+    about: float | None,
 ) -> Recurrence | None:
     """A recurrence within one leg: after whole periods, or on a plane across the flow."""
     if not parts:
         return None
     part = parts[0] if first else parts[-1]
     start, end = part.t, part.t + part.duration
-    n, scale = run.system.dimension, _scales(run)
+    scale = _scales(run)
     anchor = start if first else end
     found = []
     for t in _returns(run, start, end, anchor, symmetry, period):
         low, high = sorted((anchor, t))
+        if about is not None and not is_about(high - low, about):
+            continue
         there = run(high) if symmetry is None else symmetry @ run(high)
         distance = float(np.abs((there - run(low)) / scale).max())
         x = np.append(run(low), low) if run.system.time_dependent else run(low)
@@ -143,7 +158,6 @@ def _without_events(
         leg = type(part.leg)(part.leg.mode)
         cut = Stretch(leg, low, high - low, x, x, x)
         found.append(Recurrence((cut,), round(2 * periods) / 2, distance))
-    del n
     best = min((r.distance for r in found), default=np.inf)
     good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]
     return min(good, key=lambda r: r.parts[0].duration) if good else None
@@ -180,6 +194,31 @@ def _returns(
     from scipy.optimize import brentq  # here: it is not needed to import the library
 
     return [float(brentq(above, times[k], times[k + 1], xtol=1e-13 * end)) for k in away]
+
+
+def require_steady(run: Trajectory) -> None:
+    """Refuse a run that chatters: it had too many events, and the times between them shrink.
+
+    Raises
+    ------
+    ConvergenceError
+    """
+    if run.status is not Status.TOO_MANY_EVENTS or len(run.events) < _MANY:
+        return
+    times = np.array([event.t for event in run.events])
+    waits = np.diff(times)
+    part = len(waits) // 20
+    middle, last = (float(np.median(w)) for w in (waits[9 * part : 10 * part], waits[-part:]))
+    if last >= _FALLING * middle:
+        return
+    raise ConvergenceError(
+        f"guess: expected a run that comes back to where it was, received one that chatters: it ended "
+        f"with {run.status} at t = {times[-1]:.6g}, after {len(times)} events, the time between which "
+        f"fell from {middle:.2g} at half of them to {last:.2g}. Its switches accumulate near "
+        f"{run.x[-1].tolist()}: no orbit of finitely many legs is there. Start elsewhere, or model "
+        "what limits the switching, such as hysteresis or a delay.",
+        point=run.x[-1],
+    )
 
 
 def refused(run: Trajectory, found: Recurrence | None) -> ConvergenceError:

@@ -47,7 +47,8 @@ def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
         following = legs if problem.symmetry is None else [mirrored(problem, leg) for leg in legs]
         if any(problem.legs[i] != (legs, following)[i // k % 2][i % k] for i in range(count)):
             continue
-        once = replace(problem, legs=legs, periods=round(2 * problem.periods * k / count) / 2)
+        # a part of a period where that was given as several
+        once = replace(problem, legs=legs, periods=problem.periods * k / count)
         return once, once.pack(starts[:k], durations[:k])
     return problem, u
 

@@ -132,7 +132,7 @@ def gradient(
     Raises
     ------
     DegenerateError
-        As :func:`sensitivity`.
+        As :func:`sensitivity`; a cost that is not finite at the end, or has no finite derivatives.
     DefinitionError, NotSmoothError
         A cost with foreign symbols, or with a kink or a jump.
     OptionError
@@ -162,7 +162,7 @@ def gradient(
     row, by_parameters = _pulled(parts, at.gradient, chosen, stopped=_stopped(last))
     by_parameters = by_parameters + at.by_parameters[list(chosen)]
     numbers = dict(zip(names, by_parameters.tolist(), strict=True))
-    return Gradient(at.value, row[:n] + 0.0, numbers)
+    return _finite(Gradient(at.value, row[:n] + 0.0, numbers), run)
 
 
 def _gradient_of_sets(run: Trajectory, cost: Any, names: Sequence[str]) -> Gradient:
@@ -176,7 +176,17 @@ def _gradient_of_sets(run: Trajectory, cost: Any, names: Sequence[str]) -> Gradi
     by_p = slope[:n] @ found.dx_dp + by_time * found.dt_end_dp
     by_p = by_p + own[[system.parameter_names.index(name) for name in names]]
     value = float(here(cost)[0])
-    return Gradient(value, x0, dict(zip(names, by_p.tolist(), strict=True)))
+    return _finite(Gradient(value, x0, dict(zip(names, by_p.tolist(), strict=True))), run)
+
+
+def _finite(found: Gradient, run: Trajectory) -> Gradient:
+    """Refuse a cost that is no finite number at the end of a run, or has no finite derivatives."""
+    if np.isfinite([found.value, *found.x0, *found.parameters.values()]).all():
+        return found
+    raise DegenerateError(
+        f"cost: expected a finite number with finite derivatives at the end of the run, "
+        f"{run.x[-1].tolist()}, received {found!r}. Check logarithms, roots and divisions there."
+    )
 
 
 def _cost(system: FilippovSystem, mode: str, cost: Any) -> EventMap:

@@ -141,3 +141,31 @@ def test_a_run_that_ends_at_an_event_loses_no_direction():
     slope = ns.sensitivity(run, wrt="x0").dx_dx0
     value = 2 * 0.3**2 - 1
     assert np.abs(slope - [[4 * value * 4 * 0.3, 0], [0, 1]]).max() < 1e-12
+
+
+def test_a_map_that_diverges_has_its_exponents_as_long_as_there_are_digits():
+    """x -> 3 x, y -> -2 x y: the map has the derivatives 3 and -2 x, and x grows by 3 exp(1) each tick.
+
+    Rates far above that of the clock's phase are no grazing of its tick."""
+    start, clock = [1.0, 0.2, 0.5], ns.Clock(1.0, map=[3 * x, -2 * y * x])
+    system = ns.FilippovSystem([x, y], field=[x, y - x], clocks=clock)
+    found = ns.lyapunov_spectrum(system, start, t_end=4.0, transient=1.0, progress=False)
+    sizes = [math.exp(0.5 + k) * 3.0**k for k in range(4)]  # x at the ticks
+    total = sum(math.log(3.0) + math.log(2.0 * size) for size in sizes[1:]) + 2.0 * 3.0
+    assert found.exponents.sum() == pytest.approx(total / 3.0, rel=1e-9)
+    with pytest.raises(ns.DegenerateError, match=r"'clock' at t = .* The run diverges, or"):
+        ns.lyapunov_spectrum(system, start, t_end=20.0, progress=False)
+    with pytest.raises(ns.DegenerateError, match=r"status NOT_FINITE\. The run diverges: its last"):
+        ns.lyapunov_spectrum(system, start, t_end=60.0, progress=False)
+
+
+def test_a_squaring_map_that_diverges_keeps_the_exponent_of_its_clock_finite():
+    """x -> x^2 + 2 at rest between: the clock's direction is not lost, whatever x is."""
+    system = ns.FilippovSystem([x], field=[0 * x], clocks=ns.Clock(1.0, map=[x**2 + 2]))
+    found = ns.lyapunov_spectrum(system, [1.0, 0.5], t_end=8.4, transient=2.4, progress=False)
+    size, total = 1.0, 0.0
+    for k in range(8):  # ticks at 0.5, 1.5, ...
+        total += math.log(2.0 * size) if k + 0.5 > 2.4 else 0.0
+        size = size**2 + 2.0
+    assert found.exponents.sum() == pytest.approx(total / 6.0, rel=1e-9)
+    assert np.isfinite(found.exponents).all()

@@ -106,3 +106,151 @@ def test_attractors_that_are_no_points_are_refused(points) -> None:
         ns.PointError, match=r"attractors: expected points \(m, 2\) that are finite"
     ):
         ns.basins(stick_slip(), grid, t_end=10.0, attractors=points)
+
+
+@pytest.mark.parametrize("start", [1e300, -1e17])
+def test_a_state_whose_motion_is_lost_in_rounding_is_no_orbit(start) -> None:
+    t = ca.SX.sym("t")
+    drive = 2.5 * ca.cos(t)
+    relay = ns.FilippovSystem([X], surface=X, above=[drive - 1], below=[drive + 1], time=t)
+    with pytest.raises(ns.ConvergenceError, match=r"an orbit that moves, .* closes by rounding"):
+        ns.periodic_orbit(relay, [start])
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e9])
+def test_an_orbit_far_from_the_origin_is_one_as_long_as_it_moves(offset) -> None:
+    """The relay of the docstring about x = offset: its multiplier is that of offset 0."""
+    t = ca.SX.sym("t")
+    drive = 2.5 * ca.cos(t)
+    relay = ns.FilippovSystem([X], surface=X - offset, above=[drive - 1], below=[drive + 1], time=t)
+    orbit = ns.periodic_orbit(relay, [offset + 0.5])
+    c = 2.5 * (1 - (ca.pi / 5) ** 2) ** 0.5
+    assert abs(orbit.multipliers[0] - ((c - 1) / (c + 1)) ** 2) < 1e-15 * offset
+
+
+def test_an_equilibrium_of_a_forced_system_is_an_orbit_though_it_does_not_move() -> None:
+    """x' = (0.1 - x)(2 + cos t): the multiplier of x = 0.1 is exp(-4 pi)."""
+    t = ca.SX.sym("t")
+    system = ns.FilippovSystem([X], field=[(0.1 - X) * (2 + ca.cos(t))], time=t)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3], t_end=40.0))
+    assert orbit.start == pytest.approx([0.1], rel=1e-15)
+    assert abs(orbit.multipliers[0].real / ca.exp(-4 * ca.pi) - 1) < 1e-8
+
+
+def integrators(b3: float, a: float) -> ns.FilippovSystem:
+    """Three integrators with a relay that its output lags by two: fast switches (Johansson et al. 1999)."""
+    z = ca.SX.sym("z")
+    field = lambda u: [Y - a * X, z - u - a * X, -b3 * u - a * X]
+    return ns.FilippovSystem([X, Y, z], surface=X, above=field(1), below=field(-1))
+
+
+def test_a_run_that_chatters_is_refused_soon_and_by_its_name() -> None:
+    system = integrators(0.1, 1.0)
+    run = ns.simulate(system, [1.0, 0.0, 0.0], 200.0, max_events=20_000)
+    assert run.status is ns.Status.TOO_MANY_EVENTS
+    with pytest.raises(
+        ns.ConvergenceError, match="one that chatters: it ended with TOO_MANY_EVENTS"
+    ):
+        ns.periodic_orbit(system, run)
+    with pytest.raises(ns.ConvergenceError, match="one that chatters"):  # 2,000 events of its own
+        ns.periodic_orbit(integrators(0.0, 1.0), [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("start", [[1.0, 0.0, 0.0], [0.3, -0.2, 0.5]])
+def test_an_orbit_that_shrinks_to_a_two_fold_is_none(start) -> None:
+    """Near x = y = 0 small orbits nearly close, by their size squared: Newton's method halves them."""
+    with pytest.raises(ns.ConvergenceError, match="shrank the orbit to a point"):
+        ns.periodic_orbit(integrators(1.0, 0.0), start)
+
+
+def harmonic() -> ns.FilippovSystem:
+    """Orbits of period 2 pi around a circle that attracts."""
+    pull = 1 - X**2 - Y**2
+    return ns.FilippovSystem([X, Y], field=[-Y + X * pull, X + Y * pull])
+
+
+def test_the_period_of_a_system_without_time_is_about_what_the_orbit_takes() -> None:
+    system = harmonic()
+    run = ns.simulate(system, [0.5, 0.0], t_end=60.0)
+    for guess in (run, [0.5, 0.0], ns.periodic_orbit(system, run)):
+        assert ns.periodic_orbit(system, guess, period=7.0).period == pytest.approx(2 * ca.pi)
+        with pytest.raises(
+            ns.ConvergenceError, match=r"about period = 12.5664, received .* 6.2831"
+        ):
+            ns.periodic_orbit(system, guess, period=4 * ca.pi)
+    odd = ns.periodic_orbit(system, run, period=6.0, symmetry="odd")
+    assert odd.symmetric and odd.period == pytest.approx(2 * ca.pi)
+
+
+@pytest.mark.parametrize("period", [-1.0, 0.0, float("nan"), "x", X])
+def test_a_period_that_is_no_time_is_refused_in_a_system_without_time(period) -> None:
+    with pytest.raises(ns.OptionError, match="period: expected a"):
+        ns.periodic_orbit(harmonic(), [0.5, 0.0], period=period)
+
+
+def test_what_an_orbit_or_a_run_says_itself_is_not_said_again() -> None:
+    system = scalar_relay()
+    orbit = ns.periodic_orbit(system, [0.5])
+    for options, message in [
+        ({"itinerary": "+ -"}, "itinerary: expected none, as it belongs to a state"),
+        ({"t_start": 1.0}, "t_start: expected none, as it belongs to a state"),
+        ({"period": 3.0}, "period: expected that of the orbit that is the guess, 6.28318"),
+        ({"symmetry": "odd"}, "symmetry: expected none, or that by which the guess was found"),
+    ]:
+        with pytest.raises(ns.OptionError, match=message):
+            ns.periodic_orbit(system, orbit, **options)
+    with pytest.raises(ns.OptionError, match=r"itinerary: .* with a Trajectory"):
+        ns.periodic_orbit(system, ns.simulate(system, [0.5], 40.0), itinerary="+ -")
+
+
+@pytest.mark.parametrize("rounds", [2, 3, 10])
+def test_several_periods_of_the_forcing_given_as_one_are_the_same_orbit_once(rounds) -> None:
+    once = ns.periodic_orbit(scalar_relay(), [0.5])
+    several = ns.periodic_orbit(scalar_relay(), [0.5], period=2 * ca.pi * rounds)
+    assert several.period == pytest.approx(once.period) and len(several.legs) == 2
+    assert abs(several.multipliers[0] - once.multipliers[0]) < 1e-12
+
+
+def test_a_leg_that_begins_near_zero_may_take_as_long_as_the_one_before() -> None:
+    """At its events the only state of a relay is zero, which says nothing of how long a leg takes."""
+    found = ns.periodic_orbit(scalar_relay(), [0.5], itinerary="+ -")
+    assert (
+        abs(found.multipliers[0] - ns.periodic_orbit(scalar_relay(), [0.5]).multipliers[0]) < 1e-13
+    )
+
+
+def test_an_orbit_of_another_system_is_no_guess_and_one_of_a_like_system_is() -> None:
+    orbit = ns.periodic_orbit(scalar_relay(), [0.5])
+    for guess in (orbit, ns.simulate(scalar_relay(), [0.5], 40.0)):
+        with pytest.raises(ns.DefinitionError, match="guess: expected a run or an orbit of"):
+            ns.periodic_orbit(harmonic(), guess)
+    t, a, k = (ca.SX.sym(name) for name in ("t", "A", "k"))
+    drive = a * ca.cos(t) - X / 10  # a friction more
+    names = {a: 2.5, k: 1.0}
+    like = ns.FilippovSystem(
+        [X], surface=X, above=[drive - k], below=[drive + k], time=t, parameters=names
+    )
+    known = ns.periodic_orbit(like, [0.5])
+    found = ns.periodic_orbit(like, orbit)
+    assert found.system is like
+    assert found.multipliers[0] == pytest.approx(known.multipliers[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("cost", [ca.log(X - 100), ca.sqrt(X)])
+def test_a_cost_that_is_no_number_has_no_gradient(cost) -> None:
+    """The logarithm of a negative number; a root of zero, whose slope is infinite."""
+    run = ns.simulate(ns.FilippovSystem([X], field=[-X]), [0.0], 1.0)
+    with pytest.raises(
+        ns.DegenerateError, match="cost: expected a finite number with finite deriv"
+    ):
+        ns.gradient(run, cost)
+
+
+def test_hits_of_a_section_are_asked_for_by_whole_numbers_and_times_by_numbers() -> None:
+    system = scalar_relay()
+    hits = ns.poincare(system, "h0", [0.5], count=3, direction=0)
+    for options in ({"k": 1.5}, {"k": "a"}, {"k": 1, "since": "a"}, {"k": 1, "since": -2}):
+        with pytest.raises(ns.OptionError, match="expected a whole number"):
+            hits.jacobian(**options)
+    with pytest.raises(ns.OptionError, match="t_start: expected a finite number"):
+        ns.poincare(system, 1.0, [0.5], count=3, t_start="a")

@@ -1,10 +1,12 @@
 """What every test and every example of a docstring runs under: no display, and few compilations.
 
-What the fast suite compiles is the driver in C, once, and lanes without optimisation. A program of one
-system has the same bits as that driver and takes seconds to compile: fast tests of ``test_special.py``
-and the slow ones have it. Lanes as they are shipped are in ``tests/flow/compiled`` and the slow tests.
+What the fast suite compiles is the driver in C, once, and lanes and kernels without optimisation. A program
+of one system has the same bits as that driver and takes seconds to compile: fast tests of
+``test_special.py`` and the slow ones have it. Lanes as they are shipped have the tests in ``SHIPPED``, the
+slow ones, and where hypothesis draws all its examples those of ``tests/flow/compiled``.
 """
 
+import gc
 import importlib
 import os
 from collections.abc import Iterator
@@ -13,6 +15,8 @@ from pathlib import Path
 import pytest
 
 from nonsmooth.flow.compiled import lanes, tape
+from nonsmooth.flow.compiled.device import shim
+from tests.halves import elsewhere
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -26,6 +30,20 @@ DEAR = {
 }
 
 
+#: Tests of the fast suite with lanes as they are shipped, whatever the profile.
+SHIPPED = {"test_every_operation", "test_random_landings_agree_with_the_interpreter"}
+COMPILED = HERE / "tests" / "flow" / "compiled"
+WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
+
+# As often as Python collects garbage by default, it takes a twentieth of the time and finds little.
+gc.set_threshold(50_000, 20, 100)
+
+
+def pytest_ignore_collect(collection_path: Path) -> bool | None:
+    """Leave the files of the other half to the other process."""
+    return True if collection_path.is_file() and elsewhere(collection_path) else None
+
+
 def pytest_collectstart(collector: pytest.Collector) -> None:
     """Import a package before its modules: collected alone, a module that is imported first would take
     the place, in the package, of the function that has its name."""
@@ -34,11 +52,18 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
         importlib.import_module(".".join(path.parent.relative_to(HERE).parts))
 
 
+@pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is dear."""
+    """Mark what is dear; leave out what was asked for by name and is of the other half."""
+    items[:] = [item for item in items if not elsewhere(item.path)]
     for item in items:
         if item.nodeid in DEAR:
             item.add_marker(pytest.mark.slow)
+
+
+def pytest_collection_finish() -> None:
+    """What is there now stays: the collector need not look at it again."""
+    gc.freeze()
 
 
 @pytest.fixture(autouse=True)
@@ -50,6 +75,8 @@ def few_compilations(
     if not slow and request.path.name != "test_special.py":
         monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
         monkeypatch.setattr(tape, "_LONG", 500_000)
-    if not slow and HERE / "tests" / "flow" / "compiled" not in request.path.parents:
+    shipped = COMPILED in request.path.parents and (WHOLE or request.node.name in SHIPPED)
+    if not (slow or shipped):
         monkeypatch.setattr(lanes, "FLAGS", (*lanes.FLAGS, "-O0"))
+        monkeypatch.setattr(shim, "_FLAGS", (*shim._FLAGS, "-O0"))
     yield

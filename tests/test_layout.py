@@ -72,8 +72,10 @@ def sources(*folders, suffixes=(".py",)):
 
 @cache
 def nodes(path):
-    """The syntax of a source file, node by node."""
-    return list(ast.walk(ast.parse(path.read_text(encoding="utf-8"))))
+    """Functions, imports and attributes in the syntax of a source file; the rest is not kept."""
+    kept = (ast.FunctionDef, ast.AsyncFunctionDef, ast.Import, ast.ImportFrom, ast.Attribute)
+    syntax = ast.walk(ast.parse(path.read_text(encoding="utf-8")))
+    return [node for node in syntax if isinstance(node, kept)]
 
 
 def test_nonsmooth_has_no_words_of_the_ball():

@@ -23,6 +23,7 @@ api = importlib.util.module_from_spec(_spec)
 _spec.loader.exec_module(api)
 
 OBJECTS = dict(api.objects())
+MODULES = sorted({path.rpartition(".")[0] for path in OBJECTS})
 PACKAGES = {task.package for task in api.listed().values()} | {"nonsmooth.local"}
 PACKAGES |= {module.__name__ for _, module, _ in api.MODULES}
 SECTION = re.compile(
@@ -50,10 +51,20 @@ def docstrings(path, thing):
                 yield f"{path}.{name}", function.__doc__
 
 
-@pytest.mark.parametrize("path", OBJECTS)
-def test_every_parameter_attribute_result_and_error_is_described(path):
+def of(module):
+    """The objects of a module, by their paths."""
+    found = {path: thing for path, thing in OBJECTS.items() if path.rpartition(".")[0] == module}
+    assert found
+    return found.items()
+
+
+@pytest.mark.parametrize("module", MODULES)
+def test_every_parameter_attribute_result_and_error_is_described(module):
     missing = {
-        where: bare for where, doc in docstrings(path, OBJECTS[path]) if (bare := undescribed(doc))
+        where: bare
+        for path, thing in of(module)
+        for where, doc in docstrings(path, thing)
+        if (bare := undescribed(doc))
     }
     assert missing == {}
 
@@ -92,11 +103,12 @@ def wanted(path, thing):
     return found
 
 
-@pytest.mark.parametrize("path", OBJECTS)
-def test_no_parameter_and_no_field_is_left_out(path):
+@pytest.mark.parametrize("module", MODULES)
+def test_no_parameter_and_no_field_is_left_out(module):
     missing = {
         where: [name for name in names if name not in entries(doc or "")]
-        for where, doc, names in wanted(path, OBJECTS[path])
+        for path, thing in of(module)
+        for where, doc, names in wanted(path, thing)
     }
     assert {where: names for where, names in missing.items() if names} == {}
 
@@ -161,11 +173,12 @@ def prose(doc):
     return MARKED.sub("", re.sub(r"^[\w*, ]+ : .*$|^-+$", "", text, flags=re.MULTILINE))
 
 
-@pytest.mark.parametrize("path", OBJECTS)
-def test_formulas_are_marked_so_that_a_page_typesets_them(path):
+@pytest.mark.parametrize("module", MODULES)
+def test_formulas_are_marked_so_that_a_page_typesets_them(module):
     plain = [
         (where, line)
-        for where, doc in docstrings(path, OBJECTS[path])
+        for path, thing in of(module)
+        for where, doc in docstrings(path, thing)
         for line in prose(doc).splitlines()
         if PLAIN_FORMULA.search(line)
     ]

@@ -42,7 +42,7 @@ def system():
     return block_on_a_belt()
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def shim():
     return Shim(fused=False)
 
@@ -55,7 +55,7 @@ def as_card(monkeypatch, shim):
 
 def plain_lanes(system, x, p, options, at, monkeypatch):
     """What four lanes say without fused operations, those of what they hand over left out."""
-    monkeypatch.setattr(lanes, "FLAGS", ("-ffp-contract=off",))
+    monkeypatch.setattr(lanes, "FLAGS", (*lanes.FLAGS, "-ffp-contract=off"))
     monkeypatch.setattr(lanes, "lane_width", lambda: 4)
     monkeypatch.setattr(lanes.Lanes, "_run_rest", lambda *_: None)
     return lanes.Lanes(system, options.order).run_many(x, p, options, at)

@@ -8,7 +8,7 @@ from itertools import pairwise
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
@@ -16,6 +16,7 @@ from nonsmooth.local import find_two_fold, two_fold
 from nonsmooth.local.newton import solve
 from nonsmooth.local.place import place
 from nonsmooth.orbit import TraceError, trace_two_folds
+from tests.drawing import at_most
 
 signs = st.sampled_from([(1, -1), (-1, 1), (1, 1), (-1, -1)])
 numbers = st.floats(-3, 3)
@@ -45,7 +46,7 @@ def hidden(sigma, nu, seed, extra=0):
     return system, s, rotation
 
 
-@settings(max_examples=40)
+@at_most(40)
 @given(signs, numbers, numbers, seeds)
 def test_found_from_starts_around_it(sigma, n1, n2, seed):
     system, s, rotation = hidden(sigma, (n1, n2), seed)
@@ -63,7 +64,7 @@ def test_found_from_starts_around_it(sigma, n1, n2, seed):
         assert fold.iterations <= 8
 
 
-@settings(max_examples=20)
+@at_most(20)
 @given(signs, numbers, numbers, seeds)
 def test_least_norm_in_five_dimensions(sigma, n1, n2, seed):
     system, s, rotation = hidden(sigma, (n1, n2), seed, extra=2)
@@ -90,7 +91,7 @@ def test_convergence_is_quadratic():
     assert len(exponents) >= 2 and min(exponents) > 1.6
 
 
-@settings(max_examples=25)
+@at_most(25)
 @given(signs, numbers, numbers, seeds)
 def test_coordinates_and_point_at_are_inverse(sigma, n1, n2, seed):
     for extra in (0, 2):
@@ -105,7 +106,7 @@ def test_coordinates_and_point_at_are_inverse(sigma, n1, n2, seed):
         assert fold.coordinates(x[0, 0]).shape == (3,)
 
 
-@settings(max_examples=25)
+@at_most(25)
 @given(signs, numbers, numbers, seeds)
 def test_coordinates_move_as_the_normal_form_says(sigma, n1, n2, seed):
     system, s, _ = hidden(sigma, (n1, n2), seed)

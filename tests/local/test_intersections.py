@@ -4,10 +4,11 @@ closed forms, of difference quotients and of runs."""
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
+from tests.drawing import at_most
 
 x, y, z, a, b, c, p = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b", "c", "p"))
 
@@ -70,7 +71,7 @@ def test_a_limit_of_the_modes_is_degenerate():
 rates = st.integers(-20, 20).map(lambda k: k / 10)
 
 
-@settings(max_examples=40)
+@at_most(40)
 @given(st.lists(rates, min_size=4, max_size=4), st.lists(rates, min_size=2, max_size=2))
 def test_attraction_is_what_runs_beside_the_intersection_do(m, drift):
     """A piecewise constant field: runs from beside an attracting intersection end on it, in finite time."""

@@ -3,11 +3,12 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.local import find_two_fold, two_fold
+from tests.drawing import at_most
 
 X = ca.vertcat(*(ca.SX.sym(s) for s in "xyz"))
 STATES = ca.vertsplit(X)
@@ -91,7 +92,7 @@ def test_reversing_time(definition):
 
 
 @given(definitions(), matrix, matrix, vector, st.booleans())
-@settings(max_examples=60)
+@at_most(60)
 def test_changing_coordinates(definition, linear, quadratic, shift, curved):
     """Pull the system back by x = shift + A u + Q(u): u' = (dx/du)^-1 f(x(u))."""
     h, f1, f2 = definition

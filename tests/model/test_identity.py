@@ -3,12 +3,13 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.model import motion
 from nonsmooth.model.identity import vanish_on
+from tests.drawing import at_most
 
 x, y, z, mu = (ca.SX.sym(s) for s in ("x", "y", "z", "mu"))
 states = ca.vertcat(x, y, z)
@@ -51,7 +52,7 @@ def test_what_does_not_vanish_or_is_not_seen(expression, surface):
 small = st.integers(-3, 3)
 
 
-@settings(max_examples=30)
+@at_most(30)
 @given(st.lists(st.tuples(small, small, small, small), min_size=1, max_size=4), small, small)
 def test_a_multiple_of_the_surface_is_found_and_one_with_a_remainder_is_not(terms, a, b):
     h = y - a * x * z - b

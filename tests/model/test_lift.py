@@ -7,10 +7,11 @@ import pickle
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import assume, given, settings
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
+from tests.drawing import at_most
 
 x, y, z, t, mu, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "t", "mu", "lam"))
 lift = ns.FilippovSystem.from_expression
@@ -86,7 +87,7 @@ def prepared(name):
 
 
 @pytest.mark.parametrize("name", EXPRESSIONS)
-@settings(max_examples=30)
+@at_most(30)
 @given(a=st.floats(-3, 3), b=st.floats(-3, 3), m=st.floats(-1, 1))
 def test_off_the_surfaces_the_field_is_the_expression(name, a, b, m):
     assume(a != 0.0)  # where sign(x)**2 is 0 instead of 1
@@ -113,7 +114,7 @@ expressions = st.recursive(
 )
 
 
-@settings(max_examples=50)  # points off x = 0, x = y, ..., where a removed switch could be 0
+@at_most(50)  # points off x = 0, x = y, ..., where a removed switch could be 0
 @given(expressions, st.floats(-3, 3).map(lambda v: v + 0.12345678), st.floats(-3, 3).map(np.exp))
 def test_any_expression_is_itself_off_the_surfaces(expression, a, b):
     try:
@@ -126,7 +127,7 @@ def test_any_expression_is_itself_off_the_surfaces(expression, a, b):
     assert lifted[0] == pytest.approx(original, rel=1e-12, abs=1e-12)
 
 
-@settings(max_examples=50)
+@at_most(50)
 @given(expressions)
 def test_every_field_is_affine_in_every_multiplier(expression):
     try:

@@ -3,11 +3,12 @@
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.flow.pieces import forward, join, until
+from tests.drawing import at_most
 
 x, y, z, w, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "w", "t", "lam"))
 SGN = ns.FilippovSystem([x], surface=x, above=[1], below=[-1])
@@ -64,7 +65,7 @@ def test_times_broadcast():
 
 
 @given(st.floats(0.1, 3.0), st.floats(0.1, 3.0), st.floats(0.5, 3.0))
-@settings(max_examples=20)
+@at_most(20)
 def test_leaving_speeds_are_those_of_the_two_fields(up, down, t_end):
     """Repelling sliding of (1, up) above and (-1, -down) below drifts at (down - up)/(up + down)."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, up], below=[-1, -down])

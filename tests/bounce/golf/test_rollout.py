@@ -4,18 +4,19 @@ import math
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import bounce
 import nonsmooth as ns
+from tests.drawing import at_most
 
 G = 9.80665
 R = bounce.golf.GOLF.radius
 DRIVE = bounce.Landing.polar(28.5, math.radians(37.3), 2094)
 
 
-@settings(max_examples=20)
+@at_most(20)
 @given(r=st.floats(0.1, 0.8), u=st.floats(-20, 20), v=st.floats(0.5, 20))
 def test_zeno_sum(r, u, v):
     """Rolling and constant restitution: hops of 2 u r^n v/g for n = 1, 2, ..., 2 u v r/(g (1-r)) in all."""

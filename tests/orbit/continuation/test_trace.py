@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
+from hypothesis import given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
+from tests.drawing import at_most
 
 Curve, other_direction, trace = (
     ns.continuation.Curve,
@@ -70,7 +71,7 @@ def test_an_arc_ends_at_a_test_that_ends_it():
     assert abs(arc.points[-1].u[0] - 0.5) < 1e-13
 
 
-@settings(max_examples=20, deadline=None)
+@at_most(20)
 @given(st.floats(1e-6, 1e6))
 def test_units_do_not_matter(factor):
     start, way = np.array([-2.0, -2.0]), np.array([1.0, 9.0])

@@ -102,7 +102,8 @@ TASKS = {
         "Every future of a point whose future is not unique, and the orbits that come to a special "
         "point or leave it.",
         "nonsmooth",
-        "funnel orbit.Funnel manifold orbit.Manifold orbit.DividingCurves orbit.DividingArc",
+        "funnel orbit.Funnel manifold orbit.Manifold orbit.DividingCurves orbit.DividingArc "
+        "orbit.ComputedStarts",
     ),
     "proofs": _task(
         "Prove",

@@ -10,6 +10,7 @@ from .basin_map import (
     basins,
 )
 from .branches import bifurcation_curves, branch
+from .dividing_picture import dividing_curves
 from .manifold_picture import (
     manifold,
 )
@@ -28,6 +29,7 @@ __all__ = [
     "basins",
     "bifurcation_curves",
     "branch",
+    "dividing_curves",
     "manifold",
     "multipliers",
     "offline_page",

@@ -97,7 +97,8 @@ def _dimension(several: list[Manifold]) -> int:
         or not all(isinstance(m, Manifold) for m in several)
     ):
         raise OptionError(
-            f"found: expected manifolds of a system with two or three states, received {several!r}."
+            f"found: expected manifolds of a system with two or three states, received {several!r}. "
+            "Curves in a plane of starts are drawn by dividing_curves."
         )
     return sizes.pop()
 

@@ -62,6 +62,16 @@ def basins(count):
     return Basins(labels, [one] * count, starts, {"x": axis, "v": axis}, ("x", "v"))
 
 
+def cut():
+    """What divides starts at a height above a two-fold: arcs of both kinds, on either side."""
+    y, z = ca.SX.sym("y"), ca.SX.sym("z")
+    system = ns.FilippovSystem([x, y, z], surface=x, above=[y, 1, 0.5], below=[z, 0.3, -1])
+    fold = ns.find_two_fold(system, near=[0, 0, 0])
+    plane = lambda a, b: [a, b, 0.6 - 0.3 * b]
+    box = [(-0.8, 0.83), (-2.1, 1.07)]
+    return ns.manifold(system, fold, starts=plane, box=box, duration=6.0, spacing=0.1)
+
+
 def bifurcations():
     a, b = ca.SX.sym("a"), ca.SX.sym("b")
     system = ns.FilippovSystem(
@@ -111,6 +121,7 @@ DRAWN = {
     "basins": [lambda: ns.plot.basins(basins(2)), lambda: ns.plot.basins(basins(7))],
     "bifurcation_curves": [lambda: ns.plot.bifurcation_curves(bifurcations())],
     "branch": [lambda: ns.plot.branch(fold_branch()), lambda: ns.plot.branch(many_events())],
+    "dividing_curves": [lambda: ns.plot.dividing_curves(cut(), names=["y", "z"])],
     "manifold": [lambda: ns.plot.manifold(saddle_manifold(), names=["x", "v"])],
     "multipliers": [lambda: ns.plot.multipliers(ns.periodic_orbit(BLOCK, run()))],
     "periodic_orbit": [lambda: ns.plot.periodic_orbit(ns.periodic_orbit(BLOCK, run()))],
@@ -196,8 +207,18 @@ COLUMN = (3.4, 4.4)
         lambda: ns.plot.two_fold_3d(ns.textbook.TWO_FOLDS["mix-C"], size=COLUMN),
         lambda: ns.plot.trajectory(run(), size=COLUMN),
         lambda: ns.plot.basins(basins(2), size=COLUMN),
+        lambda: ns.plot.dividing_curves(cut(), size=(3.4, 2.9)),
+        lambda: ns.plot.dividing_curves(cut(), size=(7.0, 4.4)),
     ],
-    ids=["phase_portrait", "two_fold", "two_fold_3d", "trajectory", "basins"],
+    ids=[
+        "phase_portrait",
+        "two_fold",
+        "two_fold_3d",
+        "trajectory",
+        "basins",
+        "dividing",
+        "dividing, page",
+    ],
 )
 def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
     """The legend is below the picture there, which fills the column."""

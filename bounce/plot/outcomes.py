@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +16,7 @@ from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
 from ..units import UNITS
+from .keys import below, is_narrow
 
 style = ns.plot.style
 Array = NDArray[np.float64]
@@ -23,6 +25,10 @@ Units = Mapping[str, tuple[str, str, float]]
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
+    from matplotlib.patches import Patch
+
+    #: A region without room for its name: its entry in a legend, and its points (m, 2).
+    Narrow = tuple[Patch, Array]
 
 #: Regions of the paper's eight itineraries: warm where the ball leaves in forward slip, cold where
 #: in reverse (colours of the style and tints of them; neighbours differ in grey as well).
@@ -75,6 +81,9 @@ _LABELS = {
 #: them, but not where there are dozens.
 _LISTED, _BESIDE = 5, 8
 _POINTS = 9.0  # of the names of regions
+_TITLE = 9.0  # points
+_JOINED = "\N{NO-BREAK SPACE}"
+_NO_YES = ("#00224E", "#FEE838")  # the ends of cividis
 _QUANTITIES = ("itinerary", "slip", "omega", "spin_reversal", "lift_off_angle")
 
 
@@ -131,24 +140,28 @@ def outcome_map(
     x, y = _axes(outcomes, units)
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
+        letters = int(ax.bbox.width * 72 / figure.dpi / (0.53 * _TITLE))
+        narrow: list[Narrow] = []
         if quantity == "itinerary":
-            _regions(ax, outcomes, x, y)
+            narrow = _regions(ax, outcomes, x, y)
         else:
             _field(figure, ax, outcomes, quantity, x, y, units)
-        if curve is not None:
-            draw_curve(ax, outcomes.names, curve)
-        else:
-            _contour(ax, outcomes, x, y)
+        lines = (
+            _contour(ax, outcomes, x, y) if curve is None else draw_curve(ax, outcomes.names, curve)
+        )
+        _keys(ax, narrow, lines)
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
             what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
             axis.set_label_text(f"{what} ({unit})" if unit else what)
         ax.set_xlim(*_ends(x))
         ax.set_ylim(*_ends(y))
-        ax.set_title(_title(outcomes, units), fontsize=9, loc="left", color="0.3")
+        title = textwrap.fill(_title(outcomes, units), letters)
+        ax.set_title(title.replace(_JOINED, " "), fontsize=_TITLE, loc="left", color="0.3")
     return figure
 
 
-def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> None:
+def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> list[Narrow]:
+    """Colour the regions and name them; those without room for their name are returned."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
@@ -157,33 +170,59 @@ def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> None:
     palette = ListedColormap(["#FFFFFF", *colours])
     limits: dict[str, Any] = dict(vmin=-1.5, vmax=len(colours) - 0.5)
     ax.pcolormesh(x, y, outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits)
-    narrow: list[tuple[int, Patch, NDArray[np.bool_]]] = []
+    narrow: list[Narrow] = []
+    column = is_narrow(ax)
+    clear = ~_turns(outcomes.slip)
     for code, (name, colour) in enumerate(zip(outcomes.regions, colours, strict=True)):
         inside = outcomes.code == code
-        if not _named(ax, x, y, inside, name, colour):
-            patch = Patch(facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name))
-            narrow.append((int(inside.sum()), patch, inside))
-    narrow.sort(key=lambda entry: -entry[0])
-    if narrow:
-        handles = [patch for _, patch, _ in narrow[:_LISTED]]
-        rest = narrow[_LISTED:]
-        if len(rest) > _BESIDE:
-            handles.append(Patch(alpha=0, label=f"and {len(rest)} more"))
-            rest = []
-        labels = ns.plot.labels.Labels(ax)
-        for _, patch, inside in rest:
-            row, column = np.nonzero(inside)
-            labels.name(str(patch.get_label()), np.column_stack([x[column], y[row]]))
+        if not _named(ax, x, y, inside & clear, name, colour):
+            patch = Patch(
+                facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name, column)
+            )
+            row, col = np.nonzero(inside)
+            narrow.append((patch, np.column_stack([x[col], y[row]])))
+    return sorted(narrow, key=lambda entry: -len(entry[1]))
+
+
+def _turns(slip: Array) -> NDArray[np.bool_]:
+    """Cells at which the slip changes its sign: a line is there."""
+    sign = np.sign(slip)
+    found = np.zeros(sign.shape, dtype=bool)
+    found[1:] |= sign[1:] * sign[:-1] < 0
+    found[:, 1:] |= sign[:, 1:] * sign[:, :-1] < 0
+    return found
+
+
+def _keys(ax: Axes, narrow: list[Narrow], lines: dict[str, Any]) -> None:
+    """Say what lines are, below the map, and name narrow regions: in a legend, beside them, or not."""
+    from matplotlib.patches import Patch
+
+    column = is_narrow(ax)
+    listed = _LISTED - len(lines) if column else _LISTED
+    rest = narrow[listed:]
+    handles = [patch for patch, _ in narrow[:listed]]
+    if len(rest) > (0 if column else _BESIDE):
+        handles.append(Patch(alpha=0, label=f"and {len(rest)} more"))
+    elif rest:
+        names = ns.plot.labels.Labels(ax)
+        for patch, points in rest:
+            names.name(str(patch.get_label()), points)
+    if column:  # beside a legend little of the map would be left
+        labels = [str(patch.get_label()) for patch in handles]
+        below(ax, [*lines.values(), *handles], [*lines, *labels])
+        return
+    if handles:
         ax.legend(
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
             frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
         )  # fmt: skip
+    below(ax, list(lines.values()), list(lines))
 
 
-def _short(name: str) -> str:
-    """The first phases of a long itinerary and its last."""
-    phases = name.split()
-    return name if len(phases) <= 8 else " ".join([*phases[:6], "..", phases[-1]])
+def _short(name: str, column: bool) -> str:
+    """The first phases of a long itinerary and its last; fewer in a column of a journal."""
+    phases, most = name.split(), 5 if column else 8
+    return name if len(phases) <= most else " ".join([*phases[: most - 2], "..", phases[-1]])
 
 
 def _named(ax: Axes, x: Array, y: Array, inside: NDArray[np.bool_], name: str, colour: str) -> bool:
@@ -233,51 +272,52 @@ def _field(
         bound = float(np.abs(np.nan_to_num(values)).max()) or 1.0
         options = dict(cmap="PuOr_r", vmin=-bound, vmax=bound)
     elif quantity == "spin_reversal":
-        options, label = dict(cmap="cividis", vmin=0, vmax=1), "spin reverses"
+        from matplotlib.colors import ListedColormap
+
+        options = dict(cmap=ListedColormap(_NO_YES), vmin=-0.5, vmax=1.5)
+        label = "spin reverses"
     mesh = ax.pcolormesh(x, y, values, shading="nearest", rasterized=True, **options)
     bar = figure.colorbar(mesh, ax=ax, label=label)
     if quantity == "spin_reversal":
         bar.set_ticks([0, 1], labels=["no", "yes"])
 
 
-def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> None:
+def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, Any]:
     """Where the slip at lift-off changes its sign; what rolls at lift-off has none."""
     slip = np.where(outcomes.lift_offs.complete, outcomes.slip, np.nan)
     rolls = np.array([*(name.endswith("R") for name in outcomes.regions), False])[outcomes.code]
     size = np.abs(np.nan_to_num(slip)).max()
     slip = np.where(rolls | (np.abs(slip) < 1e-12 * size), 0.0, slip)
-    if np.any(slip < 0) and np.any(slip > 0):
-        lines = ax.contour(x, y, slip, levels=[0.0], colors="black", linewidths=1.6)
-        lines.set(path_effects=style.halo(3.0))
-        _key(ax, {"slip at lift-off $H_F=0$": lines.legend_elements()[0][0]})
+    if not (np.any(slip < 0) and np.any(slip > 0)):
+        return {}
+    lines = ax.contour(x, y, slip, levels=[0.0], colors="black", linewidths=1.6)
+    lines.set(path_effects=style.halo(3.0))
+    return {"slip at lift-off $H_F=0$": lines.legend_elements()[0][0]}
 
 
-def _key(ax: Axes, lines: dict[str, Any]) -> None:
-    """Say what lines are, in an artist of its own: the axes' legend may hold the narrow regions."""
-    from matplotlib.legend import Legend
+def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> dict[str, Any]:
+    """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``.
 
-    key = Legend(
-        ax, list(lines.values()), list(lines), loc="lower right", fontsize=8,
-        frameon=True, framealpha=0.95,
-    )  # fmt: skip
-    ax.add_artist(key)
-
-
-def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> None:
-    """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``."""
+    Returns
+    -------
+    dict of str: Artist
+        What is to be said of its lines and points, with one of each.
+    """
     order = [("xdot", "omega").index(name) for name in names]
     styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
-    lines: dict[str, Any] = {}
+    key: dict[str, Any] = {}
     for arc in (*curve.arcs, *curve.reverse):
         for sign in (1, -1) if curve.mirrored else (1,):
             u, v = sign * arc.points[:, order].T
             (line,) = ax.plot(u, v, color="black", linewidth=2.0, linestyle=styles[arc.kind])
-            lines[f"$H_F=0$, {arc.kind}"] = line
+            key[f"$H_F=0$, {arc.kind}"] = line
     if curve.junction is not None:
+        look: dict[str, Any] = dict(color="white", markeredgecolor="black", markersize=6, zorder=8)
         for sign in (1, -1) if curve.mirrored else (1,):
             point = sign * curve.junction[order]
-            ax.plot(*point, "o", color="white", markeredgecolor="black", markersize=6, zorder=8)
-    _key(ax, lines)
+            (dot,) = ax.plot(*point, "o", **look)
+            key["their junction"] = dot
+    return key
 
 
 def _title(outcomes: OutcomeMap, units: Units) -> str:
@@ -288,7 +328,7 @@ def _title(outcomes: OutcomeMap, units: Units) -> str:
     parts = []
     for name, value in shown.items():
         _, unit, size = units.get("angle" if name == "tilt" else name, ("", "", 1.0))
-        parts.append(f"{name} = {value / size:g} {unit}".rstrip())
+        parts.append(f"{name} = {value / size:g} {unit}".rstrip().replace(" ", _JOINED))
     return f"{type(outcomes.model).__name__}: " + ", ".join(parts)
 
 

@@ -9,6 +9,7 @@ import nonsmooth as ns
 from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.proven import OUTCOMES, ProvenMap
+from .keys import below, is_narrow
 from .outcomes import draw_curve
 
 style = ns.plot.style
@@ -67,8 +68,7 @@ def proven_map(
                     patches, facecolor=PROVEN_COLOURS[name], edgecolor="0.6", linewidth=0.3
                 )
             )
-        if curve is not None:
-            draw_curve(ax, ("xdot", "omega"), curve)
+        key = {} if curve is None else draw_curve(ax, ("xdot", "omega"), curve)
         low, high = found.boxes.min(axis=0), found.boxes.max(axis=0)
         ax.set_xlim(low[0], high[1])
         ax.set_ylim(low[2], high[3])
@@ -79,8 +79,13 @@ def proven_map(
             for name, share in found.area.items()
             if share > 0
         ]
+        if is_narrow(ax):
+            labels = [str(patch.get_label()) for patch in handles]
+            below(ax, [*key.values(), *handles], [*key, *labels])
+            return figure
         ax.legend(  # beside the map, not on its pieces
             handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
             frameon=False, fontsize=8, title="proven, share", title_fontsize=8,
         )  # fmt: skip
+        below(ax, list(key.values()), list(key))
     return figure

@@ -10,6 +10,7 @@ import nonsmooth as ns
 
 from ..contact.equations import equations
 from ..shot.single import Shot
+from .keys import below
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -26,6 +27,7 @@ STYLES: dict[str, dict[str, Any]] = {
 }
 _WIDTH = {"+": 2.0, "-": 2.0, "s": 2.6, "F": 1.6}
 _POINTS = 400
+_SEEN = 0.04  # of the width of the picture: a shorter jump has no name
 
 
 def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
@@ -63,17 +65,18 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
         )
     with style.settings():
         figure, ax = style.axes_for(ax, (6.4, 5.2))
-        top = _cone(ax, shot)
-        _phases(ax, shot)
-        _markers(ax, shot, top)
+        names = ns.plot.labels.Labels(ax)
+        _cone(ax, shot, names)
+        _phases(ax, shot, names)
+        _markers(ax, shot)
         ax.axhline(0.0, color="0.3", linewidth=0.8, zorder=1)
         ax.set_xlabel(r"friction force $\Lambda_T$")
         ax.set_ylabel(r"load $\Lambda_N$")
-        ax.legend(loc="upper center", bbox_to_anchor=(0.5, -0.13), ncols=2)
+        below(ax, *ax.get_legend_handles_labels())
     return figure
 
 
-def _cone(ax: Axes, shot: Shot) -> float:
+def _cone(ax: Axes, shot: Shot, names: Any) -> None:
     """Shade |Lambda_T| <= mu Lambda_N, with mu that of rest, and set the limits of the axes."""
     forces = shot.forces(np.linspace(0.0, shot.time, _POINTS))
     top = 1.15 * float(forces.load.max())
@@ -81,21 +84,20 @@ def _cone(ax: Axes, shot: Shot) -> float:
     ax.fill_betweenx(
         [0.0, top], [0.0, -mu * top], [0.0, mu * top], color="0.92", zorder=0, linewidth=0
     )
-    for side in (-1, 1):
+    height = top * np.linspace(0.4, 0.93, 12)
+    for side, sign in ((-1, "-"), (1, "")):
         ax.plot([0.0, side * mu * top], [0.0, top], color="0.45", linewidth=1.0, zorder=1)
-        ax.annotate(
-            rf"$\Lambda_T={'-' if side < 0 else ''}\mu\Lambda_N$",
-            (side * mu * top * 0.93, top * 0.93),
-            textcoords="offset points",
-            xytext=(side * 8, -3),
-            ha="left" if side > 0 else "right",
-            va="top",
-            color="0.3",
+        names.name(
+            rf"$\Lambda_T={sign}\mu\Lambda_N$",
+            np.column_stack([side * mu * height, height]),
+            "0.3",
+            keep=lambda p, side=side: side * p[:, 0] > mu * p[:, 1],
+            fontsize=9.0,
         )
     half = (1.45 * mu or 0.5) * top  # without friction the cone is a line
     ax.set_xlim(-half, half)
     ax.set_ylim(min(0.0, 1.1 * float(forces.load.min())) - 0.06 * top, top)
-    return top
+    ax.locator_params(nbins=5)
 
 
 def _static_coefficient(shot: Shot) -> float:
@@ -109,43 +111,44 @@ def _static_coefficient(shot: Shot) -> float:
     return float(eq.function([rest])(x, p))
 
 
-def _phases(ax: Axes, shot: Shot) -> None:
-    """One line per phase, with an arrow in the direction of time."""
+def _phases(ax: Axes, shot: Shot, names: Any) -> None:
+    """One line per phase, with an arrow in the direction of time, and a thin one where friction jumps."""
     labelled: set[str] = set()
-    before: tuple[float, float] | None = None
+    jumps: list[np.ndarray] = []
+    before = np.zeros(2)
     for phase in shot.phases:
         t = np.linspace(phase.t_start, phase.t_end, _POINTS)
         # A transition belongs to the later phase; ask for this one's side of it.
         t[-1] = np.nextafter(phase.t_end, phase.t_start)
         forces = shot.forces(t)
-        first, last = ((float(forces.friction[k]), float(forces.load[k])) for k in (0, -1))
-        if before is not None:  # friction jumps where slip ends in rolling or in reverse slip
-            ax.plot(*zip(before, first, strict=True), color="0.6", linewidth=0.9, zorder=2)
-        before = last
+        points = np.column_stack([forces.friction, forces.load])
+        if labelled:  # friction jumps where slip ends in rolling or in reverse slip
+            jumps.append(np.linspace(before, points[0], 12))
+            ax.plot(*jumps[-1].T, color="0.6", linewidth=0.9, zorder=2)
+        before = points[-1]
         look = dict(STYLES[phase.mode])
         label = None if phase.mode in labelled else look.pop("label")
         look.pop("label", None)
         labelled.add(phase.mode)
-        ax.plot(
-            forces.friction,
-            forces.load,
-            label=label,
-            linewidth=_WIDTH[phase.mode],
-            zorder=3,
-            **look,
-        )
-        _arrow(ax, forces.friction, forces.load, STYLES[phase.mode]["color"])
+        if phase.mode == "F" and label:
+            names.name(label, points, "0.3")
+            label = None
+        ax.plot(*points.T, label=label, linewidth=_WIDTH[phase.mode], zorder=3, **look)
+        _arrow(ax, points, STYLES[phase.mode]["color"])
+    width = np.ptp(ax.get_xlim())
+    longest = max(jumps, key=lambda jump: abs(jump[-1, 0] - jump[0, 0]), default=np.zeros((2, 2)))
+    if abs(longest[-1, 0] - longest[0, 0]) > _SEEN * width:
+        names.name("friction jumps", longest[2:-2], "0.3")
 
 
-def _arrow(ax: Axes, x: np.ndarray, y: np.ndarray, color: str) -> None:
+def _arrow(ax: Axes, curve: np.ndarray, color: str) -> None:
     """An arrow head at the middle of a curve's length, as it is seen on the axes."""
-    curve = np.column_stack([x, y])
     scale = np.array([np.ptp(ax.get_xlim()), np.ptp(ax.get_ylim())])
     if np.linalg.norm(np.diff(curve, axis=0) / scale, axis=1).sum() >= 0.06:
         style.arrowhead(ax, curve, 0.45, color, scale=scale, mutation_scale=16, zorder=4)
 
 
-def _markers(ax: Axes, shot: Shot, top: float) -> None:
+def _markers(ax: Axes, shot: Shot) -> None:
     """Touch-down, transitions and lift-off."""
     start = shot.forces(0.0)
     inner = np.array([phase.t_start for phase in shot.phases[1:]])

@@ -36,6 +36,7 @@ _TO_RGB = np.array(
 _WHITE = np.array([0.95047, 1.0, 1.08883])
 _COLOURS = 360
 _ARROWS = 13
+_DOT = 17.0  # points, of a vortex: its turns are written on it
 
 
 def direction_colours(angle: ArrayLike) -> Array:
@@ -81,7 +82,8 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     """Draw the direction of the slip at lift-off over the spins, with a colour wheel.
 
     Light is forward, dark reverse, yellow to the right, blue to the left; arrows say the same (up is
-    forward). White dots are vortices, where the ball lifts off without slip.
+    forward). White dots are vortices, where the ball lifts off without slip, with the turns that the
+    direction makes around them.
 
     Parameters
     ----------
@@ -116,12 +118,15 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
         _arrows(ax, directions, angle)
         for vortex in directions.vortices:
             ax.plot(
-                *vortex.omega, "o", color="white", markeredgecolor="black", markersize=8, zorder=6
+                *vortex.omega,
+                "o",
+                color="white",
+                markeredgecolor="black",
+                markersize=_DOT,
+                zorder=6,
             )
-            style.write(
-                ax, tuple(vortex.omega), f"{vortex.winding:+d}  ", ha="right", va="bottom", zorder=7,
-                fontweight="bold", path_effects=style.halo(3.0),
-            )  # fmt: skip
+            turns = f"{vortex.winding:+d}"
+            style.write(ax, vortex.omega, turns, zorder=7, fontsize=8.5, fontweight="bold")
         ax.set_xlabel(r"lateral spin, $\omega_z$ (backspin)")
         ax.set_ylabel(r"axial spin, $-\omega_x$ (slips to the right)")
         v = directions.xdot
@@ -133,13 +138,25 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     return figure
 
 
+def _spread(count: int) -> NDArray[np.intp]:
+    """Rows of cells with an arrow: half a distance off the frame, so that none reaches over it."""
+    shown = min(_ARROWS, count)
+    return np.unique(np.round((np.arange(shown) + 0.5) * count / shown - 0.5).astype(np.intp))
+
+
 def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
     lateral, axial = directions.omega
-    rows = np.unique(np.linspace(0, axial.size - 1, min(_ARROWS, axial.size)).round().astype(int))
-    columns = np.unique(
-        np.linspace(0, lateral.size - 1, min(_ARROWS, lateral.size)).round().astype(int)
-    )
+    rows, columns = _spread(axial.size), _spread(lateral.size)
     shown = angle[np.ix_(rows, columns)]
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    clear = 0.02 + _DOT / ax.bbox.width * figure.dpi / 72  # of the axes: half an arrow, and the dot
+    for vortex in directions.vortices:
+        at = vortex.omega
+        beside = np.abs(lateral[columns] - at[0]) < clear * np.ptp(ax.get_xlim())
+        shown[np.outer(np.abs(axial[rows] - at[1]) < clear * np.ptp(ax.get_ylim()), beside)] = (
+            np.nan
+        )
     # Up is forward: the second component of an arrow is that along the direction of travel.
     ax.quiver(
         lateral[columns], axial[rows], np.sin(shown), np.cos(shown), color="black", edgecolor="white",
@@ -150,7 +167,10 @@ def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
 
 def _wheel(ax: Axes) -> None:
     """The key: a ring of colours beside the picture, forward at its top."""
-    ring: Any = ax.inset_axes((1.075, 0.68, 0.19, 0.24), projection="polar")
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    gap = 0.55 * figure.dpi / ax.bbox.width  # inches for "left", on maps of every size
+    ring: Any = ax.inset_axes((1.0 + gap, 0.68, 0.19, 0.24), projection="polar")
     ring.set_theta_zero_location("N")
     ring.set_theta_direction(-1)
     edges = np.linspace(-math.pi, math.pi, 181)

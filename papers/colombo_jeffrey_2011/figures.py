@@ -8,7 +8,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
+from mpl_toolkits.mplot3d import Axes3D, proj3d
 from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+from numpy.typing import NDArray
 
 import nonsmooth as ns
 from nonsmooth.plot.two_fold_atlas import FILLS
@@ -16,6 +18,8 @@ from nonsmooth.plot.two_fold_atlas import FILLS
 from .. import look
 from ..pictures import Picture
 from .model import BEND, CALM, CLASSES, RECURRENT, excursions, recurrent, slid_from
+
+_HIGH = 0.3  # of the highest arc of an excursion: lower ones have no arrow
 
 
 def _legend() -> list[Line2D | Patch]:
@@ -98,16 +102,20 @@ def funnel() -> Figure:
         ax.plot(*edge, [0] * 5, color=look.GREY, linewidth=0.8, zorder=1)
         ax.plot([0, 0], [-0.8, 0.8], [0, 0], color=look.ABOVE, linestyle=look.DASHED, zorder=2)
         ax.plot([-1, 1], [0, 0], [0, 0], color=look.BELOW, linestyle=look.DASHED, zorder=2)
+        ax.set_axis_off()
+        ax.view_init(elev=17, azim=-62)
+        ax.set_box_aspect((1.3, 1, 0.72), zoom=1.35)
+        orbits = []
         for e, color in zip(excursions()[1:3], (look.BLACK, look.CANARD), strict=True):
             t = np.linspace(0, e.trajectory.t[-1], 3000)
             x, y, z = np.vstack([slid_from(tuple(e.start)), e.trajectory(t)]).T
             for side, order, width in ((-1, 0, 0.8), (1, 4, 1.5)):
                 shown = [np.where(side * x >= -1e-9, c, np.nan) for c in (y, z, x)]
                 ax.plot(*shown, color=color, linewidth=width, zorder=order)
+            orbits.append((np.column_stack([y, z, x]), color))
         ax.plot([0], [0], [0], "o", color="black", markersize=5, zorder=6)
-        ax.set_axis_off()
-        ax.view_init(elev=17, azim=-62)
-        ax.set_box_aspect((1.3, 1, 0.72), zoom=1.35)
+        for orbit, color in orbits:  # the limits of the axes are known
+            _times(ax, orbit, color)
         handles = [
             look.line(look.BLACK, "an excursion, thin below the surface"),
             look.line(look.CANARD, "another excursion"),
@@ -116,6 +124,22 @@ def funnel() -> Figure:
         ]
         figure.legend(handles=handles, loc="lower center", ncols=2)
     return figure
+
+
+def _times(ax: Axes3D, orbit: NDArray[np.float64], color: str) -> None:
+    """Arrows of time: one on each arc above the surface that is high enough to be seen."""
+    flat = np.column_stack(proj3d.proj_transform(*orbit.T, ax.get_proj())[:2])
+    high = np.concatenate([[False], orbit[:, 2] > 1e-9, [False]])
+    edges = np.flatnonzero(np.diff(high.astype(int)))
+    for first, last in zip(edges[::2], edges[1::2], strict=True):
+        if orbit[first:last, 2].max() > _HIGH * orbit[:, 2].max():
+            arc = flat[first:last]
+            far = np.concatenate([[0.0], np.cumsum(np.hypot(*np.diff(arc, axis=0).T))])
+            k = int(np.searchsorted(far, 0.35 * far[-1]))
+            head = dict(
+                arrowstyle="-|>", color=color, lw=0, shrinkA=0, shrinkB=0, mutation_scale=12
+            )
+            ax.annotate("", arc[k + 1], arc[k - 1], arrowprops=head, zorder=8)
 
 
 def series() -> Figure:
@@ -205,9 +229,9 @@ PICTURES: tuple[Picture, ...] = (
     Picture(
         "excursions",
         "excursions",
-        f"Five excursions from the two-fold of x > 0: (-y, 1, nu1 + {BEND:g} x), x < 0: (z, nu2, 1), "
+        f"Two excursions from the two-fold of x > 0: (-y, 1, nu1 + {BEND:g} x), x < 0: (z, nu2, 1), "
         f"nu1 = nu2 = {RECURRENT}: each slides on for a while, leaves to one side, crosses, slides, "
-        "and ends where it began.",
+        "and ends where it began. Arrows: the direction of time.",
         funnel,
     ),
     Picture(

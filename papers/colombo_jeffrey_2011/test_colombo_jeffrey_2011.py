@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from matplotlib.text import Annotation
+from mpl_toolkits.mplot3d import proj3d
 
 import nonsmooth as ns
-from papers.colombo_jeffrey_2011 import model, results
+from papers.colombo_jeffrey_2011 import figures, model, results
 
 
 @pytest.mark.parametrize("name", model.CLASSES)
@@ -21,6 +23,27 @@ def test_excursions_end_where_they_began():
     for e in model.excursions(8, seed=7):
         assert e.returned
         assert np.abs(e.trajectory.x[-1]).max() < 1e-8
+
+
+def test_drawn_excursions_have_arrows_in_the_direction_of_time():
+    figure = figures.funnel()
+    (ax,) = figure.axes
+    arrows = [text for text in ax.texts if isinstance(text, Annotation)]
+    assert len(arrows) >= 4 and {a.arrowprops["color"] for a in arrows} == {"#000000", "#A8005C"}
+    orbits = model.excursions()[1:3]
+    flow = []
+    for e in orbits:
+        t = np.linspace(0, e.trajectory.t[-1], 3000)
+        x, y, z = e.trajectory(t).T
+        flow.append(np.column_stack(proj3d.proj_transform(y, z, x, ax.get_proj())[:2]))
+    for arrow in arrows:
+        tail, tip = np.array(arrow.xyann), np.array(arrow.xy)
+        near = [np.argmin(np.linalg.norm(path - tip, axis=1)) for path in flow]
+        which = int(
+            np.argmin([np.linalg.norm(p[k] - tip) for p, k in zip(flow, near, strict=True)])
+        )
+        path, k = flow[which], near[which]
+        assert np.dot(tip - tail, path[k + 1] - path[k - 1]) > 0
 
 
 def test_slid_orbit_leads_from_the_two_fold_to_the_exit():

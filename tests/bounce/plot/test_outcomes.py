@@ -4,7 +4,9 @@ import matplotlib.colors
 import numpy as np
 import pytest
 from matplotlib.contour import ContourSet
+from matplotlib.legend import Legend
 from matplotlib.text import Text
+from matplotlib.transforms import Bbox
 from scipy.interpolate import RegularGridInterpolator
 
 import bounce
@@ -75,6 +77,44 @@ def test_maps_of_golfers_are_in_degrees_and_say_all_of_the_law():
 @pytest.mark.parametrize("quantity", ["slip", "spin_reversal", "lift_off_angle"])
 def test_quantities_are_drawn(outcomes, quantity):
     assert len(bounce.plot.outcome_map(outcomes, quantity).axes) == 2
+
+
+@pytest.mark.parametrize("width", [7.0, 3.4])
+@pytest.mark.parametrize("quantity", ["itinerary", "slip", "spin_reversal"])
+def test_keys_and_titles_are_within_the_sheet_and_off_the_map(outcomes, quantity, width):
+    figure = ns.plot.style.new_figure((width, 0.85 * width))
+    ax = figure.add_subplot()
+    curve = bounce.dividing_curve(TURF, step=0.2)
+    bounce.plot.outcome_map(outcomes, quantity, curve=curve, ax=ax)
+    figure.draw_without_rendering()
+    figure.draw_without_rendering()
+    (key,) = ax.findobj(Legend)
+    said = {text.get_text() for text in key.get_texts()}
+    assert {"$H_F=0$, two-fold", "$H_F=0$, slipping", "their junction"} <= said and len(said) <= 6
+    boxes = [key.get_window_extent(), ax.xaxis.label.get_window_extent()]
+    assert not Bbox.intersection(*boxes) and boxes[0].y1 <= ax.bbox.y0
+    for box in (*boxes, ax._left_title.get_window_extent()):
+        assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
+
+
+def test_names_of_regions_are_off_the_line_in_a_narrow_map():
+    """On Penner's turf the line crosses a small region."""
+    figure = ns.plot.style.new_figure((3.4, 3.0))
+    ax = figure.add_subplot()
+    bounce.plot.outcome_map(golf_map("penner"), ax=ax)
+    figure.draw_without_rendering()
+    (lines,) = [one for one in ax.collections if isinstance(one, ContourSet)]
+    points = np.vstack([path.interpolated(20).vertices for path in lines.get_paths()])
+    pixels = ax.transData.transform(points)
+    assert ax.texts
+    for text in ax.texts:
+        box = text.get_window_extent()
+        assert not any(box.contains(*p) for p in pixels), text.get_text()
+
+
+def test_a_map_of_yes_and_no_has_two_colours(outcomes):
+    figure = bounce.plot.outcome_map(outcomes, "spin_reversal")
+    assert figure.axes[0].collections[0].get_cmap().N == 2
 
 
 def test_neighbouring_regions_differ_in_grey():

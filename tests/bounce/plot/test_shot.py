@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 import bounce
+import nonsmooth as ns
 
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.0, eta=0.5, G=0.05, load="net")
 
@@ -26,6 +27,28 @@ def test_friction_cone(tmp_path):
             assert np.all(np.abs(x) <= 0.3 * y + 1e-9)
     figure.savefig(tmp_path / "cone.png")
     assert (tmp_path / "cone.png").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("width", [6.4, 3.4])
+def test_every_line_has_a_name_and_no_name_is_cut(width):
+    figure = ns.plot.style.new_figure((width, 0.85 * width))
+    ax = figure.add_subplot()
+    bounce.plot.friction_cone(bounce.simulate(TURF, 0.3, -1.0, 0.2), ax=ax)
+    figure.draw_without_rendering()
+    figure.draw_without_rendering()
+    (names,) = [one for one in ax.artists if isinstance(one, ns.plot.labels.Labels)]
+    texts = names.get_children()
+    written = {text.get_text() for text in texts}
+    assert written == {
+        r"$\Lambda_T=-\mu\Lambda_N$", r"$\Lambda_T=\mu\Lambda_N$", "friction jumps", "no friction yet",
+    }  # fmt: skip
+    for text in texts:
+        box = text.get_window_extent()
+        assert ax.bbox.x0 <= box.x0 and box.x1 <= ax.bbox.x1 and ax.bbox.y0 <= box.y0
+    key = ax.get_legend()
+    assert len(key.get_texts()) <= 6
+    box, name = key.get_window_extent(), ax.xaxis.label.get_window_extent()
+    assert box.y1 <= name.y0 and box.x0 >= 0 and box.x1 <= figure.bbox.x1 and box.y0 >= 0
 
 
 def test_phases_differ_in_colour_line_and_grey():

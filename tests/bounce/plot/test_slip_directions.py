@@ -2,8 +2,10 @@
 
 import numpy as np
 import pytest
+from matplotlib.quiver import Quiver
 
 import bounce
+import nonsmooth as ns
 
 # Machado, Oliveira & Fernandes 2009, severity 1.0, on linear sRGB.
 BLIND = {
@@ -64,7 +66,32 @@ def test_a_picture_has_map_wheel_arrows_and_vortex():
     ]
     (dot,) = ax.lines
     assert dot.get_xydata()[0] == pytest.approx(directions.vortices[0].omega)
-    from matplotlib.quiver import Quiver
-
     (arrows,) = [c for c in ax.collections if isinstance(c, Quiver)]
     assert np.ravel(arrows.V) == pytest.approx(np.cos(directions.angle).ravel())
+
+
+@pytest.mark.parametrize("width", [7.0, 3.4])
+def test_arrows_are_within_the_frame_and_off_the_vortex(width):
+    turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    spins = np.linspace(0.0, 2.6, 26), np.linspace(-1.3, 1.3, 26)
+    directions = bounce.slip_map(turf, [1.0, 0.0], spins, tol=1e-6)
+    figure = ns.plot.style.new_figure((width, 0.85 * width))
+    ax = figure.add_subplot()
+    bounce.plot.slip_map(directions, ax=ax)
+    figure.draw_without_rendering()
+    figure.draw_without_rendering()
+    (arrows,) = [c for c in ax.collections if isinstance(c, Quiver)]
+    shown = ~np.broadcast_to(arrows.Umask, arrows.U.shape)
+    assert shown.sum() > 150
+    middle = ax.transData.transform(arrows.XY)[shown]
+    half = ax.bbox.width / arrows.scale / 2
+    way = np.column_stack([np.ravel(arrows.U), np.ravel(arrows.V)])[shown] * half
+    ends = np.vstack([middle - way, middle + way])
+    assert np.all(ends >= ax.bbox.min) and np.all(ends <= ax.bbox.max)
+    (dot,), (name,) = ax.lines, ax.texts
+    centre = ax.transData.transform(dot.get_xydata()[0])
+    radius = dot.get_markersize() / 2 * figure.dpi / 72
+    assert np.linalg.norm(ends - centre, axis=1).min() > radius
+    assert name.get_text() == "+1" and name.get_window_extent().contains(*centre)
+    wheel = [text.get_window_extent() for text in ax.child_axes[0].get_xticklabels()]
+    assert all(box.x0 > ax.bbox.x1 and box.x1 <= figure.bbox.x1 for box in wheel)

@@ -1,0 +1,49 @@
+"""Keys below the axes, clear of what is drawn and of the axis' name whatever the size of the picture."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+_NARROW = 4.6  # inches: figures as wide as a column of a journal
+_UNDER = 36.0  # points from the axes to the key: the numbers of the axis and its name are between
+
+
+def is_narrow(ax: Axes) -> bool:
+    """Whether the figure of axes is as narrow as a column."""
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    return bool(figure.get_figwidth() < _NARROW)
+
+
+def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int = 2) -> None:
+    """Put a key below the axes, in an artist of its own: the axes' legend stays free if it is taken.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    handles, labels : sequence
+        Of the entries.
+    columns : int, optional
+        At most so many entries on a line.
+    """
+    if not handles:
+        return
+    from matplotlib.transforms import ScaledTranslation
+
+    figure = ax.get_figure(root=True)
+    assert figure is not None
+    down = ScaledTranslation(0.0, -_UNDER / 72, figure.dpi_scale_trans)
+    look: dict[str, Any] = dict(
+        loc="upper center", bbox_to_anchor=(0.5, 0.0), bbox_transform=ax.transAxes + down,
+        borderaxespad=0.0, ncols=columns, frameon=False, fontsize=8.0, columnspacing=1.2,
+    )  # fmt: skip
+    if ax.get_legend() is None:
+        ax.legend(handles, labels, **look)
+        return
+    from matplotlib.legend import Legend
+
+    ax.add_artist(Legend(ax, handles, labels, **look))

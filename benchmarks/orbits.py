@@ -1,5 +1,6 @@
-"""Periodic orbits, branches and gradients: time and error beside scipy with finite differences, and one
-leg with its derivatives beside heyoka.
+"""Periodic orbits, branches, gradients and legs: time and error beside scipy and heyoka.
+
+scipy has finite differences for derivatives; one leg with its derivatives is compared with heyoka.
 
     python -m benchmarks --only orbits
 

@@ -1,5 +1,6 @@
-"""Friction in the plane: a block on an incline, a block on a turning disc and a sphere on a turntable beside
-Siconos. Bounces in 3-D are in ``space.py``.
+"""Friction in the plane, beside Siconos: blocks on an incline and on a disc, a sphere on a turntable.
+
+Bounces in 3-D are in ``space.py``.
 
 ``python -m benchmarks.plane`` prints all; ``BENCH_SICONOS_PYTHON`` names an interpreter with Siconos.
 """

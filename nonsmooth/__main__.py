@@ -23,12 +23,12 @@ def _parser() -> argparse.ArgumentParser:
     verbs.add_parser("list", help="names and titles of the problems")
     show = verbs.add_parser("show", help="a problem: system, start, known values, one run")
     show.add_argument("name", help="a name from the list")
-    show.add_argument("--out", type=Path, help="draw the run into this file (.png, .svg, .pdf)")
+    show.add_argument("--output", type=Path, help="draw the run into this file (.png, .svg, .pdf)")
     explore = verbs.add_parser(
         "explore", help="two-folds in a browser: one page, without a network"
     )
     explore.add_argument(
-        "--out",
+        "--output",
         type=Path,
         default=Path("two_folds.html"),
         help="file to write (default: two_folds.html)",
@@ -83,7 +83,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """
     given = _parser().parse_args(arguments)
     if given.verb == "explore":
-        return _explore(given.out, given.open)
+        return _explore(given.output, given.open)
     if given.verb == "list":
         width = max(map(len, PROBLEMS))
         for name, make in PROBLEMS.items():
@@ -93,9 +93,9 @@ def main(arguments: Sequence[str] | None = None) -> int:
         problem = by_name(given.name)
         run = problem.run()
         print(problem, f"  run: {run!r}", f"  {run.message}", sep="\n")
-        if given.out:
-            _draw(problem, given.out)
-            print(f"  drawn: {given.out}")
+        if given.output:
+            _draw(problem, given.output)
+            print(f"  drawn: {given.output}")
     except (NonsmoothError, OSError, ValueError) as error:
         print(error, file=sys.stderr)
         return 2

@@ -1,4 +1,4 @@
-"""The command line: ``bounce shot``, ``flight``, ``map``, ``fit`` and ``models``.
+"""The command line: ``bounce shot``, ``flight``, ``map``, ``fit``, ``models`` and ``explore``.
 
 Exit codes: 0 done, 1 it could not be computed or read, 2 it was asked for wrongly, 3 a fit was
 computed, and its data do not determine a parameter.

@@ -1,4 +1,4 @@
-"""What needs both a place and a motion: canards, the set of futures, curves of two-folds."""
+"""What needs a place and a motion: derivatives of runs, periodic orbits, branches, basins, futures."""
 
 from . import continuation
 from .basins import (

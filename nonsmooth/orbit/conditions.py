@@ -1,5 +1,6 @@
-"""What is watched along a branch of periodic orbits: functions that are positive while its itinerary
-holds, and those that vanish at smooth bifurcations.
+"""What is watched along a branch of periodic orbits: its itinerary, and smooth bifurcations.
+
+Some functions are positive while the itinerary holds; others vanish at smooth bifurcations.
 
 An itinerary ceases to hold where a leg's duration ends, where a guard is grazed inside a leg, where a
 guard fails at the start of the next leg or at the end of one, or where an event is no longer crossed

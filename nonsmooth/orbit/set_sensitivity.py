@@ -1,5 +1,6 @@
-"""Derivatives of runs through sets of codimension two and three, also where surfaces, impacts, resets and
-stops are beside them: friction in the plane.
+"""Derivatives of runs with friction in the plane: through sets of codimension two and three.
+
+Surfaces, impacts, resets and stops may be beside the sets.
 
 Between events the variational equation is integrated along the steps of the run (``set_variation``). At a
 hit of a set its own formula holds; at every other event that of ``saltation``. A set that is crossed

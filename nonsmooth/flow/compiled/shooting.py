@@ -1,5 +1,4 @@
-"""Periodic orbits in the interpreter: legs followed to their events, Newton's method on the equations of legs,
-and the return map on what it keeps."""
+"""Periodic orbits in the interpreter: legs flown to their events, Newton's method, the return map."""
 
 from __future__ import annotations
 

@@ -82,6 +82,7 @@ def measured() -> str:
     )
     wrong, near = (_value(targets, f"wrong itineraries, {where}") for where in ("random", "within"))
     ours, nonlinear = fast["nonsmooth"], many["nonsmooth"]
+    callbacks = fast["heyoka, one integrator and callbacks"]
     rows = [
         (
             "bounces with friction",
@@ -96,7 +97,8 @@ def measured() -> str:
         (
             "how many times faster than heyoka, and than scipy",
             f"{heyoka:.0f} and {scipy:.0f}",
-            "linear contact; each solver at its fastest tolerance with errors below 1e-9",
+            "linear contact; each solver at its fastest tolerance with errors below 1e-9; "
+            f"{_rate(ours) / _rate(callbacks):.0f} beside heyoka's fastest form, with callbacks",
         ),
         (
             "wrong sequences of slipping and rolling",
@@ -128,7 +130,11 @@ def _value(targets: dict[str, list[str]], start: str) -> float:
 
 
 def _millions(row: list[str]) -> str:
-    return f"{float(row[1].replace(',', '')) / 1e6:.1f}"
+    return f"{_rate(row) / 1e6:.1f}"
+
+
+def _rate(row: list[str]) -> float:
+    return float(row[1].replace(",", ""))
 
 
 def _without_comments(text: str) -> str:

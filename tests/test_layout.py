@@ -126,7 +126,9 @@ def test_the_first_line_of_a_module_says_what_it_is_for():
     cut = []
     for path in sources("nonsmooth", "bounce", "papers", "benchmarks", "checker", "docs"):
         first = path.read_text(encoding="utf-8").partition("\n")[0]
-        whole = re.fullmatch(r'"""\S.*[.?:](?:""")?', first)  # a whole sentence, not cut off by the margin
+        whole = re.fullmatch(
+            r'"""\S.*[.?:](?:""")?', first
+        )  # a whole sentence, not cut off by the margin
         if not whole and "examples" not in path.parts:  # there it is the title of a picture
             cut.append(f"{path}: {first}")
     assert cut == []

@@ -77,7 +77,7 @@ def on_page_markdown(markdown: str, page: Any, **_: Any) -> str:
 def on_page_content(html: str, page: Any, **_: Any) -> str:
     """Take Sphinx's roles out of docstrings, typeset formulas, label the cells of tables."""
     read = typeset.formula
-    if page.file.src_uri.startswith("api/"):
+    if page.file.src_uri.startswith("api/") or page.file.src_uri == "gallery.md":
         read = mathematics.formula  # docstrings have formulas as plain text
         html = _LISTED.sub(lambda found: found[1].replace(">, <", "></code>, <code><"), html)
         html = _NOTHING.sub("", html)

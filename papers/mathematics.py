@@ -46,7 +46,7 @@ OPERATORS = {
 
 _LETTERS = "|".join(sorted(GREEK, key=len, reverse=True))
 _SYMBOL = rf"(?:{_LETTERS}|[A-Za-z])"
-_INDEX = rf"(?:_(?:{_LETTERS}|[A-Za-z0-9]{{1,2}}'*|[+-])|\d{{1,2}})"
+_INDEX = rf"(?:_(?:{_LETTERS}|[A-Za-z0-9]{{1,3}}'*|[+-])|\d{{1,2}})"
 _NUMBER = r"\d*\.?\d+(?:e[+-]?\d+)?"
 _NAME = rf"(?:{'|'.join(sorted(FUNCTIONS, key=len, reverse=True))}|sqrt|abs|grad|inf|O)"
 _TOKEN = re.compile(
@@ -63,7 +63,7 @@ _INTEGRAL = re.compile(r"int_(?P<low>\w)\^(?P<high>\w)(?!\w)")
 _OPENS, _CLOSES = "([", ")]"
 _LONG, _SHORT = 24, 6  # characters of a formula that is cut, and of its shortest part
 _TELLS = re.compile(
-    rf"[=<>^~]|(?<![A-Za-z])(?:{_LETTERS})(?![a-z])|'|\d/\d|[A-Za-z]\d|_[A-Za-z+-]|(?<![A-Za-z])d[A-Za-z_]*~?/d"
+    rf"[=<>^~]|(?<![A-Za-z])(?:{_LETTERS})(?![a-z])|'|\d/\d|[A-Za-z]\d|(?<=[A-Za-z])_\d|_[A-Za-z+-]|(?<![A-Za-z])d[A-Za-z_]*~?/d"
 )
 
 

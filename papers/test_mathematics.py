@@ -96,3 +96,10 @@ def test_a_marked_formula_keeps_its_words_upright():
 def test_a_block_has_a_formula_on_each_line():
     made = formula("turn = int_0^T f dt\n\nW' = F / inertia", "block")
     assert made.count('<math display="block">') == 2 and "<mo>∫</mo>" in made
+
+
+@pytest.mark.parametrize("word", ["F_1", "D_att", "D_C1", "F_s"])
+def test_a_letter_with_an_index_is_mathematics_among_words(word):
+    letter, index = word.split("_")
+    shown = typeset(f"the tip of {word}, which is there")
+    assert f"<mi>{letter}</mi>" in shown and f">{index}<" in shown and word not in shown

@@ -1,7 +1,7 @@
 """All eight classes of two-folds
 
 The generic two-folds, each by its sliding portrait and its flow in space, and where they lie in the
-plane of (nu1, nu2). Two signs and two numbers decide: which orbits reach the singularity, and
+plane of $(nu1, nu2)$. Two signs and two numbers decide: which orbits reach the singularity, and
 whether the future is unique behind it.
 """
 

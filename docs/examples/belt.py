@@ -1,8 +1,8 @@
 """Chaos that is born where an orbit first touches sticking
 
 A block on a belt, shaken. The orbit of four forcing periods that never sticks touches the velocity of the belt
-at nu = 1.7077997, a grazing-sliding: the derivative of its return map jumps there from a stable one to one with
-a multiplier -1.66, and chaos begins whose size grows in proportion to the distance. Lines: the orbit, continued
+at $nu = 1.7077997$, a grazing-sliding: the derivative of its return map jumps there from a stable one to one with
+a multiplier $-1.66$, and chaos begins whose size grows in proportion to the distance. Lines: the orbit, continued
 through the touch to where it doubles from one of two periods (Kowalczyk & di Bernardo 2005). Dots: long runs,
 once every four forcing periods.
 """

@@ -1,6 +1,6 @@
 """A harvested population at its bifurcations
 
-Predators are hunted only where there are more than alpha of them. As alpha rises, the equilibrium
+Predators are hunted only where there are more than $alpha$ of them. As $alpha$ rises, the equilibrium
 with harvest becomes a pseudo-node (boundary node); the one without harvest frees itself from the
 line and leaves a pseudo-saddle behind (boundary focus); at last pseudo-saddle and pseudo-node meet
 and vanish (pseudo-saddle-node). Kuznetsov, Rinaldi & Gragnani 2003; parameters quoted from memory.

@@ -1,10 +1,10 @@
 """An oscillator that begins to hit a wall
 
-A forced oscillator before a wall at x = 1. Where its orbit first touches the wall (an impact grazing) the
+A forced oscillator before a wall at $x = 1$. Where its orbit first touches the wall (an impact grazing) the
 return map has a square root: stability is lost at once. Lines are continued, broken where they are
 unstable: orbits of one forcing period that never hit, and that hit once, and what doubles from them. Dots
 are long runs with a thousand periods of transients, from the state at the touch. Triangle: the touch;
-squares: doublings; circles: folds. The orbits of four periods are continued to F = 4.3.
+squares: doublings; circles: folds. The orbits of four periods are continued to $F = 4.3$.
 """
 
 import casadi as ca

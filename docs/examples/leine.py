@@ -1,6 +1,6 @@
 """Leine's oscillator
 
-Friction that falls off with the slip velocity as 1/(1 + 3 |slip|). Wherever it starts, once the
+Friction that falls off with the slip velocity $u$ as $1/(1 + 3 |u|)$. Wherever it starts, once the
 block has stuck it is on the same periodic orbit: sliding forgets the past, so one multiplier of the
 cycle is zero.
 """

@@ -1,7 +1,7 @@
 """Where friction in the plane lets go
 
-Near slip h = 0 a body sees h' = a - M u, with the direction u of its slip. Above left: the blow-up, direction
-against distance, for a load that friction holds (isotropic, |a| = 0.6 c). All orbits end at r = 0, turned
+Near slip $h = 0$ a body sees $h' = a - M u$, with the direction $u$ of its slip. Above left: the blow-up, direction
+against distance, for a load that friction holds ($M = c$, a number, and $|a| = 0.6 c$). All orbits end at distance $r = 0$, turned
 towards the load. Beside it: paths of a block on an incline, from starts all round: where it holds they come
 to rest along one limit direction; where it does not, all leave along it. Below: with friction of two
 strengths four limit directions exist for loads inside the astroid, else two.

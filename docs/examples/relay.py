@@ -1,6 +1,6 @@
 """A relay that slides more and more often
 
-The orbit of a relay feedback, as its frequency w grows: di Bernardo, Johansson & Vasca's multi-sliding orbit. A
+The orbit of a relay feedback, as its frequency $w$ grows: di Bernardo, Johansson & Vasca's multi-sliding orbit. A
 slide is split in two where it touches the boundary of sliding (adding-sliding), and slides end where a flight
 no longer reaches the surface (grazing-sliding). Each line is the duration of one slide of half a period; the
 orbit is followed through all of these, stable all along.

@@ -1,9 +1,9 @@
 """Two wells and what divides them
 
-A mass between two springs that pull it to -1 and to 1, with damping. Each start is labelled by the
+A mass between two springs that pull it to $-1$ and to $1$, with the damping ratio $zeta$. Each start is labelled by the
 point that its run comes back to; the two orbits that end at the two-fold on the hill, followed backward
 through every crossing, are the boundary. Released at rest, the mass goes to the other well beyond
-x = 1 + exp(zeta pi/sqrt(1 - zeta**2)).
+$x = 1 + exp(zeta pi/sqrt(1 - zeta^2))$.
 """
 
 import casadi as ca

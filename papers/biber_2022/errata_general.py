@@ -308,7 +308,7 @@ def normal_form_slips() -> Erratum:
     return Erratum(
         21,
         "Sec. 4.1, normal form",
-        "z4..n' = O(abs z); t -> phi t when z2 <; the entry _3 of (normal_sliding)",
+        "z4..n' = O(|z|); t -> phi t when z2 <; the entry _3 of (normal_sliding)",
         "z4..n drift along the two-fold set at order one; t = phi tau when z1 > 0, tau/phi when "
         "z1 < 0; z3",
         (

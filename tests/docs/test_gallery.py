@@ -5,6 +5,7 @@ The numbers come from outside the programs: closed forms, and the references of 
 
 import importlib.util
 import math
+import re
 from functools import cache
 from pathlib import Path
 
@@ -321,3 +322,10 @@ def test_the_oscillator_grazes_where_its_free_response_reaches_the_wall():
     before = forces < 0.99 * size
     free = (forces / (1 - 2.2**2 + 0.22j)).real[before]
     assert np.abs(x[before] - free[:, None]).max() < 1e-6
+
+
+@pytest.mark.parametrize("name", generate.GALLERY)
+def test_formulas_of_the_texts_are_between_dollars(name):
+    title, text, _ = generate.described(name)
+    words = re.sub(r"\$[^$]+\$|`[^`]+`", "", f"{title} {text}")
+    assert not re.findall(r"[=^|*_]|\b(?:alpha|nu|mu|lambda|zeta|sigma|sqrt|exp)\d?\b", words)

@@ -1,4 +1,6 @@
-"""What a solution of the equations of an orbit must be to count: an orbit that moves, takes the time that
+"""What a solution of the equations of an orbit must be to count as one.
+
+An orbit that moves, takes the time that
 was said, and passes no two-fold."""
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ of one system has the same bits as that driver and takes seconds to compile: fas
 slow ones, and where hypothesis draws all its examples those of ``tests/flow/compiled``.
 """
 
+import contextlib
 import gc
 import importlib
 import os
@@ -15,8 +16,9 @@ from pathlib import Path
 import pytest
 
 from nonsmooth.flow.compiled import lanes, tape
+from nonsmooth.flow.compiled.build import CompilerError
 from nonsmooth.flow.compiled.device import shim
-from tests.halves import elsewhere
+from tests.halves import NAME, elsewhere
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -37,6 +39,17 @@ WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
 
 # As often as Python collects garbage by default, it takes a twentieth of the time and finds little.
 gc.set_threshold(50_000, 20, 100)
+
+
+def pytest_sessionstart() -> None:
+    """Where two processes begin, one compiles the driver in C while the other waits to load it."""
+    if not os.environ.get(NAME):
+        return
+    import fcntl
+
+    with open(HERE / "tests" / "halves.py", "rb") as file, contextlib.suppress(CompilerError):
+        fcntl.flock(file, fcntl.LOCK_EX)
+        tape.library()
 
 
 def pytest_ignore_collect(collection_path: Path) -> bool | None:

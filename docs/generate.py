@@ -164,9 +164,34 @@ def regions() -> str:
 # Gallery ------------------------------------------------------------------------------------------
 
 
+#: Programs that draw several pictures, `figures`, and what each shows.
+PAGES = {
+    "atlas": (
+        "visible two-folds",
+        "invisible two-folds",
+        "visible-invisible two-folds with few canards",
+        "visible-invisible two-folds with many",
+        "the classes over nu1 and nu2",
+    )
+}
+
+
 def run_example(name: str) -> dict[str, Any]:
     """Run a program of the gallery and return what it defines; `figure` is its picture."""
     return runpy.run_path(str(EXAMPLES / f"{name}.py"), run_name=name)
+
+
+def pictures(name: str) -> list[tuple[str, str]]:
+    """Names of the pictures of a program of the gallery, without a suffix, and what each shows."""
+    if name in PAGES:
+        return [(f"{name}-{k}", text) for k, text in enumerate(PAGES[name], 1)]
+    return [(name, described(name)[0])]
+
+
+def drawn(name: str, defined: dict[str, Any]) -> dict[str, Any]:
+    """The figures of a program that ran, by the names of their pictures."""
+    figures = defined["figures"] if name in PAGES else [defined["figure"]]
+    return dict(zip((picture for picture, _ in pictures(name)), figures, strict=True))
 
 
 def described(name: str) -> tuple[str, str, str]:
@@ -183,9 +208,12 @@ def gallery() -> str:
     for name in GALLERY:
         title, text, source = described(name)
         program = "\n".join("    " + line if line else "" for line in source.splitlines())
-        picture = f"gallery/{name}.svg"
+        shown = "\n\n".join(
+            f"[![{about}](gallery/{picture}.svg)](gallery/{picture}.svg){{ title='Enlarge' }}"
+            for picture, about in pictures(name)
+        )
         parts.append(
-            f"## {title}\n\n{text}\n\n[![{title}]({picture})]({picture}){{ title='Enlarge' }}\n\n"
+            f"## {title}\n\n{text}\n\n{shown}\n\n"
             f'??? example "The program: `docs/examples/{name}.py`"\n\n'
             f"    ```python\n{program}\n    ```\n"
         )

@@ -46,10 +46,10 @@ def on_files(files: Files, config: Any) -> Files:
     """Add the pictures of the gallery, the pages of the API and the explorers."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     for name in generate.GALLERY:
-        path = PICTURES / f"{name}.svg"
-        figure = generate.run_example(name)["figure"]
-        figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
-        files.append(File.generated(config, f"gallery/{name}.svg", abs_src_path=str(path)))
+        for picture, figure in generate.drawn(name, generate.run_example(name)).items():
+            path = PICTURES / f"{picture}.svg"
+            figure.savefig(path, bbox_inches="tight", dpi=120, metadata={"Date": None})
+            files.append(File.generated(config, f"gallery/{path.name}", abs_src_path=str(path)))
     for animation in animations.ANIMATIONS:
         for path in animations.write(animation, PICTURES):
             files.append(File.generated(config, f"gallery/{path.name}", abs_src_path=str(path)))

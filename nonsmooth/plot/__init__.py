@@ -20,8 +20,9 @@ from .phase_portrait import phase_portrait
 from .proven_ranges import proof_map
 from .sliding_portrait import sliding_portrait
 from .trajectory import trajectory
-from .two_fold_atlas import two_fold_atlas, two_fold_map
+from .two_fold_atlas import two_fold_atlas, two_fold_atlas_pages
 from .two_fold_explorer import two_fold_explorer
+from .two_fold_map import two_fold_map
 from .two_fold_portrait import two_fold
 from .two_fold_space import two_fold_3d
 
@@ -42,6 +43,7 @@ __all__ = [
     "two_fold",
     "two_fold_3d",
     "two_fold_atlas",
+    "two_fold_atlas_pages",
     "two_fold_explorer",
     "two_fold_map",
 ]

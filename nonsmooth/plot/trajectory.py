@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import textwrap
 from typing import Any
 
 import numpy as np
@@ -13,8 +14,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ..flow import Event, Segment, Trajectory
-from ..model import Array, DefinitionError, FilippovSystem, OptionError, call, explain, whole
+from ..model import DefinitionError, OptionError, explain, whole
 from . import style
+from .surfaces import draw_surfaces
 
 #: Marker of each kind of event; shape tells them apart without colour.
 MARKERS = {
@@ -37,6 +39,8 @@ _CYCLE = (style.ABOVE, style.BLUE, style.GREEN, style.PURPLE, style.ORANGE, styl
 _DASHES: tuple[Any, ...] = ("-", (0, (5, 1.5)), (0, (1, 1)), (0, (5, 1, 1, 1)))
 _GRID_FROM = 5  # states; fewer are stacked in one column
 _LISTED = 6  # entries of a legend
+_SHORT = 12  # letters of a name that stands beside its panel
+_ABOVE: Any = {"loc": "left", "fontsize": 8.5, "pad": 3.0}
 _MANY = 300  # events; more are not marked one by one
 
 
@@ -229,7 +233,12 @@ def _time_column(
         _mark(ax, run.events, lambda event, k=k: (event.t, event.x[k]))
         if run.accumulation_time is not None:
             ax.axvline(run.accumulation_time, color=style.PURPLE, linestyle=":", linewidth=1.2)
-        ax.set_ylabel(name)
+        if len(name) <= _SHORT:
+            ax.set_ylabel(name)
+        else:  # longer than the panel is high
+            ax.set_title(
+                _broken(name, 0.75 * grid.figure.get_figwidth() / grid.ncols, 5.5), **_ABOVE
+            )
         ax.tick_params(labelbottom=row == len(names) - 1)
     ax.set_xlabel("t")
     ax.margins(x=0.02)
@@ -305,33 +314,17 @@ def _phase_plane(
     low, high = ax.get_xlim(), ax.get_ylim()
     if not run.system.time_dependent:
         draw_surfaces(ax, run.system, np.array(list(run.parameters.values())), (*low, *high))
-    ax.set(xlim=low, ylim=high, xlabel=run.system.state_names[0], ylabel=run.system.state_names[1])
+    figure: Any = ax.get_figure(root=True)
+    room = 0.38 * figure.get_figwidth(), 0.5 * figure.get_figheight()
+    x, y = (_broken(name, r, 7.0) for name, r in zip(run.system.state_names, room, strict=True))
+    ax.set(xlim=low, ylim=high, xlabel=x, ylabel=y)
 
 
-def draw_surfaces(
-    ax: Axes, system: FilippovSystem, parameters: Array, box: tuple[float, float, float, float]
-) -> None:
-    """Draw the switching surfaces of a planar system in a box as grey lines."""
-    x, y = np.meshgrid(np.linspace(*box[:2], 161), np.linspace(*box[2:], 161))
-    points = np.vstack([x.ravel(), y.ravel()])
-    count = system.surface_count
-    function = system.function(
-        ("plot surfaces",), lambda: [system.surface_function(i) for i in range(count)]
-    )
-    values = call(function, points, parameters) if count else []
-    for value in values:
-        h = value.reshape(x.shape)
-        if np.nanmin(h) < 0 < np.nanmax(h):
-            ax.contour(
-                x,
-                y,
-                h,
-                levels=[0.0],
-                colors=[style.GREY],
-                linewidths=2.2,
-                alpha=0.7,
-                zorder=1,
-            )
+def _broken(name: str, room: float, letter: float) -> str:
+    """A name in lines no longer than the room in inches, of letters as wide as that in points."""
+    letters = max(int(72 * room / letter), 4)
+    lines = textwrap.wrap(name.replace("_", "_ "), letters)
+    return "\n".join(line.replace("_ ", "_") for line in lines) if len(name) > letters else name
 
 
 def _title(run: Trajectory, figure: Figure) -> str:
@@ -345,7 +338,7 @@ def _title(run: Trajectory, figure: Figure) -> str:
 
 def _explain(figure: Figure, title: str, handles: list[Line2D | Patch], modes: int) -> None:
     """A title and a legend, or where it would be long one of modes, above, and one of marks."""
-    columns = min(4, max(1, int(figure.get_figwidth() / 1.25)))
+    columns = min(4, max(1, int(figure.get_figwidth() / 1.6)))
     if len(handles) <= _LISTED:
         figure.suptitle(title, fontsize=10, fontfamily="monospace")
         figure.legend(handles=handles, loc="outside lower center", ncols=min(len(handles), columns))

@@ -6,7 +6,8 @@ from typing import Any
 
 from ..local.two_folds.classification import TABLE
 from .offline_page import WEB, installed_version, offline_page
-from .two_fold_atlas import CASES, REACH, SIGMA, areas, places
+from .two_fold_atlas import CASES
+from .two_fold_map import REACH, SIGMA, areas, places
 
 
 def two_fold_explorer() -> str:

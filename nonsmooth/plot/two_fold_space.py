@@ -17,6 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
+from ..local.box import Box
 from ..local.sides import SIDES, Side, other
 from ..local.two_folds import diabolo_slopes, flight_above, flight_below
 from ..local.two_folds.flights import has_diabolo
@@ -27,6 +28,7 @@ from . import style
 from .camera import Camera, azimuth_of, stretch_of
 from .labels import Labels
 from .legends import beside
+from .thin_ends import draw_orbit
 from .two_fold_marks import (
     TINTS,
     Portrait,
@@ -37,6 +39,7 @@ from .two_fold_marks import (
 )
 
 _HEIGHT = 0.75  # of what is drawn above and below the unit square of the surface
+_UNIT = Box(0.0, 1.0, 0.0, 1.0)  # of lengths on the paper
 _SHADOW = "#B5B5B5"  # of orbits above, on the surface
 _REACH = 1.08  # of what is drawn, in z2 and z3
 
@@ -127,13 +130,13 @@ class _Scene:
 
     def draw(self) -> None:
         """Draw every part."""
+        self.frame()
         self.surface()
         self.sliding()
         self.arcs()
         self.crossings()
         self.diabolo()
         self.names()
-        self.frame()
 
     # parts -------------------------------------------------------------------------------------
 
@@ -343,7 +346,9 @@ class _Scene:
         color = color or style.FIELDS[side]
         dashes = "-" if side == "+" else (0, (3.5, 1.3))
         order = self.ABOVE if side == "+" else self.BELOW
-        self._curve(curve, color, 1.2, order, dashes=dashes, at=0.62, gid=gid)
+        begin, end = np.abs(curve[[0, -1], 0]) > 1e-9  # it goes on above or below what is drawn
+        thins = (bool(begin), bool(end))
+        self._curve(curve, color, 1.2, order, dashes=dashes, at=0.62, gid=gid, thins=thins)
 
     def _curve(
         self,
@@ -355,23 +360,18 @@ class _Scene:
         dashes: Any = "-",
         at: float | None = None,
         gid: str | None = None,
+        thins: tuple[bool, bool] = (False, False),
     ) -> None:
         points = self.camera(curve)
-        effects = style.halo(2.2) if order == self.ABOVE else None
+        bed = 2.2 if order == self.ABOVE else 3.6 if width > 2.0 else None
+        effects = None if bed is None else style.halo(bed)
         if order == self.ABOVE:
             for piece in style.inside(curve[:, 1:], (-1.0, 1.0, -1.0, 1.0)):
                 shadow = self.camera(self._flat(piece))
                 look: Any = {"color": _SHADOW, "lw": 1.0, "zorder": self.SURFACE + 0.2}
                 self.ax.plot(*shadow.T, gid="shadow", **look)
-        self.ax.plot(
-            *points.T,
-            color=color,
-            linewidth=width,
-            linestyle=dashes,
-            zorder=order,
-            gid=gid,
-            path_effects=effects,
-        )
+        drawn: Any = {"color": color, "linestyle": dashes, "zorder": order, "gid": gid}
+        draw_orbit(self.ax, points, thins, _UNIT, width, **drawn, path_effects=effects)
         length = np.hypot(*np.diff(points, axis=0).T).sum()
         if at is not None and length > 0.15:
             style.arrowhead(self.ax, points, at, color, mutation_scale=9, zorder=order + 0.05)
@@ -386,6 +386,8 @@ class _Scene:
         good = (np.abs(curve[:, 0]) <= _HEIGHT / self.camera.stretch) & np.all(
             np.abs(curve[:, 1:]) <= _REACH, axis=1
         )
+        low, high = self.ax.get_ylim()
+        good &= (self.camera(curve)[:, 1] > low) & (self.camera(curve)[:, 1] < high)
         k = int(np.argmin(np.abs(curve[:, 0])))
         if not good[k]:
             return curve[:0]

@@ -44,10 +44,11 @@ def ran(name):
 
 @pytest.mark.parametrize("name", EACH)
 def test_picture_is_legible_on_a_page(name):
-    """As wide as a page at most, text of 8 points, nothing cut off."""
-    figure = ran(name)["figure"]
-    assert isinstance(figure, Figure)
-    assert faults(figure) == []
+    """It fits one: as wide as a page at most, text of 8 points, nothing cut off."""
+    for figure in generate.drawn(name, ran(name)).values():
+        assert isinstance(figure, Figure)
+        assert faults(figure) == []
+        assert figure.get_figheight() <= 9.0
 
 
 @pytest.mark.parametrize(
@@ -58,12 +59,22 @@ def test_picture_is_legible_on_a_page(name):
     ],
 )
 def test_program_draws(name, tmp_path):
-    ran(name)["figure"].savefig(tmp_path / "picture.svg")
-    assert (tmp_path / "picture.svg").stat().st_size > 5_000
+    for figure in generate.drawn(name, ran(name)).values():
+        figure.savefig(tmp_path / "picture.svg")
+        assert (tmp_path / "picture.svg").stat().st_size > 5_000
 
 
 def test_gallery_is_all_programs():
     assert sorted(generate.GALLERY) == sorted(p.stem for p in generate.EXAMPLES.glob("*.py"))
+
+
+def test_every_picture_is_shown_and_can_be_enlarged():
+    page = generate.gallery()
+    for name in generate.GALLERY:
+        for picture, about in generate.pictures(name):
+            file = f"gallery/{picture}.svg"
+            assert f"[![{about}]({file})]({file}){{ title='Enlarge' }}" in page
+    assert {len(generate.pictures(name)) for name in generate.GALLERY} == {1, 5}
 
 
 def test_two_fold_is_the_teixeira_singularity():

@@ -138,6 +138,7 @@ DRAWN = {
         lambda k=k: ns.plot.two_fold_3d(ns.textbook.TWO_FOLDS[k]) for k in ("II-C", "mix-C")
     ],
     "two_fold_atlas": [lambda: ns.plot.two_fold_atlas(["II-C", "mix-S"], maps=False)],
+    "two_fold_atlas_pages": [lambda: ns.plot.two_fold_atlas_pages(["VV-C1"])[-1]],
     "two_fold_map": [lambda k=k: ns.plot.two_fold_map(k) for k in ("VV", "II", "VI", "IV")],
 }
 GRID = {"xdot": np.linspace(-0.6, 0.6, 31), "omega": np.linspace(-0.6, 0.6, 31)}
@@ -225,3 +226,16 @@ def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
     figure = draw()
     assert faults(figure) == []
     assert max(ax.bbox.width for ax in figure.axes) > 0.3 * figure.bbox.width  # two side by side
+
+
+@pytest.mark.parametrize(("count", "size"), [(2, COLUMN), (3, None), (6, COLUMN)])
+def test_names_of_24_letters_do_not_meet(count, size):
+    names = ["displacement_of_the_block", "tip_velocity_of_the_bow_", "temperature_of_the_spring"]
+    names = [f"{names[k % 3]}{k // 3 or ''}" for k in range(count)]
+    assert min(map(len, names)) >= 24
+    states = [ca.SX.sym(name) for name in names]
+    field = [states[1], -400 * states[0], *(-state for state in states[2:])]
+    above, below = ([f - s * (k == 1) for k, f in enumerate(field)] for s in (100, -100))
+    system = ns.FilippovSystem(states, surface=states[1] - 0.7, above=above, below=below)
+    figure = ns.plot.trajectory(ns.simulate(system, np.ones(count), 0.5), size=size)
+    assert faults(figure) == []

@@ -10,7 +10,9 @@ from numpy.testing import assert_allclose
 
 import nonsmooth as ns
 from nonsmooth.local.two_folds import classify_two_fold, max_flights
-from nonsmooth.plot.two_fold_atlas import CASES, FILLS, areas
+from nonsmooth.plot.two_fold_atlas import CASES
+from nonsmooth.plot.two_fold_map import FILLS, areas
+from papers.pictures import faults
 
 SIGMA = {"VV": (1, -1), "II": (-1, 1), "VI": (1, 1), "IV": (-1, -1)}
 
@@ -91,16 +93,31 @@ def test_the_atlas_draws_what_it_is_asked_for(tmp_path):
     assert_allclose(figure.get_size_inches()[0], 7.0)  # the width of a page
 
 
+def test_pages_have_two_each_and_fit_a_page():
+    pages = ns.plot.two_fold_atlas_pages(["II-C", "mix-S", "VV-F"])
+    titles = [[ax.get_title().split(" ")[0] for ax in page.axes] for page in pages]
+    assert [[t for t in page if "-" in t] for page in titles[:2]] == [["II-C", "mix-S"], ["VV-F"]]
+    assert pages[2].axes[0].get_title() == "visible (VV)" and len(pages) == 3
+    assert len(ns.plot.two_fold_atlas_pages(["II-C"], maps=False)) == 1
+    for page in pages:
+        width, height = page.get_size_inches()
+        assert width == 7.0 and height <= 9.0
+
+
 @pytest.mark.slow
 def test_the_whole_atlas_is_drawn():
     figure = ns.plot.two_fold_atlas()
     assert len(figure.axes) == 2 * len(CASES) + 3
+    pages = ns.plot.two_fold_atlas_pages()
+    assert sum(len(page.axes) for page in pages) == len(figure.axes)
+    assert [fault for page in pages for fault in faults(page)] == []
 
 
 def test_wrong_input_is_refused():
     for wrong in (["II-X"], [], "II-C"):
-        with pytest.raises(ns.OptionError, match="cases: expected names among"):
-            ns.plot.two_fold_atlas(wrong)
+        for draw in (ns.plot.two_fold_atlas, ns.plot.two_fold_atlas_pages):
+            with pytest.raises(ns.OptionError, match="cases: expected names among"):
+                draw(wrong)
     with pytest.raises(ns.OptionError, match="columns: expected a whole number"):
         ns.plot.two_fold_atlas(["II-C"], columns=0)
     with pytest.raises(ns.OptionError, match="kind: expected one of"):

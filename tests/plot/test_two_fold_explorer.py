@@ -11,7 +11,8 @@ from nonsmooth.__main__ import main
 from nonsmooth.local.two_folds.flights import has_diabolo
 from nonsmooth.local.two_folds.reduced_flow import eigenlines, orbit, sectors
 from nonsmooth.plot.offline_page import WEB
-from nonsmooth.plot.two_fold_atlas import CASES, REACH, SIGMA
+from nonsmooth.plot.two_fold_atlas import CASES
+from nonsmooth.plot.two_fold_map import REACH, SIGMA
 from tests.browser import WIDTHS
 
 two_folds = ns.two_folds
@@ -225,7 +226,7 @@ def test_keys_move_the_point_and_everything_follows(browser, page):
 
 @pytest.mark.browser
 def test_classes_have_the_colours_of_the_atlas_and_boundaries_of_many_are_listed(browser, page):
-    from nonsmooth.plot.two_fold_atlas import FILLS
+    from nonsmooth.plot.two_fold_map import FILLS
 
     browser.open(page, hash="folds=VI&nu=-1,1")
     assert shown(browser)["label"].endswith("between mix-0, mix-S, mix-C and mix-F")

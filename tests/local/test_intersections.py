@@ -4,7 +4,7 @@ closed forms, of difference quotients and of runs."""
 import casadi as ca
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import assume, given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
@@ -69,16 +69,16 @@ def test_a_limit_of_the_modes_is_degenerate():
 
 
 rates = st.integers(-20, 20).map(lambda k: k / 10)
+inward = st.integers(-20, -5).map(lambda k: k / 10)  # most of what is drawn attracts
 
 
 @at_most(40)
-@given(st.lists(rates, min_size=4, max_size=4), st.lists(rates, min_size=2, max_size=2))
+@given(st.tuples(inward, rates, rates, inward), st.tuples(rates, rates))
 def test_attraction_is_what_runs_beside_the_intersection_do(m, drift):
     """A piecewise constant field: runs from beside an attracting intersection end on it, in finite time."""
     system = plane(drift[0] + m[0] * a + m[1] * b, drift[1] + m[2] * a + m[3] * b)
     found = ns.intersection(system, [0.0, 0.0])
-    if found.distance < 0.05 or found.attraction != "attracting":
-        return
+    assume(found.distance >= 0.05 and found.attraction == "attracting")
     for start in ([1.0, 0.5], [-0.3, 1.0], [-1.0, -0.2], [0.6, -1.0]):
         run = ns.simulate(system, start, 1e4, max_events=500)
         if run.status is ns.Status.ACCUMULATION:

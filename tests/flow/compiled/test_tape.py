@@ -174,10 +174,14 @@ def test_impacts(system, start, t_end):
 
 
 def test_refusals_have_the_same_words():
-    for start, status in (([-1.0, 0.0], "INCONSISTENT"), ([1.0, np.inf], "NOT_FINITE")):
-        if np.all(np.isfinite(start)):
-            expected, run = both(TABLE, start, 1.0)
-            assert (str(run.status), run.message) == (status, expected.message)
+    root = ns.FilippovSystem([x], field=[-1 - ca.sqrt(x)])  # at zero when t = 2 - 2 log 2
+    for system, start, status, said in (
+        (TABLE, [-1.0, 0.0], "INCONSISTENT", ""),
+        (root, [1.0], "STEP_TOO_SMALL", "just after t = 0.61370564"),
+    ):
+        expected, run = both(system, start, 1.0)
+        assert (str(run.status), run.message) == (status, expected.message)
+        assert said in run.message
 
 
 def test_where_more_modes_hold_they_are_named():

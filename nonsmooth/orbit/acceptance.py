@@ -1,7 +1,7 @@
 """What a solution of the equations of an orbit must be to count as one.
 
-An orbit that moves, takes the time that
-was said, and passes no two-fold."""
+It moves, takes the time that was said, and passes no two-fold.
+"""
 
 from __future__ import annotations
 

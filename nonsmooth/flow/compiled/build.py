@@ -132,6 +132,8 @@ def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None
         try:
             library = _library(source, command, usable_folder(), flags, run or Compilation())
         except CompilerError as error:
+            if run is not None and run.stopped:
+                raise
             failures.append(error)
             continue
         if failures:

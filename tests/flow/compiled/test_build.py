@@ -83,6 +83,16 @@ def test_named_compiler_is_preferred(cache, monkeypatch):
     assert build("int answer(void) { return EXTRA; }\n").answer() == 1
 
 
+def test_what_is_stopped_asks_no_other_compiler(cache, monkeypatch):
+    other = find_compiler()
+    build(SOURCE)
+    monkeypatch.setattr(build_module, "compilers", lambda: ((*other, "-DFIRST"), other))
+    run = build_module.Compilation(quiet=True)
+    run.stop()
+    with pytest.raises(CompilerError, match="stopped"):  # though the other one's library is there
+        build(SOURCE, run=run)
+
+
 def test_cache_folder_that_cannot_be_written(tmp_path, monkeypatch):
     warn_once.cache_clear()
     blocked = tmp_path / "file"

@@ -12,7 +12,7 @@ from collections.abc import Iterable, Sequence
 from functools import lru_cache
 from importlib import resources
 
-from ...model import Coupled, FilippovSystem, motion
+from ...model import Coupled, FilippovSystem, coupled_of, motion
 from ...model.printing.programs import is_flat, lanes_program
 from ...model.printing.set_program import set_program
 from ...model.printing.special import (
@@ -24,10 +24,14 @@ from ...model.printing.special import (
 )
 from ...model.printing.tape import OPERATIONS, TAPE_RULES, Tape
 from .. import facts
+from ..options import Options
 from ..status import Status
 
 #: Orders of the series are below this, for arrays on the stack.
 MOST_ORDER = 48
+
+#: The order to which that of linear systems is raised: beyond, longer steps lose digits to terms that cancel.
+_MOST_LINEAR = 24
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
@@ -56,6 +60,19 @@ def supports_set_lanes(coupled: Coupled) -> bool:
     alone = len(system.sets) == 1 and system.surface_count == len(system.sets[0])
     others = system.resets or system.impacts or any(system.nonlinear)
     return alone and not others and coupled.affine and not coupled.slope_moves.any()
+
+
+def tape_order(system: FilippovSystem, options: Options) -> int:
+    """Order of the series of one trajectory: a third more where all is linear.
+
+    Coefficients of a series without products cost the same each, so more of them share what a step costs.
+    At order 24 a step along exponentials loses some tens of roundings. Systems of several surfaces keep
+    theirs: most of their steps end at an event.
+    """
+    order = options.order
+    if system.coupled or not coupled_of(system).linearity.everywhere:
+        return order
+    return max(order, min((4 * order + 2) // 3, _MOST_LINEAR))
 
 
 def supports_special(tape: Tape, order: int) -> bool:

@@ -188,12 +188,31 @@ static double largest_root(const double *c, int n) {
   return 2.5 * most;
 }
 
+/* Whether a polynomial of which a step needs no more stays positive on [0, h]: the Bernstein coefficients of its
+ * first terms are above the sum of the magnitudes of the rest. A tenth of the work of all coefficients. */
+#define FIRST_TERMS 8
+static inline int stays_positive(const double *c, int n, double h) {
+  double b[FIRST_TERMS + 1], power = 1, binomial = 1, rest = 0;
+  if (n < FIRST_TERMS) return 0;
+  for (int k = n; k > FIRST_TERMS; k--) rest = MULADD(rest, h, fabs(c[k]));
+  UNROLLED for (int k = 0; k <= FIRST_TERMS; k++) {
+    b[k] = c[k] * power * (1 / binomial);
+    power *= h;
+    binomial = binomial * (FIRST_TERMS - k) / (k + 1);
+  }
+  UNROLLED for (int level = 1; level <= FIRST_TERMS; level++)
+    UNROLLED for (int i = FIRST_TERMS; i >= level; i--) b[i] += b[i - 1];
+  double low = b[0];
+  UNROLLED for (int i = 1; i <= FIRST_TERMS; i++) low = smaller(b[i], low);
+  return low > rest * power;
+}
+
 /* First t in (0, h] at which a polynomial positive at 0 stops being positive; 0 if it is not; -1 if
  * it stays positive. */
 static double first_root(const double *c, int n, double h) {
   if (c[0] <= 0) return 0;
   double a[P + 1], power = 1, rest = rest_of(c, n, h);
-  if (c[0] > rest) return -1;
+  if (c[0] > rest || (rest < 1e300 && stays_positive(c, n, h))) return -1;
   /* More halvings than there are would be needed, or an overflow. */
   if (!(rest < ldexp(c[0], DEPTH))) h = smaller(h, largest_root(c, n));
   a[0] = c[0];

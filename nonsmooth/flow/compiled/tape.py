@@ -29,7 +29,7 @@ from .arrays import (
 )
 from .background import Background
 from .build import build
-from .codegen import MOST_ORDER, interpreter_source, special_source, supports_special
+from .codegen import MOST_ORDER, interpreter_source, special_source, supports_special, tape_order
 from .output import Output, rooms_of
 
 _I32, _I64, _D, _POINTER = ctypes.c_int32, ctypes.c_int64, ctypes.c_double, ctypes.c_void_p
@@ -121,10 +121,12 @@ def _place(system: FilippovSystem, i: int) -> int:
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
     """Return the interpreter with a system at the options' tolerance, or None where it has none: hidden
     dynamics, and impacts with multipliers that enter in products."""
-    order = options.order
-    if any(system.nonlinear) or order >= MOST_ORDER:
+    if any(system.nonlinear):
         return None
     if system.impacts and not coupled_of(system).affine:
+        return None
+    order = tape_order(system, options)
+    if order >= MOST_ORDER:
         return None
     return system.cached(("tape", order), lambda: TapeEngine(system, order))
 

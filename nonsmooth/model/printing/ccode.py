@@ -149,40 +149,58 @@ class _Graph:
         self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
 
     def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
-        """Terms of sums whose partial sums nobody else uses, those that are ready first first.
+        """Terms, with their signs, of sums whose partial sums nobody else uses, those that are ready first first.
 
-        A convolution's oldest terms can then be added while its newest are still computed.
+        A convolution's oldest terms can then be added while its newest are still computed. The difference of
+        two sums stays one: where they are equal it is zero.
         """
         users = [0] * len(self.nodes)
-        for node in self.nodes:
-            for a in node.args:
-                users[a] += 1
-        for row in rows:
-            for j in row:
-                users[j] += 1
-        terms: dict[int, list[int]] = {}
+        for j in [a for node in self.nodes for a in node.args] + [j for row in rows for j in row]:
+            users[j] += 1
+        terms: dict[int, list[tuple[int, bool]]] = {}
+        depth = [0] * len(self.nodes)  # operations one after the other until a node is known
         for j, node in enumerate(self.nodes):
-            if node.op != "add" or not self.moving[j] or self._choice(node) is not None:
+            depth[j] = 1 + max((depth[a] for a in node.args), default=-1)
+            if (
+                node.op not in ("add", "sub")
+                or not self.moving[j]
+                or self._choice(node) is not None
+            ):
+                continue
+            if node.op == "sub" and node.args[1] in terms:
                 continue
             terms[j] = []
-            for a in node.args:
-                terms[j] += terms.pop(a) if a in terms and users[a] == 1 else [a]
+            for a, minus in zip(node.args, (False, node.op == "sub"), strict=True):
+                own = terms.pop(a) if a in terms and users[a] == 1 else [(a, False)]
+                terms[j] += [(k, sign != minus) for k, sign in own]
+            depth[j] = 2 + max(self._ready(k, depth) for k, _ in terms[j])
         self.sums = {
-            j: sorted(t, key=lambda k: max(self.nodes[k].args, default=k))
+            j: sorted(t, key=lambda term: self._ready(term[0], depth))
             for j, t in terms.items()
             if len(t) > 2
         }
 
-    def _sum(self, terms: Sequence[int]) -> str:
+    def _ready(self, j: int, depth: Sequence[int]) -> int:
+        """When a node can be computed: a product is one operation with the sum that it is a term of."""
+        return max((depth[a] for a in self.nodes[j].args), default=0)
+
+    def _sum(self, terms: Sequence[tuple[int, bool]]) -> str:
         """Two chains of the early terms, then the two last."""
-        names = [self.name(k) for k in terms]
-        early, late = names[:-2], names[-2:]
+        early, late = terms[:-2], terms[-2:]
         chains = [early] if len(early) < 4 else [early[0::2], early[1::2]]
-        sums = ["(" * (len(c) - 1) + ") + ".join(c) for c in chains]
+        sums = [self._chain(c) for c in chains]
         total = sums[0] if len(sums) == 1 else f"({sums[0]}) + ({sums[1]})"
-        for name in late:
-            total = f"({total}) + {name}"
+        for k, minus in late:
+            total = f"({total}) {'-' if minus else '+'} {self.name(k)}"
         return total
+
+    def _chain(self, terms: Sequence[tuple[int, bool]]) -> str:
+        """A sum from left to right; it begins with a term that is added, if there is one."""
+        (first, minus), *rest = sorted(terms, key=lambda term: term[1] and terms[0][1])
+        text = f"(-{self.name(first)})" if minus else self.name(first)
+        for k, minus in rest:
+            text = f"({text}) {'-' if minus else '+'} {self.name(k)}"
+        return text
 
     def _reciprocal(self, j: int) -> str:
         if self.constant[j]:
@@ -289,7 +307,7 @@ class _Graph:
         node = self.nodes[j]
         if node.op == "add" and self.moving[j] and self._choice(node) is not None:
             return [a for half in node.args for a in self.nodes[half].args]
-        return self.sums.get(j, list(node.args))
+        return [k for k, _ in self.sums[j]] if j in self.sums else list(node.args)
 
     def _mask(self, j: int) -> tuple[str, bool]:
         node = self.nodes[j]

@@ -16,6 +16,7 @@ import numpy as np
 
 import nonsmooth as ns
 
+from .measure import ONE_THREAD
 from .problems import BELTS, STICK, STICK_START, stick_slip_system
 
 BELT, T_END = BELTS["many events"], 100.0
@@ -67,7 +68,8 @@ def _peer(python: str, script: str, steps: list[float]) -> dict[str, Any]:
     problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": steps}
     path = Path(__file__).with_name("peers") / f"{script}.py"
     call = [python, str(path), json.dumps(problem)]
-    done = subprocess.run(call, capture_output=True, text=True, check=False)
+    environment = os.environ | ONE_THREAD
+    done = subprocess.run(call, capture_output=True, text=True, check=False, env=environment)
     if done.returncode:
         return {"missing": f"failed: {done.stderr.strip()[-200:]}", "rows": []}
     found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])

@@ -19,6 +19,9 @@ from typing import Any
 import numpy as np
 
 ROOT = Path(__file__).parent.parent
+
+#: One thread for the linear algebra of peers: for small systems more of them only wait for each other.
+ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 Clock = Callable[[], float]
 
 

@@ -23,6 +23,8 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
+from .measure import ONE_THREAD
+
 Array = NDArray[np.float64]
 
 VARIABLE = "BENCH_SICONOS_PYTHON"
@@ -160,7 +162,8 @@ def theirs(
     asked = [(ride, step) for ride in rides for step in STEPS]
     script = Path(__file__).parent / "peers" / "siconos_plane.py"
     runs = json.dumps([ride.peer(step) for ride, step in asked])
-    done = subprocess.run([python, str(script), runs], capture_output=True, text=True)
+    call, environment = [python, str(script), runs], os.environ | ONE_THREAD
+    done = subprocess.run(call, capture_output=True, text=True, env=environment)
     answers = [json.loads(row) for row in done.stdout.splitlines() if row.startswith("{")]
     gone = dict(failure=f"the process ended with {done.returncode}: {done.stderr[-200:]}")
     answers += [gone] * (len(asked) - len(answers))

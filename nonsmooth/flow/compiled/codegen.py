@@ -31,7 +31,7 @@ from ..status import Status
 MOST_ORDER = 48
 
 #: The order to which that of linear systems is raised: beyond, longer steps lose digits to terms that cancel.
-_MOST_LINEAR = 24
+_MOST_LINEAR = 22
 
 #: The driver in C, in the order in which it is read: one text.
 _FILES = (
@@ -66,7 +66,7 @@ def tape_order(system: FilippovSystem, options: Options) -> int:
     """Order of the series of one trajectory: a third more where all is linear.
 
     Coefficients of a series without products cost the same each, so more of them share what a step costs.
-    At order 24 a step along exponentials loses some tens of roundings. Systems of several surfaces keep
+    At order 22 a step along exponentials loses some ten roundings. Systems of several surfaces keep
     theirs: most of their steps end at an event.
     """
     order = options.order

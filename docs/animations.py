@@ -45,7 +45,10 @@ def bounce_in_its_cone(count: int) -> Iterator[Figure]:
     turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
     shot = bounce.simulate(turf, xdot=0.3, ydot=-1.0, omega=0.1)
     trajectory = shot.trajectory
-    times = np.linspace(trajectory.t[0], trajectory.t[-1], count)
+    begin, end = trajectory.t[0], trajectory.t[-1]
+    times = np.linspace(
+        begin + 1e-3 * (end - begin), end, count
+    )  # forces act from the first picture on
     figure = Figure(figsize=(7.0, 3.5), layout="constrained")
     for t in times:
         figure.clear()
@@ -65,6 +68,7 @@ def _cone(axes: Axes, shot: bounce.Shot, t: float) -> None:
             axes.plot(forces.friction, forces.load, color=colour, linewidth=2)
             if t <= phase.t_end:
                 axes.plot(forces.friction[-1], forces.load[-1], "o", color=colour)
+    axes.text(0.0, 0.95, "friction cone", color="0.35", ha="center", va="center")
     axes.set(xlim=(-0.33, 0.33), ylim=(-0.05, 1.0), xlabel="friction", ylabel="load")
     modes = {"+": "slips forward", "-": "slips in reverse", "s": "rolls"}
     now = next((p.mode for p in shot.phases if t <= p.t_end), shot.phases[-1].mode)
@@ -105,7 +109,13 @@ def funnel(count: int) -> Iterator[Figure]:
                 order = 3 if departure.side == "s" else 2  # what leaves late slides until then
                 axes.plot(after, states[:, 0], color=colour, linewidth=0.9, zorder=order)
         axes.axvline(futures.t, color="0.7", linewidth=0.8)
-        axes.set(xlim=(0.0, futures.t + 1.0), ylim=(-0.5, 0.5))
+        axes.set(xlim=(0.0, futures.t + 1.0), ylim=(-0.65, 0.65))
+        for y, word, colour in (
+            (0.55, "leaves up", STYLE.ABOVE),
+            (-0.55, "leaves down", STYLE.BELOW),
+        ):
+            axes.text(0.05, y, word, color=colour, va="center")
+        axes.text(futures.t + 0.02, 0.55, "two-fold", color="0.35", va="center")
         axes.set(xlabel="time", ylabel="height over the surface")
         axes.set_title("one past" if t <= futures.t else "many futures")
         yield figure

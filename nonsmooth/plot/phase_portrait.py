@@ -345,10 +345,11 @@ def _together(special: list[Special], size: Array) -> dict[str, list[Array]]:
         names = near[0] if near else list[str]()
         if not near:
             groups.append((point, names))
-        names += [_name(found)] if _name(found) not in names else []
+        names.append(_name(found))
     together: dict[str, list[Array]] = {}
     for point, names in groups:
-        together.setdefault(",\n".join(names), []).append(point)
+        seen = [name if names.count(name) == 1 else f"two {name}s" for name in dict.fromkeys(names)]
+        together.setdefault(",\n".join(seen), []).append(point)
     return together
 
 

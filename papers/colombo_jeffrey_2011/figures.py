@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+import math
+from collections.abc import Callable, Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -22,16 +23,23 @@ from .model import BEND, CALM, CLASSES, RECURRENT, excursions, recurrent, slid_f
 _HIGH = 0.3  # of the highest arc of an excursion: lower ones have no arrow
 
 
-def _legend() -> list[Line2D | Patch]:
+def _legend(names: Sequence[str] = ()) -> list[Line2D | Patch]:
+    """What areas and lines are; hatches only where one of the named portraits has them."""
+    classes = [ns.two_folds.classify_two_fold(*CLASSES[name]) for name in names]
+    hatches = [
+        (any(f.canards == math.inf for f in classes), "////", "all pass $D_a$ to $D_r$"),
+        (any(f.faux_canards == math.inf for f in classes), "...", "all pass $D_r$ to $D_a$"),
+    ]
     return [
         Patch(facecolor=look.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
         Patch(facecolor=look.TINT_REPELLING, label="$D_r$: repelling sliding"),
         look.line(look.ABOVE, "orbits in $x > 0$, field $F_1$"),
         look.line(look.BELOW, "orbits in $x < 0$, field $F_2$", dashes=look.DASHED),
-        Patch(
-            facecolor="white", edgecolor=look.GREY, hatch="////", label="all pass $D_a$ to $D_r$"
+        *(
+            Patch(facecolor="white", edgecolor=look.GREY, hatch=hatch, label=text)
+            for seen, hatch, text in hatches
+            if seen
         ),
-        Patch(facecolor="white", edgecolor=look.GREY, hatch="...", label="all pass $D_r$ to $D_a$"),
     ]
 
 
@@ -46,9 +54,9 @@ def _portraits(names: tuple[str, ...]) -> Callable[[], Figure]:
                 ax.set(xlabel="$y$", ylabel="$z$")
             if len(names) % 2:
                 axes[-1].set_axis_off()
-                axes[-1].legend(handles=_legend(), loc="center")
+                axes[-1].legend(handles=_legend(names), loc="center")
             else:
-                figure.legend(handles=_legend(), loc="outside lower center", ncols=3)
+                figure.legend(handles=_legend(names), loc="outside lower center", ncols=3)
         return figure
 
     return draw
@@ -61,7 +69,8 @@ def space() -> Figure:
         figure = look.new_figure(7.0, 5.8)
         for ax, name in zip(figure.subplots(2, 2).ravel(), names, strict=True):
             ns.plot.two_fold_3d(CLASSES[name], ax=ax, legend=False, labels=True)
-        figure.legend(handles=_legend()[:4], loc="outside lower center", ncols=2)
+        shadows = look.line("#B5B5B5", "shadows of orbits above", 1.0)
+        figure.legend(handles=[*_legend(), shadows], loc="outside lower center", ncols=3)
     return figure
 
 

@@ -52,6 +52,7 @@ def space() -> Figure:
             look.line(look.BELOW, "orbits in $x < 0$, field $F_2$", dashes=look.DASHED),
             look.line(look.BLACK, "sliding, attracting", 0.9),
             look.line(look.REPELLING, "sliding, repelling", 0.9),
+            look.line("#B5B5B5", "shadows of orbits above", 1.0),
         ]
         key.set_axis_off()
         key.legend(handles=handles, loc="center")

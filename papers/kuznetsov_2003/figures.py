@@ -142,13 +142,15 @@ def cycles() -> Figure:
         look.arrowhead(ax, curve, 0.55, look.VERMILLION)
         ax.plot(FREE_FOLD, top, "D", color=look.VERMILLION, markersize=5)
         ax.axvline(FREE_FOLD, color=look.GREY, linewidth=0.7, linestyle=look.DOTS)
-        ax.set(xlabel="$x_1$", ylabel="$x_2$", xlim=(0, 1), ylim=(0, 2.6))
+        ax.text(FREE_FOLD + 0.02, top + 0.06, "visible fold, where the cycle grazes the threshold")
+        ax.text(FREE_FOLD + 0.01, 0.05, "folds of the free field")
+        ax.set(xlabel="$x_1$", ylabel="$x_2$", xlim=(0, 1), ylim=(0, 2.7))
         handles = [
             look.line(look.BLUE, "sliding cycle", 1.2),
             look.line(look.BLACK, "its sliding part", 3.0),
             look.line(look.VERMILLION, "cycle without harvest", 1.4, look.DASHED),
         ]
-        ax.legend(handles=handles, loc="upper right")
+        ax.legend(handles=handles, loc="upper right", bbox_to_anchor=(1.0, 0.93))
     return figure
 
 

@@ -158,3 +158,9 @@ def test_an_equilibrium_on_the_surface_has_the_name_that_it_has():
     ax = ns.plot.phase_portrait(harvest(0.80135528), (0.0, 1.2, 0.3, 1.5)).axes[0]
     named = {text.get_text() for text in ax.findobj(Text)}
     assert "boundary node" in named and "visible fold" not in named
+
+
+def test_two_folds_in_one_point_are_named_together():
+    fused = ns.FilippovSystem([x, y], surface=y, above=[1, -x - 0.1 * y], below=[-1, -x])
+    ax = ns.plot.phase_portrait(fused, (-1, 1, -1, 1)).axes[0]
+    assert "two invisible folds" in {text.get_text() for text in ax.findobj(Text)}

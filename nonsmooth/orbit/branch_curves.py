@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from ..model import Array, ConvergenceError, FilippovSystem, OptionError, explain
+from ..model import Array, ConvergenceError, FilippovSystem, NonsmoothError, OptionError, explain
 from .branch import Branch, BranchEnd, BranchEvent
 from .continuation import Arc, Curve, Departure, Point, Zero, pieces, trace
 
@@ -249,6 +249,8 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         except KeyboardInterrupt:
             half.end = BranchEnd.INTERRUPTED
             return None
+        except NonsmoothError:  # the itinerary beyond has no orbit that could be followed
+            return None
 
     whole = ("bound", "closed", "interrupted", "points")
     for departure, arc in pieces(
@@ -259,7 +261,8 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         points = arc.points[1:] if half.nodes else arc.points  # pieces share their ends
         half.nodes += [(at, point) for point in points]
         last = known[id(arc.zeros[-1])] if arc.zeros and arc.zeros[-1].name == arc.end else None
-        if last is not None and last.curve is not at and last.point is not None:
+        other = None if last is None or type(last.curve) is not type(at) else last.curve
+        if last is not None and other is not None and other is not at and last.point is not None:
             half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
         found = [known[id(zero)] for zero in arc.zeros]
         half.events += [event for event in found if event is not None]
@@ -268,7 +271,8 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
             last = at.ending(arc.points[-1].u, half.end)
             if last is not None:
                 half.events.append(last)
-                half.end = BranchEnd.PERIOD_DIVERGES
+                diverges = last.kind == "homoclinic"
+                half.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
     return half
 
 

@@ -60,7 +60,9 @@ def continue_orbit(
         doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
         point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
         ``"adding-sliding"``, ``"impact grazing"``, ``"grazing, escaping"``, ``"corner"``,
-        ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium.
+        ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
+        ``"boundary equilibrium"`` (with its class) or ``"two-fold"`` where others shrink to a point of a
+        surface.
 
     Raises
     ------

@@ -16,8 +16,9 @@ import numpy as np
 
 from ..local.newton import converge
 from ..local.read_only import ReadOnly
-from ..model import Array, NonsmoothError
+from ..model import Array, ConvergenceError, NonsmoothError
 from .boundary import BoundaryProblem
+from .boundary_ends import extent, surface_end
 from .branch import BranchEnd, BranchEvent, FarSide
 from .branch_curves import BranchCurve
 from .codimension_two import ENDS, degenerate
@@ -40,6 +41,13 @@ _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
 
 #: Relative growth of a long period, over a change of the parameter by its bounds, that diverges.
 _STEEP = 30.0
+
+#: An orbit that shrank to the first of these parts of its size where its itinerary ends, or to the second
+#: where it is lost, may be about to shrink to a point of a surface.
+_TINY, _SMALL = 1e-4, 1e-2
+
+#: A solution of a branch that takes less than this part of the guess is no orbit but a point.
+_COLLAPSED = 1e-6
 
 #: What names an event of which several conditions vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
@@ -115,6 +123,12 @@ class OrbitCurve(OrbitEquations):
         curve.restart(guess)
         found = BranchCurve.solution_at(curve, guess, value)
         assert isinstance(found, PeriodicOrbit)
+        durations = self.problem.split(guess[: self.problem.size])[1]
+        if found.evaluation.durations.sum() < _COLLAPSED * durations.sum():
+            raise ConvergenceError(
+                f"the branch at {value:.10g}: expected an orbit near its neighbours, received one that "
+                f"shrank to the point {found.start.tolist()}. Continue with a smaller step."
+            )
         p = found.parameter_vector
         return replace(found, faults=tuple(faults_of(found.problem, found.evaluation, p)))
 
@@ -131,11 +145,28 @@ class OrbitCurve(OrbitEquations):
         return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
-        """The homoclinic orbit where the period diverges, or would if rounding allowed it."""
+        """The point to which the orbit shrinks, or the homoclinic orbit where the period diverges, or would
+        if rounding allowed it."""
+        shrunk = self._shrunk(u, _SMALL)
+        if shrunk is not None:
+            return shrunk
         if end is not BranchEnd.PERIOD_DIVERGES and not self._steep(u):
             return None
         name = self.system.parameter_names[self.free[-1]]
         return homoclinic_end(self.describe(u), name, float(self.widths[-1]))
+
+    def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
+        """The point of a surface to which an orbit shrinks that is no larger than a part of the first one."""
+        if self.system.time_dependent or self.system.coupled or not self.system.surface_count:
+            return None
+        first = extent(
+            self.problem, self.begin[: self.problem.size], self.parameters_at(self.begin)
+        )
+        size = extent(self.problem, u[: self.problem.size], self.parameters_at(u))
+        if not size <= part * first:
+            return None
+        name = self.system.parameter_names[self.free[-1]]
+        return surface_end(self.describe(u), name, size, first)
 
     def faults(self, u: Array) -> list[str]:
         """What the guards contradict."""
@@ -179,6 +210,9 @@ class OrbitCurve(OrbitEquations):
         u = zero.point.u
         if is_smooth(zero.name):
             return self._smooth_event(zero)
+        shrunk = self._shrunk(u, _TINY)
+        if shrunk is not None:
+            return shrunk
         conditions = self._vanishing(zero)
         at, p = self.evaluation(u), self.parameters_at(u)
         kind = kind_of(self.problem, conditions[0], at, p)
@@ -285,8 +319,7 @@ class OrbitCurve(OrbitEquations):
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """The branch in the other itinerary."""
-        assert event.point is not None
-        if is_smooth(zero.name):
+        if is_smooth(zero.name) or event.point is None or not isinstance(event.curve, OrbitCurve):
             return None
         curve, u = event.curve, event.point.u
         if curve is not self:  # located on the side with fewer legs, which is ahead

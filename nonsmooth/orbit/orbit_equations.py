@@ -48,6 +48,7 @@ class OrbitEquations(BranchCurve):
         longest: float,
     ):
         self.problem, self.p, self.free, self.longest = problem, p, free, longest
+        self.begin = np.append(u[: problem.size], p[list(free)])
         self.system, self.widths = problem.system, widths
         self.scale = np.append(problem.scales(u, p), widths)
         self.known: dict[str, Condition] = {}

@@ -27,7 +27,7 @@ _ABOUT = 1.5
 _FALLING = 0.7
 
 #: Runs of fewer events are not asked whether they chatter.
-_MANY = 200
+_MANY = 1000
 
 
 def is_about(duration: float, about: float) -> bool:
@@ -207,9 +207,10 @@ def require_steady(run: Trajectory) -> None:
         return
     times = np.array([event.t for event in run.events])
     waits = np.diff(times)
-    part = len(waits) // 20
-    middle, last = (float(np.median(w)) for w in (waits[9 * part : 10 * part], waits[-part:]))
-    if last >= _FALLING * middle:
+    part = len(waits) // 10
+    parts = (waits[4 * part : 5 * part], waits[6 * part : 7 * part], waits[-part:])
+    middle, between, last = (float(w.mean()) for w in parts)  # legs of one orbit differ
+    if last >= _FALLING * middle or not last < between < middle:
         return
     raise ConvergenceError(
         f"guess: expected a run that comes back to where it was, received one that chatters: it ended "

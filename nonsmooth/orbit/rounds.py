@@ -36,11 +36,12 @@ def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
     if not problem.legs[-1].name:
         return _leg_once(problem, starts[0], float(durations[0]), p)
     size = problem.scales(u)[:n] if count > 1 else np.ones(n)
+    whole = float(np.abs(durations).sum()) or 1.0
     for k in range(1, count // 2 + 1):
         if count % k or (problem.symmetry is not None and count // k % 2 == 0):
             continue
         apart = starts[k : 2 * k, :n] @ problem.wrap[:n, :n].T - starts[:k, :n]
-        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / np.abs(durations).sum()
+        later = np.abs(durations[k : 2 * k] - durations[:k]).max() / whole
         if not max(np.abs(apart / size).max(), later) < _SAME:
             continue
         legs = problem.legs[:k]

@@ -41,7 +41,9 @@ def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> No
     rests = not problem.legs[-1].name and not problem.system.time_dependent
     shrunk = period <= _SHRUNK * guess and _singular(problem, at)
     if period > _POINT * guess and not shrunk:
-        if not (rests and way <= _STILL * max(1.0, np.abs(x).max())):
+        guessed = float(np.abs(start.problem.split(start.unknowns)[0][:, :n]).max())
+        size = max(min(1.0, guessed), float(np.abs(x).max()))
+        if not (rests and way <= _STILL * size):
             return
     raise ConvergenceError(
         f"periodic orbit: expected a period near {guess:.6g}, received {period:.2g}: Newton's method "

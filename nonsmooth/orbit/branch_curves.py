@@ -178,6 +178,7 @@ def follow_branch(
 
     forward = np.zeros(start.size)
     forward[-1] = 1.0
+    step = min(step, 1.0)  # a step is no longer than the bounds are wide
     options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
     ways = [Departure(curve, [start], sign * forward) for sign in (-1.0, 1.0)]
     halves = [] if away is None else [_Half()]
@@ -246,10 +247,10 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         assert isinstance(departure.curve, BranchCurve)
         try:
             return departure.curve.onward(event, arc.zeros[-1])
+        except NonsmoothError:  # the itinerary beyond has no orbit that could be followed
+            return None
         except KeyboardInterrupt:
             half.end = BranchEnd.INTERRUPTED
-            return None
-        except NonsmoothError:  # the itinerary beyond has no orbit that could be followed
             return None
 
     whole = ("bound", "closed", "interrupted", "points")
@@ -261,8 +262,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         points = arc.points[1:] if half.nodes else arc.points  # pieces share their ends
         half.nodes += [(at, point) for point in points]
         last = known[id(arc.zeros[-1])] if arc.zeros and arc.zeros[-1].name == arc.end else None
-        other = None if last is None or type(last.curve) is not type(at) else last.curve
-        if last is not None and other is not None and other is not at and last.point is not None:
+        if last is not None and last.point is not None and _elsewhere(last, at):
             half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
         found = [known[id(zero)] for zero in arc.zeros]
         half.events += [event for event in found if event is not None]
@@ -274,6 +274,11 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
                 diverges = last.kind == "homoclinic"
                 half.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
     return half
+
+
+def _elsewhere(event: BranchEvent, curve: BranchCurve) -> bool:
+    """Whether an event is a point of another curve of the same kind of solutions."""
+    return event.curve is not curve and type(event.curve) is type(curve)
 
 
 def _drop_turning(arc: Arc) -> None:

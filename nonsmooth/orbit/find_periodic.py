@@ -150,6 +150,19 @@ def periodic_orbit(
     return orbit
 
 
+#: Larger steps from an orbit of a family, relative to the orbit, are rounding that is magnified along it.
+_POLISH = 1e-3
+
+#: A guess that closes to a part e of its size is as near as this times sqrt(e) to its orbit.
+_FAR = 10.0
+
+#: Directions that equations say less of than the others, by these factors.
+_WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
+
+#: Equations that hold to this part of their size cannot be asked for more.
+_CLOSED = 1e-9
+
+
 class _Solver:
     """Newton's method on the equations of an orbit, with what it knows where it fails."""
 
@@ -204,11 +217,63 @@ class _Solver:
             )
         except (ConvergenceError, DegenerateError) as error:
             root, reason = None, str(error)
+            if not last:  # not even the guess can be followed: no shorter step helps
+                raise self._failure(reason) from error
+        before = list(last)
+        nearest = self._of_family(equations, u / scales, root, max_iterations)
+        last[:] = before
+        if nearest is not root and nearest is not None:
+            return self._polished(nearest * scales, _POLISH)
         if root is None:
             root = self._damped(equations, u / scales, 2 * max_iterations)
         if root is None:
             raise self._failure(reason)
         return self._polished(root * scales)
+
+    def _of_family(
+        self, equations: Equations, v: Array, root: Array | None, most: int
+    ) -> Array | None:
+        """The orbit near a guess that closes so well that Newton's method should not leave it."""
+        try:
+            values, jacobian = equations(v)
+            closes = float(np.abs(values / self._sizes(jacobian)).max())
+            far = _FAR * math.sqrt(closes)
+            if far > 1.0 or (root is not None and np.abs(root - v).max() <= far):
+                return root
+            found = self._nearest(equations, v, most, far)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return root
+        return root if found is None else found
+
+    def _nearest(self, equations: Equations, v: Array, most: int, far: float) -> Array | None:
+        """Newton's method that does not run along a family of orbits; None where it does not converge.
+
+        Where a step makes the residual larger, it is one along a direction that the residual does not
+        decide: less and less weak directions are left as they are.
+        """
+        start, (values, jacobian) = v, equations(v)
+        for _ in range(most):
+            sizes = self._sizes(jacobian)
+            now = float(np.abs(values / sizes).max())
+            less = math.inf
+            for weak in _WEAK:
+                step = np.linalg.lstsq(jacobian / sizes[:, None], values / sizes, rcond=weak)[0]
+                if not np.abs(v - step - start).max() <= far:
+                    continue
+                there = equations(v - step)
+                less = float(np.abs(there[0] / sizes).max())
+                if less < 0.5 * now:
+                    break
+            if not less < 0.5 * now:
+                return v if now <= _CLOSED else None
+            v, (values, jacobian) = v - step, there
+        return None
+
+    def _sizes(self, jacobian: Array) -> Array:
+        """Sizes of the equations: of the states that are to meet, and of the events by their derivatives."""
+        rows, n = np.linalg.norm(jacobian, axis=1), len(self.problem.legs) * self.problem.dimension
+        rows[:n] = np.maximum(rows[:n], self.problem.scales(self.last[0])[:n])
+        return np.where(rows > 0.0, rows, 1.0)
 
     def _damped(self, equations: Equations, v: Array, max_iterations: int) -> Array | None:
         """Newton's method with halved steps, from farther away."""
@@ -227,8 +292,8 @@ class _Solver:
             return None
         return found.x
 
-    def _polished(self, u: Array) -> tuple[Array, Evaluation]:
-        """Two more steps at most, as long as they shrink: to rounding."""
+    def _polished(self, u: Array, largest: float = math.inf) -> tuple[Array, Evaluation]:
+        """Two more steps at most, as long as they shrink and are not too large: to rounding."""
         at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
         for _ in range(2):
             exact = self.problem.exact_residual(u, self.p)
@@ -236,7 +301,7 @@ class _Solver:
             size = float(np.abs(step / scales).max())
             if exact is not None and size <= FINAL:  # the derivatives are those of the orbit
                 return self._moved(u, step, at, exact)
-            if size <= ROUNDING:
+            if size <= ROUNDING or size > largest:
                 break
             try:
                 there = self.problem.evaluate(u + step, self.p)

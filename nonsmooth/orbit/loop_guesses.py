@@ -10,7 +10,7 @@ import numpy as np
 from ..flow.simulate import simulate
 from ..flow.trajectory import Trajectory
 from ..local import Equilibrium, PseudoEquilibrium
-from ..local.equilibria import find_equilibrium
+from ..local.equilibria import find_equilibrium, kind_of
 from ..local.pseudo_equilibria import find_pseudo_equilibrium
 from ..model import (
     Array,
@@ -106,7 +106,7 @@ def saddle_at(
     mode, at = min(found, key=lambda pair: float(np.linalg.norm(pair[1].point - near)))
     if not _is_saddle(at):
         raise DegenerateError(
-            f"saddle: expected a real saddle or pseudo-saddle, received a {at}. Orbits leave it on no "
+            f"saddle: expected a real saddle or pseudo-saddle, received: {at} Orbits leave it on no "
             "side or come back on none: choose another point or parameter."
         )
     return mode, at
@@ -124,7 +124,8 @@ def _is_saddle(at: Equilibrium | PseudoEquilibrium) -> bool:
 def _smooth(system: FilippovSystem, at: Array, p: Array) -> Equilibrium:
     values = spectrum_of(system, "", at, p).values
     order = np.argsort(values.real)
-    return Equilibrium(at, "+", "real", "saddle", values[order], np.inf, 0.0, 0.0, 0.0, 0, "")
+    kind, margin = kind_of(values[order], float(np.abs(values).max()))
+    return Equilibrium(at, "+", "real", kind, values[order], np.inf, margin, 0.0, 0.0, 0, "")
 
 
 def departures(system: FilippovSystem, mode: str, x: Array, p: Array) -> Iterator[Departure]:

@@ -27,6 +27,10 @@ from .saltation import GRAZING, saltations
 _LOST = 1e-12
 
 
+#: States below this part of the way of a leg are zero.
+_AT_ZERO = 1e-9
+
+
 @dataclass(frozen=True, eq=False)
 class Multipliers:
     """Multipliers of the map of the legs, and how they follow.
@@ -134,9 +138,9 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
 
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
-    n, flight = problem.dimension, at.flight
+    flight = at.flight
     # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
-    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+    units = _units(problem, at)
     basis = _kept(problem, at, p, units)
     if has_interpreter():
         legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
@@ -146,6 +150,19 @@ def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
             return found
     monodromy(problem, at)  # DegenerateError where an event is grazed
     return _passed(problem, at, units, basis)
+
+
+def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Sizes of states and time; of states that are zero where all legs begin by how far these lead."""
+    n, own = problem.dimension, problem.system.dimension
+    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+    if problem.system.time_dependent:
+        ways = np.abs(at.flight.rate[: len(at.durations), :own] * at.durations[:, None]).max(
+            initial=0.0
+        )
+        if np.abs(at.starts[:, :own]).max() < _AT_ZERO * ways:
+            units[:own] = ways
+    return units
 
 
 def _passed(problem: BoundaryProblem, at: Evaluation, units: Array, basis: Array) -> Array:

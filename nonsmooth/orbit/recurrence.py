@@ -26,6 +26,12 @@ _ABOUT = 1.5
 #: Times between events that fall below this part of what they were at half of a run go on falling.
 _FALLING = 0.7
 
+#: What moves by no more than this part of a run rests.
+_REST = 1e-6
+
+#: A run that spends this part of its time after its last event may have come to an orbit without one.
+_QUIET = 0.75
+
 #: Runs of fewer events are not asked whether they chatter.
 _MANY = 1000
 
@@ -75,6 +81,11 @@ def recurrence(
         How long it takes (see ``is_about``).
     """
     parts = [part for part in stretches(run) if part.duration > 0.0]
+    if len(parts) > 1 and not parts[-1].leg.name:
+        if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
+            found = _without_events(run, parts[-1:], symmetry, period, first, about)
+            if found is not None and found.distance <= CLOSE and _moves(run, found.parts[0]):
+                return found
     closed = [k for k, part in enumerate(parts) if part.leg.name and part.leg.kind != "stop"]
     # legs between two events: start k is after the event that ends part k - 1
     starts = [k + 1 for k in closed if k + 1 < len(parts)]
@@ -95,6 +106,12 @@ def recurrence(
     i = min(good, key=lambda i: abs(others[i] - anchor))
     low, high = sorted((anchor, others[i]))
     return Recurrence(tuple(parts[low:high]), periods[i], distances[i])
+
+
+def _moves(run: Trajectory, part: Stretch) -> bool:
+    """Whether a run does not rest in a part of it."""
+    way = np.ptp(run(part.t + part.duration * np.linspace(0.0, 1.0, 9)), axis=0)
+    return bool(np.max(way) > _REST * np.ptp(run.x, axis=0).max())
 
 
 def _key(parts: Sequence[Stretch], k: int) -> tuple[str, str]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import casadi as ca
 import numpy as np
 import pytest
 
@@ -71,3 +72,17 @@ def test_multipliers_are_the_same_in_c_and_in_python(monkeypatch):
     assert compiled.zeros == plain.zeros
     np.testing.assert_allclose(compiled.of_map, plain.of_map, atol=1e-14)
     np.testing.assert_allclose(compiled.values, compiled.of_map**2, atol=1e-15)
+
+
+@pytest.mark.parametrize("second", [1e-12, 1e-11, 1e-3, 1e6, 1e12])
+def test_multipliers_do_not_depend_on_the_unit_of_time(second):
+    """All legs of a scalar relay begin at zero: what it moves by is the size of its state."""
+    x, t = ca.SX.sym("x"), ca.SX.sym("t")
+    drive = 2.5 * ca.cos(t / second)
+    relay = ns.FilippovSystem(
+        [x], surface=x, time=t, above=[(drive - 1) / second], below=[(drive + 1) / second]
+    )
+    orbit = ns.periodic_orbit(relay, [0.5])
+    c = 2.5 * np.sqrt(1 - (np.pi / 5) ** 2)
+    assert abs(orbit.multipliers[0] - ((c - 1) / (c + 1)) ** 2) < 1e-12
+    assert orbit.stability == "asymptotically stable"

@@ -254,3 +254,11 @@ def test_hits_of_a_section_are_asked_for_by_whole_numbers_and_times_by_numbers()
             hits.jacobian(**options)
     with pytest.raises(ns.OptionError, match="t_start: expected a finite number"):
         ns.poincare(system, 1.0, [0.5], count=3, t_start="a")
+
+
+@pytest.mark.parametrize("step", [2.0, 1e9])
+def test_steps_are_no_longer_than_the_bounds_are_wide(step) -> None:
+    orbit = ns.periodic_orbit(scalar_relay(), [0.5])
+    branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), step=step)
+    assert [event.kind for event in branch.events] == ["crossing-sliding"]
+    assert branch.events[0].parameter == pytest.approx((1 + ca.pi**2 / 4) ** 0.5, rel=1e-12)

@@ -4,6 +4,7 @@ say, and their branches are switched there."""
 import casadi as ca
 import numpy as np
 import pytest
+from scipy.special import ellipk
 
 import nonsmooth as ns
 from tests.orbit.periodic_cases import symbols
@@ -173,3 +174,52 @@ def test_lorenz_orbits_lose_their_symmetry_at_a_pitchfork():
     orbit = split[151.0]
     assert abs(orbit.period / half.period - 1) < 0.1
     assert np.abs(orbit.trajectory.x.mean(axis=0)[:2]).max() > 1e-2
+
+
+@pytest.mark.parametrize("start", [[1.0, 0.0], [0.3, -0.4], [-2.0, 0.0]])
+def test_each_orbit_of_a_centre_is_found_where_it_is(start):
+    """Newton's method knows not which one of the family is meant; the guess does."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    centre = ns.FilippovSystem([x, y], field=[2 * y, -2 * x])
+    orbit = ns.periodic_orbit(centre, start)
+    assert abs(orbit.period - np.pi) < 1e-10
+    assert np.hypot(*orbit.start) == pytest.approx(np.hypot(*start), rel=1e-8)
+    assert "neutral" in orbit.stability
+
+
+@pytest.mark.parametrize("start", [[0.1, 0.0], [1.0, 0.5], [2.0, 0.5], [3.0, 0.0]])
+def test_a_pendulum_has_the_period_of_the_elliptic_integral(start):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    pendulum = ns.FilippovSystem([x, y], field=[y, -ca.sin(x)])
+    for guess in (start, ns.simulate(pendulum, start, 40.0)):
+        orbit = ns.periodic_orbit(pendulum, guess)
+        modulus = np.sin(start[0] / 2) ** 2 + start[1] ** 2 / 4
+        assert orbit.period == pytest.approx(4 * ellipk(modulus), rel=1e-7)
+        energy = orbit.start[1] ** 2 / 2 - np.cos(orbit.start[0])
+        assert energy == pytest.approx(start[1] ** 2 / 2 - np.cos(start[0]), rel=1e-7)
+
+
+def test_an_orbit_without_events_is_found_behind_a_transient_with_some():
+    """Friction on a belt stops acting when the block oscillates more slowly than the belt runs."""
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    pull = 0.04 - (x - 0.4) ** 2 - y**2  # a circle of radius 0.2, which attracts
+    field = [y + (x - 0.4) * pull, -x + y * pull]
+    belt = ns.FilippovSystem(
+        [x, y], surface=y - 0.3, above=[field[0], field[1] - 0.4], below=[field[0], field[1] + 0.4]
+    )
+    run = ns.simulate(belt, [1.0, -0.2], 2000.0)
+    assert len(run.events) > 2
+    for guess in (run, [1.0, -0.2]):
+        orbit = ns.periodic_orbit(belt, guess)
+        assert orbit.itinerary == "-" and orbit.period == pytest.approx(2 * np.pi, rel=1e-12)
+        assert orbit.multipliers[1].real == pytest.approx(np.exp(-0.16 * np.pi), rel=1e-10)
+
+
+@pytest.mark.parametrize("size", [1e-10, 1e-5, 1e10])
+def test_an_orbit_is_no_point_because_its_states_are_small(size):
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    circle = lambda s: (1 - (x / s) ** 2 - (y / s) ** 2) / 10
+    system = ns.FilippovSystem([x, y], field=[y + x * circle(size), -x + y * circle(size)])
+    orbit = ns.periodic_orbit(system, [1.1 * size, 0.0])
+    assert np.hypot(*orbit.start) == pytest.approx(size, rel=1e-9)
+    assert orbit.multipliers[1].real == pytest.approx(np.exp(-0.4 * np.pi), rel=1e-8)

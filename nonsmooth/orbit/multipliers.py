@@ -161,7 +161,7 @@ def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
             initial=0.0
         )
         if np.abs(at.starts[:, :own]).max() < _AT_ZERO * ways:
-            units[:own] = ways
+            units[:own] = np.maximum(units[:own], ways)
     return units
 
 

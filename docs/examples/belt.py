@@ -41,7 +41,7 @@ ax = figure.subplots()
 for nu, cloud in zip(values, clouds, strict=True):
     ax.plot(np.full(len(cloud), nu), cloud, **ns.plot.style.CLOUD)
 ns.plot.branch(branch, against=start, ax=ax, legend=False)
-ax.set(xlabel="forcing frequency nu", ylabel="displacement u every four periods")
+ax.set(xlabel="forcing frequency ν", ylabel="displacement u every four periods")
 ax.set(xlim=(float(values[0]), float(branch.values.max())))
 ax.annotate(
     "grazing-sliding", (touch.parameter, start(touch.orbit)), (8, 2), textcoords="offset points"

@@ -25,7 +25,7 @@ for name, ax in panels.items():
         ax=ax,
         legend=name == "saddle and node",
         labels=True,
-        title=f"{name}, alpha = {values[name]:.4f}",
+        title=f"{name}, α = {values[name]:.4f}",
     )
 
 legend = panels["saddle and node"].get_legend()

@@ -309,7 +309,7 @@ def check(name, count):
 
 @pytest.mark.parametrize("name", CLASSES)
 def test_every_random_system_of_a_class_is_named(name):
-    check(name, 100)
+    check(name, 30)
 
 
 @pytest.mark.slow
@@ -318,11 +318,12 @@ def test_every_one_of_a_thousand_is_named(name):
     check(name, 1000)
 
 
+@pytest.mark.parametrize("count", [30, pytest.param(100, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "kind", ["stable node", "unstable node", "stable focus", "unstable focus", "saddle"]
 )
-def test_equilibria_off_the_surface(kind):
-    for seed in range(100):
+def test_equilibria_off_the_surface(kind, count):
+    for seed in range(count):
         d = Draw([seed, 999])
         expected = equilibrium(d, kind)
         found = d.classify(at=(0.0, 0.05))

@@ -138,4 +138,4 @@ def _legend(axes: Any, several: list[Manifold]) -> None:
     handles.append(
         style.marker("X", "its point" if len(several) == 1 else "their points", size=5.0)
     )
-    axes.legend(handles=handles, loc="upper left")
+    axes.legend(handles=handles, loc="upper left" if axes.name == "3d" else "best")

@@ -49,6 +49,9 @@ _TINY, _SMALL = 1e-4, 1e-2
 #: A solution of a branch that takes less than this part of the guess is no orbit but a point.
 _COLLAPSED = 1e-6
 
+#: Share of the way to an event at which the orbits before it are looked at.
+_JUST = 0.99
+
 #: What names an event of which several conditions vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 
@@ -88,6 +91,26 @@ class OrbitCurve(OrbitEquations):
         """As by name; and where doubled orbits become one, as beyond are the same, a round later."""
         doubled = zero.name == "branch point" and as_doubling(self, zero) is not None
         return doubled or self.ends(zero.name)
+
+    def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
+        """Whether an extremum of a guard was born in a step and has passed zero already.
+
+        Then either no motion is left at the end of the step, or none just before another event in it.
+        """
+        born = new.tests.keys() - last.tests.keys()
+        if any(new.tests[k] < 0.0 and self._inside(k) for k in born) and ending is None:
+            return True
+        if ending is None or is_smooth(ending.name) or self.faults(last.u):
+            return False
+        step = (ending.point.u - last.u) / self.scale
+        length = float(np.linalg.norm(step))
+        if not length > 0.0:
+            return False
+        just = self.correct(last.u + _JUST * step * self.scale, step / length)
+        return just is not None and bool(self.faults(just))
+
+    def _inside(self, test: str) -> bool:
+        return test in self.known and self.known[test].what == "interior"
 
     def singular(self, name: str) -> bool:
         """At a Hopf point the equations hold for the equilibrium with any duration."""

@@ -358,3 +358,47 @@ def test_through_is_a_truth_value():
     half = ns.periodic_orbit(scalar_relay(), [0.5])
     with pytest.raises(ns.OptionError, match="through: expected True or False, received 'no'"):
         ns.continue_orbit(half, "A", bounds=(1.0, 4.0), through="no")
+
+
+def test_adding_sliding_is_where_it_is_from_the_singular_side_too():
+    """Points across a step that are far from it are other orbits: they once put the event at A = 117."""
+    x, t, A, k = (ca.SX.sym(s) for s in ("x", "t", "A", "k"))
+    drive = A * ca.cos(t)
+    relay = ns.FilippovSystem(
+        [x], surface=x, above=[drive - k], below=[drive + k], parameters={A: 2.5, k: 1}, time=t
+    )
+    branch = ns.continue_orbit(ns.periodic_orbit(relay, [-1.3]), "A", bounds=(0.8, 2.6))
+    found = {event.kind: event.parameter for event in branch.events}
+    assert found == pytest.approx(
+        {"adding-sliding": 1.0, "crossing-sliding": np.hypot(1.0, np.pi / 2)}, rel=1e-12
+    )
+    assert branch.values.min() == 0.8 and branch.values.max() == 2.6
+
+
+def test_no_event_hides_behind_another_in_a_long_step():
+    """A turn of the speed is born inside the flight and touches zero before the flight's start does."""
+    x, v, t, f = (ca.SX.sym(s) for s in ("x", "v", "t", "f"))
+    pull = ca.cos(0.45 * t) - x
+    friction = ns.FilippovSystem(
+        [x, v], surface=v, above=[v, pull - f], below=[v, pull + f], parameters={f: 0.15}, time=t
+    )
+    orbit = ns.periodic_orbit(friction, [1.3, 0.0], symmetry="odd")
+    branch = ns.continue_orbit(orbit, "f", bounds=(0.05, 0.5))
+    assert kinds(branch) == ["grazing-sliding", "switching-sliding"]
+    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert not any(one.is_virtual for one in branch.orbits)
+    # the speed along the flight in closed form: x = c + a cos(t - s) + b cos(0.45 t)
+    leg, b = branch.events[0].orbit.legs[0], 1 / (1 - 0.45**2)
+    (x0, v0), s = leg.start[:2], leg.t
+    level = -branch.events[0].parameter if leg.mode == "+" else branch.events[0].parameter
+    first = x0 - level - b * np.cos(0.45 * s)
+    second = v0 + 0.45 * b * np.sin(0.45 * s)
+    time = np.linspace(0.2, 1.5, 200_001)
+    speed = second * np.cos(time) - first * np.sin(time)
+    speed -= 0.45 * b * np.sin(0.45 * (time + s))
+    assert abs((speed if leg.mode == "-" else -speed).max()) < 1e-11
+    run = ns.simulate(friction, [1.3, 0.0], 2000.0, parameters={"f": 0.3})
+    found = ns.periodic_orbit(friction, run)
+    assert [leg.duration for leg in branch[0.3].legs] == pytest.approx(
+        [leg.duration for leg in found.legs], abs=1e-10
+    )

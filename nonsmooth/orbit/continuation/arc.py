@@ -20,6 +20,8 @@ from .zeros import Zero, zeros_between
 #: Steps turn by no more than this, and grow where they turn by less than a third of it; rad.
 BEND = 0.3
 _ROWS = 6  # points of the predictor
+#: Steps are not shortened below this share of the largest to see what they hide.
+_SEEN = 1e-5
 
 
 @dataclass(eq=False)
@@ -182,6 +184,10 @@ class _Tracing:
         if bound is not None:
             new, self.arc.end = bound, "bound"
             found = [zero for zero in found if zero.point.arclength <= new.arclength]
+        ending = next((zero for zero in found if self.curve.ends_at(zero)), None)
+        if self.size > _SEEN * self.step and self.curve.passed(last, new, ending):
+            self.size *= 0.3
+            return
         for zero in found:
             self.arc.zeros.append(zero)
             if self.curve.ends_at(zero):

@@ -145,6 +145,18 @@ class Curve:
         """
         return self.ends(zero.name)
 
+    def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
+        """Whether a step hides something that ends the curve; then shorter ones are taken.
+
+        Parameters
+        ----------
+        last, new : Point
+            The ends of the step.
+        ending : Zero or None
+            The first zero in the step of a test that ends the curve.
+        """
+        return False
+
     def singular(self, name: str) -> bool:
         """Whether the equations are singular at a zero of a test, so that it is interpolated.
 

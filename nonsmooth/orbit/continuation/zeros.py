@@ -142,10 +142,13 @@ class _Segment:
     def at(self, weight: float) -> Point | None:
         """The point of the curve across the chord at a fraction of it."""
         if weight not in self.known:
-            u = self.curve.correct(self.guess(weight), self.chord / self.length)
+            guess = self.guess(weight)
+            u = self.curve.correct(guess, self.chord / self.length)
+            # across the chord other solutions are far away
+            astray = u is not None and np.abs((u - guess) / self.curve.scale).max() > self.length
             self.known[weight] = (
                 None
-                if u is None
+                if u is None or astray
                 else self.curve.point(
                     u,
                     self.a.tangent,

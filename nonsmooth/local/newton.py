@@ -18,7 +18,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..model import Array, ConvergenceError, OptionError, PointError
+from ..model import Array, ConvergenceError, DefinitionError, OptionError, PointError, real_array
 from .checks import positive
 
 Equations = Callable[[Array], tuple[Array, Array]]
@@ -280,6 +280,12 @@ def converge(
     >>> converge(lambda x: (x**2 - 9.0, np.diag(2 * x)), np.array([2.0])).tolist()
     [3.0]
     """
+    if not callable(equations):
+        raise DefinitionError(
+            f"equations: expected a function of the unknowns, received {equations!r}. It returns values "
+            "and Jacobian; a Secant makes one of values alone."
+        )
+    start = real_array(start, "start")
     carried = isinstance(equations, Secant) and equations.jacobian is not None
     root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
     if root is None and carried and isinstance(equations, Secant) and equations.forget():

@@ -1,6 +1,7 @@
 """What cannot be a periodic orbit is refused with the leg, what happened and what to try."""
 
 import casadi as ca
+import numpy as np
 import pytest
 
 import nonsmooth as ns
@@ -262,3 +263,70 @@ def test_steps_are_no_longer_than_the_bounds_are_wide(step) -> None:
     branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), step=step)
     assert [event.kind for event in branch.events] == ["crossing-sliding"]
     assert branch.events[0].parameter == pytest.approx((1 + ca.pi**2 / 4) ** 0.5, rel=1e-12)
+
+
+class Circle(ns.continuation.Curve):
+    """The unit circle."""
+
+    def equations(self, u):
+        return np.array([u @ u - 1.0]), 2 * u[None, :]
+
+
+def curve(**given):
+    return type("Mine", (Circle,), given)()
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"curve": None}, ns.DefinitionError, "curve: expected an instance of a subclass"),
+        ({"curve": Circle}, ns.DefinitionError, "curve: expected an instance of a subclass"),
+        ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "one with equations"),
+        ({"curve": curve(equations=lambda self, u: None)}, ns.DefinitionError, "expected arrays"),
+        ({"curve": curve(equations=lambda self, u: u @ u)}, ns.DefinitionError, "expected arrays"),
+        (
+            {"curve": curve(equations=lambda self, u: (u, np.eye(2)))},
+            ns.DefinitionError,
+            r"expected arrays \(1,\) and \(1, 2\) for 2 unknowns",
+        ),
+        ({"curve": curve(parameter=7)}, ns.DefinitionError, "curve.parameter: expected the index"),
+        ({"curve": curve(scale=np.array([1.0, 0.0]))}, ns.DefinitionError, "curve.scale: expected"),
+        ({"rows": []}, ns.PointError, "rows: expected a list of points"),
+        ({"rows": None}, ns.PointError, "rows: expected a list of points"),
+        ({"rows": ["ab"]}, ns.PointError, "rows"),
+        ({"rows": [[1.0, 0.0], [1.0]]}, ns.PointError, r"rows\[0\]: expected a vector \(1,\)"),
+        ({"rows": [[float("nan"), 0.0]]}, ns.PointError, "of finite numbers"),
+        ({"tangent": [1.0]}, ns.PointError, r"tangent: expected a vector \(2,\)"),
+        ({"tangent": [0.0, 0.0]}, ns.PointError, "tangent: expected a direction, received zero"),
+        ({"step": 0.0}, ns.OptionError, "step: expected a positive"),
+        ({"step": float("nan")}, ns.OptionError, "step: expected a positive"),
+        ({"step": "a"}, ns.OptionError, "step: expected a positive"),
+        ({"first": -1.0}, ns.OptionError, "first: expected a positive"),
+        ({"most": 0}, ns.OptionError, "most: expected a positive whole number"),
+        ({"bounds": 3}, ns.OptionError, "bounds: expected entries"),
+        ({"bounds": [(5, 0, 1)]}, ns.OptionError, "bounds: expected entries"),
+        ({"bounds": [(0, 2, 1)]}, ns.OptionError, "bounds: expected entries"),
+        ({"bounds": [(0, float("nan"), 1)]}, ns.OptionError, "bounds: expected entries"),
+        ({"report": 3}, ns.OptionError, "report: expected a function"),
+    ],
+)
+def test_a_curve_of_ones_own_that_is_none_is_refused(change, error, message) -> None:
+    given = {"curve": Circle(), "rows": [[1.0, 0.0]], "tangent": [0.0, 1.0], "step": 0.2} | change
+    with pytest.raises(error, match=message):
+        ns.continuation.trace(given.pop("curve"), given.pop("rows"), given.pop("tangent"), **given)
+
+
+def test_parts_of_curves_that_are_none_are_refused() -> None:
+    c, u = ns.continuation, np.array([1.0, 0.0])
+    for call, error in [
+        (lambda: c.directions(None, u), ns.DefinitionError),
+        (lambda: c.directions(Circle(), None), ns.PointError),
+        (lambda: c.depart(None, u, u, 0.1, u), ns.DefinitionError),
+        (lambda: c.other_direction(None), ns.DefinitionError),
+        (lambda: c.ahead([], 0.1, u), ns.PointError),
+        (lambda: list(c.pieces(None, None, None, last=None)), ns.DefinitionError),
+        (lambda: c.converge(None, u), ns.DefinitionError),
+        (lambda: c.converge(lambda v: (v, np.eye(2)), "a"), ns.PointError),
+    ]:
+        with pytest.raises(error, match="expected"):
+            call()

@@ -13,7 +13,8 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...model import Array
+from ...model import Array, PointError
+from .checks import check_trace
 from .curve import Curve, Point
 from .zeros import Zero, zeros_between
 
@@ -88,7 +89,18 @@ def trace(
     -------
     Arc
         The arc, with why it ended.
+
+    Raises
+    ------
+    DefinitionError
+        What is no :class:`Curve`, or one whose equations do not fit its unknowns.
+    PointError
+        No points, or vectors of a wrong length or not finite.
+    OptionError
+        A step, a count or bounds out of their range.
     """
+    lengths = {"step": step, "smallest": smallest, **({} if first is None else {"first": first})}
+    rows, tangent = check_trace(curve, rows, tangent, lengths, most, bounds, report)
     arc = Arc()
     tracing = _Tracing(curve, arc, step, smallest, bounds)
     try:
@@ -257,6 +269,8 @@ def ahead(rows: Sequence[Array], size: float, tangent: Array) -> Array:
     >>> ahead(parabola, 0.2, np.array([1.0, 0.0])).round(12).tolist()
     [1.2, 0.0]
     """
+    if not len(rows):
+        raise PointError("rows: expected at least one point, received none.")
     last = np.array(rows)
     if len(last) < 3:
         return np.asarray(last[-1] + size * tangent)

@@ -7,8 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model import Array
+from ...model import Array, DefinitionError
 from .arc import Arc
+from .checks import require_curve, vector
 from .curve import Curve, Point
 
 
@@ -62,6 +63,9 @@ def pieces(
     Departure, Arc
         A start, and the arc that was followed from it.
     """
+    for name, value in (("follow", follow), ("following", following), ("last", last)):
+        if not callable(value):
+            raise DefinitionError(f"{name}: expected a function, received {value!r}.")
     ends: list[Array] = []
     for _ in range(most):
         arc = follow(departure)
@@ -95,6 +99,8 @@ def depart(
     forward : ndarray (N,)
         How the point was reached.
     """
+    require_curve(curve)
+    u, direction = vector(u, "u"), vector(direction, "direction")
     found = curve.correct(u + distance * direction * curve.scale, direction)
     if found is None or curve.fault(found):
         return None
@@ -118,7 +124,8 @@ def directions(curve: Curve, u: Array) -> list[Array]:
     list of two ndarray (N,)
         Unit vectors in scaled unknowns.
     """
-    _, jacobian = curve.scaled(u / curve.scale)
+    require_curve(curve)
+    _, jacobian = curve.scaled(vector(u, "u") / curve.scale)
     tangent = np.linalg.svd(jacobian)[2][-1]
     return [tangent, -tangent]
 
@@ -139,6 +146,10 @@ def other_direction(point: Point) -> Array:
     ndarray (N,)
         A unit vector in scaled unknowns.
     """
+    if not isinstance(point, Point):
+        raise DefinitionError(
+            f"point: expected a nonsmooth.continuation.Point, received {point!r}. A Zero has one."
+        )
     null = np.linalg.svd(point.jacobian)[2][-2:]
     inside = null @ point.tangent
     across = inside[0] * null[1] - inside[1] * null[0]

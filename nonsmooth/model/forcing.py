@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from functools import cached_property
+from typing import Any
 
 import casadi as ca
 import numpy as np
@@ -38,7 +39,7 @@ class Forcing:
     """
 
     def __init__(self, system: FilippovSystem, period: ca.SX | float, found: bool = False):
-        self.found = found
+        self.found, self._system = found, system
         if not is_real(period) and read_period(system, period) is None:
             raise OptionError(
                 explain(
@@ -56,6 +57,11 @@ class Forcing:
         self._inputs = [ca.SX(0, 1), p]
         self._function = Evaluator(ca.Function("period", self._inputs, self._outputs))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled with its system, as a function of the parameters."""
+        function = ca.Function("period", [self._system.parameter_symbols], [self.expression])
+        return _restored, (self._system, function.serialize(), self.found)
+
     @cached_property
     def values(self) -> Values:
         """The period and its derivatives as a graph."""
@@ -65,6 +71,11 @@ class Forcing:
         """The period, and its derivatives by all parameters."""
         value, slope = self._function.copied(np.zeros(0), p)
         return float(value[0, 0]), slope[0]
+
+
+def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:
+    period = ca.Function.deserialize(text)
+    return Forcing(system, period(system.parameter_symbols), found)
 
 
 def frequencies(system: FilippovSystem) -> list[ca.SX]:

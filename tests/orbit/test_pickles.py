@@ -78,3 +78,20 @@ def test_a_copy_says_and_computes_the_same(kind):
     for again in (pickle.loads(pickle.dumps(result)), copy.deepcopy(result)):
         assert np.array_equal(question(again), question(result))
         assert repr(again) == repr(result) or kind == "FixedItinerary"
+
+
+def test_an_orbit_of_a_forced_system_takes_its_period_along():
+    """The period is an expression in the parameters of a system that is another object afterwards."""
+    t, w = ca.SX.sym("t"), ca.SX.sym("w")
+    drive = 2.5 * ca.cos(w * t)
+    relay = ns.FilippovSystem(
+        [x], surface=x, above=[drive - 1], below=[drive + 1], time=t, parameters={w: 1.0}
+    )
+    for period in (None, 2 * np.pi / w):
+        orbit = ns.periodic_orbit(relay, [0.5], period=period)
+        for again in (pickle.loads(pickle.dumps(orbit)), copy.deepcopy(orbit)):
+            assert np.array_equal(again.multipliers, orbit.multipliers)
+            faster = ns.periodic_orbit(again.system, again, parameters={"w": 1.2})
+            assert faster.period == pytest.approx(2 * np.pi / 1.2)
+        branch = ns.continue_orbit(orbit, "w", bounds=(0.8, 1.2))
+        assert len(pickle.loads(pickle.dumps(branch))) == len(branch)

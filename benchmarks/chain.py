@@ -31,7 +31,7 @@ from .measure import ONE_THREAD
 K, V, B = 0.1, 0.3, 0.1
 VARIABLE = "BENCH_SICONOS_PYTHON"
 STEPS = (1e-2, 5e-3)
-T_END = 10.0  # of ``python -m benchmarks``; Siconos takes 30 s for 1,000 steps of 100 blocks
+BLOCKS = 40  # of ``python -m benchmarks``; 100 take Siconos more than a quarter of an hour
 TOLERANCE = 1e-10
 
 
@@ -104,14 +104,14 @@ def siconos(python: str, count: int, t_end: float, steps: list[float]) -> dict[s
 
 def run(
     quick: bool,
-    count: int = 100,
-    t_end: float = T_END,
+    count: int = BLOCKS,
+    t_end: float = 100.0,
     engine: str = "auto",
     steps: Sequence[float] = STEPS,
 ) -> dict[str, Any]:
     """Errors at t_end and processor seconds of both, for the steps of Siconos and our tolerance."""
     if quick:
-        count = min(count, 5)
+        count, t_end = min(count, 5), min(t_end, 20.0)
     truth, _ = ours(count, t_end, 1e-3 * TOLERANCE, engine)
     found, seconds = ours(count, t_end, TOLERANCE, engine)
     error = float(np.abs(found.x[-1] - truth.x[-1]).max())

@@ -188,7 +188,21 @@
     const most = Math.max(...points.map((p) => Math.abs(p.slip)));
     if (all.length < 2 || mode === "s" || most > 0.06 * range || most === 0) return [];
     const { left, top, width, height } = slip.box;
-    const box = { x: left + 0.5 * width, y: top + 34, width: 0.46 * width, height: 0.36 * height };
+    const words = ["the end,", `slip to ${text(points.at(-1).slip, 2)}`];
+    const lines = width < 420 ? words : [words.join(" ")]; // on a phone one line reaches over the curve
+    const tall = 0.36 * height + 16 * lines.length;
+    const places = [top + 34, top + height - tall - 12].map((y) => ({
+      x: left + 0.5 * width,
+      y,
+      width: 0.46 * width,
+      height: 0.36 * height,
+    }));
+    const covers = ({ x, y }) =>
+      all
+        .flatMap((phase) => phase.points)
+        .map((p) => slip.at([p.t, p.slip]))
+        .filter((q) => q[0] > x - 8 && q[1] > y - 8 && q[1] < y + tall + 8).length;
+    const box = covers(places[0]) > covers(places[1]) ? places[1] : places[0];
     const [start, end] = [points[0].t, points.at(-1).t];
     const at = (p) => [
       box.x + box.width * (0.08 + (0.84 * (p.t - start)) / (end - start || 1)),
@@ -199,13 +213,12 @@
         .map((v) => v.toFixed(1))
         .join(" "),
     );
-    const words = `the end, slip to ${text(points.at(-1).slip, 2)}`;
-    const below = {
+    const below = (k) => ({
       x: box.x + box.width,
-      y: box.y + box.height + 15,
+      y: box.y + box.height + 15 + 15 * k,
       "text-anchor": "end",
       class: "halo",
-    };
+    });
     return [
       svg("rect", { ...box, class: "inset" }),
       svg("path", { d: `M${box.x} ${box.y + box.height / 2}h${box.width}`, class: "zero" }),
@@ -214,7 +227,7 @@
         fill: "none",
         class: `phase end phase-${NAMES[mode]}`,
       }),
-      svg("text", below, words),
+      ...lines.map((line, k) => svg("text", below(k), line)),
     ];
   }
 
@@ -260,7 +273,7 @@
       `It lands with slip ${text(state.xdot + state.omega)}; ${[...turns, `lift-off at t = ${text(time)}`].join("; ")}.`;
     byId("cone-text").textContent =
       "In slip the friction lies on an edge of the cone, in rolling inside it. Dot: touch-down; " +
-      "squares: changes; diamond: lift-off.";
+      "squares: changes; diamond: lift-off. Along a thin line friction jumps.";
   }
 
   function coneKey(shot) {

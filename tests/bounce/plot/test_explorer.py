@@ -262,6 +262,35 @@ def test_names_of_regions_are_not_cut_by_the_frame(browser, page, width):
     assert browser.run(INSIDE) == []
 
 
+COVERED = """
+const words = [...document.querySelectorAll("#slip .halo, #slip .inset")];
+const met = [];
+for (const word of words) {
+  const box = word.getBoundingClientRect();
+  for (const path of document.querySelectorAll("#slip .phase:not(.end)")) {
+    const m = path.getScreenCTM(), length = path.getTotalLength();
+    for (let k = 0; k <= 400; k++) {
+      const p = path.getPointAtLength((length * k) / 400).matrixTransform(m);
+      if (p.x > box.left && p.x < box.right && p.y > box.top && p.y < box.bottom) {
+        met.push(word.textContent || word.tagName);
+        break;
+      }
+    }
+  }
+}
+return [words.length, met];
+"""
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("width", WIDTHS)
+@pytest.mark.parametrize("sign", [1, -1])
+def test_the_enlarged_end_lies_on_no_curve(browser, page, width, sign):
+    browser.open(page, width, hash=f"xdot={0.6 * sign}&omega={0.9 * sign}")
+    count, met = browser.run(COVERED)
+    assert count >= 2 and met == []
+
+
 @pytest.mark.browser
 def test_keys_and_fields_move_everything(browser, page):
     from selenium.webdriver.common.by import By

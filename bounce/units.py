@@ -39,6 +39,9 @@ UNITS: dict[str, dict[str, float]] = {
     "time": {"s": 1.0},
 }
 
+#: For ``str.translate``: the minus sign of typeset numbers, as they are copied from a page.
+MINUS = {0x2212: "-"}
+
 _RPM = UNITS["spin"]["rpm"]
 
 

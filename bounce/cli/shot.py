@@ -171,7 +171,7 @@ def run_lines(rest: Run, units: Units) -> list[str]:
     count = len(rest.bounces)
     outside = f" ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else ""
     return [
-        f"run       {units.say('length', rest.run_out)} in {rest.time:.2f} s: {count} bounces{outside}, "
+        f"run       {units.say('length', rest.run_out)} in {rest.time:.2f} s: {count} bounce{'' if count == 1 else 's'}{outside}, "
         f"the first {units.say('height', rest.first_height)} high, over "
         f"{units.say('length', rest.bounced)}; rolls {units.say('length', rest.rolled)}"
     ]

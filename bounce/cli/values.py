@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..units import UNITS
+from ..units import MINUS, UNITS
 
 #: What each system says for the kinds of quantities: of numbers without a unit, and of the output.
 SYSTEMS: dict[str, dict[str, str]] = {
@@ -92,11 +92,13 @@ def quantity(kind: str) -> Callable[[str], Quantity]:
     units = ", ".join(UNITS[kind])
 
     def read(text: str) -> Quantity:
-        found = _NUMBER.fullmatch(text)
-        if found is None or (found[2] is not None and found[2] not in UNITS[kind]):
+        found = _NUMBER.fullmatch(text.translate(MINUS))
+        unit = None if found is None or found[2] is None else found[2].replace("°", "deg")
+        if found is None or (unit is not None and unit not in UNITS[kind]):
             example = f"1{next(iter(UNITS[kind]))}"
-            fail(text, f"a {kind} such as 1 or {example} (units: {units})")
-        return Quantity(number(found[1]), found[2], kind)
+            article = "an" if kind[0] in "aeiou" else "a"
+            fail(text, f"{article} {kind} such as 1 or {example} (units: {units})")
+        return Quantity(number(found[1]), unit, kind)
 
     read.__name__ = kind  # what argparse calls it where the number is not finite
     return read
@@ -105,7 +107,7 @@ def quantity(kind: str) -> Callable[[str], Quantity]:
 def assignment(text: str) -> tuple[str, Quantity]:
     """Read NAME=VALUE, the value with a unit or without."""
     name, equals, value = text.partition("=")
-    found = _NUMBER.fullmatch(value)
+    found = _NUMBER.fullmatch(value.translate(MINUS))
     if not equals or found is None:
         fail(text, "NAME=VALUE")
     name, unit = name.strip(), found[2]
@@ -118,7 +120,7 @@ def span(text: str) -> Span:
     name, _, values = text.partition("=")
     try:
         low, high, count = values.split(":")
-        ends = [_NUMBER.fullmatch(end) for end in (low, high)]
+        ends = [_NUMBER.fullmatch(end.translate(MINUS)) for end in (low, high)]
         if ends[0] is None or ends[1] is None or int(count) < 1:
             raise ValueError(text)
         units = {end[2] for end in ends if end is not None} - {None}

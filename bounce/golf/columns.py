@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..units import UNITS
+from ..units import MINUS, UNITS
 
 Array = NDArray[np.float64]
 
@@ -152,6 +152,11 @@ def _read_csv(path: Path) -> list[tuple[str, list[str]]]:
     if not rows:
         raise DataError(f"data: expected names and rows in {path}, received an empty file.")
     titles = rows[0]
+    if len(titles) == 1 and (mark := re.search("[;\t|]", titles[0])):
+        raise DataError(
+            f"{path.name}: expected commas between the columns, received {mark[0]!r} in {titles[0]!r}. Save "
+            "it with commas, and with points in numbers."
+        )
     for number, row in enumerate(rows[1:], start=1):
         if len(row) != len(titles):
             raise DataError(
@@ -163,7 +168,7 @@ def _read_csv(path: Path) -> list[tuple[str, list[str]]]:
 def _numbers(values: Iterable[Any], title: Any) -> Array:
     result = []
     for row, value in enumerate(values, start=1):
-        text = value.strip() if isinstance(value, str) else value
+        text = value.strip().translate(MINUS) if isinstance(value, str) else value
         try:
             result.append(float(text) if text not in ("", None) else math.nan)
         except (TypeError, ValueError):

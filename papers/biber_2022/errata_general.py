@@ -308,7 +308,8 @@ def normal_form_slips() -> Erratum:
     return Erratum(
         21,
         "Sec. 4.1, normal form",
-        "z4..n' = O(|z|); t -> phi t when z2 <; the entry _3 of (normal_sliding)",
+        "z4..n' = O(|z|); t -> phi t when z2 is on one side (the condition is cut off); an entry of "
+        "(normal_sliding) without its letter, the index 3 alone",
         "z4..n drift along the two-fold set at order one; t = phi tau when z1 > 0, tau/phi when "
         "z1 < 0; z3",
         (

@@ -455,14 +455,14 @@ def which_compliance() -> Erratum:
         "in the tangential direction",
         (
             Check(
-                f"eta = 0 (normal compliance only): {runs[0.0].itinerary!r}, lift-off rolling, "
+                f'eta = 0 (normal compliance only): "{runs[0.0].itinerary}", lift-off rolling, '
                 "H_F = 0",
                 runs[0.0].itinerary.endswith("s"),
             ),
             Check(
                 "eta = .05 and .5: "
                 + ", ".join(
-                    f"{runs[v].itinerary!r} with H_F = {runs[v].x[-1, 1] + runs[v].x[-1, 4]:.3g}"
+                    f'"{runs[v].itinerary}" with H_F = {runs[v].x[-1, 1] + runs[v].x[-1, 4]:.3g}'
                     for v in (0.05, 0.5)
                 ),
                 all(not runs[v].itinerary.endswith("s") for v in (0.05, 0.5)),

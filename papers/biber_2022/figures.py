@@ -81,8 +81,8 @@ PICTURES: tuple[Picture, ...] = (
     Picture(
         "filippov_convexity",
         "filippov_convexity",
-        "F_s is the point of the line between the tips of F_1 and F_2 that lies in the surface. Drawn for "
-        "attracting sliding: each field points at the surface, so F_1, which holds above it, points "
+        "F_s is the point of the line between the tips of F1 and F2 that lies in the surface. Drawn for "
+        "attracting sliding: each field points at the surface, so F1, which holds above it, points "
         "down, behind it.",
         figures_schematic.filippov_convexity,
     ),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 
 from .. import report
@@ -56,26 +56,25 @@ def erratum_rows(errata: Sequence[Erratum]) -> list[list[str]]:
 
 
 def equation_rows(equations: Sequence[Equation], shown: Sequence[Erratum] = ()) -> list[list[str]]:
-    """Cells of the equations table; evidence that the errata show is not repeated."""
-    before = {str(check) for e in shown for check in e.checks}
-    return [
-        [
-            str(e.number),
-            equation(e.label),
-            e.content,
-            e.verdict,
-            numbers(e.errata),
-            _evidence(e, before),
-        ]
-        for e in equations
-    ]
+    """Cells of the equations table; evidence that the errata or a row above show is not repeated."""
+    before = {str(check): "" for e in shown for check in e.checks}
+    rows = []
+    for e in equations:
+        evidence = _evidence(e, before)
+        rows.append(
+            [str(e.number), equation(e.label), e.content, e.verdict, numbers(e.errata), evidence]
+        )
+        for check in e.checks:
+            before.setdefault(str(check), f"see no. {e.number}")
+    return rows
 
 
-def _evidence(e: Equation, before: set[str]) -> str:
-    own = [str(check) for check in e.checks if str(check) not in before]
-    if len(own) < len(e.checks):
-        own.append(f"see erratum {numbers(e.errata)}" if e.errata else "see the errata")
-    return "; ".join(own)
+def _evidence(e: Equation, before: Mapping[str, str]) -> str:
+    """Its checks; of those shown before, where they are."""
+    errata = f"see erratum {numbers(e.errata)}" if e.errata else "see the errata"
+    told = [before.get(str(check)) for check in e.checks]
+    own = [str(check) for check, where in zip(e.checks, told, strict=True) if where is None]
+    return "; ".join([*own, *dict.fromkeys(w or errata for w in told if w is not None)])
 
 
 def opening(errata: Sequence[Erratum]) -> list[tuple[str, list[str]]]:

@@ -240,6 +240,10 @@ def test_the_report_opens_with_what_changes_and_shows_evidence_once():
     text = written.markdown()
     for e in found:
         assert all(text.count(str(check)) <= 1 for check in e.checks if len(str(check)) > 60)
+    rows = report.equation_rows(shown, found)
+    cells = [part for row in rows for part in row[-1].split("; ") if part and part[:4] != "see "]
+    told = [str(check) for e in shown for check in e.checks]
+    assert len(cells) == len(set(cells)) and any(told.count(check) > 1 for check in told)
     assert not [label for label in places.EQUATIONS if f"({label})" in text and "_" in label]
 
 

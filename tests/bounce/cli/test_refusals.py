@@ -15,6 +15,7 @@ KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5"
     [
         ([*SHOT[:-1], "inf"], "expected a spin such as 1"),
         ([*SHOT[:-1], "1e999"], "invalid spin value: '1e999'"),
+        ([*SHOT[:-3], "12degrees", "--spin", "0"], "expected an angle such as 1 or 1rad"),
         ([*SHOT, *KV, "--set", "mu=0.3m/s", "--stiffness", "2e4"], "unit"),
         (["map", "--over", "speed=10:40:0"], "NAME=LOW:HIGH:COUNT"),
         (["map", "--over", "speed=10m/s:40mph:5"], "NAME=LOW:HIGH:COUNT"),
@@ -34,6 +35,30 @@ def test_a_table_without_a_column_is_told_with_the_columns_it_has(command, tmp_p
     code, _, err = command("shot", "--input", table)
     assert code == 2
     assert "expected columns ['spin'], received ['speed', 'angle']" in err
+
+
+def test_a_table_with_semicolons_is_told_that_it_needs_commas(command, tmp_path):
+    table = tmp_path / "shots.csv"
+    table.write_text("speed [mph];angle [deg];spin [rpm]\n167;10,9;2686\n")
+    code, _, err = command("flight", "--input", table)
+    assert code == 1
+    assert "shots.csv: expected commas between the columns, received ';'" in err
+
+
+def test_typeset_minus_signs_and_degrees_are_read(command, tmp_path):
+    """As they are copied from a page: U+2212, and the sign for degrees."""
+    plain = command(*"shot --speed 28 --angle 40deg --spin -500 --set mu=0.5".split())
+    typeset = command(
+        "shot", "--speed", "28", "--angle", "40°", "--spin", "\u2212500", "--set", "mu=0.5"
+    )
+    assert plain[0] == 0 and typeset == plain
+    rows = []
+    for name, minus in (("a", "-"), ("b", "\u2212")):
+        table = tmp_path / f"{name}.csv"
+        text = f"speed [m/s],angle [deg],spin [rpm]\n28,40,{minus}500\n"
+        table.write_text(text, encoding="utf-8")
+        rows.append(command("shot", "--input", table))
+    assert rows[0][0] == 0 and rows[0] == rows[1]
 
 
 def test_an_interrupt_ends_with_the_status_of_the_signal(capsys, monkeypatch):

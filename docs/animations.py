@@ -61,7 +61,7 @@ def bounce_in_its_cone(count: int) -> Iterator[Figure]:
 def _cone(axes: Axes, shot: bounce.Shot, t: float) -> None:
     axes.fill([-0.3, 0.0, 0.3], [1.0, 0.0, 1.0], color="0.92")
     for phase in shot.phases:
-        if phase.t_start < t:
+        if phase.t_start < t or t == phase.t_start == 0.0:
             inner = np.linspace(phase.t_start, min(t, phase.t_end), 60)[1:-1]
             forces = shot.forces(inner)
             colour = {"+": STYLE.ABOVE, "-": STYLE.BELOW, "s": "black"}[phase.mode]
@@ -80,12 +80,12 @@ def _ball(axes: Axes, trajectory: ns.Trajectory, t: float) -> None:
     past = np.linspace(trajectory.t[0], max(t, trajectory.t[0] + 1e-9), 40)
     spin = np.trapezoid(trajectory(past)[:, 4], past)
     turn = np.linspace(0, 2 * np.pi, 100)
-    axes.fill_between([-1.6, 2.0], -1.9, -1.0, color="0.85")
+    axes.fill_between([-1.6, 2.0], -2.1, -1.0, color="0.85")
     axes.fill(x + np.cos(turn), y + np.sin(turn), facecolor="white", edgecolor="black", alpha=0.8)
     for k in range(3):
         angle = spin + 2 * np.pi * k / 3
         axes.plot([x, x + np.cos(angle)], [y, y + np.sin(angle)], color="0.4")
-    axes.set(xlim=(-1.6, 2.0), ylim=(-1.9, 1.3), aspect="equal")
+    axes.set(xlim=(-1.6, 2.0), ylim=(-2.1, 1.3), aspect="equal")
     axes.set_axis_off()
 
 

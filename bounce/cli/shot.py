@@ -11,6 +11,7 @@ from .choices import Chosen, chosen_model, ground_arguments, require_scale, surr
 from .report import Units, in_course, in_words, opening, polar, print_json, tabulate
 from .side import (
     asked_for_side,
+    counted,
     side_arguments,
     side_bounce,
     side_lines,
@@ -168,10 +169,8 @@ def _lines(hit: Rebound, rest: Run | None, chosen: Chosen, units: Units) -> list
 
 def run_lines(rest: Run, units: Units) -> list[str]:
     """A run until rest in words."""
-    count = len(rest.bounces)
-    outside = f" ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else ""
     return [
-        f"run       {units.say('length', rest.run_out)} in {rest.time:.2f} s: {count} bounce{'' if count == 1 else 's'}{outside}, "
+        f"run       {units.say('length', rest.run_out)} in {rest.time:.2f} s: {counted(rest)}, "
         f"the first {units.say('height', rest.first_height)} high, over "
         f"{units.say('length', rest.bounced)}; rolls {units.say('length', rest.rolled)}"
     ]

@@ -8,6 +8,7 @@ from typing import Any
 import nonsmooth as ns
 
 from ..golf import (
+    Run,
     SideFlight,
     SideRebound,
     SideRun,
@@ -139,13 +140,18 @@ def side_run_report(rest: SideRun) -> dict[str, float]:
     )
 
 
+def counted(rest: Run | SideRun) -> str:
+    """How many bounces, and how many of them the law does not cover."""
+    count = len(rest.bounces)
+    many = "1 bounce" if count == 1 else f"{count} bounces"
+    return f"{many} ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else many
+
+
 def side_run_lines(rest: SideRun, units: Units) -> list[str]:
     """A run with side spin until rest in words."""
-    count = len(rest.bounces)
-    outside = f" ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else ""
     return [
         f"run       {units.say('length', float(rest.rest[0]))} on and "
-        f"{sideways(float(rest.rest[1]), units)} in {rest.time:.2f} s: {count} bounces{outside}, the first "
+        f"{sideways(float(rest.rest[1]), units)} in {rest.time:.2f} s: {counted(rest)}, the first "
         f"{units.say('height', rest.first_height)} high"
     ]
 

@@ -31,6 +31,15 @@ def test_it_moves_and_ends_with_a_still(animation, tmp_path):
         assert np.abs(np.asarray(last, float) - shown[-1]).mean() < 5  # WebP loses a little
 
 
+def test_each_moment_of_the_bounce_has_its_dot_and_the_ground_is_below_the_ball():
+    (bounce,) = [a for a in animations.ANIMATIONS if a.name == "bounce_in_its_cone"]
+    for figure in bounce.frames(5):
+        cone, ball = figure.axes
+        assert sum(line.get_marker() == "o" for line in cone.lines) == 1
+        (circle,) = ball.patches
+        assert circle.get_xy()[:, 1].min() > ball.get_ylim()[0] + 0.1
+
+
 def test_the_page_asks_for_files_that_are_written():
     text = animations.animations()
     for animation in animations.ANIMATIONS:

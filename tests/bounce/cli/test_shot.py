@@ -194,3 +194,9 @@ def test_what_is_wrong_with_a_row_is_said_in_the_units_of_its_columns(
     path.write_text(f"{titles}\n{row}\n", encoding="utf-8")
     (found,) = csv.DictReader(io.StringIO(command("shot", "--input", path, "--units", "us")[1]))
     assert said in found["error"]
+
+
+@pytest.mark.parametrize("side", [[], ["--side-spin", "100"]])
+def test_one_bounce_is_said_in_the_singular(command, side):
+    out = command(*"shot --speed 2 --angle 41 --spin 2141".split(), *side)[1]
+    assert ": 1 bounce (1 of them outside the fit)" in out

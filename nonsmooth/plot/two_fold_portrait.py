@@ -35,6 +35,7 @@ from .two_fold_marks import (
 
 _BOX = (-1.0, 1.0, -1.0, 1.0)
 _WIDER_BOX = (-1.2, 1.2, -1.2, 1.2)  # curves run past the frame, which clips them
+_BESIDE = 8.0  # points, from an eigenline to the middle of its name
 #: Where the crossing arrows stand in C1; those of C2 are opposite.
 _CROSSINGS = ((-0.32, 0.8), (-0.8, 0.32), (-0.4, 0.4))
 
@@ -226,11 +227,13 @@ def _along(ax: Axes, m: float, end: Array, name: str, color: str) -> None:
     """Write a name along an eigenline in Dr, on the side with more room."""
     angle = math.atan(m)
     normal = np.array([-math.sin(angle), math.cos(angle)]) * (1 if m >= 1 else -1)
-    place = -0.62 * end + 0.055 * normal
-    style.write(
-        ax,
-        place,
+    ax.annotate(
         name,
+        tuple(-0.62 * end),
+        xytext=tuple(_BESIDE * normal),
+        textcoords="offset points",
+        ha="center",
+        va="center",
         color=color,
         rotation=math.degrees(angle),
         rotation_mode="anchor",

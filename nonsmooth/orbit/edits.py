@@ -30,6 +30,9 @@ from .itinerary import leg_between
 from .legs import Leg, fly
 from .mirrors import TURNED, neighbours
 
+#: Sine of the angle at which a field is tangent to a surface.
+_TANGENT = 1e-7
+
 
 def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
     """The bifurcation that the zero of a test is."""
@@ -81,7 +84,10 @@ def _grazed(
     assert field is not None
     gradient = field(y, p).gradient[: problem.dimension]
     rate = Leg(other).field(problem.system).rate.copied(y, p)[0][: problem.dimension, 0]
-    return "grazing-sliding" if float(gradient @ rate) > 0.0 else "grazing, escaping"
+    across = float(gradient @ rate)
+    if abs(across) <= _TANGENT * float(np.linalg.norm(gradient) * np.linalg.norm(rate)):
+        return "two-fold"  # both fields touch there: always so where a force jumps with a position
+    return "grazing-sliding" if across > 0.0 else "grazing, escaping"
 
 
 def edited(

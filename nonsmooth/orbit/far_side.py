@@ -37,7 +37,7 @@ _VERDICTS = {
     "grazing of a reset": "the return map changes at once",
     "grazing of a stop": "the orbit ends at the stop",
     "grazing, escaping": "the orbit leaves along the other field: nothing continues it",
-    "two-fold": "the orbit passes a two-fold, where the future is not unique",
+    "two-fold": "the orbit passes a two-fold, where its future may not be unique",
     "corner": "two events at one time, {one} and {other}; the itinerary beyond is not known here: "
     "simulate there and continue what is found",
 }

@@ -360,7 +360,7 @@ class OrbitCurve(OrbitEquations):
             ways: list[tuple[Array, Array]] = []
             try:
                 tangent = np.linalg.svd(self.scaled(u / self.scale)[1])[2][-1]
-            except NonsmoothError:
+            except (NonsmoothError, np.linalg.LinAlgError):  # no derivatives there
                 return None
             if fresh:
                 axis = np.zeros(u.size)

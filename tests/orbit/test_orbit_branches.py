@@ -402,3 +402,24 @@ def test_no_event_hides_behind_another_in_a_long_step():
     assert [leg.duration for leg in branch[0.3].legs] == pytest.approx(
         [leg.duration for leg in found.legs], abs=1e-10
     )
+
+
+def test_where_a_force_jumps_with_a_position_a_graze_is_a_two_fold_for_an_orbit_and_its_mirror_image():
+    """Both fields are tangent there: by rounding one graze was named escaping, the other grazing-sliding."""
+    x, v, t, F = (ca.SX.sym(s) for s in ("x", "v", "t", "F"))
+    smooth = -0.2 * v - x**3 + F * ca.cos(t)
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=x,
+        above=[v, smooth - 0.3],
+        below=[v, smooth + 0.3],
+        parameters={F: 2},
+        time=t,
+    )
+    orbit = ns.periodic_orbit(system, [0.5, 0.1], symmetry="odd")
+    (pitchfork,) = ns.continue_orbit(orbit, "F", bounds=(1.5, 4.0)).events
+    branch = ns.continue_orbit(pitchfork, "F", bounds=(1.5, 12.0))
+    first, last = branch.events[0], branch.events[-1]
+    assert first.kind == last.kind == "two-fold"
+    assert first.parameter == pytest.approx(last.parameter, rel=1e-11)
+    assert branch.ends == (ns.BranchEnd.EVENT,) * 2

@@ -1,40 +1,18 @@
 /* Batches on this processor: W lanes that are refilled, itineraries as nodes of a tree. After lanes.c. */
-#define MEMORY 256
-
-/* A batch, and how far it is; nodes of the tree by code, as a memory of the last ones. */
+/* A batch, and how far it is. */
 struct Work {
   const Batch *b;
   const Options *o;
-  Tree *tree;
-  int64_t next, known_code[MEMORY];
-  int32_t known_node[MEMORY];
+  Words words;
+  int64_t next;
   int alive;
 };
 
 INLINE const Options *limits(const Work *w) { return w->o; }
 
-/* Itineraries ------------------------------------------------------------------------------------ */
-
-static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
-  for (int shift = 60; shift >= 0; shift -= 2)
-    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
-  return node;
-}
-
-static int32_t itinerary(const Lanes *s, Work *w, int l) {
-  int64_t code = LANE_I(s->code, l);
-  if (s->base[l]) return walk(w->tree, s->base[l], code);
-  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
-  if (w->known_code[slot] != code) {
-    w->known_code[slot] = code;
-    w->known_node[slot] = walk(w->tree, 0, code);
-  }
-  return w->known_node[slot];
-}
-
 static __attribute__((noinline)) void shorten_codes(Lanes *s, Work *w) {
   for EACH(l, s->code >= LONG_CODE) {
-    s->base[l] = walk(w->tree, s->base[l], LANE_I(s->code, l));
+    s->base[l] = walk(w->words.tree, s->base[l], LANE_I(s->code, l));
     LANE_I(s->code, l) = 0;
   }
 }
@@ -51,19 +29,10 @@ static void store(Lanes *s, Work *w, int l, int status) {
   if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
-  b->itinerary[i] = itinerary(s, w, l);
+  b->itinerary[i] = itinerary(&w->words, s->base[l], LANE_I(s->code, l));
   int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
   for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
   kinds[LAST_KIND] = status == REACHED_END;
-}
-
-static void refuse(const Batch *b, int64_t i) {
-  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
-  b->t[i] = b->t0;
-  b->status[i] = NOT_FINITE;
-  b->itinerary[i] = 0;
-  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
-  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
 }
 
 /* Put the next start into a lane; 0 if there is none. Vectors are written whole: what is written in parts
@@ -130,7 +99,7 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t b
     double q[NQ];
     w->b = b;
     w->o = o;
-    w->tree = tree;
+    w->words.tree = tree;
     s->size = o->atol / o->rtol;
     prepare(b->p, q);
     for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);

@@ -143,8 +143,7 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
             head,
             *texts,
             program,
-            driver_text("lanes.c"),
-            driver_text("batch.c"),
+            *map(driver_text, ("lanes.c", "records.h", "batch.c")),
         ]
     )
 
@@ -199,7 +198,7 @@ def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
         f"__attribute__((unused)) static const int ON_ROW[] = {{{_list(program.on_rows) or 0}}};\n"
         f"__attribute__((unused)) static const int OWN[] = {{{_list(program.states) or 0}}};\n"
     )
-    drivers = ("polynomials.h", "set_lanes.c", "set_steps.c")
+    drivers = ("polynomials.h", "records.h", "set_lanes.c", "set_steps.c")
     texts = [driver_text("common.h"), driver_text("vector.h"), program.text]
     return "".join(
         [facts_header(), _sizes(system, order), defines, *texts, *map(driver_text, drivers)]

@@ -1,9 +1,9 @@
 /* W trajectories in step, for systems with one set of codimension two or three, and stops.
  *
- * Off the set, on it and leaving it are three programs; each has lanes of its own, and a trajectory waits
- * until W of them are in the same mode (fewer only when no start is left). Whatever is rare is handed over as
- * in lanes.c: such a trajectory gets the status HAND_OVER and runs again from its start in the interpreter.
- * No lane's result depends on its neighbours.
+ * Off the set, on it and leaving it are three programs, and what is done near it is a fourth; each has lanes of
+ * its own, and a trajectory waits until W of them are at the same (fewer only when no start is left). Whatever is
+ * rare is handed over as in lanes.c: such a trajectory gets the status HAND_OVER and runs again from its start in
+ * the interpreter. No lane's result depends on its neighbours.
  *
  * The generated text defines, besides what common.h asks for: N states with time, ND without, K, STOPS,
  * DIRECTION[STOPS], TIMED, W, ROWS and ROW[ROWS] of the field that are not affine (on the set ON_ROWS), BENT_SLIP, BENT_STOPS,
@@ -14,16 +14,17 @@
 #define LIMIT_SLOT (STOPS + 1)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
-#define MEMORY 256
 #define WAITING (4 * W)
 #define CLOSE 1e-8 /* only where |h| is this much of its terms its time to zero is asked for */
 #define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
 #define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the interpreter sees to it */
 #define TURNED 1e-7 /* to this at least the direction is known in which a set is left */
-#define THIRD 10 /* what the last way leaves out is so many times what its terms suggest, or less */
+#define THIRD 3 /* what the last way leaves out is so many times what its terms suggest, or less */
+#define LAST_WAY 0.1 /* part of the tolerance that it may be, once for each time that a set is reached */
+#define SMALL 8 /* it is tried where |h| is twice the cube root of the tolerance */
 #define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
 
-enum { OFF, ON, LEAVING, POOLS };
+enum { OFF, ON, LEAVING, NEAR_SET, POOLS };
 
 /* All members are vectors, so that a trajectory is a column of words. */
 typedef struct {
@@ -40,11 +41,10 @@ typedef struct { int64_t word[WORDS]; } Traveller;
 typedef struct {
   const Batch *b;
   const Options *o;
-  Tree *tree;
-  int64_t next, known_code[MEMORY];
-  int32_t known_node[MEMORY];
+  Words words;
+  int64_t next;
   double size; /* of states at which both tolerances are as large */
-  int alive[POOLS], waiting[POOLS], words;
+  int alive[POOLS], waiting[POOLS], column; /* words of a trajectory */
   Traveller queue[POOLS][WAITING];
 } Work;
 
@@ -58,30 +58,11 @@ typedef struct {
 #define UNPACK(v) (v)[0], (v)[1], (v)[2]
 #endif
 
-/* Itineraries ------------------------------------------------------------------------------------ */
-
-static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
-  for (int shift = 60; shift >= 0; shift -= 2)
-    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
-  return node;
-}
-
-static int32_t itinerary(const Lanes *s, Work *w, int l) {
-  int64_t code = LANE_I(s->code, l), base = LANE_I(s->base, l);
-  if (base) return walk(w->tree, (int32_t)base, code);
-  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
-  if (w->known_code[slot] != code) {
-    w->known_code[slot] = code;
-    w->known_node[slot] = walk(w->tree, 0, code);
-  }
-  return w->known_node[slot];
-}
-
 /* A mode, by its number among the system's, follows. */
 static void note_mode(Lanes *s, Work *w, I which, int mode) {
   s->code = SELECT_I(which, (s->code << 2) + (mode + 1), s->code);
   for EACH(l, s->code >= LONG_CODE) {
-    LANE_I(s->base, l) = walk(w->tree, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
+    LANE_I(s->base, l) = walk(w->words.tree, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
     LANE_I(s->code, l) = 0;
   }
 }
@@ -100,7 +81,7 @@ static void store(Lanes *s, Work *w, int pool, int l, int status) {
   if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
   for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
-  b->itinerary[i] = itinerary(s, w, l);
+  b->itinerary[i] = itinerary(&w->words, (int32_t)LANE_I(s->base, l), LANE_I(s->code, l));
   int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
   for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
   kinds[LAST_KIND] = status == REACHED_END;
@@ -110,22 +91,13 @@ static void finish_lanes(Lanes *s, Work *w, int pool, I which, int status) {
   for EACH(l, which & s->live) store(s, w, pool, l, status);
 }
 
-static void refuse(const Batch *b, int64_t i) {
-  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
-  b->t[i] = b->t0;
-  b->status[i] = NOT_FINITE;
-  b->itinerary[i] = 0;
-  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
-  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
-}
-
 /* Put the next start into a lane; 0 if there is none. */
 static int load(Lanes *s, Work *w, int l) {
   const Batch *b = w->b;
   while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
   if (w->next >= b->count) return 0;
   int64_t i = w->next++;
-  for (int j = 0; j < w->words; j++) LANE_I(((I *)s)[j], l) = 0;
+  for (int j = 0; j < w->column; j++) LANE_I(((I *)s)[j], l) = 0;
   for (int k = 0; k < N; k++) LANE(s->x[k], l) = b->x0[i * N + k];
   if (b->p_stride) {
     double q[NQ];
@@ -145,7 +117,7 @@ static int load(Lanes *s, Work *w, int l) {
 static void send(Lanes *s, Work *w, int pool, I which, int to) {
   for EACH(l, which & s->live) {
     Traveller *one = &w->queue[to][w->waiting[to]++];
-    for (int j = 0; j < w->words; j++) one->word[j] = LANE_I(((I *)s)[j], l);
+    for (int j = 0; j < w->column; j++) one->word[j] = LANE_I(((I *)s)[j], l);
     LANE_I(s->live, l) = 0;
     w->alive[pool]--;
   }
@@ -155,7 +127,7 @@ static void receive(Lanes *s, Work *w, int pool) {
   for EACH(l, ~s->live) {
     if (!w->waiting[pool]) return;
     const Traveller *one = &w->queue[pool][--w->waiting[pool]];
-    for (int j = 0; j < w->words; j++) LANE_I(((I *)s)[j], l) = one->word[j];
+    for (int j = 0; j < w->column; j++) LANE_I(((I *)s)[j], l) = one->word[j];
     w->alive[pool]++;
   }
 }
@@ -411,7 +383,7 @@ static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear)
     T part = THIRD * bend / radius, first = part * bend / radius; /* of the second order, and of the first */
     T late = part * ABS(rest.later) + first * rest.time;
     UNROLL for (int i = 0; i < N; i++) {
-      T whole = i < ND ? SAFETY * (w->o->atol + w->o->rtol * ABS(s->x[i])) : BC(0);
+      T whole = i < ND ? LAST_WAY * (w->o->atol + w->o->rtol * ABS(s->x[i])) : BC(0);
       T third = MAX(part * ABS(rest.two[i]) + first * ABS(rest.one[i]), late * ABS(field[i]));
       close &= ~exact | (I)(third <= whole + EPSILON * (w->size + ABS(s->x[i])));
       end[i] = SELECT(exact, s->x[i] + (rest.one[i] + rest.two[i]), end[i]);

@@ -5,6 +5,7 @@ typedef struct {
   T c[N][P + 1], g[SLOTS][P + 1], unknowns[K][P + 1]; /* unknowns on the set; the direction when leaving it */
   T allowed[N], level; /* of states, and of |h| */
   T radius, stretch, fall; /* |h|, or friction's limit; 1 over the time to a branch point; part that |h| may fall to */
+  T off_stop[STOPS + 1], off_slip[K + 1]; /* what stops, unknowns and friction's limit may be off in a check */
 } Step;
 
 /* Time and the variable s of a step: dt = (1 - stretch s/3)^2 ds (set_program.py). */
@@ -28,16 +29,27 @@ INLINE T place_of(const Step *e, T time) {
   return 3.0 * time / (1.0 + y + y * y);
 }
 
-/* Where the set is reached, or was left. */
+/* 1 over the time to where the set is reached, roughly, or from where it was left: any value is right. */
 INLINE T stretch_of(const Lanes *s) {
-  T h[K], g[K][N], a[K], m[K * K], y[K], c;
+  T h[K], g[K][N], a[K], m[K * K], y[K], c, square = BC(0), back = -1.0 / (s->t - s->left_at);
   height_values(s->x, s->q, LAMBDA(s->lam), h, &g[0][0]);
   frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
   I isotropic, holds = is_definite(m, &isotropic, &c);
   solve_block(m, a, y);
-  holds &= length_of(y) < 1;
-  T left = time_left(a, m, h, length_of(h), isotropic, c);
-  return SELECT(holds & (left > 0), 1.0 / left, -1.0 / (s->t - s->left_at));
+  UNROLL for (int i = 0; i < K; i++) square += y[i] * y[i];
+  T along = BC(0), part = BC(0), rate = BC(0), radius = BC(0);
+  UNROLL for (int i = 0; i < K; i++) radius += h[i] * h[i];
+  T size = QUICK_ROOT(radius);
+  UNROLL for (int i = 0; i < K; i++) {
+    T own = a[i] * size;
+    UNROLL for (int j = 0; j < K; j++) own -= m[i * K + j] * h[j];
+    rate += h[i] * own;
+    along += a[i] * h[i];
+    part += a[i] * a[i];
+  }
+  T over = SELECT(isotropic, c * c - part, MAX(-rate, BC(0))), under = SELECT(isotropic, c * size + along, radius * size);
+  T per = over * QUICK_INVERSE(under);
+  return SELECT(holds & (square < 1) & (per >= 0), per, back);
 }
 
 /* Step size -------------------------------------------------------------------------------------- */
@@ -62,15 +74,17 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   const T *g = e->g[0];
   e->level = sum;
   e->fall = SELECT(e->radius * (SAFETY * o->rtol) > LEFT * sum, BC(FALLEN), BC(FALL));
-  if (mode == OFF) bound(g[P], g[P - 1], 1.0 / (sum / e->radius + o->rtol * ABS(g[0])), last, before);
+  if (mode == OFF) bound(g[P], g[P - 1], e->radius * ROUGH_INVERSE(sum + o->rtol * e->radius * ABS(g[0])), last, before);
   if (mode == LEAVING) bound(g[P - 2], g[P - 3], 1.0 / sum, last, before);
   if (mode == ON) {
     T value[K + 1], slope[K + 1][N];
     slip_values(s->x, s->q, LAMBDA(s->lam), value, &slope[0][0]);
-    T of_limit = weighed(slope[K], e->allowed), all = BC(0);
-    UNROLL for (int i = 0; i < K; i++)
-      all += 2.0 * (ABS(value[i]) + ABS(value[K])) * (weighed(slope[i], e->allowed) + of_limit);
-    bound(g[P], g[P - 1], 1.0 / (all + o->rtol * ABS(g[0]) + 1e-290), last, before);
+    T part[K + 1], all = BC(0);
+    UNROLL for (int i = 0; i <= K; i++) part[i] = weighed(slope[i], e->allowed);
+    UNROLL for (int i = 0; i < K; i++) all += 2.0 * (ABS(value[i]) + ABS(value[K])) * (part[i] + part[K]);
+    /* Where rolling ends the motion is smooth to the second order: the time is known to the tolerance itself. */
+    bound(g[P], g[P - 1], SAFETY * ROUGH_INVERSE(all + o->rtol * ABS(g[0]) + 1e-290), last, before);
+    UNROLL for (int i = 0; i <= K; i++) e->off_slip[i] = WRONG * part[i] + VANISHES * rounding_scale(s, w, slope[i]);
   }
 #if STOPS > 0
   if (!BENT_STOPS) return;
@@ -78,7 +92,9 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   stop_values(s->x, s->q, LAMBDA(s->lam), stop, &slopes[0][0]);
   UNROLL for (int j = 0; j < STOPS; j++) {
     const T *a = e->g[1 + j];
-    bound(a[P], a[P - 1], 1.0 / (weighed(slopes[j], e->allowed) + o->rtol * ABS(a[0]) + 1e-290), last, before);
+    T part = weighed(slopes[j], e->allowed);
+    bound(a[P], a[P - 1], ROUGH_INVERSE(part + o->rtol * ABS(a[0]) + 1e-290), last, before);
+    e->off_stop[j] = WRONG * part + VANISHES * rounding_scale(s, w, slopes[j]);
   }
 #endif
 }
@@ -92,7 +108,7 @@ INLINE T size_of(T last, T before, int more) {
 /* The coefficients of a step, and the size that they allow. */
 INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
   const Options *o = w->o;
-  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), ends[4 * K], per = BC(1.0 / (SAFETY * o->rtol));
+  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), ends[2 * K], per = BC(1.0 / (SAFETY * o->rtol));
   T turn = BC(1e-300), turn_before = BC(1e-300);
   e->stretch = mode == OFF ? stretch_of(s) : BC(0);
   if (mode == OFF) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], ends, &e->radius);
@@ -106,7 +122,7 @@ INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite
   }
   UNROLL for (int j = 0; j < SLOTS; j++) if (j != LIMIT_SLOT || mode == ON) sum += e->g[j][P] + e->g[j][P - 1] + e->g[j][0];
   guard_bounds(s, w, e, mode, &last, &before);
-  UNROLL for (int i = 0; i < (mode == OFF ? 2 * K : K); i++) {
+  UNROLL for (int i = 0; i < K; i++) {
     if (mode == ON) continue;
     T one = mode == OFF ? ends[2 * i + 1] : e->unknowns[i][P], two = mode == OFF ? ends[2 * i] : e->unknowns[i][P - 1];
     sum += one + two;
@@ -238,15 +254,24 @@ INLINE T series_at(const T *c, int degree, T at) {
   return v;
 }
 
-INLINE void state_at(T *x, const Step *e, T at, int degree) {
-  UNROLL for (int i = 0; i < N; i++) x[i] = series_at(e->c[i], degree, at);
+/* The polynomials and their slopes. */
+INLINE void follow(const Step *e, T at, int degree, T *x, T *slope) {
+  UNROLL for (int i = 0; i < N; i++) {
+    const T *c = e->c[i];
+    T v = c[degree], d = v;
+    UNROLL for (int k = degree - 1; k >= 1; k--) { v = v * at + c[k]; d = d * at + v; }
+    x[i] = v * at + c[0];
+    slope[i] = d;
+  }
 }
 
-/* Lanes where the field and what ends the mode at a time of the step are not those of the polynomials. */
-INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const T *x, T at, T dt, int degree) {
+/* Lanes where the field and what ends the mode at a time of the step are not those of the polynomials; the states
+ * then. */
+INLINE I disagrees(const Lanes *s, const Step *e, int mode, T *x, T at, T dt, int degree) {
   I wrong = {0};
-  T f[N], stop[STOPS + 1], rate = rate_of(e, at);
+  T f[N], d[N], stop[STOPS + 1], rate = rate_of(e, at);
   const int rows = mode == ON ? ON_ROWS : ROWS, *const row_of = mode == ON ? ON_ROW : ROW;
+  follow(e, at, degree, x, d);
   if (mode == OFF) off_check(x, s->q, LAMBDA(s->lam), f, stop);
   if (mode == ON) on_check(x, s->q, LAMBDA(s->lam), f, stop);
   if (mode == LEAVING) {
@@ -259,24 +284,16 @@ INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const
     if (BENT_STOPS) off_check(x, s->q, LAMBDA(s->lam), whole, stop);
   }
   UNROLL for (int m = 0; m < rows; m++) {
-    const T *row = e->c[row_of[m]];
-    T d = degree * row[degree];
-    UNROLL for (int k = degree - 1; k >= 1; k--) d = d * at + k * row[k];
-    wrong |= ~(I)(ABS(f[m] * rate - d) * dt <= WRONG * e->allowed[row_of[m]] + VANISHES * dt * ABS(d));
+    T slope = d[row_of[m]];
+    wrong |= ~(I)(ABS(f[m] * rate - slope) * dt <= WRONG * e->allowed[row_of[m]] + VANISHES * dt * ABS(slope));
   }
-  UNROLL for (int j = 0; j < (BENT_STOPS ? STOPS : 0); j++) {
-    T miss = ABS(stop[j] - series_at(e->g[1 + j], degree, at));
-    T gradient[STOPS + 1][N], value[STOPS + 1];
-    stop_values(s->x, s->q, LAMBDA(s->lam), value, &gradient[0][0]);
-    wrong |= ~(I)(miss <= WRONG * weighed(gradient[j], e->allowed) + VANISHES * rounding_scale(s, w, gradient[j]));
-  }
+  UNROLL for (int j = 0; j < (BENT_STOPS ? STOPS : 0); j++)
+    wrong |= ~(I)(ABS(stop[j] - series_at(e->g[1 + j], degree, at)) <= e->off_stop[j]);
   if (mode == ON && BENT_SLIP) {
-    T value[K + 1], slope[K + 1][N];
-    slip_values(x, s->q, LAMBDA(s->lam), value, &slope[0][0]);
-    UNROLL for (int i = 0; i <= K; i++) {
-      T known = i < K ? series_at(e->unknowns[i], degree, at) : value[K];
-      wrong |= ~(I)(ABS(value[i] - known) <= WRONG * weighed(slope[i], e->allowed) + VANISHES * rounding_scale(s, w, slope[i]));
-    }
+    T value[K + 1], gradient[K + 1][N];
+    slip_values(x, s->q, LAMBDA(s->lam), value, &gradient[0][0]);
+    UNROLL for (int i = 0; i < K; i++)
+      wrong |= ~(I)(ABS(value[i] - series_at(e->unknowns[i], degree, at)) <= e->off_slip[i]);
   }
   return wrong;
 }
@@ -285,15 +302,17 @@ INLINE I disagrees(const Lanes *s, const Work *w, const Step *e, int mode, const
  * first step in a mode may not see what comes are left to the interpreter. */
 INLINE I verify(const Lanes *s, const Work *w, const Step *e, int mode, T by_series, T *dt, I *slot, I *last, T *end) {
   I leaps = {0};
-  if (mode == ON && ON_ROWS == 0 && !BENT_SLIP && !BENT_STOPS) { state_at(end, e, *dt, P); return leaps; }
+  if (mode == ON && ON_ROWS == 0 && !BENT_SLIP && !BENT_STOPS) {
+    T slope[N];
+    follow(e, *dt, P, end, slope);
+    return leaps;
+  }
   UNROLL for (int i = 0; i < N; i++)
     leaps |= (I)(s->length == 0) & (I)(by_series * ABS(e->c[i][1]) > FAR * (ABS(e->c[i][0]) + w->size));
   for (int tries = 0; tries < 20; tries++) {
     T x[N], at = 0.5 * *dt;
-    state_at(x, e, at, INNER);
-    I early = s->live & disagrees(s, w, e, mode, x, at, *dt, INNER);
-    state_at(end, e, *dt, P);
-    I late = s->live & ~early & disagrees(s, w, e, mode, end, *dt, *dt, P);
+    I early = s->live & disagrees(s, e, mode, x, at, *dt, INNER);
+    I late = s->live & ~early & disagrees(s, e, mode, end, *dt, *dt, P);
     if (!any(early | late)) return leaps;
     *dt = SELECT(early, 0.5 * at, SELECT(late, at, *dt));
     *slot &= ~(early | late);
@@ -320,7 +339,7 @@ INLINE I passed_between(Lanes *s, const Step *e) {
 /* Times at which |nu| = |n|, from those at which their squares are equal to rounding. */
 INLINE void polish_slip(const Step *e, I which, T h, T *dt) {
   T root = *dt;
-  for (int again = 0; again < 3; again++) {
+  for (int again = 0; again < 2; again++) {
     T square = BC(0), along = BC(0), n = BC(0), of_n = BC(0);
     /* The limit's series stands in its slot over its first value. */
     UNROLL for (int i = 0; i < K; i++) {
@@ -377,12 +396,8 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
   if (mode == OFF) {
     T height[K], g[K][N], scale = heights(s, w, height, g), radius = length_of(height);
     if (any(s->behind)) s->behind &= radius <= LEFT * scale;
-    I small = (radius <= CLOSE * scale) | ((e.stretch > 0) & (radius * radius * radius <= o->rtol * scale * scale * scale));
-    I near = met | (live & ~stopped & ~last & small);
-    if (any(near)) {
-      gone = reach(s, w, near, &unclear) & ~unclear;
-      if (any(gone)) unclear |= change_mode(s, w, gone, ENTRY, 1);
-    }
+    I small = (radius <= CLOSE * scale) | ((e.stretch > 0) & (radius * radius * radius <= SMALL * o->rtol * scale * scale * scale));
+    gone = met | (live & ~stopped & ~last & small);
   } else if (mode == ON) {
     unclear |= project(s, w, s->live);
     gone = met;
@@ -408,12 +423,21 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
     finish_lanes(s, w, mode, stopped & ~unclear, STOPPED);
   }
   finish_lanes(s, w, mode, last & ~unclear, REACHED_END);
-  send(s, w, mode, gone & ~unclear, mode == OFF ? ON : mode == ON ? LEAVING : OFF);
+  send(s, w, mode, gone & ~unclear, mode == OFF ? NEAR_SET : mode == ON ? LEAVING : OFF);
 }
 
 static __attribute__((noinline)) void step_off(Lanes *s, Work *w) { step_in(s, w, OFF); }
 static __attribute__((noinline)) void step_on(Lanes *s, Work *w) { step_in(s, w, ON); }
 static __attribute__((noinline)) void step_leaving(Lanes *s, Work *w) { step_in(s, w, LEAVING); }
+
+/* What is near the set reaches it, or goes on off it. */
+static __attribute__((noinline)) void come_near(Lanes *s, Work *w) {
+  I unclear = {0}, there = reach(s, w, s->live, &unclear) & ~unclear;
+  if (any(there)) unclear |= change_mode(s, w, there, ENTRY, 1);
+  finish_lanes(s, w, NEAR_SET, unclear, HAND_OVER);
+  send(s, w, NEAR_SET, there, ON);
+  send(s, w, NEAR_SET, ~there, OFF);
+}
 
 typedef struct { Lanes lanes[POOLS]; Work work; int begun; } Many;
 
@@ -424,9 +448,9 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree) 
   double q[NQ];
   w->b = b;
   w->o = o;
-  w->tree = tree;
+  w->words.tree = tree;
   w->size = o->atol / o->rtol;
-  w->words = WORDS - (b->p_stride ? 0 : NQ);
+  w->column = WORDS - (b->p_stride ? 0 : NQ);
   prepare(b->p, q);
   for (int pool = 0; pool < POOLS; pool++) {
     Lanes *s = &many->lanes[pool];
@@ -437,7 +461,7 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree) 
 
 /* The mode whose lanes take a step: the last one of a run that has enough of them. */
 static int chosen(const Work *w) {
-  for (int pool = LEAVING; pool >= OFF; pool--) if (w->alive[pool] + w->waiting[pool] >= W) return pool;
+  for (int pool = POOLS - 1; pool >= OFF; pool--) if (w->alive[pool] + w->waiting[pool] >= W) return pool;
   if (w->next < w->b->count) return OFF;
   for (int pool = OFF; pool < POOLS; pool++) if (w->alive[pool] + w->waiting[pool]) return pool;
   return -1;
@@ -462,6 +486,7 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t b
     if (--budget < 0) return 1;
     if (pool == OFF) step_off(s, w);
     else if (pool == ON) step_on(s, w);
-    else step_leaving(s, w);
+    else if (pool == LEAVING) step_leaving(s, w);
+    else come_near(s, w);
   }
 }

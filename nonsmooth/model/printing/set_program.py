@@ -67,17 +67,30 @@ class _Writer:
         field, layer, heights, factor, stops = coupled.outputs
         none = ca.SX.zeros(self.k, 1)
         #: Field, layer and stops off the set in states and lambda; on it in states and nu.
-        scaled_ones = coupled.scaled[0]
-        off = ca.substitute([field, layer], [nu], [none]) if scaled_ones else [field, layer]
-        on = ca.substitute([field, layer], [self.lam], [none]) if scaled_ones else [field, layer]
+        self.scaled = coupled.scaled[0]
+        off = ca.substitute([field, layer], [nu], [none]) if self.scaled else [field, layer]
+        on = ca.substitute([field, layer], [self.lam], [none]) if self.scaled else [field, layer]
         self.off_field, self.off_layer = (ca.densify(e) for e in off)
         self.on_field, self.on_layer = (ca.densify(e) for e in on)
         self.nu, self.heights, self.factor = nu, ca.densify(heights), factor[0]
+        if self.scaled:
+            self._count_in_loads()
         self.stops = stops
         self.pull = ca.jacobian(self.off_layer, self.lam)  # -M of h' = a - M lambda
         self.push = ca.jacobian(self.on_layer, nu)
         rates = ca.substitute(self.on_layer, nu, none)
         self.nu_at = -_inverse(self.push) @ rates
+
+    def _count_in_loads(self) -> None:
+        """Let the factor be a load as the field has it, if it has one: the same sums, expanded once."""
+        loads = ca.densify(ca.jacobian(self.off_field, self.lam[0]))
+        parts = ca.densify(ca.jacobian(self.on_field, self.nu[0]))
+        for load, part in zip(ca.vertsplit(loads), ca.vertsplit(parts), strict=True):
+            if not load.is_zero() and not ca.depends_on(part, self.x):
+                on = [self.on_field, self.on_layer]
+                self.on_field, self.on_layer = ca.substitute(on, [self.nu], [self.nu / part])
+                self.factor = load
+                return
 
     def program(self) -> SetProgram:
         x, k = self.x, self.k
@@ -126,32 +139,32 @@ class _Writer:
         return Expansion(rules, rows, still, Expressions()), touched(rules, self.n)
 
     def _off(self) -> dict[str, ca.SX]:
-        """Off the set: coefficients of states, of |h| over its first, of stops and of the direction."""
-        expansion, late = self._expansion([self.off_field, self.heights, self.stops], self.lam)
+        """Off the set: coefficients of states, of |h| over its first, of stops; the last ones of h."""
+        field, unknowns = (self.on_field, self.nu) if self.scaled else (self.off_field, self.lam)
+        outputs = [field, self.heights, self.factor, self.stops]
+        expansion, late = self._expansion(outputs, unknowns)
         jet = self._begin()
-        direction = _Direction(self.k)
+        direction = _Direction(self.k, self.scaled)
         stops: list[list[Coefficient]] = []
         fields: list[list[Coefficient]] = []
         none: list[Coefficient] = [None] * self.k
         for k in range(self.order + 1):
             now = [row[k] for row in jet]
             if k == 0:
-                first = direction.push(0, [clean(h) for h in ca.vertsplit(self.heights)])
-                known = expansion.advance(0, [*now, *first])
+                heights = [clean(h) for h in ca.vertsplit(self.heights)]
+                known = expansion.advance(0, [*now, *direction.push(0, heights, self.factor)])
             else:
-                u = direction.push(k, expansion.advance(k, [*now, *none])[1])
-                known = expansion.again(k, [*now, *u], late)
-            stops.append(known[2])
+                _, heights, (factor,), _ = expansion.advance(k, [*now, *none])
+                known = expansion.again(k, [*now, *direction.push(k, heights, factor)], late)
+            stops.append(known[3])
             fields.append(known[0])
             if k < self.order:
                 for row, value in zip(jet, self._stretched(fields), strict=True):
                     row.append(value)
-        last = range(self.order - 1, self.order + 1)  # of the direction, and of h
-        ends = [row[k] for row in [*direction.u, *direction.own] for k in last]
         return dict(
             c=_matrix(jet),
             g=_matrix([direction.root, *zip(*stops, strict=True)]),
-            ends=_column(ends),
+            ends=_column([row[k] for row in direction.own for k in (self.order - 1, self.order)]),
             radius=direction.radius,
         )
 
@@ -247,16 +260,17 @@ class _Writer:
 
 
 class _Direction:
-    """The series of h/|h| and of |h| over its first value, as expressions (``Direction``)."""
+    """The series of h/|h|, or of n h/|h|, and of |h| over its first value, as expressions (``Direction``)."""
 
-    def __init__(self, size: int):
+    def __init__(self, size: int, scaled: bool):
         self.own: list[list[Coefficient]] = [[] for _ in range(size)]
         self.u: list[list[Coefficient]] = [[] for _ in range(size)]
         self.root: list[Coefficient] = []
         self.radius, self._per = ca.SX(1), ca.SX(1)
+        self._scaled, self._part = scaled, list[Coefficient]()  # of n |h| at first over |h|
 
-    def push(self, k: int, h: Sequence[Coefficient]) -> list[Coefficient]:
-        """Coefficients k of the direction from those of h."""
+    def push(self, k: int, h: Sequence[Coefficient], factor: Coefficient) -> list[Coefficient]:
+        """Coefficients k of the direction, or n times that, from those of h and of n."""
         if k == 0:
             self.radius = ca.sqrt(ca.sumsqr(_column(h)))
             self._per = 1 / self.radius
@@ -268,6 +282,11 @@ class _Direction:
             total = sum((value_of(row[0]) * value_of(row[k]) for row in self.own), ca.SX(0))
             curved = sum((value_of(_inner(row, k)) for row in self.own), ca.SX(0))
             self.root.append(clean(total + (curved - value_of(_inner(self.root, k)))))
+        if self._scaled:
+            # (n/|h|) h has a product less than n (h/|h|).
+            known = _products(self._part, self.root, 0, k - 1, k)
+            self._part.append(clean(value_of(factor) - value_of(known)))
+            return [_products(self._part, row, 0, k, k) for row in self.own]
         for row, own in zip(self.u, self.own, strict=True):
             known = _products(row, self.root, 0, k - 1, k)
             row.append(clean(value_of(own[k]) - value_of(known)))

@@ -141,16 +141,17 @@ def test_sets_of_three_and_friction_with_a_grain(kind):
     assert np.abs(fast.x - slow.x).max() < 1e-8 and not fast.status.any()
 
 
+@pytest.mark.parametrize("kind", ["entry", "exit"])
 @pytest.mark.parametrize("tol", [1e-6, 1e-9, 1e-12])
-def test_the_last_way_to_a_set_is_known_to_the_tolerance(tol):
-    # It is taken in one step from where |h| is about the cube root of the tolerance: were its second order wrong
-    # or missing, places and times of hits would be off by some 10 tol^(2/3).
+def test_where_sets_are_reached_and_left_is_known_to_the_tolerance(tol, kind):
+    # The last way is taken in one step from where |h| is about the cube root of the tolerance: were its second
+    # order wrong or missing, places and times of hits would be off by some 10 tol^(2/3).
     system, (x, p) = plane.ball("contact", True), drawn(400)
     rows = np.arange(400) % 8 < 5
     given = {name: p[rows, i] for i, name in enumerate(system.parameter_names)}
     fast, fine = (
         ns.ensemble(
-            system, x[rows], 20.0, parameters=given, tol=t, engine=engine, at_event=("entry", 1)
+            system, x[rows], 20.0, parameters=given, tol=t, engine=engine, at_event=(kind, 1)
         )
         for t, engine in ((tol, "compiled"), (1e-14, "auto"))
     )

@@ -1,0 +1,36 @@
+/* What lanes of every kind keep alike on this processor: itineraries as nodes of a tree, starts that are no numbers. */
+#define MEMORY 256
+
+/* A tree of itineraries, and nodes by code as a memory of the last ones. */
+typedef struct {
+  Tree *tree;
+  int64_t code[MEMORY];
+  int32_t node[MEMORY];
+} Words;
+
+/* Modes of a code: base 4 with digits from 1, the last one lowest. */
+static __attribute__((noinline)) int32_t walk(Tree *tree, int32_t node, int64_t code) {
+  for (int shift = 60; shift >= 0; shift -= 2)
+    if (code >> shift & 3) node = tree_child(tree, node, (int)(code >> shift & 3) - 1);
+  return node;
+}
+
+static int32_t itinerary(Words *words, int32_t base, int64_t code) {
+  if (base) return walk(words->tree, base, code);
+  int slot = (int)((uint64_t)code * 0x9e3779b97f4a7c15u >> 56);
+  if (words->code[slot] != code) {
+    words->code[slot] = code;
+    words->node[slot] = walk(words->tree, 0, code);
+  }
+  return words->node[slot];
+}
+
+static void refuse(const Batch *b, int64_t i) {
+  for (int k = 0; k < ND; k++) b->x[i * ND + k] = b->x0[i * N + k];
+  b->t[i] = b->t0;
+  b->status[i] = NOT_FINITE;
+  b->itinerary[i] = 0;
+  memset(b->kinds + i * SIMPLE_KINDS, 0, LAST_KIND * sizeof(int32_t));
+  b->kinds[i * SIMPLE_KINDS + LAST_KIND] = 1;
+}
+

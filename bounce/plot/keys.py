@@ -46,4 +46,5 @@ def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int 
         return
     from matplotlib.legend import Legend
 
-    ax.add_artist(Legend(ax, handles, labels, **look))
+    key = ax.add_artist(Legend(ax, handles, labels, **look))
+    key.set_clip_on(False)  # the layout leaves out what it takes for clipped to the axes

@@ -140,7 +140,8 @@ def outcome_map(
     x, y = _axes(outcomes, units)
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
-        letters = int(ax.bbox.width * 72 / figure.dpi / (0.53 * _TITLE))
+        size = _TITLE * (0.6 if is_narrow(ax) else 0.53)  # of a letter, on average
+        letters = int(ax.bbox.width * 72 / figure.dpi / size)
         narrow: list[Narrow] = []
         if quantity == "itinerary":
             narrow = _regions(ax, outcomes, x, y)

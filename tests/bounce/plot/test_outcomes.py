@@ -37,6 +37,20 @@ def test_narrow_regions_are_in_the_legend_or_beside_their_names():
     assert legend is not None
     names = {t.get_text() for t in axes.findobj(Text)}
     assert set(m.regions) <= names and len(legend.get_texts()) <= 6
+    axes.figure.draw_without_rendering()
+    axes.figure.draw_without_rendering()
+    for key in axes.findobj(Legend):  # also the one below the map is on the sheet
+        box = key.get_window_extent()
+        assert box.y0 >= 0 and box.x1 <= axes.figure.bbox.x1
+
+
+def test_a_title_is_not_cut_in_a_narrow_map():
+    figure = ns.plot.style.new_figure((3.4, 3.0))
+    ax = figure.add_subplot()
+    bounce.plot.outcome_map(golf_map("penner"), ax=ax)
+    figure.draw_without_rendering()
+    figure.draw_without_rendering()
+    assert ax._left_title.get_window_extent().x1 <= figure.bbox.x1
 
 
 def golf_map(law):

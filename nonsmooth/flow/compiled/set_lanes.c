@@ -254,8 +254,23 @@ INLINE void frozen_products(const T *a, T c, const T *h, T radius, T p[K + 1][K 
   p[K][K] = ss + ff - 2.0 * sf;
 }
 
+/* Directions along h and across it in which the frozen solution stays, and that of |h|. As they turn and mirror with
+ * h and a, so do differences along them. */
+INLINE void own_directions(const T *a, const T *h, T radius, T e[3][K + 1]) {
+  T size = length_of(a);
+  UNROLL for (int i = 0; i < K; i++) { e[0][i] = h[i] / radius; e[1][i] = a[i]; e[2][i] = e[0][K] = e[1][K] = BC(0); }
+  for (int again = 0; again < 2; again++) {
+    T along = BC(0);
+    UNROLL for (int i = 0; i < K; i++) along += e[1][i] * e[0][i];
+    UNROLL for (int i = 0; i < K; i++) e[1][i] -= along * e[0][i];
+  }
+  T across = length_of(e[1]);
+  UNROLL for (int i = 0; i < K; i++) e[1][i] = SELECT(across > 1e-13 * size, e[1][i] / across, BC(0));
+  e[2][K] = BC(1);
+}
+
 INLINE void second_order(const Lanes *s, const T *h, T radius, const T *a, T c, Rest *rest) {
-  T way[K + 1], p[K + 1][K + 1], g[K + 1][N], square = BC(0), along = c * radius, change[K + 1] = {BC(0)}, more[K + 1];
+  T way[K + 1], p[K + 1][K + 1], e[3][K + 1], g[K + 1][N], square = BC(0), along = c * radius, change[K + 1] = {BC(0)}, more[K + 1];
   UNROLL for (int i = 0; i < K; i++) { square += a[i] * a[i]; along += a[i] * h[i]; }
   T per = 1.0 / (c * c - square), back = -1.0 / radius;
   way[K] = along * per;
@@ -270,10 +285,15 @@ INLINE void second_order(const Lanes *s, const T *h, T radius, const T *a, T c, 
     rest->one[n] = rest->two[n] = BC(0);
     UNROLL for (int j = 0; j <= K; j++) rest->one[n] += g[j][n] * way[j];
   }
-  UNROLL for (int j = 0; j <= K; j++) { /* the change of all as the state moves along one component */
-    T b[K + 1], y[K + 1], w[K + 1], x[N], f[N], a1[K], m1[K * K], c1 = BC(0), turned = BC(0);
-    UNROLL for (int i = 0; i <= K; i++) { b[i] = BC(i == j); w[i] = p[i][j] - (j < K ? h[j] : radius) * way[i]; }
-    solve_frozen(a, c, per, b, y);
+  own_directions(a, h, radius, e);
+  UNROLL for (int j = 0; j < 3; j++) { /* the change of all as the state moves along one direction */
+    T y[K + 1], w[K + 1], x[N], f[N], a1[K], m1[K * K], c1 = BC(0), turned = BC(0), from = radius * e[j][K];
+    UNROLL for (int i = 0; i < K; i++) from += h[i] * e[j][i];
+    UNROLL for (int i = 0; i <= K; i++) {
+      w[i] = -from * way[i];
+      UNROLL for (int k = 0; k <= K; k++) w[i] += p[i][k] * e[j][k];
+    }
+    solve_frozen(a, c, per, e[j], y);
     UNROLL for (int n = 0; n < N; n++) {
       T direction = BC(0);
       UNROLL for (int i = 0; i <= K; i++) direction += y[i] * g[i][n];

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from benchmarks import space
 from nonsmooth.flow.compiled.lanes import lanes_for
 from nonsmooth.flow.compiled.tape import tape_for
 from nonsmooth.flow.options import Options
@@ -54,6 +55,38 @@ def test_random_landings_agree_with_the_interpreter():
     kind = np.arange(400) % 8
     alone = both(plane.ball("contact", True), x[kind < 5], p[kind < 5], TOL)[0]
     assert lanes.totals[2] < 80 and alone.totals[2] <= 3
+
+
+@pytest.mark.parametrize("kind", ["linear", "nonlinear"])
+def test_mirror_images_are_mirrored_to_the_bit_and_turned_starts_turn(kind):
+    system, x = space.system(kind), space.starts(400)
+    pairs = np.array([[0, 2], [1, 3], [6, 7]])  # places, speeds and slip along the two directions
+
+    def turned(x, by):
+        out = x.copy()
+        out[:, pairs] = x[:, pairs] @ np.transpose(by)
+        return out
+
+    def run(x, tol=TOL):
+        options = Options(t_end=20.0, rtol=tol, atol=tol)
+        found = lanes_for(system, options).run_many(x, system.parameter_vector({}), options, None)
+        assert not found.totals[2]
+        return found.x, found.t, np.array(found.words)[found.itinerary]
+
+    ends, t, words = run(x)
+    for mirror in (np.diag([1, -1]), np.diag([-1, 1])):
+        mirrored = run(turned(x, mirror))
+        assert np.array_equal(turned(mirrored[0], mirror), ends)
+        assert np.array_equal(mirrored[1], t) and np.array_equal(mirrored[2], words)
+    swapped = np.array([[0, 1], [1, 0]])
+    other = run(turned(x, swapped))  # sums of the same in another order
+    assert np.abs(turned(other[0], swapped) - ends).max() < 1e-14
+    # Each state along the ground has its own tolerance, so steps are turned starts' own: the finest show rounding.
+    c, s = np.cos(0.7), np.sin(0.7)
+    turn = np.array([[c, -s], [s, c]])
+    (ends, t, words), other = run(x, 1e-14), run(turned(x, turn), 1e-14)
+    assert np.abs(turned(other[0], turn.T) - ends).max() < 1e-14
+    assert np.abs(other[1] - t).max() < 1e-14 and np.array_equal(other[2], words)
 
 
 def test_an_ensemble_depends_on_no_neighbour():

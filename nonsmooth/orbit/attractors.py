@@ -120,8 +120,6 @@ class Search:
     def _measure(self, x: Array) -> None:
         """Take the extent of states (m, n): the unit of distances, and a box that is far away."""
         finite = x[np.all(np.isfinite(x), axis=1)]
-        if not len(finite):
-            raise PointError("grid: expected finite starts, received none.")
         low, high = finite.min(axis=0), finite.max(axis=0)
         self.scale = np.where(high > low, high - low, 1.0)
         self.box = low - 100 * self.scale, high + 100 * self.scale

@@ -169,7 +169,7 @@ def basins(
         A time, a number of samples or rounds or a section out of its range; no period, though the
         system depends on time.
     PointError
-        Starts or attractors of a wrong shape; no finite start, or an attractor that is not finite.
+        Starts or attractors of a wrong shape, none, or one that is not finite.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
 
@@ -189,6 +189,7 @@ def basins(
     """
     require_system(system)
     starts, axes = _starts(system, grid)
+    _require_finite(starts)
     search = Search(
         system,
         starts.reshape(-1, system.dimension),
@@ -227,6 +228,23 @@ def _listed(system: FilippovSystem, attractors: Sequence[ArrayLike]) -> list[Arr
                 )
             )
     return found
+
+
+def _require_finite(starts: Array) -> None:
+    """Refuse starts (..., n) of which one is no start: no run begins there, so none can fail."""
+    rows = starts.reshape(-1, starts.shape[-1])
+    wrong = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+    if len(rows) and not wrong.size:
+        return
+    first = f", the first of them {rows[wrong[0]].tolist()}" if wrong.size else ""
+    raise PointError(
+        explain(
+            "grid",
+            expected="finite starts, at least one",
+            received=f"{wrong.size} of {len(rows)} that are not finite{first}" if first else "none",
+            advice="Leave out what is no number; basins of part of a grid take a list (m, n).",
+        )
+    )
 
 
 def _starts(

@@ -79,10 +79,18 @@ def test_statuses_are_labels():
         resets=ns.Reset(x, [x, -0.5 * v], -1),
         stops=ns.Stop(x - 4, 1),
     )
-    starts = [[1.0, 0.0], [1.0, 4.0], [np.nan, 0.0], [-1e-3, 0.0]]
+    starts = [[1.0, 0.0], [1.0, 4.0], [-1e-3, 0.0], [-2e-3, 0.0]]
     found = ns.basins(system, starts, t_end=50.0, rounds=4, work=QUIET)
-    assert found.labels[:3].tolist() == [-2, -3, -4] and found.name(-2) == "events accumulate"
+    assert found.labels[:2].tolist() == [-2, -3] and found.name(-2) == "events accumulate"
     assert "stopped 25.00%" in repr(found)
+
+
+def test_what_runs_to_infinity_in_a_finite_time_has_failed():
+    """x' = x^2 - 1 from 2 is infinite at ln(3)/2; from 0 it comes to -1."""
+    found = ns.basins(
+        ns.FilippovSystem([x], field=[x**2 - 1]), [[0.0], [2.0]], t_end=40.0, work=QUIET
+    )
+    assert found.labels.tolist() == [1, -4] and found.name(-4) == "failed"
 
 
 def test_a_chaotic_attractor_is_one():
@@ -141,7 +149,15 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
     [
         ([1.0], {}, ns.PointError, r"grid: expected shape \(..., 2\)"),
         ({"x": [1.0]}, {}, ns.PointError, "a number or an axis"),
-        ([[np.nan, 0.0]], {}, ns.PointError, "expected finite starts"),
+        ([[np.nan, 0.0]], {}, ns.PointError, "grid: expected finite starts"),
+        (
+            [[0.0, 0.0], [1.0, np.nan], [np.inf, 0.0]],
+            {},
+            ns.PointError,
+            r"received 2 of 3 that are not finite, the first of them \[1.0, nan\]",
+        ),
+        ({"x": [0.0, np.nan], "v": 0.0}, {}, ns.PointError, "received 1 of 2 that are not finite"),
+        (np.zeros((0, 2)), {}, ns.PointError, "finite starts, at least one, received none"),
         ([0.0, 0.0], {"near": 2.0}, ns.OptionError, "near: expected a number from 0 to 1"),
         ([0.0, 0.0], {"t_end": 0.0}, ns.OptionError, "t_end: expected a time after"),
         ([0.0, 0.0], {"attractors": [[1.0]]}, ns.PointError, r"expected points \(m, 2\)"),

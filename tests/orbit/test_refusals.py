@@ -291,6 +291,22 @@ def curve(**given):
         ),
         ({"curve": curve(parameter=7)}, ns.DefinitionError, "curve.parameter: expected the index"),
         ({"curve": curve(scale=np.array([1.0, 0.0]))}, ns.DefinitionError, "curve.scale: expected"),
+        (
+            {"curve": curve(tests=lambda self, point: [0.5])},
+            ns.DefinitionError,
+            r"curve.tests: expected a mapping of names to numbers, received \[0.5\]",
+        ),
+        (
+            {"curve": curve(tests=lambda self, point: {"half": "a"})},
+            ns.DefinitionError,
+            "received 'a' under the name 'half'",
+        ),
+        (
+            {"curve": curve(tests=lambda self, point: {3: 0.5}, exact=False)},
+            ns.DefinitionError,
+            "received 0.5 under the name 3",
+        ),
+        ({"curve": curve(tests=lambda self, point: {"x": point.u})}, ns.DefinitionError, "under"),
         ({"rows": []}, ns.PointError, "rows: expected a list of points"),
         ({"rows": None}, ns.PointError, "rows: expected a list of points"),
         ({"rows": ["ab"]}, ns.PointError, "rows"),

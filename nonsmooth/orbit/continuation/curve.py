@@ -13,10 +13,38 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...local.newton import Secant, converge
-from ...model import Array, NonsmoothError
+from ...model import Array, DefinitionError, NonsmoothError, explain, is_real
 
 if TYPE_CHECKING:
     from .zeros import Zero
+
+
+def read_tests(found: Any) -> dict[str, float]:
+    """What ``Curve.tests`` returned, as numbers by name; they may have poles.
+
+    Raises
+    ------
+    DefinitionError
+        No mapping, or one with keys that are no names or values that are no numbers.
+    """
+    if type(found) is dict and all(type(k) is str and type(v) is float for k, v in found.items()):
+        return found
+    if isinstance(found, Mapping):
+        number = lambda v: is_real(v) or isinstance(v, (float, np.floating))
+        wrong = [k for k, v in found.items() if not (isinstance(k, str) and number(v))]
+        if not wrong:
+            return {k: float(v) for k, v in found.items()}
+        received = f"{found[wrong[0]]!r} under the name {wrong[0]!r}"
+    else:
+        received = repr(found)
+    raise DefinitionError(
+        explain(
+            "curve.tests",
+            expected="a mapping of names to numbers",
+            received=received,
+            advice='For example return {"half": float(point.u[0]) - 0.5}.',
+        )
+    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +149,7 @@ class Curve:
         Returns
         -------
         mapping of str to float
-            Their values by name.
+            Their values by name. Anything else is refused (DefinitionError).
         """
         return {}
 
@@ -273,7 +301,7 @@ class Curve:
         """
         if not self.exact:
             plain = Point(u, chord, arclength)
-            return Point(u, chord, arclength, tests=dict(self.tests(plain)))
+            return Point(u, chord, arclength, tests=read_tests(self.tests(plain)))
         try:
             jacobian = self.equations(u)[1] * self.scale
             tangent, sign = self.along(jacobian, before)
@@ -282,9 +310,10 @@ class Curve:
                 tests["fold"] = float(tangent[self.parameter])
             if self.branching:
                 tests["branch point"] = sign
-            tests.update(self.tests(Point(u, tangent, arclength, jacobian)))
+            own = self.tests(Point(u, tangent, arclength, jacobian))
         except (NonsmoothError, np.linalg.LinAlgError):
             return None
+        tests.update(read_tests(own))
         return Point(u, tangent, arclength, jacobian, tests)
 
     def solve(self, matrix: Array, right: Array) -> Array:

@@ -29,7 +29,8 @@ from .poincare import (
     PoincareOrbit,
     poincare,
 )
-from .sensitivity import Gradient, gradient, saltation_matrix, sensitivity, vjp
+from .saltation_matrix import saltation_matrix
+from .sensitivity import Gradient, gradient, sensitivity, vjp
 from .two_fold_curves import TraceError, trace_two_folds
 from .variation import Sensitivity
 

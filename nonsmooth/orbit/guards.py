@@ -191,6 +191,13 @@ def change_fault(
     return _change_fault(system, leg, float(own.gradient @ rate), field, begin, p)
 
 
+def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
+    """A guard of a leg's mode that is negative where the leg ends; empty if there is none."""
+    field = guarded_field(system, leg.mode)
+    values = np.vstack([part[:, :1] for part in field.starts.copied(end, p)])
+    return _negative(field, values, p)
+
+
 def _change_fault(
     system: FilippovSystem, leg: Leg, speed: float, field: GuardedField, begin: Array, p: Array
 ) -> str:
@@ -207,6 +214,12 @@ def _change_fault(
 
 def _following_fault(field: GuardedField, begin: Array, p: Array) -> str:
     """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
+    fault = _negative(field, begin, p)
+    return fault and f"where mode {field.motion.mode!r} begins after it, {fault}"
+
+
+def _negative(field: GuardedField, begin: Array, p: Array) -> str:
+    """The first guard whose first coefficient that is not zero is negative, in words."""
     guards = field.motion.guards
     states, rows = begin[: len(begin) - len(guards)], begin[len(begin) - len(guards) :]
     if not len(rows) or float(rows.min()) >= 0.0:
@@ -221,8 +234,7 @@ def _following_fault(field: GuardedField, begin: Array, p: Array) -> str:
         for value, size in zip(rows[k].tolist(), scale.tolist(), strict=False):
             if abs(value) > _NEGATIVE * size:
                 if value < 0.0:
-                    mode = field.motion.mode
-                    return f"where mode {mode!r} begins after it, {described(guard)} fails"
+                    return f"{described(guard)} fails"
                 break
     return ""
 

@@ -1,4 +1,4 @@
-"""The verbs ``sensitivity``, ``gradient``, ``vjp`` and ``saltation_matrix``: derivatives of a run."""
+"""The verbs ``sensitivity``, ``gradient`` and ``vjp``: derivatives of a run."""
 
 from __future__ import annotations
 
@@ -17,17 +17,12 @@ from ..model import (
     FilippovSystem,
     OptionError,
     ParameterError,
-    Parameters,
     PointError,
     explain,
     read_function,
     real_array,
-    require_system,
 )
 from ..model.event_maps import EventMap, function_map
-from .itinerary import leg_between
-from .legs import Leg
-from .saltation import saltation
 from .set_sensitivity import set_sensitivity
 from .variation import Passage, Sensitivity, along, passages
 
@@ -255,79 +250,6 @@ def vjp(
     whole[:n] = row
     back, by_parameters = _pulled(parts, whole, chosen, stopped=_stopped(parts[-1]))
     return back[:n], by_parameters
-
-
-def saltation_matrix(
-    system: FilippovSystem,
-    before: str,
-    after: str,
-    point: ArrayLike,
-    *,
-    event: str = "",
-    t: float = 0.0,
-    parameters: Parameters | None = None,
-) -> Array:
-    """The saltation matrix of one event: how perturbations of an orbit pass it.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        The one with the event.
-    before, after : str
-        Modes on the two sides of the event.
-    point : array_like (n,)
-        Where the event happens, before a reset.
-    event : str, optional
-        Name of the event (``"h0"``, a reset, an impact), where the letters of the modes do not tell it.
-    t : float, optional
-        Time, where the system depends on it.
-    parameters : mapping, optional
-        Values of parameters; default the system's.
-
-    Returns
-    -------
-    ndarray (n, n)
-        It maps small deviations of the state before the event to those after it.
-
-    Raises
-    ------
-    DegenerateError
-        The orbit grazes the surface.
-    OptionError
-        The modes do not tell the event, or none of that name joins them.
-    DefinitionError
-        ``system`` is none, or has vector multipliers; modes that it does not have.
-    ParameterError
-        An unknown parameter, one without a value, or a value that is not a finite number.
-    PointError
-        A point of a wrong shape or not finite.
-
-    Notes
-    -----
-    $S = g_x + (f+ - g_x f-) e_x/(e_x f-)$, time included (Leine & Nijmeijer 2004, ch. 7).
-
-    Examples
-    --------
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
-    >>> ns.saltation_matrix(system, "+", "-", [0.0, 0.0])
-    array([[ 1. , -1. ],
-           [ 0. ,  0.5]])
-    """
-    require_system(system)
-    p, x = system.parameter_vector(parameters), system.extended_point(point, t)
-    for mode in (before, after):
-        system.parse_letters(mode)  # refuses what is no mode
-    leg = leg_between(system, before, after, event)
-    field, following = leg.field(system), Leg(after).field(system)
-    y = field.initial(x, p)
-    at = leg.at_end(system, y[:, 0], p)
-    start = following.states_at(at.after, p)
-    rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
-    size, n = system.extended_dimension, system.dimension
-    matrix = saltation(at, rates[0], rates[1][:size], f"{leg.name!r} at {x[:n].tolist()}").matrix
-    return np.asarray((matrix @ y[:, 1 : 1 + size])[:n, :n])
 
 
 def _stopped(last: Passage) -> bool:

@@ -265,10 +265,47 @@ def test_saltation_matrices_are_those_of_exact_fractions() -> None:
     assert np.array_equal(found, exact(values["time_dependent"]))
     after = [x + y / 4, -y / 2]
     jump = ns.FilippovSystem(
-        [x, y], surface=x - y, above=[1, 2], below=[1, -2], resets=ns.Reset(y, after, -1, "jump")
+        [x, y], surface=x, above=[1, 2], below=[1, -2], resets=ns.Reset(y, after, -1, "jump")
     )
     found = ns.saltation_matrix(jump, "-", "+", at, event="jump")
     assert np.array_equal(found, exact(values["reset"]))
+
+
+TURN = ns.FilippovSystem([x, y], surface=y, above=[1, x], below=[1, 1])
+HALF = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
+FLOOR = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
+
+
+@pytest.mark.parametrize(
+    ("system", "before", "after", "point", "message"),
+    [
+        (HALF, "+", "-", [0.0, 1.0], r"h0 = 0, received \[0.0, 1.0\], where it is 1"),
+        (HALF, "+", "-", [0.0, 1e-8], "where it is 1e-08"),
+        (HALF, "-", "+", [0.0, 0.0], "h0 < 0 is about to hold, not to fail"),
+        (HALF, "+", "s", [0.0, 0.0], "the condition L_F2 h >= 0 of sliding fails"),
+        (TURN, "s", "+", [0.0, 1.0], r"'L_F1 h' happens in mode 's': h0 = 0"),
+        (TURN, "s", "+", [1.0, 0.0], "L_F1 h = 0, received"),
+        (TURN, "+", "s", [1.0, 0.0], "h0 > 0 is about to hold"),
+        (FLOOR, "o", "o", [1e-3, -1.0], "where it is 0.001"),
+        (FLOOR, "o", "o", [0.0, 1.0], "the gap of 'impact' >= 0 is about to hold"),
+    ],
+)
+def test_a_point_at_which_no_such_event_happens_has_no_saltation_matrix(
+    system, before, after, point, message
+) -> None:
+    with pytest.raises(ns.PointError, match=message):
+        ns.saltation_matrix(system, before, after, point)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
+def test_points_that_are_on_the_event_to_rounding_are_taken(size) -> None:
+    """The tolerance is relative: the units of the states do not matter."""
+    system = ns.FilippovSystem([x, y], surface=3 * x - y, above=[1, -1], below=[2, -1])
+    line = np.array([1.0, 3.0]) * size / 3.0
+    found = ns.saltation_matrix(system, "-", "+", line)  # S = 1 + (f+ - f-) e_x/(e_x f-)
+    assert np.abs(found - np.eye(2) - np.outer([-1, 0], [3, -1]) / 7).max() < 1e-15
+    with pytest.raises(ns.PointError, match="happens in mode"):
+        ns.saltation_matrix(system, "-", "+", line * [1.0, 1.0 + 1e-6])
 
 
 def test_bad_input_is_refused_in_words() -> None:

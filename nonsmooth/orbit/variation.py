@@ -23,6 +23,7 @@ from .collocation import collocated
 from .flight import Flight, Flights
 from .guards import described, watch
 from .legs import Flown, Leg, Stretch, fly, stretches
+from .near_grazes import require_known
 from .saltation import Saltation, saltation, saltations
 
 
@@ -76,7 +77,7 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     Raises
     ------
     DegenerateError
-        An event that is grazed, a corner, impacts that accumulate.
+        An event that is grazed, also within the run's error; a corner, impacts that accumulate.
     """
     system = run.system
     p = system.parameter_vector(run.parameters)
@@ -88,12 +89,15 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
             p,
         )
     except ConvergenceError:
-        return _one_by_one(run, parts, p, chosen)
+        found = _one_by_one(run, parts, p, chosen)
+        require_known(system, found, p)
+        return found
     found = _together(parts, flight)
     if parts[-1].leg.name and run.events[-1].kind == "end":  # the run ends at the very event
         last = found[-1]
         jump = saltation_after(run, last.stretch, last.flown, None, p)
         found[-1] = replace(last, event=jump)
+    require_known(system, found, p)
     return found
 
 

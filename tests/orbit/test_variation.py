@@ -271,6 +271,42 @@ def test_saltation_matrices_are_those_of_exact_fractions() -> None:
     assert np.array_equal(found, exact(values["reset"]))
 
 
+def swing(a0: float, tol: float, r: float = 0.5) -> tuple[ns.Trajectory, float]:
+    """x'' = -x from -a0 against a wall at 1, and the derivative of x at t = 4 by the start."""
+    wall = ns.FilippovSystem([x, v], field=[v, -x], resets=ns.Reset(x - 1, [x, -r * v], 1))
+    run = ns.simulate(wall, [-a0, 0.0], t_end=4.0, tol=tol)
+    speed = max(a0**2 - 1, 1e-300) ** 0.5  # at the wall, after the time arccos(-1/a0)
+    later, sooner = 4.0 - np.arccos(-1 / a0), 1 / (a0 * speed)
+    by_later = -np.sin(later) - r * speed * np.cos(later)
+    return run, -float(by_later * sooner - r * a0 / speed * np.sin(later))
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-10])
+@pytest.mark.parametrize("ask", [ns.sensitivity, lambda run: ns.vjp(run, [1.0, 0.0])])
+def test_an_impact_that_a_run_has_by_its_error_alone_is_a_graze(tol, ask) -> None:
+    run, _ = swing(1.0, tol)
+    assert run.events[0].name == "reset"  # by rounding; the exact orbit touches the wall
+    with pytest.raises(ns.DegenerateError, match="that the run is sure of, received a grazing"):
+        ask(run)
+
+
+@pytest.mark.parametrize(
+    ("beyond", "tol", "rel"), [(1e-6, 1e-8, 1e-4), (1e-8, 1e-12, 1e-4), (1e-10, 1e-14, 1e-4)]
+)
+def test_impacts_that_nearly_graze_have_their_derivative(beyond, tol, rel) -> None:
+    run, expected = swing(1.0 + beyond, tol)
+    assert abs(expected) > 400.0
+    assert ns.sensitivity(run).dx_dx0[0, 0] == pytest.approx(expected, rel=rel)
+
+
+def test_a_flat_impact_of_an_orbit_that_does_not_turn_back_is_no_graze() -> None:
+    flat = ns.FilippovSystem(
+        [x, y], field=[1, -1e-6 * b], resets=ns.Reset(y, [x, y + 1], -1), parameters={b: 1.0}
+    )
+    s = ns.sensitivity(ns.simulate(flat, [0.0, 1e-6], t_end=3.0))
+    assert s.event_times == pytest.approx([1.0]) and s.dt_dx0[0, 1] == pytest.approx(1e6)
+
+
 TURN = ns.FilippovSystem([x, y], surface=y, above=[1, x], below=[1, 1])
 HALF = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
 FLOOR = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 import math
 
-from ..golf import fit
+from ..golf import DataError, fit
 from .choices import chosen_model, ground_arguments
 from .report import opening, print_json
 
@@ -28,16 +28,19 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace) -> int:
     """Fit, and print what was found."""
     chosen = chosen_model(args)
-    found = fit(
-        chosen.model,
-        args.data,
-        parameters=[name.strip() for name in args.parameters.split(",") if name.strip()],
-        ball=chosen.ball,
-        scaling=chosen.scaling,
-        starts=args.starts,
-        bad_rows="leave out" if args.leave_out else "raise",
-        progress=True,
-    )
+    try:
+        found = fit(
+            chosen.model,
+            args.data,
+            parameters=[name.strip() for name in args.parameters.split(",") if name.strip()],
+            ball=chosen.ball,
+            scaling=chosen.scaling,
+            starts=args.starts,
+            bad_rows="leave out" if args.leave_out else "raise",
+            progress=True,
+        )
+    except DataError as error:  # what it advises is an option of the function
+        raise DataError(str(error).replace("bad_rows='leave out'", "--leave-out")) from error
     ends = found.profile() if found.narrow else {}
     profile = {name: ends[name] for name in found.narrow}
     if args.json:

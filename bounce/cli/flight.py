@@ -7,8 +7,9 @@ from typing import Any
 
 from ..golf import AIRS, Flight, Run, SideFlight, SideRun, flight
 from ..units import Landing
+from .batch import tabulate
 from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
-from .report import Units, in_words, opening, polar, print_json, tabulate
+from .report import Units, echoed, in_words, opening, polar, print_json
 from .shot import UNVALIDATED, run_arguments, run_lines, run_report, to_rest
 from .side import (
     asked_for_side,
@@ -19,7 +20,7 @@ from .side import (
     side_to_rest,
     sideways,
 )
-from .starts import start_arguments, starts
+from .starts import Start, start_arguments, starts
 
 HELP = "a launch: carry and landing, and with a ground the run until rest"
 ABOUT = f"Fly a ball to the ground; with --turf or --model also to rest. {UNVALIDATED}"
@@ -41,22 +42,27 @@ def run(args: argparse.Namespace) -> int:
     chosen = chosen_model(args)
     require_scale(args, chosen)
     side = asked_for_side(args)
+
+    def report_on(start: Start) -> dict[str, Any]:
+        assert start.state is not None
+        if side:
+            report = _side_report(start.state, *_fly_aside(args, chosen, start.state))
+        else:
+            report = _report(*_fly(args, chosen, start.state))
+        return {**report, "launch": echoed(report["launch"], start.typed, args.units)}
+
+    given = starts(args, up=True)
     if args.input is not None:
-
-        def report_on(launch: Landing) -> dict[str, Any]:
-            if side:
-                return _side_report(launch, *_fly_aside(args, chosen, launch))
-            return _report(*_fly(args, chosen, launch))
-
-        return tabulate(args, starts(args, up=True), report_on)
-    ((launch, _),) = starts(args, up=True)
+        return tabulate(args, given, report_on)
+    units, launch = Units(args.units), given[0].state
     assert launch is not None
+    if args.json:
+        report = units.report(report_on(given[0]))
+        print_json({**opening(args), "units": units.names, **report})
+        return 0
     if side:
         return _print_side(args, chosen, launch)
-    units, (path, rest) = Units(args.units), _fly(args, chosen, launch)
-    if args.json:
-        print_json({**opening(args), "units": units.names, **units.report(_report(path, rest))})
-        return 0
+    path, rest = _fly(args, chosen, launch)
     print(
         f"carry     {units.say('length', path.range)} in {path.time:.2f} s, "
         f"{units.say('height', path.height)} high\nlanding   {in_words(path.landing, units)}"
@@ -83,19 +89,13 @@ def _report(path: Flight, rest: Run | None) -> dict[str, Any]:
         landing=polar(path.landing),
     )
     if rest is not None:
-        report |= dict(
-            run=run_report(rest), total=path.range + rest.run_out, cautions=list(rest.cautions)
-        )
-    return report
+        report |= dict(run=run_report(rest), total=path.range + rest.run_out)
+    return report | dict(cautions=_cautions(path, rest))
 
 
 def _print_side(args: argparse.Namespace, chosen: Chosen, launch: Landing) -> int:
     """Fly a ball with side spin, and print where it lands and comes to rest."""
     units, (path, rest) = Units(args.units), _fly_aside(args, chosen, launch)
-    if args.json:
-        report = units.report(_side_report(launch, path, rest))
-        print_json({**opening(args), "units": units.names, **report})
-        return 0
     heading = units.say("angle", abs(path.landing.heading), 1)
     print(
         f"carry     {units.say('length', path.range)}, {sideways(path.side, units)}, in {path.time:.2f} s, "
@@ -136,6 +136,9 @@ def _side_report(launch: Landing, path: SideFlight, rest: SideRun | None) -> dic
             run=side_run_report(rest),
             total=path.range + float(rest.rest[0]),
             total_side=path.side + float(rest.rest[1]),
-            cautions=list(rest.cautions),
         )
-    return report
+    return report | dict(cautions=_cautions(path, rest))
+
+
+def _cautions(path: Flight | SideFlight, rest: Run | SideRun | None) -> list[str]:
+    return [*path.cautions, *(() if rest is None else rest.cautions)]

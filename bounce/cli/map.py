@@ -15,7 +15,7 @@ from ..laws import BounceLaw
 from ..maps.dividing import DividingCurve, dividing_curve
 from ..maps.outcomes import OutcomeMap, outcome_map
 from .choices import Chosen, chosen_model, ground_arguments, require_scale
-from .report import opening, print_json
+from .report import in_course, opening, print_json
 from .starts import NAMES
 from .values import SYSTEMS, assignment, in_si, span
 
@@ -82,9 +82,16 @@ def run(args: argparse.Namespace) -> int:
         model = repr(chosen.model)
         print_json({**opening(args), "model": model, "output": args.output, "share": shares})
     else:
-        print("\n".join(f"{share:8.2%}  {name}" for name, share in shares.items()))
+        print("\n".join(f"{share:8.2%}  {_in_words(name)}" for name, share in shares.items()))
+        if isinstance(chosen.model, BounceLaw):
+            print("+ and - are the sign of the slip at touch-down")
         print(f"wrote {args.output}")
     return 0
+
+
+def _in_words(name: str) -> str:
+    """A region with what it means, unless that is long."""
+    return name if name == "no lift-off" or len(name.split()) > 4 else in_course(name)
 
 
 def _map(args: argparse.Namespace, chosen: Chosen) -> OutcomeMap:

@@ -3,21 +3,18 @@
 from __future__ import annotations
 
 import argparse
-import csv
 import json
 import math
-import sys
-import warnings
-from collections.abc import Callable, Iterable, Sequence
-from typing import Any, TextIO
+from typing import Any
 
 import nonsmooth as ns
 
+from ..laws.law import CASES
 from ..units import Landing
 from .values import SYSTEMS, Quantity, Span, factor
 
 #: What argparse keeps that is no input of the computation.
-_NO_INPUTS = ("run", "json", "command", "output", "usual_turf")
+_NO_INPUTS = ("run", "json", "command", "output", "resume", "usual_turf")
 
 
 #: What the names of a report measure.
@@ -34,9 +31,14 @@ class Units:
 
     def __init__(self, system: str):
         self.names = SYSTEMS[system]
+        self._system = system
 
-    def show(self, kind: str, value: float) -> float:
-        """Return a value in SI units in those asked for."""
+    def show(self, kind: str, value: float | Quantity) -> float:
+        """Return a value in SI units, or as it was typed, in those asked for."""
+        if isinstance(value, Quantity):
+            if value.named(self._system) == self.names[kind]:
+                return value.value
+            value = value.si(self._system)
         return value / factor(kind, self.names[kind])
 
     def say(self, kind: str, value: float, digits: int = 2) -> str:
@@ -73,6 +75,18 @@ def polar(state: Landing) -> dict[str, float]:
     return dict(speed=state.speed, angle=angle, spin=state.omega)
 
 
+def echoed(report: dict[str, float], typed: dict[str, Quantity], system: str) -> dict[str, Any]:
+    """A reported state in SI units, its numbers as they were typed where they are the same.
+
+    A speed or an angle that went through the components of a velocity differs in its last digit.
+    """
+    shown: dict[str, Any] = dict(report)
+    for name, given in typed.items():
+        if math.isclose(given.si(system), report[name], rel_tol=1e-12):
+            shown[name] = given
+    return shown
+
+
 def in_words(state: Landing, units: Units) -> str:
     """Speed, angle and spin of a state in a line."""
     digits = dict(speed=2, angle=4 if units.names["angle"] == "rad" else 1, spin=0)
@@ -82,19 +96,16 @@ def in_words(state: Landing, units: Units) -> str:
 def in_course(itinerary: str) -> str:
     """An itinerary of modes, or the case of a rigid impact, with what it means in words."""
     cases = itinerary.rstrip("+-").split("/")
-    if all(case in _CASES for case in cases):
-        return f"{itinerary}: {' or '.join(_CASES[case] for case in cases)}"
+    if all(case in CASES for case in cases):
+        return f"{itinerary}: {' or '.join(CASES[case] for case in cases)}"
     return f"{itinerary}: {', '.join(_MODES.get(mode, mode) for mode in itinerary.split())}"
 
 
-#: What the letters of a mode and the cases of a rigid impact mean.
-_MODES = {"+": "slips forward", "-": "slips in reverse", "*": "slips", "s": "rolls"}
-_CASES = {
-    "I": "slips throughout",
-    "II": "slips, then rolls from restitution on",
-    "III": "slips, then rolls from compression on",
-    "grip": "slips, then grips the ground",
-}
+#: What the letters of a mode mean, of a course and of a map.
+_MODES = {
+    "+": "slips forward", "-": "slips in reverse", "*": "slips", "s": "rolls",
+    "S+": "slips forward", "S-": "slips in reverse", "R": "rolls",
+}  # fmt: skip
 
 
 def opening(args: argparse.Namespace) -> dict[str, Any]:
@@ -126,58 +137,3 @@ def _plain(value: Any, system: str) -> Any:
 def print_json(report: dict[str, Any]) -> None:
     """Print a report that any reader of JSON can read."""
     print(json.dumps(report, indent=2, allow_nan=False))
-
-
-def tabulate(
-    args: argparse.Namespace,
-    starts: Iterable[tuple[Landing | None, str]],
-    report: Callable[[Landing], dict[str, Any]],
-) -> int:
-    """Report on each start, as CSV or JSON; what is wrong with one is said in its row.
-
-    Returns
-    -------
-    int
-        0, or 1 if something is wrong with one.
-    """
-    units, reports, wrong, warned = Units(args.units), list[dict[str, Any]](), 0, 0
-    for start, error in starts:
-        found: dict[str, Any] = {}
-        if start is not None:
-            try:
-                with warnings.catch_warnings():
-                    warnings.simplefilter("ignore", UserWarning)  # in the column of cautions
-                    found = report(start)
-            except ns.NonsmoothError as failure:
-                error = " ".join(str(failure).split())
-        reports.append({"row": len(reports) + 1, **found, "error": error})
-        wrong += bool(error)
-        warned += bool(found.get("cautions"))
-    if args.json:
-        rows = [units.report(r) for r in reports]
-        print_json({**opening(args), "units": units.names, "rows": rows})
-    else:
-        write_rows([units.row(r) for r in reports], args.output)
-    if warned:
-        print(f"bounce: caution: {warned} of {len(reports)} rows: see cautions", file=sys.stderr)
-    if wrong:
-        print(
-            f"bounce: error: {wrong} of {len(reports)} rows: see the column error", file=sys.stderr
-        )
-    return 1 if wrong else 0
-
-
-def write_rows(rows: Sequence[dict[str, Any]], path: str | None) -> None:
-    """Write rows as CSV, to a file or to the terminal; a name that is missing in a row stays empty."""
-    names = list(dict.fromkeys(name for row in rows for name in row))
-    if path is None:
-        _write(rows, names, sys.stdout)
-        return
-    with open(path, "w", newline="", encoding="utf-8") as file:
-        _write(rows, names, file)
-
-
-def _write(rows: Sequence[dict[str, Any]], names: list[str], file: TextIO) -> None:
-    writer = csv.DictWriter(file, names, restval="", lineterminator="\n")
-    writer.writeheader()
-    writer.writerows(rows)

@@ -7,8 +7,9 @@ from typing import Any
 
 from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideRebound, SideRun, play, rebound
 from ..units import Landing
+from .batch import tabulate
 from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
-from .report import Units, in_course, in_words, opening, polar, print_json, tabulate
+from .report import Units, echoed, in_course, in_words, opening, polar, print_json
 from .side import (
     asked_for_side,
     counted,
@@ -21,7 +22,7 @@ from .side import (
     side_state,
     side_to_rest,
 )
-from .starts import start_arguments, starts
+from .starts import Start, start_arguments, starts
 from .values import number, quantity
 
 HELP = "a landing: the bounce, and the run until rest"
@@ -58,35 +59,29 @@ def run(args: argparse.Namespace) -> int:
     chosen = chosen_model(args)
     require_scale(args, chosen)
     side = asked_for_side(args)
+
+    def report_on(start: Start) -> dict[str, Any]:
+        assert start.state is not None
+        if side:
+            report = _side_report(chosen, *_bounce_aside(args, chosen, start.state))
+        else:
+            report = _report(chosen, *_bounce(args, chosen, start.state))
+        return {**report, "landing": echoed(report["landing"], start.typed, args.units)}
+
+    given = starts(args, up=False)
     if args.input is not None:
-
-        def report_on(one: Landing) -> dict[str, Any]:
-            if side:
-                return _side_report(chosen, *_bounce_aside(args, chosen, one))
-            return _report(chosen, *_bounce(args, chosen, one))
-
-        return tabulate(args, starts(args, up=False), report_on)
-    ((landing, _),) = starts(args, up=False)
+        return tabulate(args, given, report_on)
+    units, landing = Units(args.units), given[0].state
     assert landing is not None
-    if side:
-        return _print_side(args, chosen, landing)
-    units, (hit, rest) = Units(args.units), _bounce(args, chosen, landing)
     if args.json:
-        report = units.report(_report(chosen, hit, rest))
+        report = units.report(report_on(given[0]))
         print_json({**opening(args), "units": units.names, **report})
+    elif side:
+        kick, run_aside = _bounce_aside(args, chosen, landing)
+        lines = side_lines(kick, units)
+        print("\n".join(lines + (side_run_lines(run_aside, units) if run_aside else [])))
     else:
-        print("\n".join(_lines(hit, rest, chosen, units)))
-    return 0
-
-
-def _print_side(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> int:
-    """Bounce a ball with side spin, and print what becomes of it."""
-    units, (hit, rest) = Units(args.units), _bounce_aside(args, chosen, landing)
-    if args.json:
-        report = units.report(_side_report(chosen, hit, rest))
-        print_json({**opening(args), "units": units.names, **report})
-    else:
-        print("\n".join(side_lines(hit, units) + (side_run_lines(rest, units) if rest else [])))
+        print("\n".join(_lines(*_bounce(args, chosen, landing), chosen, units)))
     return 0
 
 

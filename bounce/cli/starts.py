@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import math
-from collections.abc import Iterator
+from typing import NamedTuple
 
 import nonsmooth as ns
 
-from ..golf.columns import read_columns
+from ..golf.columns import Row, read_rows
 from ..units import Landing
-from .values import KINDS, Quantity, factor, quantity
+from .values import KINDS, Quantity, quantity
 
 NAMES = ("speed", "angle", "spin")
 _HELP = dict(
@@ -18,6 +18,23 @@ _HELP = dict(
     angle="between path and ground, such as 37.3 or 0.65rad",
     spin="backspin positive, such as 2094 or 219rad/s",
 )
+
+
+class Start(NamedTuple):
+    """A start, or what is wrong with it.
+
+    Attributes
+    ----------
+    state : Landing or None
+        None where something is wrong.
+    typed : dict of str to Quantity
+        Speed, angle and spin as they were given.
+    error : str
+    """
+
+    state: Landing | None
+    typed: dict[str, Quantity]
+    error: str
 
 
 def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
@@ -32,10 +49,13 @@ def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     parser.add_argument(
         "--output", metavar="FILE", help="of --input: CSV, to the terminal if not given"
     )
+    parser.add_argument(
+        "--resume", action="store_true", help="go on behind the rows that --output has already"
+    )
 
 
-def starts(args: argparse.Namespace, up: bool) -> Iterator[tuple[Landing | None, str]]:
-    """Give each start, or None and what is wrong with it.
+def starts(args: argparse.Namespace, up: bool) -> list[Start]:
+    """Return each start, or what is wrong with it.
 
     Raises
     ------
@@ -50,26 +70,28 @@ def starts(args: argparse.Namespace, up: bool) -> Iterator[tuple[Landing | None,
                 f"{', '.join('--' + m for m in missing)}: expected a number, or --input FILE, received "
                 "none."
             )
-        yield _start(given, args.units, up, "--"), ""
-        return
+        if args.resume:
+            raise ns.OptionError("--resume: expected with --input and --output, received neither.")
+        return [Start(_start(given, args.units, up, "--"), given, "")]
     if len(missing) < len(NAMES):
         raise ns.OptionError(
             f"--input: expected instead of {', '.join('--' + n for n in NAMES)}, received both."
         )
-    table = read_columns(args.input, {name: KINDS[name] for name in NAMES})
-    absent = [name for name in NAMES if name not in table.values]
+    table = read_rows(args.input, {name: KINDS[name] for name in NAMES})
+    absent = [name for name in NAMES if name not in table.units]
     if absent:
         raise ns.OptionError(f"--input: expected columns {absent}, received {table.titles}.")
-    for row in zip(*(table.values[name].tolist() for name in NAMES), strict=True):
-        typed = {
-            name: Quantity(value / factor(name, unit) if unit else value, unit, name)
-            for name, value in zip(NAMES, row, strict=True)
-            for unit in [table.units[name]]
-        }
-        try:
-            yield _start(typed, args.units, up, ""), ""
-        except ns.OptionError as error:
-            yield None, " ".join(str(error).split())
+    return [_of_row(row, table.units, args.units, up) for row in table.rows]
+
+
+def _of_row(row: Row, units: dict[str, str | None], system: str, up: bool) -> Start:
+    if row.error:
+        return Start(None, {}, row.error + ".")
+    typed = {name: Quantity(row.values[name], units[name], name) for name in NAMES}
+    try:
+        return Start(_start(typed, system, up, ""), typed, "")
+    except ns.OptionError as error:
+        return Start(None, typed, " ".join(str(error).split()))
 
 
 def _start(given: dict[str, Quantity], system: str, up: bool, prefix: str) -> Landing:

@@ -78,13 +78,13 @@ def in_si(name: str, typed: Quantity, system: str) -> float:
 
 def number(text: str) -> float:
     """Read a finite number."""
-    value = float(text)
+    try:
+        value = float(text)
+    except ValueError:
+        fail(text, "a number")
     if not math.isfinite(value):
-        raise ValueError(text)
+        fail(text, "a number that is finite, so between -1.8e308 and 1.8e308")
     return value
-
-
-number.__name__ = "number"  # what argparse calls it in its messages
 
 
 def quantity(kind: str) -> Callable[[str], Quantity]:
@@ -100,7 +100,6 @@ def quantity(kind: str) -> Callable[[str], Quantity]:
             fail(text, f"{article} {kind} such as 1 or {example} (units: {units})")
         return Quantity(number(found[1]), unit, kind)
 
-    read.__name__ = kind  # what argparse calls it where the number is not finite
     return read
 
 

@@ -18,10 +18,11 @@ Examples
 """
 
 from ..units import GOLF
+from .air import AIRS, QUINTAVALLA, SMITS_SMITH, Air
 from .columns import DataError
 from .fit_result import FitError, FitResult, IdentifiabilityWarning, Start
 from .fitting import fit
-from .flight import AIRS, QUINTAVALLA, SMITS_SMITH, Air, Flight, flight
+from .flight import Flight, flight
 from .ground import ExtrapolationWarning, Rebound, rebound
 from .maps import landing_map
 from .measurements import Measurements, read_measurements

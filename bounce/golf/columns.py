@@ -38,10 +38,45 @@ class Columns(NamedTuple):
         Of every column, as received.
     units : dict of str to str or None
         Of the columns that were asked for, as received.
+    words : dict of int to str
+        Rows, from 1, with something else than a number, which is NaN in ``values``; and what it is.
     """
 
     values: dict[str, Array]
     si: bool
+    titles: list[str]
+    units: dict[str, str | None]
+    words: dict[int, str]
+
+
+class Row(NamedTuple):
+    """A row of a file, as it was typed.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        By name, in the unit of the column; empty where something is wrong.
+    error : str
+        What is wrong with it, or nothing.
+    """
+
+    values: dict[str, float]
+    error: str
+
+
+class Rows(NamedTuple):
+    """Rows of a file, of which some may be wrong.
+
+    Attributes
+    ----------
+    rows : list of Row
+    titles : list of str
+        Of every column, as received.
+    units : dict of str to str or None
+        Of the columns that were asked for, as received.
+    """
+
+    rows: list[Row]
     titles: list[str]
     units: dict[str, str | None]
 
@@ -73,10 +108,62 @@ def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
     read = [(*_title(title), str(title), values) for title, values in table]
     read = [column for column in read if column[0] in kinds]
     _require_each_once([(name, title) for name, _, title, _ in read])
+    units = {name: unit for name, unit, _, _ in read}
+    si = _in_si([(name, unit, title) for name, unit, title, _ in read], kinds)
     columns: dict[str, Array] = {}
-    si, without = False, list[str]()
+    words: dict[int, str] = {}
     for name, unit, title, values in read:
-        columns[name] = _numbers(values, title)
+        columns[name] = _numbers(values, title, words)
+        if unit is not None:
+            columns[name] = columns[name] * UNITS[kinds[name]][unit]
+    lengths = {name: len(values) for name, values in columns.items()}
+    if len(set(lengths.values())) > 1:
+        raise DataError(f"data: expected columns of one length, received {lengths}.")
+    if columns and not next(iter(lengths.values())):
+        raise DataError("data: expected at least one row, received none.")
+    return Columns(columns, si, [str(title) for title, _ in table], units, words)
+
+
+def read_rows(path: str, kinds: Mapping[str, str]) -> Rows:
+    """Read the columns ``name [unit]`` of a file row by row; what is wrong with one is said in it.
+
+    Parameters
+    ----------
+    path : str
+        Of a CSV file with names in its first row.
+    kinds : mapping of str to str
+        As :func:`read_columns`.
+
+    Returns
+    -------
+    Rows
+
+    Raises
+    ------
+    DataError
+        Of the file: it is not readable, or has columns that cannot be understood.
+    """
+    titles, cells = _csv(Path(path))
+    places = [(*_title(title), k) for k, title in enumerate(titles)]
+    places = [place for place in places if place[0] in kinds]
+    _require_each_once([(name, titles[k]) for name, _, k in places])
+    _in_si([(name, unit, titles[k]) for name, unit, k in places], kinds)
+    if not cells:
+        raise DataError("data: expected at least one row, received none.")
+    rows = []
+    for row in cells:
+        try:
+            _require_length(row, titles)
+            rows.append(Row({name: _number(row[k], titles[k]) for name, _, k in places}, ""))
+        except ValueError as wrong:
+            rows.append(Row({}, str(wrong)))
+    return Rows(rows, titles, {name: unit for name, unit, _ in places})
+
+
+def _in_si(read: list[tuple[str, str | None, str]], kinds: Mapping[str, str]) -> bool:
+    """Whether columns (name, unit, title) have units, which must be known and in all of them or none."""
+    si, without = False, list[str]()
+    for name, unit, title in read:
         if unit is None:
             without.append(title)
             continue
@@ -85,22 +172,14 @@ def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
             raise DataError(
                 f"column {title!r}: expected a unit among {list(known)}, received {unit!r}."
             )
-        si = (
-            si or kinds[name] != "angle"
-        )  # the angles of a dimensionless model may say what they are
-        columns[name] = columns[name] * known[unit]
+        # the angles of a dimensionless model may say what they are
+        si = si or kinds[name] != "angle"
     if si and without:
         raise DataError(
             f"data: expected units in all columns or in none, received none in {without}. Write "
             "'speed [m/s]', 'spin [rpm]'."
         )
-    lengths = {name: len(values) for name, values in columns.items()}
-    if len(set(lengths.values())) > 1:
-        raise DataError(f"data: expected columns of one length, received {lengths}.")
-    if columns and not next(iter(lengths.values())):
-        raise DataError("data: expected at least one row, received none.")
-    units = {name: unit for name, unit, _, _ in read}
-    return Columns(columns, si, [str(title) for title, _ in table], units)
+    return si
 
 
 def _title(title: Any) -> tuple[str, str | None]:
@@ -141,6 +220,17 @@ def _table(data: Any) -> list[tuple[Any, Any]]:
 
 
 def _read_csv(path: Path) -> list[tuple[str, list[str]]]:
+    titles, rows = _csv(path)
+    for number, row in enumerate(rows, start=1):
+        try:
+            _require_length(row, titles)
+        except ValueError as wrong:
+            raise DataError(f"{path.name}, row {number}: {wrong}.") from None
+    return [(title, [row[k] for row in rows]) for k, title in enumerate(titles)]
+
+
+def _csv(path: Path) -> tuple[list[str], list[list[str]]]:
+    """Names and rows of a file."""
     try:  # a path with NUL in it is a ValueError
         text = path.read_text(encoding="utf-8-sig")
         lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
@@ -157,22 +247,36 @@ def _read_csv(path: Path) -> list[tuple[str, list[str]]]:
             f"{path.name}: expected commas between the columns, received {mark[0]!r} in {titles[0]!r}. Save "
             "it with commas, and with points in numbers."
         )
-    for number, row in enumerate(rows[1:], start=1):
-        if len(row) != len(titles):
-            raise DataError(
-                f"{path.name}, row {number}: expected {len(titles)} values, received {len(row)}."
-            )
-    return [(title, [row[k] for row in rows[1:]]) for k, title in enumerate(titles)]
+    return titles, rows[1:]
 
 
-def _numbers(values: Iterable[Any], title: Any) -> Array:
+def _require_length(row: list[str], titles: list[str]) -> None:
+    if len(row) != len(titles):
+        raise ValueError(f"expected {len(titles)} values, received {len(row)}")
+
+
+def _number(value: Any, title: str) -> float:
+    """A number; NaN where there is none.
+
+    Raises
+    ------
+    ValueError
+        Something else.
+    """
+    text = value.strip().translate(MINUS) if isinstance(value, str) else value
+    try:
+        return float(text) if text not in ("", None) else math.nan
+    except (TypeError, ValueError):
+        raise ValueError(f"expected a number, received {value!r} in column {title!r}") from None
+
+
+def _numbers(values: Iterable[Any], title: str, words: dict[int, str]) -> Array:
+    """The numbers of a column; what is none is NaN, and is told in ``words`` by its row."""
     result = []
     for row, value in enumerate(values, start=1):
-        text = value.strip().translate(MINUS) if isinstance(value, str) else value
         try:
-            result.append(float(text) if text not in ("", None) else math.nan)
-        except (TypeError, ValueError):
-            raise DataError(
-                f"column {title!r}, row {row}: expected a number, received {value!r}."
-            ) from None
+            result.append(_number(value, title))
+        except ValueError as wrong:
+            words.setdefault(row, str(wrong))
+            result.append(math.nan)
     return np.array(result, dtype=float)

@@ -13,8 +13,10 @@ parabola, in closed form.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -25,95 +27,10 @@ import nonsmooth as ns
 from ..errors import require
 from ..parameters import LIMITS, number
 from ..units import GOLF, GRAVITY, Ball, Landing
+from .air import Air
+from .ground import ExtrapolationWarning
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Air:
-    """Drag and lift of a ball in still air.
-
-    Parameters
-    ----------
-    drag, lift : callable (spin_ratio, reynolds) -> coefficient
-        Coefficients of drag and lift from the spin ratio (surface speed over speed, not negative) and
-        the Reynolds number; numbers in, numbers out.
-    spin_decay : float, optional
-        c of $omega' = -c v omega/R$, with the speed v and the ball's radius R.
-    density : float, optional
-        kg/m³; 1.204 is dry air at 20 degrees C and 101.325 kPa.
-    viscosity : float, optional
-        Kinematic, m²/s; 1.516e-5 at 20 degrees C.
-    largest_spin_ratio : float, optional
-        Beyond it the coefficients keep their value there: a slow ball leaves every measured range.
-    name, source : str, optional
-        What the law is called, and where its coefficients come from.
-
-    Examples
-    --------
-    >>> smooth = Air(drag=lambda s, re: 0.45, lift=lambda s, re: 0.0)
-    >>> flight(Landing(10.0, 10.0, 0.0), air=smooth).range < flight(Landing(10.0, 10.0, 0.0)).range
-    True
-    """
-
-    drag: Callable[[float, float], float]
-    lift: Callable[[float, float], float]
-    spin_decay: float = 0.0
-    density: float = 1.204
-    viscosity: float = 1.516e-5
-    largest_spin_ratio: float = math.inf
-    name: str = ""
-    source: str = ""
-
-    def __post_init__(self) -> None:
-        limits = dict(spin_decay=">= 0", density="> 0", viscosity="> 0")
-        for what, limit in limits.items():
-            value = number(getattr(self, what), f"Air: {what}")
-            if not LIMITS[limit](value):
-                raise ns.ParameterError(
-                    f"Air: {what}: expected a number {limit}, received {value!r}."
-                )
-        for what in ("drag", "lift"):
-            if not callable(getattr(self, what)):
-                raise ns.ParameterError(
-                    f"Air: {what}: expected a function (spin_ratio, reynolds), received "
-                    f"{getattr(self, what)!r}. For a constant write lambda s, re: ..."
-                )
-
-
-def _smits_smith_drag(spin_ratio: float, reynolds: float) -> float:
-    transition = min(max((reynolds - 90e3) / 200e3, 0.0), 1.0)
-    return 0.24 + 0.18 * spin_ratio + 0.06 * math.sin(math.pi * transition)
-
-
-#: Cd = 0.24 + 0.18 S + 0.06 sin(pi (Re - 90000)/200000), Cl = 0.54 S^0.4.
-SMITS_SMITH = Air(
-    drag=_smits_smith_drag,
-    lift=lambda s, re: 0.54 * s**0.4,
-    spin_decay=2.0e-5,
-    largest_spin_ratio=1.4,
-    name="smits-smith",
-    source="Smits & Smith 1994, A new aerodynamic model of a golf ball in flight, Science and Golf II, "
-    "340-347, measured for Re in 4e4..2.5e5 and S in 0.04..1.4; coefficients as quoted by public "
-    "golf simulators, decay as in Penner 2001, Am. J. Phys. 69, 563, eq. 16 (others quote 0.9e-5). "
-    "The sine is held at zero outside its band (a choice here).",
-)
-
-#: Cd = 0.171 + 0.62 S, Cl = 0.083 + 0.885 S, moment coefficient 0.0125 S.
-QUINTAVALLA = Air(
-    drag=lambda s, re: 0.171 + 0.62 * s,
-    lift=lambda s, re: 0.083 + 0.885 * s,
-    # The torque (density/2) v^2 area Cm 2 radius over inertia 2/5 m radius^2, for a golf ball.
-    spin_decay=0.0125 * 1.204 * math.pi * GOLF.radius**3 / (GOLF.inertia * GOLF.mass),
-    largest_spin_ratio=0.5,
-    name="quintavalla",
-    source="Quintavalla 2002, A generally applicable model for the aerodynamic behavior of golf balls, "
-    "Science and Golf IV; coefficients as quoted by a public implementation. No range was quoted: "
-    "S is held at 0.5 (a choice here).",
-)
-
-#: Published coefficients by name.
-AIRS = {air.name: air for air in (SMITS_SMITH, QUINTAVALLA)}
 
 
 @dataclass(frozen=True)
@@ -132,6 +49,8 @@ class Flight:
         x at landing less x at launch, m.
     height : float
         Largest y, m.
+    cautions : tuple of str
+        What of it is an extrapolation.
     """
 
     launch: Landing
@@ -141,6 +60,7 @@ class Flight:
     range: float
     height: float
     _path: Callable[[Array], Array]
+    cautions: tuple[str, ...] = ()
 
     def __call__(self, t: ArrayLike) -> Array:
         """Return x and y at times after launch.
@@ -196,11 +116,17 @@ def flight(
     nonsmooth.OptionError
         A slope outside of $-pi/2$ to $pi/2$.
 
+    Warns
+    -----
+    ExtrapolationWarning
+        A launch faster than any that the coefficients of the air were measured for.
+
     Examples
     --------
     >>> out = flight(Landing(10.0, 9.80665, 0.0))
     >>> out.time, out.range, round(out.height, 12)
     (2.0, 20.0, 4.903325)
+    >>> from bounce.golf import SMITS_SMITH
     >>> drive = flight(Landing(70 * math.cos(0.19), 70 * math.sin(0.19), 283.0), air=SMITS_SMITH)
     >>> f"{drive.range:.0f} m, lands at {math.degrees(drive.landing.angle):.0f} deg"
     '215 m, lands at 39 deg'
@@ -219,7 +145,10 @@ def flight(
         )
     if air is None:
         return _parabola(launch, tilt, x0, y0)
-    return _through_air(launch, ball, air, tilt, x0, y0, tol)
+    found = _through_air(launch, ball, air, tilt, x0, y0, tol)
+    for caution in found.cautions:
+        warnings.warn(caution, ExtrapolationWarning, stacklevel=2)
+    return found
 
 
 def _parabola(launch: Landing, slope: float, x0: float, y0: float) -> Flight:
@@ -244,7 +173,8 @@ def _through_air(
     fall = fly(_field(ball, air, slope), start, 2, in_vacuum, tol)
     x, _, xdot, ydot, omega = (float(value) for value in fall.end)
     landing = Landing(xdot, ydot, omega)
-    return Flight(launch, landing, fall.time, (x0, y0), x - x0, fall.height, fall.path)
+    cautions = air.cautions(launch.speed, ball)
+    return Flight(launch, landing, fall.time, (x0, y0), x - x0, fall.height, fall.path, cautions)
 
 
 class Fall(NamedTuple):
@@ -300,25 +230,33 @@ def fly(
 
     ground.terminal, ground.direction = True, -1  # type: ignore[attr-defined]
     apex.direction = -1  # type: ignore[attr-defined]
-    run = solve_ivp(
-        field,
-        (0.0, 10 * in_vacuum + 10.0),
-        start,
-        method="DOP853",
-        rtol=max(tol, 1e-13),
-        atol=max(tol, 1e-13),
-        events=(ground, apex),
-        dense_output=True,
-        max_step=in_vacuum / 20,  # no step over a whole hop
-    )
+
+    def solve(dense: bool) -> Any:
+        return solve_ivp(
+            field,
+            (0.0, 10 * in_vacuum + 10.0),
+            start,
+            method="DOP853",
+            rtol=max(tol, 1e-13),
+            atol=max(tol, 1e-13),
+            events=(ground, apex),
+            dense_output=dense,
+            max_step=in_vacuum / 20,  # no step over a whole hop
+        )
+
+    run = solve(False)
     if run.status != 1:
         raise ns.OptionError(
             f"air: expected a ball that comes down, received {run.message} after {run.t[-1]:g} s. Are "
             "the coefficients of drag and lift sensible?"
         )
 
+    @cache
+    def between() -> Any:
+        return solve(True).sol  # three evaluations a step more: only for those who ask for the path
+
     def path(t: Array) -> Array:
-        return np.moveaxis(run.sol(t.ravel())[:axes].reshape(axes, *t.shape), 0, -1)
+        return np.moveaxis(between()(t.ravel())[:axes].reshape(axes, *t.shape), 0, -1)
 
     tops = [float(state[1]) for state in run.y_events[1]]
     return Fall(run.y[:, -1], float(run.t[-1]), max([float(run.y[1, 0]), *tops]), path)
@@ -330,14 +268,14 @@ def _field(ball: Ball, air: Air, slope: float) -> Callable[[float, Any], list[fl
     along, down = GRAVITY * math.sin(slope), GRAVITY * math.cos(slope)
 
     def field(t: float, z: Any) -> list[float]:
-        _, _, u, v, omega = (float(value) for value in z)
+        _, _, u, v, omega = z.tolist()  # plain numbers: NumPy's are slow one by one
         speed = math.hypot(u, v)
         if speed == 0.0:
             return [u, v, -along, -down, 0.0]
         ratio = min(ball.radius * abs(omega) / speed, air.largest_spin_ratio)
         reynolds = 2 * ball.radius * speed / air.viscosity
         drag = k * speed * air.drag(ratio, reynolds)
-        lift = k * speed * air.lift(ratio, reynolds) * float(np.sign(omega))
+        lift = k * speed * air.lift(ratio, reynolds) * ((omega > 0) - (omega < 0))
         return [
             u,
             v,

@@ -20,7 +20,8 @@ import nonsmooth as ns
 
 from ..parameters import LIMITS, number, require_positive
 from ..units import GOLF, GRAVITY, Ball, Landing, Scaling
-from .flight import Air, Flight, flight
+from .air import Air
+from .flight import Flight, flight
 from .ground import ExtrapolationWarning, Model, Rebound, ground
 
 Array = NDArray[np.float64]

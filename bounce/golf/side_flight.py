@@ -12,6 +12,7 @@ plane; the lift falls as the sine of the angle between axis and path.
 from __future__ import annotations
 
 import math
+import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 
@@ -23,7 +24,9 @@ import nonsmooth as ns
 from ..errors import require
 from ..parameters import LIMITS, number, numbers
 from ..units import GOLF, GRAVITY, Ball, Landing
-from .flight import Air, fly
+from .air import Air
+from .flight import fly
+from .ground import ExtrapolationWarning
 
 Array = NDArray[np.float64]
 
@@ -115,6 +118,8 @@ class SideFlight:
         Way forward and to the right until landing, m.
     height : float
         Largest y, m.
+    cautions : tuple of str
+        What of it is an extrapolation.
     """
 
     launch: SideState
@@ -125,6 +130,7 @@ class SideFlight:
     side: float
     height: float
     _path: Callable[[Array], Array]
+    cautions: tuple[str, ...] = ()
 
     def __call__(self, t: ArrayLike) -> Array:
         """Return x, y and z at times after launch.
@@ -196,6 +202,11 @@ def side_flight(
     nonsmooth.OptionError
         A slope outside of $-pi/2$ to $pi/2$; coefficients with which the ball never comes down.
 
+    Warns
+    -----
+    ExtrapolationWarning
+        A launch faster than any that the coefficients of the air were measured for.
+
     Examples
     --------
     A drive whose axis is tilted by ten degrees, a fade of a right-handed player:
@@ -220,7 +231,10 @@ def side_flight(
     in_vacuum = (up + math.sqrt(up**2 + 2 * down * height)) / down
     if air is None:
         return _parabola(launch, gravity, place, in_vacuum)
-    return _through_air(launch, ball, air, gravity, place, in_vacuum, tol)
+    found = _through_air(launch, ball, air, gravity, place, in_vacuum, tol)
+    for caution in found.cautions:
+        warnings.warn(caution, ExtrapolationWarning, stacklevel=2)
+    return found
 
 
 def _parabola(launch: SideState, gravity: Array, place: Array, time: float) -> SideFlight:
@@ -248,9 +262,9 @@ def _through_air(
     fall = fly(_field(ball, air, gravity), begin, 3, in_vacuum, tol)
     way, start = fall.end[:3] - place, (float(place[0]), float(place[1]), float(place[2]))
     landing = SideState(fall.end[3:6], fall.end[6:])
-    return SideFlight(
-        launch, landing, fall.time, start, float(way[0]), float(way[2]), fall.height, fall.path
-    )
+    sizes = (float(way[0]), float(way[2]), fall.height)
+    cautions = air.cautions(float(np.linalg.norm(launch.velocity)), ball)
+    return SideFlight(launch, landing, fall.time, start, *sizes, fall.path, cautions)
 
 
 def _field(ball: Ball, air: Air, gravity: Array) -> Callable[[float, Array], Array]:

@@ -23,7 +23,7 @@ from ..contact.space import Contact3D
 from ..laws import BounceLaw
 from ..parameters import require_positive
 from ..units import GOLF, Ball, Scaling
-from .flight import Air
+from .air import Air
 from .ground import ExtrapolationWarning, ground
 from .rollout import GREEN_ROLLING_FRICTION, NoRestError, roll_cautions
 from .side_flight import SideFlight, SideState, pull, side_flight

@@ -15,6 +15,14 @@ from ..parameters import Parametrised
 
 Array = NDArray[np.float64]
 
+#: What the cases of a rigid impact mean; the sign behind them is that of the slip at touch-down.
+CASES = {
+    "I": "slips throughout",
+    "II": "slips, then rolls from restitution on",
+    "III": "slips, then rolls from compression on",
+    "grip": "slips, then grips the ground",
+}
+
 
 @dataclass(frozen=True)
 class RigidShot:

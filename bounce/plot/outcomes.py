@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 import nonsmooth as ns
 
 from ..errors import require
+from ..laws.law import CASES
 from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
 from ..units import UNITS
@@ -150,6 +151,7 @@ def outcome_map(
         lines = (
             _contour(ax, outcomes, x, y) if curve is None else draw_curve(ax, outcomes.names, curve)
         )
+        lines |= _cases(ax, outcomes) if quantity == "itinerary" else {}
         _keys(ax, narrow, lines)
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
             what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
@@ -218,6 +220,18 @@ def _keys(ax: Axes, narrow: list[Narrow], lines: dict[str, Any]) -> None:
             frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
         )  # fmt: skip
     below(ax, list(lines.values()), list(lines))
+
+
+def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
+    """What the cases of a law on the map mean, for the key; in a column there is no room for it."""
+    from matplotlib.patches import Patch
+
+    met = {case for name in outcomes.regions for case in name.rstrip("+-").split("/")}
+    said = [f"{case}: {CASES[case]}" for case in CASES if case in met]
+    if is_narrow(ax) or not said:
+        return {}
+    said.append("+, −: sign of the slip at touch-down")
+    return {text: Patch(alpha=0) for text in said}
 
 
 def _short(name: str, column: bool) -> str:
@@ -329,8 +343,16 @@ def _title(outcomes: OutcomeMap, units: Units) -> str:
     parts = []
     for name, value in shown.items():
         _, unit, size = units.get("angle" if name == "tilt" else name, ("", "", 1.0))
-        parts.append(f"{name} = {value / size:g} {unit}".rstrip().replace(" ", _JOINED))
+        parts.append(f"{name} = {_digits(value, size)} {unit}".rstrip().replace(" ", _JOINED))
     return f"{type(outcomes.model).__name__}: " + ", ".join(parts)
+
+
+def _digits(value: float, size: float) -> str:
+    """A value in a unit; one that was converted to four digits, which is what the landing was typed with."""
+    shown = value / size
+    if size == 1.0:
+        return f"{shown:g}"
+    return f"{shown:.0f}" if abs(shown) >= 1e4 else f"{shown:.4g}"
 
 
 def _golf(outcomes: OutcomeMap) -> bool:

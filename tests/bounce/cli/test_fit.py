@@ -66,3 +66,16 @@ def test_an_interval_that_is_too_narrow_is_shown_beside_its_profile(command, tmp
     assert err.startswith("bounce: caution: mu: the 95 % interval")
     low, high = json.loads(command(*argv, "--json")[1])["profile_95"]["mu"]
     assert low <= 0.3 and (high is None or high >= 0.3)
+
+
+def test_bad_rows_are_left_out_by_a_flag_that_the_error_names(command, measured):
+    lines = measured.read_text().splitlines()
+    lines[2] = "fast" + lines[2][lines[2].index(",") :]
+    lines[4] = lines[4][lines[4].index(",") :]
+    measured.write_text("\n".join(lines) + "\n")
+    argv = ["fit", measured, "--parameters", "mu,restitution,tilt", "--starts", "4"]
+    code, _, err = command(*argv)
+    assert code == 1 and "leave them out with --leave-out." in err and "bad_rows" not in err
+    assert "row 2: expected a number, received 'fast' in column 'xdot [m/s]'" in err
+    code, out, _ = command(*argv, "--leave-out", "--json")
+    assert code == 0 and [row for row, _ in json.loads(out)["left_out"]] == [2, 4]

@@ -14,7 +14,11 @@ KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5"
     ("argv", "said"),
     [
         ([*SHOT[:-1], "inf"], "expected a spin such as 1"),
-        ([*SHOT[:-1], "1e999"], "invalid spin value: '1e999'"),
+        ([*SHOT[:-1], "1e999"], "a number that is finite, so between -1.8e308 and 1.8e308"),
+        ([*SHOT, "--stiffness", "1e400"], "a number that is finite"),
+        ([*SHOT, "--stiffness", "soft"], "expected a number, received 'soft'"),
+        ([*SHOT, "--set", "mu=1e400"], "a number that is finite"),
+        (["map", "--over", "speed=1:1e400:5"], "a number that is finite"),
         ([*SHOT[:-3], "12degrees", "--spin", "0"], "expected an angle such as 1 or 1rad"),
         ([*SHOT, *KV, "--set", "mu=0.3m/s", "--stiffness", "2e4"], "unit"),
         (["map", "--over", "speed=10:40:0"], "NAME=LOW:HIGH:COUNT"),

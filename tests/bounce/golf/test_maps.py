@@ -72,7 +72,7 @@ def test_pictures_speak_of_degrees_and_rpm(quantity):
     assert axes.get_xlabel() == "landing speed (m/s)"
     assert axes.get_ylabel() == "angle of descent (deg)"
     assert axes.get_ylim() == pytest.approx((15, 80))
-    assert "spin = 1909.86 rpm" in axes.get_title(loc="left")
+    assert "spin = 1910 rpm" in axes.get_title(loc="left")
 
 
 @pytest.mark.parametrize(

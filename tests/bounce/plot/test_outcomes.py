@@ -88,6 +88,28 @@ def test_maps_of_golfers_are_in_degrees_and_say_all_of_the_law():
     assert "mu = 0.998, restitution = 0.147, tilt = 18.4 deg, speed = 28 m/s" in title
 
 
+@pytest.mark.parametrize("speeds, said", [("mph", "62.63 mph"), ("m/s", "28 m/s")])
+def test_values_in_the_title_have_the_digits_of_a_landing(speeds, said):
+    figure = bounce.plot.outcome_map(golf_map("natural"), speeds=speeds)
+    assert figure.axes[0].get_title(loc="left").endswith(f"speed = {said}")
+
+
+def test_the_cases_of_a_law_are_said_in_words_where_there_is_room():
+    m = golf_map("penner")
+    cases = {name.rstrip("+-") for name in m.regions}
+    for quantity, width, shown in (
+        ("itinerary", 7, True),
+        ("itinerary", 3.4, False),
+        ("slip", 7, False),
+    ):
+        ax = ns.plot.style.new_figure((width, 0.8 * width)).add_subplot()
+        bounce.plot.outcome_map(m, quantity, ax=ax)
+        said = {text.get_text().partition(":")[0] for text in ax.findobj(Text)}
+        assert (cases <= said) is shown and ("+, \N{MINUS SIGN}" in said) is shown
+    with pytest.raises(StopIteration):
+        next(t for t in bounce.plot.outcome_map(m).findobj(Text) if "grip" in t.get_text())
+
+
 @pytest.mark.parametrize("quantity", ["slip", "spin_reversal", "lift_off_angle"])
 def test_quantities_are_drawn(outcomes, quantity):
     assert len(bounce.plot.outcome_map(outcomes, quantity).axes) == 2

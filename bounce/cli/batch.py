@@ -1,0 +1,215 @@
+"""Tables of starts: a row is written as soon as it is computed, and an interrupted table goes on."""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import io
+import os
+import sys
+import warnings
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any, NamedTuple, TextIO
+
+from tqdm import tqdm
+
+import nonsmooth as ns
+
+from .report import Units, opening, print_json
+from .starts import Start
+
+#: Exit code after Ctrl-C, as shells give it.
+INTERRUPTED = 130
+Report = Callable[[Start], dict[str, Any]]
+
+
+def tabulate(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> int:
+    """Report on each start, as CSV or JSON; what is wrong with one is said in its row.
+
+    Parameters
+    ----------
+    args : argparse.Namespace
+        With ``units``, ``json``, ``output`` and ``resume``.
+    starts : sequence of Start
+        What the rows begin with.
+    report : callable
+        What becomes of a start, in SI units.
+
+    Returns
+    -------
+    int
+        0, or 1 if something is wrong with one, or 130 after an interrupt.
+
+    Raises
+    ------
+    nonsmooth.OptionError
+        A table to go on with that is none, or not of these inputs.
+    """
+    if args.resume and (args.output is None or args.json):
+        raise ns.OptionError("--resume: expected with --output FILE and without --json.")
+    if args.json:
+        return _as_json(args, starts, report)
+    if args.output is None:
+        return _as_csv(args, starts, report, sys.stdout, _Kept([], [], 0))
+    kept = _kept(args, starts, report) if args.resume else _Kept([], [], 0)
+    with open(args.output, "r+" if kept.rows else "w", newline="", encoding="utf-8") as file:
+        file.seek(kept.size)
+        file.truncate()
+        return _as_csv(args, starts, report, file, kept)
+
+
+class _Kept(NamedTuple):
+    """What a file has already: names, rows, and how many bytes of it are whole rows."""
+
+    names: list[str]
+    rows: list[dict[str, str]]
+    size: int
+
+
+def _as_json(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> int:
+    units, count, rows = Units(args.units), _Count(len(starts)), list[dict[str, Any]]()
+    try:
+        for row in _rows(starts, report, 0):
+            rows.append(units.report(row))
+            count.add(row)
+    except KeyboardInterrupt:
+        count.interrupted = True
+    print_json({**opening(args), "units": units.names, "rows": rows})
+    return count.said("they are printed. To have them all, begin again")
+
+
+def _as_csv(
+    args: argparse.Namespace, starts: Sequence[Start], report: Report, file: TextIO, kept: _Kept
+) -> int:
+    """Write the rows that are not kept; the names are those of the first row that has results."""
+    units, count, names = Units(args.units), _Count(len(starts)), kept.names
+    for old in kept.rows:
+        count.add(old)
+    waiting: list[dict[str, Any]] = []
+    try:
+        for row in _rows(starts, report, len(kept.rows)):
+            waiting.append(units.row(row))
+            if not names and len(waiting[-1]) > len(_BARE):
+                names = list(waiting[-1])
+                file.write(_line(names, dict(zip(names, names, strict=True))))
+            if names:
+                file.write("".join(_line(names, one) for one in waiting))
+                file.flush()
+                waiting.clear()
+            count.add(row)
+    except KeyboardInterrupt:
+        count.interrupted = True
+    if waiting and not names:  # nothing but errors
+        file.write(
+            "".join(_line(_BARE, one) for one in [dict(zip(_BARE, _BARE, strict=True)), *waiting])
+        )
+    if args.output is None:
+        return count.said("they are printed. With --output FILE the next time --resume goes on")
+    return count.said(f"they are in {args.output}. To go on, add --resume to the same command")
+
+
+#: The names of a row that has no results.
+_BARE = ["row", "error"]
+
+
+def _rows(starts: Sequence[Start], report: Report, done: int) -> Iterator[dict[str, Any]]:
+    """The rows behind those that are done, with a bar on a terminal where they take long."""
+    bar = tqdm(
+        total=len(starts), initial=done, disable=None, delay=1.0, unit="row", unit_scale=True
+    )
+    with bar:
+        for k, start in enumerate(starts[done:], start=done + 1):
+            yield _row(k, start, report)
+            bar.update()
+
+
+def _row(number: int, start: Start, report: Report) -> dict[str, Any]:
+    found, error = dict[str, Any](), start.error
+    if start.state is not None:
+        try:
+            with warnings.catch_warnings():
+                warnings.simplefilter("ignore", UserWarning)  # in the column of cautions
+                found = report(start)
+        except ns.NonsmoothError as failure:
+            error = " ".join(str(failure).split())
+    return {"row": number, **found, "error": error}
+
+
+def _line(names: list[str], row: dict[str, Any]) -> str:
+    text = io.StringIO()
+    csv.DictWriter(text, names, restval="", lineterminator="\n").writerow(row)
+    return text.getvalue()
+
+
+def _kept(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> _Kept:
+    """The whole rows of the output, which must be the first of those that are asked for.
+
+    The first and the last row with results are computed again: they show other inputs and options.
+    """
+    if not os.path.exists(args.output):
+        return _Kept([], [], 0)
+    with open(args.output, newline="", encoding="utf-8") as file:
+        text = file.read()
+    whole = text[: text.rfind("\n") + 1]
+    lines = list(csv.reader(io.StringIO(whole)))
+    names = lines[0] if lines else []
+    if not lines or names == _BARE:  # nothing, or nothing but errors: the names were not known
+        return _Kept([], [], 0)
+    rows = [dict(zip(names, line, strict=False)) for line in lines[1:]]
+    units = Units(args.units)
+    if len(rows) > len(starts):
+        raise _others(args, f"{len(rows)} rows for {len(starts)}")
+    results = [k for k, row in enumerate(rows) if not row.get("error")]
+    again = sorted({*results[:1], *results[-1:], *range(len(rows))[-1:]})
+    for k, old in enumerate(rows):
+        if not _begins(old, starts[k], units):
+            raise _others(args, f"another start in row {k + 1}")
+        if k in again:
+            row = units.row(_row(k + 1, starts[k], report))
+            if not {*row} <= {*names} or _line(names, row) != _line(names, old):
+                raise _others(args, f"other results in row {k + 1}")
+    return _Kept(names, rows, len(whole.encode()))
+
+
+def _begins(row: dict[str, str], start: Start, units: Units) -> bool:
+    """Whether a row says the speed and the angle of a start (its spin depends on a tilted axis)."""
+    for name in ("speed", "angle"):
+        said = [row.get(f"{what}_{name} [{units.names[name]}]") for what in ("launch", "landing")]
+        value = said[0] or said[1]
+        if value and (start.state is None or value != str(units.show(name, start.typed[name]))):
+            return False
+    return True
+
+
+def _others(args: argparse.Namespace, received: str) -> ns.OptionError:
+    return ns.OptionError(
+        f"--resume: expected in {args.output} the first rows of what {args.input} gives with these "
+        f"options, received {received}. Name another file, or leave out --resume to begin again."
+    )
+
+
+class _Count:
+    """How many rows there are, with errors and cautions among them."""
+
+    def __init__(self, total: int):
+        self.total, self.done, self.wrong, self.warned = total, 0, 0, 0
+        self.interrupted = False
+
+    def add(self, row: dict[str, Any]) -> None:
+        """Count a row."""
+        self.done += 1
+        self.wrong += bool(row["error"])
+        self.warned += bool(row.get("cautions"))
+
+    def said(self, kept: str) -> int:
+        """Say what is to be said of the rows, and return the exit code."""
+        lines = []
+        if self.warned:
+            lines.append(f"bounce: caution: {self.warned} of {self.done} rows: see cautions")
+        if self.wrong:
+            lines.append(f"bounce: error: {self.wrong} of {self.done} rows: see the column error")
+        if self.interrupted:
+            lines.append(f"bounce: interrupted after {self.done} of {self.total} rows; {kept}.")
+        for line in lines:
+            print(line, file=sys.stderr)
+        return INTERRUPTED if self.interrupted else int(self.wrong > 0)

@@ -1,0 +1,191 @@
+"""Rows of a table are written as they are computed, an interrupted table goes on, a wrong row costs no other."""
+
+import csv
+import io
+import json
+import sys
+
+import pytest
+
+HEAD = "speed [m/s],angle [deg],spin [rpm]\n"
+LAUNCHES = [(70, 10.9, 2686), (60, 14, 3000), (50, 18, 5000), (40, 24, 7000), (30, 40, 9000)]
+MODULE = sys.modules["bounce.cli.flight"]
+
+
+def rows_of(text):
+    return list(csv.DictReader(io.StringIO(text)))
+
+
+@pytest.fixture
+def table(tmp_path):
+    path = tmp_path / "launches.csv"
+
+    def write(launches=LAUNCHES):
+        lines = (",".join(map(str, launch)) + "\n" for launch in launches)
+        path.write_text(HEAD + "".join(lines), encoding="utf-8")
+        return path
+
+    return write
+
+
+@pytest.fixture
+def stopped(monkeypatch):
+    """Let Ctrl-C come at a flight; counts flights, and runs something at each."""
+    fly = MODULE.flight
+
+    def stop(at=None, look=lambda: None):
+        seen = []
+
+        def flight(*args, **options):
+            seen.append(look())
+            if len(seen) == at:
+                raise KeyboardInterrupt
+            return fly(*args, **options)
+
+        monkeypatch.setattr(MODULE, "flight", flight)
+        return seen
+
+    return stop
+
+
+def test_a_row_is_in_the_file_before_the_next_is_computed(command, table, tmp_path, stopped):
+    out = tmp_path / "out.csv"
+    seen = stopped(look=lambda: out.read_text().count("\n"))
+    assert command("flight", "--input", table(), "--output", out)[0] == 0
+    assert seen == [0, 2, 3, 4, 5]  # the names come with the first row
+
+
+@pytest.mark.parametrize("cut", [0, 7])
+def test_an_interrupted_table_goes_on_to_the_same_file(command, table, tmp_path, stopped, cut):
+    out, whole = tmp_path / "out.csv", tmp_path / "whole.csv"
+    command("flight", "--input", table(), "--output", whole)
+    stopped(at=4)
+    code, said, err = command("flight", "--input", table(), "--output", out)
+    assert (code, said) == (130, "")
+    assert f"interrupted after 3 of 5 rows; they are in {out}. To go on, add --resume" in err
+    text = whole.read_text().splitlines(keepends=True)
+    assert out.read_text() == "".join(text[:4])
+    if cut:  # a process that was killed left a part of a row
+        out.write_text(out.read_text()[:-cut])
+    seen = stopped()
+    assert command("flight", "--input", table(), "--output", out, "--resume")[::2] == (0, "")
+    assert out.read_text() == whole.read_text()
+    assert len(seen) == (
+        5 if cut else 4
+    )  # two to see that the inputs are the same, and what is left
+    seen = stopped()
+    assert command("flight", "--input", table(), "--output", out, "--resume")[0] == 0
+    assert len(seen) == 2 and out.read_text() == whole.read_text()
+
+
+def test_other_inputs_are_refused_and_nothing_is_lost(command, table, tmp_path):
+    out = tmp_path / "out.csv"
+    command("flight", "--input", table(), "--output", out)
+    before = out.read_text()
+    changed = [*LAUNCHES[:2], (51, 18, 5000), *LAUNCHES[3:]]
+    for launches, options, said in [
+        (changed, [], "another start in row 3"),
+        (LAUNCHES[:3], [], "5 rows for 3"),
+        (LAUNCHES, ["--air", "none"], "other results in row 1"),
+        (LAUNCHES, ["--turf", "natural"], "other results in row 1"),
+    ]:
+        argv = ["flight", "--input", table(launches), "--output", out, "--resume"]
+        code, _, err = command(*argv, *options)
+        assert code == 2 and f"received {said}" in err
+        assert out.read_text() == before
+
+
+def test_resume_needs_a_file_to_go_on_with(command, table):
+    for argv in (
+        ["flight", "--input", table(), "--resume"],
+        ["flight", "--input", table(), "--output", "x.csv", "--json", "--resume"],
+        "flight --speed 70 --angle 11 --spin 2700 --resume".split(),
+    ):
+        code, _, err = command(*argv)
+        assert code == 2 and "--resume: expected with" in err
+
+
+def test_what_was_computed_is_printed_at_an_interrupt(command, table, stopped):
+    for options, count in (([], rows_of), (["--json"], lambda out: json.loads(out)["rows"])):
+        stopped(at=3)
+        code, out, err = command("flight", "--input", table(), *options)
+        assert code == 130 and len(count(out)) == 2
+        assert "interrupted after 2 of 5 rows; they are printed" in err
+
+
+WRONG = [
+    ("fast,11,2700", "expected a number, received 'fast' in column 'speed [m/s]'"),
+    ("70,11", "expected 3 values, received 2"),
+    ("70,,2700", "angle: expected an angle"),
+    ("-70,11,2700", "received -70 m/s"),
+    ("1e400,11,2700", "speed: expected a positive speed, received inf m/s"),
+    ("70,11,nan", "spin: expected a number, received nan"),
+]
+
+
+@pytest.mark.parametrize("name", ["flight", "shot"])
+@pytest.mark.parametrize("first", [True, False])
+def test_what_is_wrong_with_a_row_is_in_it_and_the_others_are_computed(
+    command, tmp_path, name, first
+):
+    path, good = tmp_path / "rows.csv", ["70,41,2700"]
+    lines = [line for line, _ in WRONG]
+    path.write_text(HEAD + "\n".join(lines + good if first else good + lines) + "\n")
+    out = tmp_path / "out.csv"
+    code, _, err = command(name, "--input", path, "--output", out)
+    rows = rows_of(out.read_text())
+    assert code == 1 and "6 of 7 rows: see the column error" in err
+    computed = rows.pop(-1 if first else 0)
+    assert computed["error"] == "" and float(computed[f"{_echo(name)}_speed [m/s]"]) == 70.0
+    for row, (_, said) in zip(rows, WRONG, strict=True):
+        assert said in row["error"]
+    before = out.read_text()
+    assert command(name, "--input", path, "--output", out, "--resume")[0] == 1
+    assert out.read_text() == before
+
+
+def _echo(name):
+    return "launch" if name == "flight" else "landing"
+
+
+def test_a_table_of_nothing_but_errors_goes_on_too(command, tmp_path):
+    path, out = tmp_path / "rows.csv", tmp_path / "out.csv"
+    path.write_text(HEAD + "fast,11,2700\n")
+    command("flight", "--input", path, "--output", out)
+    assert [row["row"] for row in rows_of(out.read_text())] == ["1"]
+    path.write_text(HEAD + "fast,11,2700\n70,11,2700\n")
+    assert command("flight", "--input", path, "--output", out, "--resume")[0] == 1
+    assert [bool(row["error"]) for row in rows_of(out.read_text())] == [True, False]
+
+
+@pytest.mark.parametrize("side", [[], ["--side-spin", "100"]])
+@pytest.mark.parametrize("name", ["flight", "shot"])
+def test_what_was_given_is_echoed_as_it_was_typed(command, tmp_path, name, side):
+    """A number that goes through radians and velocities and back differs in its last digits."""
+    path, what = tmp_path / "rows.csv", _echo(name)
+    path.write_text("speed [mph],angle [deg],spin [rpm]\n40.1,10.9,2686\n")
+    for units, speed in (("us", 40.1), ("golf", 40.1 * 0.44704)):
+        (row,) = rows_of(command(name, "--input", path, "--units", units, *side)[1])
+        assert [row[f"{what}_angle [deg]"], row[f"{what}_spin [rpm]"]] == ["10.9", "2686.0"]
+        typed = "--speed 40.1mph --angle 10.9 --spin 2686 --json --units".split()
+        report = json.loads(command(name, *typed, units, *side)[1])[what]
+        assert report == dict(speed=speed, angle=10.9, spin=2686.0)
+
+
+def test_a_tilted_axis_takes_a_part_of_the_spin(command):
+    argv = "shot --speed 25 --angle 53 --spin 9000 --axis-tilt 10 --launch-angle 28 --json".split()
+    assert json.loads(command(*argv)[1])["landing"]["spin"] < 9000
+
+
+def test_a_launch_beyond_what_was_measured_is_cautioned(command, tmp_path):
+    argv = "flight --angle 10 --spin 3000 --speed".split()
+    assert command(*argv, 85)[2] == ""
+    for more in ([], ["--side-spin", "100"]):
+        code, _, err = command(*argv, 1e9, *more)
+        assert code == 0 and "a launch at 1e+09 m/s, faster than 88.8 m/s" in err
+    (caution,) = json.loads(command(*argv, 1e9, "--json")[1])["cautions"]
+    assert "extrapolation" in caution
+    path = tmp_path / "rows.csv"
+    path.write_text(HEAD + "1e9,10,3000\n")
+    (row,) = rows_of(command("flight", "--input", path)[1])
+    assert row["cautions"] == caution

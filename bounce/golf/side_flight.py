@@ -267,19 +267,32 @@ def _through_air(
     return SideFlight(launch, landing, fall.time, start, *sizes, fall.path, cautions)
 
 
-def _field(ball: Ball, air: Air, gravity: Array) -> Callable[[float, Array], Array]:
+def _field(ball: Ball, air: Air, gravity: Array) -> Callable[[float, Array], list[float]]:
     k = air.density * math.pi * ball.radius**2 / (2 * ball.mass)
 
-    def field(t: float, z: Array) -> Array:
-        v, spin = z[3:6], z[6:]
-        speed, turning = float(np.linalg.norm(v)), float(np.linalg.norm(spin))
+    g = gravity.tolist()
+
+    def field(t: float, z: Array) -> list[float]:
+        # plain numbers: NumPy's are slow three by three
+        _, _, _, u, v, w, p, q, r = z.tolist()
+        speed, turning = math.hypot(u, v, w), math.hypot(p, q, r)
         if speed == 0.0:
-            return np.concatenate([v, gravity, np.zeros(3)])
+            return [u, v, w, *g, 0.0, 0.0, 0.0]
         ratio = min(ball.radius * turning / speed, air.largest_spin_ratio)
         reynolds = 2 * ball.radius * speed / air.viscosity
-        force = gravity - k * speed * air.drag(ratio, reynolds) * v
-        if turning:
-            force = force + k * speed * air.lift(ratio, reynolds) * np.cross(spin / turning, v)
-        return np.concatenate([v, force, -air.spin_decay * speed * spin / ball.radius])
+        drag = k * speed * air.drag(ratio, reynolds)
+        lift = k * speed * air.lift(ratio, reynolds) / turning if turning else 0.0
+        decay = air.spin_decay * speed / ball.radius
+        return [
+            u,
+            v,
+            w,
+            g[0] - drag * u + lift * (q * w - r * v),
+            g[1] - drag * v + lift * (r * u - p * w),
+            g[2] - drag * w + lift * (p * v - q * u),
+            -decay * p,
+            -decay * q,
+            -decay * r,
+        ]
 
     return field

@@ -28,9 +28,6 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
 
-    #: A region without room for its name: its entry in a legend, and its points (m, 2).
-    Narrow = tuple[Patch, Array]
-
 #: Regions of the paper's eight itineraries: warm where the ball leaves in forward slip, cold where
 #: in reverse (colours of the style and tints of them; neighbours differ in grey as well).
 COLOURS = {
@@ -50,7 +47,7 @@ COLOURS = {
     "II-": "#B7E4C7",
     "I-": "#BCDDF5",
 }
-#: For other itineraries, in the order in which they occur.
+#: For other itineraries: each has one meaning on a map.
 MORE = (
     style.PURPLE,
     "#999999",
@@ -78,9 +75,10 @@ _LABELS = {
     "d2": r"$d_2$",
     "G": r"gravity $G$",
 }
-#: How many regions without room for their name are listed, the largest first; a few more have it beside
-#: them, but not where there are dozens.
-_LISTED, _BESIDE = 5, 8
+#: How many regions without room for their name are listed, the largest first, and the colour of the others.
+_LISTED, _REST = 5, "#E4E4E4"
+#: What the layout leaves of the height and the width of axes to the map, at least: keys need the rest.
+_LEFT, _LEFT_COLUMN = np.array([1.0, 0.8]), np.array([0.8, 1.0])
 _POINTS = 9.0  # of the names of regions
 _TITLE = 9.0  # points
 _JOINED = "\N{NO-BREAK SPACE}"
@@ -143,16 +141,17 @@ def outcome_map(
         figure, ax = style.axes_for(ax, (7.0, 5.4))
         size = _TITLE * (0.6 if is_narrow(ax) else 0.53)  # of a letter, on average
         letters = int(ax.bbox.width * 72 / figure.dpi / size)
-        narrow: list[Narrow] = []
-        if quantity == "itinerary":
-            narrow = _regions(ax, outcomes, x, y)
-        else:
+        if quantity != "itinerary":
             _field(figure, ax, outcomes, quantity, x, y, units)
         lines = (
             _contour(ax, outcomes, x, y) if curve is None else draw_curve(ax, outcomes.names, curve)
         )
-        lines |= _cases(ax, outcomes) if quantity == "itinerary" else {}
-        _keys(ax, narrow, lines)
+        patches: list[Patch] = []
+        if quantity == "itinerary":
+            room = _LISTED - len(lines) if is_narrow(ax) else _LISTED
+            patches = _regions(ax, outcomes, x, y, room)
+            lines |= _cases(ax, outcomes)
+        _keys(ax, patches, lines)
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
             what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
             axis.set_label_text(f"{what} ({unit})" if unit else what)
@@ -163,28 +162,45 @@ def outcome_map(
     return figure
 
 
-def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> list[Narrow]:
-    """Colour the regions and name them; those without room for their name are returned."""
+def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> list[Patch]:
+    """Colour the regions and name them; a key of those without room for their name.
+
+    The key lists at most ``room`` of them, the largest; the others have one colour, so that each colour
+    has one meaning.
+    """
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 
-    spare = iter(MORE * (1 + len(outcomes.regions) // len(MORE)))
-    colours = [COLOURS.get(name) or next(spare) for name in outcomes.regions]
+    clear = ~_turns(outcomes.slip)
+    inside = [outcomes.code == code for code in range(len(outcomes.regions))]
+    places = [
+        _place(ax, x, y, cells & clear, name)
+        for cells, name in zip(inside, outcomes.regions, strict=True)
+    ]
+    named = [code for code, place in enumerate(places) if place is not None]
+    narrow = [code for code, place in enumerate(places) if place is None]
+    narrow.sort(key=lambda code: -np.count_nonzero(inside[code]))
+    listed = narrow if len(narrow) <= room + 1 else narrow[:room]  # not "and 1 more"
+    spare = iter(MORE)
+    colours = [_REST] * len(outcomes.regions)
+    for code in (*listed, *named):
+        colours[code] = COLOURS.get(outcomes.regions[code]) or next(spare, _REST)
     palette = ListedColormap(["#FFFFFF", *colours])
     limits: dict[str, Any] = dict(vmin=-1.5, vmax=len(colours) - 0.5)
     ax.pcolormesh(x, y, outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits)
-    narrow: list[Narrow] = []
+    for code in named:
+        place = places[code]
+        assert place is not None
+        ink = "white" if _luminance(colours[code]) < 0.2 else "black"
+        look: dict[str, Any] = dict(color=ink, fontsize=_POINTS, fontweight="bold")
+        style.write(ax, place, outcomes.regions[code], zorder=6, **look)
     column = is_narrow(ax)
-    clear = ~_turns(outcomes.slip)
-    for code, (name, colour) in enumerate(zip(outcomes.regions, colours, strict=True)):
-        inside = outcomes.code == code
-        if not _named(ax, x, y, inside & clear, name, colour):
-            patch = Patch(
-                facecolor=colour, edgecolor="0.3", linewidth=0.6, label=_short(name, column)
-            )
-            row, col = np.nonzero(inside)
-            narrow.append((patch, np.column_stack([x[col], y[row]])))
-    return sorted(narrow, key=lambda entry: -len(entry[1]))
+    key = [(_short(outcomes.regions[code], column), colours[code]) for code in listed]
+    if rest := narrow[len(listed) :]:
+        key.append((f"and {len(rest)} more", _REST))
+        _borders(ax, outcomes.code, rest, x, y)
+    frame: dict[str, Any] = dict(edgecolor="0.3", linewidth=0.6)
+    return [Patch(facecolor=colour, label=name, **frame) for name, colour in key]
 
 
 def _turns(slip: Array) -> NDArray[np.bool_]:
@@ -196,27 +212,15 @@ def _turns(slip: Array) -> NDArray[np.bool_]:
     return found
 
 
-def _keys(ax: Axes, narrow: list[Narrow], lines: dict[str, Any]) -> None:
-    """Say what lines are, below the map, and name narrow regions: in a legend, beside them, or not."""
-    from matplotlib.patches import Patch
-
-    column = is_narrow(ax)
-    listed = _LISTED - len(lines) if column else _LISTED
-    rest = narrow[listed:]
-    handles = [patch for patch, _ in narrow[:listed]]
-    if len(rest) > (0 if column else _BESIDE):
-        handles.append(Patch(alpha=0, label=f"and {len(rest)} more"))
-    elif rest:
-        names = ns.plot.labels.Labels(ax)
-        for patch, points in rest:
-            names.name(str(patch.get_label()), points)
-    if column:  # beside a legend little of the map would be left
-        labels = [str(patch.get_label()) for patch in handles]
-        below(ax, [*lines.values(), *handles], [*lines, *labels])
+def _keys(ax: Axes, patches: list[Patch], lines: dict[str, Any]) -> None:
+    """Say what lines are, below the map, and which regions are narrow, beside it."""
+    if is_narrow(ax):  # beside a legend little of the map would be left
+        labels = [str(patch.get_label()) for patch in patches]
+        below(ax, [*lines.values(), *patches], [*lines, *labels])
         return
-    if handles:
+    if patches:
         ax.legend(
-            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
+            handles=patches, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
             frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
         )  # fmt: skip
     below(ax, list(lines.values()), list(lines))
@@ -235,28 +239,46 @@ def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
 
 
 def _short(name: str, column: bool) -> str:
-    """The first phases of a long itinerary and its last; fewer in a column of a journal."""
+    """The first phases of a long itinerary, its last and how many they are; fewer in a column."""
     phases, most = name.split(), 5 if column else 8
-    return name if len(phases) <= most else " ".join([*phases[: most - 2], "..", phases[-1]])
+    if len(phases) <= most:
+        return name
+    return " ".join([*phases[: most // 2], "..", phases[-1], f"({len(phases)})"])
 
 
-def _named(ax: Axes, x: Array, y: Array, inside: NDArray[np.bool_], name: str, colour: str) -> bool:
-    """Write a region's name where it is widest, if there is room for it."""
+def _borders(ax: Axes, code: NDArray[Any], rest: Sequence[int], x: Array, y: Array) -> None:
+    """Thin lines between regions that have the same colour."""
+    from matplotlib.collections import LineCollection
+
+    left, low = ([axis[0], *((axis[1:] + axis[:-1]) / 2), axis[-1]] for axis in (x, y))
+    shared = np.isin(code, rest)
+    lines = []
+    for row, col in np.argwhere((code[:, 1:] != code[:, :-1]) & shared[:, 1:] & shared[:, :-1]):
+        lines.append([(left[col + 1], low[row]), (left[col + 1], low[row + 1])])
+    for row, col in np.argwhere((code[1:] != code[:-1]) & shared[1:] & shared[:-1]):
+        lines.append([(left[col], low[row + 1]), (left[col + 1], low[row + 1])])
+    ax.add_collection(
+        LineCollection(lines, colors="0.72", linewidths=0.4, zorder=1, rasterized=True)
+    )
+
+
+def _place(
+    ax: Axes, x: Array, y: Array, inside: NDArray[np.bool_], name: str
+) -> tuple[float, float] | None:
+    """Where a region is widest, if its name has room there."""
     from scipy.ndimage import distance_transform_edt, minimum_filter
 
     room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
     letters = np.array([1.3, 0.72 * len(name)]) * _POINTS  # height and width of the name
-    frame = np.array([ax.bbox.height, ax.bbox.width]) * 72 / ax.figure.dpi
+    left = _LEFT_COLUMN if is_narrow(ax) else _LEFT
+    frame = np.array([ax.bbox.height, ax.bbox.width]) * left * 72 / ax.figure.dpi
     cells = np.ceil(letters / frame * inside.shape).astype(int)
     fits = minimum_filter(inside, size=tuple(cells), mode="constant", cval=0)
     room = np.where(fits, room, 0.0)
     row, column = np.unravel_index(int(np.argmax(room)), room.shape)
     if room.max() < 0.03 * min(inside.shape):
-        return False
-    place = (x[column], y[row])
-    text = "white" if _luminance(colour) < 0.2 else "black"
-    style.write(ax, place, name, color=text, zorder=6, fontsize=_POINTS, fontweight="bold")
-    return True
+        return None
+    return float(x[column]), float(y[row])
 
 
 def _field(

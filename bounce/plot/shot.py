@@ -10,7 +10,7 @@ import nonsmooth as ns
 
 from ..contact.equations import equations
 from ..shot.single import Shot
-from .keys import below
+from .keys import below, is_narrow
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +28,7 @@ STYLES: dict[str, dict[str, Any]] = {
 _WIDTH = {"+": 2.0, "-": 2.0, "s": 2.6, "F": 1.6}
 _POINTS = 400
 _SEEN = 0.04  # of the width of the picture: a shorter jump has no name
+_LONG = 0.33  # of a column: over a shorter jump its name takes two lines
 
 
 def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
@@ -135,10 +136,13 @@ def _phases(ax: Axes, shot: Shot, names: Any) -> None:
             label = None
         ax.plot(*points.T, label=label, linewidth=_WIDTH[phase.mode], zorder=3, **look)
         _arrow(ax, points, STYLES[phase.mode]["color"])
-    width = np.ptp(ax.get_xlim())
     longest = max(jumps, key=lambda jump: abs(jump[-1, 0] - jump[0, 0]), default=np.zeros((2, 2)))
-    if abs(longest[-1, 0] - longest[0, 0]) > _SEEN * width:
-        names.name("friction jumps", longest[2:-2], "0.3")
+    share = abs(longest[-1, 0] - longest[0, 0]) / np.ptp(ax.get_xlim())
+    if share > _SEEN:
+        mu = _static_coefficient(shot)
+        words = "friction\njumps" if is_narrow(ax) and share < _LONG else "friction jumps"
+        inside = lambda p: np.abs(p[:, 0]) < mu * p[:, 1]
+        names.name(words, longest[2:-2], "0.3", keep=inside)
 
 
 def _arrow(ax: Axes, curve: np.ndarray, color: str) -> None:
@@ -153,11 +157,12 @@ def _markers(ax: Axes, shot: Shot) -> None:
     start = shot.forces(0.0)
     inner = np.array([phase.t_start for phase in shot.phases[1:]])
     face: dict[str, Any] = dict(markerfacecolor="white", markeredgecolor="black")
-    common: dict[str, Any] = dict(linestyle="none", zorder=5, clip_on=False)
-    ax.plot(
-        start.friction, start.load, "o", color="black", markersize=7, label="touch-down", **common
-    )
+    common: dict[str, Any] = dict(linestyle="none", clip_on=False)
+    touch: dict[str, Any] = dict(color="black", markersize=7, label="touch-down")
+    ax.plot(start.friction, start.load, "o", zorder=6, **touch, **common)  # not under lift-off
     if inner.size:
         at = shot.forces(inner)
-        ax.plot(at.friction, at.load, "s", markersize=6, label="transition", **face, **common)
-    ax.plot(0.0, 0.0, "D", markersize=9, label="lift-off", **face, **common)
+        ax.plot(
+            at.friction, at.load, "s", markersize=6, label="transition", zorder=5, **face, **common
+        )
+    ax.plot(0.0, 0.0, "D", markersize=9, label="lift-off", zorder=5, **face, **common)

@@ -3,6 +3,7 @@
 import matplotlib.colors
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 from matplotlib.contour import ContourSet
 from matplotlib.legend import Legend
 from matplotlib.text import Text
@@ -29,14 +30,20 @@ def test_regions_are_named_on_the_picture(outcomes):
     assert axes.get_xlim() == (-2, 2) and axes.get_ylim() == (-4, 4)
 
 
-def test_narrow_regions_are_in_the_legend_or_beside_their_names():
+def test_narrow_regions_are_in_the_legend_and_every_colour_has_one_meaning():
     over = dict(eta=np.linspace(0.05, 3, 60), omega=np.linspace(-2, 3, 60))
     m = bounce.outcome_map(TURF, over, fixed=dict(xdot=0.5))
     axes = bounce.plot.outcome_map(m).axes[0]
     legend = axes.get_legend()
     assert legend is not None
-    names = {t.get_text() for t in axes.findobj(Text)}
-    assert set(m.regions) <= names and len(legend.get_texts()) <= 6
+    names = {t.get_text() for t in (*axes.texts, *legend.get_texts())}
+    more = int(legend.get_texts()[-1].get_text().split()[1])
+    assert len(set(m.regions) - names) == more and len(legend.get_texts()) <= 6
+    (mesh,) = [one for one in axes.collections if isinstance(one, QuadMesh)]
+    colours = dict(zip(m.regions, mesh.get_cmap().colors[1:], strict=True))
+    said = [colours[name] for name in m.regions if name in names]
+    others = {colours[name] for name in m.regions if name not in names}
+    assert len(set(said)) == len(said) and len(others) == 1 and not others & set(said)
     axes.figure.draw_without_rendering()
     axes.figure.draw_without_rendering()
     for key in axes.findobj(Legend):  # also the one below the map is on the sheet
@@ -200,3 +207,4 @@ def test_a_legend_of_dozens_of_regions_is_short():
     assert len(names) == 6
     assert names[-1].endswith("more")
     assert max(map(len, names)) < 30
+    assert len({*names}) == 6  # shortened, they still differ

@@ -18,6 +18,9 @@ from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
 from ..units import UNITS
 from .keys import below, is_narrow
+from .regions import COLOURS as COLOURS
+from .regions import LISTED, regions
+from .regions import MORE as MORE
 
 style = ns.plot.style
 Array = NDArray[np.float64]
@@ -27,35 +30,6 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
     from matplotlib.patches import Patch
-
-#: Regions of the paper's eight itineraries: warm where the ball leaves in forward slip, cold where
-#: in reverse (colours of the style and tints of them; neighbours differ in grey as well).
-COLOURS = {
-    "S+": "#F6C7A3",
-    "S+ R S+": style.VERMILLION,
-    "S- R S+": style.YELLOW,
-    "S- S+": "#A05A2C",
-    "S-": "#BCDDF5",
-    "S- R S-": style.BLUE,
-    "S+ R S-": style.SKY,
-    "S+ S-": "#0B3C5D",
-    # of the laws: slip throughout in the same colours, rolling at lift-off in those of its own side
-    "I+": "#F6C7A3",
-    "II+": style.GREEN,
-    "III+": style.SKY,
-    "III-": style.VERMILLION,
-    "II-": "#B7E4C7",
-    "I-": "#BCDDF5",
-}
-#: For other itineraries: each has one meaning on a map.
-MORE = (
-    style.PURPLE,
-    "#999999",
-    "#7A5195",
-    "#5F5F5F",
-    "#EBC4DB",
-    "#00573F",
-)
 
 #: Axes of landings in SI units as golfers read them: name, unit, and the unit in SI.
 _GOLF = {
@@ -75,11 +49,6 @@ _LABELS = {
     "d2": r"$d_2$",
     "G": r"gravity $G$",
 }
-#: How many regions without room for their name are listed, the largest first, and the colour of the others.
-_LISTED, _REST = 5, "#E4E4E4"
-#: What the layout leaves of the height and the width of axes to the map, at least: keys need the rest.
-_LEFT, _LEFT_COLUMN = np.array([1.0, 0.8]), np.array([0.8, 1.0])
-_POINTS = 9.0  # of the names of regions
 _TITLE = 9.0  # points
 _JOINED = "\N{NO-BREAK SPACE}"
 _NO_YES = ("#00224E", "#FEE838")  # the ends of cividis
@@ -148,8 +117,8 @@ def outcome_map(
         )
         patches: list[Patch] = []
         if quantity == "itinerary":
-            room = _LISTED - len(lines) if is_narrow(ax) else _LISTED
-            patches = _regions(ax, outcomes, x, y, room)
+            room = LISTED - len(lines) if is_narrow(ax) else LISTED
+            patches = regions(ax, outcomes, x, y, room)
             lines |= _cases(ax, outcomes)
         _keys(ax, patches, lines)
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
@@ -160,56 +129,6 @@ def outcome_map(
         title = textwrap.fill(_title(outcomes, units), letters)
         ax.set_title(title.replace(_JOINED, " "), fontsize=_TITLE, loc="left", color="0.3")
     return figure
-
-
-def _regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> list[Patch]:
-    """Colour the regions and name them; a key of those without room for their name.
-
-    The key lists at most ``room`` of them, the largest; the others have one colour, so that each colour
-    has one meaning.
-    """
-    from matplotlib.colors import ListedColormap
-    from matplotlib.patches import Patch
-
-    clear = ~_turns(outcomes.slip)
-    inside = [outcomes.code == code for code in range(len(outcomes.regions))]
-    places = [
-        _place(ax, x, y, cells & clear, name)
-        for cells, name in zip(inside, outcomes.regions, strict=True)
-    ]
-    named = [code for code, place in enumerate(places) if place is not None]
-    narrow = [code for code, place in enumerate(places) if place is None]
-    narrow.sort(key=lambda code: -np.count_nonzero(inside[code]))
-    listed = narrow if len(narrow) <= room + 1 else narrow[:room]  # not "and 1 more"
-    spare = iter(MORE)
-    colours = [_REST] * len(outcomes.regions)
-    for code in (*listed, *named):
-        colours[code] = COLOURS.get(outcomes.regions[code]) or next(spare, _REST)
-    palette = ListedColormap(["#FFFFFF", *colours])
-    limits: dict[str, Any] = dict(vmin=-1.5, vmax=len(colours) - 0.5)
-    ax.pcolormesh(x, y, outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits)
-    for code in named:
-        place = places[code]
-        assert place is not None
-        ink = "white" if _luminance(colours[code]) < 0.2 else "black"
-        look: dict[str, Any] = dict(color=ink, fontsize=_POINTS, fontweight="bold")
-        style.write(ax, place, outcomes.regions[code], zorder=6, **look)
-    column = is_narrow(ax)
-    key = [(_short(outcomes.regions[code], column), colours[code]) for code in listed]
-    if rest := narrow[len(listed) :]:
-        key.append((f"and {len(rest)} more", _REST))
-        _borders(ax, outcomes.code, rest, x, y)
-    frame: dict[str, Any] = dict(edgecolor="0.3", linewidth=0.6)
-    return [Patch(facecolor=colour, label=name, **frame) for name, colour in key]
-
-
-def _turns(slip: Array) -> NDArray[np.bool_]:
-    """Cells at which the slip changes its sign: a line is there."""
-    sign = np.sign(slip)
-    found = np.zeros(sign.shape, dtype=bool)
-    found[1:] |= sign[1:] * sign[:-1] < 0
-    found[:, 1:] |= sign[:, 1:] * sign[:, :-1] < 0
-    return found
 
 
 def _keys(ax: Axes, patches: list[Patch], lines: dict[str, Any]) -> None:
@@ -236,49 +155,6 @@ def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
         return {}
     said.append("+, −: sign of the slip at touch-down")
     return {text: Patch(alpha=0) for text in said}
-
-
-def _short(name: str, column: bool) -> str:
-    """The first phases of a long itinerary, its last and how many they are; fewer in a column."""
-    phases, most = name.split(), 5 if column else 8
-    if len(phases) <= most:
-        return name
-    return " ".join([*phases[: most // 2], "..", phases[-1], f"({len(phases)})"])
-
-
-def _borders(ax: Axes, code: NDArray[Any], rest: Sequence[int], x: Array, y: Array) -> None:
-    """Thin lines between regions that have the same colour."""
-    from matplotlib.collections import LineCollection
-
-    left, low = ([axis[0], *((axis[1:] + axis[:-1]) / 2), axis[-1]] for axis in (x, y))
-    shared = np.isin(code, rest)
-    lines = []
-    for row, col in np.argwhere((code[:, 1:] != code[:, :-1]) & shared[:, 1:] & shared[:, :-1]):
-        lines.append([(left[col + 1], low[row]), (left[col + 1], low[row + 1])])
-    for row, col in np.argwhere((code[1:] != code[:-1]) & shared[1:] & shared[:-1]):
-        lines.append([(left[col], low[row + 1]), (left[col + 1], low[row + 1])])
-    ax.add_collection(
-        LineCollection(lines, colors="0.72", linewidths=0.4, zorder=1, rasterized=True)
-    )
-
-
-def _place(
-    ax: Axes, x: Array, y: Array, inside: NDArray[np.bool_], name: str
-) -> tuple[float, float] | None:
-    """Where a region is widest, if its name has room there."""
-    from scipy.ndimage import distance_transform_edt, minimum_filter
-
-    room = distance_transform_edt(np.pad(inside, 1))[1:-1, 1:-1]
-    letters = np.array([1.3, 0.72 * len(name)]) * _POINTS  # height and width of the name
-    left = _LEFT_COLUMN if is_narrow(ax) else _LEFT
-    frame = np.array([ax.bbox.height, ax.bbox.width]) * left * 72 / ax.figure.dpi
-    cells = np.ceil(letters / frame * inside.shape).astype(int)
-    fits = minimum_filter(inside, size=tuple(cells), mode="constant", cval=0)
-    room = np.where(fits, room, 0.0)
-    row, column = np.unravel_index(int(np.argmax(room)), room.shape)
-    if room.max() < 0.03 * min(inside.shape):
-        return None
-    return float(x[column]), float(y[row])
 
 
 def _field(
@@ -399,10 +275,3 @@ def _axes(outcomes: OutcomeMap, units: Units) -> list[Array]:
 def _ends(values: NDArray[np.float64]) -> tuple[float, float]:
     low, high = float(values.min()), float(values.max())
     return (low, high) if low < high else (low - 0.5, high + 0.5)
-
-
-def _luminance(colour: str) -> float:
-    """Relative luminance of WCAG 2.1."""
-    parts = [int(colour[k : k + 2], 16) / 255 for k in (1, 3, 5)]
-    r, g, b = (c / 12.92 if c <= 0.03928 else ((c + 0.055) / 1.055) ** 2.4 for c in parts)
-    return 0.2126 * r + 0.7152 * g + 0.0722 * b

@@ -185,12 +185,17 @@ def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
     return facts_header() + _sizes(system, order) + defines, program
 
 
+#: Characters of a program from which on a step's instructions fill a processor's nearest memory of 32 KiB: measured.
+_LONG_TEXT = 200_000
+
+
 def set_lanes_source(coupled: Coupled, order: int, width: int) -> str:
     """C source of the engine in step of a system that ``supports_set_lanes``."""
     system, program = coupled.system, set_program(coupled, order)
     directions = _list(d for _, d in system.stops) or "0"
+    groups = 8 if len(program.text) > _LONG_TEXT else 2
     defines = (
-        f"#define W {width}\n#define K {system.surface_count}\n#define STOPS {len(system.stops)}\n"
+        f"#define W {width}\n#define GROUPS {groups}\n#define K {system.surface_count}\n#define STOPS {len(system.stops)}\n"
         f"#define ROWS {len(program.rows)}\n#define ON_ROWS {len(program.on_rows)}\n#define NAMED {int(bool(program.states))}\n"
         f"#define BENT_SLIP {int(program.bent_slip)}\n#define BENT_STOPS {int(program.bent_stops)}\n"
         f"__attribute__((unused)) static const int DIRECTION[] = {{{directions}}};\n"

@@ -1,20 +1,23 @@
 /* W trajectories in step, for systems with one set of codimension two or three, and stops.
  *
  * Off the set, on it and leaving it are three programs, and what is done near it is a fourth; each has lanes of
- * its own, and a trajectory waits until W of them are at the same (fewer only when no start is left). Whatever is
- * rare is handed over as in lanes.c: such a trajectory gets the status HAND_OVER and runs again from its start in
- * the interpreter. No lane's result depends on its neighbours.
+ * its own, and a trajectory waits until all lanes of a program are filled (fewer run only when no start is left).
+ * These are GROUPS of W: each part of a step is done for all groups before the next part, since a step's text is
+ * longer than what a processor keeps of instructions close by. Whatever is rare is handed over as in lanes.c: such a
+ * trajectory gets the status HAND_OVER and runs again from its start in the interpreter. No lane's result depends on
+ * its neighbours.
  *
  * The generated text defines, besides what common.h asks for: N states with time, ND without, K, STOPS,
- * DIRECTION[STOPS], TIMED, W, ROWS and ROW[ROWS] of the field that are not affine (on the set ON_ROWS), BENT_SLIP, BENT_STOPS,
- * OWN[K] states that the switching functions are (NAMED: whether they are), and the functions of
+ * DIRECTION[STOPS], TIMED, W, GROUPS, ROWS and ROW[ROWS] of the field that are not affine (on the set ON_ROWS),
+ * BENT_SLIP, BENT_STOPS, OWN[K] states that the switching functions are (NAMED: whether they are), and the functions of
  * nonsmooth/model/printing/set_program.py.
  */
 #define SLOTS (STOPS + 2) /* the set's guard, stops, friction's limit */
 #define LIMIT_SLOT (STOPS + 1)
 #define INNER (P - P / 3) /* degree that is enough at half of a step */
 #define LONG_CODE (1LL << 60)
-#define WAITING (4 * W)
+#define WAITING (4 * GROUPS * W)
+#define OFTEN 8 /* fewer groups run where the starts do not fill all of them so many times */
 #define CLOSE 1e-8 /* only where |h| is this much of its terms its time to zero is asked for */
 #define FALLEN 0.01 /* a step ends where |h| has fallen to this part, closer to rounding to FALL */
 #define PASSED 1e-11 /* what passes h = 0 closer than this much of its terms may cross it: the interpreter sees to it */
@@ -44,7 +47,7 @@ typedef struct {
   Words words;
   int64_t next;
   double size; /* of states at which both tolerances are as large */
-  int alive[POOLS], waiting[POOLS], column; /* words of a trajectory */
+  int alive[POOLS], waiting[POOLS], groups, column; /* words of a trajectory */
   Traveller queue[POOLS][WAITING];
 } Work;
 

@@ -2,7 +2,7 @@
 
 /* Coefficients of a step. */
 typedef struct {
-  T c[N][P + 1], g[SLOTS][P + 1], unknowns[K][P + 1]; /* unknowns on the set; the direction when leaving it */
+  T c[N][P + 1], g[SLOTS][P + 1], unknowns[K][P + 1], ends[2 * K]; /* unknowns on the set; the direction when leaving it */
   T allowed[N], level; /* of states, and of |h| */
   T radius, stretch, fall; /* |h|, or friction's limit; 1 over the time to a branch point; part that |h| may fall to */
   T off_stop[STOPS + 1], off_slip[K + 1]; /* what stops, unknowns and friction's limit may be off in a check */
@@ -105,15 +105,19 @@ INLINE T size_of(T last, T before, int more) {
   return EXP2(MIN(h1, h2));
 }
 
-/* The coefficients of a step, and the size that they allow. */
-INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
-  const Options *o = w->o;
-  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), ends[2 * K], per = BC(1.0 / (SAFETY * o->rtol));
-  T turn = BC(1e-300), turn_before = BC(1e-300);
+/* The coefficients of a step. */
+INLINE void expand_step(const Lanes *s, Step *e, int mode) {
   e->stretch = mode == OFF ? stretch_of(s) : BC(0);
-  if (mode == OFF) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], ends, &e->radius);
+  if (mode == OFF) off_jet(s->x, s->q, UNPACK(s->lam), e->stretch, &e->c[0][0], &e->g[0][0], e->ends, &e->radius);
   if (mode == ON) on_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
   if (mode == LEAVING) leave_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
+}
+
+/* The size that the coefficients allow. */
+INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
+  const Options *o = w->o;
+  T last = BC(1e-300), before = BC(1e-300), sum = BC(0), per = BC(1.0 / (SAFETY * o->rtol));
+  T turn = BC(1e-300), turn_before = BC(1e-300);
   UNROLL for (int i = 0; i < N; i++) {
     e->allowed[i] = i < ND ? SAFETY * (o->atol + o->rtol * ABS(s->x[i])) : BC(0);
     if (i >= ND) continue;
@@ -124,7 +128,7 @@ INLINE T expand_step(const Lanes *s, const Work *w, Step *e, int mode, I *finite
   guard_bounds(s, w, e, mode, &last, &before);
   UNROLL for (int i = 0; i < K; i++) {
     if (mode == ON) continue;
-    T one = mode == OFF ? ends[2 * i + 1] : e->unknowns[i][P], two = mode == OFF ? ends[2 * i] : e->unknowns[i][P - 1];
+    T one = mode == OFF ? e->ends[2 * i + 1] : e->unknowns[i][P], two = mode == OFF ? e->ends[2 * i] : e->unknowns[i][P - 1];
     sum += one + two;
     if (mode == OFF) { one = SELECT(s->behind, one, BC(0)); two = SELECT(s->behind, two, BC(0)); }
     if (mode == LEAVING) bound(one, two, BC(1), &turn, &turn_before);
@@ -359,32 +363,31 @@ INLINE void polish_slip(const Step *e, I which, T h, T *dt) {
   *dt = SELECT(which & (ABS(root - *dt) <= 1e-6 * *dt), root, *dt);
 }
 
-INLINE void step_in(Lanes *s, Work *w, int mode) {
+INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
   const Options *o = w->o;
-  Step e;
   T dt, slope = BC(0), end[N];
   I finite, slot;
-  T by_series = expand_step(s, w, &e, mode, &finite);
+  T by_series = series_size(s, w, e, mode, &finite);
   T h = by_series, left = o->t_end - s->t, longest = SELECT(s->length > 0, GROWTH * s->length, BC(INFINITY));
   longest = MIN(longest, BC(o->max_step));
-  I held = time_of(&e, h) > longest, last, unclear = ~finite;
-  if (any(held)) h = SELECT(held, place_of(&e, longest), h);
-  last = time_of(&e, h) >= left;
-  unclear |= ~last & (time_of(&e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0)));
-  unclear |= (s->steps >= o->max_steps) | passed_between(s, &e);
-  if (any(last)) h = SELECT(last, place_of(&e, left + AT_END * MAX(BC(1), ABS(s->t + left))), h);
+  I held = time_of(e, h) > longest, last, unclear = ~finite;
+  if (any(held)) h = SELECT(held, place_of(e, longest), h);
+  last = time_of(e, h) >= left;
+  unclear |= ~last & (time_of(e, h) <= SHORTEST * MAX(ABS(s->t), ABS(s->t - w->b->t0)));
+  unclear |= (s->steps >= o->max_steps) | passed_between(s, e);
+  if (any(last)) h = SELECT(last, place_of(e, left + AT_END * MAX(BC(1), ABS(s->t + left))), h);
   T whole = h;
-  unclear |= first_hit(s, &e, mode, &h, &dt, &slot, &slope);
-  if (mode == ON && any(slot == 1)) polish_slip(&e, slot == 1, h, &dt);
+  unclear |= first_hit(s, e, mode, &h, &dt, &slot, &slope);
+  if (mode == ON && any(slot == 1)) polish_slip(e, slot == 1, h, &dt);
   last &= h == whole;
-  I over = last & (time_of(&e, dt) >= left);
+  I over = last & (time_of(e, dt) >= left);
   unclear |= over & (slot == 1); /* a mode without a step */
-  if (any(over)) dt = SELECT(over, place_of(&e, left), dt);
+  if (any(over)) dt = SELECT(over, place_of(e, left), dt);
   T wanted = dt;
-  unclear |= verify(s, w, &e, mode, by_series, &dt, &slot, &last, end);
-  T passed = time_of(&e, dt);
+  unclear |= verify(s, w, e, mode, by_series, &dt, &slot, &last, end);
+  T passed = time_of(e, dt);
   over &= last;
-  s->length = SELECT(dt < wanted, passed, MIN(time_of(&e, h), left));
+  s->length = SELECT(dt < wanted, passed, MIN(time_of(e, h), left));
   UNROLL for (int i = 0; i < N; i++) s->x[i] = end[i];
   s->t += passed;
   if (TIMED) s->x[N - 1] = s->t;
@@ -396,21 +399,21 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
   if (mode == OFF) {
     T height[K], g[K][N], scale = heights(s, w, height, g), radius = length_of(height);
     if (any(s->behind)) s->behind &= radius <= LEFT * scale;
-    I small = (radius <= CLOSE * scale) | ((e.stretch > 0) & (radius * radius * radius <= SMALL * o->rtol * scale * scale * scale));
+    I small = (radius <= CLOSE * scale) | ((e->stretch > 0) & (radius * radius * radius <= SMALL * o->rtol * scale * scale * scale));
     gone = met | (live & ~stopped & ~last & small);
   } else if (mode == ON) {
     unclear |= project(s, w, s->live);
     gone = met;
     if (any(gone)) {
-      unclear |= gone & ~(I)(slope < -1e-10 * e.g[0][0]);
+      unclear |= gone & ~(I)(slope < -1e-10 * e->g[0][0]);
       unclear |= release(s, gone) | change_mode(s, w, gone & ~unclear, EXIT, 0);
       s->left_at = SELECT(gone, s->t, s->left_at);
     }
   } else {
-    unclear |= met | (live & ~(I)(e.g[0][0] > 0));
+    unclear |= met | (live & ~(I)(e->g[0][0] > 0));
     gone = live & ~stopped & ~last;
-    T distance = series_at(e.g[0], P, dt) * dt * dt, height[K], g[K][N], u[K];
-    UNROLL for (int i = 0; i < K; i++) u[i] = series_at(e.unknowns[i], P, dt);
+    T distance = series_at(e->g[0], P, dt) * dt * dt, height[K], g[K][N], u[K];
+    UNROLL for (int i = 0; i < K; i++) u[i] = series_at(e->unknowns[i], P, dt);
     if (NAMED) UNROLL for (int i = 0; i < K; i++) s->x[OWN[i]] = SELECT(s->live, distance * u[i], s->x[OWN[i]]);
     T scale = heights(s, w, height, g);
     s->behind = distance <= LEFT * scale;
@@ -426,12 +429,21 @@ INLINE void step_in(Lanes *s, Work *w, int mode) {
   send(s, w, mode, gone & ~unclear, mode == OFF ? NEAR_SET : mode == ON ? LEAVING : OFF);
 }
 
+/* The parts of a step one after the other for all groups: the text of each is long, and read once for them all. */
+INLINE void step_in(Lanes *groups, Work *w, int mode) {
+  Step e[GROUPS];
+  for (int group = 0; group < w->groups; group++)
+    if (any(groups[group].live)) expand_step(&groups[group], &e[group], mode);
+  for (int group = 0; group < w->groups; group++)
+    if (any(groups[group].live)) take_step(&groups[group], w, &e[group], mode);
+}
+
 static __attribute__((noinline)) void step_off(Lanes *s, Work *w) { step_in(s, w, OFF); }
 static __attribute__((noinline)) void step_on(Lanes *s, Work *w) { step_in(s, w, ON); }
 static __attribute__((noinline)) void step_leaving(Lanes *s, Work *w) { step_in(s, w, LEAVING); }
 
 /* What is near the set reaches it, or goes on off it. */
-static __attribute__((noinline)) void come_near(Lanes *s, Work *w) {
+INLINE void come_near(Lanes *s, Work *w) {
   I unclear = {0}, there = reach(s, w, s->live, &unclear) & ~unclear;
   if (any(there)) unclear |= change_mode(s, w, there, ENTRY, 1);
   finish_lanes(s, w, NEAR_SET, unclear, HAND_OVER);
@@ -439,7 +451,11 @@ static __attribute__((noinline)) void come_near(Lanes *s, Work *w) {
   send(s, w, NEAR_SET, ~there, OFF);
 }
 
-typedef struct { Lanes lanes[POOLS]; Work work; int begun; } Many;
+static __attribute__((noinline)) void step_near(Lanes *groups, Work *w) {
+  for (int group = 0; group < w->groups; group++) if (any(groups[group].live)) come_near(&groups[group], w);
+}
+
+typedef struct { Lanes lanes[POOLS][GROUPS]; Work work; int begun; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
 
@@ -450,18 +466,25 @@ static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree) 
   w->o = o;
   w->words.tree = tree;
   w->size = o->atol / o->rtol;
+  w->groups = b->count >= OFTEN * GROUPS * W ? GROUPS : 1 + (int)(b->count / (OFTEN * W));
   w->column = WORDS - (b->p_stride ? 0 : NQ);
   prepare(b->p, q);
   for (int pool = 0; pool < POOLS; pool++) {
-    Lanes *s = &many->lanes[pool];
-    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
+    for (int group = 0; group < GROUPS; group++)
+      for (int k = 0; k < NQ; k++) many->lanes[pool][group].q[k] = BC(q[k]);
   }
   many->begun = 1;
 }
 
+static void load_lanes(Lanes *s, Work *w) {
+  I fresh = {0};
+  for EACH(l, ~s->live) if (load(s, w, l)) LANE_I(fresh, l) = -1;
+  if (any(fresh)) begin(s, w, fresh);
+}
+
 /* The mode whose lanes take a step: the last one of a run that has enough of them. */
 static int chosen(const Work *w) {
-  for (int pool = POOLS - 1; pool >= OFF; pool--) if (w->alive[pool] + w->waiting[pool] >= W) return pool;
+  for (int pool = POOLS - 1; pool >= OFF; pool--) if (w->alive[pool] + w->waiting[pool] >= w->groups * W) return pool;
   if (w->next < w->b->count) return OFF;
   for (int pool = OFF; pool < POOLS; pool++) if (w->alive[pool] + w->waiting[pool]) return pool;
   return -1;
@@ -475,18 +498,16 @@ int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t b
   for (;;) {
     int pool = chosen(w);
     if (pool < 0) return 0;
-    Lanes *s = &many->lanes[pool];
-    receive(s, w, pool);
-    if (pool == OFF && w->alive[OFF] < W && w->next < b->count) {
-      I fresh = {0};
-      for EACH(l, ~s->live) if (load(s, w, l)) LANE_I(fresh, l) = -1;
-      begin(s, w, fresh);
+    Lanes *s = many->lanes[pool];
+    for (int group = 0; group < w->groups; group++) receive(&s[group], w, pool);
+    if (pool == OFF && w->alive[OFF] < w->groups * W && w->next < b->count) {
+      for (int group = 0; group < w->groups; group++) load_lanes(&s[group], w);
       continue;
     }
-    if (--budget < 0) return 1;
+    if ((budget -= w->groups) < 0) return 1;
     if (pool == OFF) step_off(s, w);
     else if (pool == ON) step_on(s, w);
     else if (pool == LEAVING) step_leaving(s, w);
-    else come_near(s, w);
+    else step_near(s, w);
   }
 }

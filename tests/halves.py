@@ -117,7 +117,8 @@ def closing(texts: Sequence[str]) -> list[str]:
     failed = re.findall(r"^(?:FAILED|ERROR) .*$", texts[0], re.MULTILINE)
     sums: Counter[str] = Counter()
     for text in texts:
-        *_, last = ["", *text.splitlines()]
+        # the last of such lines, which may not be the last of all
+        *_, last = ["", *re.findall(r"^.*\d [a-z]+.* in [\d.]+s\b.*$", text, re.MULTILINE)]
         for number, what in re.findall(r"(\d+) ([a-z]+)", last.rpartition(" in ")[0]):
             sums[what.rstrip("s")] += int(number)
     names = ("failed", "passed", "skipped", "deselected", "xfailed", "xpassed", "warning", "error")

@@ -34,6 +34,11 @@ from .tracing import Arc, arcs_from_rest, landing_at
 Array = NDArray[np.float64]
 
 
+#: A speed this near to a point's, relative to the next one's, is the point's: at a junction an orbit
+#: that is off by rounding may be of the other arc.
+_AT_POINT = 1e-13
+
+
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingCurve:
     """Landings ``(xdot, omega)`` that lift off without slip, at one normal speed.
@@ -128,7 +133,7 @@ class DividingCurve:
                     continue
                 k, weight = found
                 guess = (1 - weight) * arc.points[k] + weight * arc.points[k + 1]
-                if weight in (0.0, 1.0):
+                if min(weight, 1.0 - weight) <= _AT_POINT:
                     return sign * float(guess[1])
                 word = arc.itinerary.replace(" ", "")
                 curve = curves.setdefault(word, ns.orbit.StartCurve(shooting, word, tol=1e-15))

@@ -39,6 +39,9 @@ from .normal_forms import hopf_coefficient
 #: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.
 _START = 1e-4
 
+#: A state is known to this part of its size.
+_BESIDE = 1e-13
+
 
 class Equilibria(BranchCurve):
     """What curves of equilibria and pseudo-equilibria share."""
@@ -77,6 +80,12 @@ class Equilibria(BranchCurve):
             return hopf_coefficient(self.system, self.mode_at(u), x, p, frequency)
         except (NonsmoothError, np.linalg.LinAlgError):
             return float("nan")
+
+    def _vague(self, u: Array, frequency: float, value: float) -> float:
+        """By how much the first Lyapunov coefficient differs where the state does by its rounding."""
+        beside = u.copy()
+        beside[: self.n] += _BESIDE * self.scale[: self.n] * np.cos(np.arange(self.n))
+        return abs(self.lyapunov(beside, frequency) - value)
 
     def bautin(self, u: Array) -> Mapping[str, float]:
         """The first Lyapunov coefficient, which vanishes at a Bautin point on a curve of Hopf points."""
@@ -131,7 +140,10 @@ class Equilibria(BranchCurve):
             rest = np.delete(values, [k[nearest], l[nearest]])
             stable = value < 0.0 and bool(np.all(rest.real < 0.0))
             kind = "supercritical" if value < 0.0 else "subcritical"
-            words += f": orbits branch off ({kind}{', stable' if stable else ''})"
+            if abs(value) <= 10.0 * self._vague(u, frequency, value):
+                words += ": degenerate to rounding"
+            else:
+                words += f": orbits branch off ({kind}{', stable' if stable else ''})"
         side = FarSide("", words, ReadOnly(numbers))
         return self.described(zero, "Hopf", far_side=side, coefficients=ReadOnly(numbers))
 

@@ -32,6 +32,9 @@ _REST = 1e-6
 #: A run that spends this part of its time after its last event may have come to an orbit without one.
 _QUIET = 0.75
 
+#: States as large as this have no squares.
+_HUGE = 1e150
+
 #: Runs of fewer events are not asked whether they chatter.
 _MANY = 1000
 
@@ -198,6 +201,8 @@ def _returns(
     times = np.linspace(start, end, 4001)
     states = run(times) if symmetry is None else run(times) @ symmetry.T
     x = run(anchor)
+    if not np.abs(states).max() < _HUGE:
+        return []  # it diverges
     i = int(np.argmin(np.abs(times - anchor)))
     rate = (run(times[min(i + 1, 4000)]) - run(times[max(i - 1, 0)])) / 2.0
     height = (states - x) @ rate

@@ -169,6 +169,15 @@ def test_states_that_are_not_finite_end_the_run(engine):
     assert status is ns.Status.NOT_FINITE and np.all(np.isfinite(state))
 
 
+@pytest.mark.parametrize("engine", ["auto", "reference"])
+def test_a_run_ends_where_derivatives_of_large_states_are_no_numbers(engine):
+    """x grows like exp(3 t): at 1e307 the steps of a point without derivatives went on for minutes."""
+    system = ns.FilippovSystem([x, y], surface=x, above=[y + x, 3 * y], below=[y + x, 3 * y])
+    start, least = [1.0, 0.3], np.log(1e300) / 3
+    run = ns.simulate(system, start, 1000.0, engine=engine, max_steps=2000)
+    assert run.status is ns.Status.NOT_FINITE and least < run.t[-1] < np.log(1e310) / 3
+
+
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("far", [1e8, -1e9])
 def test_far_from_zero_rounding_is_no_defect(far, engine):

@@ -214,6 +214,26 @@ def test_a_curve_of_hopf_points_has_its_bautin_point():
     assert fold.kind == "fold" and fold.parameter == pytest.approx(-(0.5**2) / 4, rel=1e-9)
 
 
+@pytest.mark.parametrize("cubic", [0.0, 1e-9, -1e-9])
+@pytest.mark.parametrize("size", [1.0, 1e4])
+def test_a_hopf_point_without_its_cubic_term_has_no_direction(cubic, size):
+    """r' = r (mu + c r^2 - r^4) with r in units of ``size``: of c = 0 nothing says whether cycles are stable."""
+    square = (X * X + Y * Y) / size**2
+    growth = R + cubic * square - square**2
+    system = ns.FilippovSystem(
+        [X, Y], field=[growth * X - 2 * Y, growth * Y + 2 * X], parameters={R: -0.3}
+    )
+    (event,) = ns.continue_equilibrium(system, [0.0, 0.0], "r", bounds=(-1, 1)).events
+    words = "degenerate to rounding" if cubic == 0.0 else "subcritical" if cubic > 0 else "stable)"
+    assert event.kind == "Hopf" and words in event.far_side.verdict
+
+
+def test_a_linear_centre_is_degenerate():
+    system = ns.FilippovSystem([X, Y], field=[R * X - 3 * Y, 3 * X + R * Y], parameters={R: -0.4})
+    (event,) = ns.continue_equilibrium(system, [0.0, 0.0], "r", bounds=(-1, 1)).events
+    assert event.far_side.verdict.endswith("imaginary axis: degenerate to rounding")
+
+
 def test_a_curve_of_doublings_has_the_point_where_it_becomes_subcritical():
     """x -> -(1 + m) x + n x^3 - x^5: c = n along m = 0."""
     m, n = symbols("m n")

@@ -142,7 +142,7 @@ class Driver(Bookkeeping):
     def _singular_step(self, e: Expansion, left: float) -> None:
         """Leave a point where only low derivatives exist; guards are looked at after the step."""
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
-        if h == 0.0:
+        if h == 0.0 or e.overflows:
             return self.end(
                 Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x.tolist())
             )

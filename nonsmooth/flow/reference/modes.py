@@ -18,6 +18,10 @@ from ..facts import SAFETY
 from ..options import Options
 
 
+#: What is larger may have derivatives that are infinite.
+_HUGE = 1e300
+
+
 @dataclass(frozen=True)
 class Expansion:
     """Jets of a mode at a point, and how exact they have to be and can be.
@@ -63,6 +67,11 @@ class Expansion:
     directions: Array = field(default_factory=lambda: np.zeros((0, 1)))
     radii: Array = field(default_factory=lambda: np.zeros(0))
     limits: Array = field(default_factory=lambda: np.zeros((0, 1)))
+
+    @property
+    def overflows(self) -> bool:
+        """Whether the field is so large that its derivatives may be no numbers."""
+        return bool(np.nanmax(np.abs(self.states[:, :2])) > _HUGE)
 
 
 class Modes(Protocol):

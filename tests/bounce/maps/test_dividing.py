@@ -64,6 +64,15 @@ def test_junction_and_lift_off(curve):
     assert np.abs(first.lift_off[:, 1] + first.lift_off[:, 4]).max() < 1e-12
 
 
+def test_speeds_within_rounding_of_the_junction_have_its_spin(curve):
+    """There an orbit of one arc may be of the other by rounding."""
+    for model in (curve.model, NO_GRAVITY):
+        found = bounce.dividing_curve(model)
+        xdot, omega = found.junction
+        near = xdot + np.spacing(xdot) * np.arange(-4, 5)
+        np.testing.assert_allclose(found.omega(near), omega, rtol=1e-12)
+
+
 def test_slope_at_rest_is_five_halves(curve):
     assert curve.omega(1e-6) / 1e-6 == pytest.approx(2.5, abs=1e-4)
 

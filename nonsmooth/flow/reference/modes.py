@@ -17,7 +17,6 @@ from ...model.frozen import Frozen
 from ..facts import SAFETY
 from ..options import Options
 
-
 #: What is larger may have derivatives that are infinite.
 _HUGE = 1e300
 

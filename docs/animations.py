@@ -106,8 +106,10 @@ def funnel(count: int) -> Iterator[Figure]:
             after = np.linspace(futures.t, t, 80)
             for states, departure in zip(futures(after), futures.departures, strict=True):
                 colour = {"+": STYLE.ABOVE, "-": STYLE.BELOW, "s": "black"}[departure.side]
-                order = 3 if departure.side == "s" else 2  # what leaves late slides until then
-                axes.plot(after, states[:, 0], color=colour, linewidth=0.9, zorder=order)
+                order, width = (
+                    (3, 2) if departure.side == "s" else (2, 0.9)
+                )  # slides until it leaves
+                axes.plot(after, states[:, 0], color=colour, linewidth=width, zorder=order)
         axes.axvline(futures.t, color="0.7", linewidth=0.8)
         axes.set(xlim=(0.0, futures.t + 1.0), ylim=(-0.65, 0.65))
         for y, word, colour in (

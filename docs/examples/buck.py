@@ -47,6 +47,8 @@ ax.set_xlim(22.0, 33.5)
 for line in ax.lines:
     if str(line.get_gid()).startswith("event"):
         line.set_markersize(5)
+ax.text(24.4, 12.06, "period doubling", ha="right")
+ax.text(32.35, 12.55, "chaos", ha="right")
 ax.set_title("Buck converter: doublings and chaos")
 
 if __name__ == "__main__":

@@ -32,11 +32,11 @@ for states, departure in zip(futures(after), futures.departures, strict=True):
 for side, label in (("+", "leaves up"), ("-", "leaves down"), ("s", "slides")):
     height.plot([], [], label=label, **STYLE[side])
 ns.plot.style.arrowhead(plane, run(before)[:, 1:], 0.5, "black", mutation_scale=16, zorder=4)
-height.set(xlabel="t", ylabel="z1", xlim=(0.0, futures.t + 1.0), xticks=[0, 0.5, 1, 1.5])
+height.set(xlabel="$t$", ylabel="$z_1$", xlim=(0.0, futures.t + 1.0), xticks=[0, 0.5, 1, 1.5])
 height.legend(loc="upper left", frameon=False)
 plane.plot(0.0, 0.0, "ko")
 plane.annotate("two-fold", (0.0, 0.0), xytext=(8, -4), textcoords="offset points")
-plane.set(xlabel="z2", ylabel="z3", xlim=(-1.0, 0.5), xticks=[-1, -0.5, 0, 0.5])
+plane.set(xlabel="$z_2$", ylabel="$z_3$", xlim=(-1.0, 0.5), xticks=[-1, -0.5, 0, 0.5])
 
 if __name__ == "__main__":
     print(run.status, run.message)

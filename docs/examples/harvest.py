@@ -27,6 +27,7 @@ for name, ax in panels.items():
         labels=True,
         title=f"{name}, α = {values[name]:.4f}",
     )
+    ax.set(xlabel="$x_1$", ylabel="$x_2$")
 
 legend = panels["saddle and node"].get_legend()
 figure.legend(handles=legend.legend_handles, loc="outside lower center", ncols=3, frameon=False)

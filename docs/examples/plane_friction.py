@@ -60,7 +60,7 @@ directions = ns.limit_directions(block, [0.0, 0.0])
 paths.plot([], [], label="a = 0.6 c: comes to rest", **RESTS)
 paths.plot([], [], label="a = 1.5 c: goes on", **GOES)
 paths.plot(0, 0, "k.", zorder=5)
-paths.set(xlabel="h1", ylabel="h2", xlim=(-1.1, 2.1), ylim=(-1.2, 1.6))
+paths.set(xlabel="$h_1$", ylabel="$h_2$", xlim=(-1.1, 2.1), ylim=(-1.2, 1.6))
 paths.legend(loc="upper left", frameon=False, fontsize=8)
 
 loads = np.linspace(-2.0, 2.0, 41) + 1e-3
@@ -91,7 +91,7 @@ astroid.plot(
     linestyle="--",
     label="sliding inside",
 )
-astroid.set(xlabel="a1", ylabel="a2", aspect="equal", xlim=(-2.3, 2.3), ylim=(-1.7, 1.7))
+astroid.set(xlabel="$a_1$", ylabel="$a_2$", aspect="equal", xlim=(-2.3, 2.3), ylim=(-1.7, 1.7))
 astroid.legend(loc="upper left", bbox_to_anchor=(1.02, 1.0), frameon=False, fontsize=8)
 
 if __name__ == "__main__":

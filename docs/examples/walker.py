@@ -54,7 +54,7 @@ for ax in (whole, close):
     for line in ax.lines:
         if str(line.get_gid()).startswith("event"):
             line.set_markersize(4.5)
-    ax.set(xlabel="slope gamma in radians", ylabel="stance angle after heelstrike")
+    ax.set(xlabel="slope γ in radians", ylabel="stance angle after heelstrike")
 whole.set_title("two gaits")
 whole.text(0.0088, 0.21, "long steps", ha="right")
 whole.text(0.0092, 0.183, "short steps")

@@ -150,6 +150,17 @@ def _names(axes: Axes, found: Basins) -> None:
     labels, parts = Labels(axes), found.fractions
     x, y = found.axes.values()
     for k in sorted((k for k in parts if k > 0), key=lambda k: -parts[k])[: len(COLORS)]:
-        i, j = np.nonzero(found.labels == k)
+        i, j = np.nonzero(_core(found.labels == k))
         text = f"{found.name(k)}:\n{100 * parts[k]:.1f} %"
         labels.name(text, np.column_stack([x[i], y[j]]), inside=True)
+
+
+def _core(cells: Any) -> Any:
+    """The cells of a region (m, n) that are farthest from others, so that what is there is in it."""
+    while True:
+        padded = np.pad(cells, 1, mode="edge")
+        near = [padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]]
+        inner = np.logical_and.reduce([cells, *near])
+        if not inner.any() or np.array_equal(inner, cells):
+            return cells
+        cells = inner

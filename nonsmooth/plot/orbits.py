@@ -22,6 +22,7 @@ _MODES: dict[str, tuple[str, Any, float]] = {
 }
 _CYCLE = (style.GREEN, style.PURPLE, style.ORANGE, style.SKY, style.BLUE)
 _POINTS = 120  # of a leg
+_ENTRIES = 6  # of a legend
 
 
 def periodic_orbit(
@@ -110,15 +111,24 @@ def periodic_orbit(
         )
         axes.margins(0.08)
         box = (*axes.get_xlim(), *axes.get_ylim())
-        if own and system.dimension == 2 and not system.time_dependent:
+        surfaces = own and system.dimension == 2 and not system.time_dependent
+        if surfaces:
             draw_surfaces(axes, system, orbit.parameter_vector, box)
             axes.set(xlim=box[:2], ylim=box[2:])
         axes.set(xlabel=names[0], ylabel=names[1])
         axes.set_title(f"period {orbit.period:.6g}, {orbit.stability}" if title is None else title)
         if legend:
-            handles = [style.line(c, m or "smooth", w, d) for m, (c, d, w) in looks.items()]
-            axes.legend(handles=handles, loc="best", title="mode")
+            handles = [style.line(c, _words(m), w, d) for m, (c, d, w) in looks.items()]
+            handles.append(style.marker("o", "event", fill="white", size=4.5))
+            if surfaces:
+                handles.append(style.line(style.GREY, "surface", 2.2))
+            axes.legend(handles=handles[:_ENTRIES], loc="best")
     return figure
+
+
+def _words(mode: str) -> str:
+    """What a legend says of a mode."""
+    return f"mode {mode}".replace("-", "\N{MINUS SIGN}") if mode else "smooth"
 
 
 def _look(mode: str, k: int) -> tuple[str, Any, float]:

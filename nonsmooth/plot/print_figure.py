@@ -9,6 +9,7 @@ from matplotlib.figure import Figure
 
 #: TrueType fonts, which publishers take and whose text can be searched and edited; Type 3 otherwise.
 _FONTS: Any = {"pdf.fonttype": 42, "ps.fonttype": 42}
+_LAYOUTS = 5  # at most: three do so far
 
 
 class PrintFigure(Figure):
@@ -26,5 +27,15 @@ class PrintFigure(Figure):
             Of ``matplotlib.figure.Figure.savefig``.
         """
         with mpl.rc_context(_FONTS):
-            self.draw_without_rendering()  # the first layout does not know how high titles are
+            self._settle()
             super().savefig(fname, **options)
+
+    def _settle(self) -> None:
+        """Lay out until nothing moves: titles and square axes know their heights only when drawn."""
+        before = list[tuple[int, ...]]()
+        for _ in range(_LAYOUTS):
+            self.draw_without_rendering()
+            after = [tuple(map(round, map(float, axes.bbox.bounds))) for axes in self.axes]
+            if after == before:
+                return
+            before = after

@@ -40,8 +40,14 @@ _NAMES = {
     "VI": {
         "mix-0": (1.7, 1.5),
         "mix-S": (-2.1, 2.1),
-        "mix-C": (-2.47, 0.02),
+        "mix-C": (-2.48, 0.17),
         "mix-F": (0.18, 2.72),
+    },
+    "IV": {
+        "mix-0": (1.5, 1.7),
+        "mix-S": (2.1, -2.1),
+        "mix-C": (-0.06, -2.76),
+        "mix-F": (2.57, -0.16),
     },
 }
 #: Of the maps: nu1 and nu2 from -REACH to REACH.
@@ -117,8 +123,6 @@ def two_fold_map(
 
 def places(kind: str) -> dict[str, tuple[float, float]]:
     """Where the names of the classes stand in the map of a kind."""
-    if kind == "IV":  # the other side up: (nu1, nu2) -> (nu2, nu1)
-        return {name: (b, a) for name, (a, b) in _NAMES["VI"].items()}
     return _NAMES[kind]
 
 

@@ -195,7 +195,7 @@ def _eigenlines(ax: Axes, portrait: Portrait, numbers: bool) -> None:
             path_effects=style.halo(4.0),
         )
         if abs(value) < ZERO:
-            _along(ax, m, end, name, color)
+            _along(ax, m, end, name, color, away=0.54)  # longer than others: off the frame
             continue
         for at in (0.62, -0.42):
             tip = at * end - np.sign(-value) * 1e-3 * end
@@ -223,13 +223,13 @@ def _eigenlines(ax: Axes, portrait: Portrait, numbers: bool) -> None:
                 )
 
 
-def _along(ax: Axes, m: float, end: Array, name: str, color: str) -> None:
+def _along(ax: Axes, m: float, end: Array, name: str, color: str, away: float = 0.62) -> None:
     """Write a name along an eigenline in Dr, on the side with more room."""
     angle = math.atan(m)
     normal = np.array([-math.sin(angle), math.cos(angle)]) * (1 if m >= 1 else -1)
     ax.annotate(
         name,
-        tuple(-0.62 * end),
+        tuple(-away * end),
         xytext=tuple(_BESIDE * normal),
         textcoords="offset points",
         ha="center",

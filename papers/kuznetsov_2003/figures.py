@@ -171,8 +171,7 @@ def diagram() -> Figure:
             levels = np.append(np.linspace(start, SADDLE_NODE, 300)[:-1], SADDLE_NODE * (1 - 1e-15))
             roots = [pseudo_equilibria(a) for a in levels]
             points = [r[which] if r else np.nan for r in roots]
-            name = "stable pseudo-node" if which else "pseudo-saddle"
-            upper.plot(levels, points, color=look.BLACK, linestyle=dashes, linewidth=1.6, gid=name)
+            upper.plot(levels, points, color=look.BLACK, linestyle=dashes, linewidth=1.6)
         ends = top - np.geomspace(0.1, 1e-6, 12)  # where it ends as a square root does
         begun = [*np.linspace(BOUNDARY_FOCUS + 1e-3, top - 0.11, 24), *ends]
         born = sliding_homoclinic()
@@ -205,14 +204,11 @@ def _names(ax: Axes) -> None:
         labels.name(f"{name}, {after}", [(a, x) for a in np.linspace(1.3, 2.4, 12)], color)
         labels.name(before, [((0.7 + level) / 2, x)], color)
     curves = {line.get_gid(): line.get_xydata() for line in ax.lines if line.get_gid()}
-    for name, color in (
-        ("stable pseudo-node", look.BLACK),
-        ("pseudo-saddle", look.BLACK),
-        ("landing of the sliding cycle", look.GREEN),
-        ("landing of the fold's orbit", look.GREEN),
-    ):
+    for height, name in ((0.648, "stable\npseudo-node"), (0.055, "pseudo-\nsaddle")):
+        ax.text(1.18, height, name, fontsize=8, ha="right", va="bottom", linespacing=1.0)
+    for name in ("landing of the sliding cycle", "landing of the fold's orbit"):
         points = np.asarray(curves[name])
-        labels.name(name, points[np.all(np.isfinite(points), axis=1)], color)
+        labels.name(name, points[np.all(np.isfinite(points), axis=1)], look.GREEN)
 
 
 def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:

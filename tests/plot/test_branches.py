@@ -134,6 +134,8 @@ def test_an_orbit_has_its_modes_and_lies_over_a_portrait():
     drawn = np.concatenate([np.column_stack(line.get_data()) for line in ax.lines[:2]])
     assert_allclose(drawn.max(axis=0), orbit.trajectory(np.linspace(0, 1, 2)).max(axis=0), atol=2)
     assert np.abs(drawn[:, 1].max() - 0.5) < 1e-9  # it sticks to the belt and slips below it
+    words = [text.get_text() for text in ax.get_legend().get_texts()]
+    assert words == ["mode \N{MINUS SIGN}", "mode s", "event", "surface"]
     under = ns.plot.phase_portrait(block, (-2, 2, -1, 1))
     figure = ns.plot.periodic_orbit(orbit, ax=under.axes[0])
     assert figure is under

@@ -2,10 +2,12 @@
 none cut off or on another, and no legend of more than six entries."""
 
 import dataclasses
+import io
 
 import casadi as ca
 import numpy as np
 import pytest
+from matplotlib.image import imread
 
 import bounce
 import nonsmooth as ns
@@ -228,6 +230,14 @@ def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
     assert max(ax.bbox.width for ax in figure.axes) > 0.3 * figure.bbox.width  # two side by side
 
 
+def test_no_title_is_cut_in_a_file():
+    """Square axes of a narrow figure need more than one layout."""
+    stream = io.BytesIO()
+    ns.plot.two_fold(ns.textbook.TWO_FOLDS["II-C"], size=COLUMN).savefig(stream, dpi=150)
+    stream.seek(0)
+    assert imread(stream)[0].min() == 1.0  # the uppermost row of pixels is white
+
+
 @pytest.mark.parametrize(("count", "size"), [(2, COLUMN), (3, None), (6, COLUMN)])
 def test_names_of_24_letters_do_not_meet(count, size):
     names = ["displacement_of_the_block", "tip_velocity_of_the_bow_", "temperature_of_the_spring"]
@@ -239,3 +249,18 @@ def test_names_of_24_letters_do_not_meet(count, size):
     system = ns.FilippovSystem(states, surface=states[1] - 0.7, above=above, below=below)
     figure = ns.plot.trajectory(ns.simulate(system, np.ones(count), 0.5), size=size)
     assert faults(figure) == []
+
+
+def test_names_of_narrow_basins_are_about_their_middles():
+    found = basins(7)
+    figure = ns.plot.basins(found, size=COLUMN)
+    figure.draw_without_rendering()
+    (axes,) = figure.axes
+    texts = [text for artist in axes.artists for text in artist.get_children()]
+    assert len(texts) == 7
+    for text in texts:
+        box = text.get_window_extent()
+        middle = axes.transData.inverted().transform((box.p0 + box.p1) / 2)
+        k = int(text.get_text().split(":")[0].split()[1])
+        inside = found.axes["x"][np.any(found.labels == k, axis=1)]
+        assert inside.min() <= middle[0] <= inside.max()

@@ -134,10 +134,13 @@ def periodic_orbit(
         raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
     mirror = mirror_of(system, symmetry)
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
-    solver = _Solver(start.problem, start.p)
-    u, at = solver.solve(start.unknowns, max_iterations)
-    problem, once = once_round(start.problem, u, start.p)
-    if problem is not start.problem:
+    begun, guessed = start.problem, start.unknowns
+    if begun.legs[-1].name:  # a guess that goes round many times is solved for once
+        begun, guessed = once_round(begun, guessed, start.p)
+    solver = _Solver(begun, start.p)
+    u, at = solver.solve(guessed, max_iterations)
+    problem, once = once_round(begun, u, start.p)
+    if problem is not begun:
         u, at = _Solver(problem, start.p).solve(once, max_iterations)
     require_motion(problem, at, start)
     require_duration(problem, at, about_of(system, period, start.p))
@@ -159,6 +162,9 @@ _FAR = 10.0
 #: Directions that equations say less of than the others, by these factors.
 _WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
 
+#: Of more equations no singular values are taken: that would take minutes and hear no Ctrl-C.
+_LARGE = 1000
+
 #: Equations that hold to this part of their size cannot be asked for more.
 _CLOSED = 1e-9
 
@@ -167,8 +173,7 @@ class _Solver:
     """Newton's method on the equations of an orbit, with what it knows where it fails."""
 
     def __init__(self, problem: BoundaryProblem, p: Array):
-        self.problem, self.p = problem, p
-        self.iterations = 0
+        self.problem, self.p, self.iterations = problem, p, 0
         self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
 
     def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
@@ -224,7 +229,7 @@ class _Solver:
         last[:] = before
         if nearest is not root and nearest is not None:
             return self._polished(nearest * scales, _POLISH)
-        if root is None:
+        if root is None and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
         if root is None:
             raise self._failure(reason)
@@ -234,6 +239,8 @@ class _Solver:
         self, equations: Equations, v: Array, root: Array | None, most: int
     ) -> Array | None:
         """The orbit near a guess that closes so well that Newton's method should not leave it."""
+        if v.size > _LARGE:
+            return root
         try:
             values, jacobian = equations(v)
             closes = float(np.abs(values / self._sizes(jacobian)).max())
@@ -358,7 +365,8 @@ class _Solver:
         if at is not None and not backward:
             backward = [self._largest(at)]
         where = f" At the last iterate {backward[0]}." if backward else ""
-        words = " ".join(leg.mode or "o" for leg in legs)
+        words = " ".join(leg.mode or "o" for leg in legs[:40])
+        words += f" ... ({len(legs)} legs)" * (len(legs) > 40)
         return ConvergenceError(
             f"periodic orbit: expected Newton's method to converge with the itinerary {words!r}, "
             f"received none after {self.iterations} steps, residual {size:.2g}.{told}{where} Simulate "

@@ -346,3 +346,25 @@ def test_parts_of_curves_that_are_none_are_refused() -> None:
     ]:
         with pytest.raises(error, match="expected"):
             call()
+
+
+def test_a_guess_of_many_rounds_is_solved_for_once(monkeypatch) -> None:
+    space, solved = ns.periodic_orbit.__globals__, []
+    plain = space["shot"]
+
+    def shot(problem, *rest):
+        solved.append(len(problem.legs))
+        return plain(problem, *rest)
+
+    monkeypatch.setitem(space, "shot", shot)
+    orbit = ns.periodic_orbit(scalar_relay(), [0.5], period=200 * 2 * np.pi)
+    assert max(solved) == len(orbit.legs) == 2
+    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-14)
+
+
+@pytest.mark.slow
+def test_a_guess_of_two_thousand_legs_is_refused_without_their_singular_values() -> None:
+    """They took more than four minutes in one call, which no Ctrl-C ended."""
+    with pytest.raises(ns.ConvergenceError, match=r"\.\.\. \(\d+ legs\)', received none") as caught:
+        ns.periodic_orbit(scalar_relay(), [0.5], period=1000 * 2 * np.pi)
+    assert len(str(caught.value)) < 600

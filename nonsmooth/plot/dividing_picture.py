@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import numpy as np
@@ -36,8 +37,8 @@ def dividing_curves(
     """Draw the curves in which a plane of starts is cut by what divides orbits beside two-folds.
 
     Starts that slide into a two-fold are full lines, those that just touch the surface are dashed, and dots
-    are where they meet. Beside every arc is its itinerary. What comes to the two-folds is blue, what leaves
-    them red.
+    are where they meet; circles are where arcs of two itineraries do that are of one kind. Beside every arc
+    is its itinerary. What comes to the two-folds is blue, what leaves them red.
 
     Parameters
     ----------
@@ -108,8 +109,19 @@ def _draw(axes: Any, named: Labels | None, one: DividingCurves) -> None:
             back = "" if one.stable else ", backward"
             modes = arc.itinerary.replace("-", "\N{MINUS SIGN}")
             named.name(f"{modes} {words}{back}", _middle(arc.points), color)
+    changes = _changes(one)
+    if len(changes):
+        look: Any = {"markersize": 4.5, "zorder": 5}
+        axes.plot(*changes.T, "o", markerfacecolor="white", markeredgecolor=color, **look)
     if len(one.junctions):
         axes.plot(*one.junctions.T, "o", color=style.BLACK, markersize=4.5, zorder=5)
+
+
+def _changes(one: DividingCurves) -> Array:
+    """Points (k, 2) at which arcs of two itineraries of one kind follow each other."""
+    pairs = [pair for curve in one.curves for pair in pairwise(curve)]
+    found = [a.points[-1] for a, b in pairs if a.kind == b.kind and a.itinerary != b.itinerary]
+    return np.array(found).reshape(-1, 2)
 
 
 def _middle(points: Array) -> Array:

@@ -1,5 +1,7 @@
 """Pictures of dividing curves show the arcs that were computed, by their kinds, with their names."""
 
+from itertools import pairwise
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -63,3 +65,18 @@ def test_what_does_not_fit_is_refused(found):
         ns.plot.dividing_curves(found, ax=Figure().add_subplot(projection="3d"))
     with pytest.raises(ns.OptionError, match="drawn by dividing_curves"):
         ns.plot.manifold(found)
+
+
+def test_a_circle_is_where_two_itineraries_of_one_kind_meet():
+    given = dict(starts=lambda a, b: [a, b, 0.6 - 0.3 * b], box=[(-0.8, 0.83), (-2.1, 1.07)])
+    fold = ns.find_two_fold(SYSTEM, near=[0, 0, 0])  # starts on either side of the surface
+    cut = ns.manifold(SYSTEM, fold, duration=6.0, spacing=0.3, **given)
+    meet = [
+        a.points[-1]
+        for curve in cut.curves
+        for a, b in pairwise(curve)
+        if a.kind == b.kind and a.itinerary != b.itinerary
+    ]
+    (axes,) = ns.plot.dividing_curves(cut, labels=False).axes
+    (circles,) = (line for line in axes.lines if line.get_markerfacecolor() == "white")
+    assert meet and np.array_equal(circles.get_xydata(), meet)

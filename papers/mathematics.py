@@ -52,7 +52,7 @@ _NAME = rf"(?:{'|'.join(sorted(FUNCTIONS, key=len, reverse=True))}|sqrt|abs|grad
 _TOKEN = re.compile(
     rf"(?P<name>{_NAME}(?![A-Za-z_0-9]))"
     rf"|(?P<force>l(?P<axis>[NT])(?![A-Za-z]))"
-    rf"|(?P<partial>d(?P<of>{_LETTERS}|[A-Z]|[nptvxyz](?![a-z]))(?P<ofindex>{_INDEX}|)(?P<ofprimes>'*)(?![a-z]))"
+    rf"|(?P<partial>d(?P<of>{_LETTERS}|[A-Z]|[nptvxyz](?![a-z]))(?P<ofhat>~?)(?P<ofindex>{_INDEX}|)(?P<ofprimes>'*)(?![a-z]))"
     rf"|(?P<symbol>{_SYMBOL})(?P<hat>~?)(?P<primes>'*)(?P<index>{_INDEX}?)(?P<late>'*)(?![A-Za-z])"
     rf"|(?P<number>{_NUMBER})"
     r"|(?P<operator><=|>=|!=|->|<<|>>|\+-|-\+|\.\.|[-+=<>~*/^|.,;:()\[\]])"
@@ -264,7 +264,9 @@ def _atom(found: re.Match[str]) -> str:
     if found["force"]:
         return f"<msub><mi>λ</mi><mi>{found['axis']}</mi></msub>"
     if found["partial"]:
-        letter = _symbol(found["of"], found["ofprimes"], found["ofindex"] or "")
+        letter = _symbol(
+            found["of"], found["ofprimes"], found["ofindex"] or "", hat=bool(found["ofhat"])
+        )
         return f"<mrow><mi>d</mi>{letter}</mrow>"
     if found["symbol"]:
         primes = found["primes"] + found["late"]

@@ -238,7 +238,9 @@ def _table(part: Section) -> str:
 
 def _cell(text: str, column: str) -> str:
     marked = text in ("agrees", "corrected", "confirmed", "holds", "no")
-    name = f" class='{text}'" if marked else ""
+    whole = "word" if column == "verdict" else ""  # a narrow column does not break a verdict
+    names = " ".join(name for name in (text if marked else "", whole) if name)
+    name = f" class='{names}'" if names else ""
     return f"<td{name} data-label='{html.escape(column)}'>{typeset(text)}</td>"
 
 
@@ -249,7 +251,7 @@ math{font-family:"STIX Two Math","Latin Modern Math","Cambria Math",math,serif;f
 table{border-collapse:collapse;width:100%;font-size:13px}
 th,td{border-bottom:1px solid #ccc;padding:.35rem .5rem;text-align:left;vertical-align:top;min-width:4.5em}
 th{position:sticky;top:0;background:#f4f4f4}
-li,figcaption,td{overflow-wrap:anywhere}li{max-width:52rem;margin:.3rem 0}
+li,figcaption,td{overflow-wrap:anywhere}td.word{overflow-wrap:normal}li{max-width:52rem;margin:.3rem 0}
 figure{margin:1.5rem 0}figure img{max-width:100%;height:auto}figcaption{max-width:48rem}
 .grid{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(26rem,100%),1fr));gap:1rem}
 td.corrected,td.no{color:#a33b00;font-weight:600}td.agrees,td.confirmed,td.holds{color:#005a8c}

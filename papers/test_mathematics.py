@@ -29,6 +29,7 @@ def seen(text: str) -> str:
         ("dLambda_N/dY < 0", "[dΛN/dY&lt;0]"),
         ("dv_N/dt = lambda_N - g", "[dvN/dt=λN−g]"),
         ("lambda~ of the force", "[λ~] of the force"),
+        ("dv/dt~ = m^-1 lambda~", "[dv/dt~=m−1λ~]"),
     ],
 )
 def test_formulas(text, expected):

@@ -113,7 +113,9 @@ def outcome_map(
         if quantity != "itinerary":
             _field(figure, ax, outcomes, quantity, x, y, units)
         lines = (
-            _contour(ax, outcomes, x, y) if curve is None else draw_curve(ax, outcomes.names, curve)
+            _contour(ax, outcomes, x, y)
+            if curve is None
+            else draw_curve(ax, outcomes.names, curve, (_ends(x), _ends(y)))
         )
         patches: list[Patch] = []
         if quantity == "itinerary":
@@ -208,13 +210,23 @@ def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, An
     return {"slip at lift-off $H_F=0$": lines.legend_elements()[0][0]}
 
 
-def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> dict[str, Any]:
+def draw_curve(
+    ax: Axes, names: Sequence[str], curve: DividingCurve, view: Sequence[Sequence[float]]
+) -> dict[str, Any]:
     """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``.
+
+    Parameters
+    ----------
+    ax : matplotlib Axes
+    names : (str, str)
+    curve : DividingCurve
+    view : ((low, high), (low, high))
+        The limits of the axes.
 
     Returns
     -------
     dict of str: Artist
-        What is to be said of its lines and points, with one of each.
+        What is to be said of the lines and points in view, with one of each.
     """
     order = [("xdot", "omega").index(name) for name in names]
     styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
@@ -223,14 +235,22 @@ def draw_curve(ax: Axes, names: Sequence[str], curve: DividingCurve) -> dict[str
         for sign in (1, -1) if curve.mirrored else (1,):
             u, v = sign * arc.points[:, order].T
             (line,) = ax.plot(u, v, color="black", linewidth=2.0, linestyle=styles[arc.kind])
-            key[f"$H_F=0$, {arc.kind}"] = line
+            if _in_view(u, v, view):
+                key[f"$H_F=0$, {arc.kind}"] = line
     if curve.junction is not None:
         look: dict[str, Any] = dict(color="white", markeredgecolor="black", markersize=6, zorder=8)
         for sign in (1, -1) if curve.mirrored else (1,):
             point = sign * curve.junction[order]
             (dot,) = ax.plot(*point, "o", **look)
-            key["their junction"] = dot
+            if _in_view(point[0], point[1], view):
+                key["their junction"] = dot
     return key
+
+
+def _in_view(u: Any, v: Any, view: Sequence[Sequence[float]]) -> bool:
+    """Whether a point is within limits."""
+    (left, right), (low, high) = view
+    return bool(np.any((u >= left) & (u <= right) & (v >= low) & (v <= high)))
 
 
 def _title(outcomes: OutcomeMap, units: Units) -> str:

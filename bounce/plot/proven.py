@@ -68,10 +68,11 @@ def proven_map(
                     patches, facecolor=PROVEN_COLOURS[name], edgecolor="0.6", linewidth=0.3
                 )
             )
-        key = {} if curve is None else draw_curve(ax, ("xdot", "omega"), curve)
         low, high = found.boxes.min(axis=0), found.boxes.max(axis=0)
-        ax.set_xlim(low[0], high[1])
-        ax.set_ylim(low[2], high[3])
+        view = (low[0], high[1]), (low[2], high[3])
+        key = {} if curve is None else draw_curve(ax, ("xdot", "omega"), curve, view)
+        ax.set_xlim(view[0])
+        ax.set_ylim(view[1])
         ax.set_xlabel(r"speed $\dot X_0$")
         ax.set_ylabel(r"spin $\Omega_0$")
         handles = [

@@ -13,6 +13,7 @@ import nonsmooth as ns
 from ..errors import require
 from ..maps.slip_directions import SlipMap
 from ..parameters import numbers
+from .keys import is_narrow
 
 style = ns.plot.style
 
@@ -35,7 +36,7 @@ _TO_RGB = np.array(
 )
 _WHITE = np.array([0.95047, 1.0, 1.08883])
 _COLOURS = 360
-_ARROWS = 13
+_ARROWS, _ARROWS_COLUMN = 13, 8  # across a map, and across one in a column of a journal
 _DOT = 17.0  # points, of a vortex: its turns are written on it
 
 
@@ -138,15 +139,17 @@ def slip_map(directions: SlipMap, ax: Axes | None = None) -> Figure:
     return figure
 
 
-def _spread(count: int) -> NDArray[np.intp]:
+def _spread(count: int, most: int) -> NDArray[np.intp]:
     """Rows of cells with an arrow: half a distance off the frame, so that none reaches over it."""
-    shown = min(_ARROWS, count)
+    shown = min(most, count)
     return np.unique(np.round((np.arange(shown) + 0.5) * count / shown - 0.5).astype(np.intp))
 
 
 def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
     lateral, axial = directions.omega
-    rows, columns = _spread(axial.size), _spread(lateral.size)
+    most = _ARROWS_COLUMN if is_narrow(ax) else _ARROWS
+    rows, columns = _spread(axial.size, most), _spread(lateral.size, most)
+    larger = _ARROWS / most
     shown = angle[np.ix_(rows, columns)]
     figure = ax.get_figure(root=True)
     assert figure is not None
@@ -160,7 +163,7 @@ def _arrows(ax: Axes, directions: SlipMap, angle: Array) -> None:
     # Up is forward: the second component of an arrow is that along the direction of travel.
     ax.quiver(
         lateral[columns], axial[rows], np.sin(shown), np.cos(shown), color="black", edgecolor="white",
-        linewidth=0.5, width=0.0045, scale=26, headwidth=4, headlength=4.5, headaxislength=4,
+        linewidth=0.5, width=0.0045 * larger, scale=26 / larger, headwidth=4, headlength=4.5, headaxislength=4,
         pivot="middle", angles="uv", zorder=4,
     )  # fmt: skip
 

@@ -60,9 +60,9 @@ PICTURES: tuple[Picture, ...] = (
         "rolls at lift-off. Of the two "
         "classes that the paper describes, small negative slip appears in the compliant model on "
         "both surfaces, and never in the rigid law. Large positive slip appears in the rigid law "
-        "on both, for few landings (at up to 1061/s on astroturf and 1767/s on turf). In the "
-        "compliant model it appears on turf, where 35 of 248 forward landings leave forward, at up to "
-        "780/s, and not on astroturf, where 16 of 248 do, at no more than 6/s.",
+        "on both, for few landings (at up to 1061/s on artificial turf and 1767/s on teeing turf). In the "
+        "compliant model it appears on teeing turf, where 35 of 248 forward landings leave forward, at up to "
+        "780/s, and not on artificial turf, where 16 of 248 do, at no more than 6/s.",
         figures_data.tangential_velocity,
     ),
     Picture(
@@ -92,7 +92,8 @@ PICTURES: tuple[Picture, ...] = (
         "What a bounce can do near lift-off, computed with the normal form of the linear ball's "
         "two-fold (mu = .3, d1 = d2 = .1, eta = .5, G = 1e-4): (a) forward slip throughout, (b) "
         "reverse slip throughout, (c, d) slip, roll, and slip again through a fold. Diamonds: "
-        "lift-off. Pale: behind or below a surface.",
+        "lift-off. Dotted: from a start straight to the surface, at a cross. Pale: behind or below a "
+        "surface.",
         figures_space.geometries,
     ),
     Picture(

@@ -176,6 +176,8 @@ class Scene:
             t = np.linspace(-0.45, end, 60)
             z = np.column_stack([-(t**2) / 2, centre + n2 * t, -t])
             self.curve(z, look.BELOW, FRONT_BELOW, look.DASHED, 1.6, at=(0.25, 0.75))
+        order = ABOVE if side == "+" else FRONT_BELOW
+        self.axes.plot(*project(z[0]), "o", color="black", markersize=4, zorder=order + 0.1)
         self.lift_off(z[-1])
 
 
@@ -197,6 +199,7 @@ def geometries() -> Figure:
             scene.run(start)
             foot = project(np.array([[0.0, *start[1:]], start])).T
             axes.plot(*foot, color=look.GREY, linewidth=0.9, linestyle=look.DOTS, zorder=TEXT - 0.1)
+            axes.plot(*foot[:, 0], "+", color=look.GREY, markersize=5, zorder=TEXT - 0.1)
             x, y = project(np.array(start))
             axes.plot(x, y, "o", color="black", markersize=5, zorder=TEXT)
             axes.text(
@@ -237,7 +240,7 @@ def _ball_labels(axes: Axes, scene: Scene) -> None:
         va="top",
         color=look.ABOVE,
     )
-    scene.text([0, 0.62 * a, 0.93 * a], r"$H=0$: rolling")
+    scene.text([0, 0.8 * a, 0.8 * a], r"$H=0$: rolling", ha="left")
     axes.text(0.2, 0.95, "$H>0$: forward slip, $F_1$", color=look.ABOVE)
     axes.text(-1.9, -1.22, "$H<0$: reverse slip, $F_2$", color=look.BELOW)
 
@@ -253,10 +256,11 @@ def two_fold_visible() -> Figure:
         scene.lift_off_plane(0.45)
         scene.folds()
         slope = flow.slopes[0]
-        canard = np.array([[0, 0.9, 0.9 * slope], [0, 0, 0], [0, -0.9, -0.9 * slope]]) * 1.1
+        canard = np.array([[0, 1, slope], [0, 0, 0], [0, -1, -slope]])
+        canard *= scene.size / max(1.0, slope)  # to the edges of the surface
         scene.curve(canard[:2], look.CANARD, SURFACE + 1.6, width=3.0, at=(0.5,))
         scene.curve(canard[1:], look.CANARD, BEHIND + 0.6, width=3.0, at=(0.6,))
-        for start in ((0, 1.2, 0.55), (0, 1.2, 0.9), (0, 0.55, 1.2), (0, 0.9, 1.2)):
+        for start in ((0, 1.25, 0.55), (0, 1.25, 0.9), (0, 0.55, 1.25), (0, 0.9, 1.25)):
             scene.run(start, width=1.4)
         for centre in (0.42, 0.85):
             scene.grazing("+", centre)
@@ -269,7 +273,7 @@ def two_fold_visible() -> Figure:
 
 def _region_labels(scene: Scene) -> None:
     a = scene.size
-    scene.text([0, 0.93 * a, 0.91 * a], r"$D_a$", fontsize=13)
+    scene.text([0, 0.84 * a, 0.69 * a], r"$D_a$", fontsize=13)
     scene.text([0, -0.78 * a, -0.5 * a], r"$D_r$", fontsize=13)
     scene.text([0, 0.72 * a, -0.5 * a], r"$C_2$", fontsize=13)
     scene.text([0, -0.5 * a, 0.72 * a], r"$C_1$", fontsize=13)

@@ -140,6 +140,14 @@ def test_keys_and_titles_are_within_the_sheet_and_off_the_map(outcomes, quantity
         assert box.x0 >= 0 and box.y0 >= 0 and box.x1 <= figure.bbox.x1 and box.y1 <= figure.bbox.y1
 
 
+def test_the_key_names_what_is_in_view():
+    """The junction of the curve is at xdot = 0.44, beyond this map."""
+    small = bounce.outcome_map(TURF, dict(xdot=np.linspace(0, 0.2, 8), omega=np.linspace(0, 1, 8)))
+    figure = bounce.plot.outcome_map(small, curve=bounce.dividing_curve(TURF, step=0.2))
+    said = {text.get_text() for key in figure.findobj(Legend) for text in key.get_texts()}
+    assert {name for name in said if "$" in name or "junction" in name} == {"$H_F=0$, two-fold"}
+
+
 def test_names_of_regions_are_off_the_line_in_a_narrow_map():
     """On Penner's turf the line crosses a small region."""
     figure = ns.plot.style.new_figure((3.4, 3.0))

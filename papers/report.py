@@ -238,7 +238,7 @@ def _table(part: Section) -> str:
 
 def _cell(text: str, column: str) -> str:
     marked = text in ("agrees", "corrected", "confirmed", "holds", "no")
-    whole = "word" if column == "verdict" else ""  # a narrow column does not break a verdict
+    whole = "word" if marked or column == "verdict" else ""  # not broken in a narrow column
     names = " ".join(name for name in (text if marked else "", whole) if name)
     name = f" class='{names}'" if names else ""
     return f"<td{name} data-label='{html.escape(column)}'>{typeset(text)}</td>"

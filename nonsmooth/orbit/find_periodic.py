@@ -65,7 +65,8 @@ def periodic_orbit(
         orbit at other parameters, whose itinerary is kept.
     itinerary : str or sequence, optional
         Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
-        ends it; with a state as the guess.
+        ends it; with a state as the guess. One mode alone means an orbit of a forced system without
+        events, over as many periods of the forcing (up to 16) as close best.
     period : expression in parameters or float, optional
         The period of the forcing, if the system depends on time. Found by itself where the time only
         enters sines and cosines of one frequency. The orbit may take several. Of a system without
@@ -135,7 +136,7 @@ def periodic_orbit(
     mirror = mirror_of(system, symmetry)
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     begun, guessed = start.problem, start.unknowns
-    if begun.legs[-1].name:  # a guess that goes round many times is solved for once
+    if begun.legs[-1].name:
         begun, guessed = once_round(begun, guessed, start.p)
     solver = _Solver(begun, start.p)
     u, at = solver.solve(guessed, max_iterations)
@@ -162,11 +163,8 @@ _FAR = 10.0
 #: Directions that equations say less of than the others, by these factors.
 _WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
 
-#: Of more equations no singular values are taken: that would take minutes and hear no Ctrl-C.
-_LARGE = 1000
-
-#: Equations that hold to this part of their size cannot be asked for more.
-_CLOSED = 1e-9
+#: Equations of which singular values would take minutes, and residuals that cannot be smaller.
+_LARGE, _CLOSED = 1000, 1e-9
 
 
 class _Solver:

@@ -32,12 +32,15 @@ from .guess_checks import require_alone, require_of, require_period, require_sam
 from .legs import Leg, fly, leg_name
 from .periodic import PeriodicOrbit, named
 from .recurrence import CLOSE, Recurrence, recurrence, refused, require_steady
-from .words import Itinerary, word_legs
+from .words import Itinerary, lone_leg, word_legs
 
 _MOST_EVENTS = 2000
 
 #: A leg of a given itinerary is followed so many times the time in which the state changes.
 _LONGEST = 200.0
+
+#: A mode alone is followed over so many periods of the forcing.
+_MOST_PERIODS = 16
 
 #: A run that comes back as near as this, relative to its size, is not simulated further.
 _GOOD = 0.02
@@ -188,7 +191,9 @@ def _from_word(
     mirror: Array | None,
     p: Array,
 ) -> Start:
-    """Follow the legs of an itinerary, each to its event."""
+    """Follow the legs of an itinerary, each to its event; one mode alone over periods of the forcing."""
+    if forcing is not None and mirror is None and (leg := lone_leg(system, itinerary)) is not None:
+        return _from_mode(system, x, leg, forcing, p)
     legs = word_legs(system, itinerary, mirror is not None)
     found = flights_of(system, legs).followed(x, p, _LONGEST)
     starts, durations = found or _followed(system, legs, x, p)
@@ -197,6 +202,17 @@ def _from_word(
         count = float(durations.sum()) / forcing(p)[0]
         periods = max(1.0, round(count)) if mirror is None else round(count - 0.5) + 0.5
     return _problem(system, legs, starts[: len(legs)], durations, periods, forcing, mirror, p)
+
+
+def _from_mode(system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, p: Array) -> Start:
+    """Fly one mode over periods of the forcing, and take as many as close best."""
+    span, n, y, apart = span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
+    for _ in range(_MOST_PERIODS):
+        y = fly(system, leg, y, span, p).end[: x.size]
+        apart.append(float(np.abs(y[:n] - x[:n]).max()))
+    count = 1 + int(np.argmin(apart))
+    durations = np.array([count * span])
+    return _problem(system, (leg,), x[None].copy(), durations, count, forcing, None, p)
 
 
 def _followed(

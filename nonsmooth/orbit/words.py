@@ -31,6 +31,18 @@ def word_legs(system: FilippovSystem, itinerary: Itinerary, mirrored: bool) -> t
         return read()
 
 
+def lone_leg(system: FilippovSystem, itinerary: Itinerary) -> Leg | None:
+    """The leg without an event that one mode alone means; None where something can happen to the mode."""
+    if system.resets or system.impacts:
+        return None
+    word: Any = itinerary if isinstance(itinerary, str) else _listed(itinerary)
+    modes = read_word(system, word) if isinstance(word, str) else word
+    if len(modes) != 1 or not isinstance(modes[0], str):
+        return None
+    system.parse_letters(modes[0])
+    return Leg(modes[0])
+
+
 def _listed(itinerary: Any) -> tuple[Any, ...]:
     """Modes, or pairs of a mode and a name, as they were given."""
     try:

@@ -183,6 +183,16 @@ def test_k1_an_orbit_of_four_forcing_periods_that_grazes() -> None:
     assert abs(orbit.margins[0].value) < 1e-12 and "h0 > 0" in orbit.margins[0].what
 
 
+def test_k1_from_one_mode_where_the_run_from_the_guess_goes_elsewhere() -> None:
+    """Of two digits, at a neighbouring frequency: the run meets the belt, the orbit does not."""
+    nu = {"nu": 1.7085}
+    known = ns.periodic_orbit(friction_oscillator(), [2.19, -0.42], parameters=nu)
+    found = ns.periodic_orbit(friction_oscillator(), [2.2, -0.42], itinerary="+", parameters=nu)
+    assert found.problem.periods == 4 and len(found.legs) == 1
+    assert found.period == pytest.approx(known.period, rel=1e-13)
+    assert np.abs(found.multipliers - known.multipliers).max() < 1e-11
+
+
 def test_w1_two_gaits_of_the_simplest_walker_from_two_digits() -> None:
     values, system = CASES["W1"], walker()
     for angle, rate, length in ((0.20, -0.20, "long"), (0.19, -0.20, "short")):

@@ -96,8 +96,10 @@ def saltation_matrix(
     start = following.states_at(at.after, p)
     rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
     matrix = saltation(at, rates[0], rates[1][:size], f"{leg.name!r} at {x[:n].tolist()}").matrix
-    fault = begin_fault(system, leg, y[:, 0], p)
-    fault = fault or change_fault(system, leg, after, y[:, 0], at.after, p)
+    fault = ""
+    if leg.kind != "reset":  # of which both modes are said, on a surface too
+        fault = begin_fault(system, leg, y[:, 0], p)
+        fault = fault or change_fault(system, leg, after, y[:, 0], at.after, p)
     if fault:
         raise PointError(
             explain(

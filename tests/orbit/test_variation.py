@@ -264,11 +264,16 @@ def test_saltation_matrices_are_those_of_exact_fractions() -> None:
     found = ns.saltation_matrix(moving, "+", "-", at)
     assert np.array_equal(found, exact(values["time_dependent"]))
     after = [x + y / 4, -y / 2]
-    jump = ns.FilippovSystem(
-        [x, y], surface=x, above=[1, 2], below=[1, -2], resets=ns.Reset(y, after, -1, "jump")
-    )
-    found = ns.saltation_matrix(jump, "-", "+", at, event="jump")
-    assert np.array_equal(found, exact(values["reset"]))
+    for surface in (x, x - y):
+        jump = ns.FilippovSystem(
+            [x, y],
+            surface=surface,
+            above=[1, 2],
+            below=[1, -2],
+            resets=ns.Reset(y, after, -1, "jump"),
+        )
+        found = ns.saltation_matrix(jump, "-", "+", at, event="jump")
+        assert np.array_equal(found, exact(values["reset"]))
 
 
 def swing(a0: float, tol: float, r: float = 0.5) -> tuple[ns.Trajectory, float]:

@@ -117,6 +117,7 @@ def outcome_map(
             if curve is None
             else draw_curve(ax, outcomes.names, curve, (_ends(x), _ends(y)))
         )
+        lines |= _without_lift_off(ax, outcomes)
         patches: list[Patch] = []
         if quantity == "itinerary":
             room = LISTED - len(lines) if is_narrow(ax) else LISTED
@@ -145,6 +146,17 @@ def _keys(ax: Axes, patches: list[Patch], lines: dict[str, Any]) -> None:
             frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
         )  # fmt: skip
     below(ax, list(lines.values()), list(lines))
+
+
+def _without_lift_off(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
+    """Hatch what lies behind the map, where landings without lift-off leave it open; its entry of the key."""
+    from matplotlib.patches import Patch
+
+    if outcomes.lift_offs.complete.all():
+        return {}
+    look: dict[str, Any] = dict(facecolor="white", edgecolor="0.45", hatch="////", linewidth=0.0)
+    ax.patch.set(**look)
+    return {"no lift-off": Patch(**look)}
 
 
 def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:

@@ -94,15 +94,24 @@ def regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> li
     colours = [_REST] * len(outcomes.regions)
     for code in (*listed, *named):
         colours[code] = COLOURS.get(outcomes.regions[code]) or next(spare, _REST)
-    palette = ListedColormap(["#FFFFFF", *colours])
-    limits: dict[str, Any] = dict(vmin=-1.5, vmax=len(colours) - 0.5)
-    ax.pcolormesh(x, y, outcomes.code, cmap=palette, shading="nearest", rasterized=True, **limits)
+    look: dict[str, Any] = dict(
+        cmap=ListedColormap(colours or [_REST]), vmin=-0.5, vmax=max(len(colours), 1) - 0.5
+    )
+    cells = np.ma.masked_less(outcomes.code, 0)  # without lift-off
+    ax.pcolormesh(x, y, cells, shading="nearest", rasterized=True, **look)
     for code in named:
         place = places[code]
         assert place is not None
         ink = "white" if _luminance(colours[code]) < 0.2 else "black"
-        look: dict[str, Any] = dict(color=ink, fontsize=_POINTS, fontweight="bold")
-        style.write(ax, place, outcomes.regions[code], zorder=6, **look)
+        style.write(
+            ax,
+            place,
+            outcomes.regions[code],
+            zorder=6,
+            color=ink,
+            fontsize=_POINTS,
+            fontweight="bold",
+        )
     column = is_narrow(ax)
     key = [(_short(outcomes.regions[code], column), colours[code]) for code in listed]
     if rest := narrow[len(listed) :]:

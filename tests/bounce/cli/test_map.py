@@ -5,6 +5,7 @@ import json
 import matplotlib.colors
 import numpy as np
 import pytest
+from matplotlib.collections import QuadMesh
 
 import bounce
 import nonsmooth as ns
@@ -140,10 +141,11 @@ def test_a_kind_of_bounce_has_one_colour_on_every_map(command, tmp_path, monkeyp
         both = [word for text in over for word in ("--over", text)]
         argv = ["map", "--turf", "natural-rigid", *both, "--output", tmp_path / "map.png"]
         assert command(*argv)[0] == 0
-    colours = [
-        dict(zip(names, figure.axes[0].collections[0].cmap.colors[1:], strict=True))
+    meshes = [
+        (names, next(c for c in figure.axes[0].collections if isinstance(c, QuadMesh)))
         for names, figure in drawn
     ]
+    colours = [dict(zip(names, mesh.cmap.colors, strict=True)) for names, mesh in meshes]
     shared = {*colours[0]} & {*colours[1]}
     assert shared and {*colours[0]} != {*colours[1]}
     assert all(colours[0][name] == colours[1][name] for name in shared)

@@ -40,7 +40,7 @@ def test_narrow_regions_are_in_the_legend_and_every_colour_has_one_meaning():
     more = int(legend.get_texts()[-1].get_text().split()[1])
     assert len(set(m.regions) - names) == more and len(legend.get_texts()) <= 6
     (mesh,) = [one for one in axes.collections if isinstance(one, QuadMesh)]
-    colours = dict(zip(m.regions, mesh.get_cmap().colors[1:], strict=True))
+    colours = dict(zip(m.regions, mesh.get_cmap().colors, strict=True))
     said = [colours[name] for name in m.regions if name in names]
     others = {colours[name] for name in m.regions if name not in names}
     assert len(set(said)) == len(said) and len(others) == 1 and not others & set(said)
@@ -203,6 +203,33 @@ def test_a_picture_of_a_map_without_lift_off(quantity):
     over = {"xdot": [0.0, 1.0], "omega": [0.0, 1.0]}
     figure = bounce.plot.outcome_map(bounce.outcome_map(turf, over, {"ydot": 1.0}), quantity)
     figure.canvas.draw()
+    assert figure.axes[0].patch.get_hatch() and "no lift-off" in key_of(figure)
+
+
+def key_of(figure):
+    return [t.get_text() for k in figure.findobj(Legend) for t in k.get_texts()]
+
+
+@pytest.mark.parametrize("size", [(3.4, 3.0), (7.0, 5.4)])
+@pytest.mark.parametrize("quantity", ["itinerary", "slip"])
+def test_landings_without_lift_off_are_hatched_and_named(size, quantity):
+    """White is the middle of the scale of slip: it has one meaning. Slow balls stay in their own dent."""
+    law = bounce.laws.TURFS["natural"].law
+    over = dict(speed=np.linspace(5, 40, 30), spin=np.linspace(-1000, 1000, 30))
+    with pytest.warns(bounce.golf.ExtrapolationWarning):
+        found = bounce.golf.landing_map(law, over, dict(angle=np.radians(40)))
+    stays = ~found.lift_offs.complete
+    assert stays.any()
+    axes = ns.plot.style.new_figure(size).add_subplot()
+    figure = bounce.plot.outcome_map(found, quantity, ax=axes)
+    (mesh,) = (c for c in axes.collections if isinstance(c, QuadMesh))
+    assert np.array_equal(np.ma.getmaskarray(mesh.get_array()), stays)
+    assert axes.patch.get_hatch() and key_of(figure).count("no lift-off") == 1
+    with pytest.warns(bounce.golf.ExtrapolationWarning):
+        fast = bounce.golf.landing_map(
+            law, dict(over, speed=np.linspace(20, 40, 30)), dict(angle=np.radians(40))
+        )
+    assert "no lift-off" not in key_of(bounce.plot.outcome_map(fast, quantity))
 
 
 def test_a_legend_of_dozens_of_regions_is_short():

@@ -71,7 +71,7 @@ def periodic_orbit(
     >>> orbit = ns.periodic_orbit(block, ns.simulate(block, [0.3, 0.4], 30))
     >>> figure = ns.plot.periodic_orbit(orbit)
     >>> [text.get_text() for text in figure.axes[0].get_legend().get_texts()]
-    ['-', 's']
+    ['mode −', 'mode s', 'event', 'surface']
     """
     if not isinstance(orbit, PeriodicOrbit):
         raise DefinitionError(

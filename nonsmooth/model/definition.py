@@ -7,6 +7,7 @@ states, time, parameters and multipliers, and functions of the first three.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import Any
 
 import casadi as ca
@@ -170,7 +171,25 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
                 f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
                 f"received {item.direction!r}."
             )
-    return items
+    return _told_apart(items)
+
+
+def _told_apart(items: list[Any]) -> list[Any]:
+    """Events with names of their own: of those with one name, all but the first are numbered.
+
+    Events are found again by their names, so that two of one name would have the derivatives of the first.
+    """
+    taken, found = {item.name for item in items}, list[Any]()
+    for item in items:
+        name, number = item.name, 1
+        if any(name == other.name for other in found):
+            while name in taken:
+                number += 1
+                name = f"{item.name} {number}"
+            item = replace(item, name=name)
+            taken.add(name)
+        found.append(item)
+    return found
 
 
 def _two_fields(

@@ -78,7 +78,7 @@ def regularise(
     name : str, optional
         Name of the parameter.
     edges : bool, optional
-        Whether the layer has edges: resets ``"edge of h0"`` that do not change the state, where a
+        Whether the layer has edges: resets ``"edge of h0"`` (and ``"edge of h0 2"``, ...) that do not change the state, where a
         step ends so that none passes over the layer.
 
     Returns

@@ -80,7 +80,8 @@ def test_no_run_steps_over_a_thin_layer(transition, tol):
         smooth = ns.regularise(system, width, transition=transition)
         run = ns.simulate(smooth, [0.0, 1.0], 3.0, tol=tol)
         assert run.x[-1, 0] == pytest.approx(11.0, abs=100 * (width + tol))
-        assert {e.name for e in run.events if e.kind == "reset"} == {"edge of h0"}
+        names = {e.name for e in run.events if e.kind == "reset"}
+        assert names and all(name.startswith("edge of h0") for name in names)
         assert run.itinerary == "o"
 
 
@@ -105,7 +106,10 @@ def test_everything_else_is_kept():
     )
     smooth = ns.regularise(system, 0.1, transition="algebraic")
     assert smooth.stops == (("far", 1),)
-    assert smooth.resets == (("wall", -1), *[("edge of h0", 0)] * 6)
+    assert smooth.resets == (
+        ("wall", -1),
+        *[(f"edge of h0{more}", 0) for more in ("", " 2", " 3", " 4", " 5", " 6")],
+    )
     assert smooth.parameter_names == ("mu", "eps") and smooth.time_dependent
     lam_at = 0.7 / np.sqrt(1 + 0.7**2)
     field = smooth.evaluate(smooth.field(""), [0.0, 0.07 + np.sin(2.0)], t=2.0).ravel()

@@ -364,3 +364,25 @@ def test_bad_input_is_refused_in_words() -> None:
     with pytest.raises(ns.DefinitionError):
         ns.gradient(run, ca.SX.sym("stranger"))
     assert ns.sensitivity(run, wrt="r").dx_dp.shape == (2, 1)
+
+
+def test_events_without_names_of_their_own_have_their_own_derivatives() -> None:
+    """A free particle between two walls: x(4) = .1 + .45 (dx) ..., each bounce by its own restitution."""
+    walls = [ns.Impact(1 - x, restitution=0.5), ns.Impact(x + 1, restitution=0.9)]
+    system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls)
+    run = ns.simulate(system, [0.1, 1.3], 4.0, tol=1e-13)
+    assert [e.name for e in run.events[:2]] == ["impact", "impact 2"]
+    t1 = 0.9 / 1.3  # of the first bounce; the second is 2/(.5 v) later
+    t2 = t1 + 2 / 0.65
+    by_v = 0.45 * (4 - t2) - 0.585 * (
+        -0.9 / 1.3**2 - 2 / (0.5 * 1.3**2)
+    )  # d/dv of -1 + .45 v (4 - t2)
+    by_x = -0.585 * (-1 / 1.3)
+    found = ns.sensitivity(run).dx_dx0
+    assert np.abs(found - [[by_x, by_v], [0.0, 0.45]]).max() < 1e-12
+
+
+def test_numbers_of_names_avoid_names_that_are_given() -> None:
+    stops = [ns.Stop(x - k, name=name) for k, name in enumerate(["a", "a", "a 2", "a", "b"])]
+    system = ns.FilippovSystem([x, v], field=[v, -x], stops=stops)
+    assert [name for name, _ in system.stops] == ["a", "a 3", "a 2", "a 4", "b"]

@@ -26,8 +26,8 @@ class Section:
     Parameters
     ----------
     at : str, number or expression
-        A name: of a surface (``"h0"``, ``"h1"``, ...), a stop, a reset or an impact, or else a kind
-        of event (``"crossing"``, ``"entry"``, ``"exit"``, ``"reset"``, ...). A number, or an
+        A name: of a surface (``"h0"``, ``"h1"``, ...), a stop, a reset or an impact (all to which it
+        was given), or else a kind of event (``"crossing"``, ``"entry"``, ``"exit"``, ``"reset"``, ...). A number, or an
         expression in parameters, is a period: the run is looked at after each, from ``t_start``. An
         expression in states is a section of its own: the system gets a reset named ``"section"``
         where it is zero, which changes nothing. One that is a surface of the system, written alike,

@@ -10,7 +10,6 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import (
-    SECTION,
     Array,
     FilippovSystem,
     OptionError,
@@ -89,7 +88,7 @@ def sectioned(system: FilippovSystem, at: Any) -> tuple[FilippovSystem, Any]:
         name, sign = surface
         return system, replace(section, at=name, direction=sign * section.direction)
     wider = with_section(system, section.at, section.direction)
-    return wider, replace(section, at=SECTION, direction=0)
+    return wider, replace(section, at=wider.resets[-1][0], direction=0)
 
 
 def _period(system: FilippovSystem, section: Section) -> float | str:
@@ -114,18 +113,23 @@ def _period(system: FilippovSystem, section: Section) -> float | str:
 def _hits(system: FilippovSystem, section: Section, t_start: float) -> Hits:
     """Events of a name, or of a kind where nothing has the name."""
     name, letter = str(section.at), None
-    surfaces = [f"h{i}" for i in range(system.surface_count)]
+    surfaces = list(dict.fromkeys(system.surface_names))
     items = {
         "stop": [n for n, _ in system.stops],
         "reset": [n for n, _ in system.resets],
         "impact": list(system.impacts),
     }
-    owners = tuple(kind for kind, names in items.items() if name in names)
-    kinds, names = (owners, (name,)) if owners else ((name,), None)
-    if name in surfaces and not owners:
+    given = dict(system.definition.renamed)
+    called = {
+        kind: [n for n in names if name in (n, given.get(n))] for kind, names in items.items()
+    }
+    owners = tuple(kind for kind, names in called.items() if names and name not in surfaces)
+    kinds: tuple[str, ...] = owners or (name,)
+    names = tuple(n for kind in owners for n in called[kind]) or None
+    if name in surfaces:
         kinds, names = KINDS_OF_SECTIONS, (name,)
         if section.direction:
-            letter = surfaces.index(name), "+" if section.direction < 0 else "-"
+            letter = _side_before(system, name, section.direction)
     elif section.direction and (owners or name in KINDS_OF_SECTIONS):
         raise OptionError(
             f"direction: expected 0 for {name!r}, received {section.direction}. Only surfaces are "
@@ -143,6 +147,17 @@ def _hits(system: FilippovSystem, section: Section, t_start: float) -> Hits:
         )
     rest = section.every, section.skip, section.count, section.after
     return Hits(kinds, names, letter, *rest, begin=t_start + AT_END * max(1.0, abs(t_start)))
+
+
+def _side_before(system: FilippovSystem, name: str, direction: int) -> tuple[int, str]:
+    """Number of a surface in modes, and its letter before it is crossed in a direction."""
+    surface = list(dict.fromkeys(system.surface_names)).index(name)
+    if len(system.entries[surface]) > 1:
+        raise OptionError(
+            f"direction: expected 0 for {name!r}, received {direction}. It is a set, which is reached "
+            'from all sides; kinds of events tell them apart, at="entry" and at="exit".'
+        )
+    return surface, "+" if direction < 0 else "-"
 
 
 def _given(t_eval: ArrayLike, t_start: float, t_end: float) -> Times:

@@ -59,11 +59,11 @@ def read_definition(
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
-    stops, resets = _items(stops, Stop, "stops"), _items(resets, Reset, "resets")
+    kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
+    (stops, resets, impacts), renamed = _told_apart([_items(*k) for k in kinds], _own_names(sizes))
     guards = [column([s.function], f"stop {s.name!r}", 1) for s in stops]
     guards += [column([r.function], f"reset {r.name!r}", 1) for r in resets]
     maps = [column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
-    impacts = _items(impacts, Impact, "impacts")
     reactions, f = _reactions(impacts, x, t, f)
     definition = Definition(
         states=x,
@@ -85,6 +85,7 @@ def read_definition(
         defaults=defaults,
         hidden=hidden,
         sizes=sizes if max(sizes, default=1) > 1 else (),
+        renamed=renamed,
     )
     require_consistent(definition)
     return definition
@@ -152,7 +153,7 @@ def _surfaces(
 
 
 def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
-    """Read stops= or resets=: one, or a sequence of them."""
+    """Read stops=, resets= or impacts=: one, or a sequence of them."""
     items = [values] if isinstance(values, kind) else listed(values)
     for i, item in enumerate(items):
         if not isinstance(item, kind):
@@ -171,25 +172,39 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
                 f"direction of {item.name!r}: expected -1 (falling), 0 (both) or 1 (rising), "
                 f"received {item.direction!r}."
             )
-    return _told_apart(items)
+    return items
 
 
-def _told_apart(items: list[Any]) -> list[Any]:
-    """Events with names of their own: of those with one name, all but the first are numbered.
+def _own_names(sizes: Sequence[int]) -> set[str]:
+    """Names that guards of a system have by themselves: of surfaces and sets, and of the ends of sliding."""
+    of_each = {f"{what}{k}" for k in range(len(sizes)) for what in ("h", "lambda")}
+    return of_each | ({"L_F1 h", "L_F2 h", "stability of sliding"} if sizes else set())
+
+
+def _told_apart(
+    kinds: Sequence[list[Any]], own: set[str]
+) -> tuple[list[list[Any]], tuple[tuple[str, str], ...]]:
+    """Events with names of their own: of those with one name, all but the first are numbered; and the names
+    that were given to those.
 
     Events are found again by their names, so that two of one name would have the derivatives of the first.
     """
-    taken, found = {item.name for item in items}, list[Any]()
-    for item in items:
-        name, number = item.name, 1
-        if any(name == other.name for other in found):
-            while name in taken:
-                number += 1
-                name = f"{item.name} {number}"
-            item = replace(item, name=name)
-            taken.add(name)
-        found.append(item)
-    return found
+    taken, used = {item.name for items in kinds for item in items} | own, set(own)
+    found, renamed = list[list[Any]](), list[tuple[str, str]]()
+    for items in kinds:
+        found.append([])
+        for item in items:
+            name, number = item.name, 1
+            if name in used:
+                while name in taken:
+                    number += 1
+                    name = f"{item.name} {number}"
+                renamed.append((name, item.name))
+                item = replace(item, name=name)
+                taken.add(name)
+            used.add(name)
+            found[-1].append(item)
+    return found, tuple(renamed)
 
 
 def _two_fields(

@@ -39,6 +39,8 @@ class Definition:
     sizes : tuple of int
         How many of the switching functions, in order, belong to each surface or set; 1 for a surface.
         Empty where all are surfaces.
+    renamed : tuple of (name, given)
+        Of the stops, resets and impacts that have another name than was given to them.
     """
 
     states: ca.SX
@@ -58,6 +60,7 @@ class Definition:
     defaults: dict[str, float | None]
     hidden: bool
     sizes: tuple[int, ...] = ()
+    renamed: tuple[tuple[str, str], ...] = ()
 
     @property
     def extended_states(self) -> ca.SX:
@@ -84,9 +87,9 @@ class Definition:
         """Plain values from which ``from_state`` makes an equal definition."""
         inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
         outputs = [self.field, self.surfaces, self.guards, self.maps, self.gaps, self.restitutions]
-        sets = {"sizes": self.sizes} if self.sizes else {}
+        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed}
         return {
-            **sets,
+            **{name: value for name, value in some.items() if value},
             "definition": ca.Function("definition", inputs, outputs).serialize(),
             "names": [[str(s) for s in listed(v)] for v in inputs],
             "defaults": self.defaults,
@@ -107,4 +110,5 @@ class Definition:
         outputs = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
         rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
         parts = dict(zip((*inputs, *outputs), (*vectors, *expressions), strict=True))
-        return cls(**parts, **rest, sizes=tuple(state.get("sizes", ())))
+        sizes, renamed = tuple(state.get("sizes", ())), tuple(state.get("renamed", ()))
+        return cls(**parts, **rest, sizes=sizes, renamed=renamed)

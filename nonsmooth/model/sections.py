@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import chain, count
 from typing import Any
 
 import casadi as ca
@@ -17,7 +18,7 @@ SECTION = "section"
 
 
 def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
-    """Return the system with a reset at a function's zeros that changes nothing.
+    """Return the system with a last reset, at a function's zeros, that changes nothing.
 
     Parameters
     ----------
@@ -35,13 +36,16 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
     if not ca.depends_on(h, d.extended_states):
         raise DefinitionError(f"section: expected a function of the states, received {h}.")
     known = ca.vertcat(d.extended_states, d.parameters)
+    taken = {*d.impacts, *(n for n, _ in (*d.stops, *d.resets))}
+    numbered = (f"{SECTION} {k}" for k in count(2))
+    name = next(n for n in chain([SECTION], numbered) if n not in taken)
 
     def build() -> FilippovSystem:
         definition = replace(
             d,
             guards=ca.vertcat(d.guards, h) if d.guards.numel() else h,
             maps=ca.horzcat(d.maps, d.states) if d.resets else d.states,
-            resets=(*d.resets, (SECTION, direction)),
+            resets=(*d.resets, (name, direction)),
         )
         wider = FilippovSystem.__new__(FilippovSystem)
         wider.__setstate__({**definition.state(), "lifted": system.lifted})
@@ -53,6 +57,8 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
 def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
     """Name of the surface where a function is zero, written alike, and its sign there; else None.
 
+    A component of a set is none: it is zero elsewhere too.
+
     Examples
     --------
     >>> x = ca.SX.sym("x")
@@ -60,10 +66,12 @@ def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
     ('h0', -1)
     """
     for i in range(system.surface_count):
+        if i in system.set_of:
+            continue
         for sign in (1, -1):
             h, other = system.surface_function(i), sign * ca.SX(function)
             if ca.is_equal(h, other, 20) or _vanishes(ca.simplify(h - other)):
-                return f"h{i}", sign
+                return system.surface_names[i], sign
     return None
 
 

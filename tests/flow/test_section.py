@@ -205,3 +205,57 @@ def test_bad_sections_are_refused(options, message):
 def test_an_ensemble_must_know_how_many_hits_to_keep():
     with pytest.raises(ns.OptionError, match="expected count= with a section at events"):
         ns.ensemble(TWO_SPRINGS, [0.0, 1.0], 10.0, at="h0")
+
+
+def test_events_that_share_a_name_are_hits_of_it() -> None:
+    """Between walls at -1 and 1, the second of them not named, or all three named alike."""
+    walls = [ns.Impact(1 - x, restitution=0.5), ns.Impact(x + 1, restitution=0.9)]
+    system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls)
+    times = [0.9 / 1.3, 0.9 / 1.3 + 2 / 0.65]
+    for engine in ("auto", "reference"):
+        run = ns.simulate(system, [0.1, 1.3], 6.0, at="impact", engine=engine)
+        assert run.sample_t == pytest.approx(times, abs=1e-12)
+    second = ns.simulate(system, [0.1, 1.3], 6.0, at="impact 2")
+    assert second.sample_t == pytest.approx(times[1:], abs=1e-12)
+    named = ns.FilippovSystem(
+        [x, v],
+        field=[v, 0 * v],
+        impacts=[ns.Impact(1 - x, restitution=0.5, name="w")],
+        resets=[ns.Reset(x + 1, [x, -0.9 * v], direction=-1, name="w")],
+    )
+    run = ns.simulate(named, [0.1, 1.3], 6.0, at="w")
+    assert run.sample_t == pytest.approx(times, abs=1e-12)
+
+
+def test_a_section_of_ones_own_is_not_a_reset_called_section() -> None:
+    kick = ns.Reset(x, [x, 2 * v], direction=1, name="section")
+    system = ns.FilippovSystem([x, v], field=[v, 0 * v], resets=[kick])
+    run = ns.simulate(system, [-1.0, 1.0], 3.0, at=x - 1)
+    assert run.sample_t == pytest.approx([1.5], abs=1e-12)
+
+
+def test_sections_beside_a_set_of_codimension_two() -> None:
+    """A puck on a turning frame, v = (1 - mu t) (cos t, sin t), and a harmonic oscillator z = cos t."""
+    v1, v2, z, w = (ca.SX.sym(name) for name in ("v1", "v2", "z", "w"))
+    lam, one = ca.vertcat(ca.SX.sym("l1"), ca.SX.sym("l2")), ca.SX.sym("one")
+    system = ns.FilippovSystem(
+        [v1, v2, z, w],
+        field=[-v2 - 0.1 * lam[0], v1 - 0.1 * lam[1], w, -z + 0 * one],
+        surfaces=[ca.vertcat(v1, v2), z],
+        multipliers=[lam, one],
+    )
+    quarters = np.pi * np.array([0.5, 1.5, 2.5])
+    for engine in ("auto", "reference"):
+        run = lambda at, engine=engine: ns.simulate(
+            system, [1.0, 0.0, 1.0, 0.0], 9.5, at=at, engine=engine, tol=1e-12
+        )
+        for at in (z, -z, "h1", v1):
+            assert run(at).sample_t == pytest.approx(quarters, abs=1e-9)
+        for at in (ns.Section(z, 1), ns.Section(-z, -1), ns.Section("h1", 1), ns.Section(v1, 1)):
+            assert run(at).sample_t == pytest.approx(quarters[1:2], abs=1e-9)
+    many = ns.ensemble(system, [[1.0, 0.0, 1.0, 0.0]], 9.5, at=ns.Section(z, 1, count=1))
+    assert many.sample_t[0] == pytest.approx(quarters[1:2], abs=1e-9)
+    with pytest.raises(ns.OptionError, match=r"expected a name of \['h0', 'h1'\]"):
+        ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at="h2")
+    with pytest.raises(ns.OptionError, match="It is a set, which is reached from all sides"):
+        ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import pickle
 from pathlib import Path
 
 import casadi as ca
@@ -386,3 +387,37 @@ def test_numbers_of_names_avoid_names_that_are_given() -> None:
     stops = [ns.Stop(x - k, name=name) for k, name in enumerate(["a", "a", "a 2", "a", "b"])]
     system = ns.FilippovSystem([x, v], field=[v, -x], stops=stops)
     assert [name for name, _ in system.stops] == ["a", "a 3", "a 2", "a 4", "b"]
+
+
+@pytest.mark.parametrize("kind", [ns.Stop, ns.Reset])
+def test_events_of_one_name_across_kinds_have_their_own_derivatives(kind) -> None:
+    """Each wall doubles as another event: v is .5 v behind the first and .45 v behind the second."""
+    back = dict(direction=-1, name="w")
+    other = ns.Stop(v + 9, **back) if kind is ns.Stop else ns.Reset(x + 1, [x, -0.9 * v], **back)
+    walls = [ns.Impact(1 - x, restitution=0.5, name="w")]
+    if kind is ns.Stop:
+        walls.append(ns.Impact(x + 1, restitution=0.9, name="h0"))
+    more = dict(stops=[other]) if kind is ns.Stop else dict(resets=[other])
+    system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls, **more)
+    found = ns.sensitivity(ns.simulate(system, [0.1, 1.3], 4.0, tol=1e-13)).dx_dx0
+    late = 4 - 0.9 / 1.3 - 2 / 0.65
+    expected = [[0.45, 0.45 * late + 0.585 * (0.9 + 4) / 1.3**2], [0.0, 0.45]]
+    assert np.abs(found - expected).max() < 1e-12
+    again = pickle.loads(pickle.dumps(system))
+    assert again == system and again.impacts == system.impacts
+
+
+def test_an_event_with_the_name_of_a_surface_has_its_own_derivative() -> None:
+    """A reset called h0 beside a surface h0 through which the speed falls from v to v - 1."""
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=x,
+        above=[v - 1, 0],
+        below=[v, 0],
+        resets=[ns.Reset(x - 1, [x / 2, 2 * v], direction=1, name="h0")],
+    )
+    assert system.resets == (("h0 2", 1),)
+    run = ns.simulate(system, [-1.0, 2.0], 1.6, tol=1e-13)
+    # x = 0 at 1/2, 1 at 3/2; then x = 1/2 + (2 v - 1) (1.6 - t2), t2 = -x0/v + 1/(v - 1)
+    expected = [[3 / 2, 2 * 0.1 + 3 * (1 / 4 + 1)], [0.0, 2.0]]
+    assert np.abs(ns.sensitivity(run).dx_dx0 - expected).max() < 1e-12

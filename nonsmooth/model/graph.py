@@ -42,6 +42,13 @@ NOT_SMOOTH: dict[str, str] = {
 }
 
 
+#: Smooth operations that are no longer so where one of their arguments is always zero.
+_BESIDE_ZERO: dict[str, str] = {
+    "atan2": "atan2 with an argument that is zero (a jump where the other one changes its sign)",
+    "hypot": "hypot with an argument that is zero (the absolute value of the other one)",
+}
+
+
 @dataclass(frozen=True)
 class Node:
     """One operation: its name, its arguments (node numbers) and a payload.
@@ -180,12 +187,20 @@ def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])
     for node, moves in zip(nodes, moving, strict=True):
-        if moves and node.op in NOT_SMOOTH and any(moving[a] for a in node.args):
+        if not moves:
+            continue
+        if found := NOT_SMOOTH.get(node.op) or _beside_zero(node, nodes):
             raise NotSmoothError(
                 f"{what}: expected an expression with derivatives of every order, received one "
-                f"with {NOT_SMOOTH[node.op]} of the states. Declare the switch as a surface: "
+                f"with {found} of the states. Declare the switch as a surface: "
                 "give the smooth pieces as above= and below= with surface= the argument whose "
                 "sign decides, or write sign(h) as a multiplier lam with surfaces=[h], "
                 "multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with "
                 "h = a - b)."
             )
+
+
+def _beside_zero(node: Node, nodes: Sequence[Node]) -> str | None:
+    """Name an operation of something and zero that is not smooth."""
+    zero = any(nodes[a].op == "const" and nodes[a].payload == 0.0 for a in node.args)
+    return _BESIDE_ZERO.get(node.op) if zero else None

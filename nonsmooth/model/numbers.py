@@ -37,8 +37,8 @@ BINARY: dict[str, Callable[[float, float], float]] = {
     "constpow": math.pow,
     "atan2": math.atan2,
     "hypot": math.hypot,
-    "fmin": min,
-    "fmax": max,
+    "fmin": lambda a, b: b if a != a else min(a, b),
+    "fmax": lambda a, b: b if a != a else max(a, b),
     "fmod": math.fmod,
     "remainder": math.remainder,
     "copysign": math.copysign,
@@ -90,10 +90,6 @@ class Numbers:
             if len(values) == 1:
                 return UNARY[op](values[0])
             return BINARY[op](values[0], values[1])
-        except OverflowError:
-            return math.inf
-        except ZeroDivisionError:
-            return self.divide(1.0 if op == "inv" else values[0], None)
-        except ValueError:
-            pole = {"log": 0.0, "log1p": -1.0}.get(op)
-            return -math.inf if values[0] == pole else math.nan
+        except (OverflowError, ZeroDivisionError, ValueError):  # infinite, or none
+            code, given = getattr(ca, "OP_" + op.upper()), map(ca.DM, values)
+            return float((ca.DM.unary if len(values) == 1 else ca.DM.binary)(code, *given))

@@ -1,5 +1,6 @@
 """A jet is the Taylor series of the flow: it agrees with repeated Lie derivatives for every operation."""
 
+import itertools
 import math
 
 import casadi as ca
@@ -9,8 +10,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from nonsmooth.model import NotSmoothError
+from nonsmooth.model.graph import operation
 from nonsmooth.model.jets import taylor
-from nonsmooth.model.numbers import Numbers
+from nonsmooth.model.numbers import BINARY, UNARY, Numbers
 
 x, y, p = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("p")
 U = 0.45 + 0.3 * ca.sin(x) + 0.1 * y  # stays in (0.05, 0.85), inside every domain below
@@ -122,3 +124,17 @@ def test_values_outside_of_the_numbers_are_infinite_or_none():
     assert numbers.apply("log", [0.0]) == -math.inf
     assert math.isnan(numbers.apply("sqrt", [-1.0]))
     assert numbers.apply("hypot", [3.0, 4.0]) == 5.0
+
+
+SPECIAL = [0.0, 1.0, -1.0, 0.5, -2.5, 3.0, 1000.0, -1000.0, 1e308, math.inf, -math.inf, math.nan]
+
+
+@pytest.mark.parametrize("op", [*UNARY, *BINARY])
+def test_numbers_have_the_values_of_casadi(op):
+    """Overflow with its sign, infinite and missing arguments: what CasADi's own evaluation gives."""
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    given = [a] if op in UNARY else [a, b]
+    evaluate = ca.Function("f", given, [operation(op, given)])
+    for values in itertools.product(SPECIAL, repeat=len(given)):
+        own, expected = Numbers().apply(op, list(values)), float(evaluate(*values))
+        assert own == pytest.approx(expected, rel=1e-14, abs=0, nan_ok=True), values

@@ -141,6 +141,9 @@ def test_wrong_definitions_are_refused_in_words(name):
         ca.floor(x),
         (x > 0) * v,
         ca.fmod(x, 1),
+        ca.atan2(0, x),
+        ca.atan2(x, 0),
+        ca.hypot(x, 0),
     ],
 )
 @pytest.mark.parametrize("where", ["above", "surface", "stops"])

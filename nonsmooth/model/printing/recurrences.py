@@ -65,6 +65,11 @@ class Writer:
         """C of the interpreter's ``over``."""
         return f"divided({value}, {self.inverse(divisor)})"
 
+    def ratio(self, u: int, v: int) -> str:
+        """C of the interpreter's ``ratio`` of two values."""
+        value, divisor = self.name(u, 0), self.name(v, 0)
+        return f"{value} == 0 && {divisor} == 0 ? NAN : {self.over(value, divisor)}"
+
     def advance(self, j: int, k: int, given: Callable[[int, int], str], mark: str = "") -> None:
         """Write coefficient k of rule j; inputs are given."""
         rule, u, v = self.rule[j], self.a[j], self.b[j]
@@ -136,7 +141,7 @@ class Writer:
         return f"{self.name(u, k)} * {self.name(v, 0)}"
 
     def _over(self, j: int, k: int, u: int, v: int) -> str:
-        return self.over(self.name(u, k), self.name(v, 0))
+        return self.over(self.name(u, k), self.name(v, 0)) if k else self.ratio(u, v)
 
     def _mul(self, j: int, k: int, u: int, v: int) -> str:
         return self.convolve(u, v, k, 0, k)
@@ -149,13 +154,15 @@ class Writer:
         return half if k % 2 else f"MULADD({middle}, {middle}, {half})"
 
     def _div(self, j: int, k: int, u: int, v: int) -> str:
-        known = self.convolve(j, v, k, 0, k - 1)
-        top = f"{self.name(u, k)} - ({known})" if k else f"{self.name(u, 0)} - 0.0"
+        if k == 0:
+            return self.ratio(u, v)
+        top = f"{self.name(u, k)} - ({self.convolve(j, v, k, 0, k - 1)})"
         return self.over(top, self.name(v, 0))
 
     def _under(self, j: int, k: int, u: int, v: int) -> str:
-        top = f"-({self.convolve(j, v, k, 0, k - 1)})" if k else self.name(u, 0)
-        return self.over(top, self.name(v, 0))
+        if k == 0:
+            return self.ratio(u, v)
+        return self.over(f"-({self.convolve(j, v, k, 0, k - 1)})", self.name(v, 0))
 
     def _sqrt(self, j: int, k: int, u: int, v: int) -> str:
         if k == 0:

@@ -263,6 +263,19 @@ def test_every_operation(name):
     assert "s" in run.itinerary
 
 
+@pytest.mark.parametrize(
+    "f", [ca.sin(x) / x, x / y, (1 - ca.cos(x)) / x, x / (P + 0.7), (P + 0.7) / x, y / x + 1]
+)
+def test_zero_over_zero_is_no_number(f):
+    """Not zero either, as which a run would stay where it is and end well."""
+    system = ns.FilippovSystem([x, y], field=[f, -y], parameters={P: -0.7})
+    for engine in ("reference", "auto", "compiled"):
+        run = ns.simulate(system, [0.0, 0.0], 1.0, engine=engine)
+        assert run.status is ns.Status.NOT_FINITE and run.t[-1] == 0.0, engine
+    many = ns.ensemble(system, np.zeros((70, 2)), 1.0)
+    assert {ns.Status(s) for s in many.status} == {ns.Status.NOT_FINITE}
+
+
 def test_interruption_is_heard(monkeypatch):
     """Between bursts of steps; the burst is shortened here, so that no clock is needed."""
     import nonsmooth.flow.compiled.tape as module

@@ -157,6 +157,9 @@ static inline double over(double a, double b) { return a == 0 ? 0 : a * (1.0 / b
 /* The same with the reciprocal of b. */
 static inline double divided(double a, double reciprocal) { return a == 0 ? 0 : a * reciprocal; }
 
+/* The value of a quotient: 0/0 is none, though all further coefficients that are zero stay so. */
+static inline double ratio(double a, double b) { return a == 0 && b == 0 ? NAN : over(a, b); }
+
 static double power_coefficient(const double *u, const double *w, double exponent, int k) {
   double sum = exponent * k * (u[k] * w[0]);
   for (int j = 1; j < k; j++) sum = MULADD(exponent * (k - j) - j, u[k - j] * w[j], sum);
@@ -180,15 +183,15 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
       case RULE_neg: w[k] = -u[k]; break;
       case RULE_twice: w[k] = u[k] + u[k]; break;
       case RULE_scale: w[k] = u[k] * v[0]; break;
-      case RULE_over: w[k] = over(u[k], v[0]); break;
+      case RULE_over: w[k] = k ? over(u[k], v[0]) : ratio(u[0], v[0]); break;
       case RULE_mul: w[k] = convolve(u, v, k, 0, k); break;
       case RULE_sq: {
         double half = 2 * convolve(u, u, k, 0, (k + 1) / 2 - 1);
         w[k] = k % 2 ? half : k ? MULADD(u[k / 2], u[k / 2], half) : u[0] * u[0];
         break;
       }
-      case RULE_div: w[k] = over(u[k] - convolve(w, v, k, 0, k - 1), v[0]); break;
-      case RULE_under: w[k] = over(k ? -convolve(w, v, k, 0, k - 1) : u[0], v[0]); break;
+      case RULE_div: w[k] = k ? over(u[k] - convolve(w, v, k, 0, k - 1), v[0]) : ratio(u[0], v[0]); break;
+      case RULE_under: w[k] = k ? over(-convolve(w, v, k, 0, k - 1), v[0]) : ratio(u[0], v[0]); break;
       case RULE_sqrt: w[k] = k ? over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]) : sqrt(u[0]); break;
       case RULE_power: w[k] = k ? power_coefficient(u, w, v[0], k) : operate(OP_pow, u[0], v[0]); break;
       case RULE_affine: w[k] = k ? t->second[j] * u[k] : MULADD(t->second[j], u[0], t->first[j]); break;

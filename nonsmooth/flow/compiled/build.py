@@ -45,8 +45,11 @@ __all__ = [
     "library_key",
 ]
 
-#: Seconds after which a compilation says that it is under way.
-_QUIET = 1.0
+#: Seconds after which a compilation says that it is under way, and after which it is ended.
+_QUIET, _LONGEST = 1.0, 600.0
+
+#: Compilers that were ended so; each is waited for once in a process.
+_HANGING: set[Command] = set()
 
 
 class Compilation:
@@ -55,21 +58,18 @@ class Compilation:
     Parameters
     ----------
     quiet : bool
-        Beside the work, without a word; an interrupt at the terminal does not reach it.
+        Beside the work, without a word.
     """
 
     def __init__(self, quiet: bool = False) -> None:
-        self.quiet, self.stopped = quiet, False
+        self.quiet, self.stopped, self.hangs = quiet, False, False
         self._process: subprocess.Popen[str] | None = None
 
     def stop(self) -> None:
         """End the compiler that runs, and let none begin."""
         self.stopped, process = True, self._process
         if process is not None and process.poll() is None:
-            try:
-                os.killpg(process.pid, signal.SIGKILL)
-            except (OSError, AttributeError):
-                process.kill()
+            _end(process)
 
     def call(self, command: list[str]) -> str:
         """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
@@ -84,7 +84,7 @@ class Compilation:
                 stderr=subprocess.PIPE,
                 text=True,
                 errors="replace",
-                start_new_session=self.quiet,
+                start_new_session=True,  # of which all processes can be ended together
             )
         except (OSError, ValueError) as error:
             return str(error)
@@ -93,10 +93,13 @@ class Compilation:
             try:
                 if self.stopped:
                     self.stop()
-                errors = process.communicate()[1] if self.quiet else _finished(process, name)
-            except BaseException:
-                process.kill()
-                raise
+                errors = _errors(process, "" if self.quiet else name)
+            except BaseException as error:
+                _end(process)
+                if not isinstance(error, subprocess.TimeoutExpired):
+                    raise
+                self.hangs = True
+                return _no_end()
         if not process.returncode:
             return ""
         return errors.strip() or f"exit status {process.returncode} and no word about why"
@@ -208,7 +211,9 @@ def _compile(
         key = f'const char nonsmooth_key[] = "{library.stem}";\n'
         text.write_text(f"{source}\n{key}", encoding="utf-8")
         call = [*command, *FLAGS, *flags, str(text), "-o", str(output), "-lm"]
-        failure = run.call(call)
+        failure = _no_end() if command in _HANGING else run.call(call)
+        if run.hangs:
+            _HANGING.add(command)
         if not failure and not output.is_file():
             failure = "no error, but no library either"
         if run.stopped:
@@ -224,14 +229,30 @@ def _compile(
         files.replace(library, sealed(library.name, output.read_bytes()))
 
 
-def _finished(process: subprocess.Popen[str], name: str) -> str:
+def _errors(process: subprocess.Popen[str], name: str) -> str:
+    """What a compiler says; if it has a name and takes long, that is said on stderr."""
+    if not name:
+        return process.communicate(timeout=_LONGEST)[1]
     try:
         return process.communicate(timeout=_QUIET)[1]
     except subprocess.TimeoutExpired:
         _say(f"nonsmooth: compiling a fast engine with {name} (once; it is kept) ... ")
-        errors = process.communicate()[1]
-        _say("failed\n" if process.returncode else "done\n")
-        return errors
+    try:
+        return process.communicate(timeout=_LONGEST)[1]
+    finally:
+        _say("done\n" if process.returncode == 0 else "failed\n")
+
+
+def _no_end() -> str:
+    return f"no end within {_LONGEST:g} s"
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a compiler and what it has started."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except (OSError, AttributeError):
+        process.kill()
 
 
 def _say(text: str) -> None:

@@ -4,6 +4,7 @@ import importlib.util
 import os
 import platform
 import shutil
+import signal
 import stat
 import subprocess
 import sys
@@ -177,6 +178,35 @@ def test_an_interrupt_ends_the_compiler_and_leaves_nothing(monkeypatch, tmp_path
         build(SOURCE)
     assert started[0].returncode is not None
     assert list((tmp_path / "cache").iterdir()) == []
+
+
+@pytest.mark.parametrize("quiet", [False, True])
+def test_a_compiler_without_an_end_is_ended_with_all_it_started(quiet, monkeypatch, tmp_path):
+    """It is waited for once; then the next one does the work."""
+    started, ended, real, sound = [], [], subprocess.Popen, find_compiler()
+    hanging, kill = program(tmp_path / "hanging", "#!/bin/sh\nsleep 600 &\nwait\n"), os.killpg
+
+    class Seen(real):
+        def __init__(self, command, **options):
+            super().__init__(command, **options)
+            started.append((command[0], self.pid))
+
+    monkeypatch.setattr(subprocess, "Popen", Seen)
+    monkeypatch.setattr(os, "killpg", lambda *group: (ended.append(group), kill(*group)))
+    monkeypatch.setattr(build_module, "_QUIET", 0.05)
+    monkeypatch.setattr(build_module, "_LONGEST", 0.5)
+    monkeypatch.setattr(build_module, "_HANGING", set())
+    monkeypatch.setattr(build_module, "compilers", lambda: ((str(hanging),),))
+    for _ in range(2):
+        with pytest.raises(CompilerError, match=r"received\nno end within 0.5 s\n.*Install one"):
+            build(SOURCE, run=build_module.Compilation(quiet))
+    assert len(started) == 1
+    assert ended == [(started[0][1], signal.SIGKILL)]
+    monkeypatch.setattr(build_module, "compilers", lambda: ((str(hanging),), sound))
+    monkeypatch.setattr(build_module, "_LONGEST", 600.0)
+    with pytest.warns(CompilerWarning, match=r"hanging failed \(no end within .* is used instead"):
+        assert build(SOURCE, run=build_module.Compilation(quiet)).answer() == 42
+    assert [command for command, _ in started] == [str(hanging), sound[0]]
 
 
 def test_a_full_disk_is_told(monkeypatch):

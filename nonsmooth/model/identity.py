@@ -104,12 +104,13 @@ def vanish_on(
     >>> vanish_on([(x / 8) ** 14], y, ca.vertcat(x, y), mu)
     False
     """
-    nodes, rows = instructions([variables, others], [surface, ca.vertcat(*expressions)])
+    every = ca.vertcat(surface, *expressions)
+    used = [(s, ca.depends_on(variables, s)) for s in ca.symvar(every)]
+    vectors = [ca.vertcat(*[s for s, moves in used if moves is kind]) for kind in (True, False)]
+    nodes, rows = instructions(vectors, [surface, ca.vertcat(*expressions)])
     generator, trials = random.Random(0), 0
     for seed in range(_DRAWS):
-        values = [
-            [generator.randrange(PRIME) for _ in range(v.numel())] for v in (variables, others)
-        ]
+        values = [[generator.randrange(PRIME) for _ in range(v.numel())] for v in vectors]
         try:
             point = _on_surface(nodes, rows[0][0], values, seed)
             if point is None:

@@ -131,9 +131,9 @@ def bent(expressions: ca.SX, x: ca.SX, time: ca.SX = _NO_TIME) -> list[bool]:
     found = [not ca.is_linear(e, x) for e in ca.vertsplit(ca.vec(ca.densify(expressions)))]
     if not time.numel() or not any(found):
         return found
-    symbols = ca.vertsplit(x)
-    place = next((i for i, s in enumerate(symbols) if ca.is_equal(s, time)), None)
-    others = [s for s in ca.symvar(expressions) if not any(ca.is_equal(s, own) for own in symbols)]
+    places = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
+    place = places.get(time.element_hash())
+    others = [s for s in ca.symvar(expressions) if s.element_hash() not in places]
     nodes, rows = instructions([x, ca.vertcat(*others)], [expressions])
     kinds = evaluate(nodes, _Kinds(place))
     return [kinds[j] is _Kind.BENT for j in rows[0]]

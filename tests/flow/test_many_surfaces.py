@@ -1,11 +1,16 @@
 """Blocks on a belt, each with a friction surface: up to four against an independent integrator, more by their
 symmetry."""
 
+import itertools
+import sys
+
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.flow.compiled import tape_for
+from nonsmooth.flow.options import Options
 
 from .independent import blocks
 from .independent.integrator import Run
@@ -62,3 +67,36 @@ def test_a_long_chain_keeps_its_symmetry():
     q_end, v_end = run.x[-1, :k], run.x[-1, k:]
     np.testing.assert_allclose(q_end, q_end[::-1], atol=1e-9)
     np.testing.assert_allclose(v_end, v_end[::-1], atol=1e-9)
+
+
+def forced_chain(k):
+    """Blocks in a row, pushed in time, with a friction that depends on where they are."""
+    q, v, lam, t = *(ca.SX.sym(name, k) for name in ("q", "v", "lam")), ca.SX.sym("t")
+    force = [
+        sum(q[j] - q[i] for j in (i - 1, i + 1) if 0 <= j < k)
+        + 0.1 * ca.sin(t + i)
+        - (1 + 0.2 * ca.tanh(q[i])) * lam[i]
+        for i in range(k)
+    ]
+    return ns.FilippovSystem(
+        [*ca.vertsplit(q), *ca.vertsplit(v)],
+        field=[*ca.vertsplit(v), *force],
+        surfaces=ca.vertsplit(v),
+        multipliers=ca.vertsplit(lam),
+        time=t,
+    )
+
+
+def test_a_program_is_generated_in_proportion_to_its_graph():
+    """Counted in calls of functions: twice the blocks, twice the work."""
+    work = {}
+    for k in (2, 15, 30, 60):  # the first one fills caches
+        system = forced_chain(k)
+        calls = itertools.count()
+        sys.setprofile(lambda frame, event, _, calls=calls: "call" in event and next(calls))
+        try:
+            tape_for(system, Options(t_end=1.0))
+        finally:
+            sys.setprofile(None)
+        work[k] = next(calls)
+    assert work[30] < 2.2 * work[15] and work[60] < 2.2 * work[30]

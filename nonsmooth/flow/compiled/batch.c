@@ -1,11 +1,14 @@
-/* Batches on this processor: W lanes that are refilled, itineraries as nodes of a tree. After lanes.c. */
+/* Batches on this processor: groups of W lanes that are refilled, itineraries as nodes of a tree. After lanes.c. */
+#define GROUPS MOST
+#define OFTEN 16 /* starts for each lane from which on there are several groups */
+
 /* A batch, and how far it is. */
 struct Work {
   const Batch *b;
   const Options *o;
   Words words;
   int64_t next;
-  int alive;
+  int alive, groups;
 };
 
 INLINE const Options *limits(const Work *w) { return w->o; }
@@ -86,31 +89,54 @@ INLINE void keep_event(const Lanes *s, Work *w, int kind, I which) {
   }
 }
 
-typedef struct { Lanes lanes; Work work; int begun; } Many;
+typedef struct { Lanes lanes[GROUPS]; Step steps[GROUPS]; Work work; int begun; } Many;
 
 int64_t many_size(void) { return sizeof(Many); }
+
+/* The parts of a step one after the other for all groups: a part's text is read once for them all, and what
+ * one group waits for another one's work fills. */
+#define PART(NAME, CALL) \
+  static __attribute__((noinline)) void NAME(Lanes *groups, Work *w, Step *e, int n) { \
+    for (int i = 0; i < n; i++) { Lanes *s = &groups[i]; (void)w; if (any(s->live)) CALL; } \
+  }
+PART(expand_all, expand_step(s, w, &e[i]))
+PART(sort_all, sort_step(s, &e[i]))
+PART(take_all, take_step(s, w, &e[i]))
+static __attribute__((noinline)) void hit_all(Lanes *s, Step *e) { first_hits(GROUPS, s, e); }
+
+static void begin_all(Many *many, const Batch *b, const Options *o, Tree *tree) {
+  Work *w = &many->work;
+  double q[NQ];
+  w->b = b;
+  w->o = o;
+  w->words.tree = tree;
+  w->groups = b->count >= OFTEN * GROUPS * W ? GROUPS : 1 + (int)(b->count / (OFTEN * W));
+  prepare(b->p, q);
+  for (int i = 0; i < GROUPS; i++) {
+    many->lanes[i].size = o->atol / o->rtol;
+    for (int k = 0; k < NQ; k++) many->lanes[i].q[k] = BC(q[k]);
+  }
+  many->begun = 1;
+}
 
 /* Run a batch, ``budget`` steps of it at most; whether something is left for another call. ``many``
  * is zero before the first, and aligned like a vector. */
 int run_many(Many *many, const Batch *b, const Options *o, Tree *tree, int64_t budget) {
-  Lanes *s = &many->lanes;
+  Lanes *s = many->lanes;
+  Step *e = many->steps;
   Work *w = &many->work;
-  if (!many->begun) {
-    double q[NQ];
-    w->b = b;
-    w->o = o;
-    w->words.tree = tree;
-    s->size = o->atol / o->rtol;
-    prepare(b->p, q);
-    for (int k = 0; k < NQ; k++) s->q[k] = BC(q[k]);
-    many->begun = 1;
-  }
+  if (!many->begun) begin_all(many, b, o, tree);
   for (;;) {
-    I fresh = {0};
-    if (w->alive < W && w->next < b->count) fresh = refill(s, w);
-    if (any(fresh)) { begin(s, w, fresh); continue; }
+    while (w->alive < w->groups * W && w->next < b->count)
+      for (int i = 0; i < w->groups; i++) {
+        I fresh = refill(&s[i], w);
+        if (any(fresh)) begin(&s[i], w, fresh);
+      }
     if (!w->alive) return 0;
-    if (--budget < 0) return 1;
-    step(s, w);
+    if ((budget -= w->groups) < 0) return 1;
+    expand_all(s, w, e, w->groups);
+    sort_all(s, w, e, w->groups);
+    hit_all(s, e);
+    take_all(s, w, e, w->groups);
   }
 }

@@ -314,35 +314,54 @@ SELDOM I resolve(Guards *v) {
   }
 }
 
-/* Polish the isolated roots that can be the first: of each lane the one that a secant puts first, the
- * slots of different lanes together, then others only if they are not clearly later. */
-INLINE void polish_guards(Guards *v, T margin) {
-  I all = {0};
-  UNROLL for (int j = 0; j < SLOTS; j++) all |= v->one[j];
-  while (any(all)) {
-    T a[P + 1], end = BC(0), guess = BC(INFINITY), d = BC(0);
-    I mine[S1];
-    UNROLL for (int j = 0; j < SLOTS; j++) {
-      T g = MIN(v->a[j][0] * ROUGH_INVERSE(v->a[j][0] - v->end[j]), BC(1));
-      mine[j] = v->one[j] & (g < guess);
-      guess = SELECT(mine[j], g, guess);
-      for (int i = 0; i < j; i++) mine[i] &= ~mine[j];
+/* Polish the isolated roots that can be the first, of ``n`` vectors in step: of each lane the one that a secant puts
+ * first, the slots of different lanes together, then others only if they are not clearly later. */
+INLINE void polish_guards(int n, Guards *const *given, const T *margin) {
+  T a[MOST][P + 1], end[MOST], at[MOST], slope[MOST];
+  const T *series[MOST];
+  I mine[MOST][S1], all[MOST], some = NONE;
+  IN_STEP {
+    const Guards *v = given[i];
+    series[i] = a[i];
+    slope[i] = BC(0);
+    all[i] = NONE;
+    UNROLL for (int j = 0; j < SLOTS; j++) all[i] |= v->one[j];
+    some |= all[i];
+  }
+  while (any(some)) {
+    IN_STEP {
+      const Guards *v = given[i];
+      T guess = BC(INFINITY);
+      UNROLL for (int j = 0; j < SLOTS; j++) {
+        T g = MIN(v->a[j][0] * ROUGH_INVERSE(v->a[j][0] - v->end[j]), BC(1));
+        mine[i][j] = v->one[j] & (g < guess);
+        guess = SELECT(mine[i][j], g, guess);
+        for (int k = 0; k < j; k++) mine[i][k] &= ~mine[i][j];
+      }
+      UNROLL for (int k = 0; k <= P; k++) a[i][k] = v->a[SLOTS - 1][k];
+      end[i] = v->end[SLOTS - 1];
+      for (int j = 0; j < SLOTS - 1; j++) {
+        UNROLL for (int k = 0; k <= P; k++) a[i][k] = SELECT(mine[i][j], v->a[j][k], a[i][k]);
+        end[i] = SELECT(mine[i][j], v->end[j], end[i]);
+      }
     }
-    UNROLL for (int k = 0; k <= P; k++) a[k] = v->a[SLOTS - 1][k];
-    end = v->end[SLOTS - 1];
-    for (int j = 0; j < SLOTS - 1; j++) {
-      if (!any(mine[j])) continue;
-      UNROLL for (int k = 0; k <= P; k++) a[k] = SELECT(mine[j], v->a[j][k], a[k]);
-      end = SELECT(mine[j], v->end[j], end);
-    }
-    T s = polish(a, end, all, &d), later = s + margin;
-    all = NONE;
-    UNROLL for (int j = 0; j < SLOTS; j++) {
-      v->root[j] = SELECT(mine[j], s, v->root[j]);
-      v->slope[j] = SELECT(mine[j], d, v->slope[j]);
-      v->one[j] &= ~mine[j];
-      if (any(v->one[j])) v->one[j] &= ~(I)(values_at(v->a[j], P, later, later * later) > 0);
-      all |= v->one[j];
+    polish(n, series, end, all, at, slope);
+    some = NONE;
+    IN_STEP {
+      Guards *v = given[i];
+      T s = at[i], later = s + margin[i];
+      UNROLL for (int j = 0; j < SLOTS; j++) {
+        v->root[j] = SELECT(mine[i][j], s, v->root[j]);
+        v->slope[j] = SELECT(mine[i][j], slope[i], v->slope[j]);
+        v->one[j] &= ~mine[i][j];
+      }
+      all[i] = NONE;
+      UNROLL for (int j = 0; j < SLOTS; j++) all[i] |= v->one[j];
+      if (any(all[i])) {
+        all[i] = NONE;
+        UNROLL for (int j = 0; j < SLOTS; j++) all[i] |= v->one[j] &= ~(I)(values_at(v->a[j], P, later, later * later) > 0);
+      }
+      some |= all[i];
     }
   }
 }
@@ -364,28 +383,42 @@ INLINE I sort_guards(const Lanes *s, Guards *v, T g[S1][P + 1], T *h) {
   }
 }
 
-/* Time of the first event within h in each lane and its slot + 1; lanes that are not clear. */
-INLINE I first_hit(const Lanes *s, T g[S1][P + 1], T *steps, T *dt, I *slot, T *slope) {
+/* A step: its series, its guards, and what is known of its end. */
+typedef struct {
+  T c[N][P + 1], g[S1][P + 1], allowed[N], of_guards[S1], by_series, h, left;
+  T dt, slope; /* to the first event, or the step's end, and how fast the event's guard falls */
+  I unclear, last, slot;
   Guards v;
-  I unclear = sort_guards(s, &v, g, steps);
-  T h = *steps;
-  I hard = {0};
-  UNROLL for (int j = 0; j < SLOTS; j++) hard |= v.hard[j];
-  if (any(hard)) unclear |= resolve(&v);
-  T tie = NEAR * MAX(BC(1), ABS(s->t));
-  if (SLOTS > 0) polish_guards(&v, tie * QUICK_INVERSE(h));
-  T best = BC(INFINITY), second = BC(INFINITY);
-  *slot = NONE;
-  UNROLL for (int j = 0; j < SLOTS; j++) {
-    I first = v.root[j] < best;
-    second = SELECT(first, best, MIN(second, v.root[j]));
-    best = SELECT(first, v.root[j], best);
-    *slot = (*slot & ~first) | (first & (j + 1));
-    *slope = SELECT(first, v.slope[j], *slope);
+} Step;
+
+/* Time of the first event within h in each lane and its slot + 1, of ``n`` vectors; lanes that are not clear are
+ * added. */
+INLINE void first_hits(int n, const Lanes *s, Step *e) {
+  T tie[MOST], margin[MOST];
+  Guards *guards[MOST];
+  IN_STEP {
+    guards[i] = &e[i].v;
+    tie[i] = NEAR * MAX(BC(1), ABS(s[i].t));
+    margin[i] = tie[i] * QUICK_INVERSE(e[i].h);
   }
-  I hit = *slot != 0;
-  *dt = SELECT(hit, best * h, h);
-  return unclear | (hit & ((second - best) * h <= tie));
+  if (SLOTS > 0) polish_guards(n, guards, margin);
+  IN_STEP {
+    const Guards *v = guards[i];
+    T best = BC(INFINITY), second = BC(INFINITY), slope = BC(0), h = e[i].h;
+    I slot = NONE;
+    UNROLL for (int j = 0; j < SLOTS; j++) {
+      I first = v->root[j] < best;
+      second = SELECT(first, best, MIN(second, v->root[j]));
+      best = SELECT(first, v->root[j], best);
+      slot = (slot & ~first) | (first & (j + 1));
+      slope = SELECT(first, v->slope[j], slope);
+    }
+    I hit = slot != 0;
+    e[i].dt = SELECT(hit, best * h, h);
+    e[i].slot = slot;
+    e[i].slope = slope;
+    e[i].unclear |= hit & ((second - best) * h <= tie[i]);
+  }
 }
 
 /* Events --------------------------------------------------------------------------------------- */
@@ -526,26 +559,38 @@ INLINE I finite_lanes(const Lanes *s) {
   return sum == 0;
 }
 
-static void step(Lanes *s, Work *w) {
+/* The series of a step, its length, and which guards have a root in it. */
+INLINE void expand_step(Lanes *s, Work *w, Step *e) {
   const Options *o = limits(w);
-  T c[N][P + 1], g[S1][P + 1], dt, slope = BC(0), allowed[N], of_guards[S1];
-  I finite, slot;
-  jet(s->x, s->q, s->slides, s->above, s->lambda, &c[0][0], &g[0][0]);
-  T by_series = step_size(s, o, c, g, allowed, of_guards, &finite);
-  T h = MIN(by_series, BC(o->max_step)), left = o->t_end - s->t;
-  I last = h >= left, unclear = ~finite;
-  unclear |= ~last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
-  unclear |= (s->steps >= o->max_steps) | passed_between(s, g);
+  I finite;
+  jet(s->x, s->q, s->slides, s->above, s->lambda, &e->c[0][0], &e->g[0][0]);
+  e->by_series = step_size(s, o, e->c, e->g, e->allowed, e->of_guards, &finite);
+  T h = MIN(e->by_series, BC(o->max_step)), left = o->t_end - s->t;
+  e->last = h >= left;
+  e->unclear = ~finite;
+  e->unclear |= ~e->last & (h <= SHORTEST * MAX(BC(1), ABS(s->t)));
+  e->unclear |= (s->steps >= o->max_steps) | passed_between(s, e->g);
   /* What happens at the end, to rounding, happens. */
-  h = SELECT(last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
-  unclear |= first_hit(s, g, &h, &dt, &slot, &slope);
-  last &= h >= left;
+  e->h = SELECT(e->last, left + AT_END * MAX(BC(1), ABS(s->t + left)), h);
+  e->left = left;
+}
+
+INLINE void sort_step(Lanes *s, Step *e) {
+  e->unclear |= sort_guards(s, &e->v, e->g, &e->h);
+  I hard = {0};
+  UNROLL for (int j = 0; j < SLOTS; j++) hard |= e->v.hard[j];
+  if (any(hard)) e->unclear |= resolve(&e->v);
+}
+
+INLINE void take_step(Lanes *s, Work *w, Step *e) {
+  const Options *o = limits(w);
+  T left = e->left, dt = e->dt;
+  I last = e->last & (e->h >= left), unclear = e->unclear, slot = e->slot;
   dt = MIN(dt, SELECT(last, left, dt));
   unclear |= last & (dt == left) & (slot != 0) & (slot <= FIRST_STOP); /* a mode without a step */
-  h = MIN(h, left);
-  T end[N];
-  state_at(end, c, dt, P);
-  unclear |= unchecked(s, o, c, g, allowed, of_guards, by_series, h, dt, end);
+  T h = MIN(e->h, left), end[N];
+  state_at(end, e->c, dt, P);
+  unclear |= unchecked(s, o, e->c, e->g, e->allowed, e->of_guards, e->by_series, h, dt, end);
   I was_sliding = s->slides;
   advance(s, end, dt);
   I live = s->live & ~unclear, met = {0}, up = {0}, down = {0}, stopped = {0};
@@ -556,7 +601,7 @@ static void step(Lanes *s, Work *w) {
   if (any(met | (live & was_sliding))) unclear |= project(s, met | was_sliding);
   I on = live & was_sliding & (slot == 0) & ~last;
   if (!CANCELLED && any(on)) unclear |= on & near_two_fold(s, o->rtol);
-  if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, slope);
+  if (any(met | up | down)) unclear |= change_modes(s, w, met, up, down, e->slope);
 #endif
 #if STOPS > 0
   stopped = live & (slot > FIRST_STOP);

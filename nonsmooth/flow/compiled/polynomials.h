@@ -51,19 +51,32 @@ INLINE T values_at(const T *a, int n, T s, T z) {
   return even + s * odd;
 }
 
-/* The Taylor coefficients f[0] to f[2] at s of a polynomial of degree n: a[0] to a[n - 1], and the top. Its even
- * and odd parts are expanded in s^2, in chains of half the length. */
-INLINE void expand(const T *a, int n, T top, T s, T *f) {
-  T z = s * s, even[3] = {BC(0), BC(0), BC(0)}, odd[3] = {BC(0), BC(0), BC(0)};
-  UNROLL for (int k = n; k >= 0; k--) {
-    T *part = k % 2 ? odd : even, c = k == n ? top : a[k];
-    part[2] = part[2] * z + part[1];
-    part[1] = part[1] * z + part[0];
-    part[0] = part[0] * z + c;
+/* What follows is done for ``n`` vectors in step, MOST at most: each of its chains waits for its own results, and
+ * the work of another fills that time. */
+#define MOST 2
+#define IN_STEP UNROLL for (int i = 0; i < n; i++)
+
+/* The Taylor coefficients f[0] to f[2] at s of polynomials of a degree: a[0] to a[degree - 1], and the top. Their
+ * even and odd parts are expanded in s^2, in chains of half the length. */
+INLINE void expand(int n, const T *const *a, int degree, const T *top, const T *s, T f[MOST][3]) {
+  T z[MOST], even[MOST][3], odd[MOST][3];
+  IN_STEP {
+    z[i] = s[i] * s[i];
+    UNROLL for (int j = 0; j < 3; j++) even[i][j] = odd[i][j] = BC(0);
   }
-  f[0] = even[0] + s * odd[0];
-  f[1] = odd[0] + 2.0 * (z * odd[1] + s * even[1]);
-  f[2] = (even[1] + 4.0 * (z * even[2])) + s * (3.0 * odd[1] + 4.0 * (z * odd[2]));
+  UNROLL for (int k = degree; k >= 0; k--) {
+    IN_STEP {
+      T *part = k % 2 ? odd[i] : even[i], c = k == degree ? top[i] : a[i][k];
+      part[2] = part[2] * z[i] + part[1];
+      part[1] = part[1] * z[i] + part[0];
+      part[0] = part[0] * z[i] + c;
+    }
+  }
+  IN_STEP {
+    f[i][0] = even[i][0] + s[i] * odd[i][0];
+    f[i][1] = odd[i][0] + 2.0 * (z[i] * odd[i][1] + s[i] * even[i][1]);
+    f[i][2] = (even[i][1] + 4.0 * (z[i] * even[i][2])) + s[i] * (3.0 * odd[i][1] + 4.0 * (z[i] * odd[i][2]));
+  }
 }
 
 /* Where a step of Halley's iteration leaves less than rounding: its error is step^3 times the difference
@@ -78,44 +91,74 @@ INLINE I within(T next, T lo, T hi) { return (next >= lo - 4 * EPSILON) & (next 
 
 /* After a step of Halley's iteration one of Newton's, with the slope where it ended from the coefficients where
  * it began. Lanes where this leaves less than rounding get its end and that slope. */
-INLINE I corrected(const T *a, const T *f, T third, T step, T lo, T hi, I which, T *next, T *slope) {
-  T there = f[1] - 2.0 * step * f[2], more = values_at(a, P, *next, *next * *next) * QUICK_INVERSE(there);
-  T end = *next - more, error = ABS(more) * (ABS(more * f[2]) + 3.0 * third * (step * step));
-  I good = which & (I)(ABS(step) <= 1e-2) & (I)(ABS(more) <= 1e-8) & (I)(error <= 1e-16 * ABS(there)) & within(end, lo, hi);
-  *next = SELECT(good, end, *next);
-  *slope = SELECT(good, there, *slope);
-  return good;
+INLINE void corrected(int n, const T *const *a, T f[MOST][3], const T *third, const T *step, const T *lo, const T *hi,
+                      const I *which, T *next, T *slope, I *good) {
+  T value[MOST];
+  IN_STEP value[i] = values_at(a[i], P, next[i], next[i] * next[i]);
+  IN_STEP {
+    T there = f[i][1] - 2.0 * step[i] * f[i][2], more = value[i] * QUICK_INVERSE(there);
+    T end = next[i] - more, error = ABS(more) * (ABS(more * f[i][2]) + 3.0 * third[i] * (step[i] * step[i]));
+    good[i] = which[i] & (I)(ABS(step[i]) <= 1e-2) & (I)(ABS(more) <= 1e-8) & (I)(error <= 1e-16 * ABS(there))
+              & within(end, lo[i], hi[i]);
+    next[i] = SELECT(good[i], end, next[i]);
+    slope[i] = SELECT(good[i], there, slope[i]);
+  }
 }
 
-/* The root of a polynomial with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
- * not move any more. It starts from the root of a parabola with the same end, improved once on a
- * polynomial of degree MODEL with the same end: one full iteration, corrected, is then enough as a rule. */
-INLINE T polish(const T *a, T end, I active, T *slope) {
-  T lo = BC(0), hi = BC(1), f[3], top = end;
-  T disc = a[1] * a[1] - 4.0 * a[0] * (end - a[0] - a[1]);
-  T s = 2.0 * a[0] * QUICK_INVERSE(QUICK_ROOT(MAX(disc, BC(1e-300))) - a[1]);
-  s = SELECT((s > 0) & (s <= 1), s, BC(0.5));
-  UNROLL for (int k = 0; k < MODEL; k++) top -= a[k];
-  expand(a, MODEL, top, s, f);
-  T better = s - f[0] * f[1] * QUICK_INVERSE(f[1] * f[1] - f[0] * f[2]);
-  s = SELECT((better > 0) & (better <= 1), better, s);
-  /* A bound of the third coefficient at s by the magnitudes of the first terms; the others are smaller. */
-  T third = ABS(a[3]) + s * (4.0 * ABS(a[4]) + s * (10.0 * ABS(a[5]) + s * (20.0 * ABS(a[6]))));
-  for (int it = 0; it < 60; it++) {
-    expand(a, P, a[P], s, f);
-    T step = f[0] * f[1] * INVERSE(f[1] * f[1] - f[0] * f[2]), next = s - step, at_end = f[1];
-    I positive = f[0] > 0;
-    lo = SELECT(positive & active, s, lo);
-    hi = SELECT(positive | ~active, hi, s);
-    I inside = (next > lo) & (next < hi);
-    I small = (converged(f, third, step) & within(next, lo, hi)) | (I)(hi - lo <= 4 * EPSILON);
-    I rest = active & ~small; /* the others stay, whatever their neighbours need */
-    if (any(rest)) small |= corrected(a, f, third, step, lo, hi, rest & inside, &next, &at_end);
-    next = SELECT(small, MIN(MAX(next, lo), hi), SELECT(inside, next, 0.5 * (lo + hi)));
-    s = SELECT(active, next, s);
-    *slope = SELECT(active, at_end, *slope);
-    active &= ~small;
-    if (!any(active)) break;
+/* The root of a parabola with the same end as a polynomial, improved once on a polynomial of degree MODEL with
+ * that end; and a bound of the third coefficient there by the magnitudes of the first terms: the others are smaller. */
+INLINE void guess_roots(int n, const T *const *a, const T *end, T *s, T *third) {
+  T top[MOST], f[MOST][3];
+  IN_STEP {
+    const T *c = a[i];
+    T disc = c[1] * c[1] - 4.0 * c[0] * (end[i] - c[0] - c[1]);
+    s[i] = 2.0 * c[0] * QUICK_INVERSE(QUICK_ROOT(MAX(disc, BC(1e-300))) - c[1]);
+    s[i] = SELECT((s[i] > 0) & (s[i] <= 1), s[i], BC(0.5));
+    top[i] = end[i];
+    UNROLL for (int k = 0; k < MODEL; k++) top[i] -= c[k];
   }
-  return s;
+  expand(n, a, MODEL, top, s, f);
+  IN_STEP {
+    T better = s[i] - f[i][0] * f[i][1] * QUICK_INVERSE(f[i][1] * f[i][1] - f[i][0] * f[i][2]);
+    s[i] = SELECT((better > 0) & (better <= 1), better, s[i]);
+    third[i] = ABS(a[i][3]) + s[i] * (4.0 * ABS(a[i][4]) + s[i] * (10.0 * ABS(a[i][5]) + s[i] * (20.0 * ABS(a[i][6]))));
+  }
+}
+
+/* The roots of polynomials with one on (0, 1], by Halley's iteration in a bracket; converged lanes do
+ * not move any more. From such a start one full iteration, corrected, is enough as a rule. */
+INLINE void polish(int n, const T *const *a, const T *end, const I *which, T *s, T *slope) {
+  T lo[MOST], hi[MOST], top[MOST], third[MOST], f[MOST][3], step[MOST], next[MOST], at_end[MOST];
+  I active[MOST], small[MOST], rest[MOST], inside[MOST], good[MOST], some;
+  guess_roots(n, a, end, s, third);
+  IN_STEP { lo[i] = BC(0); hi[i] = BC(1); top[i] = a[i][P]; active[i] = which[i]; }
+  for (int it = 0; it < 60; it++) {
+    expand(n, a, P, top, s, f);
+    IN_STEP {
+      step[i] = f[i][0] * f[i][1] * INVERSE(f[i][1] * f[i][1] - f[i][0] * f[i][2]);
+      next[i] = s[i] - step[i];
+      at_end[i] = f[i][1];
+      I positive = f[i][0] > 0;
+      lo[i] = SELECT(positive & active[i], s[i], lo[i]);
+      hi[i] = SELECT(positive | ~active[i], hi[i], s[i]);
+      inside[i] = (next[i] > lo[i]) & (next[i] < hi[i]);
+      small[i] = (converged(f[i], third[i], step[i]) & within(next[i], lo[i], hi[i])) | (I)(hi[i] - lo[i] <= 4 * EPSILON);
+      rest[i] = active[i] & ~small[i]; /* the others stay, whatever their neighbours need */
+    }
+    some = NONE;
+    IN_STEP { some |= rest[i]; rest[i] &= inside[i]; }
+    if (any(some)) {
+      corrected(n, a, f, third, step, lo, hi, rest, next, at_end, good);
+      IN_STEP small[i] |= good[i];
+    }
+    some = NONE;
+    IN_STEP {
+      next[i] = SELECT(small[i], MIN(MAX(next[i], lo[i]), hi[i]), SELECT(inside[i], next[i], 0.5 * (lo[i] + hi[i])));
+      s[i] = SELECT(active[i], next[i], s[i]);
+      slope[i] = SELECT(active[i], at_end[i], slope[i]);
+      active[i] &= ~small[i];
+      some |= active[i];
+    }
+    if (!any(some)) return;
+  }
 }

@@ -236,7 +236,9 @@ INLINE I first_hit(const Lanes *s, Step *e, int mode, T *steps, T *dt, I *slot, 
       if (at >= 0) LANE(root, l) = at;
     }
     if (any(one[j])) {
-      T at = polish(a[j], end[j], one[j], &d);
+      const T *series = a[j];
+      T at;
+      polish(1, &series, &end[j], &one[j], &at, &d);
       root = SELECT(one[j], at, root);
     }
     I sooner = root < best;

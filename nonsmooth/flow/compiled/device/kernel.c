@@ -113,6 +113,14 @@ static inline int load(Lanes *s, Work *w) {
   return 1;
 }
 
+static inline void step(Lanes *s, Work *w) {
+  Step e;
+  expand_step(s, w, &e);
+  sort_step(s, &e);
+  first_hits(1, s, &e);
+  take_step(s, w, &e);
+}
+
 static inline void run_all(Work *w) {
   Lanes s;
   s.size = w->o.atol / w->o.rtol;

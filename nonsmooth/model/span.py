@@ -12,6 +12,7 @@ import casadi as ca
 import numpy as np
 
 from .cancel import Forms, Monomial, Sum, normal_forms
+from .graph import NOT_SMOOTH, instructions
 
 #: Part of a function that may be left over by rounding.
 _LEFT = 1e-9
@@ -22,7 +23,7 @@ def in_span(
 ) -> list[bool]:
     """Whether each function is a combination of rows and of an affine function of the variables.
 
-    The coefficients may depend on ``others``. False where it is not seen.
+    The coefficients may depend on ``others``, smoothly. False where it is not seen.
 
     Parameters
     ----------
@@ -41,6 +42,9 @@ def in_span(
     >>> in_span([x * y - 2 * mu * ca.sin(y) + 1, x**2], rows, ca.vertcat(x, y), mu)
     [True, False]
     """
+    nodes, _ = instructions([variables, others], [ca.vertcat(*rows, *functions)])
+    if any(node.op in NOT_SMOOTH for node in nodes):
+        return [False for _ in functions]  # other values of ``others`` have other combinations
     numbers = np.random.default_rng(1).uniform(0.3, 1.7, others.numel())
     fixed = [ca.substitute(ca.SX(e), others, ca.DM(numbers)) for e in [*rows, *functions]]
     forms, sums = normal_forms([variables, others], fixed)
@@ -48,10 +52,14 @@ def in_span(
     monomials = sorted({m for form in bent for m in form})
     table = np.array([[form.get(m, 0.0) for m in monomials] for form in bent])
     table = table.reshape(len(bent), len(monomials))
-    basis, result = table[: len(rows)].T, []
+    known = table[: len(rows)]
+    basis, result = known[np.isfinite(known).all(axis=1)].T, []
     for function, target in zip(functions, table[len(rows) :], strict=True):
-        if not target.any() and not ca.is_linear(function, variables):
-            result.append(False)  # its coefficients are below the least number
+        unseen = not target.any() and not ca.is_linear(function, variables)
+        if unseen or not np.isfinite(target).all():
+            result.append(
+                False
+            )  # coefficients below the least number, or none for these ``others``
             continue
         weights = np.linalg.lstsq(basis, target, rcond=None)[0] if basis.size else np.zeros(0)
         left = target - basis @ weights if basis.size else target

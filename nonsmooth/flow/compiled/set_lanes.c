@@ -24,7 +24,10 @@
 #define TURNED 1e-7 /* to this at least the direction is known in which a set is left */
 #define THIRD 3 /* what the last way leaves out is so many times what its terms suggest, or less */
 #define LAST_WAY 0.1 /* part of the tolerance that it may be, once for each time that a set is reached */
-#define SMALL 8 /* it is tried where |h| is twice the cube root of the tolerance */
+#define SMALL 0.05 /* it is tried where |h| is a third of the cube root of the tolerance */
+#define LAST_TERM 2.0 /* off the set and on it the last two terms of series may be so many times the tolerance */
+#define BEFORE_LAST 10.0
+#define AT_LIMIT 10 /* at the end of rolling |lambda| is 1 to so many times the tolerance */
 #define ROOM_TO_ROLL 1e-6 /* |lambda| is clearly below 1 */
 
 enum { OFF, ON, LEAVING, NEAR_SET, POOLS };
@@ -439,14 +442,14 @@ static __attribute__((noinline)) I reach(Lanes *s, Work *w, I which, I *unclear)
 }
 
 /* Lanes on the set at the end of friction's range: they leave it in the direction of friction. */
-INLINE I release(Lanes *s, I which) {
+INLINE I release(Lanes *s, const Work *w, I which) {
   T a[K], m[K * K], y[K], c;
   I isotropic;
   frozen_values(s->x, s->q, LAMBDA(s->lam), a, m);
   I good = is_definite(m, &isotropic, &c);
   solve_block(m, a, y);
   T size = length_of(y);
-  good &= ABS(size - 1) <= 1e-9;
+  good &= ABS(size - 1) <= larger(1e-9, AT_LIMIT * w->o->rtol);
   UNROLL for (int i = 0; i < K; i++) s->lam[i] = SELECT(which, y[i] / size, s->lam[i]);
   return which & ~good;
 }

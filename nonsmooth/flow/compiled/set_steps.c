@@ -83,7 +83,7 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
     UNROLL for (int i = 0; i <= K; i++) part[i] = weighed(slope[i], e->allowed);
     UNROLL for (int i = 0; i < K; i++) all += 2.0 * (ABS(value[i]) + ABS(value[K])) * (part[i] + part[K]);
     /* Where rolling ends the motion is smooth to the second order: the time is known to the tolerance itself. */
-    bound(g[P], g[P - 1], SAFETY * ROUGH_INVERSE(all + o->rtol * ABS(g[0]) + 1e-290), last, before);
+    bound(g[P], g[P - 1], SAFETY * BEFORE_LAST * ROUGH_INVERSE(all + o->rtol * ABS(g[0]) + 1e-290), last, before);
     UNROLL for (int i = 0; i <= K; i++) e->off_slip[i] = WRONG * part[i] + VANISHES * rounding_scale(s, w, slope[i]);
   }
 #if STOPS > 0
@@ -113,7 +113,8 @@ INLINE void expand_step(const Lanes *s, Step *e, int mode) {
   if (mode == LEAVING) leave_jet(s->x, s->q, LAMBDA(s->lam), &e->c[0][0], &e->g[0][0], &e->unknowns[0][0]);
 }
 
-/* The size that the coefficients allow. */
+/* The size that the coefficients allow: terms fall to a fifth of the one before or less, so what comes after the
+ * last one is within the tolerance where this is LAST_TERM of it and the one before BEFORE_LAST. */
 INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite) {
   const Options *o = w->o;
   T last = BC(1e-300), before = BC(1e-300), sum = BC(0), per = BC(1.0 / (SAFETY * o->rtol));
@@ -143,8 +144,8 @@ INLINE T series_size(const Lanes *s, const Work *w, Step *e, int mode, I *finite
     UNROLL for (int k = 1; k <= P; k++) g[k] = SELECT(moves, g[k] * first, BC(0));
     g[0] = BC(1 - LIMIT_FALL);
   }
+  if (mode != LEAVING) return size_of(last * (1 / LAST_TERM), before * (1 / BEFORE_LAST), 0);
   T h = size_of(last, before, 0);
-  if (mode != LEAVING) return h;
   /* Where the set is far behind at the end h has to be known to the tolerance, nearer its direction. */
   T rate = e->g[0][0], part = rate / e->level;
   T far = MIN(size_of(turn * (1 / TURNED), turn_before * (1 / TURNED), 0), size_of(turn * part, turn_before * part, 2));
@@ -408,7 +409,7 @@ INLINE void take_step(Lanes *s, Work *w, Step *e, int mode) {
     gone = met;
     if (any(gone)) {
       unclear |= gone & ~(I)(slope < -1e-10 * e->g[0][0]);
-      unclear |= release(s, gone) | change_mode(s, w, gone & ~unclear, EXIT, 0);
+      unclear |= release(s, w, gone) | change_mode(s, w, gone & ~unclear, EXIT, 0);
       s->left_at = SELECT(gone, s->t, s->left_at);
     }
   } else {

@@ -146,10 +146,10 @@ INLINE T length_of(const T *h) {
   return SQRT_(sum);
 }
 
-/* sum of |gradient| (size + |x|): rounding in a function is that times epsilon. */
-INLINE T rounding_scale(const Lanes *s, const Work *w, const T *gradient) {
+/* sum of |gradient| (size + |x|), of those that are there: rounding in a function is that times epsilon. */
+INLINE T rounding_scale(const Lanes *s, const Work *w, const T *gradient, const char *there) {
   T scale = BC(0);
-  UNROLL for (int i = 0; i < N; i++) scale += ABS(gradient[i]) * (w->size + ABS(s->x[i]));
+  UNROLL for (int i = 0; i < N; i++) if (there[i]) scale += ABS(gradient[i]) * (w->size + ABS(s->x[i]));
   return scale;
 }
 
@@ -157,7 +157,7 @@ INLINE T rounding_scale(const Lanes *s, const Work *w, const T *gradient) {
 INLINE T heights(const Lanes *s, const Work *w, T *h, T gradient[K][N]) {
   T scale = BC(0);
   height_values(s->x, s->q, LAMBDA(s->lam), h, &gradient[0][0]);
-  UNROLL for (int i = 0; i < K; i++) scale = MAX(scale, rounding_scale(s, w, gradient[i]));
+  UNROLL for (int i = 0; i < K; i++) scale = MAX(scale, rounding_scale(s, w, gradient[i], HEIGHT_SLOPES[i]));
   return scale;
 }
 
@@ -469,7 +469,7 @@ static void begin(Lanes *s, Work *w, I fresh) {
   T stop[STOPS], gradient[STOPS][N];
   stop_values(s->x, s->q, LAMBDA(s->lam), stop, &gradient[0][0]);
   for (int j = 0; j < STOPS; j++) {
-    unclear |= ABS(stop[j]) <= VANISHES * rounding_scale(s, w, gradient[j]);
+    unclear |= ABS(stop[j]) <= VANISHES * rounding_scale(s, w, gradient[j], STOP_SLOPES[j]);
     s->above_stop[j] = SELECT_I(fresh, (I)(stop[j] > 0), s->above_stop[j]);
   }
 #endif

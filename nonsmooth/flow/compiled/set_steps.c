@@ -54,9 +54,9 @@ INLINE T stretch_of(const Lanes *s) {
 
 /* Step size -------------------------------------------------------------------------------------- */
 
-INLINE T weighed(const T *gradient, const T *allowed) {
+INLINE T weighed(const T *gradient, const char *there, const T *allowed) {
   T sum = BC(0);
-  UNROLL for (int i = 0; i < ND; i++) sum += ABS(gradient[i]) * allowed[i];
+  UNROLL for (int i = 0; i < ND; i++) if (there[i]) sum += ABS(gradient[i]) * allowed[i];
   return sum;
 }
 
@@ -70,7 +70,7 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   const Options *o = w->o;
   T h[K], gradient[K][N], sum = BC(0);
   height_values(s->x, s->q, LAMBDA(s->lam), h, &gradient[0][0]);
-  UNROLL for (int i = 0; i < K; i++) sum += weighed(gradient[i], e->allowed);
+  UNROLL for (int i = 0; i < K; i++) sum += weighed(gradient[i], HEIGHT_SLOPES[i], e->allowed);
   const T *g = e->g[0];
   e->level = sum;
   e->fall = SELECT(e->radius * (SAFETY * o->rtol) > LEFT * sum, BC(FALLEN), BC(FALL));
@@ -80,11 +80,11 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
     T value[K + 1], slope[K + 1][N];
     slip_values(s->x, s->q, LAMBDA(s->lam), value, &slope[0][0]);
     T part[K + 1], all = BC(0);
-    UNROLL for (int i = 0; i <= K; i++) part[i] = weighed(slope[i], e->allowed);
+    UNROLL for (int i = 0; i <= K; i++) part[i] = weighed(slope[i], SLIP_SLOPES[i], e->allowed);
     UNROLL for (int i = 0; i < K; i++) all += 2.0 * (ABS(value[i]) + ABS(value[K])) * (part[i] + part[K]);
     /* Where rolling ends the motion is smooth to the second order: the time is known to the tolerance itself. */
     bound(g[P], g[P - 1], SAFETY * BEFORE_LAST * ROUGH_INVERSE(all + o->rtol * ABS(g[0]) + 1e-290), last, before);
-    UNROLL for (int i = 0; i <= K; i++) e->off_slip[i] = WRONG * part[i] + VANISHES * rounding_scale(s, w, slope[i]);
+    UNROLL for (int i = 0; i <= K; i++) e->off_slip[i] = WRONG * part[i] + VANISHES * rounding_scale(s, w, slope[i], SLIP_SLOPES[i]);
   }
 #if STOPS > 0
   if (!BENT_STOPS) return;
@@ -92,9 +92,9 @@ INLINE void guard_bounds(const Lanes *s, const Work *w, Step *e, int mode, T *la
   stop_values(s->x, s->q, LAMBDA(s->lam), stop, &slopes[0][0]);
   UNROLL for (int j = 0; j < STOPS; j++) {
     const T *a = e->g[1 + j];
-    T part = weighed(slopes[j], e->allowed);
+    T part = weighed(slopes[j], STOP_SLOPES[j], e->allowed);
     bound(a[P], a[P - 1], ROUGH_INVERSE(part + o->rtol * ABS(a[0]) + 1e-290), last, before);
-    e->off_stop[j] = WRONG * part + VANISHES * rounding_scale(s, w, slopes[j]);
+    e->off_stop[j] = WRONG * part + VANISHES * rounding_scale(s, w, slopes[j], STOP_SLOPES[j]);
   }
 #endif
 }

@@ -24,6 +24,9 @@ from ..rules import lower, touched
 from ..system import FilippovSystem
 from .ccode import Program
 
+#: Lines of functions that are short.
+_SHORT = 150
+
 
 @dataclass(frozen=True)
 class SetProgram:
@@ -118,7 +121,23 @@ class _Writer:
         program.add("on_check", f=on[list(on_rows)], value=self.stops)
         bent_slip = not ca.is_linear(used, x)
         bent_stops = bool(self.stops.numel()) and not ca.is_linear(self.stops, x)
-        return SetProgram(program.text(), rows, on_rows, bent_slip, bent_stops, self._states())
+        text = self._slopes(height=self.heights, slip=used, stop=self.stops)
+        text += _short_inline(program.text())
+        return SetProgram(text, rows, on_rows, bent_slip, bent_stops, self._states())
+
+    def _slopes(self, **functions: ca.SX) -> str:
+        """Which of their derivatives by states are not zero."""
+        lines = []
+        for name, values in functions.items():
+            there = [
+                [int(not e.is_zero()) for e in ca.horzsplit(row)]
+                for row in ca.vertsplit(_gradient(values, self.x))
+            ]
+            rows = ", ".join("{" + ", ".join(map(str, row)) + "}" for row in there) or "{0}"
+            lines.append(
+                f"__attribute__((unused)) static const char {name.upper()}_SLOPES[][N] = {{{rows}}};\n"
+            )
+        return "".join(lines)
 
     def _states(self) -> tuple[int, ...]:
         found = []
@@ -291,6 +310,15 @@ class _Direction:
             known = _products(row, self.root, 0, k - 1, k)
             row.append(clean(value_of(own[k]) - value_of(known)))
         return [row[k] for row in self.u]
+
+
+def _short_inline(text: str) -> str:
+    """Let compilers see into short functions that are needed in parts: their other outputs are then not computed."""
+    for name in ("height", "frozen", "slip", "stop"):
+        head, body = f"FUNCTION {name}_values(", text.partition(f"FUNCTION {name}_values(")[2]
+        if body.partition("\n}\n")[0].count("\n") <= _SHORT:
+            text = text.replace(head, f"INLINE void {name}_values(")
+    return text
 
 
 def clean(a: ca.SX) -> Coefficient:

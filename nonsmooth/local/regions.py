@@ -40,7 +40,7 @@ class Region(Enum):
     TANGENT_ABOVE = "tangency of the field above"  # L1 = 0
     TANGENT_BELOW = "tangency of the field below"  # L2 = 0
     TWO_FOLD = "tangency of both fields"  # L1 = L2 = 0
-    MIXED = "sliding that neither attracts nor repels"  # on several surfaces only
+    MIXED = "sliding that neither attracts nor repels"  # on several surfaces, or a set where M is not positive definite
     SLIDING = "sliding"  # of a set of codimension two or three: |M^-1 a| < 1
     CROSSING = "crossing"  # |M^-1 a| > 1
     BOUNDARY = "boundary of sliding"  # |M^-1 a| = 1
@@ -80,7 +80,8 @@ def region(
 
     On a set $h = 0$ with a vector multiplier $h' = a - M lambda$: ``SLIDING`` where $|M^-1 a| < 1$, so that
     $lambda = M^-1 a$ keeps the motion on it; ``CROSSING`` where $|M^-1 a| > 1$ (see
-    :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M has a negative direction.
+    :func:`limit_directions`), ``BOUNDARY`` between; ``MIXED`` where M has a negative direction, or
+    none in which it attracts.
 
     Parameters
     ----------
@@ -141,14 +142,18 @@ def _is_set(system: FilippovSystem, surface: int) -> bool:
 
 def _region_of_set(law: Frozen, tol: float) -> Region:
     """Where sliding along a set is possible, and whether it attracts."""
-    if not law.definite:
-        size = float(np.abs(law.m).max())
-        if law.indefinite or size == 0.0:
-            return Region.MIXED if law.indefinite else Region.CROSSING
-    needed = float(np.linalg.norm(np.linalg.solve(law.m, law.a)))
+    if law.indefinite:
+        return Region.MIXED
+    size = float(np.abs(law.m).max()) + float(np.abs(law.a).max())
+    lam = np.linalg.lstsq(law.m, law.a, rcond=1e-13)[0]
+    if np.abs(law.m @ lam - law.a).max() > tol * size:
+        return Region.CROSSING  # friction does not act against all of a
+    needed = float(np.linalg.norm(lam))
     if abs(needed - 1.0) <= tol:
         return Region.BOUNDARY
-    return Region.SLIDING if needed < 1.0 else Region.CROSSING
+    if needed > 1.0 or not np.any(law.m):
+        return Region.CROSSING
+    return Region.SLIDING if law.definite else Region.MIXED
 
 
 def _refuse_crossing(numbers: Numbers, found: Region, what: str) -> None:

@@ -111,6 +111,24 @@ def test_regions_of_a_block_on_an_incline():
     assert repr(pickle.loads(pickle.dumps(found))) == repr(found)
 
 
+@pytest.mark.parametrize(
+    ("a", "m", "expected"),
+    [
+        ((0.3, 0.0), [[1.0, 0.0], [0.0, 0.0]], "MIXED"),
+        ((0.1, 0.1), [[1.0, 1.0], [1.0, 1.0]], "MIXED"),
+        ((0.0, 0.0, 0.0), np.diag([1.0, 1.0, 0.0]), "MIXED"),
+        ((0.3, 0.0), [[0.0, -1.0], [1.0, 0.0]], "MIXED"),
+        ((0.3, 0.1), [[1.0, 0.0], [0.0, 0.0]], "CROSSING"),
+        ((1.3, 0.0), [[1.0, 0.0], [0.0, 0.0]], "CROSSING"),
+        ((1.0, 0.0), [[1.0, 0.0], [0.0, 0.0]], "BOUNDARY"),
+    ],
+)
+def test_friction_that_misses_a_direction_attracts_from_none_along_it(a, m, expected):
+    """It holds only loads that it acts against: their multiplier is not unique, or nothing leads back."""
+    system = frozen(a, np.array(m))
+    assert ns.region(system, np.zeros(len(a))) is ns.Region[expected]
+
+
 def test_beside_a_surface_the_side_is_known_or_asked_for():
     v, lam = (ca.vertcat(ca.SX.sym(n + "1"), ca.SX.sym(n + "2")) for n in ("v", "l"))
     z, switch = ca.SX.sym("z"), ca.SX.sym("switch")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import argparse
+import math
 from typing import Any
 
 import nonsmooth as ns
@@ -24,6 +25,13 @@ from .report import Units, in_course, in_words, polar
 from .values import quantity
 
 _NAMES = ("side_spin", "axis_tilt", "launch_angle", "side_slope")
+
+#: Angles in degrees: least and most, and whether these are among them.
+_ANGLES = {
+    "axis_tilt": (-90, 90, True),
+    "launch_angle": (0, 90, True),
+    "side_slope": (-90, 90, False),
+}
 
 
 def side_arguments(parser: argparse.ArgumentParser, launched: bool = False) -> None:
@@ -54,7 +62,7 @@ def asked_for_side(args: argparse.Namespace) -> bool:
     Raises
     ------
     nonsmooth.OptionError
-        Arguments that do not go together.
+        Arguments that do not go together, an angle out of its range.
     """
     given = [name for name in _NAMES if getattr(args, name, None) is not None]
     if not given:
@@ -67,6 +75,17 @@ def asked_for_side(args: argparse.Namespace) -> bool:
             f"--axis-tilt: expected together with --launch-angle, received {said}. The axis is tilted in "
             "the plane normal to the launch."
         )
+    for name, (least, most, closed) in _ANGLES.items():
+        typed = getattr(args, name, None)
+        if typed is None:
+            continue
+        angle = math.degrees(typed.si(args.units))
+        if not (least <= angle <= most if closed else least < angle < most):
+            within = f"from {least} to {most}" if closed else f"between {least} and {most}"
+            raise ns.OptionError(
+                f"--{name.replace('_', '-')}: expected an angle {within} deg, received "
+                f"{typed.said(args.units)}."
+            )
     return True
 
 

@@ -123,7 +123,7 @@ def ensemble(
     require_system(system, sets=True)
     work = checked_work(work)
     if start_mode is not None:
-        system.parse_mode(start_mode)
+        system.require_mode(start_mode)
     system, at = sectioned(system, at)
     starts = Starts(system, x0, parameters, t_start)
     number = _event_number(at_event)

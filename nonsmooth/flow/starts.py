@@ -111,23 +111,30 @@ def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Opti
     Raises
     ------
     OptionError
+    DefinitionError
+        The system has no such mode.
     """
     if options.start_mode is None or not system.surface_count:
         return
-    letters = {1: "+", -1: "-", 0: "s"}
-    asked = system.parse_mode(options.start_mode)[: system.surface_count]
+    asked = options.start_mode
+    system.require_mode(asked)
     h, gradient = Surfaces(system).values(x, p)
     scale = rounding_scale(np.abs(gradient), x, options.size)
-    sides = np.sign(np.where(np.abs(h) <= ON_SURFACE * scale, 0.0, h))[: system.surface_count]
-    wrong = [i for i, side in enumerate(sides) if side and side != asked[i]]
-    if wrong:
-        said = ", ".join(f"h{i} = {h[i]:.6g} ({letters[int(sides[i])]!r})" for i in wrong)
+    sides = np.sign(np.where(np.abs(h) <= ON_SURFACE * scale, 0.0, h))
+    said = []
+    for k, members in enumerate(system.entries):
+        own = list(members)
+        letter = "*" if len(own) > 1 else "+" if sides[own[0]] > 0 else "-"
+        if np.any(sides[own]) and asked[k] != letter:
+            value = ", ".join(f"{v:.6g}" for v in h[own])
+            said.append(f"h{k} = {value if len(own) == 1 else f'[{value}]'} ({letter!r})")
+    if said:
         raise OptionError(
             explain(
                 "start_mode",
-                expected=f"the sides of the start, where {said}",
-                received=repr(options.start_mode),
-                advice="Only on a surface, h = 0, is there a choice.",
+                expected=f"the sides of the start, where {', '.join(said)}",
+                received=repr(asked),
+                advice="Only on a surface or set, h = 0, is there a choice.",
             )
         )
 

@@ -254,7 +254,7 @@ def place(
     system.surface_function(surface)  # refuses what is no index or out of range
     letters = list(_signs(system, x, p, surface) if mode is None else mode)
     if mode is not None:
-        system.parse_mode(mode)
+        system.require_mode(mode)
     letters[surface] = "s"
     if letters.count("s") > 1:
         raise DefinitionError(

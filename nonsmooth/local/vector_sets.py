@@ -202,7 +202,7 @@ def _members(system: FilippovSystem, surface: int | None) -> tuple[int, ...]:
 def _letters(system: FilippovSystem, h: Array, members: tuple[int, ...], mode: str | None) -> str:
     """Letters of all switching functions, ``s`` for those of the set."""
     if mode is not None:
-        system.parse_letters(mode)
+        system.require_mode(mode)
         letters = list(system.widened(mode).ljust(len(h), "o"))
     else:
         sides = ["+" if value > 0 else "-" for value in h[: system.surface_count]]

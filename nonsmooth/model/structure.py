@@ -98,6 +98,10 @@ class Structure:
         """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set."""
         return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
 
+    def entry_of(self, function: int) -> int:
+        """Number in names and modes of the surface or set to which a switching function belongs."""
+        return next(k for k, members in enumerate(self.entries) if function in members)
+
     @cached_property
     def coupled(self) -> bool:
         """Whether multipliers are not eliminated: several surfaces, one that enters nonlinearly, or
@@ -185,6 +189,19 @@ class Structure:
         ):
             raise DefinitionError(self._letters_expected(mode))
         return tuple(letters[letter] for letter in whole)
+
+    def require_mode(self, mode: object) -> None:
+        """Refuse what is no mode for a user: one letter for each surface and set, and none that only runs know.
+
+        Raises
+        ------
+        DefinitionError
+        """
+        known = ["*s" if len(members) > 1 else "+-s" for members in self.entries]
+        whole = [*known, *["oc"] * len(self.impacts)]
+        fits = isinstance(mode, str) and len(mode) in (len(known), len(whole))
+        if not fits or any(a not in b for a, b in zip(str(mode), whole, strict=False)):
+            raise DefinitionError(self._letters_expected(mode))
 
     def _letters_expected(self, mode: object) -> str:
         m, c, k = len(self.entries), len(self.impacts), len(self.sets)

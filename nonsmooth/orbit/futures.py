@@ -140,6 +140,7 @@ def _past(
                 "starts where the trajectory ends."
             )
         past = start
+        require_system(past.system)
     else:
         require_system(start)
         if point is None:

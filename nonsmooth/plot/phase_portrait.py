@@ -140,6 +140,8 @@ def _check(system: object) -> None:
     elif system.dimension != 2:
         received = f"{system.dimension} states: {', '.join(system.state_names)}"
         advice = "For a two-fold in three states use two_fold; for runs use trajectory."
+    elif system.sets:
+        received, advice = "a set of codimension two or three", "Draw runs with trajectory."
     elif system.surface_count != 1:
         received = f"{system.surface_count} surfaces"
         advice = "Its surfaces meet and cut each other; draw runs with trajectory."

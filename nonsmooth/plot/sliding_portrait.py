@@ -141,6 +141,8 @@ def _check(system: object) -> None:
     elif system.dimension != 3:
         received = f"{system.dimension} states: {', '.join(system.state_names)}"
         advice = "For two states use phase_portrait; with more, hold some of them fixed."
+    elif system.sets:
+        received, advice = "a set of codimension two or three", "Draw runs with trajectory."
     elif system.surface_count != 1:
         received, advice = f"{system.surface_count} surfaces", "Draw runs with trajectory."
     elif system.time_dependent:

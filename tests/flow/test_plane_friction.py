@@ -202,8 +202,43 @@ def test_a_mode_to_start_in():
     assert run.itinerary == "*"
     refused = ns.simulate(_puck(), [0, 0, 0, 0], 2.0, parameters={"pull": 0.6}, start_mode="s")
     assert refused.status == ns.Status.NON_UNIQUE
-    with pytest.raises(ns.DefinitionError, match=r"\* s for a set"):
-        ns.simulate(_puck(), [0, 0, 0, 0], 2.0, start_mode="+")
+    # Letters that only runs know, one for each component, none, no letters
+    for mode in ("+", "i", "b", "ll", "**", "", 1):
+        for run in (ns.simulate, ns.ensemble):
+            with pytest.raises(ns.DefinitionError, match=r"\* s for a set"):
+                run(_puck(), [0, 0, 0, 0], 2.0, start_mode=mode)
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_a_start_off_a_set_goes_on_from_a_surface_that_repels(engine):
+    # A puck of known stopping time beside z' = sign z, which may go either way from z = 0.
+    x, z = plane.columns("v1", "v2"), ca.SX.sym("z")
+    lam, one = ca.vertcat(*plane.columns("l1", "l2")), ca.SX.sym("one")
+    system = ns.FilippovSystem(
+        [*x, z],
+        field=[-0.5 * lam[0], -0.5 * lam[1], one],
+        surfaces=[ca.vertcat(*x), z],
+        multipliers=[lam, one],
+    )
+    run = lambda start, mode: ns.simulate(system, start, 3.0, start_mode=mode, engine=engine)
+    start = [0.6, -0.8, 0.0]
+    stopped = run(start, None)
+    assert stopped.status == ns.Status.NON_UNIQUE
+    assert "On h1 = 0" in stopped.message and "'*+', '*-'" in stopped.message
+    for letter, z_end in [("+", 3.0), ("-", -3.0)]:
+        found = run(start, "*" + letter)
+        assert found.itinerary == f"*{letter} s{letter}"
+        assert found.events[0].t == pytest.approx(2.0, abs=1e-11)
+        assert found.x[-1] == pytest.approx([0.0, 0.0, z_end], abs=1e-11)
+    held = run(start, "*s")  # to where the puck stops, and there either way is asked for again
+    assert held.itinerary == "*s" and held.status == ns.Status.NON_UNIQUE
+    assert held.x[-1] == pytest.approx(np.zeros(3), abs=1e-11)
+    for mode in ("s+", "ss"):
+        with pytest.raises(ns.OptionError, match=r"where h0 = \[0.6, -0.8\] \('\*'\)"):
+            run(start, mode)
+    with pytest.raises(ns.OptionError, match=r"where h1 = 2 \('\+'\)"):
+        run([0.6, -0.8, 2.0], "*s")
+    assert "start_mode '*+' has 0" in run([0.0, 0.0, 0.0], "*+").message
 
 
 def test_ensembles_and_sections_meet_sets():

@@ -107,14 +107,15 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
 
 
 def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
-    modes, t = run.letters, float(run.t[-1])
+    modes, t = [system.spelled(mode) for mode in run.letters], float(run.t[-1])
     reason = REASONS[run.reason]
+    entries = [k for k, own in enumerate(system.entries) if any(i in run.active for i in own)]
     if reason == "two_fold":
-        return messages.two_fold(run.where)
+        return messages.two_fold(system.entry_of(run.where))
     if reason == "slid_to_two_fold":
-        return messages.slid_to_two_fold(run.where)
+        return messages.slid_to_two_fold(system.entry_of(run.where))
     if reason == "ambiguous":
-        return messages.ambiguous(run.several)
+        return messages.ambiguous([system.spelled(mode) for mode in run.several])
     if reason == "wrong_start":
         return messages.wrong_start(str(options.start_mode), modes[run.where])
     if reason == "field":
@@ -122,7 +123,7 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
     if reason == "state":
         return messages.state_not_finite(t)
     if reason == "multiple_zero":
-        return messages.multiple_zero(run.where)
+        return messages.multiple_zero(system.entry_of(run.where))
     if reason == "two_sided":
         return messages.two_sided(system.resets[run.where][0])
     contacts = _contacts(system, run)
@@ -135,9 +136,9 @@ def _reason(system: FilippovSystem, options: Options, run: Run) -> str:
     if reason == "no_reaction":
         return messages.no_reaction(contacts)
     if reason == "no_stable_motion":
-        return messages.no_stable_motion(run.active)
+        return messages.no_stable_motion(entries)
     if reason == "possibly_several":
-        return messages.possibly_several(run.active)
+        return messages.possibly_several(entries)
     if reason == "reset_map":
         return messages.reset_not_finite(system.resets[run.where][0], t)
     return messages.surface_not_finite() if reason == "surface" else messages.degenerate()

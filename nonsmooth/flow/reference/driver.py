@@ -143,9 +143,8 @@ class Driver(Bookkeeping):
         """Leave a point where only low derivatives exist; guards are looked at after the step."""
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
         if h == 0.0 or e.overflows:
-            return self.end(
-                Status.NOT_FINITE, messages.field_not_finite(self.mode, self.x.tolist())
-            )
+            mode = self.system.spelled(self.mode)
+            return self.end(Status.NOT_FINITE, messages.field_not_finite(mode, self.x.tolist()))
         drops, self._sides, self._fired = self.drops, {}, set()
         if self.advance(replace(e, states=coefficients, finite=True), h):
             self.drops = {row: k for row, k in drops.items() if k > e.guards.shape[1]}
@@ -155,7 +154,8 @@ class Driver(Bookkeeping):
             return
         surface = self.mode.index("s")
         if is_two_fold(self.modes, self.mode, self.x, surface, self.options.rtol):
-            self.end(Status.NON_UNIQUE, messages.slid_to_two_fold(surface))
+            entry = self.system.entry_of(surface)
+            self.end(Status.NON_UNIQUE, messages.slid_to_two_fold(entry))
 
     # events ------------------------------------------------------------------------------------
 
@@ -176,7 +176,7 @@ class Driver(Bookkeeping):
         self.x = self.surfaces.project(self.x, self.p, active)
         self.record.correct(self.x)
         if guard.kind == "surface" and not self._is_on(i):
-            return self.end(Status.NON_UNIQUE, messages.multiple_zero(i))
+            return self.end(Status.NON_UNIQUE, messages.multiple_zero(self.system.entry_of(i)))
         known: dict[tuple[str, int, int], int] = {}
         if guard.kind in ("exit", "branch"):
             self._watch_two_fold()
@@ -283,15 +283,13 @@ class Driver(Bookkeeping):
         self.system.parse_letters(mode)
         mode = sets.asked(self.system.widened(mode).ljust(len(self.mode), "o"), self.mode, active)
         wrong = [i for i, c in enumerate(mode) if i not in active and c != self.mode[i]]
+        asked, actual = self.system.spelled(mode), self.system.spelled(self.mode)
         if wrong:
-            return self.end(
-                Status.NON_UNIQUE,
-                messages.wrong_start(self.system.spelled(mode), self.system.spelled(self.mode)),
-            )
+            return self.end(Status.NON_UNIQUE, messages.wrong_start(asked, actual))
         self.mode, affine = mode, not any(self.system.nonlinear)
         solutions = self.modes.solutions(mode, self.x, stable_only=not affine)
         if len(solutions) != 1:
-            return self.end(Status.NON_UNIQUE, messages.start_solutions(mode, len(solutions)))
+            return self.end(Status.NON_UNIQUE, messages.start_solutions(asked, len(solutions)))
         self.unknowns = solutions[0]
         e, leading = self.expand(), {}
         for row, guard in enumerate(self.stepper.guards(mode)):
@@ -309,7 +307,7 @@ class Driver(Bookkeeping):
             or leaves
             or any(kind == "surface" and value < 0.0 for kind, value in leading.values())
         ):
-            self.end(Status.NON_UNIQUE, messages.impossible_start(mode))
+            self.end(Status.NON_UNIQUE, messages.impossible_start(asked))
 
     def arm(self, fired: Guard | None = None) -> None:
         """Look at the stops and resets on whose zero the run stands: is one of them met?

@@ -89,7 +89,9 @@ def decide(
     first = stepper.system.surface_count  # of the contacts
     contacts = [i - first for i in active if i >= first]
     if len(active) == 1 and not contacts and is_two_fold(stepper.modes, mode, x, active[0]):
-        return Decision(None, Status.NON_UNIQUE, messages.two_fold(active[0]))
+        return Decision(
+            None, Status.NON_UNIQUE, messages.two_fold(stepper.system.entry_of(active[0]))
+        )
     if any(i in stepper.system.set_of for i in active):
         letters = _of_sets(stepper, x, mode, active, known, kept)
     else:
@@ -163,17 +165,17 @@ def _by_rates(
         return undecided
     problem = stepper.modes.rates(mode, x, active)
     if problem is None:
-        return undecided if _choices(undecided) <= _TRIED else _too_many(active)
+        return undecided if _choices(undecided) <= _TRIED else _too_many(stepper, active)
     a, m, scales = problem
     if complementarity.is_unique(m):
         guess = np.array([{"+": 1.0, "-": -1.0, "o": -1.0}.get(mode[i], 0.0) for i in active])
         lam = complementarity.solve(a, m, guess, [i >= first for i in active])
     else:
         if len(active) <= _FEW or max(active) >= first:
-            return undecided if _choices(undecided) <= _TRIED else _too_many(active)
+            return undecided if _choices(undecided) <= _TRIED else _too_many(stepper, active)
         found = complementarity.all_solutions(a, m)
         if found is None or len(found) > 1:
-            return _too_many(active)
+            return _too_many(stepper, active)
         lam = found[0] if found else None
     if lam is None:
         return Decision(
@@ -191,7 +193,7 @@ def _by_rates(
         elif clear_rate[k]:
             undecided[i] = "o" if i >= first else ("+" if lam[k] > 0.0 else "-")
     if _choices(undecided) > _TRIED:
-        return _too_many(active)
+        return _too_many(stepper, active)
     return undecided
 
 
@@ -232,7 +234,7 @@ def _of_sets(
             for j in system.set_of[i] if i not in leaving else ():
                 undecided[j] = letter
     choices = {i: undecided[i] for i in active if i not in own or i in first}
-    return undecided if _choices(choices) <= _TRIED else _too_many(active)
+    return undecided if _choices(choices) <= _TRIED else _too_many(stepper, active)
 
 
 def _choices(letters: Mapping[int, str]) -> int:
@@ -240,8 +242,9 @@ def _choices(letters: Mapping[int, str]) -> int:
     return math.prod(len(possible) for possible in letters.values())
 
 
-def _too_many(active: Sequence[int]) -> Decision:
-    return Decision(None, Status.NON_UNIQUE, messages.possibly_several(active))
+def _too_many(stepper: Stepper, active: Sequence[int]) -> Decision:
+    entries = _entries(stepper, active)
+    return Decision(None, Status.NON_UNIQUE, messages.possibly_several(entries))
 
 
 def _spelled(

@@ -97,7 +97,15 @@ def test_a_flight_curves_with_the_axis(command, tmp_path):
             ["--first-only", "--side-spin", "1", "--axis-tilt", "10", "--launch-angle", "9"],
             "expected instead of --side-spin",
         ),
-        (["--first-only", "--side-slope", "95"], "side_slope: expected radians"),
+        (
+            ["--axis-tilt", "95", "--launch-angle", "28"],
+            "--axis-tilt: expected an angle from -90 to 90 deg, received 95 deg",
+        ),
+        (["--axis-tilt", "10", "--launch-angle", "2.2rad"], "from 0 to 90 deg, received 2.2 rad"),
+        (
+            ["--first-only", "--side-slope", "95"],
+            "--side-slope: expected an angle between -90 and 90 deg, received 95 deg",
+        ),
     ],
 )
 def test_usage_errors(command, argv, message):

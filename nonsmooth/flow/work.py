@@ -219,8 +219,8 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
         return 1  # nothing to divide
     while True:
         spent = _probe(job, starts, k)
-        if _PROBE < spent < _WORTH and 64 * k <= count:
-            spent = min(spent, _probe(job, starts, k))  # another process may have had the processor
+        if _PROBE < spent < _SECONDS and 64 * k <= count:
+            spent = min(spent, _probe(job, starts, k))  # what is done once was done now
         if spent > _PROBE or 64 * k > count or (k >= _LEAST and 8 * spent > _PROBE):
             break
         k *= 8
@@ -234,9 +234,16 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
 def _probe(job: Job, starts: Starts, k: int) -> float:
     """Seconds that k of the trajectories take."""
     x, p = starts.rows(np.linspace(0, starts.count - 1, k).astype(np.int64))
-    began = time.perf_counter()
+    began = _clock()
     run_chunk(job, x, p)
-    return time.perf_counter() - began
+    return _clock() - began
+
+
+def _clock() -> float:
+    """Time that this thread has had a processor, however busy the machine is; all time where only ticks
+    of milliseconds are counted."""
+    fine = time.get_clock_info("thread_time").resolution < 1e-4
+    return time.thread_time() if fine else time.perf_counter()
 
 
 #: The number of a chunk, its starts and parameters, the arrays for its results.

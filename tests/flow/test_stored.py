@@ -3,6 +3,7 @@
 import json
 import os
 import signal
+import time
 
 import casadi as ca
 import numpy as np
@@ -191,7 +192,7 @@ def test_the_size_follows_the_time_of_a_trajectory(each, count, workers, least, 
         clock[0] += each * len(x)
 
     monkeypatch.setattr(work_module, "run_chunk", run)
-    monkeypatch.setattr(work_module.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(work_module, "_clock", lambda: clock[0])
 
     class Many:
         rows = staticmethod(lambda index: (index, None))
@@ -228,16 +229,28 @@ def test_a_worker_that_is_lost_costs_its_chunk(whole, tmp_path):
     assert_same(found, whole)
 
 
-def test_an_interrupted_probe_does_not_make_small_chunks(monkeypatch):
-    """Another process has the processor while the first trajectory is timed; it takes 1e-6 s."""
+def test_time_of_other_processes_is_not_counted(monkeypatch):
+    """A processor that others have for most of the time does not make small chunks."""
+    monkeypatch.setattr(work_module, "run_chunk", lambda job, x, p: time.sleep(0.05))
+
+    class Many:
+        count = 200_000
+        rows = staticmethod(lambda index: (index, None))
+
+    assert size_of_chunk(None, Many, 1) >= 50_000
+
+
+@pytest.mark.parametrize("once", [0.01, 0.05])
+def test_what_is_done_once_does_not_make_small_chunks(once, monkeypatch):
+    """The first trajectory prepares what all use; each takes 1e-6 s."""
     clock, calls = [0.0], []
 
     def run(job, x, p):
         calls.append(len(x))
-        clock[0] += 1e-6 * len(x) + (0.01 if len(calls) == 1 else 0.0)
+        clock[0] += 1e-6 * len(x) + (once if len(calls) == 1 else 0.0)
 
     monkeypatch.setattr(work_module, "run_chunk", run)
-    monkeypatch.setattr(work_module.time, "perf_counter", lambda: clock[0])
+    monkeypatch.setattr(work_module, "_clock", lambda: clock[0])
 
     class Many:
         count = 200_000

@@ -12,6 +12,7 @@ import ctypes
 import hashlib
 import os
 import shlex
+import shutil
 import signal
 import subprocess
 import sys
@@ -32,7 +33,7 @@ from .compilers import (
     processor,
     version,
 )
-from .store import cache_directory, is_intact, sealed, usable_folder
+from .store import cache_directory, is_intact, remove_leftovers, sealed, usable_folder
 
 __all__ = [
     "Compilation",
@@ -47,6 +48,9 @@ __all__ = [
 
 #: Seconds after which a compilation says that it is under way, and after which it is ended.
 _QUIET, _LONGEST = 1.0, 600.0
+
+#: How folders in which a compiler works begin.
+_WORK = "build-"
 
 #: Compilers that were ended so; each is waited for once in a process.
 _HANGING: set[Command] = set()
@@ -206,8 +210,11 @@ def compile_library(
 def _compile(
     source: str, command: Command, flags: Sequence[str], library: Path, run: Compilation
 ) -> None:
-    with tempfile.TemporaryDirectory(dir=library.parent, prefix="build-") as work:
-        text, output = Path(work) / "engine.c", Path(work) / "engine.so"
+    remove_leftovers(library.parent, [_WORK, files.PART], 6 * _LONGEST)
+    # No TemporaryDirectory: it would go before the compiler does where a program ends meanwhile.
+    work = Path(tempfile.mkdtemp(dir=library.parent, prefix=_WORK))
+    try:
+        text, output = work / "engine.c", work / "engine.so"
         key = f'const char nonsmooth_key[] = "{library.stem}";\n'
         text.write_text(f"{source}\n{key}", encoding="utf-8")
         call = [*command, *FLAGS, *flags, str(text), "-o", str(output), "-lm"]
@@ -227,6 +234,8 @@ def _compile(
                 f"compiler: {shlex.join(command)} failed ({failure.splitlines()[0][:200]}).",
             )
         files.replace(library, sealed(library.name, output.read_bytes()))
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
 
 
 def _errors(process: subprocess.Popen[str], name: str) -> str:

@@ -15,6 +15,8 @@ import shutil
 import stat
 import sys
 import tempfile
+import time
+from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
 
@@ -165,6 +167,25 @@ def _own_folder() -> Path:
 def _remove(folder: Path, process: int) -> None:
     if os.getpid() == process:  # not in a child that was forked
         shutil.rmtree(folder, ignore_errors=True)
+
+
+def remove_leftovers(folder: Path, prefixes: Sequence[str], age: float) -> None:
+    """Remove what processes that were killed left in a folder.
+
+    Parameters
+    ----------
+    folder : Path
+    prefixes : sequence of str
+        How its names begin.
+    age : float
+        Seconds for which nothing was put into it.
+    """
+    for found in [path for prefix in prefixes for path in folder.glob(f"{prefix}*")]:
+        try:
+            if time.time() - os.lstat(found).st_mtime > age:
+                shutil.rmtree(found) if found.is_dir() else found.unlink()
+        except OSError:
+            pass  # another process was faster
 
 
 def sealed(name: str, data: bytes) -> bytes:

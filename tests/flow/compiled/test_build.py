@@ -5,6 +5,7 @@ import multiprocessing
 import os
 import subprocess
 import sys
+import weakref
 
 import pytest
 
@@ -30,6 +31,38 @@ def test_compiled_once(cache, monkeypatch):
     assert [e.suffix for e in entries] == [".so"]
     monkeypatch.setattr(subprocess, "Popen", lambda *a, **k: pytest.fail("compiled again"))
     assert build(SOURCE).answer() == 42
+
+
+def test_what_killed_processes_left_is_removed(cache):
+    cache.mkdir(mode=0o700)
+    for name in ("build-old", "build-new"):
+        (cache / name).mkdir()
+        (cache / name / "engine.c").write_text(SOURCE)
+    for name in (".part-old", ".part-new", "other"):
+        (cache / name).write_text("")
+    for name in ("build-old", ".part-old", "other"):
+        os.utime(cache / name, (0.0, 0.0))
+    (cache / "build-link").symlink_to(cache / "build-new")
+    os.utime(cache / "build-link", (0.0, 0.0), follow_symlinks=False)
+    assert build(SOURCE).answer() == 42
+    left = {path.name for path in cache.iterdir() if path.suffix != ".so"}
+    assert left - {"build-link"} == {"build-new", ".part-new", "other"}
+    assert (cache / "build-new" / "engine.c").exists()
+
+
+def test_a_folder_of_work_stays_until_the_compiler_ends(cache, monkeypatch):
+    """Also where the program ends: what tempfile removes then is not it."""
+    before, during = set(weakref.finalize._registry), []
+
+    def call(self, command):
+        during.append(set(weakref.finalize._registry))
+        return "failed"
+
+    monkeypatch.setattr(build_module.Compilation, "call", call)
+    with pytest.raises(CompilerError):
+        build(SOURCE)
+    assert during and all(found <= before for found in during)
+    assert not list(cache.glob("build-*"))
 
 
 def test_key_depends_on_source_flags_compiler_and_processor(monkeypatch):

@@ -109,27 +109,49 @@ class _Expansion:
 def first_fall(c: Series, h: Any, drop: int) -> Any | None:
     """First zero in (0, h] where a series goes from positive to negative; None without one.
 
-    All roots are found in double precision, the real ones polished in high precision and kept where
-    the sign changes; ``drop`` leading coefficients are zero by construction and left out.
+    Between its extrema the series is monotone, so that its signs there tell of every zero, also of two
+    that are closer than double precision tells apart. ``drop`` leading coefficients are zero by
+    construction and left out.
     """
-    scaled = [float(v * h**k) for k, v in enumerate(c)][drop:]
+    high = c[drop:]
+    slope = [k * v for k, v in enumerate(high)][1:]
+    places = [mp.mpf(0), *sorted(_extrema(slope, h)), h]
+    values = [mp.polyval(high, place, asc=True) for place in places]
+    for k in range(len(places) - 1):
+        if values[k] > 0 >= values[k + 1]:
+            return _zero(high, places[k], places[k + 1])
+    return None
+
+
+def _extrema(slope: Series, h: Any) -> list[Any]:
+    """Zeros of a series in (0, h): found in double precision, polished in high precision."""
+    scaled = [float(v * h**k) for k, v in enumerate(slope)]
     size = max(map(abs, scaled))
     while len(scaled) > 1 and abs(scaled[-1]) < 1e-26 * size:
         scaled.pop()
     roots = np.roots(scaled[::-1])
     near = (abs(roots.imag) < 1e-6) & (roots.real > -1e-6) & (roots.real < 1 + 1e-6)
-    high = c[drop:]
-    for guess in np.sort(roots[near].real):
+    found = []
+    for guess in roots[near].real:
         root = mp.mpf(float(guess)) * h
         for _ in range(60):
-            value, slope = mp.polyval(high, root, derivative=1, asc=True)
-            change = value / slope
+            value, rate = mp.polyval(slope, root, derivative=1, asc=True)
+            change = value / rate
             root -= change
-            if abs(change) < mp.mpf(10) ** -30:
+            if abs(change) < 1000 * mp.eps:
+                found.append(root)
                 break
-        if 0 < root <= h and mp.polyval(high, root, derivative=1, asc=True)[1] < 0:
-            return root
-    return None
+    return [root for root in found if 0 < root < h]
+
+
+def _zero(c: Series, low: Any, high: Any) -> Any:
+    """Zero of a series that falls from a positive value at ``low`` to none at ``high``."""
+    while high - low > mp.eps * (1 + high):
+        middle = (low + high) / 2
+        if not low < middle < high:
+            break
+        low, high = (middle, high) if mp.polyval(c, middle, asc=True) > 0 else (low, middle)
+    return high
 
 
 def _lift_off(name: str, x: Series) -> tuple[Any, Series, int]:

@@ -83,6 +83,18 @@ def test_stick_slip_is_the_same_for_peers():
     assert end.itinerary[0] == problems.code(run.itinerary)
 
 
+@pytest.mark.parametrize("depth", [1e-28, 1e-22, 1e-17, 1e-12])
+def test_first_fall_of_two_zeros_that_are_closer_than_double_precision_tells(depth):
+    """(t - 1/2)^2 - depth has them, with the sign turned it has none that falls before; plus depth, none."""
+    square = [mp.mpf("0.25"), mp.mpf(-1), mp.mpf(1), *[mp.mpf(0)] * 28]
+    with mp.workdps(34):
+        apart = mp.sqrt(mp.mpf(depth))
+        below, above = ([square[0] + sign * mp.mpf(depth), *square[1:]] for sign in (-1, 1))
+        fall = reference.first_fall(below, mp.mpf(1), 0)
+        assert abs(fall - (mp.mpf("0.5") - apart)) < 1e-3 * apart
+        assert reference.first_fall(above, mp.mpf(1), 0) is None
+
+
 def test_first_fall_skips_rises_and_what_is_dropped():
     # t (t - 0.25) (0.5 - t) (t - 0.75): falls at 0.5 only, after t is dropped
     c = [mp.mpf(v) for v in np.polynomial.polynomial.polyfromroots([0, 0.25, 0.5, 0.75])]

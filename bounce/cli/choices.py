@@ -31,7 +31,7 @@ from ..contact.models import (
 from ..golf import AIRS
 from ..laws import TURFS, BounceLaw, CrossBounce, PennerBounce, RigidBounce, TiltedBounce
 from ..units import BALLS, Ball, Scaling
-from .values import SYSTEMS, assignment, in_si, number
+from .values import SYSTEMS, angle_within, assignment, in_si, number
 
 CONTACT_MODELS: dict[str, type[ContactModel]] = {
     c.__name__: c
@@ -140,9 +140,8 @@ def chosen_model(args: argparse.Namespace) -> Chosen:
     if args.stiffness is not None:
         scaling = Scaling.from_stiffness(ball, args.stiffness)
         values.setdefault("G", scaling.gravity)
-    slope = getattr(args, "slope", None)
-    if slope is not None:
-        values.setdefault("slope", slope.si(args.units))
+    if getattr(args, "slope", None) is not None:
+        values.setdefault("slope", _slope(args))
     friction = FRICTION[args.friction]
     own = {n: values.pop(n) for n in list(values) if n in friction.declared()}
     return Chosen(CONTACT_MODELS[args.model](friction=friction(**own), **values), ball, scaling)
@@ -151,7 +150,11 @@ def chosen_model(args: argparse.Namespace) -> Chosen:
 def surroundings(args: argparse.Namespace) -> dict[str, Any]:
     """The air and the slope of the ground, as the verbs of ``bounce.golf`` take them."""
     air = None if args.air == "none" else AIRS[args.air]
-    return dict(air=air, slope=args.slope.si(args.units))
+    return dict(air=air, slope=_slope(args))
+
+
+def _slope(args: argparse.Namespace) -> float:
+    return angle_within("--slope", args.slope, args.units, -90, 90, closed=False)
 
 
 def require_scale(args: argparse.Namespace, chosen: Chosen) -> None:

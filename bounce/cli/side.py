@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import math
 from typing import Any
 
 import nonsmooth as ns
@@ -22,7 +21,7 @@ from ..golf import (
 from ..units import Landing
 from .choices import Chosen, surroundings
 from .report import Units, in_course, in_words, polar
-from .values import quantity
+from .values import angle_within, quantity
 
 _NAMES = ("side_spin", "axis_tilt", "launch_angle", "side_slope")
 
@@ -76,16 +75,8 @@ def asked_for_side(args: argparse.Namespace) -> bool:
             "the plane normal to the launch."
         )
     for name, (least, most, closed) in _ANGLES.items():
-        typed = getattr(args, name, None)
-        if typed is None:
-            continue
-        angle = math.degrees(typed.si(args.units))
-        if not (least <= angle <= most if closed else least < angle < most):
-            within = f"from {least} to {most}" if closed else f"between {least} and {most}"
-            raise ns.OptionError(
-                f"--{name.replace('_', '-')}: expected an angle {within} deg, received "
-                f"{typed.said(args.units)}."
-            )
+        if (typed := getattr(args, name, None)) is not None:
+            angle_within("--" + name.replace("_", "-"), typed, args.units, least, most, closed)
     return True
 
 

@@ -51,6 +51,24 @@ class Quantity(NamedTuple):
         return f"{self.value:g} {self.named(system)}"
 
 
+def angle_within(
+    option: str, typed: Quantity, system: str, least: float, most: float, closed: bool = True
+) -> float:
+    """Return an angle in radians; the ends of its range, in degrees, are in it if that is ``closed``.
+
+    Raises
+    ------
+    nonsmooth.OptionError
+    """
+    angle = math.degrees(typed.si(system))
+    if not (least <= angle <= most if closed else least < angle < most):
+        within = f"from {least} to {most}" if closed else f"between {least} and {most}"
+        raise ns.OptionError(
+            f"{option}: expected an angle {within} deg, received {typed.said(system)}."
+        )
+    return typed.si(system)
+
+
 class Span(NamedTuple):
     """NAME=LOW:HIGH:COUNT as it was typed."""
 

@@ -99,6 +99,11 @@ OVER = ["--over", "xdot=-2:2:5", "--over", "omega=-4:4:5", "--output"]
         ),
         ([*SHOT, "--turf", "natural-rigid", "--slope", "-10"], 1, "rolling ball stops"),
         (
+            [*SHOT, "--slope", "95"],
+            2,
+            "--slope: expected an angle between -90 and 90 deg, received 95 deg",
+        ),
+        (
             ["map", "--turf", "natural", *OVER, "m.png"],
             2,
             "expected names among ['speed', 'angle', 'spin']",

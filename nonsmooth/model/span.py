@@ -57,10 +57,8 @@ def in_span(
     for function, target in zip(functions, table[len(rows) :], strict=True):
         unseen = not target.any() and not ca.is_linear(function, variables)
         if unseen or not np.isfinite(target).all():
-            result.append(
-                False
-            )  # coefficients below the least number, or none for these ``others``
-            continue
+            result.append(False)
+            continue  # coefficients below the least number, or none for these ``others``
         weights = np.linalg.lstsq(basis, target, rcond=None)[0] if basis.size else np.zeros(0)
         left = target - basis @ weights if basis.size else target
         result.append(bool(np.abs(left).max(initial=0.0) <= _LEFT * np.abs(target).max(initial=0)))

@@ -8,6 +8,7 @@ seal over its rows.
 
 from __future__ import annotations
 
+import errno
 import json
 import math
 import os
@@ -23,6 +24,9 @@ from ..model import OptionError, explain
 from . import files
 from .checkpoint import Checkpoint, chunk_arrays
 from .results import Chunk
+
+#: What file systems say that cannot reserve room.
+_CANNOT_RESERVE = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)
 
 
 class Stored(Checkpoint):
@@ -118,7 +122,27 @@ class Stored(Checkpoint):
 
 
 def _make(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
-    """A file of zeros that takes room on the disk as it is written, there whole or not at all."""
+    """A file of zeros, there whole or not at all."""
     part = path.with_name(f"{files.PART}{path.name}")
-    np.lib.format.open_memmap(part, mode="w+", dtype=dtype, shape=shape)
-    os.replace(part, path)
+    try:
+        np.lib.format.open_memmap(part, mode="w+", dtype=dtype, shape=shape)
+        _reserve(part)
+        os.replace(part, path)
+    except OSError:
+        part.unlink(missing_ok=True)
+        raise
+
+
+def _reserve(path: Path) -> None:
+    """Take the room of a file on the disk, where that can be done.
+
+    A disk that is full when a row is written to a mapped array would end the process with a signal.
+    """
+    if not hasattr(os, "posix_fallocate"):
+        return
+    with path.open("r+b") as file:
+        try:
+            os.posix_fallocate(file.fileno(), 0, os.fstat(file.fileno()).st_size)
+        except OSError as error:
+            if error.errno not in _CANNOT_RESERVE:
+                raise

@@ -1,8 +1,12 @@
 """Results in a folder are those in memory, to the bit, also after an interruption, a loss or damage."""
 
+import errno
 import json
 import os
+import shutil
 import signal
+import subprocess
+import sys
 import time
 
 import casadi as ca
@@ -149,6 +153,72 @@ def test_a_file_that_is_no_such_array_is_refused(wrong, tmp_path):
         sweep(tmp_path / "sweep")
     if wrong == "link":
         assert not np.load(tmp_path / "elsewhere.npy").any()
+
+
+needs_reserving = pytest.mark.skipif(
+    not hasattr(os, "posix_fallocate"), reason="no room can be reserved on this system"
+)
+
+
+@needs_reserving
+def test_the_room_of_all_rows_is_taken_before_the_first_is_computed(tmp_path, monkeypatch):
+    """Where a disk fills up under a mapped array, the system ends the process without a word."""
+
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(work_module, "run_chunk", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        sweep(tmp_path / "sweep", starts=ns.RandomStarts(10**5, low=[0, 0], high=[1, 1]))
+    facts = [path.stat() for path in (tmp_path / "sweep").glob("*.npy")]
+    assert len(facts) == 10 and sum(f.st_size for f in facts) > 10**7
+    assert all(512 * f.st_blocks >= f.st_size for f in facts)
+
+
+@needs_reserving
+@pytest.mark.parametrize("code", [errno.ENOSPC, errno.EDQUOT])
+def test_a_disk_without_room_is_told_at_once(code, whole, tmp_path, monkeypatch, counted):
+    def full(*args):
+        raise OSError(code, os.strerror(code))
+
+    with monkeypatch.context() as patched:
+        patched.setattr(os, "posix_fallocate", full)
+        with pytest.raises(ns.OptionError, match=rf"{os.strerror(code)}[^$]*Make room"):
+            sweep(tmp_path / "sweep")
+    assert counted == [] and [f.name for f in (tmp_path / "sweep").iterdir()] == ["problem.json"]
+    assert_same(sweep(tmp_path / "sweep"), whole)
+
+
+@needs_reserving
+def test_a_folder_where_none_can_be_reserved_is_used_all_the_same(whole, tmp_path, monkeypatch):
+    def refused(*args):
+        raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
+
+    monkeypatch.setattr(os, "posix_fallocate", refused)
+    assert_same(sweep(tmp_path / "sweep"), whole)
+
+
+@pytest.mark.slow
+@needs_reserving
+def test_a_disk_that_is_too_small_ends_no_process(tmp_path):
+    """On a real one of two megabytes, which a user may mount in a name space of his own."""
+    mounts = ["unshare", "-rm", "sh", "-c", 'mount -t tmpfs -o size=2m tmpfs "$0" && exec "$@"']
+    if not shutil.which("unshare") or subprocess.run([*mounts, tmp_path, "true"]).returncode:
+        pytest.skip("no file system can be mounted here")
+    program = (
+        "import sys, casadi as ca, nonsmooth as ns\n"
+        "x = ca.SX.sym('x')\n"
+        "system = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])\n"
+        "starts = ns.RandomStarts(10**6, low=[-1], high=[1])\n"
+        "try:\n"
+        "    ns.ensemble(system, starts, 2.0, work=ns.Work(store=sys.argv[1], progress=False))\n"
+        "except ns.OptionError as error:\n"
+        "    print(error)\n"
+    )
+    run = [*mounts, tmp_path, sys.executable, "-c", program, tmp_path / "sweep"]
+    found = subprocess.run(run, capture_output=True, text=True, check=False)
+    assert found.returncode == 0, found
+    assert os.strerror(errno.ENOSPC) in found.stdout and "Make room" in found.stdout
 
 
 def test_another_problem_and_a_checkpoint_are_refused(tmp_path):

@@ -1,4 +1,4 @@
-"""NVRTC by ctypes, from the wheel nvidia-cuda-nvrtc: CUDA C++ to machine code, without a card or a driver."""
+"""NVRTC by ctypes, from the wheel nvidia-cuda-nvrtc: CUDA C++ to PTX and to machine code, without a card or a driver."""
 
 import ctypes
 import importlib.util
@@ -36,12 +36,11 @@ OPTIONS = (
     "--std=c++17",
     "--device-as-default-execution-space",
     "--disable-warnings",
-    "--ptxas-options=-v",
 )
 
 
-def compiled(source, arch, kernel, *options):
-    """Compile for an architecture such as ``sm_90``; AssertionError with the log where that fails."""
+def _run(source, arch, options, size_of, get):
+    """Compile for an architecture, and return what ``get`` has of it, and the log; AssertionError with that if it fails."""
     nvrtc, program, size = ctypes.CDLL(str(library())), ctypes.c_void_p(), ctypes.c_size_t()
     name = ctypes.c_char_p(b"engine.cu")
     assert (
@@ -53,18 +52,27 @@ def compiled(source, arch, kernel, *options):
     log = ctypes.create_string_buffer(size.value)
     nvrtc.nvrtcGetProgramLog(program, log)
     assert code == 0, log.value.decode()
-    nvrtc.nvrtcGetCUBINSize(program, ctypes.byref(size))
+    getattr(nvrtc, size_of)(program, ctypes.byref(size))
     image = ctypes.create_string_buffer(size.value)
-    nvrtc.nvrtcGetCUBIN(program, image)
+    getattr(nvrtc, get)(program, image)
     nvrtc.nvrtcDestroyProgram(ctypes.byref(program))
-    said = (
-        log.value.decode()
-        .split(f"Compiling entry function '{kernel}'")[1]
-        .split("Compiling entry")[0]
+    return image.raw, log.value.decode()
+
+
+def ptx(source, arch, *options):
+    """Compile for a virtual architecture such as ``compute_90``, to text."""
+    return _run(source, arch, options, "nvrtcGetPTXSize", "nvrtcGetPTX")[0].rstrip(b"\0").decode()
+
+
+def compiled(source, arch, kernel, *options):
+    """Compile for an architecture such as ``sm_90``; AssertionError with the log where that fails."""
+    image, log = _run(
+        source, arch, ("--ptxas-options=-v", *options), "nvrtcGetCUBINSize", "nvrtcGetCUBIN"
     )
+    said = log.split(f"Compiling entry function '{kernel}'")[1].split("Compiling entry")[0]
     own = re.search(
         r"(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads", said
     )
     registers = re.search(r"Used (\d+) registers", said)
     assert own and registers, said
-    return Compiled(image.raw, int(registers[1]), *map(int, own.groups()))
+    return Compiled(image, int(registers[1]), *map(int, own.groups()))

@@ -21,6 +21,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
+from .dormant import awake
 from .economy import economise
 from .evaluators import Evaluator
 from .factors import with_factors
@@ -65,10 +66,10 @@ class Coupled:
         self.continuous = tuple(self._is_continuous(i) for i in range(self._surfaces))
         extra = [n for n, scaled in zip(unknowns, self.scaled, strict=True) if scaled]
         self.moving = ca.vertcat(x, lam, d.reactions, *extra)
+        self._symbols = [self.moving, system.parameter_symbols]
         self._stable: dict[tuple[int, ...], list[ca.SX]] = {}
         self._series: dict[tuple[int, ...], tuple[Expansion, list[int]]] = {}
-        kept = ca.vertcat(d.surfaces, d.gap_rates)
-        self.layer = ca.densify(ca.jtimes(kept, x, field))
+        self.layer = ca.densify(ca.jtimes(ca.vertcat(d.surfaces, d.gap_rates), x, field))
         stops = ca.vertcat(d.guards, *watched)
         stops = ca.densify(stops) if stops.numel() else ca.SX(0, 1)
         heights = ca.densify(ca.vertcat(d.surfaces, d.gaps))
@@ -78,13 +79,11 @@ class Coupled:
         self.slope = ca.jacobian(self.layer, every)
         #: Whether the unknown multipliers of a mode enter linearly together.
         self.affine = bool(ca.is_linear(field, every))
-        guards, smooth = ca.vertcat(heights, stops), not system.sets
-        time = d.time
-        self.linearity = linearity(field, self.layer, guards, factor, x, every, smooth, time)
+        guards, rest = ca.vertcat(heights, stops), (x, every, not system.sets, d.time)
+        self.linearity = linearity(field, self.layer, guards, factor, *rest)
         #: Of layer, of surfaces and gaps, of stops and resets, and of factors, by the states.
         self.gradients = [ca.jacobian(e, x) for e in (self.layer, heights, stops, factor)]
         self.columns_of_field = ca.jacobian(field, every)
-        self._column_function: Evaluator | None = None
 
     def _is_continuous(self, surface: int) -> bool:
         """Whether the multiplier makes no difference on its surface: it is 0 there."""
@@ -93,10 +92,8 @@ class Coupled:
         d, x = self.system.definition, self.system.extended_states
         column = ca.jacobian(d.field, d.multipliers[surface])
         pieces = [e for e in ca.vertsplit(ca.densify(column)) if not e.is_zero()]
-        if not all(ca.depends_on(piece, x) for piece in pieces):
-            return False
-        others = ca.vertcat(d.parameters, d.multipliers, d.reactions)
-        return vanish_on(pieces, self.system.surface_function(surface), x, others)
+        h, others = d.surfaces[surface], ca.vertcat(d.parameters, d.multipliers, d.reactions)
+        return all(ca.depends_on(e, x) for e in pieces) and vanish_on(pieces, h, x, others)
 
     # shape -------------------------------------------------------------------------------------
 
@@ -256,14 +253,23 @@ class Coupled:
                     held[k] = own
         return [ca.substitute(e, rest, held) for e in expressions]
 
+    def awake(self, expressions: Sequence[ca.SX]) -> list[ca.SX]:
+        """Dense expressions in ``moving``, for numbers: terms that a mode leaves out are not looked at."""
+        n, m, places = self.system.extended_dimension, self._surfaces, self.moving.numel()
+        held: dict[int, tuple[float, ...]] = dict.fromkeys(range(n + m, places), (0.0,))
+        for i in range(m):
+            signs = () if i in self.system.set_of else (1.0, -1.0)
+            held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
+        return awake(self._symbols, [ca.densify(e) for e in expressions], held)
+
     # numbers -----------------------------------------------------------------------------------
 
     @cached_property
     def _yardsticks(self) -> Evaluator:
-        p = self.system.parameter_symbols
-        point = [self.layer, self.slope, self.factors, *self.gradients]
-        outputs = [ca.densify(e) for e in point]
-        return Evaluator(ca.Function("point", [self.moving, p], outputs, {"cse": True}))
+        return self._evaluator([self.layer, self.slope, self.factors, *self.gradients])
+
+    def _evaluator(self, outputs: Sequence[ca.SX]) -> Evaluator:
+        return Evaluator(ca.Function("at", self._symbols, self.awake(outputs), {"cse": True}))
 
     def yardsticks(self, x: Array, multipliers: Array, unknowns: Array, p: Array) -> Yardsticks:
         """Evaluate at an extended state, with lambda where nothing slides (else 0) and nu (else 0)."""
@@ -275,14 +281,11 @@ class Coupled:
 
     def columns(self, x: Array, multipliers: Array, p: Array) -> Array:
         """Derivatives of the field by the unknowns (N, m), with the multipliers held."""
-        if self._column_function is None:
-            inputs = [self.moving, self.system.parameter_symbols]
-            function = ca.Function(
-                "columns", inputs, [ca.densify(self.columns_of_field)], {"cse": True}
-            )
-            self._column_function = Evaluator(function)
-        none = np.zeros(self.count)
-        return self._column_function.copied(self._inputs(x, multipliers, none), p)[0]
+        return self._columns.copied(self._inputs(x, multipliers, np.zeros(self.count)), p)[0]
+
+    @cached_property
+    def _columns(self) -> Evaluator:
+        return self._evaluator([self.columns_of_field])
 
     def _inputs(self, x: Array, multipliers: Array, unknowns: Array) -> Array:
         scaled = self._scaled
@@ -298,19 +301,16 @@ class Coupled:
 
     @cached_property
     def _values(self) -> Evaluator:
-        p = self.system.parameter_symbols
-        outputs = [ca.densify(e) for e in self.outputs]
-        return Evaluator(ca.Function("values", [self.moving, p], outputs, {"cse": True}))
+        return self._evaluator(self.outputs)
 
     def _expansion(self, mode: str) -> tuple[Expansion, list[int]]:
         """Return the expansion for a mode, and the rules that the unknowns enter."""
         stability = self._stability(self.sliding(mode))
         key = tuple(self.sliding(mode)) if stability else ()
         if key not in self._series:
-            inputs = [self.moving, self.system.parameter_symbols]
             outputs = [*self.outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
-            outputs = [ca.densify(o) for o in outputs]
-            nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
+            outputs = economise(self._symbols, self.awake(outputs), [True, False])
+            nodes, rows = instructions(self._symbols, outputs)
             rules, place = lower(nodes, depends_on(nodes, [True, False]))
             rows = [[place[j] for j in row] for row in rows]
             late = touched(rules, self.system.extended_dimension)

@@ -360,3 +360,6 @@ class Expansion:
             return self._scaled(self._quotient_of(top, radius[0]), 1.0 / k)
 
         return angle
+
+    def _chosen(self, _: Rule, __: list[Any], c: list[Any], u: list[Any]) -> Callable[[int], Any]:
+        return lambda k: None if all(v is None for v in c[: k + 1]) else u[k]

@@ -34,6 +34,7 @@ RULES = (
     "integral",
     "quotient",
     "atan2",
+    "chosen",
 )
 
 
@@ -46,7 +47,8 @@ class Rule:
     rule : str
         One of ``RULES``. ``apply`` is an operation on what does not move; ``integral`` is
         w' = sign g u', ``quotient`` w' = sign u'/g, both with w = operation(u) at order zero;
-        ``affine`` is offset + factor u; ``power`` has a constant exponent.
+        ``affine`` is offset + factor u; ``power`` has a constant exponent; ``chosen`` is its second argument,
+    or zero where the first, which that has as a factor, has been zero up to the same order.
     args : tuple of int
         Numbers of rules.
     operation : str
@@ -210,6 +212,7 @@ _EXPANSIONS: dict[str, Callable[..., int]] = {
     "assign": lambda s, u: u,
     **{op: _plain(op) for op in ("add", "sub", "neg", "twice", "mul", "sq", "div", "sqrt")},
     "inv": _L._inv,
+    "if_else_zero": _plain("chosen"),
     "hypot": _L._hypot,
     "exp": _L._exp,
     "expm1": _L._expm1,

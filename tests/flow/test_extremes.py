@@ -23,6 +23,10 @@ def two(surface, above, below, states=(x, y), **more):
     return ns.FilippovSystem([*states], surface=surface, above=above, below=below, **more)
 
 
+def lifted(states, rhs):
+    return ns.FilippovSystem.from_expression(states, rhs)
+
+
 def falling(e, g=G):
     return smooth([y, v], [v, -g], impacts=ns.Impact(y, restitution=e))
 
@@ -135,6 +139,14 @@ CASES = {
             [x, y], [1, 0], resets=[ns.Reset(x - 1, [0, y + 1]), ns.Reset(x - 1, [0, y + 10])]
         ),
         [0.0, 0.0], 3.5, [0.5, 3.0], None, {}),
+    "a logarithm of the other side": (
+        lambda: two(y - 0.1, [1, 1], [ca.log(1 - x), 1]), [0.5, 0.2], 3.0, [3.5, 3.2], "+", {}),
+    "a root of the other side, beside friction": (
+        lambda: lifted([x, y], [ca.sign(x) * ca.sqrt(0.01 + ca.fabs(x)), -ca.sign(y)]),
+        [0.005, 1.0], 3.0, [(sqrt(0.015) + 1.5) ** 2 - 0.01, 0.0], "++ +s", {}),
+    "an exponential of the other side that overflows": (
+        lambda: lifted([x, y], [-ca.if_else(x < 0.7, 1e-9 * ca.exp(x / 0.025), x), -ca.sign(y)]),
+        [50.0, 1.0], 3.0, [50 * exp(-3.0), 0.0], None, {}),
     "nothing moves": (lambda: smooth([x], [0.0]), [1.0], 1e9, [1.0], None, {}),
     "sixty states": (
         lambda: smooth(ca.vertsplit(ca.SX.sym("s", 60)), [1.0] * 60), [0.0] * 60, 1.0, [1.0] * 60,

@@ -148,8 +148,10 @@ class CoupledModes:
         return np.array(rows + [worst] * (count - len(rows)))
 
     def gradient(self, mode: str, x: Array) -> Array:
-        """Not asked for: multipliers are series."""
-        raise NotImplementedError
+        """Magnitudes of the derivatives of the guards of a mode in which nothing slides."""
+        none = np.zeros(self.coupled.count)
+        marks = self.coupled.yardsticks(x, self.coupled.held(mode), none, self._p)
+        return np.concatenate([marks.surface_gradient, marks.stop_gradient])
 
     def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
         """Field (N,), guards (m,) at the polynomials' state at time s; multipliers' errors."""

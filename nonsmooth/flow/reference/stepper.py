@@ -325,10 +325,12 @@ class Stepper:
                 return c, 0.0
         allowed = e.allowed / SAFETY
         kept = replace(e, states=c, finite=True)
-        h = min(h_max, 1e-3)
-        while h > 1e-15 and not e.unknowns.size:
+        several = e.unknowns.size and (self.system.sets or {*e.mode} & {*"sc"})
+        unknowns = e.unknowns[:, 0] if e.unknowns.size else e.unknowns
+        h = 0.0 if several else min(h_max, 1e-3)
+        while h > 1e-15:
             end = self.advance(kept, h)
-            there = self.expand(e.mode, end, e.unknowns)
+            there = self.expand(e.mode, end, unknowns)
             slope = there.states[:, 1]
             defect = np.abs(
                 slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * powers(h, c.shape[1] - 1))

@@ -215,3 +215,10 @@ class Writer:
         turn = f"({self.weigh(u, v, k, 1, k)}) - ({self.weigh(v, u, k, 1, k)})"
         top = f"{turn} - ({self.weigh(j, radius, k, 1, k - 1)})"
         return f"{self.over(top, self.name(radius, 0))} * (1.0 / {float(k)!r})"
+
+    def _gated(self, j: int, k: int, u: int, v: int) -> str:
+        return f"{self.name(u, 0)} != 0 ? {self.name(v, k)} : 0.0"
+
+    def _chosen(self, j: int, k: int, u: int, v: int) -> str:
+        known = " || ".join(f"{self.name(u, i)} != 0" for i in range(k + 1))
+        return f"{known} ? {self.name(v, k)} : 0.0"

@@ -25,9 +25,10 @@ Integers = NDArray[np.int32]
 
 #: Operations and rules by number, as in the C enumerations. Where one argument does not move, sums are
 #: ``shift``, differences ``lower`` and ``below`` it, products ``scale``, quotients ``over`` and ``under`` it;
-#: an ``integral`` over what is affine in the time, as in cos(omega t), is a ``turn``.
+#: an ``integral`` over what is affine in the time, as in cos(omega t), is a ``turn``, and what is ``chosen`` by a
+#: factor that does not move is ``gated``.
 OPERATIONS = ("const", "input", *UNARY, *BINARY)
-TAPE_RULES = (*RULES, "shift", "lower", "below", "scale", "over", "under", "turn")
+TAPE_RULES = (*RULES, "shift", "lower", "below", "scale", "over", "under", "turn", "gated")
 
 
 @dataclass(frozen=True)
@@ -144,11 +145,11 @@ def tape_of(coupled: Coupled) -> Tape:
     return Tape(
         series=series,
         free=free,
-        point=values_of([coupled.moving, p], point, (4, 5)),
+        point=values_of([coupled.moving, p], coupled.awake(point), (4, 5)),
         surfaces=values_of([x, p], [kept, surface_gradient[0]]),
         maps=values_of([x, p], [d.maps]),
         restitution=values_of([x, p], [d.restitutions]),
-        columns=values_of([coupled.moving, p], [column[0]]),
+        columns=values_of([coupled.moving, p], coupled.awake([column[0]])),
         slope=slope[1],
         layer_gradient=gradients[0][1],
         height_gradient=gradients[1][1],
@@ -202,7 +203,7 @@ def _series_of_modes(coupled: Coupled, slopes: ca.SX) -> tuple[Series, Series]:
     """Rules of all that a mode needs: in any, and in one where nothing slides. They are numbered alike."""
     n, m = coupled.system.extended_dimension, coupled.system.surface_count
     inputs = [coupled.moving, coupled.system.parameter_symbols]
-    rules, rows = _rules_of(inputs, [*coupled.outputs, slopes])
+    rules, rows = _rules_of(inputs, coupled.awake([*coupled.outputs, slopes]))
     of_sets = {n + i for i in coupled.system.set_of}
     held = {n + i for i in range(m) if coupled.scaled[i]} - of_sets
     time = n - 1 if coupled.system.time_dependent else None
@@ -318,6 +319,7 @@ _SPECIAL = {
     "sub": (("below", False), ("lower", False)),
     "mul": (("scale", True), ("scale", False)),
     "div": (("under", False), ("over", False)),
+    "chosen": (("gated", False),),
 }
 
 

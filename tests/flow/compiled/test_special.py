@@ -129,6 +129,21 @@ def test_10000_random_systems(n):
     many(tape_for(made, options), *draws_of_operations(700, n), options)
 
 
+def test_terms_that_a_mode_leaves_out():
+    """Beside what slides and what does not; functions of the other sides have no values on the way."""
+    x, z, w = (ca.SX.sym(s) for s in "xzw")
+    grows = ca.sign(x) * ca.sqrt(0.01 + ca.fabs(x))
+    empties = -ca.if_else(z > 0.25, ca.sqrt(z), 0.5)
+    made = ns.FilippovSystem.from_expression([x, z, w], [grows, empties, -ca.sign(w)])
+    options = Options(t_end=3.0)
+    engine, start = tape_for(made, options), np.array([[0.005, 1.0, 0.5], [-0.005, 0.8, -0.1]])
+    many(engine, start, np.zeros(0), options)
+    run = one(engine, start[0], np.zeros(0), options)
+    exact = [(np.sqrt(0.015) + 1.5) ** 2 - 0.01, 0.25 - 0.5 * 2.0, 0.0]
+    assert run.status == ns.Status.REACHED_END and run.t[-1] == 3.0
+    np.testing.assert_allclose(run.x[-1, :3], exact, atol=1e-9)
+
+
 def bouncing():
     """A ball with friction that lands, slides, sticks and rests."""
     x, y, v, w, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "w", "lam"))

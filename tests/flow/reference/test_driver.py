@@ -360,6 +360,23 @@ def test_super_twisting_control_ends_at_its_limit():
     assert run.t[-1] == pytest.approx(first.t + left, abs=1e-5)
 
 
+def test_a_root_on_one_of_several_surfaces_is_passed_as_on_one():
+    """Super-twisting control beside an independent body with friction, at the same times."""
+    w = ca.SX.sym("w")
+    k1, k2 = 1.5, 1.1
+    control = [v - k1 * ca.sqrt(ca.fabs(x)) * ca.sign(x), -k2 * ca.sign(x)]
+    alone = ns.simulate(ns.FilippovSystem.from_expression([x, v], control), [1.0, 0.5], 10.0)
+    beside = ns.FilippovSystem.from_expression([x, v, w], [*control, -0.3 * ca.sign(w)])
+    run = ns.simulate(beside, [1.0, 0.5, 5.0], 10.0)
+    assert run.status is ns.Status.ACCUMULATION
+    met, expected = events(run, "crossing"), events(alone, "crossing")
+    for one, other in zip(met[:6], expected[:6], strict=True):
+        assert one.t == pytest.approx(other.t, abs=1e-8)
+        assert one.x[:2] == pytest.approx(other.x, abs=1e-6)
+        assert one.x[2] == pytest.approx(5.0 - 0.3 * one.t)
+
+
+
 def test_limits_end_the_run_with_advice():
     run = ns.simulate(relay(), [30.0, 0.0], 1e3, max_events=3)
     assert run.status is ns.Status.TOO_MANY_EVENTS and "max_events" in run.message

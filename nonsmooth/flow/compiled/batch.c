@@ -30,11 +30,11 @@ static void store(Lanes *s, Work *w, int l, int status) {
   b->totals[1] += LANE_I(s->events, l);
   b->status[i] = (int8_t)status;
   if (status == HAND_OVER) { b->totals[2]++; b->itinerary[i] = 0; return; }
-  for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
+  UNROLL for (int k = 0; k < ND; k++) b->x[i * ND + k] = LANE(s->x[k], l);
   b->t[i] = LANE(s->t, l);
   b->itinerary[i] = itinerary(&w->words, s->base[l], LANE_I(s->code, l));
   int32_t *kinds = b->kinds + i * SIMPLE_KINDS;
-  for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
+  UNROLL for (int k = 0; k < LAST_KIND; k++) kinds[k] = (int32_t)LANE_I(s->kinds[k], l);
   kinds[LAST_KIND] = status == REACHED_END;
 }
 
@@ -42,7 +42,6 @@ static void store(Lanes *s, Work *w, int l, int status) {
  * cannot be read soon. */
 static int load(Lanes *s, Work *w, int l, I mine) {
   const Batch *b = w->b;
-  while (w->next < b->count && !finite_all(b->x0 + w->next * N, N)) refuse(b, w->next++);
   if (w->next >= b->count) return 0;
   int64_t i = w->next++;
   UNROLL for (int k = 0; k < N; k++) s->x[k] = SELECT(mine, BC(b->x0[i * N + k]), s->x[k]);
@@ -65,6 +64,14 @@ static I refill(Lanes *s, Work *w) {
     if (!load(s, w, (int)l, mine)) break;
     fresh |= mine;
   }
+  T wrong = BC(0);
+  UNROLL for (int k = 0; k < N; k++) wrong += s->x[k] - s->x[k];
+  I refused = fresh & (wrong != 0);
+  for EACH(l, refused) {
+    refuse(w->b, s->index[l]);
+    w->alive--;
+  }
+  fresh &= ~refused;
   s->t = SELECT(fresh, BC(w->b->t0), s->t);
   s->last_event = SELECT(fresh, s->t, s->last_event);
   s->shortest = SELECT(fresh, BC(1e-3), s->shortest);
@@ -75,7 +82,7 @@ static I refill(Lanes *s, Work *w) {
   s->events &= ~fresh;
   s->shrinking &= ~fresh;
   s->drop &= ~fresh;
-  for (int k = 0; k < LAST_KIND; k++) s->kinds[k] &= ~fresh;
+  UNROLL for (int k = 0; k < LAST_KIND; k++) s->kinds[k] &= ~fresh;
   return fresh;
 }
 

@@ -43,14 +43,19 @@ static void note_modes(Lanes *s, Work *w, I which) {
   if (any(s->code >= LONG_CODE)) shorten_codes(s, w);
 }
 
-/* The runs of these lanes end. */
-static void finish_lanes(Lanes *s, Work *w, I which, int status) {
-  which &= s->live;
-  s->live &= ~which;
+SELDOM void store_lanes(Lanes *s, Work *w, I which, int status) {
   for EACH(l, which) store(s, w, l, status);
 }
 
-static void hand_over(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
+/* The runs of these lanes end. */
+INLINE void finish_lanes(Lanes *s, Work *w, I which, int status) {
+  which &= s->live;
+  if (!any(which)) return;
+  s->live &= ~which;
+  store_lanes(s, w, which, status);
+}
+
+INLINE void hand_over(Lanes *s, Work *w, I which) { finish_lanes(s, w, which, HAND_OVER); }
 
 /* The surface -------------------------------------------------------------------------------- */
 

@@ -46,6 +46,10 @@ Rows = NDArray[np.intp]
 #: What a bounce takes at touch-down.
 INPUTS = ("xdot", "ydot", "omega", "x", "y")
 
+#: Plain numbers are given to NumPy: before Python 3.12 it asks the class of an enum's member for things in
+#: Python's code, and drops a Ctrl-C that comes there.
+_LIFTED_OFF = int(BounceStatus.LIFTED_OFF)
+
 _FROM_RUN = {
     ns.Status.STOPPED: BounceStatus.LIFTED_OFF,
     ns.Status.REACHED_END: BounceStatus.NO_LIFT_OFF,
@@ -101,7 +105,7 @@ class Batch:
             self.states[:, k] = self._rows(self.given[name])
         self.time = np.zeros(count)
         self.free = np.zeros(count, bool)
-        self.status = np.full(count, BounceStatus.LIFTED_OFF, np.int8)
+        self.status = np.full(count, _LIFTED_OFF, np.int8)
         self.parts = self._parts()
 
     def _replaced(self, parameters: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
@@ -145,11 +149,11 @@ class Batch:
 
     def _mark(self, where: Any, status: BounceStatus) -> None:
         if np.any(where):
-            self.status[self._rows(np.asarray(where))] = status
+            self.status[self._rows(np.asarray(where))] = int(status)
 
     def _going(self, part: Part) -> Bools:
         """Rows of a part that nothing is wrong with so far."""
-        going = self.status == BounceStatus.LIFTED_OFF
+        going = self.status == _LIFTED_OFF
         return going if part.rows is None else going & part.rows
 
     def touch_down(self, t_max: float, work: ns.Work, options: dict[str, Any]) -> None:
@@ -184,7 +188,7 @@ class Batch:
     ) -> None:
         """Move rows without friction until their load is positive."""
         up = leaving(self.states[rows])
-        self.status[rows[up]] = BounceStatus.NOT_A_LANDING
+        self.status[rows[up]] = int(BounceStatus.NOT_A_LANDING)
         rows = rows[~up]
         if not rows.size:
             return
@@ -200,9 +204,9 @@ class Batch:
         )
         self.states[rows], self.time[rows], self.free[rows] = runs.x, runs.t, True
         self.status[rows] = _translate(runs.status)
-        rows = rows[self.status[rows] == BounceStatus.LIFTED_OFF]
+        rows = rows[self.status[rows] == _LIFTED_OFF]
         unpressed = surfaced(self.states[rows])
-        self.status[rows[unpressed]] = BounceStatus.NO_CONTACT
+        self.status[rows[unpressed]] = int(BounceStatus.NO_CONTACT)
         rows = rows[~unpressed]
         self.states[rows] = onto_zero_load(blueprint, self.states[rows].T, self._columns(rows)).T
 
@@ -241,10 +245,10 @@ class Batch:
             if work.checkpoint is not None:  # the second part, if any, has its own
                 work = replace(work, checkpoint=f"{os.fspath(work.checkpoint)}-weightless")
         start = np.stack([self._rows(self.given[n]) for n in ("x", "xdot", "y", "ydot")], axis=-1)
-        stay = (self.status == BounceStatus.LIFTED_OFF) & rests(self.states, start)
-        self.status[stay] = BounceStatus.NO_LIFT_OFF
+        stay = (self.status == _LIFTED_OFF) & rests(self.states, start)
+        self.status[stay] = int(BounceStatus.NO_LIFT_OFF)
         self._look_at_energy(options["tol"])
-        failed = self.status != BounceStatus.LIFTED_OFF
+        failed = self.status != _LIFTED_OFF
         self.states[failed], self.time[failed], code[failed] = np.nan, np.nan, -1
         itineraries, code = _sorted(words, code)
         return itineraries, code.reshape(self.shape)
@@ -273,7 +277,7 @@ class Batch:
 
 
 def _translate(status: NDArray[np.int8]) -> NDArray[np.int8]:
-    table = [_FROM_RUN.get(s, BounceStatus.FAILED) for s in sorted(ns.Status)]
+    table = [int(_FROM_RUN.get(s, BounceStatus.FAILED)) for s in sorted(ns.Status)]
     return np.array(table, np.int8)[status]
 
 

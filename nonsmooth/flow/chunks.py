@@ -18,6 +18,7 @@ from .options import Options
 from .reference.driver import Driver
 from .results import Chunk, Stopped, kinds_of
 from .section import Times
+from .starts import Cut
 from .status import Status
 from .view import sampled
 
@@ -99,6 +100,11 @@ def run_chunk(
         used = np.bincount(chunk.itinerary).nonzero()[0].tolist()
         chunk.rename({code: words[code] for code in used})
     return chunk
+
+
+def run_away(job: Job, cut: Cut) -> Chunk:
+    """Run the trajectories of a chunk that came from another process."""
+    return run_chunk(job, *cut.rows())
 
 
 def _run_compiled(

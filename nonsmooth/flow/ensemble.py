@@ -148,13 +148,15 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     there = (
         None if device is None else lambda first, out: run_there(job, device, starts, first, out)
     )
+    none = Chunk.empty(0, system, job.at is not None, job.room)
+    most = work.largest(none.row_size)
     size = lambda: (
-        work.chunk or (size_of_chunk(job, starts, work.workers) if there is None else CHUNK)
+        work.chunk or (size_of_chunk(job, starts, work.workers, most) if there is None else CHUNK)
     )
     saved = work.saved(lambda: _problem(system, starts, job, device), size)
     arrays, codes = None, None
     if isinstance(saved, Stored):
-        arrays = saved.arrays(Chunk.empty(0, system, job.at is not None, job.room), count)
+        arrays = saved.arrays(none, count)
         codes = saved.codes(count)
     results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
     run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)

@@ -186,7 +186,8 @@ def outcomes(
         system, options, None, None, None, engine_for(system, options, engine, starts.count, step)
     )
     if device is None:
-        size = work.chunk or size_of_chunk(job, starts, work.workers)
+        most = work.largest(Chunk.empty(0, system, at=False).row_size)
+        size = work.chunk or size_of_chunk(job, starts, work.workers, most)
         run_all(job, starts, made, work, size, None)
     else:
         require_device(job, device, work.executor is not None)

@@ -88,6 +88,11 @@ class Chunk:
             **_block(shapes),
         )
 
+    @property
+    def row_size(self) -> int:
+        """Bytes of the results of one trajectory."""
+        return sum(a.itemsize * math.prod(a.shape[1:]) for a in self.arrays().values())
+
     def part(self, first: int, last: int) -> Chunk:
         """Return the arrays of the trajectories first to last - 1, to be written in place."""
         cut = slice(first, last)

@@ -5,16 +5,54 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, OptionError, PointError, Surfaces, explain
-from .drawn import Drawn, Index, part_of
+from .drawn import Drawn, Grid, Index, RandomStarts, part_of
 from .facts import ON_SURFACE
 from .options import Options
 from .reference.modes import rounding_scale
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Starts and parameters of some trajectories on their way to another process, small where a rule
+    makes them.
+
+    Attributes
+    ----------
+    p : ndarray (np,) or (m, np)
+        Parameters.
+    x : ndarray (m, N) or None
+        Extended starts, or None where they are made there.
+    drawn : Grid or RandomStarts, optional
+    shape : tuple of int
+        To which they are broadcast.
+    first, last : int
+        Numbers of the trajectories: first to last - 1.
+    t_start : float or None
+        The last extended state; None in systems without time.
+    """
+
+    p: Array
+    x: Array | None = None
+    drawn: Drawn | None = None
+    shape: tuple[int, ...] = ()
+    first: int = 0
+    last: int = 0
+    t_start: float | None = None
+
+    def rows(self) -> tuple[Array, Array]:
+        """Return the extended starts (m, N) and parameters."""
+        if self.x is not None or self.drawn is None:
+            assert self.x is not None
+            return self.x, self.p
+        x = part_of(self.drawn, self.shape, np.arange(self.first, self.last))
+        return _extended(x, self.t_start), self.p
 
 
 class Starts:
@@ -88,6 +126,15 @@ class Starts:
         """Extended starts and parameters of the trajectories first to last - 1."""
         return self.rows(slice(first, last))
 
+    def cut(self, first: int, last: int) -> Cut:
+        """Return the same for another process."""
+        if not isinstance(self.x0, (Grid, RandomStarts)):
+            x, p = self.part(first, last)
+            return Cut(p, x)
+        t_start = self.t_start if self.system.time_dependent else None
+        p = self._parameters(slice(first, last), last - first)
+        return Cut(p, None, self.x0, self.shape, first, last, t_start)
+
     def rows(self, which: slice | Index) -> tuple[Array, Array]:
         """Extended starts and parameters of some trajectories, by their numbers."""
         n = self.system.dimension
@@ -95,14 +142,21 @@ class Starts:
             x = part_of(self.x0, self.shape, _numbered(which))
         else:
             x = _rows(self.x0, self.shape, which, n)
-        if self.system.time_dependent:
-            x = np.concatenate([x, np.full((len(x), 1), self.t_start)], axis=1)
+        x = _extended(x, self.t_start if self.system.time_dependent else None)
+        return x, self._parameters(which, len(x))
+
+    def _parameters(self, which: slice | Index, count: int) -> Array:
         if not self.varied:
-            return x, self.p
-        p = np.tile(self.p, (len(x), 1))
+            return self.p
+        p = np.tile(self.p, (count, 1))
         for column, values in self.varied.items():
             p[:, column] = _rows(values[..., None], self.shape, which, 1)[:, 0]
-        return x, p
+        return p
+
+
+def _extended(x: Array, t_start: float | None) -> Array:
+    """States (m, n) with the time where there is one."""
+    return x if t_start is None else np.concatenate([x, np.full((len(x), 1), t_start)], axis=1)
 
 
 def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Options) -> None:

@@ -7,23 +7,25 @@ import os
 import threading
 import time
 from collections.abc import Callable, Generator, Iterator
-from concurrent.futures import FIRST_COMPLETED, Executor, Future, ThreadPoolExecutor, wait
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
 from contextlib import closing
 from dataclasses import dataclass
-from typing import Any, Protocol
+from functools import partial
+from queue import Empty, SimpleQueue
+from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from ..model import Array, OptionError, explain
 from .checkpoint import Checkpoint
-from .chunks import Job, run_chunk, shipped
+from .chunks import Job, run_away, run_chunk, shipped
 from .progress import progress_bar
 from .results import Chunk
 from .starts import Starts
 from .stored import Stored
 
-#: Chunks under way at once with an executor.
-_IN_FLIGHT = 64
+#: Chunks under way at once with an executor, and bytes of results of each: so much is on its way at most.
+_IN_FLIGHT, _SHIPPED = 64, 1 << 22
 
 #: How long a chunk should take, a run of several that is worth more than one chunk, and one that tells
 #: how long they take (seconds).
@@ -120,6 +122,16 @@ class Work:
         """Number of chunks at once: the threads, or as many as an executor is given ahead."""
         return (self.threads or _processors()) if self.executor is None else _IN_FLIGHT
 
+    def largest(self, row: int) -> int:
+        """Trajectories in a chunk at most, unless the user says how many.
+
+        Parameters
+        ----------
+        row : int
+            Bytes of the results of one.
+        """
+        return _LARGEST if self.executor is None else min(_LARGEST, max(1, _SHIPPED // row))
+
 
 def _positive(name: str, value: int) -> None:
     if not (isinstance(value, int) and value > 0):
@@ -193,8 +205,7 @@ def run_all(
         if there is not None:
             chunks = ((k, there(a, results.part(a, b))) for k, a, b in ends)
         else:
-            pieces = ((k, *starts.part(a, b), results.part(a, b)) for k, a, b in ends)
-            chunks = _chunks(job, pieces, workers, work.executor)
+            chunks = _chunks(job, starts, results, ends, workers, work.executor)
         with closing(chunks) as finished:
             for number, chunk in finished:
                 results.put(number * size, chunk)
@@ -205,7 +216,7 @@ def run_all(
         bar.close()
 
 
-def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
+def size_of_chunk(job: Job, starts: Starts, workers: int, most: int = _LARGEST) -> int:
     """Trajectories that take about as long as one chunk should; a few of them are run to know.
 
     Parameters
@@ -213,6 +224,8 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
     job : Job
     starts : Starts
     workers : int
+    most : int, optional
+        Trajectories in a chunk at most, where they are worth more than one.
     """
     count, k, spent = starts.count, 1, 0.0
     if count < 2:
@@ -227,8 +240,9 @@ def size_of_chunk(job: Job, starts: Starts, workers: int) -> int:
     every = max(spent / k, 1e-9)
     if count * every < _WORTH:
         return max(count, 1)
-    size = min(_SECONDS / every, count / (4 * workers), _LARGEST)
-    return max(math.ceil(size), min(_LEAST, math.ceil(count / workers)) if every < 1e-3 else 1)
+    size = min(_SECONDS / every, count / (4 * workers))
+    least = min(_LEAST, math.ceil(count / workers)) if every < 1e-3 else 1
+    return min(max(math.ceil(size), least), most)
 
 
 def _probe(job: Job, starts: Starts, k: int) -> float:
@@ -246,28 +260,37 @@ def _clock() -> float:
     return time.thread_time() if fine else time.perf_counter()
 
 
-#: The number of a chunk, its starts and parameters, the arrays for its results.
-_Piece = tuple[int, Array, Array, Chunk]
+#: The number of a chunk, its first trajectory and the one after its last.
+_Piece = tuple[int, int, int]
 
 
 def _chunks(
-    job: Job, work: Iterator[_Piece], workers: int, executor: Executor | None
+    job: Job,
+    starts: Starts,
+    results: Sink,
+    pieces: Iterator[_Piece],
+    workers: int,
+    executor: Executor | None,
 ) -> Generator[tuple[int, Chunk], None, None]:
     """Finished chunks in the order in which they finish; a bounded number is under way."""
-    if executor is not None:
-        if not isinstance(executor, ThreadPoolExecutor):
-            job = shipped(job)
-        away = lambda x, p, out: executor.submit(run_chunk, job, x, p)
-        yield from _submit(work, away, _IN_FLIGHT)
-    elif workers < 2:
-        for number, x, p, out in work:
-            yield number, run_chunk(job, x, p, out)
+    if isinstance(executor, ThreadPoolExecutor):
+        rows = ((k, *starts.part(a, b)) for k, a, b in pieces)
+        yield from _submit(rows, lambda x, p: executor.submit(run_chunk, job, x, p), _IN_FLIGHT)
+    elif executor is not None:
+        job = shipped(job)
+        cuts = ((k, starts.cut(a, b)) for k, a, b in pieces)
+        yield from _submit(cuts, lambda cut: executor.submit(run_away, job, cut), _IN_FLIGHT)
     else:
-        yield from _in_threads(job, work, workers)
+        work = ((k, *starts.part(a, b), results.part(a, b)) for k, a, b in pieces)
+        if workers < 2:
+            for number, x, p, out in work:
+                yield number, run_chunk(job, x, p, out)
+        else:
+            yield from _in_threads(job, work, workers)
 
 
 def _in_threads(
-    job: Job, work: Iterator[_Piece], workers: int
+    job: Job, work: Iterator[tuple[int, Array, Array, Chunk]], workers: int
 ) -> Generator[tuple[int, Chunk], None, None]:
     pool, stop = ThreadPoolExecutor(workers), threading.Event()
     here = lambda x, p, out: pool.submit(run_chunk, job, x, p, out, stop.is_set)
@@ -280,32 +303,57 @@ def _in_threads(
         pool.shutdown(cancel_futures=True)
 
 
+_T = TypeVar("_T")
+
+
 def _submit(
-    work: Iterator[_Piece],
-    submit: Callable[[Array, Array, Chunk], Future[Chunk]],
-    limit: int,
-) -> Iterator[tuple[int, Chunk]]:
-    pending: dict[Future[Chunk], int] = {}
-    exhausted = False
+    work: Iterator[tuple[Any, ...]], submit: Callable[..., Future[_T]], limit: int
+) -> Iterator[tuple[int, _T]]:
+    """Results with their numbers, as they are finished; so many are under way or wait to be taken.
+
+    A future is let go as soon as its result is there: a cluster keeps what a future stands for, and
+    computes it again where the worker that had it is lost.
+    """
+    pending: dict[int, Future[_T]] = {}
+    finished: SimpleQueue[tuple[int, _T | None, BaseException | None]] = SimpleQueue()
+    count = 0
+
+    def note(number: int, future: Future[_T]) -> None:
+        pending.pop(number, None)
+        error = CancelledError() if future.cancelled() else future.exception()
+        finished.put((number, None if error else future.result(), error))
+
     try:
-        while pending or not exhausted:
-            while not exhausted and len(pending) < limit:
-                item = next(work, None)
-                if item is None:
-                    exhausted = True
-                else:
-                    pending[submit(*item[1:])] = item[0]
-            if pending:
-                finished, _ = wait(pending, return_when=FIRST_COMPLETED)
-                for future in sorted(finished, key=_failed):  # what is finished is saved first
-                    yield pending.pop(future), future.result()
+        while True:
+            while count < limit and (item := next(work, None)) is not None:
+                count += 1
+                pending[item[0]] = submit(*item[1:])
+                pending[item[0]].add_done_callback(partial(note, item[0]))
+            if not count:
+                return
+            number, result, error = finished.get()
+            count -= 1
+            if error is not None:
+                yield from _taken(finished)  # what is finished is saved first
+                raise error
+            yield number, result  # type: ignore[misc]  # there is one where there is no error
+            del result
     finally:
-        for future in pending:
+        for future in list(pending.values()):
             future.cancel()
 
 
-def _failed(future: Future[Chunk]) -> bool:
-    return future.cancelled() or future.exception() is not None
+def _taken(
+    finished: SimpleQueue[tuple[int, Any, BaseException | None]],
+) -> Iterator[tuple[int, Any]]:
+    """What is there, without the errors."""
+    try:
+        while True:
+            number, result, error = finished.get_nowait()
+            if error is None:
+                yield number, result
+    except Empty:
+        return
 
 
 def checked_work(work: Any) -> Work:

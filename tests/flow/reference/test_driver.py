@@ -376,7 +376,6 @@ def test_a_root_on_one_of_several_surfaces_is_passed_as_on_one():
         assert one.x[2] == pytest.approx(5.0 - 0.3 * one.t)
 
 
-
 def test_limits_end_the_run_with_advice():
     run = ns.simulate(relay(), [30.0, 0.0], 1e3, max_events=3)
     assert run.status is ns.Status.TOO_MANY_EVENTS and "max_events" in run.message

@@ -121,14 +121,18 @@ static inline void step(Lanes *s, Work *w) {
   take_step(s, w, &e);
 }
 
+/* A thread whose run has ended takes its next start at once: its neighbours wait for that, and all make their step
+ * together. */
 static inline void run_all(Work *w) {
   Lanes s;
   s.size = w->o.atol / w->o.rtol;
   w->alive = 0;
   for (;;) {
-    if (w->alive) { step(&s, w); continue; }
-    if (!load(&s, w)) return;
-    if (w->alive) begin(&s, w, s.live);
+    while (!w->alive) {
+      if (!load(&s, w)) return;
+      if (w->alive) begin(&s, w, s.live);
+    }
+    step(&s, w);
   }
 }
 

@@ -4,6 +4,12 @@
 #include <string.h>
 #include <type_traits>
 
+/* Before each instruction, and at each label. */
+#ifndef AT
+#define AT(number, word)
+#define LABEL(number) ;
+#endif
+
 struct Place { unsigned x, y, z; };
 static thread_local Place threadIdx, blockIdx, blockDim, gridDim;
 typedef unsigned char Byte;

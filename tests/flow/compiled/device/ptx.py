@@ -4,6 +4,7 @@ Kernels whose threads do not wait for each other can then be run on this process
 here is refused. Source: NVIDIA, Parallel Thread Execution ISA 9.
 """
 
+import itertools
 import re
 from pathlib import Path
 
@@ -47,16 +48,20 @@ class Interpreted(Shim):
         super().__init__(fused=False, flags=("-O1",), **more)
         self._option = f"--fmad={'true' if fused else 'false'}"
 
+    def translate(self, source):
+        """Return what NVRTC makes of a source, as C++."""
+        return translated(nvrtc.ptx(source, "compute_90", self._option))
+
     def compile(self, source):
         """Return the kernels of a source."""
-        return super().compile(translated(nvrtc.ptx(source, "compute_90", self._option)))
+        return super().compile(self.translate(source))
 
 
 def translated(text):
     """Return C++ for a module of PTX."""
     text = re.sub(r"//[^\n]*", "", text)
     text = re.sub(r"^\.(version|target|address_size)[^\n]*", "", text, flags=re.MULTILINE)
-    data, heads, functions = [], [], []
+    data, heads, functions, numbers = [], [], [], itertools.count()
     while match := re.match(r"\s*(\.global[^;]*;|[^{;]*;|[^{]*(?=\{))", text):
         found = match[1].strip()
         text = text[match.end() :]
@@ -66,7 +71,7 @@ def translated(text):
             end = re.search(r"^\}", text, re.MULTILINE)
             head, copies = _head(found)
             heads.append(head + ";")
-            functions.append(f"{head} {{\n{copies}{_body(text[1 : end.start()])}}}\n")
+            functions.append(f"{head} {{\n{copies}{_body(text[1 : end.start()], numbers)}}}\n")
             text = text[end.end() :]
         elif not found:
             break
@@ -100,16 +105,16 @@ def _head(text):
     return f'extern "C" void {name}({", ".join(values)})', "".join(copies)
 
 
-def _body(text):
-    """The statements of a function."""
+def _body(text, numbers):
+    """The statements of a function. Labels and instructions are numbered together, so that they can be counted."""
     made = ["unsigned carry = 0; (void)carry;"]
     for label, brace, statement in re.findall(r"([\w$]+):|([{}])|([^;{}\s][^;]*);", text):
         if brace:
             made.append(brace)
         elif label:
-            made.append(f"{_name(label)}: ;")
+            made.append(f"{_name(label)}: LABEL({next(numbers)})")
         else:
-            made.append(_statement(" ".join(statement.split())))
+            made.append(_statement(" ".join(statement.split()), numbers))
     return "\n".join(made)
 
 
@@ -117,7 +122,7 @@ def _name(text):
     return text.replace("%", "").replace("$", "_")
 
 
-def _statement(text):
+def _statement(text, numbers):
     """A declaration or an instruction."""
     if text.startswith(".pragma"):
         return ""
@@ -133,7 +138,8 @@ def _statement(text):
     assert match, text
     guard, word, rest = match.groups()
     made = _instruction(word.split("."), _operands(rest))
-    return f"if ({_name(guard[1:])}) {{ {made} }}" if guard else made
+    made = f"if ({_name(guard[1:])}) {{ {made} }}" if guard else made
+    return f'AT({next(numbers)}, "{word}") {made}'
 
 
 def _declared(text):

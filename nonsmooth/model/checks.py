@@ -60,7 +60,8 @@ def real(
 
 def whole(value: Any, what: str, *, least: int = 1, advice: str = "") -> int:
     """Return a whole number of at least ``least`` or raise OptionError; 1e6 is one too."""
-    if not is_real(value) or float(value) != int(value) or value < least:
+    exact = isinstance(value, int)  # one beyond 2**53 may be no float
+    if not is_real(value) or not (exact or float(value) == int(value)) or value < least:
         expected = "a positive whole number" if least == 1 else f"a whole number >= {least}"
         raise OptionError(
             explain(what, expected=expected, received=repr(value), advice=advice).rstrip()

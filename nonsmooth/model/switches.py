@@ -137,8 +137,8 @@ class Affine:
         a = ca.simplify(ca.mtimes(gradient, middle))
         # A factor of G is one of b = grad h . G too, and there it may no longer be in sight.
         reduced, factor = cancel_common_factor(entries, self.states, system.parameter_symbols)
-        self.regular = bool(ca.depends_on(factor, self.states))
         b = ca.simplify(ca.mtimes(gradient, ca.vertcat(*reduced)))
+        self.regular = bool(ca.depends_on(factor, self.states)) and not b.is_zero()
         self.field = middle - (a / b) * ca.vertcat(*reduced)
 
     def exits(self, surface: int) -> Guarded:

@@ -259,3 +259,27 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at="h2")
     with pytest.raises(ns.OptionError, match="It is a set, which is reached from all sides"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))
+
+
+@pytest.mark.parametrize("engine", ENGINES)
+def test_more_hits_than_any_run_has_are_not_met(engine) -> None:
+    """Numbers beyond those of C, where they became others, and zero."""
+    relay = ns.FilippovSystem([x, v], surface=v, above=[v, -x - 0.1], below=[v, -x + 0.1])
+    run = lambda at: ns.simulate(relay, [1.05, 0.0], 10.0, at=at, engine=engine)
+    hits = run("crossing").sample_t
+    assert len(hits) > 2
+    sections = {"every": 2**64, "skip": 2**64}, {"every": 2**64 + 1}, {"skip": 2**63}
+    for options in sections:
+        assert run(ns.Section("crossing", **options)).sample_t.size == 0
+    for options in {"count": 2**62}, {"count": 2**62, "every": 4}, {"count": 2**64 + 1}:
+        found = run(ns.Section("crossing", **options))
+        assert found.status is ns.Status.REACHED_END
+        assert (
+            found.sample_t.tolist()
+            == hits[options.get("every", 1) - 1 :: options.get("every", 1)].tolist()
+        )
+    for count in 2**63, 2**64 + 1:
+        many = ns.ensemble(
+            relay, [[1.05, 0.0]] * 2, 10.0, at_event=("crossing", count), engine=engine
+        )
+        assert np.isnan(many.event_t).all()

@@ -185,7 +185,7 @@ def options_of(
 ) -> OptionsStructure:
     """Options as C reads them; the start's mode by its number."""
     kind, count = at or (-1, 0)
-    limit = 2**62
+    limit = 2**62  # no run has so many events
     made = OptionsStructure(
         o.t_end,
         o.rtol,
@@ -195,16 +195,17 @@ def options_of(
         int(min(o.max_events, limit)),
         start_mode,
         kind,
-        count,
+        min(count, limit),
         int(dense),
     )
     made.hit_every = 1
     if o.hits is not None:
         made.kept = _named(system, o.hits)
         made.hit_named, made.hit_width = address(made.kept), made.kept.shape[1]
-        made.hit_after, made.hit_skip, made.hit_every = int(o.hits.after), o.hits.skip, o.hits.every
+        made.hit_after, last = int(o.hits.after), o.hits.last
+        made.hit_skip, made.hit_every = min(o.hits.skip, limit), min(o.hits.every, limit)
         made.hit_kinds = sum(1 << i for i, kind in enumerate(KINDS) if kind in o.hits.kinds)
-        made.hit_count = o.hits.count or 0
+        made.hit_count = o.hits.count if o.hits.count is not None and last <= limit else 0
         made.hit_side = 0 if o.hits.letter is None else (1 if o.hits.letter[1] == "+" else -1)
     return made
 

@@ -14,7 +14,15 @@ from ...model.multiplier_series import MultiplierSeries, set_values
 from ...model.multipliers import newton_multipliers, sliding_multipliers
 from ..options import Options
 from .laws_of_sets import unknowns_of_sets
-from .modes import Expansion, Modes, SeparateModes, powers, rounding_scale, tolerances
+from .modes import (
+    Expansion,
+    Modes,
+    SeparateModes,
+    powers,
+    relative,
+    rounding_scale,
+    tolerances,
+)
 
 
 def modes_of(system: FilippovSystem, p: Array, options: Options) -> Modes:
@@ -181,8 +189,7 @@ class CoupledModes:
             if self.coupled.scaled[surface] and marks.slope[surface, surface]:
                 return None
             scale = rounding_scale(marks.layer_gradient[surface], x, self._options.size)
-            with np.errstate(divide="ignore", invalid="ignore"):
-                result.append(marks.layer[surface] / scale)
+            result.append(relative(marks.layer[surface], scale))
         return np.array(result)
 
     def rates(

@@ -136,6 +136,12 @@ def rounding_scale(gradient: Array, x: Array, size: float) -> Array:
     return np.where(np.isfinite(gradient), gradient, 0.0) @ (size + np.abs(x))
 
 
+def relative(values: Array, scales: Array) -> Array:
+    """Values over their scales; zero where the value is, also where it is everywhere and has no scale."""
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(values == 0.0, 0.0, values / scales)
+
+
 def tolerances(system: FilippovSystem, x: Array, options: Options) -> Array:
     """Local errors that are allowed at an extended state; the time is exact."""
     allowed = SAFETY * (options.atol + options.rtol * np.abs(x))
@@ -224,8 +230,7 @@ class SeparateModes:
         ]
         values = self._evaluator("value", sliding)(x, self._p)[1][rows, 0]
         scales = rounding_scale(self.gradient(sliding, x)[rows], x, self._options.size)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(values / scales)
+        return relative(values, scales)
 
     def rates(self, mode: str, x: Array, active: Sequence[int]) -> None:
         """There is one surface."""

@@ -498,3 +498,14 @@ def test_a_touch_at_the_end_of_a_step_is_no_event(engine):
     system = ns.FilippovSystem([y, v], field=[v, 1], stops=[ns.Stop(y, -1)])
     run = ns.simulate(system, [0.5, -1.0], 2.0, max_step=0.25, engine=engine)
     assert run.status is ns.Status.REACHED_END
+
+
+@pytest.mark.parametrize("engine", ["reference", "compiled"])
+def test_a_state_that_does_not_move_from_its_surface_has_no_unique_future(engine):
+    """Any of the fields between the two keeps it there."""
+    for above, below in (([1, 0], [-1, 0]), ([-x, 0 * v], [x, 0 * v])):
+        system = ns.FilippovSystem([x, v], surface=v, above=above, below=below)
+        run = ns.simulate(system, [1.0, 0.0], 1.0, engine=engine)
+        assert run.status is ns.Status.NON_UNIQUE and "tangent" in run.message
+        beside = ns.simulate(system, [1.0, 1e-3], 1.0, engine=engine)
+        assert beside.itinerary == "+" and beside.status is ns.Status.REACHED_END

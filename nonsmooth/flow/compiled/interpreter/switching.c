@@ -14,7 +14,7 @@ static int is_two_fold(Run *r, const int8_t *letter, int surface, double toleran
     gradient_sums(r, &r->s->point, r->point, 2 * width_of(r) + r->s->slope.count, &r->s->layer_gradient, width_of(r), near,
                   1, r->small);
     double scale = r->small[surface];
-    if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale && scale > 0)) return 0;
+    if (!(fabs(layer_of(r, surface)) <= (tolerance + TANGENT) * scale)) return 0; /* or zero everywhere */
   }
   return 1;
 }

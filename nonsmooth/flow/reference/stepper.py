@@ -325,16 +325,14 @@ class Stepper:
                 return c, 0.0
         allowed = e.allowed / SAFETY
         kept = replace(e, states=c, finite=True)
-        several = e.unknowns.size and (self.system.sets or {*e.mode} & {*"sc"})
         unknowns = e.unknowns[:, 0] if e.unknowns.size else e.unknowns
+        several = unknowns.size and (self.system.sets or {*e.mode} & {*"sc"})
         h = 0.0 if several else min(h_max, 1e-3)
         while h > 1e-15:
             end = self.advance(kept, h)
             there = self.expand(e.mode, end, unknowns)
-            slope = there.states[:, 1]
-            defect = np.abs(
-                slope - c[:, 1:] @ (np.arange(1, c.shape[1]) * powers(h, c.shape[1] - 1))
-            )
+            slope, rates = there.states[:, 1], c[:, 1:] * np.arange(1, c.shape[1])
+            defect = np.abs(slope - rates @ powers(h, c.shape[1] - 1))
             # Guards are not located within this step: none may fall in it, and what leaves zero at
             # a rate must do so at that rate, however far below the tolerance.
             crossed = np.sign(there.guards[:, 0]) * np.sign(e.guards[:, 0]) < 0

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
+from contextlib import nullcontext
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -154,13 +155,13 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
         work.chunk or (size_of_chunk(job, starts, work.workers, most) if there is None else CHUNK)
     )
     saved = work.saved(lambda: _problem(system, starts, job, device), size)
-    arrays, codes = None, None
-    if isinstance(saved, Stored):
-        arrays = saved.arrays(none, count)
-        codes = saved.codes(count)
-    results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
-    run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)
-    return results.ensemble(codes)
+    with saved.alone() if isinstance(saved, Stored) else nullcontext():
+        arrays, codes = None, None
+        if isinstance(saved, Stored):
+            arrays, codes = saved.arrays(none, count), saved.codes(count)
+        results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
+        run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)
+        return results.ensemble(codes)
 
 
 def engine_for(

@@ -12,7 +12,8 @@ import errno
 import json
 import math
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,6 +25,17 @@ from ..model import OptionError, explain
 from . import files
 from .checkpoint import Checkpoint, chunk_arrays
 from .results import Chunk
+
+try:
+    import fcntl
+except ImportError:  # a system where no other process can be told of
+    fcntl = None  # type: ignore[assignment]
+
+#: How the file that a run holds is opened: made where it is not there, no link followed.
+_OPENED = os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0)
+
+#: Folders that runs of this process write to, and what stands for each run.
+_AT_WORK: dict[Path, object] = {}
 
 #: What file systems say that cannot reserve room.
 _CANNOT_RESERVE = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)
@@ -48,6 +60,47 @@ class Stored(Checkpoint):
 
     def __init__(self, path: str | os.PathLike[str], problem: str, chunk: Callable[[], int]):
         super().__init__(path, f"stored {problem}", chunk)
+
+    @contextmanager
+    def alone(self) -> Iterator[None]:
+        """Hold the folder for one run, since two would write to the same rows.
+
+        The system lets it go when the process ends, in whatever way.
+
+        Raises
+        ------
+        OptionError
+            Another run holds it; it cannot be written.
+        """
+        folder, own = self.folder.resolve(), object()
+        try:
+            if _AT_WORK.setdefault(folder, own) is not own:
+                raise self._busy()
+            try:
+                file = os.fdopen(os.open(folder / ".lock", _OPENED), "w")
+            except OSError as error:
+                raise self._unusable(error) from error
+            with file:
+                try:
+                    if fcntl is not None:
+                        fcntl.lockf(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                except OSError as error:
+                    if error.errno in (errno.EACCES, errno.EAGAIN):  # others: none can be had there
+                        raise self._busy() from error
+                yield
+        finally:
+            if _AT_WORK.get(folder) is own:
+                del _AT_WORK[folder]
+
+    def _busy(self) -> OptionError:
+        return OptionError(
+            explain(
+                "store",
+                expected="a folder that no other run writes to",
+                received=f"{self.folder}, which another run is writing",
+                advice="Wait until it has ended, or choose another path.",
+            )
+        )
 
     def arrays(self, like: Chunk, count: int) -> Chunk:
         """Return arrays of ``count`` rows in the folder, of the types that the arrays of a chunk have.

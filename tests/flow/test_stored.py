@@ -185,7 +185,8 @@ def test_a_disk_without_room_is_told_at_once(code, whole, tmp_path, monkeypatch,
         patched.setattr(os, "posix_fallocate", full)
         with pytest.raises(ns.OptionError, match=rf"{os.strerror(code)}[^$]*Make room"):
             sweep(tmp_path / "sweep")
-    assert counted == [] and [f.name for f in (tmp_path / "sweep").iterdir()] == ["problem.json"]
+    left = {f.name for f in (tmp_path / "sweep").iterdir()}
+    assert counted == [] and left <= {"problem.json", ".lock"}
     assert_same(sweep(tmp_path / "sweep"), whole)
 
 
@@ -195,6 +196,64 @@ def test_a_folder_where_none_can_be_reserved_is_used_all_the_same(whole, tmp_pat
         raise OSError(errno.EOPNOTSUPP, os.strerror(errno.EOPNOTSUPP))
 
     monkeypatch.setattr(os, "posix_fallocate", refused)
+    assert_same(sweep(tmp_path / "sweep"), whole)
+
+
+def test_a_folder_that_another_run_writes_to_is_refused(whole, tmp_path, monkeypatch):
+    """Both would write to the same rows, and one read what the other has not finished."""
+    run, said = work_module.run_chunk, []
+
+    def within(*args):
+        monkeypatch.setattr(work_module, "run_chunk", run)
+        with pytest.raises(ns.OptionError, match="another run is writing") as caught:
+            sweep(tmp_path / "sweep")
+        said.append(str(caught.value))
+        return run(*args)
+
+    monkeypatch.setattr(work_module, "run_chunk", within)
+    assert_same(sweep(tmp_path / "sweep"), whole)
+    assert len(said) == 1 and str(tmp_path / "sweep") in said[0]
+    assert_same(sweep(tmp_path / "sweep"), whole)
+
+
+def test_so_is_one_of_another_process_until_that_ends(whole, tmp_path):
+    pytest.importorskip("fcntl")
+    sweep(tmp_path / "sweep")
+    program = (
+        "import fcntl, sys\n"
+        "file = open(sys.argv[1], 'w')\n"
+        "fcntl.lockf(file, fcntl.LOCK_EX)\n"
+        "print('held', flush=True)\n"
+        "sys.stdin.read()\n"
+    )
+    run = [sys.executable, "-c", program, tmp_path / "sweep" / ".lock"]
+    with subprocess.Popen(run, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
+        assert other.stdout.readline() == b"held\n"
+        with pytest.raises(ns.OptionError, match="another run is writing"):
+            sweep(tmp_path / "sweep")
+        other.kill()
+    assert_same(sweep(tmp_path / "sweep"), whole)
+
+
+@pytest.mark.skipif(not hasattr(os, "O_NOFOLLOW"), reason="links are followed on this system")
+def test_a_link_in_the_place_of_the_lock_is_not_followed(tmp_path):
+    sweep(tmp_path / "sweep")
+    (tmp_path / "sweep" / ".lock").unlink()
+    (tmp_path / "elsewhere").write_text("kept")
+    (tmp_path / "sweep" / ".lock").symlink_to(tmp_path / "elsewhere")
+    with pytest.raises(ns.OptionError, match="a folder that can be read and written"):
+        sweep(tmp_path / "sweep")
+    assert (tmp_path / "elsewhere").read_text() == "kept"
+
+
+def test_a_run_that_was_refused_or_interrupted_holds_nothing(whole, tmp_path, monkeypatch):
+    def interrupted(*args):
+        raise KeyboardInterrupt
+
+    with monkeypatch.context() as patched:
+        patched.setattr(work_module, "run_chunk", interrupted)
+        with pytest.raises(KeyboardInterrupt):
+            sweep(tmp_path / "sweep")
     assert_same(sweep(tmp_path / "sweep"), whole)
 
 

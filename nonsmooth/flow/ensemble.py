@@ -19,6 +19,7 @@ from .facts import KINDS
 from .on_device import CHUNK, require_device, run_there
 from .options import Options
 from .results import Chunk, Collected, Ensemble
+from .section import KINDS_OF_SECTIONS
 from .select import compiled_or_none, use_compiled
 from .starts import Starts
 from .stored import Stored
@@ -197,16 +198,16 @@ def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:
         return None
     try:
         kind, count = at_event
-        if kind in KINDS and int(count) == count and count >= 1:
+        if kind in KINDS_OF_SECTIONS and int(count) == count and count >= 1:
             return KINDS.index(kind), int(count)
     except (TypeError, ValueError):
         pass
     raise OptionError(
         explain(
             "at_event",
-            expected=f"(kind, k) with a kind of {KINDS} and k from 1",
+            expected=f"(kind, k) with a kind of {KINDS_OF_SECTIONS} and k from 1",
             received=repr(at_event),
-            advice='For example ("crossing", 1).',
+            advice='For example ("crossing", 1). The ends of all runs are x of the result.',
         )
     )
 

@@ -281,6 +281,7 @@ def test_bad_input(system):
     for options in (
         {"at_event": ("hop", 1)},
         {"at_event": ("exit", 0)},
+        {"at_event": ("end", 1)},
         {"at_event": 3},
         {"engine": "warp"},
         {"tol": 2.0},

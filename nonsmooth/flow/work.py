@@ -326,15 +326,19 @@ def _submit(
     try:
         while True:
             while count < limit and (item := next(work, None)) is not None:
+                try:
+                    pending[item[0]] = submit(*item[1:])
+                except Exception:
+                    yield from _taken(finished)  # what is finished is saved first
+                    raise
                 count += 1
-                pending[item[0]] = submit(*item[1:])
                 pending[item[0]].add_done_callback(partial(note, item[0]))
             if not count:
                 return
             number, result, error = finished.get()
             count -= 1
             if error is not None:
-                yield from _taken(finished)  # what is finished is saved first
+                yield from _taken(finished)
                 raise error
             yield number, result  # type: ignore[misc]  # there is one where there is no error
             del result

@@ -115,6 +115,23 @@ def test_what_is_finished_is_taken_before_an_error_is_told():
     assert {0, 1, 3, 4, 5, 6, 7} <= set(taken) and 2 not in taken
 
 
+def test_so_it_is_where_an_executor_takes_no_more():
+    """As a pool of processes does when one of them was killed."""
+
+    def submit(number):
+        if number == 5:
+            raise RuntimeError("broken")
+        future = Future()
+        future.set_result(number)
+        return future
+
+    taken = []
+    with pytest.raises(RuntimeError, match="broken"):
+        for number, _ in work_module._submit(iter((k, k) for k in range(30)), submit, 8):
+            taken.append(number)
+    assert sorted(taken) == [0, 1, 2, 3, 4]
+
+
 def test_what_was_not_begun_is_taken_back_after_an_error():
     began, gate = [], threading.Event()
 

@@ -65,6 +65,10 @@ class Writer:
         """C of the interpreter's ``over``."""
         return f"divided({value}, {self.inverse(divisor)})"
 
+    def settled(self, value: str, j: int, divisor: int) -> str:
+        """C of the interpreter's ``settled``."""
+        return f"settled({value}, {self.name(j, 0)}, {self.name(divisor, 0)})"
+
     def ratio(self, u: int, v: int) -> str:
         """C of the interpreter's ``ratio`` of two values."""
         value, divisor = self.name(u, 0), self.name(v, 0)
@@ -157,12 +161,13 @@ class Writer:
         if k == 0:
             return self.ratio(u, v)
         top = f"{self.name(u, k)} - ({self.convolve(j, v, k, 0, k - 1)})"
-        return self.over(top, self.name(v, 0))
+        return self.settled(self.over(top, self.name(v, 0)), j, v)
 
     def _under(self, j: int, k: int, u: int, v: int) -> str:
         if k == 0:
             return self.ratio(u, v)
-        return self.over(f"-({self.convolve(j, v, k, 0, k - 1)})", self.name(v, 0))
+        value = self.over(f"-({self.convolve(j, v, k, 0, k - 1)})", self.name(v, 0))
+        return self.settled(value, j, v)
 
     def _sqrt(self, j: int, k: int, u: int, v: int) -> str:
         if k == 0:
@@ -178,7 +183,8 @@ class Writer:
         for i in range(1, k):
             factor = f"{e} * {float(k - i)!r} - {float(i)!r}"
             total = f"MULADD({factor}, {self.name(u, k - i)} * {self.name(j, i)}, {total})"
-        return f"{self.over(total, self.name(u, 0))} * (1.0 / {float(k)!r})"
+        value = f"{self.over(total, self.name(u, 0))} * (1.0 / {float(k)!r})"
+        return self.settled(value, j, u)
 
     def _affine(self, j: int, k: int, u: int, v: int) -> str:
         factor = literal(self.second[j])

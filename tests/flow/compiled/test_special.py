@@ -144,6 +144,23 @@ def test_terms_that_a_mode_leaves_out():
     np.testing.assert_allclose(run.x[-1, :3], exact, atol=1e-9)
 
 
+def test_quotients_whose_divisors_overflow():
+    """Friction 2/(1 + exp(-v/e)) - 1 = tanh(v/2e) at speeds of 900 e, where exp is infinite or nearly."""
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    width, options = 1e-2, Options(t_end=12.0)
+    friction = ca.tanh(v / (2 * width))
+    forms = [2 / (1 + ca.exp(-v / width)) - 1, 2 * (1 + ca.exp(-v / width)) ** -1.0 - 1]
+    forms.append(2 / (1 + ca.exp(-v / width / 2) ** 2) - 1)
+    exact = ns.simulate(
+        ns.FilippovSystem([x, v], field=[v, -x - 0.4 * friction]), [-10.0, 0.0], 12.0
+    )
+    for form in forms:
+        engine = tape_for(ns.FilippovSystem([x, v], field=[v, -x - 0.4 * form]), options)
+        run = one(engine, np.array([-10.0, 0.0]), np.zeros(0), options)
+        assert run.status == ns.Status.REACHED_END and len(run.t) < 200
+        np.testing.assert_allclose(run.x[-1], exact.x[-1], atol=1e-8)
+
+
 def bouncing():
     """A ball with friction that lands, slides, sticks and rests."""
     x, y, v, w, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "w", "lam"))

@@ -160,10 +160,16 @@ static inline double divided(double a, double reciprocal) { return a == 0 ? 0 : 
 /* The value of a quotient: 0/0 is none, though all further coefficients that are zero stay so. */
 static inline double ratio(double a, double b) { return a == 0 && b == 0 ? NAN : over(a, b); }
 
+/* A later coefficient of a quotient: nothing is left of one that is no number because the divisor's overflow,
+ * as in 1/(1 + exp(1000)). */
+static inline double settled(double coefficient, double value, double divisor) {
+  return isfinite(coefficient) || !(fabs(value) < 1e-100 && fabs(divisor) > 1e150) ? coefficient : 0;
+}
+
 static double power_coefficient(const double *u, const double *w, double exponent, int k) {
   double sum = exponent * k * (u[k] * w[0]);
   for (int j = 1; j < k; j++) sum = MULADD(exponent * (k - j) - j, u[k - j] * w[j], sum);
-  return over(sum, u[0]) * (1.0 / k);
+  return settled(over(sum, u[0]) * (1.0 / k), w[0], u[0]);
 }
 
 /* Coefficient k of some rules; coefficient i of rule j is s[j * stride + i], of input x[i] x[k]. */
@@ -190,8 +196,12 @@ static void series_rules(const Series *t, const int32_t *which, int32_t count, i
         w[k] = k % 2 ? half : k ? MULADD(u[k / 2], u[k / 2], half) : u[0] * u[0];
         break;
       }
-      case RULE_div: w[k] = k ? over(u[k] - convolve(w, v, k, 0, k - 1), v[0]) : ratio(u[0], v[0]); break;
-      case RULE_under: w[k] = k ? over(-convolve(w, v, k, 0, k - 1), v[0]) : ratio(u[0], v[0]); break;
+      case RULE_div:
+        w[k] = k ? settled(over(u[k] - convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]) : ratio(u[0], v[0]);
+        break;
+      case RULE_under:
+        w[k] = k ? settled(over(-convolve(w, v, k, 0, k - 1), v[0]), w[0], v[0]) : ratio(u[0], v[0]);
+        break;
       case RULE_sqrt: w[k] = k ? over(0.5 * (u[k] - convolve(w, w, k, 1, k - 1)), w[0]) : sqrt(u[0]); break;
       case RULE_power: w[k] = k ? power_coefficient(u, w, v[0], k) : operate(OP_pow, u[0], v[0]); break;
       case RULE_affine: w[k] = k ? t->second[j] * u[k] : MULADD(t->second[j], u[0], t->first[j]); break;

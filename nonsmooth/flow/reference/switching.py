@@ -130,7 +130,22 @@ def decide(
         return Decision(
             None, Status.INTERSECTION, messages.no_stable_motion(_entries(stepper, active))
         )
+    if not known and (ends := _where_sliding_ends(stepper, x, mode, active[0])):
+        return decide(stepper, x, mode, active, ends, layer, kept)
     return Decision(None, Status.NON_UNIQUE, messages.degenerate())
+
+
+def _where_sliding_ends(stepper: Stepper, x: Array, mode: str, surface: int) -> Known:
+    """Coefficients that vanish where the multiplier of a surface is at its bound, to rounding: there the
+    rate of that side is zero too, whatever its own terms have left."""
+    slides = mode[:surface] + "s" + mode[surface + 1 :]
+    for unknowns in stepper.modes.solutions(slides, x, False):
+        e = stepper.expand(slides, x, unknowns)
+        for row, guard in enumerate(stepper.guards(slides)):
+            at_end = guard.kind == "exit" and guard.index == surface
+            if at_end and e.finite and stepper.leading(e, row, 0)[0]:
+                return {("exit", surface, guard.side): 1, ("surface", surface, guard.side): 2}
+    return {}
 
 
 def _entries(stepper: Stepper, active: Sequence[int]) -> list[int]:

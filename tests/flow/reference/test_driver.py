@@ -509,3 +509,26 @@ def test_a_state_that_does_not_move_from_its_surface_has_no_unique_future(engine
         assert run.status is ns.Status.NON_UNIQUE and "tangent" in run.message
         beside = ns.simulate(system, [1.0, 1e-3], 1.0, engine=engine)
         assert beside.itinerary == "+" and beside.status is ns.Status.REACHED_END
+
+
+def test_a_run_goes_on_from_where_its_sliding_ended():
+    """Whatever rounding of terms that cancel leaves of a rate that is zero there."""
+    a, u = ca.SX.sym("a"), 1000 * x
+    large = 7.3 * ca.cos(u) - 7.2 * kap * ca.cos(u)
+    system = ns.FilippovSystem(
+        [x, v, z],
+        field=[1e-4, ca.sin(3 * u) - a * lam * ca.exp(u) + large, -0.01 * kap],
+        surfaces=[v, z - 5],
+        multipliers=[lam, kap],
+        parameters={a: 0.3},
+    )
+    ended = 0
+    for value in np.linspace(0.12, 0.79, 40):
+        given = {"a": value}
+        run = ns.simulate(system, [-3e-4, 0.0, 9.0], 12.0, parameters=given)
+        for event in events(run, "exit"):
+            then = ns.simulate(system, event.x, 12.0, t_start=event.t, parameters=given)
+            assert then.status is ns.Status.REACHED_END
+            assert then.x[-1] == pytest.approx(run.x[-1], abs=1e-8)
+            ended += 1
+    assert ended > 15

@@ -177,6 +177,7 @@ def _lanes_head(system: FilippovSystem, order: int) -> tuple[str, str]:
         f"#define CANCELLED {int(cancelled)}\n#define ROWS {len(rows)}\n"
         f"#define GUARDS {len(checked)}\n"
         f"#define CURVED {int(bool(affine) and not is_flat(system))}\n"
+        f"#define LINEAR {int(all(_affine_modes(system)))}\n"
         f"static const int DIRECTION[] = {{{directions}}};\n"
         f"static const long long AFFINE_MODES[] = {{{_list(_affine_modes(system))}}};\n"
         f"static const int ROW[] = {{{_list(rows) or 0}}}, SLOT[] = {{{_list(checked) or 0}}};\n"

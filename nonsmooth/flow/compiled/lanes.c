@@ -8,10 +8,10 @@
  * neighbours.
  *
  * The generated text defines, besides what common.h asks for: N states with time, ND without, M surfaces,
- * TIMED whether time is a state, W, SLOTS guards (surface or exit to +,
- * exit to -, stops), STOPS, DIRECTION[STOPS], AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding), CANCELLED,
- * CURVED, prepare(p, q), jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values;
- * ROW[ROWS] of the field and SLOT[GUARDS] are not affine, and check_values gives them.
+ * TIMED whether time is a state, W, SLOTS guards (surface or exit to +, exit to -, stops), STOPS, DIRECTION[STOPS],
+ * AFFINE[SLOTS], AFFINE_MODES[3] (above, below, sliding), LINEAR whether all are, CANCELLED, CURVED, prepare(p, q),
+ * jet(x, q, slides, above, lambda, c, g), surface_values, lie_values, stop_values; ROW[ROWS] of the field and SLOT[GUARDS]
+ * are not affine, and check_values gives them.
  */
 #define S1 (SLOTS > 0 ? SLOTS : 1)
 #define FIRST_STOP (SLOTS - STOPS)

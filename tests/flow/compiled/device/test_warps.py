@@ -94,7 +94,7 @@ def counted(name, each=12):
 
 
 @pytest.mark.parametrize(
-    ("name", "together", "most"), [("linear", 0.66, 4500), ("nonlinear", 0.79, 25500)]
+    ("name", "together", "most"), [("linear", 0.71, 4500), ("nonlinear", 0.79, 25500)]
 )
 def test_warps(name, together, most):
     words, threads, count = counted(name)

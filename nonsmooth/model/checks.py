@@ -7,6 +7,7 @@ than an intention, so it is refused even where Python or NumPy would convert it.
 from __future__ import annotations
 
 import math
+import sys
 from typing import Any
 
 import casadi as ca
@@ -82,7 +83,7 @@ def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArra
         return np.array(np.nan)  # no axis: the caller says which shape is expected
     try:
         array = np.asarray(values)
-        fits = array.dtype.kind in "iuf" and not np.ma.is_masked(values)
+        fits = array.dtype.kind in "iuf" and not _is_masked(values)
         if array.dtype.kind == "O":
             fits = array.size > 0 and all(_number(v) for v in array.ravel())
         if fits or array.size == 0:
@@ -98,6 +99,12 @@ def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArra
             "or missing values.",
         )
     )
+
+
+def _is_masked(values: Any) -> bool:
+    """Whether some numbers are missing. Who has such arrays has loaded numpy.ma, a third of the first run's time."""
+    ma = sys.modules.get("numpy.ma")
+    return ma is not None and bool(ma.is_masked(values))
 
 
 def _number(value: Any) -> bool:

@@ -1,5 +1,8 @@
 """What a user gives is read strictly, and every refusal is a NonsmoothError that says what is wrong."""
 
+import subprocess
+import sys
+
 import casadi as ca
 import numpy as np
 import pytest
@@ -184,3 +187,17 @@ def test_a_surface_of_time_alone_is_refused_with_the_way_out():
 def test_other_wrong_arguments(call, message):
     with pytest.raises(ns.NonsmoothError, match=message):
         call()
+
+
+def test_a_first_run_loads_no_masked_arrays():
+    """NumPy loads them when asked, which takes as long as a third of a first run."""
+    code = (
+        "import sys, casadi as ca, numpy, nonsmooth as ns\n"
+        "before = 'numpy.ma' in sys.modules\n"
+        "x = ca.SX.sym('x')\n"
+        "ns.simulate(ns.FilippovSystem([x], field=[-x]), [1], 1.0)\n"
+        "print(before, 'numpy.ma' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    before, after = done.stdout.split()
+    assert after == before

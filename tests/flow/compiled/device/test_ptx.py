@@ -10,12 +10,10 @@ import nonsmooth.textbook as textbook
 from benchmarks.problems import bounce_system, random_starts
 from nonsmooth.flow import on_device
 from nonsmooth.flow.compiled import find_compiler
-from nonsmooth.flow.compiled.codegen import supports_lanes
-from nonsmooth.flow.compiled.device.kernel import Kernel, Source
 from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.options import Options
-from nonsmooth.flow.results import Chunk
 from nonsmooth.flow.status import Status
+from tests.flow.compiled.device.cases import TAKEN, block_on_a_belt, ends
 from tests.flow.compiled.device.nvrtc import library
 from tests.flow.compiled.device.ptx import Interpreted, translated
 
@@ -26,27 +24,6 @@ pytestmark = [
 ]
 
 STARTS = np.random.default_rng(3).normal(size=(300, 2)) * 0.8
-
-
-def block_on_a_belt():
-    x, v, t, belt, friction = (ca.SX.sym(s) for s in ("x", "v", "t", "belt", "friction"))
-    return ns.FilippovSystem(
-        [x, v],
-        surface=v - belt,
-        above=[v, -x - friction - 0.1 * v + 0.2 * t],
-        below=[v, -x + friction - 0.1 * v + 0.2 * t],
-        parameters={belt: 0.3, friction: 0.4},
-        stops=[ns.Stop(x + 1.5, -1, "far")],
-        time=t,
-    )
-
-
-def ends(machine, system, x, options, p=None, at=None):
-    chunk = Chunk.empty(len(x), system, at is not None)
-    p = system.parameter_vector() if p is None else p
-    kernel = Kernel(system, options.order, machine)
-    kernel.run(Source.rows(x), 0, len(x), p, options, at, chunk)
-    return chunk
 
 
 def same_bits(one, two):
@@ -142,11 +119,9 @@ def test_functions_of_the_card(name):
 FORCED = {"belt_oscillator", "forced_dry_friction"}
 
 
-@pytest.mark.parametrize("name", sorted(textbook.PROBLEMS))
+@pytest.mark.parametrize("name", TAKEN)
 def test_textbook_problems(name):
     problem = textbook.by_name(name)
-    if not supports_lanes(problem.system) or problem.system.sets:
-        pytest.skip("not for a card")
     scale = 0.1 * (1 + np.abs(problem.start))
     x = problem.start + scale * np.random.default_rng(1).normal(size=(64, len(problem.start)))
     p = problem.system.parameter_vector(problem.parameters)

@@ -9,29 +9,15 @@ import nonsmooth.textbook as textbook
 from benchmarks.problems import bounce_system, random_starts
 from nonsmooth.flow import on_device
 from nonsmooth.flow.compiled import find_compiler, lanes
-from nonsmooth.flow.compiled.codegen import supports_lanes
-from nonsmooth.flow.compiled.device.kernel import Kernel, Source, word_of
+from nonsmooth.flow.compiled.device.kernel import word_of
 from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.facts import HAND_OVER
 from nonsmooth.flow.options import Options
-from nonsmooth.flow.results import Chunk
+from tests.flow.compiled.device.cases import TAKEN, block_on_a_belt, ends
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
 LOOSE = Options(t_end=3.0, rtol=1e-5, atol=1e-5)
-
-
-def block_on_a_belt():
-    x, v, t, belt, friction = (ca.SX.sym(s) for s in ("x", "v", "t", "belt", "friction"))
-    return ns.FilippovSystem(
-        [x, v],
-        surface=v - belt,
-        above=[v, -x - friction - 0.1 * v + 0.2 * t],
-        below=[v, -x + friction - 0.1 * v + 0.2 * t],
-        parameters={belt: 0.3, friction: 0.4},
-        stops=[ns.Stop(x + 1.5, -1, "far")],
-        time=t,
-    )
 
 
 STARTS = np.random.default_rng(3).normal(size=(200, 2)) * 0.8
@@ -61,18 +47,11 @@ def plain_lanes(system, x, p, options, at, monkeypatch):
     return lanes.Lanes(system, options.order).run_many(x, p, options, at)
 
 
-def on_shim(system, x, p, options, at, machine):
-    chunk = Chunk.empty(len(x), system, at is not None)
-    kernel = Kernel(system, options.order, machine)
-    kernel.run(Source.rows(x[:, : system.dimension]), 0, len(x), p, options, at, chunk)
-    return chunk
-
-
 def compared(system, x, options, machine, monkeypatch, at=None, p=None):
     """Trajectories that neither hands over: both results, and how many there are."""
     x = np.concatenate([x, np.full((len(x), int(system.time_dependent)), options.t_start)], axis=1)
     p = system.parameter_vector() if p is None else p
-    one = on_shim(system, x, p, options, at, machine)
+    one = ends(machine, system, x, options, p, at)
     two = plain_lanes(system, x, p, options, at, monkeypatch)
     # What only this processor resolves is handed over by the kernel; what the lanes cannot, by both.
     assert np.all(one.status[two.status == HAND_OVER] == HAND_OVER)
@@ -135,7 +114,7 @@ def test_a_share_of_threads_changes_nothing(system):
     for blocks in (1, 2, 50):
         x = np.concatenate([STARTS, np.zeros((len(STARTS), 1))], axis=1)
         machine = Shim(fused=False, blocks=blocks)
-        results.append(on_shim(system, x, p, LOOSE, None, machine))
+        results.append(ends(machine, system, x, LOOSE, p))
     for other in results[1:]:
         assert np.array_equal(results[0].x, other.x)
         assert np.array_equal(results[0].itinerary, other.itinerary)
@@ -162,21 +141,11 @@ def test_bounces(name, monkeypatch):
     system, x, options = bounce_system(name), random_starts(2000, seed=5), Options(t_end=100.0)
     done = compared(system, x, options, Shim(fused=False), monkeypatch)
     assert done.mean() > 0.97
-    one, two = (
-        on_shim(system, x, system.parameter_vector(), options, None, Shim(fused=fused))
-        for fused in (False, True)
-    )
+    one, two = (ends(Shim(fused=fused), system, x, options) for fused in (False, True))
     assert np.array_equal(one.status, two.status)
     assert [one.words[k] for k in one.itinerary] == [two.words[k] for k in two.itinerary]
     np.testing.assert_allclose(one.x[done], two.x[done], rtol=0, atol=1e-14)
     np.testing.assert_allclose(one.t[done], two.t[done], rtol=0, atol=1e-14)
-
-
-TAKEN = sorted(
-    name
-    for name in textbook.PROBLEMS
-    if supports_lanes(textbook.by_name(name).system) and not textbook.by_name(name).system.sets
-)
 
 
 @pytest.mark.slow

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.orbit.flight import Flights
+from nonsmooth.orbit.runs.flight import Flights
 
 from .measure import Timing, alternate
 from .peers import scipy_shooting

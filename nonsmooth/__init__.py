@@ -97,7 +97,6 @@ from .orbit import (
     TraceError,
     VirtualOrbitError,
     basins,
-    continuation,
     continue_bifurcation,
     continue_equilibrium,
     continue_orbit,
@@ -113,6 +112,7 @@ from .orbit import (
     trace_two_folds,
     vjp,
 )
+from .solvers import continuation
 
 if TYPE_CHECKING:
     from . import plot, textbook

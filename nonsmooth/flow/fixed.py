@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError, Evaluator
+from ..model.derivatives.variational import ORDER
 from ..model.printing.tape import Series, Values
-from ..model.variational import ORDER
 from .compiled.shooting import FollowedProgram
 from .compiled.smooth import LegsProgram, SmoothProgram, ValuesProgram
 from .compiled.tape import library

@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 
 from ..model import OptionError, explain, real, whole
-from .facts import SAFETY
+from .constants import SAFETY
 from .section import Hits
 
 

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, FilippovSystem
-from ..model.cards import card
+from ..notebook import card
 from . import tables
-from .facts import KINDS, SIMPLE_KINDS
+from .constants import KINDS, SIMPLE_KINDS
 from .saving import Savable
 from .status import Status
 

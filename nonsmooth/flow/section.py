@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..model import Array, OptionError, periods, whole
-from .facts import KINDS
+from .constants import KINDS
 from .saving import savable
 from .trajectory import Event
 

@@ -7,7 +7,7 @@ from typing import TypeVar
 from weakref import WeakSet
 
 from ..model import OptionError, explain
-from .compiled.compilers import ADVICE, CompilerError, find_compiler
+from .compiled.building.compilers import ADVICE, CompilerError, find_compiler
 from .warn import CompilerWarning, warn_once
 
 __all__ = ["ENGINES", "CompilerWarning", "compiled_or_none", "use_compiled"]

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, PointError, real_array
-from ..model.cards import card, lines
+from ..notebook import card, lines
 from . import tables
 from .saving import Savable, savable
 from .status import Status

@@ -23,7 +23,7 @@ from ..model import (
     surface_of,
     with_section,
 )
-from .facts import AT_END
+from .constants import AT_END
 from .options import Options
 from .section import KINDS_OF_SECTIONS, Hits, Section, Times
 from .trajectory import Trajectory

@@ -12,17 +12,9 @@ from functools import cached_property
 import numpy as np
 
 from ..model import Array
-from ..model.variational import GuardedField
+from ..model.derivatives.variational import GuardedField
 from .compiled.smooth import WatchProgram
-from .fixed import (
-    MOST_STEPS,
-    TOLERANCE,
-    flow_for,
-    has_interpreter,
-    program_of,
-    steps_for,
-    stuck,
-)
+from .fixed import MOST_STEPS, TOLERANCE, flow_for, has_interpreter, program_of, steps_for, stuck
 from .reference.polynomial import first_crossing, first_root, sign_changes
 
 

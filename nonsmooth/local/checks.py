@@ -2,23 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
-from ..model import DefinitionError, FilippovSystem, explain, real, require_system
+from ..model import DefinitionError, FilippovSystem, explain, require_system
 
 #: A class that is closer than this to a change is not named.
 MARGIN = 1e-6
-
-
-def positive(value: float, name: str) -> float:
-    """Return a positive finite number or raise OptionError."""
-    return real(
-        value,
-        name,
-        expected="a positive finite number",
-        advice="Leave it out for the default.",
-        low=math.nextafter(0.0, 1.0),
-    )
 
 
 def require_surface(system: FilippovSystem) -> None:

@@ -7,11 +7,11 @@ from fractions import Fraction
 from typing import Any
 
 from ..model import FilippovSystem
-from .algebra import Difference
-from .arithmetic import Numbers, ends, exact, fraction
-from .described import Written
-from .flint import arb
-from .tape import Program
+from .arithmetic.algebra import Difference
+from .arithmetic.flint import arb
+from .arithmetic.instructions import Program
+from .arithmetic.intervals import Numbers, ends, exact, fraction
+from .surface_functions import Written
 
 FORMAT = "nonsmooth proof 1"
 

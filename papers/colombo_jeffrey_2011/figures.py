@@ -14,7 +14,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 import nonsmooth as ns
-from nonsmooth.plot.two_fold_map import FILLS
+from nonsmooth.plot.two_folds.class_map import FILLS
 
 from .. import look
 from ..pictures import Picture

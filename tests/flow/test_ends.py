@@ -4,7 +4,7 @@ import casadi as ca
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled.build import find_compiler
+from nonsmooth.flow.compiled.building.build import find_compiler
 
 x, y, u, v, lam, kap, r = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "lam", "kap", "r"))
 

@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
-from ..facts import GUARDS, KINDS
+from ..constants import GUARDS, KINDS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
-from .build import CompilerError
+from .building.build import CompilerError
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 BURST = 4096

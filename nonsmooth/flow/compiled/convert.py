@@ -6,7 +6,7 @@ import math
 
 from ...model import Array, FilippovSystem
 from .. import messages
-from ..facts import KINDS, REASONS
+from ..constants import KINDS, REASONS
 from ..options import Options
 from ..status import ADVICE, Status
 from ..trajectory import Event, Segment, Steps, Trajectory

@@ -17,7 +17,7 @@ from itertools import product
 import numpy as np
 
 from ...model import Array, Coupled, Evaluator, FilippovSystem, Surfaces
-from ..facts import ON_SURFACE
+from ..constants import ON_SURFACE
 from ..options import Options
 from .modes import rounding_scale
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ...model import Array, Coupled, FilippovSystem, Guard, Resets, Surfaces, coupled_of
 from .. import messages
-from ..facts import ON_SURFACE, PRIORITY, VANISHES, change
+from ..constants import ON_SURFACE, PRIORITY, VANISHES, change
 from ..options import Options
 from ..status import Status
 from ..trajectory import Trajectory

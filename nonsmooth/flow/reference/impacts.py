@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import Guard, coupled_of
 from .. import messages
-from ..facts import change
+from ..constants import change
 from ..status import Status
 from .contacts import Contacts
 

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Array, Coupled
-from ...model.frozen import Frozen, frozen
-from ...model.limit_directions import leaving_direction, limit_directions_of
-from ...model.multipliers import is_stable, sliding_multipliers
-from ..facts import EPSILON
+from ...model.laws.frozen import Frozen, frozen
+from ...model.laws.limit_directions import leaving_direction, limit_directions_of
+from ...model.laws.multipliers import is_stable, sliding_multipliers
+from ..constants import EPSILON
 
 if TYPE_CHECKING:
     from .modes import Expansion

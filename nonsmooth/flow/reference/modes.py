@@ -13,8 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
-from ...model.frozen import Frozen
-from ..facts import SAFETY
+from ...model.laws.frozen import Frozen
+from ..constants import SAFETY
 from ..options import Options
 
 #: What is larger may have derivatives that are infinite.

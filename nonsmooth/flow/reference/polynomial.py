@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import OptionError
-from ..facts import DEPTH, ROUNDING
+from ..constants import DEPTH, ROUNDING
 
 
 @lru_cache(maxsize=64)

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Array, FilippovSystem, Guard, multiplier_enters
-from ...model.frozen import field_at, frozen
-from ...model.multiplier_series import unit
-from ..facts import EPSILON, LEFT, OVERFLOW, REACHED, SHORTEST, TENFOLD, VANISHES
+from ...model.laws.frozen import field_at, frozen
+from ...model.laws.multiplier_series import unit
+from ..constants import EPSILON, LEFT, OVERFLOW, REACHED, SHORTEST, TENFOLD, VANISHES
 from .modes import rounding_scale, tolerances
 
 if TYPE_CHECKING:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
 from .. import messages
-from ..facts import (
+from ..constants import (
     AT_END,
     BEFORE_EVENT,
     CHECKS,

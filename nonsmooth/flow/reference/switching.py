@@ -16,10 +16,11 @@ from itertools import product
 
 import numpy as np
 
-from ...model import Array, complementarity
-from ...model.frozen import Frozen
+from ...model import Array
+from ...model.laws import complementarity
+from ...model.laws.frozen import Frozen
 from .. import messages
-from ..facts import TANGENT, VANISHES
+from ..constants import TANGENT, VANISHES
 from ..status import Status
 from .laws_of_sets import bounded_multipliers
 from .modes import Expansion, Modes

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...model import OptionError
-from ..checks import positive
+from ...model.checks import positive
 from .reduced_flow import ReducedFlow
 
 MIXED = ("VI", "IV")

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...model import Array, OptionError, PointError, real, real_array
-from ..checks import positive
+from ...model.checks import positive
 from .reduced_flow import ReducedFlow
 
 Nu = tuple[float, float]

@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..graph import instructions
-from ..jets import Coefficient, expansion_of, scaled, value_of
-from ..motion import motion
-from ..span import in_span
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
+from ..expressions.dependent_rows import in_span
+from ..expressions.graph import instructions
+from ..expressions.jets import Coefficient, expansion_of, scaled, value_of
+from ..laws.motion import motion
 
 #: A field made of these is as safe to evaluate at lambda = +-1 as at a fixed sign.
 _ENTIRE = {"const", "input", "add", "sub", "mul", "neg", "sq", "twice", "sin", "cos", "not"}

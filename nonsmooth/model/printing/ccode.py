@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..graph import Node, instructions
+from ..expressions.graph import Node, instructions
 
 #: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
 _ARITHMETIC = {

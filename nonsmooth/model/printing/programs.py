@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
 from .blend import Blend, blended_jet
 from .ccode import Program
 

@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..coupled import Coupled
-from ..economy import economise
-from ..graph import depends_on, instructions
-from ..jets import Coefficient, Expansion, Expressions, scaled, value_of
-from ..rules import lower, touched
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
+from ..expressions.graph import depends_on, instructions
+from ..expressions.jets import Coefficient, Expansion, Expressions, scaled, value_of
+from ..expressions.simplification import economise
+from ..expressions.taylor_rules import lower, touched
+from ..laws.coupled import Coupled
 from .ccode import Program
 
 #: Lines of functions that are short.

@@ -14,11 +14,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..coupled import Coupled
-from ..economy import economise
-from ..graph import depends_on, instructions
-from ..numbers import BINARY, UNARY
-from ..rules import RULES, Rule, entered, lower
+from ..expressions.float_arithmetic import BINARY, UNARY
+from ..expressions.graph import depends_on, instructions
+from ..expressions.simplification import economise
+from ..expressions.taylor_rules import RULES, Rule, entered, lower
+from ..laws.coupled import Coupled
 from ..values import Array
 
 Integers = NDArray[np.int32]

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model import Array, FilippovSystem
-from ...facts import HAND_OVER, SIMPLE_KINDS
+from ...constants import HAND_OVER, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk
 from ...status import Status
-from ..codegen import device_source
+from ..building.codegen import device_source
 from .machine import Machine
 
 #: Kinds of starts, by number in kernel.c.

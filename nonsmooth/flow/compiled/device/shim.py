@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..build import build
+from ..building.build import build
 from .machine import Argument, numbers
 
 _STAND = """

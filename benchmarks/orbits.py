@@ -32,19 +32,7 @@ TOLERANCES = (1e-9, 1e-11, 1e-13)
 
 @dataclass(frozen=True)
 class Case:
-    """A periodic orbit with its truth.
-
-    Attributes
-    ----------
-    solve : callable
-        The orbit by this library.
-    state : dict of int to float
-        Entries of the state after a return, in the order of the peer.
-    time : float
-        Of a return.
-    multipliers : tuple of complex
-        Of the return map, without structural ones.
-    """
+    """A periodic orbit with its truth."""
 
     solve: Callable[[], ns.PeriodicOrbit]
     state: dict[int, float]

@@ -24,22 +24,7 @@ _NUMBER = "{:.4g}"
 
 
 def card(title: str, rows: Iterable[tuple[str, object]], picture: str = "") -> str:
-    """Return HTML of a title and rows of a name and a value, beside a picture.
-
-    Parameters
-    ----------
-    title : str
-        The first line.
-    rows : iterable of (str, object)
-        What is shown by its ``str``; empty values are left out.
-    picture : str, optional
-        SVG, as :func:`lines` and :func:`circle` return it.
-
-    Examples
-    --------
-    >>> print(card("A <thing>", [("size", 3), ("name", "")]))
-    <div><b>A &lt;thing&gt;</b><table><tr><td>size</td><td>3</td></tr></table></div>
-    """
+    """Return HTML of a title and rows of a name and a value, beside a picture."""
     shown = [(name, _cell(value)) for name, value in rows]
     body = "".join(
         f"<tr><td>{html.escape(name)}</td><td>{value}</td></tr>" for name, value in shown if value
@@ -54,17 +39,7 @@ def _cell(value: object) -> str:
 
 
 def lines(t: ArrayLike, columns: ArrayLike, names: Sequence[str]) -> str:
-    """Draw values over time, each between its own extremes; SVG.
-
-    Parameters
-    ----------
-    t : array_like (m,)
-        Where the values are; what is not finite is left out.
-    columns : array_like (m, n)
-        The values; the first six columns are drawn.
-    names : sequence of n str
-        What the columns are called.
-    """
+    """Draw values over time, each between its own extremes; SVG."""
     along, values = np.asarray(t, float), np.asarray(columns, float)
     keep = np.unique(np.linspace(0, len(along) - 1, min(len(along), _MOST)).astype(int))
     along, values = along[keep], values[keep]

@@ -14,20 +14,8 @@ from .trajectory import Event, Segment, Steps, Trajectory
 
 
 def forward(run: Trajectory) -> Trajectory:
-    """Read a trajectory that was followed backward in time from its end to its start.
-
-    The events are left out, but for the end.
-
-    Parameters
-    ----------
-    run : Trajectory
-        With one mode, as ``follow`` returns.
-
-    Returns
-    -------
-    Trajectory
-        The same curve; each step's polynomial is expanded about its other end.
-    """
+    """Read a trajectory that was followed backward in time from its end to its start."""
+    # The events are left out, but for the end.
     mode, count = run.segments[0].mode, len(run.steps)
     starts, coefficients = np.zeros(count), []
     for k, (begin, c) in enumerate(zip(run.steps.starts, run.steps.coefficients, strict=True)):
@@ -46,18 +34,7 @@ def forward(run: Trajectory) -> Trajectory:
 
 
 def straight(run: Trajectory, t: float, x: Array) -> Trajectory:
-    """Return a straight piece from (t, x) to the start of ``run``, in the mode of ``run``.
-
-    Parameters
-    ----------
-    run : Trajectory
-    t : float
-    x : ndarray (n,)
-
-    Returns
-    -------
-    Trajectory
-    """
+    """Return a straight piece from (t, x) to the start of ``run``, in the mode of ``run``."""
     end, mode = float(run.t[0]), run.segments[0].mode
     slope = (run.x[0] - x) / (end - t)
     return replace(
@@ -92,21 +69,7 @@ def until(run: Trajectory, t: float) -> Trajectory:
 
 
 def join(pieces: Sequence[Trajectory]) -> Trajectory:
-    """Put pieces end to end; each starts where and when the one before it ends.
-
-    The status is that of the last piece. Where the mode changes at a seam an event says so, of kind
-    ``entry``, ``exit`` or ``crossing`` and with the name ``chosen``. What ended the other pieces,
-    and zeros that ``follow`` reported, are left out.
-
-    Parameters
-    ----------
-    pieces : sequence of Trajectory
-        Forward in time, at least one.
-
-    Returns
-    -------
-    Trajectory
-    """
+    """Put pieces end to end; each starts where and when the one before it ends."""
     pieces = [p for p in pieces[:-1] if len(p.steps)] + [pieces[-1]]
     times, states = [pieces[0].t], [pieces[0].x]
     events: list[Event] = []

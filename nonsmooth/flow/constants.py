@@ -152,13 +152,7 @@ RUNNING, FULL, HAND_OVER = -1, -2, -3
 
 
 def change(before: str, after: str) -> str:
-    """Kind of the event by which one mode follows another.
-
-    Examples
-    --------
-    >>> change("+", "s"), change("s+", "-+"), change("+", "-"), change("o", "c")
-    ('entry', 'exit', 'crossing', 'contact')
-    """
+    """Kind of the event by which one mode follows another."""
     closed = after.count("c") - before.count("c")
     if closed:
         return "contact" if closed > 0 else "release"

@@ -52,13 +52,7 @@ def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
 def parameter_index(
     system: FilippovSystem, name: str, what: str = "parameter", advice: str = "Give its name."
 ) -> int:
-    """Return which of its parameters a system calls by a name.
-
-    Raises
-    ------
-    DefinitionError
-        None of them.
-    """
+    """Return which of its parameters a system calls by a name."""
     if name not in system.parameter_names:
         raise DefinitionError(
             explain(

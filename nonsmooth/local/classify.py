@@ -58,13 +58,7 @@ def meeting_at(
     mode: str | None,
     tol: float,
 ) -> Meeting | None:
-    """The intersection that a question is about, or None if it is about one surface.
-
-    Raises
-    ------
-    PointError
-        The point is not on the surfaces that slide in ``mode``.
-    """
+    """The intersection that a question is about, or None if it is about one surface."""
     require_system(system)
     if system.surface_count < 2:
         return None

@@ -47,13 +47,7 @@ def real(
     high: float = math.inf,
     error: type[NonsmoothError] = OptionError,
 ) -> float:
-    """Return a finite number from ``low`` to ``high`` or raise.
-
-    Examples
-    --------
-    >>> real(np.float32(0.5), "eps")
-    0.5
-    """
+    """Return a finite number from ``low`` to ``high`` or raise."""
     if not is_real(value) or not low <= float(value) <= high:
         raise error(explain(what, expected=expected, received=repr(value), advice=advice).rstrip())
     return float(value)
@@ -71,10 +65,8 @@ def whole(value: Any, what: str, *, least: int = 1, advice: str = "") -> int:
 
 
 def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArray[np.float64]:
-    """Return an array of real numbers, NaN and inf included, or raise PointError.
-
-    A CasADi column or row is one axis.
-    """
+    """Return an array of real numbers, NaN and inf included, or raise PointError."""
+    # A CasADi column or row is one axis.
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and type(values) is np.ndarray:
         return values
     if isinstance(values, ca.DM) and 1 in values.shape:

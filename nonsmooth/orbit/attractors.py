@@ -48,20 +48,7 @@ class Attractor:
 
 
 class Search:
-    """Runs in rounds, and the attractors that they show.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    starts : ndarray (m, n)
-    t_start, t_end, section, near, samples, rounds, parameters, tol, work
-        As in :func:`basins`, read.
-
-    Attributes
-    ----------
-    labels : ndarray of int32 (m,)
-    found : list of Attractor
-    """
+    """Runs in rounds, and the attractors that they show."""
 
     def __init__(
         self,

@@ -27,18 +27,7 @@ _DETOUR = 0.3  # by which the way over an event may be longer than its chord
 
 @dataclass
 class Sample:
-    """A point of a line.
-
-    Attributes
-    ----------
-    value, height : float
-        Of the parameter, and what is drawn over it.
-    solution
-        What says whether it is stable; None at an event, after which the line goes on as the next
-        sample says.
-    curve, u
-        The equations that it solves, and their unknowns (N,); None where chords beside it are not divided.
-    """
+    """A point of a line."""
 
     value: float
     height: float
@@ -50,31 +39,7 @@ class Sample:
 def line_of(
     one: Branch, measure: Callable[[Any], float], shape: tuple[float, float] = (1.0, 1.0)
 ) -> list[Sample]:
-    """The samples of a branch in their order: nodes, the events between them, and what is solved for.
-
-    Parameters
-    ----------
-    one : Branch
-    measure : callable
-        What is drawn, as a function of a solution.
-    shape : (float, float), optional
-        Width and height of the picture, in any unit.
-
-    Returns
-    -------
-    list of Sample
-
-    Examples
-    --------
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
-    >>> s = ns.FilippovSystem([x, y], surface=y, above=[mu - x**2, 1 - y], below=[1, 1],
-    ...                       parameters={mu: 0.5})
-    >>> fold = ns.continue_equilibrium(s, [0.7, 1.0], "mu", bounds=(-1, 1))
-    >>> samples = line_of(fold, lambda at: at.point[0])
-    >>> all(abs(sample.value - sample.height**2) < 1e-12 for sample in samples)
-    True
-    """
+    """The samples of a branch in their order."""
     nodes = [
         Sample(float(value), measure(solution), solution, curve, point.u)
         for value, solution, (curve, point) in zip(

@@ -16,20 +16,7 @@ Range = Any
 
 
 class Written:
-    """The stored expressions of a system on a tape.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    moving : sequence of int, optional
-        Parameters that are taken as further states that do not change.
-
-    Attributes
-    ----------
-    tape : Tape
-    x, p : list of int
-        Input nodes of the extended states and the parameters.
-    """
+    """The stored expressions of a system on a tape."""
 
     def __init__(self, system: FilippovSystem, moving: Sequence[int] = ()):
         self.system = system
@@ -74,29 +61,7 @@ class Written:
 
 
 class Described:
-    """One surface of a system and what follows from its expressions.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    surface : int
-    mode : str, optional
-        The sides of the other surfaces, one letter for each surface.
-    written : Written, optional
-        The system on a tape; a new one by default.
-
-    Attributes
-    ----------
-    tape : Tape
-    x, p : list of int
-        Input nodes of the extended states and the parameters.
-    h : int
-    fields : (list of int, list of int)
-        F1 and F2, the rate of time included.
-    elsewhere : list of (str, int)
-        What must be positive where the fields are those of the mode: the sides of the other surfaces
-        and open gaps, in words and as nodes.
-    """
+    """One surface of a system and what follows from its expressions."""
 
     def __init__(
         self,
@@ -182,13 +147,7 @@ class Described:
 def parameter_ranges(
     system: FilippovSystem, given: Mapping[Any, Range] | None, numbers: Numbers
 ) -> list[tuple[Any, Any]]:
-    """Ends of the intervals of all parameters, as exact fractions.
-
-    Raises
-    ------
-    ParameterError
-        An unknown or missing parameter, an interval that is empty or not finite.
-    """
+    """Ends of the intervals of all parameters, as exact fractions."""
     intervals: dict[str, tuple[Any, Any]] = {}
     for key, value in (given or {}).items():
         name = key if isinstance(key, str) else str(key)

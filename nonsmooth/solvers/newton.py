@@ -33,28 +33,7 @@ _FAR = 1e8  # a longer step has left the problem
 def solve_many(
     equations: ManyEquations, starts: Array, *, tol: float, iterations: int = 10
 ) -> tuple[Array, NDArray[np.bool_]]:
-    """Find a root close to each start.
-
-    Parameters
-    ----------
-    equations : callable
-    starts : ndarray (k, n)
-    tol : float
-        Accepted residual, a distance relative to $1 + |x|$.
-    iterations : int, optional
-
-    Returns
-    -------
-    x : ndarray (k, n)
-        The last iterates.
-    converged : ndarray of bool (k,)
-
-    Examples
-    --------
-    >>> circles = lambda x, k: ((x**2).sum(axis=1, keepdims=True) - 1, 2 * x[:, None, :])
-    >>> solve_many(circles, np.array([[3.0, 4.0], [0.0, 0.0]]), tol=1e-12)
-    (array([[0.6, 0.8], [0. , 0. ]]), array([ True, False]))
-    """
+    """Find a root close to each start."""
     x = np.array(starts, dtype=float)
     residual = np.full(len(x), np.inf)
     index = np.arange(len(x))
@@ -94,23 +73,7 @@ _SHORT = 1e-11
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """What a search found.
-
-    Attributes
-    ----------
-    x : ndarray (n,)
-    residual : float
-        Largest distance |r_i|/|grad r_i| of the equations.
-    iterations : int
-        Iterations that Newton's method took; 0 where nothing was searched.
-    history : tuple of float
-        Residual at the start and after each step.
-    conditioning : float
-        Smallest over largest singular value of the normalised Jacobian.
-    linear : bool
-        Whether the last steps (six or more) gained less than a factor 5 each: a multiple root,
-        where the equations have dependent gradients.
-    """
+    """What a search found."""
 
     x: Array
     residual: float
@@ -170,30 +133,7 @@ def _damped(equations: Equations, at: _Values, step: Array) -> tuple[_Values, fl
 def solve(
     equations: Equations, start: Array, *, tol: float, max_iterations: int, what: str
 ) -> Root:
-    """Find a root close to ``start``.
-
-    Parameters
-    ----------
-    equations : callable
-        x (n,) -> values (m,), Jacobian (m, n).
-    start : ndarray (n,)
-    tol : float
-        Accepted residual, relative to $1 + |x|$; its square root at a multiple root.
-    max_iterations : int
-        Newton's method gives up after this many.
-    what : str
-        Named in messages, e.g. ``"two-fold"``.
-
-    Raises
-    ------
-    ConvergenceError, PointError, OptionError
-
-    Examples
-    --------
-    >>> circle = lambda x: (np.array([x @ x - 1]), 2 * x[None, :])
-    >>> solve(circle, np.array([3.0, 4.0]), tol=1e-12, max_iterations=20, what="circle").x
-    array([0.6, 0.8])
-    """
+    """Find a root close to ``start``."""
     positive(tol, "tol")
     if isinstance(max_iterations, bool) or int(max_iterations) != max_iterations:
         raise OptionError(f"max_iterations: expected a whole number, received {max_iterations!r}.")

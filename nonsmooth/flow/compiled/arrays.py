@@ -152,12 +152,7 @@ class Run:
 
 
 def require_size(size: Any, structure: type[ctypes.Structure]) -> None:
-    """Refuse a library whose structure is not laid out as ours.
-
-    Raises
-    ------
-    CompilerError
-    """
+    """Refuse a library whose structure is not laid out as ours."""
     size.restype = _I64
     if size() != ctypes.sizeof(structure):
         raise CompilerError(

@@ -84,16 +84,7 @@ def _layout(n: int, order: int) -> tuple[dict[str, tuple[int, tuple[int, ...]]],
 
 
 class Output:
-    """Arrays of a dense run, in a block of memory for each of steps, points and events.
-
-    Parameters
-    ----------
-    n : int
-        Extended dimension.
-    order : int
-    rooms : mapping, optional
-        What a run like this one took.
-    """
+    """Arrays of a dense run, in a block of memory for each of steps, points and events."""
 
     class Structure(ctypes.Structure):
         """``Output`` of the drivers."""
@@ -136,10 +127,8 @@ class Output:
         self._point_to(counts)
 
     def filled(self, counts: Sequence[int]) -> dict[str, NDArray[Any]]:
-        """Return the parts that were written: steps, points and events.
-
-        They are views of the blocks, unless nearly all of these would be kept for nothing.
-        """
+        """Return the parts that were written: steps, points and events."""
+        # They are views of the blocks, unless nearly all of these would be kept for nothing.
         found = {}
         for (kind, room), size in zip(self._rooms.items(), counts, strict=True):
             own = self._of(kind, size)
@@ -217,12 +206,7 @@ class _System(ctypes.Structure):
 
 @lru_cache(maxsize=1)
 def library() -> ctypes.CDLL:
-    """Return the interpreter, compiled when it is first asked for on a machine.
-
-    Raises
-    ------
-    CompilerError
-    """
+    """Return the interpreter, compiled when it is first asked for on a machine."""
     return _declared(build(interpreter_source()))
 
 
@@ -251,8 +235,7 @@ def _place(system: FilippovSystem, i: int) -> int:
 
 
 def tape_for(system: FilippovSystem, options: Options) -> TapeEngine | None:
-    """Return the interpreter with a system at the options' tolerance, or None where it has none: hidden
-    dynamics, and impacts with multipliers that enter in products."""
+    """Return the interpreter with a system at the options' tolerance, or None where it has none."""
     if any(system.nonlinear):
         return None
     if system.impacts and not coupled_of(system).affine:
@@ -297,16 +280,10 @@ _LONG = 20_000
 
 
 class TapeEngine:
-    """The driver in C with one system at one order.
+    """The driver in C with one system at one order."""
 
-    The interpreter runs it at once. Long runs go on, from a step to the next, in a program generated for
-    the system, which a compiler makes meanwhile: the same operations, so the same bits.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    order : int
-    """
+    # The interpreter runs it at once. Long runs go on, from a step to the next, in a program generated for
+    # the system, which a compiler makes meanwhile: the same operations, so the same bits.
 
     def __init__(self, system: FilippovSystem, order: int):
         self.system, self.order = system, order
@@ -321,12 +298,7 @@ class TapeEngine:
             self._special = Background(source, _declared)
 
     def compile(self) -> None:
-        """Wait for the program generated for the system; very large ones have none.
-
-        Raises
-        ------
-        CompilerError
-        """
+        """Wait for the program generated for the system; very large ones have none."""
         if self._special is not None:
             self._special.start()  # beside the interpreter, where that is not there yet
         library()
@@ -494,10 +466,8 @@ class TapeEngine:
         stop: Callable[[], bool] = lambda: False,
         times: Array | None = None,
     ) -> Chunk:
-        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,).
-
-        As ``Engine.run_many``, which is faster where many trajectories share a system.
-        """
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
+        # As ``Engine.run_many``, which is faster where many trajectories share a system.
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x = np.ascontiguousarray(x, float)

@@ -176,11 +176,9 @@ def chunk_arrays(chunk: Chunk) -> dict[str, NDArray[Any]]:
 
 
 def _unpacked(data: bytes, expected: dict[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
-    """Arrays of a file; ValueError unless they have the types and shapes expected.
-
-    Nothing is made larger than the file: its parts are not compressed, and an array that says that it
-    is of another size than it has to be is not read.
-    """
+    """Arrays of a file; ValueError unless they have the types and shapes expected."""
+    # Nothing is made larger than the file: its parts are not compressed, and an array that says that it
+    # is of another size than it has to be is not read.
     arrays: dict[str, NDArray[Any]] = {}
     with ZipFile(io.BytesIO(data)) as file:
         parts = {part.filename: part for part in file.infolist()}

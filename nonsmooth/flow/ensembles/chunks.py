@@ -31,23 +31,7 @@ ENGINES = ("reference", "tape", "lanes")
 
 @dataclass(frozen=True)
 class Job:
-    """What every chunk of an ensemble has in common; small, and the same for all of them.
-
-    Attributes
-    ----------
-    system : FilippovSystem or bytes
-        The system, or its pickle where the work leaves this process.
-    options : Options
-    at : (kind, count) or None
-        Event whose state is kept; the kind by its number.
-    times : Times or None
-        When runs are looked at.
-    room : int or None
-        Samples kept of each.
-    engine : str
-        One of ``ENGINES``: the reference driver, the driver in C, or a program generated for the system
-        that runs several trajectories in step.
-    """
+    """What every chunk of an ensemble has in common; small, and the same for all of them."""
 
     system: FilippovSystem | bytes
     options: Options
@@ -74,11 +58,9 @@ def run_chunk(
     out: Chunk | None = None,
     stop: Callable[[], bool] = lambda: False,
 ) -> Chunk:
-    """Run the trajectories from extended starts x (m, N) with parameters p (np,) or (m, np).
-
-    ``out`` has the arrays for the results, which are made unless given; ``stop`` is asked now and
-    then whether to raise Stopped.
-    """
+    """Run the trajectories from extended starts x (m, N) with parameters p (np,) or (m, np)."""
+    # ``out`` has the arrays for the results, which are made unless given; ``stop`` is asked now and
+    # then whether to raise Stopped.
     system = _unpickled(job.system) if isinstance(job.system, bytes) else job.system
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(len(x), bool)
     start = np.where(bad[:, None], np.nan, x) if bad.any() else x

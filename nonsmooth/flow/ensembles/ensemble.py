@@ -168,19 +168,8 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
 def engine_for(
     system: FilippovSystem, options: Options, engine: str, count: int, step: bool
 ) -> str:
-    """Return which of ``chunks.ENGINES`` runs; few trajectories are not worth generating a program.
-
-    It is compiled here, so that all chunks run the same one.
-
-    Parameters
-    ----------
-    system, options, engine
-        As of an ensemble.
-    count : int
-        How many trajectories there are.
-    step : bool
-        Whether they may run in step.
-    """
+    """Return which of ``chunks.ENGINES`` runs."""
+    # It is compiled here, so that all chunks run the same one.
     lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
     if not use_compiled(engine, tape is not None) or tape is None:
         return "reference"

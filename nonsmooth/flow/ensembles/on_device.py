@@ -20,15 +20,7 @@ CHUNK = 1 << 22
 
 
 def require_device(job: Job, device: str, executor: bool) -> None:
-    """Refuse what a GPU does not run, and a GPU that is not there.
-
-    Raises
-    ------
-    OptionError
-        A system, or an option, that only this processor serves.
-    DeviceError
-        No GPU, or nothing that drives it.
-    """
+    """Refuse what a GPU does not run, and a GPU that is not there."""
     system = job.system
     assert isinstance(system, FilippovSystem)
     wrong = _unsupported(system, job.options) or (
@@ -62,21 +54,7 @@ def _kernel(job: Job, device: str) -> Kernel:
 
 
 def run_there(job: Job, device: str, starts: Starts, first: int, out: Chunk) -> Chunk:
-    """Run the trajectories from ``first`` on that ``out`` has rows for; what is rare runs here.
-
-    Parameters
-    ----------
-    job : Job
-        Its engine runs what the GPU hands over.
-    device : str
-    starts : Starts
-    first : int
-    out : Chunk
-
-    Raises
-    ------
-    DeviceError
-    """
+    """Run the trajectories from ``first`` on that ``out`` has rows for; what is rare runs here."""
     kernel, count = _kernel(job, device), len(out.t)
     drawn = _drawn(starts)
     if drawn is not None:

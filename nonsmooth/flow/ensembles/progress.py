@@ -14,15 +14,7 @@ class _NoBar:
 
 
 def progress_bar(total: int | None, shown: bool, unit: str = "run") -> Any:
-    """Return a bar on a terminal, for work of more than a second; nothing elsewhere.
-
-    Parameters
-    ----------
-    total : int or None
-        None if it is not known.
-    shown : bool
-    unit : str, optional
-    """
+    """Return a bar on a terminal, for work of more than a second; nothing elsewhere."""
     if not shown:
         return _NoBar()
     from tqdm import tqdm  # here: it is not needed to import the library

@@ -20,23 +20,8 @@ from .lazy_starts import Drawn, Grid, Index, RandomStarts, part_of
 
 @dataclass(frozen=True)
 class Cut:
-    """Starts and parameters of some trajectories on their way to another process, small where a rule
-    makes them.
-
-    Attributes
-    ----------
-    p : ndarray (np,) or (m, np)
-        Parameters.
-    x : ndarray (m, N) or None
-        Extended starts, or None where they are made there.
-    drawn : Grid or RandomStarts, optional
-    shape : tuple of int
-        To which they are broadcast.
-    first, last : int
-        Numbers of the trajectories: first to last - 1.
-    t_start : float or None
-        The last extended state; None in systems without time.
-    """
+    """Starts and parameters of some trajectories on their way to another process, small where a
+    rule makes them."""
 
     p: Array
     x: Array | None = None
@@ -56,20 +41,7 @@ class Cut:
 
 
 class Starts:
-    """Starts and parameters, given out chunk by chunk.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    x0 : array_like (..., n), Grid or RandomStarts
-    parameters : mapping or None
-        Numbers, or arrays that broadcast with the starts.
-    t_start : float
-
-    Raises
-    ------
-    PointError, ParameterError
-    """
+    """Starts and parameters, given out chunk by chunk."""
 
     def __init__(
         self,
@@ -160,14 +132,7 @@ def _extended(x: Array, t_start: float | None) -> Array:
 
 
 def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Options) -> None:
-    """Refuse a start mode with another side than the start (N,) has.
-
-    Raises
-    ------
-    OptionError
-    DefinitionError
-        The system has no such mode.
-    """
+    """Refuse a start mode with another side than the start (N,) has."""
     if options.start_mode is None or not system.surface_count:
         return
     asked = options.start_mode

@@ -42,36 +42,15 @@ _CANNOT_RESERVE = (errno.EOPNOTSUPP, errno.EINVAL, errno.ENOSYS)
 
 
 class Stored(Checkpoint):
-    """Chunks whose rows are in mapped arrays.
-
-    Parameters
-    ----------
-    path : path-like
-        A folder; made if it is not there.
-    problem : str
-        Hash of everything the results depend on.
-    chunk : callable
-        Returns the size of a chunk, if the folder has none.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Chunks whose rows are in mapped arrays."""
 
     def __init__(self, path: str | os.PathLike[str], problem: str, chunk: Callable[[], int]):
         super().__init__(path, f"stored {problem}", chunk)
 
     @contextmanager
     def alone(self) -> Iterator[None]:
-        """Hold the folder for one run, since two would write to the same rows.
-
-        The system lets it go when the process ends, in whatever way.
-
-        Raises
-        ------
-        OptionError
-            Another run holds it; it cannot be written.
-        """
+        """Hold the folder for one run, since two would write to the same rows."""
+        # The system lets it go when the process ends, in whatever way.
         folder, own = self.folder.resolve(), object()
         try:
             if _AT_WORK.setdefault(folder, own) is not own:
@@ -103,13 +82,8 @@ class Stored(Checkpoint):
         )
 
     def arrays(self, like: Chunk, count: int) -> Chunk:
-        """Return arrays of ``count`` rows in the folder, of the types that the arrays of a chunk have.
-
-        Raises
-        ------
-        OptionError
-            A file is no such array, or cannot be made.
-        """
+        """Return arrays of ``count`` rows in the folder, of the types that the arrays of a chunk
+        have."""
         mapped: dict[str, Any] = {
             name: self._map(name, (count, *array.shape[1:]), array.dtype)
             for name, array in like.arrays().items()
@@ -157,12 +131,7 @@ class Stored(Checkpoint):
             return None
 
     def save(self, number: int, chunk: Chunk) -> None:
-        """Note that a chunk is finished, whose rows are in the arrays.
-
-        Raises
-        ------
-        OptionError
-        """
+        """Note that a chunk is finished, whose rows are in the arrays."""
         seal = self._seal(number, chunk.words, chunk_arrays(chunk)).hex()
         content = {"words": chunk.words, "totals": chunk.totals.tolist(), "seal": seal}
         try:
@@ -187,10 +156,8 @@ def _make(path: Path, shape: tuple[int, ...], dtype: np.dtype[Any]) -> None:
 
 
 def _reserve(path: Path) -> None:
-    """Take the room of a file on the disk, where that can be done.
-
-    A disk that is full when a row is written to a mapped array would end the process with a signal.
-    """
+    """Take the room of a file on the disk, where that can be done."""
+    # A disk that is full when a row is written to a mapped array would end the process with a signal.
     if not hasattr(os, "posix_fallocate"):
         return
     with path.open("r+b") as file:

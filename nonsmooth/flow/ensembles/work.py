@@ -171,23 +171,7 @@ def run_all(
     saved: Checkpoint | None,
     there: Callable[[int, Chunk], Chunk] | None = None,
 ) -> None:
-    """Run all trajectories, chunk by chunk, except those that are kept.
-
-    Parameters
-    ----------
-    job : Job
-    starts : Starts
-    results : Sink
-        Takes what is finished.
-    work : Work
-    size : int
-        Of a chunk.
-    saved : Checkpoint or None
-        Where finished chunks are kept.
-    there : callable, optional
-        Runs the trajectories from a number on that a chunk has rows for, one chunk after the other, in
-        the place of this processor.
-    """
+    """Run all trajectories, chunk by chunk, except those that are kept."""
     bar = progress_bar(starts.count, work.progress)
     missing = []
     for number in range(math.ceil(starts.count / size)):
@@ -217,16 +201,7 @@ def run_all(
 
 
 def size_of_chunk(job: Job, starts: Starts, workers: int, most: int = _LARGEST) -> int:
-    """Trajectories that take about as long as one chunk should; a few of them are run to know.
-
-    Parameters
-    ----------
-    job : Job
-    starts : Starts
-    workers : int
-    most : int, optional
-        Trajectories in a chunk at most, where they are worth more than one.
-    """
+    """Trajectories that take about as long as one chunk should; a few of them are run to know."""
     count, k, spent = starts.count, 1, 0.0
     if count < 2:
         return 1  # nothing to divide
@@ -254,8 +229,7 @@ def _probe(job: Job, starts: Starts, k: int) -> float:
 
 
 def _clock() -> float:
-    """Time that this thread has had a processor, however busy the machine is; all time where only ticks
-    of milliseconds are counted."""
+    """Time that this thread has had a processor, however busy the machine is."""
     fine = time.get_clock_info("thread_time").resolution < 1e-4
     return time.thread_time() if fine else time.perf_counter()
 
@@ -309,11 +283,9 @@ _T = TypeVar("_T")
 def _submit(
     work: Iterator[tuple[Any, ...]], submit: Callable[..., Future[_T]], limit: int
 ) -> Iterator[tuple[int, _T]]:
-    """Results with their numbers, as they are finished; so many are under way or wait to be taken.
-
-    A future is let go as soon as its result is there: a cluster keeps what a future stands for, and
-    computes it again where the worker that had it is lost.
-    """
+    """Results with their numbers, as they are finished."""
+    # A future is let go as soon as its result is there: a cluster keeps what a future stands for, and
+    # computes it again where the worker that had it is lost.
     pending: dict[int, Future[_T]] = {}
     finished: SimpleQueue[tuple[int, _T | None, BaseException | None]] = SimpleQueue()
     count = 0

@@ -19,26 +19,7 @@ from .record import Record
 def remaining_time(
     intervals: Sequence[float], patterns: Sequence[str], elapsed: float
 ) -> float | None:
-    """Estimate the time left until events accumulate, or None if they do not (yet).
-
-    Blocks of events with a repeating pattern shrink by a steady ratio r < 1 before a Zeno point,
-    so the time left is (last block) r/(1 - r). The estimate is given once it is below 1e-6 of the
-    time that the run has taken, so that the unit of time does not matter.
-
-    Parameters
-    ----------
-    intervals : sequence of float
-        Times between successive events.
-    patterns : sequence of str
-        What each event was; same length.
-    elapsed : float
-        Time since the start of the run, the scale of "small".
-
-    Examples
-    --------
-    >>> remaining_time([2.0**-k for k in range(40)], ["impact"] * 40, 2.0) < 1e-11
-    True
-    """
+    """Estimate the time left until events accumulate, or None if they do not (yet)."""
     if len(intervals) > AT_ONCE and not any(intervals[-AT_ONCE:]):
         return 0.0
     for lag in LAGS:
@@ -62,16 +43,7 @@ def remaining_time(
 
 
 class Bookkeeping:
-    """State of one run, and what is known of its past.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    x : ndarray (N,)
-        Extended start.
-    p : ndarray
-    options : Options
-    """
+    """State of one run, and what is known of its past."""
 
     def __init__(self, system: FilippovSystem, x: Array, p: Array, options: Options):
         self.system, self.p, self.options = system, p, options

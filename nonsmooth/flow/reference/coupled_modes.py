@@ -25,17 +25,7 @@ def modes_of(system: FilippovSystem, p: Array, options: Options) -> Modes:
 
 
 class CoupledModes:
-    """Modes of one program, with multipliers as numbers or series, in Python's doubles.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    coupled : Coupled
-    p : ndarray
-    options : Options
-    kinds : callable, optional
-        Guards of a mode, where they have other meanings than the program's.
-    """
+    """Modes of one program, with multipliers as numbers or series, in Python's doubles."""
 
     def __init__(
         self,

@@ -39,8 +39,7 @@ def resting(driver: Driver) -> list[int]:
 
 
 def strike_due(driver: Driver) -> None:
-    """Look at the closed gaps: one that is closing further is struck at once, one that opens has
-    a known zero."""
+    """Look at the closed gaps."""
     if driver.contacts is None or driver.ended is not None:
         return
     gaps, rates = driver.contacts.gaps(driver.x)

@@ -30,10 +30,8 @@ CLOSE = 1e-8
 
 
 def near(driver: Driver, guard: Guard, fell: bool = True) -> None:
-    """|h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer.
-
-    What has fallen to rounding is zero, whatever its direction says.
-    """
+    """|h| has fallen tenfold, or is small."""
+    # What has fallen to rounding is zero, whatever its direction says.
     own = list(driver.system.set_of[guard.index])
     if driver.mode[own[0]] == "s":
         return  # friction's limit has fallen: the next step sees its digits

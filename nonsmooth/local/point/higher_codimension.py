@@ -131,10 +131,8 @@ def limit_directions(
 
 
 def _attracts(law: Frozen, rate: float, u: Array) -> bool:
-    """Whether u' = ((1 - u u^T) (a - M u))/r, times r, is stable at an equilibrium.
-
-    Its linearisation in the plane across u is -(P M P + rate).
-    """
+    """Whether u' = ((1 - u u^T) (a - M u))/r, times r, is stable at an equilibrium."""
+    # Its linearisation in the plane across u is -(P M P + rate).
     k = len(u)
     across = np.linalg.svd(np.eye(k) - np.outer(u, u))[0][:, : k - 1]
     slope = across.T @ (law.m + rate * np.eye(k)) @ across

@@ -207,18 +207,7 @@ def _meeting(
 
 
 class Meeting:
-    """A point of some surfaces with its parameters.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        With two surfaces or more.
-    x : ndarray (N,)
-    p : ndarray
-    surfaces : list of int
-    letters : ndarray (m,), optional
-        Sides of the others; by default those of the point.
-    """
+    """A point of some surfaces with its parameters."""
 
     def __init__(
         self,
@@ -243,12 +232,7 @@ class Meeting:
         surfaces: Sequence[int] | None,
         tol: float,
     ) -> Meeting:
-        """The surfaces through a point, or those that are asked for.
-
-        Raises
-        ------
-        PointError, DefinitionError
-        """
+        """The surfaces through a point, or those that are asked for."""
         return cls(system, x, p, _meeting(system, x, p, surfaces, tol))
 
     def at(self, multipliers: Array) -> LayerNumbers:

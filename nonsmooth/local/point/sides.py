@@ -16,18 +16,7 @@ FIELDS: dict[str, str] = {"+": "F1 (above)", "-": "F2 (below)"}
 
 
 def side_index(side: object) -> int:
-    """0 for ``+`` and 1 for ``-``.
-
-    Raises
-    ------
-    DefinitionError
-        Another letter.
-
-    Examples
-    --------
-    >>> side_index("-")
-    1
-    """
+    """0 for ``+`` and 1 for ``-``."""
     if side not in SIDES:
         raise DefinitionError(
             explain(
@@ -41,11 +30,5 @@ def side_index(side: object) -> int:
 
 
 def other(side: Side) -> Side:
-    """The other side.
-
-    Examples
-    --------
-    >>> other("+")
-    '-'
-    """
+    """The other side."""
     return "-" if side == "+" else "+"

@@ -212,30 +212,7 @@ def place(
     *,
     smooth: bool = False,
 ) -> tuple[Place, Array]:
-    """Check the arguments that every function of this floor shares.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    point : array_like (n,)
-    parameters : mapping, optional
-    t : float, optional
-    surface : int, optional
-    mode : str, optional
-        One letter per surface; the letter of ``surface`` is replaced by ``s``. By default the
-        other surfaces take the signs of their functions at the point.
-    smooth : bool, optional
-        Whether the question makes sense without a surface.
-
-    Returns
-    -------
-    where : Place
-    x : ndarray (N,)
-
-    Raises
-    ------
-    PointError, ParameterError, DefinitionError
-    """
+    """Check the arguments that every function of this floor shares."""
     require_system(system)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
@@ -297,15 +274,8 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
 
 
 def on_surface(where: Place, x: Array, tol: float) -> Numbers:
-    """Evaluate at a point of the surface.
-
-    The point counts as on the surface when its distance is at most ``tol (1 + |x|)``.
-
-    Raises
-    ------
-    PointError
-        Off the surface, or grad h = 0, or not finite.
-    """
+    """Evaluate at a point of the surface."""
+    # The point counts as on the surface when its distance is at most ``tol (1 + |x|)``.
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):
         raise PointError(

@@ -14,14 +14,7 @@ _ROUNDING = 1e-9
 
 @dataclass(frozen=True)
 class Box:
-    """x0 <= x <= x1, y0 <= y <= y1.
-
-    Examples
-    --------
-    >>> box = Box.read(((0, 4), (-1, 1)))
-    >>> box.size, box.contains([[1, 0], [5, 0]])
-    (array([4., 2.]), array([ True, False]))
-    """
+    """x0 <= x <= x1, y0 <= y <= y1."""
 
     x0: float
     x1: float
@@ -30,12 +23,7 @@ class Box:
 
     @classmethod
     def read(cls, box: object) -> Box:
-        """Read (xmin, xmax, ymin, ymax), or two pairs.
-
-        Raises
-        ------
-        OptionError
-        """
+        """Read (xmin, xmax, ymin, ymax), or two pairs."""
         try:
             values = np.asarray(box, dtype=float).ravel()
         except (TypeError, ValueError):

@@ -11,14 +11,7 @@ from ...model import Array
 
 
 def zero_lines(lines: tuple[Array, Array], values: Array) -> list[Array]:
-    """Polylines (m, 2) on which a function of grid points vanishes; NaN counts as undefined.
-
-    Examples
-    --------
-    >>> u = np.linspace(-1, 1, 3)
-    >>> [line.tolist() for line in zero_lines((u, u), np.add.outer(0 * u, u - 0.5))]
-    [[[0.5, 1.0], [0.5, 0.0], [0.5, -1.0]]]
-    """
+    """Polylines (m, 2) on which a function of grid points vanishes; NaN counts as undefined."""
     if not (np.any(values > 0) and np.any(values < 0)):
         return []
     from contourpy import contour_generator  # of matplotlib, on which it does not depend
@@ -60,10 +53,8 @@ def sign_changes(values: Array) -> NDArray[np.int64]:
 def middle_of_sign_changes(
     lines: tuple[Array, Array], functions: Sequence[Array], keep: NDArray[np.bool_] | None = None
 ) -> Array:
-    """Middles (k, 2) of the grid cells in which all functions (rows, columns) change sign.
-
-    ``keep`` excludes cells; a cell with an undefined corner has no sign change.
-    """
+    """Middles (k, 2) of the grid cells in which all functions (rows, columns) change sign."""
+    # ``keep`` excludes cells; a cell with an undefined corner has no sign change.
     u, v = lines
     found = np.ones((len(v) - 1, len(u) - 1), dtype=bool) if keep is None else keep
     for f in functions:

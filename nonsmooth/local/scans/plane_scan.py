@@ -43,26 +43,7 @@ class Piece:
 
 @dataclass(frozen=True, eq=False)
 class PlaneScan:
-    """A planar system with one surface in a box.
-
-    Attributes
-    ----------
-    where : Place
-        The system, its surface and its parameters.
-    box : Box
-
-    Examples
-    --------
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> relay = ns.FilippovSystem(
-    ...     [x, y], surface=x + y, above=[y - x, 3 * y - 10], below=[y - x, 3 * y + 10])
-    >>> scan = PlaneScan.of(relay, {}, Box(-4.0, 4.0, -4.0, 4.0))
-    >>> [(f.side, f.kind) for f in scan.folds], [e.kind for e in scan.pseudo_equilibria]
-    ([('+', 'invisible'), ('-', 'invisible')], ['stable pseudo-node'])
-    >>> [piece.kind for piece in scan.pieces]
-    ['crossing', 'attracting', 'crossing']
-    """
+    """A planar system with one surface in a box."""
 
     where: Place
     box: Box
@@ -131,11 +112,9 @@ class PlaneScan:
 
     @cached_property
     def boundary_equilibria(self) -> list[Equilibrium]:
-        """Equilibria of a field on the surface, or too close to it for a picture of the box.
-
-        There the field is not only tangent but zero: it has no visible or invisible fold, and no
-        pseudo-equilibrium beside it.
-        """
+        """Equilibria of a field on the surface, or too close to it for a picture of the box."""
+        # There the field is not only tangent but zero: it has no visible or invisible fold, and no
+        # pseudo-equilibrium beside it.
         found = list[Equilibrium]()
         for fold in self.tangencies:
             for at in find_all(partial(self._equilibrium, side=fold.side), fold.point[None, :]):

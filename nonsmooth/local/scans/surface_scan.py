@@ -38,16 +38,7 @@ REGIONS = (Region.ATTRACTING, Region.REPELLING, Region.CROSSING_UP, Region.CROSS
 
 @dataclass(frozen=True, eq=False)
 class FoldCurve:
-    """Folds of one field along a curve over the box.
-
-    Attributes
-    ----------
-    side : {"+", "-"}
-        Of the field F1 or F2.
-    pieces : tuple of (ndarray (m, 2), bool)
-        Polylines between cusps, and whether the folds are visible.
-    cusps : ndarray (k, 2)
-    """
+    """Folds of one field along a curve over the box."""
 
     side: Side
     pieces: tuple[tuple[Array, bool], ...]
@@ -56,20 +47,7 @@ class FoldCurve:
 
 @dataclass(frozen=True, eq=False)
 class SurfaceScan:
-    """The surface of a system of three states over a box of two of them.
-
-    Attributes
-    ----------
-    where : Place
-        The system, its surface and its parameters.
-    box : Box
-    shown : (int, int)
-        Indices of the two coordinates.
-    left_out : int
-        Index of the third.
-    guess : float
-        Where the search for it starts.
-    """
+    """The surface of a system of three states over a box of two of them."""
 
     where: Place
     box: Box
@@ -86,13 +64,7 @@ class SurfaceScan:
         coordinates: Sequence[str] | None = None,
         guess: float = 0.0,
     ) -> SurfaceScan:
-        """Choose the coordinates unless they are given: those along which the surface is flattest.
-
-        Raises
-        ------
-        DefinitionError
-            Not two different states, or no surface over the box.
-        """
+        """Choose the coordinates unless they are given."""
         names = list(system.state_names)
         if coordinates is None:
             pairs = [(1, 2), (0, 2), (0, 1)]

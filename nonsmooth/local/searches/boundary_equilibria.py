@@ -271,28 +271,9 @@ def _planar_class(
 
 
 def fold_orbit_landing(rho: float, omega: float) -> float:
-    """L1 where the orbit from the visible fold of an unstable focus comes back to the surface.
-
-    The focus is a unit of h above the surface. Along the orbit h - 1 =
-    -exp(rho t) (cos wt - (rho/w) sin wt), which is -1 again once in (pi/w, 2 pi/w).
-
-    Parameters
-    ----------
-    rho, omega : float
-        Eigenvalues rho +- i omega of the focus, both positive.
-
-    Returns
-    -------
-    float
-        Negative: in the sliding region if the other field points up.
-
-    Examples
-    --------
-    The pseudo-saddle of A = [[r, -1], [1, r]], F2 = (c, 1) is met at c = r - (1 + r^2)/|landing|:
-
-    >>> [round(r + (1 + r**2) / fold_orbit_landing(r, 1.0), 12) for r in (0.1, 0.3)]
-    [-0.586212601033, 0.052559241308]
-    """
+    """L1 where the orbit from the visible fold of an unstable focus comes back to the surface."""
+    # The focus is a unit of h above the surface. Along the orbit h - 1 =
+    # -exp(rho t) (cos wt - (rho/w) sin wt), which is -1 again once in (pi/w, 2 pi/w).
     q = rho / omega
 
     def miss(u: float) -> float:  # divided by exp(q u), which overflows for a strong focus

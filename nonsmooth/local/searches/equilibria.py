@@ -72,10 +72,8 @@ class Equilibrium:
 
 
 def equilibrium_distance(field: Array, derivative: Array, x: Array) -> float:
-    """How far the next zero of a field is, to first order, relative to $1 + |x|$.
-
-    Infinite where the linearised equations have no solution.
-    """
+    """How far the next zero of a field is, to first order, relative to $1 + |x|$."""
+    # Infinite where the linearised equations have no solution.
     length, size = 1 + float(np.linalg.norm(x)), float(np.linalg.norm(derivative, 2))
     norm = float(np.linalg.norm(field))
     if norm <= TOLERANCE * size * length or norm == 0.0:

@@ -172,11 +172,9 @@ def require_planar(system: FilippovSystem, what: str) -> None:
 
 
 def fused_focus(where: Place, numbers: Numbers) -> float:
-    """Stability of a fused focus (II2): positive if orbits spiral in.
-
-    A flight of the field (a + p x + q y, b x + r x^2 + s y) maps x to -x + beta x^2 with
-    beta = 2 (b p + b s - a r)/(3 a b); one flight each gives x + (beta2 - beta1) x^2.
-    """
+    """Stability of a fused focus (II2): positive if orbits spiral in."""
+    # A flight of the field (a + p x + q y, b x + r x^2 + s y) maps x to -x + beta x^2 with
+    # beta = 2 (b p + b s - a r)/(3 a b); one flight each gives x + (beta2 - beta1) x^2.
     tangent = numbers.tangents[:, 0]
     gradient, square = numbers.gradient, float(numbers.gradient @ numbers.gradient)
     hessians, _ = where.hessians(numbers.x)

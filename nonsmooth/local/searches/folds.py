@@ -75,11 +75,9 @@ class Fold:
 
 
 def contact(where: Place, x: Array, side: Side, max_order: int, tol: float) -> Array:
-    """Derivatives L^k h for k = 0..max_order, with rounding-level values set to zero.
-
-    The k-th Taylor coefficient counts as zero below ``tol |grad h| |F| r^(k-1)``, where r is the
-    rate, per time, at which the coefficients of the orbit and of h grow.
-    """
+    """Derivatives L^k h for k = 0..max_order, with rounding-level values set to zero."""
+    # The k-th Taylor coefficient counts as zero below ``tol |grad h| |F| r^(k-1)``, where r is the
+    # rate, per time, at which the coefficients of the orbit and of h grow.
     states, h = where.orbit(x, side, max_order)
     speed = float(np.linalg.norm(states[:, 1]))
     size = speed * float(np.linalg.norm(where.at(x).gradient))

@@ -46,12 +46,7 @@ class Chart:
         return np.hstack([x, tail])
 
     def __call__(self, x: ArrayLike) -> Array:
-        """Return z (..., 3) at states (..., n).
-
-        Raises
-        ------
-        PointError
-        """
+        """Return z (..., 3) at states (..., n)."""
         states, n = real_array(x, "states"), self._dimension
         if states.ndim == 0 or states.shape[-1] != n:
             raise PointError(

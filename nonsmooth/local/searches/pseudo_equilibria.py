@@ -245,10 +245,9 @@ def pseudo_equilibrium_at(where: Place, found: Found) -> PseudoEquilibrium:
 
 
 def sliding_matrix(numbers: Numbers, derivatives: Array) -> tuple[Array, Array]:
-    """Dg on the tangent space at a pseudo-equilibrium (n-1, n-1), and an orthonormal basis (n, n-1).
-
-    Dg = (L2 DF1 - L1 DF2 + F1 (grad L2)^T - F2 (grad L1)^T)/(L2 - L1), where g = 0.
-    """
+    """Dg on the tangent space at a pseudo-equilibrium (n-1, n-1), and an orthonormal basis (n,
+    n-1)."""
+    # Dg = (L2 DF1 - L1 DF2 + F1 (grad L2)^T - F2 (grad L1)^T)/(L2 - L1), where g = 0.
     (f1, f2), (l1, l2) = numbers.fields, numbers.lie
     (g1, g2), (d1, d2) = numbers.lie_gradients, derivatives
     dg = (l2 * d1 - l1 * d2 + np.outer(f1, g2) - np.outer(f2, g1)) / (l2 - l1)
@@ -257,14 +256,8 @@ def sliding_matrix(numbers: Numbers, derivatives: Array) -> tuple[Array, Array]:
 
 
 def sliding_expansion(where: Place, numbers: Numbers) -> tuple[float, float]:
-    """Slope and second derivative of the planar sliding speed at a pseudo-equilibrium.
-
-    g = c1 x + c2 x^2 + ... in the tangent coordinate; c1 = 0 != c2 is a pseudo-saddle-node.
-
-    Returns
-    -------
-    c1, c2 : float
-    """
+    """Slope and second derivative of the planar sliding speed at a pseudo-equilibrium."""
+    # g = c1 x + c2 x^2 + ... in the tangent coordinate; c1 = 0 != c2 is a pseudo-saddle-node.
     x, (l1, l2) = numbers.x, numbers.lie
     tangent = numbers.tangents[:, 0]
     square = float(numbers.gradient @ numbers.gradient)
@@ -388,15 +381,9 @@ def _kind(
 
 
 def along_intersection(at: LayerNumbers, surfaces: list[int]) -> tuple[Array, Array]:
-    """D(f(x, lambda(x))) on the tangent space (N - k, N - k), where f = 0, and its basis (N, N - k).
-
-    lambda_x = -(dG/dlambda)^-1 dG/dx, with G the rates of the surfaces.
-
-    Raises
-    ------
-    PointError
-        Where dG/dlambda is singular.
-    """
+    """D(f(x, lambda(x))) on the tangent space (N - k, N - k), where f = 0, and its basis (N, N -
+    k)."""
+    # lambda_x = -(dG/dlambda)^-1 dG/dx, with G the rates of the surfaces.
     gradient = at.h_x[surfaces]
     basis = np.linalg.svd(gradient)[2][len(surfaces) :].T
     if not basis.size:

@@ -28,20 +28,7 @@ from ...solvers.newton import Equations, solve
 
 @dataclass(frozen=True, eq=False)
 class Found:
-    """Where a search ended, or a point that was given.
-
-    Attributes
-    ----------
-    x : ndarray (N,)
-    distance : float
-        From the start of the search; 0 if the point was given.
-    residual : float
-        Largest first-order distance to a zero of one of the equations.
-    iterations : int
-        Iterations that Newton's method took; 0 where nothing was searched.
-    linear : bool
-        Whether the point is a multiple root (see :class:`nonsmooth.solvers.newton.Root`).
-    """
+    """Where a search ended, or a point that was given."""
 
     x: Array
     distance: float = 0.0
@@ -59,30 +46,7 @@ def search(
     max_iterations: int,
     what: str,
 ) -> Found:
-    """Find a zero close to ``start``, changing the coordinates ``free`` only (all by default).
-
-    Parameters
-    ----------
-    equations : callable
-        x (N,) -> values (m,), Jacobian (m, N).
-    start : ndarray (N,)
-    free : sequence of int, optional
-    tol, max_iterations, what
-        As in :func:`nonsmooth.solvers.newton.solve`.
-
-    Raises
-    ------
-    ConvergenceError
-        Its ``point`` is the last iterate, held coordinates included.
-    PointError, OptionError
-
-    Examples
-    --------
-    >>> circle = lambda x: (np.array([x @ x - 1]), 2 * x[None, :])
-    >>> found = search(circle, np.array([0.6, 2.0]), [1], tol=1e-12, max_iterations=20, what="circle")
-    >>> found.x.round(12), round(found.distance, 12)
-    (array([0.6, 0.8]), 1.2)
-    """
+    """Find a zero close to ``start``, changing the coordinates ``free`` only (all by default)."""
     chosen = list(range(start.size) if free is None else free)
 
     def full(u: Array) -> Array:
@@ -105,13 +69,7 @@ def search(
 
 
 def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: str) -> list[int]:
-    """Indices of the states that a search may change.
-
-    Raises
-    ------
-    DefinitionError
-        An unknown state, or fewer free states than equations.
-    """
+    """Indices of the states that a search may change."""
     names = [hold] if isinstance(hold, str) else [str(name) for name in hold]
     unknown = [name for name in names if name not in system.state_names]
     if unknown:

@@ -24,11 +24,10 @@ MIXED = ("VI", "IV")
 
 @dataclass(frozen=True)
 class Row:
-    """One class of the table.
+    """One class of the table."""
 
-    ``into`` says which orbits of Da reach s, ``out_of`` which orbits of Da come from s (and, along
-    the same lines, which orbits of Dr reach s): none, one, all or a sector.
-    """
+    # ``into`` says which orbits of Da reach s, ``out_of`` which orbits of Da come from s (and, along
+    # the same lines, which orbits of Dr reach s): none, one, all or a sector.
 
     label: str
     folds: tuple[str, ...]

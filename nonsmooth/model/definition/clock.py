@@ -76,18 +76,7 @@ class Clock:
 
 
 def with_clocks(clocks: Any, given: dict[str, Any]) -> dict[str, Any]:
-    """Put clocks into the arguments of a definition: phases as states, ticks as resets.
-
-    Parameters
-    ----------
-    clocks : Clock or sequence of Clock
-    given : dict
-        Arguments of :func:`read_definition`, or ``rhs`` of an expression to be lifted.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Put clocks into the arguments of a definition: phases as states, ticks as resets."""
     clocks = [clocks] if isinstance(clocks, Clock) else listed(clocks)
     if not clocks:
         return given

@@ -16,12 +16,7 @@ from .vectors import require_linear_sets
 
 
 def require_consistent(d: Definition) -> None:
-    """Refuse a definition that describes no system.
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError
-    """
+    """Refuse a definition that describes no system."""
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     named = [("field", d.field, True)]
     named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
@@ -91,13 +86,7 @@ def _check_impact(d: Definition, j: int) -> None:
 def consistent_parameters(
     d: Definition, names: Sequence[str], parameters: Parameters | None
 ) -> Array:
-    """Numbers for all parameters; a restitution that depends on nothing else must be one.
-
-    Raises
-    ------
-    ParameterError
-        An unknown name, a missing value, or one that is not a finite number or no restitution.
-    """
+    """Numbers for all parameters; a restitution that depends on nothing else must be one."""
     p = parameter_values(names, d.defaults, parameters)
     for j, name in enumerate(d.impacts):
         e = d.restitutions[j]

@@ -13,35 +13,7 @@ from ..reading import listed
 
 @dataclass(frozen=True)
 class Definition:
-    """A system as symbols and expressions.
-
-    Attributes
-    ----------
-    states, time, parameters, multipliers : SX columns
-        Symbols; ``time`` is empty where the system does not depend on it.
-    field : SX (n,)
-        In all of them.
-    surfaces : SX (m,)
-        Switching functions, one for each multiplier.
-    guards : SX
-        Functions of the stops, then of the resets.
-    maps : SX (n, resets)
-        States after the resets.
-    reactions, gaps, restitutions : SX (c,)
-        Symbols and functions of the impacts.
-    stops, resets : tuple of (name, direction)
-    impacts : tuple of str
-        Names.
-    defaults : dict
-        Values of the parameters by name; None where there is none.
-    hidden : bool
-        Whether multipliers may enter nonlinearly.
-    sizes : tuple of int
-        How many of the switching functions, in order, belong to each surface or set; 1 for a surface.
-        Empty where all are surfaces.
-    renamed : tuple of (name, given)
-        Of the stops, resets and impacts that have another name than was given to them.
-    """
+    """A system as symbols and expressions."""
 
     states: ca.SX
     time: ca.SX

@@ -15,22 +15,7 @@ _ROUNDING = 16 * 2.220446049250313e-16
 
 @dataclass(frozen=True)
 class LiftedSwitch:
-    """A surface that was found in an expression.
-
-    Attributes
-    ----------
-    surface : str
-        Its name in events: ``h0``, ``h1``, ... in the order of the states that they depend on.
-    multiplier : str
-        Name of its multiplier.
-    function : str
-        The switching function.
-    origins : tuple of str
-        What it came from: ``sign``, ``fabs``, ``comparison``, ...
-    hidden : bool
-        Whether the multiplier was not affine in the expression as written, other than inside a
-        continuous switch, so that hidden dynamics would be another reading.
-    """
+    """A surface that was found in an expression."""
 
     surface: str
     multiplier: str
@@ -45,11 +30,10 @@ class LiftedSwitch:
 
 @dataclass
 class Switch:
-    """A surface under construction.
+    """A surface under construction."""
 
-    ``even`` is the multiplier inside continuous switches, where it makes no difference on h = 0; it
-    becomes ``lam`` at the end.
-    """
+    # ``even`` is the multiplier inside continuous switches, where it makes no difference on h = 0; it
+    # becomes ``lam`` at the end.
 
     h: ca.SX
     lam: ca.SX
@@ -59,14 +43,7 @@ class Switch:
 
 
 class Switches:
-    """Surfaces with their multipliers, in the order in which they are found.
-
-    Parameters
-    ----------
-    states : SX (n,)
-    inputs : [SX, SX]
-        States with the time, and parameters.
-    """
+    """Surfaces with their multipliers, in the order in which they are found."""
 
     def __init__(self, states: ca.SX, inputs: list[ca.SX]):
         self.states, self.inputs = states, inputs
@@ -78,10 +55,9 @@ class Switches:
         return self.all[number]
 
     def find(self, h: ca.SX, origin: str) -> tuple[int | None, int]:
-        """Return the number of the surface h = 0 and the sign by which h differs from its function.
-
-        The number is None where h is a constant; then the sign is that of h.
-        """
+        """Return the number of the surface h = 0 and the sign by which h differs from its
+        function."""
+        # The number is None where h is a constant; then the sign is that of h.
         h = simple_zeros(h, *self.inputs)
         forms = self._forms([h, *(s.h for s in self.all)])
         if all(monomial == () for monomial in forms[0]):

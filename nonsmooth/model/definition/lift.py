@@ -80,36 +80,7 @@ class _Value:
 def lift(
     rhs: ca.SX, states: ca.SX, time: ca.SX, parameters: ca.SX, *, hidden: bool = False
 ) -> Lifting:
-    """Replace the switches of a right-hand side by multipliers.
-
-    Parameters
-    ----------
-    rhs : SX (n,)
-    states, time, parameters : SX
-        Columns of symbols; ``time`` and ``parameters`` may be empty. A switch of the parameters
-        alone is a constant and stays as it is.
-    hidden : bool, optional
-        Keep multipliers nonlinear where the expression is, instead of Filippov's convention.
-
-    Returns
-    -------
-    Lifting
-
-    Raises
-    ------
-    NotSmoothError
-        A switch that cannot be expressed; the message names it and the entry of ``rhs``.
-    DefinitionError
-        A switch of time alone, or too many switches within one.
-
-    Examples
-    --------
-    >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
-    >>> friction = -0.4 * ca.sign(v - 0.2) / (1 + ca.fabs(v - 0.2))
-    >>> result = lift(ca.vertcat(v, friction), ca.vertcat(x, v), ca.SX(0, 1), ca.SX(0, 1))
-    >>> print(*result.switches)
-    h0 = (v-0.2) (fabs, sign)
-    """
+    """Replace the switches of a right-hand side by multipliers."""
     return _Lifter(rhs, states, time, parameters, hidden).run()
 
 

@@ -40,12 +40,7 @@ def read_definition(
     impacts: Any,
     hidden: bool,
 ) -> Definition:
-    """Read what a user gave to FilippovSystem, whose docstring says what each is.
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError, ParameterError
-    """
+    """Read what a user gave to FilippovSystem, whose docstring says what each is."""
     x = symbols(states, "states")
     if x.numel() == 0:
         raise DefinitionError("states: expected at least one symbol, received none.")
@@ -104,12 +99,7 @@ def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:
 
 
 def read_function(definition: Definition, value: Any, what: str) -> ca.SX:
-    """Check a scalar function of states, parameters and time that a user gave.
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError
-    """
+    """Check a scalar function of states, parameters and time that a user gave."""
     expression = scalar(value, what)
     known = ca.vertcat(definition.extended_states, definition.parameters)
     require_known(expression, known, what, **definition.names)
@@ -184,11 +174,8 @@ def _own_names(sizes: Sequence[int]) -> set[str]:
 def _told_apart(
     kinds: Sequence[list[Any]], own: set[str]
 ) -> tuple[list[list[Any]], tuple[tuple[str, str], ...]]:
-    """Events with names of their own: of those with one name, all but the first are numbered; and the names
-    that were given to those.
-
-    Events are found again by their names, so that two of one name would have the derivatives of the first.
-    """
+    """Events with names of their own."""
+    # Events are found again by their names, so that two of one name would have the derivatives of the first.
     taken, used = {item.name for items in kinds for item in items} | own, set(own)
     found, renamed = list[list[Any]](), list[tuple[str, str]]()
     for items in kinds:

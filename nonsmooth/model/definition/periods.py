@@ -19,13 +19,7 @@ def is_function(value: Any) -> bool:
 
 
 def read_period(system: FilippovSystem, value: Any) -> float | str | None:
-    """Read a number, or an expression in parameters as a serialised function; None if it is neither.
-
-    Raises
-    ------
-    OptionError
-        A number that is not positive.
-    """
+    """Read a number, or an expression in parameters as a serialised function."""
     if is_real(value):
         return float(periods(float(value), np.zeros(0)))
     if not is_function(value):
@@ -37,13 +31,7 @@ def read_period(system: FilippovSystem, value: Any) -> float | str | None:
 
 
 def periods(period: float | str, p: Array) -> Array:
-    """Periods () or (m,) of parameters (np,) or (m, np); NaN where a parameter is.
-
-    Raises
-    ------
-    OptionError
-        One that is not positive.
-    """
+    """Periods () or (m,) of parameters (np,) or (m, np); NaN where a parameter is."""
     values: Array = np.asarray(period if isinstance(period, float) else np.nan)
     if isinstance(period, str):
         found = np.array(ca.Function.deserialize(period)(p.T), float)

@@ -9,26 +9,8 @@ from .system import FilippovSystem
 
 
 def reversed_system(system: FilippovSystem) -> FilippovSystem:
-    """Return the system with all fields reversed, without its stops.
-
-    Backward in time attracting sliding repels and repelling sliding attracts.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        Without time, resets and impacts: jumps cannot be undone.
-
-    Raises
-    ------
-    DefinitionError
-
-    Examples
-    --------
-    >>> import casadi as ca
-    >>> x = ca.SX.sym("x")
-    >>> reversed_system(FilippovSystem([x], surface=x, above=[-1], below=[3])).field("+")
-    SX(1)
-    """
+    """Return the system with all fields reversed, without its stops."""
+    # Backward in time attracting sliding repels and repelling sliding attracts.
     for what, found in (
         ("time", system.time_dependent),
         ("resets", system.resets),

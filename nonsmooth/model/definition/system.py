@@ -365,10 +365,8 @@ class FilippovSystem(Structure):
 
 
 def require_system(value: Any, sets: bool = False) -> None:
-    """Raise DefinitionError unless a value is a FilippovSystem.
-
-    ``sets`` says whether it may have sets of codimension two or more, where multipliers are vectors.
-    """
+    """Raise DefinitionError unless a value is a FilippovSystem."""
+    # ``sets`` says whether it may have sets of codimension two or more, where multipliers are vectors.
 
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(

@@ -25,12 +25,7 @@ LARGEST = 3
 
 
 def read_entry(value: Any, what: str) -> list[ca.SX]:
-    """Read a surface (a scalar) or a set (a vector of two or three) as a list of expressions.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Read a surface (a scalar) or a set (a vector of two or three) as a list of expressions."""
     if not isinstance(value, (list, tuple)) and not (
         isinstance(value, (ca.SX, ca.DM)) and ca.SX(value).numel() > 1
     ):
@@ -54,12 +49,7 @@ def read_entry(value: Any, what: str) -> list[ca.SX]:
 
 
 def require_alike(sizes: Sequence[int], multipliers: Any) -> None:
-    """Refuse multipliers that are not shaped as the surfaces.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Refuse multipliers that are not shaped as the surfaces."""
     entries = [len(listed(entry)) for entry in listed(multipliers)]
     if max((*sizes, *entries), default=1) == 1 or list(sizes) == entries:
         return
@@ -74,12 +64,8 @@ def require_alike(sizes: Sequence[int], multipliers: Any) -> None:
 
 
 def require_linear_sets(d: Definition) -> None:
-    """Refuse sets whose multipliers do not enter linearly together, or are multiplied by a reaction.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Refuse sets whose multipliers do not enter linearly together, or are multiplied by a
+    reaction."""
     first = 0
     for i, size in enumerate(d.sizes):
         lam = d.multipliers[first : first + size]

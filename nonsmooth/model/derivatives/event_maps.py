@@ -112,24 +112,7 @@ class AtEvent:
 def event_map(
     system: FilippovSystem, mode: str, name: str, side: int = 0, letters: str = ""
 ) -> EventMap:
-    """The map of an event of a mode, by the name of its guard; built once.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    name : str
-        ``h0``, ``L_F1 h``, ``lambda0``, the name of a stop, reset or impact.
-    side : int
-        Of an exit that has two of the same name.
-    letters : str
-        At an impact with friction: the sides that the impulse acts with.
-
-    Raises
-    ------
-    DegenerateError
-        The mode has no event of that name.
-    """
+    """The map of an event of a mode, by the name of its guard; built once."""
 
     def build() -> EventMap:
         of_mode = explicit(system, mode)
@@ -152,19 +135,7 @@ def event_map(
 def instant_map(
     system: FilippovSystem, mode: str, kind: str, name: str, letters: str = ""
 ) -> EventMap:
-    """The map of a crossing, entry, stop, reset or impact as one of the extended states alone: what acts
-    may be anything. Built once.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-        Before the event, with a letter for each switching function and contact.
-    kind, name : str
-        Of the event.
-    letters : str
-        As for :func:`event_map`.
-    """
+    """The map of a crossing, entry, stop, reset or impact as one of the extended states alone."""
 
     def build() -> EventMap:
         d = system.definition
@@ -207,11 +178,9 @@ def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.
 
 
 def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
-    """The state after the impulses at a gap that closes (``flow/reference/contacts.py``).
-
-    Contacts that are closed take part with the rate zero; friction on them acts with the impulse
-    in the same proportion as with the reaction, and ``letters`` say to which side.
-    """
+    """The state after the impulses at a gap that closes (``flow/reference/contacts.py``)."""
+    # Contacts that are closed take part with the rate zero; friction on them acts with the impulse
+    # in the same proportion as with the reaction, and ``letters`` say to which side.
     coupled, m, d = coupled_of(system), system.surface_count, system.definition
     signs = system.parse_letters(mode)
     taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]

@@ -79,15 +79,8 @@ def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:
 
 
 def frequencies(system: FilippovSystem) -> list[ca.SX]:
-    """Rates of the arguments of sines and cosines that are linear in the time, without repetition.
-
-    Examples
-    --------
-    >>> x, t, w = (ca.SX.sym(s) for s in "xtw")
-    >>> forced = FilippovSystem([x], field=[ca.cos(w * t + 1) - x], time=t, parameters={w: 2.0})
-    >>> frequencies(forced)
-    [SX(w)]
-    """
+    """Rates of the arguments of sines and cosines that are linear in the time, without
+    repetition."""
     if not system.time_dependent:
         return []
     d = system.definition

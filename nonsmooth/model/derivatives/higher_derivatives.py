@@ -11,16 +11,8 @@ from .variational import guarded_field
 
 
 def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
-    """(x, u), p -> A, B(u, .), C(u, u, .) of the field of a mode, and gradient and Hessian of the function
-    of the surface on which it slides (zero without).
-
-    Examples
-    --------
-    >>> x = ca.SX.sym("x")
-    >>> at = field_expansion(FilippovSystem([x], field=[x**3]), "")
-    >>> [float(v[0, 0]) for v in at.copied([2.0, 1.0], [])[:3]]
-    [12.0, 12.0, 6.0]
-    """
+    """(x, u), p -> A, B(u, .), C(u, u, .) of the field of a mode, and gradient and Hessian of
+    the function of the surface on which it slides (zero without)."""
 
     def build() -> Evaluator:
         f, x, p = mode_field(system, mode), system.extended_states, system.parameter_symbols
@@ -37,18 +29,8 @@ def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int) -> Evaluator:
-    """x, p -> the field of a mode, the field across one of its surfaces, and the gradient of L_F h of
-    the first along that surface's function.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-        Without sliding.
-    surface : int
-    side : {1, -1}
-        On which the mode is.
-    """
+    """x, p -> the field of a mode, the field across one of its surfaces, and the gradient of L_F
+    h of the first along that surface's function."""
 
     def build() -> list[ca.SX]:
         turned = mode[:surface] + ("-" if side > 0 else "+") + mode[surface + 1 :]

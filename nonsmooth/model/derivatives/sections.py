@@ -18,19 +18,7 @@ SECTION = "section"
 
 
 def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
-    """Return the system with a last reset, at a function's zeros, that changes nothing.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    function : expression
-        In states, parameters and time.
-    direction : {-1, 0, 1}
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError
-    """
+    """Return the system with a last reset, at a function's zeros, that changes nothing."""
     d = system.definition
     h = read_function(d, function, SECTION)
     if not ca.depends_on(h, d.extended_states):
@@ -55,16 +43,8 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
 
 
 def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
-    """Name of the surface where a function is zero, written alike, and its sign there; else None.
-
-    A component of a set is none: it is zero elsewhere too.
-
-    Examples
-    --------
-    >>> x = ca.SX.sym("x")
-    >>> surface_of(FilippovSystem([x], surface=x - 1, above=[-1], below=[3]), 1 - x)
-    ('h0', -1)
-    """
+    """Name of the surface where a function is zero, written alike, and its sign there."""
+    # A component of a set is none: it is zero elsewhere too.
     for i in range(system.surface_count):
         if i in system.set_of:
             continue

@@ -15,28 +15,7 @@ from ..values import Array
 
 
 class StartMap:
-    """States of a system as a smooth function of two coordinates.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    starts : array_like (3, n) or callable
-        A point and two directions, x = starts[0] + a starts[1] + b starts[2]; or a function of two
-        scalars (symbols of CasADi) that returns n expressions.
-
-    Raises
-    ------
-    OptionError
-
-    Examples
-    --------
-    >>> import casadi as ca
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> system = FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1])
-    >>> states, slope = StartMap(system, lambda a, b: [a * b, b])(np.array([2.0, 3.0]))
-    >>> states.tolist(), slope.tolist()
-    ([6.0, 3.0], [[3.0, 2.0], [0.0, 1.0]])
-    """
+    """States of a system as a smooth function of two coordinates."""
 
     def __init__(self, system: FilippovSystem, starts: Any):
         u, n = ca.SX.sym("u", 2), system.dimension

@@ -31,17 +31,7 @@ ORDER = 20
 
 @dataclass(frozen=True)
 class Blocks:
-    """Where the entries of x, X and P are in the state of a variational field.
-
-    Attributes
-    ----------
-    states, starts, parameters : int
-        N + k states of the leg (k multipliers that are further states), N starts, q parameters.
-    moving : ndarray of bool (N + k, 1 + N + q)
-        Entries of the matrix (x, X, P) that are states of the field, column after column.
-    fixed : ndarray (N + k, 1 + N + q)
-        Values of the others.
-    """
+    """Where the entries of x, X and P are in the state of a variational field."""
 
     states: int
     starts: int
@@ -270,27 +260,13 @@ def _nonzero(matrix: ca.SX) -> NDArray[np.bool_]:
 def variational_field(
     system: FilippovSystem, mode: str, chosen: tuple[int, ...] = ()
 ) -> VariationalField:
-    """Return the variational field of a mode, built once per system.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    chosen : tuple of int
-        Parameters by which one differentiates.
-    """
+    """Return the variational field of a mode, built once per system."""
     key = ("variational field", mode, chosen)
     return system.cached(key, lambda: VariationalField(explicit(system, mode), chosen))
 
 
 class PlainField:
-    """One mode's flow as a smooth field.
-
-    Parameters
-    ----------
-    of_mode : Motion
-        With all multipliers solved for.
-    """
+    """One mode's flow as a smooth field."""
 
     def __init__(self, of_mode: Motion):
         self.motion = of_mode
@@ -326,13 +302,7 @@ def plain_field(system: FilippovSystem, mode: str) -> PlainField:
 
 
 class GuardedField(PlainField):
-    """One mode's flow with its guards along it, as a smooth field to be stepped through.
-
-    Parameters
-    ----------
-    of_mode : Motion
-        With all multipliers solved for.
-    """
+    """One mode's flow with its guards along it, as a smooth field to be stepped through."""
 
     @cached_property
     def series(self) -> Series:

@@ -150,15 +150,8 @@ class _Normal:
 def normal_forms(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[Forms, list[list[Sum]]]:
-    """Sums of coefficient times monomial for each entry of each output, and what they are made of.
-
-    Parameters
-    ----------
-    inputs : sequence of SX
-        Symbol vectors.
-    outputs : sequence of SX
-        Expressions in these symbols.
-    """
+    """Sums of coefficient times monomial for each entry of each output, and what they are made
+    of."""
     nodes, rows = instructions(inputs, outputs)
     algebra = _Normal(inputs)
     values = evaluate(nodes, algebra)
@@ -186,14 +179,7 @@ def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
 
 
 def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.SX, int]]:
-    """Factors of a scalar expression, with their powers, as far as they are in sight.
-
-    Examples
-    --------
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> powers(3 * (x - 1) ** 3 * y, ca.vertcat(x, y), ca.SX(0, 1))
-    [(SX((1-x)), 3), (SX(y), 1)]
-    """
+    """Factors of a scalar expression, with their powers, as far as they are in sight."""
     forms, rows = normal_forms([variables, others], [expression])
     if not rows[0][0]:
         return []
@@ -202,14 +188,7 @@ def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.
 
 
 def simple_zeros(expression: ca.SX, variables: ca.SX, others: ca.SX) -> ca.SX:
-    """Return an expression of the same sign without the powers that are in sight.
-
-    Examples
-    --------
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> simple_zeros(-(x**2) * (y - 1) ** 3, ca.vertcat(x, y), ca.SX(0, 1))
-    SX((1-y))
-    """
+    """Return an expression of the same sign without the powers that are in sight."""
     forms, rows = normal_forms([variables, others], [expression])
     if not rows[0][0]:
         return expression
@@ -222,29 +201,7 @@ def simple_zeros(expression: ca.SX, variables: ca.SX, others: ca.SX) -> ca.SX:
 def cancel_common_factor(
     expressions: Sequence[ca.SX], variables: ca.SX, others: ca.SX
 ) -> tuple[list[ca.SX], ca.SX]:
-    """Divide scalar expressions by the factors that all of them have.
-
-    Parameters
-    ----------
-    expressions : sequence of scalar SX
-        Zero expressions are passed through.
-    variables, others : SX
-        The two vectors of symbols.
-
-    Returns
-    -------
-    reduced : list of SX
-        ``expressions[i] == factor * reduced[i]``.
-    factor : SX
-        1 when nothing is common; the expressions are then returned as they came.
-
-    Examples
-    --------
-    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
-    >>> (a, b), n = cancel_common_factor([mu * (x + y), 2 * x + 2 * y], ca.vertcat(x, y), mu)
-    >>> n, a, b
-    (SX((x+y)), SX(mu), SX(2))
-    """
+    """Divide scalar expressions by the factors that all of them have."""
     forms, rows = normal_forms([variables, others], expressions)
     sums = [row[0] for row in rows]
     factored = [forms.factor(s) if s else None for s in sums]

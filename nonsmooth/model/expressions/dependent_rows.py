@@ -21,27 +21,8 @@ _LEFT = 1e-9
 def in_span(
     functions: Sequence[ca.SX], rows: Sequence[ca.SX], variables: ca.SX, others: ca.SX
 ) -> list[bool]:
-    """Whether each function is a combination of rows and of an affine function of the variables.
-
-    The coefficients may depend on ``others``, smoothly. False where it is not seen.
-
-    Parameters
-    ----------
-    functions, rows : sequence of scalar SX
-    variables, others : SX
-        The two vectors of symbols.
-
-    Returns
-    -------
-    list of bool
-
-    Examples
-    --------
-    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
-    >>> rows = [mu * x * y + x, ca.sin(y)]
-    >>> in_span([x * y - 2 * mu * ca.sin(y) + 1, x**2], rows, ca.vertcat(x, y), mu)
-    [True, False]
-    """
+    """Whether each function is a combination of rows and of an affine function of the variables."""
+    # The coefficients may depend on ``others``, smoothly. False where it is not seen.
     nodes, _ = instructions([variables, others], [ca.vertcat(*rows, *functions)])
     if any(node.op in NOT_SMOOTH for node in nodes):
         return [False for _ in functions]  # other values of ``others`` have other combinations

@@ -51,10 +51,9 @@ _BESIDE_ZERO: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Node:
-    """One operation: its name, its arguments (node numbers) and a payload.
+    """One operation: its name, its arguments (node numbers) and a payload."""
 
-    The payload is the value of a ``const`` node and ``(input, position)`` of an ``input`` node.
-    """
+    # The payload is the value of a ``const`` node and ``(input, position)`` of an ``input`` node.
 
     op: str
     args: tuple[int, ...]
@@ -69,22 +68,7 @@ class Node:
 def instructions(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[list[Node], list[list[int]]]:
-    """Value-number the graph of dense ``outputs`` over ``inputs``.
-
-    Parameters
-    ----------
-    inputs : sequence of SX
-        Symbol vectors.
-    outputs : sequence of SX
-        Expressions in these symbols, any shape, read column by column.
-
-    Returns
-    -------
-    nodes : list of Node
-        Each node's arguments come before it.
-    rows : list of list of int
-        For each output the node number of each of its entries.
-    """
+    """Value-number the graph of dense ``outputs`` over ``inputs``."""
     function = ca.Function("graph", list(inputs), [ca.densify(ca.SX(o)) for o in outputs])
     nodes: list[Node] = []
     known: dict[Node, int] = {}
@@ -131,19 +115,7 @@ class Algebra(Protocol[V]):
 
 
 def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
-    """Values of all nodes of a graph in an algebra.
-
-    Parameters
-    ----------
-    nodes : sequence of Node
-        As ``instructions`` returns them.
-    algebra : Algebra
-
-    Returns
-    -------
-    list
-        One value for each node.
-    """
+    """Values of all nodes of a graph in an algebra."""
     values: list[V] = []
     for node in nodes:
         if node.op == "const":
@@ -156,14 +128,7 @@ def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
 
 
 def operation(op: str, args: Sequence[ca.SX]) -> ca.SX:
-    """Return the expression of an operation, named as in ``OPERATIONS``.
-
-    Examples
-    --------
-    >>> x = ca.SX.sym("x")
-    >>> operation("mul", [x, operation("sin", [x])])
-    SX((x*sin(x)))
-    """
+    """Return the expression of an operation, named as in ``OPERATIONS``."""
     code = getattr(ca, "OP_" + op.upper())
     return ca.SX.unary(code, args[0]) if len(args) == 1 else ca.SX.binary(code, *args)
 
@@ -180,10 +145,8 @@ def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
 
 
 def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str) -> None:
-    """Raise NotSmoothError if ``expression`` is not smooth in ``variables``.
-
-    A non-smooth operation on ``others`` alone (parameters) is harmless: it is a constant.
-    """
+    """Raise NotSmoothError if ``expression`` is not smooth in ``variables``."""
+    # A non-smooth operation on ``others`` alone (parameters) is harmless: it is a constant.
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])
     for node, moves in zip(nodes, moving, strict=True):

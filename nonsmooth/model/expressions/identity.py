@@ -81,29 +81,7 @@ def _small(b: int) -> int | None:
 def vanish_on(
     expressions: Sequence[ca.SX], surface: ca.SX, variables: ca.SX, others: ca.SX
 ) -> bool:
-    """Whether all expressions are zero wherever ``surface`` is.
-
-    Parameters
-    ----------
-    expressions : sequence of scalar SX
-    surface : scalar SX
-    variables, others : SX
-        The two vectors of symbols; points of the surface are found by changing one variable in
-        which it is linear or quadratic.
-
-    Returns
-    -------
-    bool
-        False where it is not so or not seen.
-
-    Examples
-    --------
-    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
-    >>> vanish_on([mu * (x**2 - y**2) * ca.sin(x)], x - y, ca.vertcat(x, y), mu)
-    True
-    >>> vanish_on([(x / 8) ** 14], y, ca.vertcat(x, y), mu)
-    False
-    """
+    """Whether all expressions are zero wherever ``surface`` is."""
     every = ca.vertcat(surface, *expressions)
     used = [(s, ca.depends_on(variables, s)) for s in ca.symvar(every)]
     vectors = [ca.vertcat(*[s for s, moves in used if moves is kind]) for kind in (True, False)]

@@ -83,31 +83,7 @@ class Expressions:
 def taylor(
     rhs: ca.SX, functions: ca.SX, states: ca.SX, others: ca.SX, order: int
 ) -> tuple[ca.SX, ca.SX]:
-    """Taylor coefficients of the flow of ``rhs`` and of ``functions`` along it.
-
-    Parameters
-    ----------
-    rhs : SX (n,)
-        Right-hand side in ``states`` and ``others``.
-    functions : SX (m,)
-        Functions of the same symbols, may be empty.
-    states, others : SX
-        Symbol vectors; ``others`` (parameters) do not move.
-    order : int
-        Highest order of the state's coefficients.
-
-    Returns
-    -------
-    states_jet : SX (n, order + 1)
-    functions_jet : SX (m, order + 1)
-
-    Examples
-    --------
-    >>> x, p = ca.SX.sym("x"), ca.SX.sym("p", 0)
-    >>> jet = taylor(x, x**2, x, p, 2)[1]  # (x e^t)^2 = x^2 (1 + 2 t + 2 t^2 + ...)
-    >>> ca.Function("jet", [x, p], [jet])(3.0, [])
-    DM([[9, 18, 18]])
-    """
+    """Taylor coefficients of the flow of ``rhs`` and of ``functions`` along it."""
     n, m = rhs.numel(), functions.numel()
     expansion = expansion_of([rhs, functions], states, others)
     jet: list[list[Coefficient]] = [[states[i]] for i in range(n)]
@@ -123,10 +99,8 @@ def taylor(
 
 
 def expansion_of(outputs: Sequence[ca.SX], states: ca.SX, others: ca.SX) -> Expansion:
-    """Return the expansion of expressions in ``states`` and ``others``, which do not move.
-
-    The expressions are rewritten first so that their jets need fewer products.
-    """
+    """Return the expansion of expressions in ``states`` and ``others``, which do not move."""
+    # The expressions are rewritten first so that their jets need fewer products.
     inputs = [states, others]
     nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
     rules, place = lower(nodes, depends_on(nodes, [True, False]))
@@ -161,17 +135,7 @@ def value_of(a: Coefficient) -> ca.SX:
 
 
 class Expansion:
-    """All series of a list of rules, expanded together.
-
-    Parameters
-    ----------
-    rules : sequence of Rule
-    rows : sequence of sequence of int
-        Numbers of the rules of each output's entries.
-    still : sequence
-        Values of the input vector 1, which does not move; vector 0 moves.
-    arithmetic : Arithmetic
-    """
+    """All series of a list of rules, expanded together."""
 
     def __init__(
         self,

@@ -21,18 +21,7 @@ _NO_TIME = ca.SX(0, 1)
 
 @dataclass(frozen=True)
 class Linearity:
-    """What of a system is affine.
-
-    Attributes
-    ----------
-    everywhere, free : bool
-        Field and guards: in states and unknown multipliers together, and in the states where nothing
-        slides.
-    bent_rows, bent_free_rows : list of bool
-        Rows of the field that are not, in any mode and where nothing slides.
-    bent_guards : list of bool
-        Surfaces and gaps, then stops and resets, that are not affine in the states.
-    """
+    """What of a system is affine."""
 
     everywhere: bool
     free: bool
@@ -51,19 +40,7 @@ def linearity(
     smooth: bool = True,
     time: ca.SX = _NO_TIME,
 ) -> Linearity:
-    """Return what is affine.
-
-    Parameters
-    ----------
-    field, layer, guards, factors : SX
-        Field, rates of surfaces and gaps, surfaces, gaps, stops and resets, factors of multipliers.
-    x, unknowns : SX
-        States, and unknown multipliers.
-    smooth : bool
-        Whether multipliers that are known are constant in every mode: not off a set.
-    time : SX, optional
-        The one of ``x`` that is the time; empty if there is none.
-    """
+    """Return what is affine."""
     every = ca.vertcat(x, unknowns)
     bent_rows, bent_guards = bent(field, every, time), bent(guards, x, time)
     bent_free_rows = bent(field, x, time)
@@ -113,21 +90,7 @@ class _Kinds:
 
 
 def bent(expressions: ca.SX, x: ca.SX, time: ca.SX = _NO_TIME) -> list[bool]:
-    """Which expressions are not affine in states, with sines of the time added.
-
-    Parameters
-    ----------
-    expressions : SX
-    x : SX
-        States; all other symbols are constants.
-    time : SX, optional
-        The one of ``x`` that is the time; empty if there is none.
-
-    Returns
-    -------
-    list of bool
-        One for each expression, column by column.
-    """
+    """Which expressions are not affine in states, with sines of the time added."""
     found = [not ca.is_linear(e, x) for e in ca.vertsplit(ca.vec(ca.densify(expressions)))]
     if not time.numel() or not any(found):
         return found

@@ -28,28 +28,7 @@ _DEPTH = 12  # coefficients count as equal when their expressions are, to this d
 def economise(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], variable: Sequence[bool]
 ) -> list[ca.SX]:
-    """Rewrite ``outputs`` with fewer products of functions of the variables.
-
-    Parameters
-    ----------
-    inputs : sequence of SX
-        Symbol vectors.
-    outputs : sequence of SX
-        Dense expressions in these symbols.
-    variable : sequence of bool
-        Which vectors hold variables; the others are constants.
-
-    Returns
-    -------
-    list of SX
-        Equal expressions of the same shapes.
-
-    Examples
-    --------
-    >>> x, y, z, p = (ca.SX.sym(s) for s in "xyzp")
-    >>> economise([ca.vertcat(x, y, z), p], [p * x * y - 2 * x * z], [True, False])
-    [SX((x*((p*y)+(-2*z))))]
-    """
+    """Rewrite ``outputs`` with fewer products of functions of the variables."""
     reader = _Reader(inputs, outputs, variable)
     writer = _Writer(reader, [reader.sum(j) for row in reader.rows for j in row])
     entries = iter(writer.expressions())
@@ -289,10 +268,8 @@ class _Writer:
         return result
 
     def _take_out(self, terms: Sum) -> Sum:
-        """Take factors that several products have in common out of them, the commonest first.
-
-        Products that are needed elsewhere too stay what they are.
-        """
+        """Take factors that several products have in common out of them, the commonest first."""
+        # Products that are needed elsewhere too stay what they are.
         terms = dict(terms)
         free = {p for p in terms if len(p) > 1 and self._count[p] < 2}
         while True:

@@ -40,24 +40,7 @@ RULES = (
 
 @dataclass(frozen=True)
 class Rule:
-    """How one series follows from others.
-
-    Attributes
-    ----------
-    rule : str
-        One of ``RULES``. ``apply`` is an operation on what does not move; ``integral`` is
-        w' = sign g u', ``quotient`` w' = sign u'/g, both with w = operation(u) at order zero;
-        ``affine`` is offset + factor u; ``power`` has a constant exponent; ``chosen`` is its second argument,
-    or zero where the first, which that has as a factor, has been zero up to the same order.
-    args : tuple of int
-        Numbers of rules.
-    operation : str
-        Of an ``apply``, ``integral`` or ``quotient``.
-    numbers : tuple of float
-        Value of a constant, sign, offset and factor.
-    place : (int, int)
-        Vector and position of an input.
-    """
+    """How one series follows from others."""
 
     rule: str
     args: tuple[int, ...] = ()
@@ -67,27 +50,7 @@ class Rule:
 
 
 def lower(nodes: Sequence[Node], moving: Sequence[bool]) -> tuple[list[Rule], list[int]]:
-    """Write a graph as rules.
-
-    Parameters
-    ----------
-    nodes : sequence of Node
-        As ``graph.instructions`` returns them.
-    moving : sequence of bool
-        Whether each node moves in time.
-
-    Returns
-    -------
-    rules : list of Rule
-        In the order in which they advance.
-    place : list of int
-        Number of the rule of each node.
-
-    Raises
-    ------
-    NotSmoothError
-        An operation of the state without a Taylor rule.
-    """
+    """Write a graph as rules."""
     lowering = _Lowering()
     for node, moves in zip(nodes, moving, strict=True):
         lowering.add(node, moves, moving)

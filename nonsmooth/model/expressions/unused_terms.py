@@ -50,29 +50,8 @@ class _Term:
 def awake(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], held: Mapping[int, Sequence[float]]
 ) -> list[ca.SX]:
-    """Return expressions in which terms that a mode leaves out are zero whatever their functions are.
-
-    Parameters
-    ----------
-    inputs : sequence of SX
-        Symbol vectors; multipliers are in the first one.
-    outputs : sequence of SX
-        Dense expressions in these symbols.
-    held : mapping
-        Values at which modes hold the multiplier at a place.
-
-    Returns
-    -------
-    list of SX
-        Of the same shapes; the same objects where nothing is left out.
-
-    Examples
-    --------
-    >>> x, lam = ca.SX.sym("x"), ca.SX.sym("lam")
-    >>> (field,) = awake([ca.vertcat(x, lam)], [(1 + lam) / 2 * ca.log(x) - x], {1: (1.0, -1.0)})
-    >>> ca.Function("f", [x, lam], [field])(-1.0, -1.0)
-    DM(1)
-    """
+    """Return expressions in which terms that a mode leaves out are zero whatever their functions
+    are."""
     if not held:
         return list(outputs)
     nodes, rows = instructions(inputs, outputs)

@@ -38,28 +38,7 @@ def solve(
     contact: Sequence[bool] | None = None,
     iterations: int = 10_000,
 ) -> Array | None:
-    """Find lambda with the complementarity above, where -M is a P-matrix.
-
-    Parameters
-    ----------
-    a, m : ndarray (k,), (k, k)
-        Rates at lambda = 0 and their derivatives by lambda.
-    start : ndarray (k,)
-        Letters to begin with: +1, -1, or 0 for sliding; -1 or 0 for open and closed contacts.
-    contact : sequence of bool (k,), optional
-        Rows with the bounds 0 and infinity.
-    iterations : int, optional
-
-    Returns
-    -------
-    ndarray (k,) or None
-        None if it was not found, or M is singular on the way.
-
-    Examples
-    --------
-    >>> solve(np.array([0.5, 3.0]), -np.eye(2), np.zeros(2)).tolist()
-    [0.5, 1.0]
-    """
+    """Find lambda with the complementarity above, where -M is a P-matrix."""
     letters = np.array(start, float)
     touches = np.zeros(len(letters), bool) if contact is None else np.array(contact)
     low, high = np.where(touches, 0.0, -1.0), np.where(touches, np.inf, 1.0)
@@ -101,34 +80,14 @@ def _wanted(lam: Array, rates: Array, letters: Array, low: Array, high: Array) -
 
 
 def is_unique(m: Array) -> bool:
-    """Whether -M is shown to be a P-matrix, so that there is one solution for every a.
-
-    Shown for a matrix that attracts (``attracts``), and by its minors if it is small.
-
-    Examples
-    --------
-    >>> is_unique(-np.eye(3)), is_unique(np.array([[-1.0, 3.0], [-3.0, -1.0]])), is_unique(np.eye(1))
-    (True, True, False)
-    """
+    """Whether -M is shown to be a P-matrix, so that there is one solution for every a."""
+    # Shown for a matrix that attracts (``attracts``), and by its minors if it is small.
     a = _scaled(m)
     return a is not None and (_is_stable(a) or (len(a) <= _MINORS and _has_positive_minors(a)))
 
 
 def attracts(m: Array) -> bool:
-    """Whether the intersection of the surfaces is shown to attract where all of them can slide.
-
-    With V = sum_i d_i |h_i| (1 - lambda_i sgn h_i), lambda the sliding multipliers, V' = mu^T D M mu < 0
-    for all mu = sgn h - lambda if D M has a definite symmetric part: the intersection is reached in
-    finite time. There is such a positive diagonal D for one or two surfaces if -M is a P-matrix, and for
-    any number if a scaling makes M symmetric and definite, if its symmetric part is definite, or if its
-    diagonal dominates (Kaszkurewicz & Bhaya 2000, "Matrix diagonal stability in systems and computation",
-    ch. 2). False says that none of this was found, not that the intersection repels.
-
-    Examples
-    --------
-    >>> attracts(np.array([[-1.0, 3.0], [-3.0, -1.0]])), attracts(np.array([[0.0, 1.0], [-1.0, 0.0]]))
-    (True, False)
-    """
+    """Whether the intersection of the surfaces is shown to attract where all of them can slide."""
     a = _scaled(m)
     return a is not None and (_is_stable(a) or (len(a) <= 2 and _has_positive_minors(a)))
 

@@ -42,19 +42,7 @@ from .switches import Guard
 
 @dataclass(frozen=True)
 class Yardsticks:
-    """Numbers at the start of a step.
-
-    Attributes
-    ----------
-    layer : ndarray (m,)
-        G at the multipliers given.
-    slope : ndarray (m, m)
-        Its derivatives by the unknown of each surface (lambda_i, or nu_i).
-    factors : ndarray (m,)
-        n_i; 1 where there is none.
-    layer_gradient, surface_gradient, stop_gradient, factor_gradient : ndarray (m, N) or (s, N)
-        Magnitudes of the state derivatives of G, of surfaces and gaps, of stops and resets.
-    """
+    """Numbers at the start of a step."""
 
     layer: Array
     slope: Array
@@ -69,22 +57,7 @@ class Yardsticks:
 
 
 def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX], list[ca.SX]]:
-    """Return the field in lambda, reactions and nu, with the factors taken out.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    lam : SX (m,)
-        Symbols of the multipliers; lambda_i is 0 while its surface slides.
-
-    Returns
-    -------
-    field : SX (N,)
-    factors : list of SX (m,)
-        n_i; 1 where there is none.
-    unknowns : list of SX (m,)
-        nu_i, or lambda_i where there is no factor.
-    """
+    """Return the field in lambda, reactions and nu, with the factors taken out."""
     x, p, reactions = system.extended_states, system.parameter_symbols, system.definition.reactions
     field = plain = system.field_with(lam, reactions)
     factors, unknowns = [ca.SX(1)] * system.surface_count, [*ca.vertsplit(lam)][: lam.numel()]
@@ -107,14 +80,7 @@ def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX]
 
 
 class Coupled:
-    """Series of states, surfaces, stops and multipliers of a system in any mode.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    watched : sequence of SX scalars, optional
-        Further functions, that follow the stops and resets.
-    """
+    """Series of states, surfaces, stops and multipliers of a system in any mode."""
 
     def __init__(self, system: FilippovSystem, watched: Sequence[ca.SX] = ()):
         self.system, d = system, system.definition
@@ -173,8 +139,7 @@ class Coupled:
         return signs
 
     def known_multipliers(self, mode: str, x: Array, unknowns: Array, p: Array) -> Array:
-        """Multipliers at a state that are known in a mode: as ``held``, and h/|h| off a set; ``unknowns``
-        of a set that was just left (letter ``b``) are h, of one being left (``l``) its direction."""
+        """Multipliers at a state that are known in a mode."""
         held = self.held(mode)
         for members in self.moving_sets(mode):
             own = list(members)
@@ -251,18 +216,15 @@ class Coupled:
         return moves
 
     def _changing(self, sliding: Sequence[int]) -> list[int]:
-        """Unknowns that the stability of sliding is read from: two surfaces together, else each
-        alone; none where the slope does not change."""
+        """Unknowns that the stability of sliding is read from."""
         if len(sliding) == 2 and max(sliding) < self._surfaces:
             return list(sliding) if self.slope_moves[np.ix_(sliding, sliding)].any() else []
         return [i for i in sliding if self.slope_moves[i, i]]
 
     def _stability(self, sliding: Sequence[int]) -> list[ca.SX]:
-        """Functions that pass zero where sliding loses its stability across the layer.
-
-        The slope of one multiplier, determinant and trace of that of two; of more, or with contacts,
-        its diagonal, each of which has to keep its sign.
-        """
+        """Functions that pass zero where sliding loses its stability across the layer."""
+        # The slope of one multiplier, determinant and trace of that of two; of more, or with contacts,
+        # its diagonal, each of which has to keep its sign.
         changing = self._changing(sliding)
         if len(sliding) == 2 and len(changing) == 2 and max(sliding) < self._surfaces:
             if (pair := tuple(changing)) not in self._stable:
@@ -386,21 +348,7 @@ class Coupled:
         return self._series[key]
 
     def jets(self, law: MultiplierSeries, x: Array, p: Array) -> tuple[Array, Array]:
-        """Taylor coefficients in a mode.
-
-        Parameters
-        ----------
-        law : MultiplierSeries
-            Of the mode; filled.
-        x : ndarray (N,)
-        p : ndarray
-
-        Returns
-        -------
-        states : ndarray (N, order + 1)
-        guards : ndarray (g, order + 1)
-            In the order of ``guards``.
-        """
+        """Taylor coefficients in a mode."""
         expansion, late = self._expansion(law.mode)
         expansion.restart([v or None for v in p.tolist()])
         order = law.order
@@ -438,8 +386,7 @@ class Coupled:
         stops: Array,
         stability: Array | None = None,
     ) -> Array:
-        """Guards of a mode, from coefficients or values (rows) of what they are made of; those of the
-        sets as they are."""
+        """Guards of a mode, from coefficients or values (rows) of what they are made of."""
         rows: list[Array] = []
         signs, first = self.system.parse_letters(mode), [s[0] for s in self.system.sets]
         for i, sign in enumerate(signs):

@@ -20,17 +20,7 @@ _WRITTEN_OUT = 3
 
 
 class Solved:
-    """The law of a mode of coupled surfaces and contacts (see ``switches.Sliding``).
-
-    Attributes
-    ----------
-    states : SX
-        The extended states, and the unknowns that are further states.
-    unknowns : tuple of int
-        Surfaces and contacts whose multipliers are further states.
-    values : SX
-        Multipliers (and reactions) of what slides, as functions of ``states``.
-    """
+    """The law of a mode of coupled surfaces and contacts (see ``switches.Sliding``)."""
 
     regular = True
 
@@ -94,13 +84,7 @@ class Solved:
 
 
 def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
-    """Solution of linear equations, written out for few unknowns.
-
-    Examples
-    --------
-    >>> solved(ca.SX(ca.DM([[2, 0], [0, 4]])), ca.SX(ca.DM([2, 2])))
-    SX([1, 0.5])
-    """
+    """Solution of linear equations, written out for few unknowns."""
     k = matrix.shape[0]
     if k == 1:
         return ca.simplify(right / matrix)
@@ -110,18 +94,7 @@ def solved(matrix: ca.SX, right: ca.SX) -> ca.SX:
 
 
 def explicit(system: FilippovSystem, mode: str) -> Motion:
-    """Return the motion of a mode as a field of the states, for any system; built once.
-
-    Examples
-    --------
-    A mass that rests on a table, and one that flies:
-
-    >>> y, v = ca.SX.sym("y"), ca.SX.sym("v")
-    >>> from nonsmooth import Impact
-    >>> system = FilippovSystem([y, v], field=[v, -9.81], impacts=Impact(y))
-    >>> explicit(system, "c").field, explicit(system, "o").field
-    (SX([v, 0]), SX([v, -9.81]))
-    """
+    """Return the motion of a mode as a field of the states, for any system; built once."""
     require_system(system)
     if not system.coupled:
         return motion(system, mode)

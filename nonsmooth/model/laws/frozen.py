@@ -14,13 +14,7 @@ from .multiplier_series import unit
 
 @dataclass(frozen=True)
 class Frozen:
-    """h' = a - M lambda of a set at a point, with what slides elsewhere eliminated.
-
-    Attributes
-    ----------
-    a : ndarray (k,)
-    m : ndarray (k, k)
-    """
+    """h' = a - M lambda of a set at a point, with what slides elsewhere eliminated."""
 
     a: Array
     m: Array

@@ -20,17 +20,7 @@ from .evaluators import Evaluator
 
 @dataclass(frozen=True, eq=False)
 class LayerNumbers:
-    """Values at a state and multipliers; N extended states, m surfaces.
-
-    Attributes
-    ----------
-    h, h_x : ndarray (m,), (m, N)
-        The surfaces and their gradients.
-    field, field_x, field_l : ndarray (N,), (N, N), (N, m)
-        The field, its derivatives by states and by multipliers.
-    rates, rates_x, rates_l : ndarray (m,), (m, N), (m, m)
-        G and its derivatives.
-    """
+    """Values at a state and multipliers; N extended states, m surfaces."""
 
     h: Array
     h_x: Array
@@ -105,24 +95,8 @@ class Loop:
 def loop_at(
     layer: Layer, x: Array, surfaces: Sequence[int], multipliers: Array, p: Array
 ) -> Loop | None:
-    """Follow an orbit once round the point of the plane where two surfaces meet, to second order.
-
-    Parameters
-    ----------
-    layer : Layer
-    x : ndarray (2,)
-        The point; the system is planar and does not depend on time.
-    surfaces : sequence of int
-        The two surfaces that meet there.
-    multipliers : ndarray (m,)
-        Of the other surfaces.
-    p : ndarray
-
-    Returns
-    -------
-    Loop or None
-        None if the four fields do not lead round the point, from each quadrant to the next.
-    """
+    """Follow an orbit once round the point of the plane where two surfaces meet, to second
+    order."""
     i, j = surfaces
     ratio, bend, size = 1.0, 0.0, 0.0
     quadrants = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
@@ -174,10 +148,8 @@ def _in_surfaces(
 def spirals_in(
     system: FilippovSystem, x: Array, multipliers: Array, p: Array, surfaces: Sequence[int]
 ) -> bool:
-    """Whether orbits of the plane run round the point where two surfaces meet, and towards it.
-
-    ``multipliers`` begin with those of the surfaces; false for contacts and outside the plane.
-    """
+    """Whether orbits of the plane run round the point where two surfaces meet, and towards it."""
+    # ``multipliers`` begin with those of the surfaces; false for contacts and outside the plane.
     m = system.surface_count
     if system.extended_dimension != 2 or max(surfaces) >= m or len(surfaces) != 2:
         return False

@@ -22,26 +22,7 @@ _ALONG = 1e-14
 
 
 def limit_directions_of(a: Array, m: Array) -> list[tuple[float, Array]]:
-    """All limit directions of h' = a - M u: pairs of the rate s = r' and the direction u (k,).
-
-    Parameters
-    ----------
-    a : ndarray (k,)
-    m : ndarray (k, k)
-
-    Returns
-    -------
-    list of (float, ndarray (k,))
-        By descending rate. Where a = 0 and M has equal eigenvalues there are infinitely many; the
-        eigenvectors stand for them.
-
-    Examples
-    --------
-    A block on an incline with 0.3 downhill and friction 0.5: it stops, whatever way it came.
-
-    >>> [(round(s, 12), u.tolist()) for s, u in limit_directions_of(np.array([0.3, 0.0]), 0.5 * np.eye(2))]
-    [(-0.2, [1.0, 0.0]), (-0.8, [-1.0, 0.0])]
-    """
+    """All limit directions of h' = a - M u: pairs of the rate s = r' and the direction u (k,)."""
     size = float(np.abs(a).max(initial=0.0) + np.abs(m).max(initial=0.0))
     if size == 0.0 or not np.isfinite(size):
         return []
@@ -55,17 +36,9 @@ def limit_directions_of(a: Array, m: Array) -> list[tuple[float, Array]]:
 
 
 def leaving_direction(a: Array, m: Array) -> tuple[float, Array]:
-    """The largest rate s and its direction u, for M symmetric and positive definite or zero.
-
-    Newton's method on 1/|(M + s)^-1 a| = 1 from the left, where it is monotone: the function is concave, so
-    that a step from the right may lead beyond a pole.
-
-    Examples
-    --------
-    >>> s, u = leaving_direction(np.array([0.09, 1.0]), np.diag([0.01, 1.0]))
-    >>> round(s, 9), (u * [0.01 + s, 1 + s]).round(9).tolist()
-    (0.165300817, [0.09, 1.0])
-    """
+    """The largest rate s and its direction u, for M symmetric and positive definite or zero."""
+    # Newton's method on 1/|(M + s)^-1 a| = 1 from the left, where it is monotone: the function is concave, so
+    # that a step from the right may lead beyond a pole.
     w, axes = np.linalg.eigh(0.5 * (m + m.T))
     c = axes.T @ a
     present = c != 0.0

@@ -21,14 +21,7 @@ from .evaluators import Evaluator
 
 @dataclass(frozen=True, eq=False)
 class Derived:
-    """A vector of functions of x, a and p, with its derivatives.
-
-    Attributes
-    ----------
-    value : ndarray (k,)
-    x, a, p : ndarray (k, N), (k, A), (k, q)
-        Derivatives by the states, by what acts, and by the parameters asked for.
-    """
+    """A vector of functions of x, a and p, with its derivatives."""
 
     value: Array
     x: Array
@@ -46,14 +39,7 @@ class Derived:
 
 @dataclass(frozen=True, eq=False)
 class AtMode:
-    """Values at a state.
-
-    Attributes
-    ----------
-    field, heights, rates, factors : Derived
-        The field (N,); switching functions and gaps (m,); the rates of the former and the second
-        derivatives of the latter; the factors of the multipliers.
-    """
+    """Values at a state."""
 
     field: Derived
     heights: Derived
@@ -62,16 +48,7 @@ class AtMode:
 
 
 class ModeDerivatives:
-    """The functions of a system; made by ``mode_derivatives``.
-
-    Attributes
-    ----------
-    coupled : Coupled
-    size : int
-        Number of what acts.
-    column : list of int
-        Where the unknown of each switching function or contact is among what acts.
-    """
+    """The functions of a system; made by ``mode_derivatives``."""
 
     def __init__(self, system: FilippovSystem):
         self.coupled: Coupled = coupled_of(system)

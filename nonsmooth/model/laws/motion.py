@@ -25,20 +25,7 @@ from .switches import Guard, Guarded, Implicit, Sliding, guards_of, sliding
 
 
 class Motion:
-    """Field, guards and jets of one mode of a system; made by ``motion`` and ``followed``.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-        One letter for each surface.
-    law : Sliding
-        How the mode moves on its surfaces.
-    guarded : list of (Guard, SX)
-        Guards and their functions.
-    key : hashable
-        Tells motions of the same mode with other guards apart.
-    """
+    """Field, guards and jets of one mode of a system; made by ``motion`` and ``followed``."""
 
     def __init__(
         self,
@@ -105,27 +92,14 @@ def motion(system: FilippovSystem, mode: str) -> Motion:
 
 
 def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[ca.SX]:
-    """Check functions that a user wants to watch.
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError
-    """
+    """Check functions that a user wants to watch."""
     return [
         read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
     ]
 
 
 def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -> Motion:
-    """Return a mode whose functions are only watched: its guards' and further ones, of kind "zero".
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    watched : sequence of SX scalars
-        Functions of states, parameters and time, named ``f0``, ``f1``, ...
-    """
+    """Return a mode whose functions are only watched."""
     expressions = watched_functions(system, watched)
     symbols = [system.extended_states, system.parameter_symbols]
     key = Content(symbols, ca.vertcat(*expressions)) if expressions else ()

@@ -38,25 +38,14 @@ Outputs = Sequence[Sequence[float | None]]
 
 
 def unit(h: Array) -> Array:
-    """Direction of a vector of any size; NaN for zero.
-
-    Examples
-    --------
-    >>> unit(np.array([3e-200, 4e-200])).round(9).tolist()
-    [0.6, 0.8]
-    """
+    """Direction of a vector of any size; NaN for zero."""
     with np.errstate(invalid="ignore", divide="ignore"):
         scaled = h / np.abs(h).max()
         return np.asarray(scaled / np.linalg.norm(scaled))
 
 
 class Direction:
-    """The series of h/|h|, order by order.
-
-    Parameters
-    ----------
-    size, order : int
-    """
+    """The series of h/|h|, order by order."""
 
     def __init__(self, size: int, order: int):
         self.radius = 0.0
@@ -79,28 +68,7 @@ class Direction:
 
 
 class MultiplierSeries:
-    """The multipliers of one step.
-
-    Parameters
-    ----------
-    coupled : Coupled
-    mode : str
-    unknowns : ndarray (m,)
-        At the start: of what slides, h of sets just left, the direction of those that are being left.
-    held : ndarray (m,)
-        Multipliers that are known at the start.
-    slope : ndarray (m, m)
-        dG/d(unknowns) there.
-    factors : ndarray (m,)
-    order : int
-
-    Attributes
-    ----------
-    held, series, acting : ndarray (m, order + 1)
-        Known multipliers; unknowns, and h of sets that are being left; those unknowns that act.
-    limits : ndarray (sets, order + 1)
-        Factors of the sets; filled with ``rows``.
-    """
+    """The multipliers of one step."""
 
     def __init__(
         self,
@@ -220,8 +188,7 @@ class MultiplierSeries:
 
     @property
     def directions(self) -> Array:
-        """Series whose relative accuracy counts, whatever the size of the states: directions of slip
-        close to a set that is left, and the distance from it."""
+        """Series whose relative accuracy counts, whatever the size of the states."""
         rows: list[Array] = []
         for s, direction in self._off.items():
             if self.mode[s[0]] == "b":

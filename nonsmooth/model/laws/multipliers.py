@@ -18,22 +18,9 @@ def sliding_multipliers(
     stable_only: bool = True,
     kept: Array | None = None,
 ) -> list[Array]:
-    """Multipliers (surfaces,) that keep the sliding surfaces of a mode.
-
-    Linear equations have one set; for others Newton's method starts from a grid (bilinear
-    equations of two multipliers have at most two sets).
-
-    Parameters
-    ----------
-    of : Coupled
-    mode : str
-    x : ndarray (N,)
-    p : ndarray
-    stable_only : bool, optional
-        Only those that are stable across the layer (Jeffrey 2018).
-    kept : ndarray (m,), optional
-        h of sets that were just left, which stay in the result.
-    """
+    """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
+    # Linear equations have one set; for others Newton's method starts from a grid (bilinear
+    # equations of two multipliers have at most two sets).
     sliding = of.sliding(mode)
     unknowns = np.zeros(of.count) if kept is None else kept.copy()
     if not sliding:

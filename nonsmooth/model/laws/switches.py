@@ -43,19 +43,7 @@ Guarded = list[tuple[Guard, ca.SX]]
 
 
 class Sliding(Protocol):
-    """What a kind of sliding gives to the motion of a mode.
-
-    Attributes
-    ----------
-    surfaces : tuple of int
-        Those that slide.
-    states : SX
-        The extended states, and multipliers that are further states.
-    field : SX
-        Their rates.
-    regular : bool
-        Whether the field has no 0/0 where both fields are tangent to the surface.
-    """
+    """What a kind of sliding gives to the motion of a mode."""
 
     @property
     def surfaces(self) -> tuple[int, ...]: ...
@@ -106,19 +94,7 @@ class Free:
 
 
 class Affine:
-    """One surface slides and its multiplier enters linearly.
-
-    The field is F0 - (a/b) G with the common factor of G and b cancelled (Filippov 1988, sec. 4).
-    The exits are -L_F+ h and L_F- h; the ratio a/b is never used for them, because it is 0/0 at a
-    two-fold.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    surface : int
-        The one that slides.
-    """
+    """One surface slides and its multiplier enters linearly."""
 
     def __init__(self, system: FilippovSystem, mode: str, surface: int):
         self.system, self.mode, self.surfaces = system, mode, (surface,)
@@ -159,8 +135,7 @@ class Affine:
         return []
 
     def _continuous(self, difference: list[ca.SX]) -> bool:
-        """Whether the two fields are one field on the surface: their difference is 0 or h times a
-        function, so that there is nothing to choose there."""
+        """Whether the two fields are one field on the surface."""
         h, p = self.system.surface_function(self.surfaces[0]), self.system.parameter_symbols
         forms = normal_forms([self.states, p], difference)[1]  # to rounding of the coefficients
         pieces = [e for e, form in zip(difference, forms, strict=True) if form[0]]
@@ -175,18 +150,7 @@ def _with_letter(mode: str, surface: int, letter: str) -> str:
 
 
 class Implicit:
-    """Sliding whose multipliers solve grad h_i . f(x, lambda) = 0 implicitly.
-
-    The multipliers are further states with lambda' = -(dG/dlambda)^-1 dG/dx f, so the same jets
-    carry them. A multiplier that reaches +1 or -1 leaves its surface; the functions of
-    ``stability`` keep the equilibrium lambda of the layer problem eps lambda_i' = grad h_i . f
-    stable (Jeffrey 2018).
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    """
+    """Sliding whose multipliers solve grad h_i . f(x, lambda) = 0 implicitly."""
 
     regular = True
 
@@ -232,15 +196,7 @@ class Implicit:
 
 
 def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
-    """Guards of a mode: surfaces and exits, stops and resets, stability of sliding.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    law : Sliding
-        Of the mode.
-    """
+    """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
     result: Guarded = []
     for i, sign in enumerate(system.parse_mode(mode)):
         if sign:

@@ -129,12 +129,7 @@ class BranchCurve(Curve):
 
 
 def check_bounds(bounds: Sequence[float], value: float, name: str) -> tuple[float, float]:
-    """Check bounds of a parameter around its value.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Check bounds of a parameter around its value."""
     try:
         low, high = (float(b) for b in bounds)
     except (TypeError, ValueError):
@@ -163,10 +158,8 @@ def follow_branch(
     progress: bool = False,
     away: Departure | None = None,
 ) -> Branch:
-    """Continue a solution both ways to the bounds of the parameter, through events if asked to.
-
-    With ``away`` one way only, from an event.
-    """
+    """Continue a solution both ways to the bounds of the parameter, through events if asked to."""
+    # With ``away`` one way only, from an event.
     if not isinstance(through, (bool, np.bool_)):
         raise OptionError(f"through: expected True or False, received {through!r}.")
     bar = progress_bar(progress)
@@ -282,11 +275,9 @@ def _elsewhere(event: BranchEvent, curve: BranchCurve) -> bool:
 
 
 def _drop_turning(arc: Arc) -> None:
-    """Forget a turning or branch point that only mirrors the event at which an arc ends.
-
-    Where a new leg grows like a square root the branch is tangent to a constant parameter, and where
-    it grows like a cube root the equations are singular; so they are at a Hopf point.
-    """
+    """Forget a turning or branch point that only mirrors the event at which an arc ends."""
+    # Where a new leg grows like a square root the branch is tangent to a constant parameter, and where
+    # it grows like a cube root the equations are singular; so they are at a Hopf point.
     if not arc.zeros or arc.zeros[-1].name != arc.end:
         return
     end = arc.zeros[-1].point.arclength

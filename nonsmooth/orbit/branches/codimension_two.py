@@ -33,18 +33,7 @@ ENDS = ("1:1 resonance", "1:2 resonance")
 def degenerate(
     problem: BoundaryProblem, condition: Condition | None, name: str, at: Evaluation, p: Array
 ) -> dict[str, float]:
-    """Functions that vanish at points of codimension two on the curve of one event.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    condition : Condition or None
-        That vanishes on the curve; None for bifurcations of multipliers.
-    name : str
-        Of the test.
-    at : Evaluation
-    p : ndarray
-    """
+    """Functions that vanish at points of codimension two on the curve of one event."""
     if name == "Neimark-Sacker":
         return _resonances(problem, at) | _cubic(problem, at, p, name)
     if name in ("period doubling", "pitchfork"):

@@ -78,11 +78,9 @@ def conditions_of(
 def condition_row(
     problem: BoundaryProblem, u: Array, p: Array, free: tuple[int, ...], condition: Condition
 ) -> tuple[float, Array] | None:
-    """Value of a condition on one leg, and its derivatives by the unknowns and free parameters.
-
-    Only the start of its leg and the parameters matter, by which differences are taken; they steer
-    Newton's method, whose accuracy is that of the value. None for conditions on the end of a leg.
-    """
+    """Value of a condition on one leg, and its derivatives by the unknowns and free parameters."""
+    # Only the start of its leg and the parameters matter, by which differences are taken; they steer
+    # Newton's method, whose accuracy is that of the value. None for conditions on the end of a leg.
     if condition.what not in ("interior", "start"):
         return None
     i, n = condition.leg, problem.dimension
@@ -113,10 +111,8 @@ def condition_row(
 
 
 def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
-    """Tests by the multipliers of the legs' map.
-
-    An eigenvalue -1 of the half map of a symmetric orbit breaks its symmetry: a pitchfork.
-    """
+    """Tests by the multipliers of the legs' map."""
+    # An eigenvalue -1 of the half map of a symmetric orbit breaks its symmetry: a pitchfork.
     reduced = finite_return_map(problem, at)
     if reduced is None or not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
         return {}
@@ -135,13 +131,7 @@ def _pairs(count: int) -> tuple[NDArray[Any], NDArray[Any]]:
 
 
 class _Tests:
-    """What is watched of the legs of an orbit, and by which guards.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    legs : tuple of Leg
-    """
+    """What is watched of the legs of an orbit, and by which guards."""
 
     def __init__(self, system: FilippovSystem, legs: tuple[Leg, ...]):
         self.system, self.legs, self.guards = system, legs, LegGuards(system, legs)
@@ -174,19 +164,16 @@ class _Tests:
 def _starting(
     system: FilippovSystem, i: int, leg: Leg, before: Leg
 ) -> list[tuple[int, int, Condition]]:
-    """Guards that are not zero by construction at the start of a leg, of those to order 3: number and order
-    of the first Taylor coefficient."""
+    """Guards that are not zero by construction at the start of a leg, of those to order 3."""
     guards = guarded_field(system, leg.mode).motion.guards
     orders = [(k, guard, _order(system, guard, before)) for k, guard in enumerate(guards)]
     return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
 
 
 def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
-    """Order at which a guard is positive after the event of the leg before; None if not watched.
-
-    A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
-    too, and its positive second derivative is the transversality of that event.
-    """
+    """Order at which a guard is positive after the event of the leg before; None if not watched."""
+    # A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
+    # too, and its positive second derivative is the transversality of that event.
     if guard.kind not in ("surface", "exit", "impact", "release"):
         return None
     if before.kind in ("reset", "impact") and guard.kind != "surface":

@@ -316,10 +316,8 @@ class PseudoEquilibriumCurve(Equilibria):
 
 
 def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | None:
-    """Leave a boundary equilibrium into the region where the new solutions are real.
-
-    ``inward`` is a gradient that must grow, or the sign with which alpha must.
-    """
+    """Leave a boundary equilibrium into the region where the new solutions are real."""
+    # ``inward`` is a gradient that must grow, or the sign with which alpha must.
     _, jacobian = curve.scaled(u / curve.scale)
     tangent = np.linalg.svd(jacobian)[2][-1]
     if isinstance(inward, float):

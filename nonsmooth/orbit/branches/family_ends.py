@@ -37,26 +37,7 @@ _NEAR = 0.1
 def hopf_point(
     system: FilippovSystem, mode: str, x: Array, p: Array, index: int
 ) -> tuple[Array, float, float] | None:
-    """The Hopf point near a small orbit of one mode.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    x : ndarray (n,)
-        Inside the orbit.
-    p : ndarray
-        All parameters.
-    index : int
-        Of the one that varies.
-
-    Returns
-    -------
-    point : ndarray (n,)
-    value : float
-        Of the parameter.
-    frequency : float
-    """
+    """The Hopf point near a small orbit of one mode."""
     field, n = variational_field(system, mode).linear, system.dimension
     size = np.append(np.full(n, max(1.0, float(np.abs(x).max()))), max(abs(float(p[index])), 1e-3))
 
@@ -109,16 +90,7 @@ def extent(problem: BoundaryProblem, u: Array, p: Array) -> float:
 def surface_end(
     orbit: PeriodicOrbit, parameter: str, size: float, first: float
 ) -> BranchEvent | None:
-    """The point of a surface that a small orbit is about to shrink to; None if there is none.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-    parameter : str
-        The one that varies.
-    size, first : float
-        Of the orbit, and of the one from which the branch began.
-    """
+    """The point of a surface that a small orbit is about to shrink to; None if there is none."""
     reach = max(_NEAR * size, _BESIDE * first)
     problem, system = orbit.problem, orbit.system
     x = problem.split(orbit.unknowns)[0][:, : system.dimension].mean(axis=0)

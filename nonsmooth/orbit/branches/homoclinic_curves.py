@@ -88,16 +88,7 @@ def event_of(connection: Connection) -> BranchEvent:
 
 
 def homoclinic_end(orbit: PeriodicOrbit, parameter: str, width: float) -> BranchEvent | None:
-    """The homoclinic orbit that a long periodic orbit is close to; None if none is found.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-    parameter : str
-        That varied.
-    width : float
-        Of its bounds.
-    """
+    """The homoclinic orbit that a long periodic orbit is close to; None if none is found."""
     system, value = orbit.system, orbit.parameters[parameter]
     if system.time_dependent or system.coupled or system.surface_count > 1:
         return None

@@ -33,20 +33,9 @@ from .conditions import Condition, touching
 
 
 def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by: float) -> Array:
-    """Unknowns near an orbit whose legs ``fresh`` last for ``by``.
-
-    A flight that is added inside a slide begins before the point where the slide touched its boundary
-    and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a flight of the duration t.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    u : ndarray (m,)
-        The orbit at the event, with new legs of no duration.
-    p : ndarray
-    fresh : sequence of int
-    by : float
-    """
+    """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
+    # A flight that is added inside a slide begins before the point where the slide touched its boundary
+    # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a flight of the duration t.
     starts, durations = (np.array(part) for part in problem.split(u))
     legs = problem.legs
     for i in fresh:
@@ -127,18 +116,7 @@ def cut_corner(before: Edited, i: int, p: Array) -> Edited | None:
 
 @dataclass(frozen=True, eq=False)
 class Edited:
-    """An itinerary on the other side of a bifurcation.
-
-    Attributes
-    ----------
-    problem : BoundaryProblem
-    u : ndarray (m,)
-        Unknowns of the same orbit in it.
-    origin : tuple of int
-        For each leg its number before; -1 for a new one, -2 for one that grows from zero.
-    test : str
-        In an itinerary with fewer legs the condition that vanishes there; else empty.
-    """
+    """An itinerary on the other side of a bifurcation."""
 
     problem: BoundaryProblem
     u: Array
@@ -273,17 +251,7 @@ def _grazed(
 def edited(
     problem: BoundaryProblem, kind: str, conditions: Sequence[Condition], u: Array, p: Array
 ) -> Edited | None:
-    """The itinerary beyond a bifurcation; None where nothing continues it.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    kind : str
-    conditions : sequence of Condition
-        Those that vanish; several in an orbit that is symmetric, or on several rounds.
-    u : ndarray (m,)
-    p : ndarray
-    """
+    """The itinerary beyond a bifurcation; None where nothing continues it."""
     found: Edited | None = Edited(problem, u, tuple(range(len(problem.legs))))
     for condition in conditions:
         assert found is not None

@@ -31,18 +31,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Expansion:
-    """Derivatives of a map or field at a fixed point, as far as one eigenvector needs them.
-
-    Attributes
-    ----------
-    a : ndarray (n, n)
-    q, p : ndarray (n,)
-        Right and left eigenvector, |q| = 1 and p.q = 1.
-    second : ndarray (n, n)
-        B(q, .).
-    third : ndarray (n, n)
-        C(q, q*, .).
-    """
+    """Derivatives of a map or field at a fixed point, as far as one eigenvector needs them."""
 
     a: Array
     q: Complex
@@ -52,14 +41,8 @@ class Expansion:
 
 
 def eigenvectors(a: Array, value: complex) -> tuple[Complex, Complex]:
-    """Right eigenvector q with |q| = 1 and left one p with p.q = 1, of the eigenvalue next to a value.
-
-    Examples
-    --------
-    >>> q, p = eigenvectors(np.array([[-1.0, 0.0], [0.0, 0.5]]), -1.0)
-    >>> np.abs(q).tolist(), complex(p @ q)
-    ([1.0, 0.0], (1+0j))
-    """
+    """Right eigenvector q with |q| = 1 and left one p with p.q = 1, of the eigenvalue next to a
+    value."""
 
     def of(matrix: Array) -> Complex:
         values, vectors = np.linalg.eig(matrix)
@@ -88,17 +71,8 @@ def torus_coefficient(at: Expansion, turn: complex) -> float:
 def hopf_coefficient(
     system: FilippovSystem, mode: str, x: Array, p: Array, frequency: float
 ) -> float:
-    """The first Lyapunov coefficient l1 of an equilibrium of one mode, on its surface if that slides.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    x : ndarray (n,)
-    p : ndarray
-    frequency : float
-        Of the imaginary pair.
-    """
+    """The first Lyapunov coefficient l1 of an equilibrium of one mode, on its surface if that
+    slides."""
     forms = field_expansion(system, mode)
     a = forms.copied(np.append(x, np.zeros(x.size)), p)[0]
     q, left = eigenvectors(a, 1j * frequency)
@@ -131,16 +105,9 @@ _ITERATIONS, _TOLERANCE = 12, 1e-13
 def normal_form(
     problem: BoundaryProblem, at: Evaluation, p: Array, kind: str
 ) -> Mapping[str, float]:
-    """The coefficient of a period doubling or pitchfork (c), or of a Neimark-Sacker point (a).
-
-    In states (and time) as they are, with an eigenvector of length one where the first leg starts, and
-    the error of the differences.
-
-    Returns
-    -------
-    mapping
-        Empty where the orbits beside the event cannot be flown.
-    """
+    """The coefficient of a period doubling or pitchfork (c), or of a Neimark-Sacker point (a)."""
+    # In states (and time) as they are, with an eigenvector of length one where the first leg starts, and
+    # the error of the differences.
     n = problem.dimension
     units = problem.scales(problem.pack(at.starts, at.durations), p)[:n]
     a = return_map(problem, at) * (units / units[:, None])

@@ -90,10 +90,8 @@ class OrbitCurve(OrbitEquations):
         return doubled or self.ends(zero.name)
 
     def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
-        """Whether an extremum of a guard was born in a step and has passed zero already.
-
-        Then either no motion is left at the end of the step, or none just before another event in it.
-        """
+        """Whether an extremum of a guard was born in a step and has passed zero already."""
+        # Then either no motion is left at the end of the step, or none just before another event in it.
         born = new.tests.keys() - last.tests.keys()
         if any(new.tests[k] < 0.0 and self._inside(k) for k in born) and ending is None:
             return True
@@ -253,11 +251,9 @@ class OrbitCurve(OrbitEquations):
         return self._event(kind, curve, point, beyond.test, side)
 
     def _vanishing(self, zero: Zero) -> list[Condition]:
-        """Conditions that vanish together at a zero, those that name the event.
-
-        Where a leg vanishes the events beside it are tangent too; an orbit that is symmetric has
-        each event several times.
-        """
+        """Conditions that vanish together at a zero, those that name the event."""
+        # Where a leg vanishes the events beside it are tangent too; an orbit that is symmetric has
+        # each event several times.
         small = [self.known[zero.name]]
         small += [self.known[n] for n in zero.together if n != zero.name and not is_smooth(n)]
         first = min(small, key=lambda c: _PRIORITY.index(c.what))

@@ -18,17 +18,7 @@ from .conditions import Condition
 
 @dataclass(frozen=True, eq=False)
 class Small:
-    """What elimination leaves of bordered equations.
-
-    Attributes
-    ----------
-    matrix, right : ndarray (n + k, n + k), (n + k,)
-        Equations of the first start and the k parameters.
-    starts, durations : list of (ndarray, ndarray), list of (ndarray, float)
-        Of each leg as affine functions of these.
-    pivots : float
-        Product of the pivots of the durations, of rows of length 1.
-    """
+    """What elimination leaves of bordered equations."""
 
     matrix: Array
     right: Array
@@ -41,12 +31,7 @@ class Small:
         return float(np.linalg.det(self.matrix)) * self.pivots
 
     def solution(self) -> Array:
-        """All unknowns.
-
-        Raises
-        ------
-        numpy.linalg.LinAlgError
-        """
+        """All unknowns."""
         few = np.linalg.solve(self.matrix, self.right)
         n = self.starts[0][0].shape[0]
         rows = [a @ few + c for a, c in self.starts]
@@ -60,15 +45,8 @@ def applies(problem: BoundaryProblem) -> bool:
 
 
 def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
-    """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border.
-
-    Columns and rows may be scaled.
-
-    Raises
-    ------
-    numpy.linalg.LinAlgError
-        An event is grazed to all digits.
-    """
+    """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border."""
+    # Columns and rows may be scaled.
     count, n, m = len(problem.legs), problem.dimension, problem.size
     k = len(matrix) - m
     few = n + k
@@ -116,19 +94,7 @@ _MOST, _MOST_STEPS, _UNKNOWNS = 10, 1000, 100
 
 
 class OrbitEquations(BranchCurve):
-    """Periodic orbits of one itinerary in the unknowns (starts, durations, parameters).
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    p : ndarray
-        All parameters.
-    free : tuple of int
-        Those that vary.
-    scale : ndarray
-    longest : float
-        Where the period counts as divergent.
-    """
+    """Periodic orbits of one itinerary in the unknowns (starts, durations, parameters)."""
 
     def __init__(
         self,

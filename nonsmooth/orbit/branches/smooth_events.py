@@ -32,15 +32,7 @@ _RESONANT = 1e-4
 
 
 def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
-    """Classify a smooth bifurcation; None for a neutral saddle in place of a Neimark-Sacker point.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    at : Evaluation
-    p : ndarray
-    kind : str
-    """
+    """Classify a smooth bifurcation."""
     words, numbers = _WORDS[kind], dict[str, float]()
     if kind in ("fold", "branch point"):
         return FarSide("", words)
@@ -80,14 +72,7 @@ Parting = tuple[str, "OrbitCurve", Point, str, FarSide]
 
 
 def as_doubling(curve: OrbitCurve, zero: Zero) -> Parting | None:
-    """Two rounds that become one: the period doubling of the shorter orbit, met from the doubled ones.
-
-    Parameters
-    ----------
-    curve : OrbitCurve
-    zero : Zero
-        A branch point.
-    """
+    """Two rounds that become one."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
     problem, once = once_round(curve.problem, u[: curve.problem.size], p)
     whole = float(curve.problem.split(u)[1].sum())
@@ -97,14 +82,7 @@ def as_doubling(curve: OrbitCurve, zero: Zero) -> Parting | None:
 
 
 def as_pitchfork(curve: OrbitCurve, zero: Zero) -> Parting | None:
-    """An orbit that a reflection of coordinates maps to itself half a period later: its pitchfork.
-
-    Parameters
-    ----------
-    curve : OrbitCurve
-    zero : Zero
-        A branch point.
-    """
+    """An orbit that a reflection of coordinates maps to itself half a period later."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
     for problem, half in halves(curve.problem, u[: curve.problem.size], p):
         found = _part(curve, problem, half, zero, "pitchfork")

@@ -25,15 +25,9 @@ _LONG = 10.0
 
 
 def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
-    """The branch that crosses at an event: its curve, and a point near the event.
-
-    Where rounds double the event itself comes first: the other half of the branch has the same orbits,
-    begun a round later.
-
-    Raises
-    ------
-    DefinitionError, ConvergenceError
-    """
+    """The branch that crosses at an event: its curve, and a point near the event."""
+    # Where rounds double the event itself comes first: the other half of the branch has the same orbits,
+    # begun a round later.
     if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
         return _around(event, free)
     if event.kind not in ("period doubling", "pitchfork", "branch point"):

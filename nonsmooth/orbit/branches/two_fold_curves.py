@@ -165,18 +165,7 @@ def _given(parameters: Parameters | None, changed: dict[str, float]) -> dict[str
 
 
 class TwoFoldCurve(Curve):
-    """h = L1 = L2 = 0 in three states and a parameter, or a fourth state, for continuation.
-
-    Parameters
-    ----------
-    where : Place
-    x : ndarray (N,)
-        An extended point; its held coordinates stay.
-    free : sequence of int
-        The three states that are unknowns.
-    name : str
-        Of the parameter or state that is the last unknown.
-    """
+    """h = L1 = L2 = 0 in three states and a parameter, or a fourth state, for continuation."""
 
     def __init__(self, where: Place, x: Array, free: Sequence[int], name: str):
         names = where.system.state_names

@@ -52,21 +52,7 @@ def far_side(
     word: str,
     beyond: Edited | None = None,
 ) -> FarSide:
-    """Classify an event.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-        Of the itinerary with fewer legs, where the event is regular.
-    kind : str
-    test : Condition
-    at : Evaluation
-    p : ndarray
-    word : str
-        The other itinerary.
-    beyond : Edited, optional
-        The other itinerary, at the same orbit.
-    """
+    """Classify an event."""
     try:
         if kind == "grazing-sliding" and test.what == "interior":
             numbers = contact_numbers(problem, test, at, p)
@@ -142,13 +128,8 @@ def contact_maps(
 def impact_numbers(
     problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array
 ) -> dict[str, float]:
-    """The map x -> A (x - s w) of orbits that touch an impact or reset, s the speed of the impact.
-
-    A is that of orbits that do not, on the section where the gap's rate vanishes, n the gradient of the
-    gap, and w = W + f (1 + r)/a for a jump by W per speed: n.A.w says by how much the next round is
-    further in, n.(I - A)^-1.A.w on which side of the parameter the orbit with an impact is. Without them
-    where the reset moves the grazing state itself.
-    """
+    """The map x -> A (x - s w) of orbits that touch an impact or reset, s the speed of the
+    impact."""
     system, n, leg, guard = problem.system, problem.dimension, problem.legs[test.leg], test.guard
     assert guard is not None
     _require_one_touch(at)

@@ -67,13 +67,7 @@ class Departure:
 def saddle_at(
     system: FilippovSystem, saddle: object, p: Array
 ) -> tuple[str, Equilibrium | PseudoEquilibrium]:
-    """The saddle that is meant, and its mode.
-
-    Raises
-    ------
-    DegenerateError
-        There is none.
-    """
+    """The saddle that is meant, and its mode."""
     found = list[tuple[str, Equilibrium | PseudoEquilibrium]]()
     if isinstance(saddle, (Equilibrium, PseudoEquilibrium)):
         near = np.asarray(saddle.point, float)

@@ -81,14 +81,7 @@ def flight_to(
 
 
 class PseudoSaddleLoop(Loop):
-    """A flight from a visible fold to a pseudo-saddle of a planar system.
-
-    Parameters
-    ----------
-    system, legs, free, p : see Loop
-    side : {"+", "-"}
-        On which the flight begins.
-    """
+    """A flight from a visible fold to a pseudo-saddle of a planar system."""
 
     def __init__(
         self,

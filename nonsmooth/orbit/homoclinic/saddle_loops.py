@@ -37,18 +37,7 @@ _TRUNCATION = 1e-14
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """A saddle of one mode with its eigenspaces.
-
-    Attributes
-    ----------
-    point : ndarray (n,)
-    values : ndarray (n,) or (n - 1,)
-        Eigenvalues; of a mode that slides those along the surface.
-    stable, unstable : ndarray (n, k)
-        Bases of the eigenspaces.
-    left_stable, left_unstable : ndarray (k, n)
-        Rows that annihilate the other space, dual to a reference basis.
-    """
+    """A saddle of one mode with its eigenspaces."""
 
     point: Array
     values: Array
@@ -64,12 +53,7 @@ class Spectrum:
 
 
 def equilibrium_of(system: FilippovSystem, mode: str, x: Array, p: Array) -> Array:
-    """The zero of a mode's field near ``x``, on the surface if it slides.
-
-    Raises
-    ------
-    ConvergenceError
-    """
+    """The zero of a mode's field near ``x``, on the surface if it slides."""
     field = variational_field(system, mode).linear
     held = [surface_map(system, k) for k, c in enumerate(mode) if c == "s"]
     size = float(np.abs(x).max()) or 1.0
@@ -137,17 +121,7 @@ def _real_basis(values: Array, vectors: Array, sign: float) -> Array:
 
 
 class SaddleLoop(Loop):
-    """A homoclinic orbit to a saddle of one mode.
-
-    Parameters
-    ----------
-    system, legs, free, p, held : see Loop
-    mode : str
-    point : ndarray (n,)
-        The saddle.
-    near, far : float
-        Distances from it at which the orbit begins and ends.
-    """
+    """A homoclinic orbit to a saddle of one mode."""
 
     def __init__(
         self,

@@ -65,18 +65,7 @@ class InterruptedOrbit(KeyboardInterrupt):
 
 @dataclass(frozen=True)
 class Follower:
-    """Follows orbits of a system in one direction of time.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    parameters : dict
-    ahead : bool
-        Forward, or backward: then up to the first sliding, unless it begins there.
-    length, spacing : float
-        Of the curves, and between their points.
-    tol : float
-    """
+    """Follows orbits of a system in one direction of time."""
 
     system: FilippovSystem
     parameters: dict[str, float]
@@ -86,13 +75,7 @@ class Follower:
     tol: float
 
     def arc(self, start: Array, mode: str | None = None) -> Arc | None:
-        """Follow the orbit from a start; None where it cannot leave in the mode asked for.
-
-        Raises
-        ------
-        InterruptedOrbit
-            With the part of the curve that was followed.
-        """
+        """Follow the orbit from a start; None where it cannot leave in the mode asked for."""
         try:
             found = self.run(start, mode)
         except InterruptedOrbit as stopped:

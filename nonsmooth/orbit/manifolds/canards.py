@@ -224,11 +224,9 @@ def _along(slider: Slider, s: Array, t: float, numbers: Numbers, ab: Array) -> P
 def _of_node(
     slider: Slider, s: Array, t: float, numbers: Numbers, ab: Array, distance: float
 ) -> Path | None:
-    """Find the orbit from s through the point at ``distance`` along ``ab``, backward from there.
-
-    The point is moved until the orbit comes from s and not from a two-fold beside it, which matters
-    with more than three states or explicit time.
-    """
+    """Find the orbit from s through the point at ``distance`` along ``ab``, backward from there."""
+    # The point is moved until the orbit comes from s and not from a two-fold beside it, which matters
+    # with more than three states or explicit time.
     n, v = slider.where.system.dimension, ab @ numbers.fields
     distance *= _scale(slider, s, t, v)
     for _ in range(10):

@@ -89,19 +89,7 @@ class DividingCurves(Savable):
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane of starts with the part of it that is looked at.
-
-    Attributes
-    ----------
-    start : callable
-        Where the orbit of coordinates (2,) begins.
-    box : ndarray (2, 2)
-        Least and largest value of each coordinate.
-    scale : ndarray (2,) or float
-        Sizes of the coordinates: half of the box, or what comes with starts that are computed.
-    exact : bool
-        Whether ``start`` gives derivatives.
-    """
+    """A plane of starts with the part of it that is looked at."""
 
     start: Callable[[Array], Start]
     box: Array
@@ -116,12 +104,7 @@ class Plane:
 
 
 def plane_of(system: FilippovSystem, starts: Any, box: Any) -> Plane:
-    """Read a plane of starts and its box.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Read a plane of starts and its box."""
     try:
         limits = np.asarray(box, dtype=float)
     except (TypeError, ValueError):
@@ -156,31 +139,7 @@ def dividing_curves(
     tol: float,
     report: Callable[[], object],
 ) -> DividingCurves:
-    """Curves in a plane of starts that divide orbits beside two-folds.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        Reversed, if ``stable`` is false.
-    fold : TwoFold
-    plane : Plane
-    stable : bool
-    duration : float
-    step : float
-        In scaled coordinates.
-    until : str, optional
-        Name of the event at which orbits end.
-    begin : sequence of (str, ndarray)
-        Points of the one curve that is followed, with their itineraries; none to look for curves.
-    parameters, tol
-    report : callable
-        Called with every arc.
-
-    Raises
-    ------
-    DegenerateError
-        The two-fold parts no orbits, or none of the box.
-    """
+    """Curves in a plane of starts that divide orbits beside two-folds."""
     _require_plain(system)
     passages: TwoFoldPassages | EventPassages
     if until is None:

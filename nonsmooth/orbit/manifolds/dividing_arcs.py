@@ -372,28 +372,11 @@ class DividingTracer:
 
 
 def last_side(word: str) -> int:
-    """The side on which an itinerary ends: 1, -1, or 0 while it slides.
-
-    Parameters
-    ----------
-    word : str
-        One letter for each leg.
-    """
+    """The side on which an itinerary ends: 1, -1, or 0 while it slides."""
     return {"+": 1, "-": -1}.get(word[-1:], 0)
 
 
 def common_start(a: str, b: str) -> str:
-    """What two itineraries begin with.
-
-    Parameters
-    ----------
-    a, b : str
-        One letter for each leg.
-
-    Examples
-    --------
-    >>> common_start("+s-", "+s+")
-    '+s'
-    """
+    """What two itineraries begin with."""
     differ = (k for k, (p, q) in enumerate(zip(a, b, strict=False)) if p != q)
     return a[: next(differ, min(len(a), len(b)))]

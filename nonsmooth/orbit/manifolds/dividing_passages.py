@@ -46,23 +46,7 @@ _AT_EVENT = 1e-7
 def require_event(
     system: FilippovSystem, until: object, fold: TwoFold, parameters: dict[str, float]
 ) -> None:
-    """Refuse an event unless at it both fields have the same component across the surface.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    until : object
-    fold : TwoFold
-        At the event.
-    parameters : dict
-
-    Raises
-    ------
-    OptionError
-        No stop has that name.
-    DegenerateError
-        The two-fold is not at the event, or the components differ there beside it.
-    """
+    """Refuse an event unless at it both fields have the same component across the surface."""
     names = [name for name, _ in system.stops]
     if until not in names:
         raise OptionError(
@@ -91,17 +75,7 @@ def require_event(
 
 
 def read_begin(system: FilippovSystem, begin: Any) -> list[tuple[str, Array]]:
-    """Points of a curve with their itineraries, one letter for each leg.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    begin : sequence of (str, array_like (2,)), or None
-
-    Raises
-    ------
-    OptionError
-    """
+    """Points of a curve with their itineraries, one letter for each leg."""
     if begin is None:
         return []
     try:
@@ -282,23 +256,7 @@ class EventPassages:
 
 
 class TwoFoldPassages:
-    """Orbits that two-folds of a system part.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        With one surface, without explicit time.
-    sheet : TwoFoldSheet
-        What slides into the two-folds.
-    start : callable
-        Takes coordinates (2,) of the plane and returns where the orbit begins.
-    scale : ndarray (2,)
-        Sizes of the coordinates.
-    duration : float
-        How long orbits are looked at.
-    parameters, tol : optional
-        As of :class:`FixedItinerary`.
-    """
+    """Orbits that two-folds of a system part."""
 
     exact = True
 
@@ -318,16 +276,7 @@ class TwoFoldPassages:
         self._met: dict[str, Meeting] = {}
 
     def passage(self, u: Array, word: str) -> Passage:
-        """The orbit from a start: how far it passes the sheet after sliding, h where it turns else.
-
-        Parameters
-        ----------
-        u : ndarray (2,)
-            Coordinates of the start.
-        word : str
-            Its itinerary. It ends by sliding into a two-fold, or with the orbit that turns back from the
-            surface.
-        """
+        """The orbit from a start."""
         return self._slides(u, word) if word.endswith("s") else self._touches(u, word)
 
     def simulated(self, u: Array) -> str:
@@ -339,14 +288,8 @@ class TwoFoldPassages:
         return run.itinerary.replace(" ", "")
 
     def seed(self, u: Array, word: str) -> None:
-        """Take from a simulation beside a dividing surface where orbits of an itinerary meet the sheet.
-
-        Parameters
-        ----------
-        u : ndarray (2,)
-        word : str
-            Ends with ``"s"``.
-        """
+        """Take from a simulation beside a dividing surface where orbits of an itinerary meet the
+        sheet."""
         _, x, _ = self.start(u)
         run = simulate(
             self.system, x, self.duration, parameters=self.parameters, tol=max(self.tol, 1e-12)

@@ -33,18 +33,7 @@ Follow = Callable[[Array, bool, Cut], Array]
 
 
 class SpacedOrbit(NamedTuple):
-    """One of many orbits through a box.
-
-    Attributes
-    ----------
-    start : ndarray (2,)
-        From where it was followed both ways.
-    curve : ndarray (m, 2)
-        In the direction of time.
-    thins : (bool, bool)
-        Whether its beginning, and its end, are not where the orbit ends: it goes on beside another, and
-        is drawn thinner and thinner there.
-    """
+    """One of many orbits through a box."""
 
     start: Array
     curve: Array
@@ -54,18 +43,7 @@ class SpacedOrbit(NamedTuple):
 def polyline(
     run: Trajectory, scale: Array, step: float = 1 / 90, until: tuple[float, Array] | None = None
 ) -> Array:
-    """Points (m, n) of a run so close that straight lines between them draw its polynomials.
-
-    Parameters
-    ----------
-    run : Trajectory
-    scale : ndarray (n,)
-        Width and height of the picture.
-    step : float, optional
-        Largest distance of neighbours, relative to ``scale``; each step has at least eight parts.
-    until : (float, ndarray (n,)), optional
-        Time and state of the event at which the curve ends; by default the end of the run.
-    """
+    """Points (m, n) of a run so close that straight lines between them draw its polynomials."""
     ends, last = run.t, run.x[-1]
     if until is not None:
         ends, last = np.append(run.t[run.t < until[0]], until[0]), until[1]
@@ -84,16 +62,7 @@ def polyline(
 
 
 def until_rest(curve: Array, rests: Sequence[Array], size: Array) -> Array | None:
-    """Part of a curve to the equilibrium that it comes to, if it does; not the one it starts in.
-
-    Parameters
-    ----------
-    curve : ndarray (m, 2)
-    rests : sequence of ndarray (2,)
-        Equilibria.
-    size : ndarray (2,)
-        Of the box.
-    """
+    """Part of a curve to the equilibrium that it comes to, if it does; not the one it starts in."""
     found = None
     for rest in rests:
         near = np.linalg.norm((curve - rest) / size, axis=1) < _AT_REST
@@ -104,23 +73,7 @@ def until_rest(curve: Array, rests: Sequence[Array], size: Array) -> Array | Non
 
 
 class Spacing:
-    """Where orbits have been, and what else no orbit shall start close to.
-
-    Parameters
-    ----------
-    box : Box
-    count : int
-        About how many orbits fit across the box.
-    avoid : sequence of ndarray (m, 2)
-        Curves that orbits may cross, but do not start beside.
-    rests : sequence of ndarray (2,)
-        Equilibria: an orbit that comes to one ends in it.
-
-    Attributes
-    ----------
-    thins : bool
-        Whether the part that ``until_met`` kept last goes on beside another curve.
-    """
+    """Where orbits have been, and what else no orbit shall start close to."""
 
     def __init__(
         self, box: Box, count: int, avoid: Sequence[Array] = (), rests: Sequence[Array] = ()
@@ -203,25 +156,7 @@ def evenly_spaced(
     avoid: Sequence[Array] = (),
     rests: Sequence[Array] = (),
 ) -> Iterator[SpacedOrbit]:
-    """Follow orbits both ways from middles of count x count cells that are still free.
-
-    Parameters
-    ----------
-    box : Box
-    count : int
-    follow : callable
-        Returns an empty or single-point curve where there is no orbit.
-    shortest : float, optional
-        Curves shorter than this, in units of the box, are left out.
-    avoid : sequence of ndarray (m, 2), optional
-        Curves that orbits may cross, but do not start beside.
-    rests : sequence of ndarray (2,), optional
-        Equilibria: an orbit that comes to one ends in it.
-
-    Yields
-    ------
-    SpacedOrbit
-    """
+    """Follow orbits both ways from middles of count x count cells that are still free."""
     spacing = Spacing(box, count, avoid, rests)
 
     def along(start: Array, ahead: bool) -> tuple[Array, bool]:

@@ -100,23 +100,7 @@ class Funnel:
         return len(self.trajectories)
 
     def __call__(self, t: ArrayLike) -> Array:
-        """Evaluate all members.
-
-        Parameters
-        ----------
-        t : array_like (...)
-            Times; before the funnel's start all members are on its past.
-
-        Returns
-        -------
-        ndarray (samples, ..., n)
-            NaN for a member that has ended before.
-
-        Raises
-        ------
-        PointError
-            A time before the start of the past.
-        """
+        """Evaluate all members."""
         times = real_array(t, "time")
         result = np.full((len(self), *times.shape, self.point.size), np.nan)
         before = times < self.t

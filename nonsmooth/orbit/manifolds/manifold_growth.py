@@ -38,32 +38,7 @@ def bundle(
     most: int,
     report: Callable[[], object] = lambda: None,
 ) -> tuple[list[tuple[float, Arc]], bool]:
-    """Arcs from seeds on a curve with the parameter 0 to 1, with further ones where they part.
-
-    Parameters
-    ----------
-    seed : callable
-        The arc of a parameter, None where there is none.
-    closed : bool
-        Whether 1 is 0 again.
-    spacing : float
-        Distance of neighbours that is aimed at, and of points on an arc.
-    count, most : int
-        Arcs at the beginning, and at most.
-    report : callable, optional
-        Called with every arc.
-
-    Returns
-    -------
-    arcs : list of (parameter, Arc)
-        In the order of their parameters.
-    complete : bool
-        False if interrupted.
-
-    Notes
-    -----
-    Krauskopf et al. 2005 (Int. J. Bifurcation Chaos 15, 763) compare this with other methods.
-    """
+    """Arcs from seeds on a curve with the parameter 0 to 1, with further ones where they part."""
     arcs: dict[float, Arc] = {}
     tried: set[float] = set()
     new = np.linspace(0.0, 1.0, count, endpoint=not closed).tolist()
@@ -298,11 +273,9 @@ class Grower:
         return self._surface(seed, True)
 
     def _around(self, u: float) -> Array:
-        """A direction in the eigenspace, by a parameter from 0 to 1 that goes round once.
-
-        With two real eigenvalues nearly all orbits leave along the strong direction; those that come
-        far along the weak one start beside it, at angles that differ by factors.
-        """
+        """A direction in the eigenspace, by a parameter from 0 to 1 that goes round once."""
+        # With two real eigenvalues nearly all orbits leave along the strong direction; those that come
+        # far along the weak one start beside it, at angles that differ by factors.
         if not self.node:
             return np.array([np.cos(2 * np.pi * u), np.sin(2 * np.pi * u)])
         quarter, part = divmod(4.0 * u, 1.0)

@@ -28,17 +28,7 @@ _HYPERBOLIC = 1e-6
 
 
 def orbit_seeds(orbit: PeriodicOrbit, follower: Follower, stable: bool) -> list[Seed]:
-    """Arcs of the surface of orbits that come to a periodic orbit, or leave it, by sheets.
-
-    Every orbit on a sheet passes the ray from a point x of the periodic orbit along the eigenvector v
-    of a multiplier mu once between x + e v and x + e mu v; the parameter is the logarithm of the
-    distance. A negative multiplier has one sheet, which goes round twice.
-
-    Raises
-    ------
-    DegenerateError
-        Not one multiplier on the side that is asked for, or no surface.
-    """
+    """Arcs of the surface of orbits that come to a periodic orbit, or leave it, by sheets."""
     multiplier, x, v, period = _direction(orbit, stable)
     rounds = 1 if multiplier > 0 else 2
     factor = abs(multiplier) ** (-rounds if stable else rounds)
@@ -99,15 +89,9 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
 
 
 def canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:
-    """The sliding orbit that comes to a two-fold in attracting sliding (or leaves it in repelling).
-
-    A function of a parameter from 0, at the two-fold, to 1.
-
-    Raises
-    ------
-    DegenerateError
-        None, or a whole sector of them.
-    """
+    """The sliding orbit that comes to a two-fold in attracting sliding (or leaves it in
+    repelling)."""
+    # A function of a parameter from 0, at the two-fold, to 1.
     system = reversed_system(follower.system) if stable else follower.system
     where, s = place(system, fold.point, follower.parameters)
     surfaces = Surfaces(system)

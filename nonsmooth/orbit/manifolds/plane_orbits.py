@@ -22,16 +22,9 @@ _NEAR = 1e-4  # in units of the box: of a saddle's manifolds at their start, of 
 
 
 class PlaneOrbits:
-    """Orbits through crossing and sliding, forward and backward, to a little outside the box.
+    """Orbits through crossing and sliding, forward and backward, to a little outside the box."""
 
-    Stops and resets of the system are ignored.
-
-    Parameters
-    ----------
-    scan : PlaneScan
-    t_end : float, optional
-        Duration each way; by default long enough to pass the box several times.
-    """
+    # Stops and resets of the system are ignored.
 
     def __init__(self, scan: PlaneScan, t_end: float | None = None):
         self.scan = scan
@@ -56,25 +49,7 @@ class PlaneOrbits:
         mode: str | None = None,
         landing: bool = False,
     ) -> Array:
-        """Follow one orbit, a few steps at a time, until ``cut`` shortens it.
-
-        Parameters
-        ----------
-        start : ndarray (2,)
-        ahead : bool, optional
-            Forward in time, or backward.
-        cut : callable, optional
-            Shown the curve as it grows; returns the part of it that is wanted.
-        mode : str, optional
-            Which way to leave the surface at the start.
-        landing : bool, optional
-            End where sliding begins.
-
-        Returns
-        -------
-        ndarray (m, 2)
-            From the start on; empty where the start is not finite.
-        """
+        """Follow one orbit, a few steps at a time, until ``cut`` shortens it."""
         if not np.all(np.isfinite(start)):
             return np.empty((0, 2))
         curve, x, t, events = start[None, :], start, 0.0, list[Array]()
@@ -110,19 +85,15 @@ class PlaneOrbits:
         return bool(np.min(np.linalg.norm(gaps, axis=1)) < _NEAR)
 
     def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[SpacedOrbit]:
-        """Orbits in the direction of time, about evenly spaced; none starts beside ``avoid``.
-
-        They go from where they begin to where they end, if that is in the box: sliding or rest.
-        """
+        """Orbits in the direction of time, about evenly spaced; none starts beside ``avoid``."""
+        # They go from where they begin to where they end, if that is in the box: sliding or rest.
         follow = partial(self.follow, landing=True)
         return evenly_spaced(self.scan.box, count, follow, avoid=avoid, rests=self.rests)
 
     def separatrices(self) -> Iterator[tuple[str, Array]]:
-        """Names and curves (m, 2), in the direction of time.
-
-        ``"fold orbit"`` through visible folds, ``"separatrix"`` for the invariant manifolds of
-        saddles and for the orbits that end in, or leave, pseudo-saddles.
-        """
+        """Names and curves (m, 2), in the direction of time."""
+        # ``"fold orbit"`` through visible folds, ``"separatrix"`` for the invariant manifolds of
+        # saddles and for the orbits that end in, or leave, pseudo-saddles.
         for fold in self.scan.folds:
             if fold.kind == "visible":
                 for ahead in (False, True):

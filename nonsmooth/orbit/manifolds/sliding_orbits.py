@@ -33,12 +33,7 @@ _FROM_TWO_FOLD, _FINEST = 2e-2, 1e-13
 
 
 class SlidingOrbits:
-    """Sliding orbits of a system over the box of a scan.
-
-    Parameters
-    ----------
-    scan : SurfaceScan
-    """
+    """Sliding orbits of a system over the box of a scan."""
 
     def __init__(self, scan: SurfaceScan):
         self.scan = scan
@@ -77,23 +72,7 @@ class SlidingOrbits:
         cut: Cut | None = None,
         tol: float = _TOLERANCE,
     ) -> Array:
-        """Follow the sliding orbit through a state to the fold, the frame or its rest.
-
-        Parameters
-        ----------
-        start : ndarray (3,)
-            On the surface.
-        ahead : bool, optional
-            Forward in time, or backward.
-        cut : callable, optional
-            Shown the curve as it grows; returns the part of it that is wanted.
-        tol : float, optional
-
-        Returns
-        -------
-        ndarray (m, 2)
-            From the start on; empty where the start does not slide.
-        """
+        """Follow the sliding orbit through a state to the fold, the frame or its rest."""
         scan, x = self.scan, start
         if not np.all(np.isfinite(start)):
             return np.empty((0, 2))
@@ -119,10 +98,8 @@ class SlidingOrbits:
     def spaced(
         self, count: int = 12, avoid: Sequence[Array] = ()
     ) -> Iterator[tuple[SpacedOrbit, bool]]:
-        """Orbits in the direction of time, about evenly spaced, and whether they attract.
-
-        None starts beside the curves ``avoid``.
-        """
+        """Orbits in the direction of time, about evenly spaced, and whether they attract."""
+        # None starts beside the curves ``avoid``.
         scan = self.scan
 
         def orbit(flat: Array, ahead: bool, cut: Cut) -> Array:
@@ -136,10 +113,8 @@ class SlidingOrbits:
             yield one, bool(l1 < l2)
 
     def manifolds(self, found: PseudoEquilibrium) -> Iterator[Array]:
-        """Manifolds (m, 2) of a saddle of the sliding flow, in the direction of time.
-
-        None where the pseudo-saddle is one across the surface only.
-        """
+        """Manifolds (m, 2) of a saddle of the sliding flow, in the direction of time."""
+        # None where the pseudo-saddle is one across the surface only.
         scan = self.scan
         where, x = place(scan.where.system, found.point, scan.where.values)
         matrix, basis = sliding_matrix(where.at(x), where.jacobians(x))
@@ -155,10 +130,8 @@ class SlidingOrbits:
                 yield self.follow(start, bool(value > 0))[:: 1 if value > 0 else -1]
 
     def eigenlines(self, fold: TwoFold) -> Iterator[tuple[str, Array]]:
-        """Orbits (m, 2) along the sliding eigenlines of a two-fold, in the direction of time.
-
-        ``"canard"`` for Da -> s -> Dr, ``"faux canard"`` for Dr -> s -> Da; one half each.
-        """
+        """Orbits (m, 2) along the sliding eigenlines of a two-fold, in the direction of time."""
+        # ``"canard"`` for Da -> s -> Dr, ``"faux canard"`` for Dr -> s -> Da; one half each.
         if fold.discriminant < 0:
             return
         tangents = self.scan.flat(fold.tangents()[:, 1:].T) / self.scan.box.size

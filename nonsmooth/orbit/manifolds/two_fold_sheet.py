@@ -41,24 +41,7 @@ _NOISE = 1e-9  # steps below this that shrink no more are rounding
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """How a point of the surface meets the sheet.
-
-    Attributes
-    ----------
-    fold : ndarray (n,)
-        The two-fold into which the sheet leads from there.
-    duration, left : float
-        Of the sliding up to close by it, and of what is left from there.
-    gap : float
-        Distance from the point to the sheet, along ``across``.
-    across : ndarray (n,)
-        A unit vector in the surface, across the sheet.
-    slope : ndarray (n,)
-        Derivative of the gap by the point; exact where the gap is zero.
-    fault : str
-        Why the orbit on the sheet does not slide to the two-fold; empty if it does, and for a point
-        that is not close to the sheet.
-    """
+    """How a point of the surface meets the sheet."""
 
     fold: Array
     duration: float
@@ -70,23 +53,7 @@ class Meeting:
 
 
 class TwoFoldSheet:
-    """The sheet of orbits that slide into the two-folds about one of them.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        With one surface, without explicit time.
-    fold : ndarray (n,)
-        A two-fold.
-    size : float
-        Of the part of the phase space that is looked at.
-    parameters : mapping, optional
-
-    Raises
-    ------
-    DegenerateError
-        No orbit, or a whole sector of them, slides into the two-fold.
-    """
+    """The sheet of orbits that slide into the two-folds about one of them."""
 
     def __init__(
         self, system: FilippovSystem, fold: Array, size: float, parameters: Parameters | None = None
@@ -151,14 +118,7 @@ class TwoFoldSheet:
         return flown.end, flown.by_start @ turn, -flown.rate
 
     def guess(self, point: Array, leaves: Array, duration: float) -> Meeting:
-        """A meeting to begin with: an orbit slides from a point and leaves close to a two-fold.
-
-        Parameters
-        ----------
-        point, leaves : ndarray (n,)
-        duration : float
-            Of the sliding.
-        """
+        """A meeting to begin with: an orbit slides from a point and leaves close to a two-fold."""
         fold = self.nearest(leaves)
         return Meeting(
             fold, duration, 0.0, 0.0, self._across(point, fold, duration), 0.0 * fold, ""
@@ -185,19 +145,7 @@ class TwoFoldSheet:
         return np.asarray(np.linalg.svd(columns)[0][:, -1])
 
     def meet(self, point: Array, near: Meeting | None) -> Meeting:
-        """How a point of the surface meets the sheet.
-
-        Parameters
-        ----------
-        point : ndarray (n,)
-        near : Meeting or None
-            Of a point close by.
-
-        Raises
-        ------
-        ConvergenceError
-            Newton's method does not come there.
-        """
+        """How a point of the surface meets the sheet."""
         if near is None:
             near = self.guess(point, self.fold, self._time_to(point))
         n, across = point.size, near.across

@@ -37,8 +37,7 @@ from ..runs.legs import Flown, Leg, fly
 
 
 class Places(NamedTuple):
-    """Where entries of the Jacobian are in it, row after row: states by starts (own and following),
-    states by durations, events by starts and by durations; and the number of the next leg."""
+    """Where entries of the Jacobian are in it, row after row."""
 
     blocks: NDArray[Any]
     following: NDArray[Any]
@@ -50,12 +49,7 @@ class Places(NamedTuple):
 
 @lru_cache(maxsize=256)
 def places_of(count: int, n: int) -> Places:
-    """The places for so many legs of n states.
-
-    Parameters
-    ----------
-    count, n : int
-    """
+    """The places for so many legs of n states."""
     size = count * (n + 1)
     places = np.arange(size * size).reshape(size, size)
     rows = np.arange(count * n).reshape(count, n)
@@ -98,19 +92,7 @@ def demands_of(
     most: int = 1,
     most_steps: int = MOST_STEPS,
 ) -> Demands:
-    """Demands on an orbit.
-
-    Parameters
-    ----------
-    forcing : Forcing or None
-    periods : float
-        Of the forcing, by which the legs advance the time.
-    tol, noise : float, optional
-    longest : float, optional
-        No leg may last longer.
-    most, most_steps : int, optional
-        Steps of Newton's method, and along a leg.
-    """
+    """Demands on an orbit."""
     period = None if forcing is None else values_program(forcing).pointer
     local = (TOLERANCE, COARSE, EXTENDED, FINAL, ROUNDING)
     return Demands(tol, noise, *local, longest, periods, period, most, most_steps)
@@ -374,8 +356,7 @@ class BoundaryProblem:
         p: Array,
         columns: Sequence[int],
     ) -> None:
-        """An orbit that slides all the time keeps h whatever it is: demand h(x_1) = 0 in place of
-        the closing row that h says most about."""
+        """An orbit that slides all the time keeps h whatever it is."""
         n = self.dimension
         first = (len(self.legs) - 1) * n
         taken: list[int] = []

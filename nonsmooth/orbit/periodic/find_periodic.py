@@ -50,10 +50,8 @@ _STILL = 1e-6
 
 
 def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> None:
-    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration.
-
-    So does, with any duration, every point so far away that motion is lost in its rounding.
-    """
+    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
+    # So does, with any duration, every point so far away that motion is lost in its rounding.
     n = problem.system.dimension
     guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
     period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
@@ -270,12 +268,7 @@ class _Solver:
         self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
 
     def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
-        """The orbit, to rounding.
-
-        Raises
-        ------
-        ConvergenceError
-        """
+        """The orbit, to rounding."""
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
         found = shot(self.problem, u, self.p, longest, max_iterations)
         if found is not None:
@@ -346,11 +339,9 @@ class _Solver:
         return root if found is None else found
 
     def _nearest(self, equations: Equations, v: Array, most: int, far: float) -> Array | None:
-        """Newton's method that does not run along a family of orbits; None where it does not converge.
-
-        Where a step makes the residual larger, it is one along a direction that the residual does not
-        decide: less and less weak directions are left as they are.
-        """
+        """Newton's method that does not run along a family of orbits."""
+        # Where a step makes the residual larger, it is one along a direction that the residual does not
+        # decide: less and less weak directions are left as they are.
         start, (values, jacobian) = v, equations(v)
         for _ in range(most):
             sizes = self._sizes(jacobian)

@@ -10,18 +10,7 @@ from ...model.derivatives.forcing import Forcing, frequencies
 
 
 def forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
-    """The period of the forcing as a function of the parameters; None for autonomous systems.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    period : expression in parameters or float, optional
-
-    Raises
-    ------
-    OptionError
-        None is given or found.
-    """
+    """The period of the forcing as a function of the parameters; None for autonomous systems."""
     if not system.time_dependent:
         return None
     if period is None:
@@ -40,13 +29,7 @@ def forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
 
 
 def span_of(forcing: Forcing | None, p: Array) -> float | None:
-    """The forcing period at some parameters; None for autonomous systems.
-
-    Raises
-    ------
-    OptionError
-        Not a positive time.
-    """
+    """The forcing period at some parameters; None for autonomous systems."""
     if forcing is None:
         return None
     span = forcing(p)[0]
@@ -63,13 +46,7 @@ def span_of(forcing: Forcing | None, p: Array) -> float | None:
 
 
 def about_of(system: FilippovSystem, period: Any, p: Array) -> float | None:
-    """About how long an orbit takes, in a system without time; None if that was not said.
-
-    Raises
-    ------
-    OptionError
-        Neither a positive time nor an expression in parameters.
-    """
+    """About how long an orbit takes, in a system without time; None if that was not said."""
     if period is None or system.time_dependent:
         return None
     span = Forcing(system, period)(p)[0]

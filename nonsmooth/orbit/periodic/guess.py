@@ -43,12 +43,7 @@ _OTHER = 1e-6
 
 
 def require_of(system: FilippovSystem, other: FilippovSystem) -> None:
-    """Refuse a guess that is of another system, by what its states and events are.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Refuse a guess that is of another system, by what its states and events are."""
     if other is system or _signature(other) == _signature(system):
         return
     raise DefinitionError(
@@ -67,12 +62,7 @@ def _signature(system: FilippovSystem) -> tuple[Any, ...]:
 
 
 def require_alone(guess: Any, **given: Any) -> None:
-    """Refuse what is said of a state, where the guess is none.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Refuse what is said of a state, where the guess is none."""
     for name, value in given.items():
         if value is not None:
             raise OptionError(
@@ -86,12 +76,7 @@ def require_alone(guess: Any, **given: Any) -> None:
 
 
 def require_same(problem: BoundaryProblem, period: Any, mirror: Array | None, p: Array) -> None:
-    """Refuse another period of the forcing, or another symmetry, than an orbit has.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Refuse another period of the forcing, or another symmetry, than an orbit has."""
     own, other = problem.forcing, None if period is None else forcing_of(problem.system, period)
     if own is not None and other is not None and abs(other(p)[0] / own(p)[0] - 1.0) > _OTHER:
         raise OptionError(
@@ -123,10 +108,8 @@ def require_period(
     span: float,
     p: Array,
 ) -> None:
-    """Refuse a period after which the fields are not what they were.
-
-    A field may jump where a leg begins; so it counts what is within.
-    """
+    """Refuse a period after which the fields are not what they were."""
+    # A field may jump where a leg begins; so it counts what is within.
     for leg, x, duration in zip(legs, starts, durations, strict=True):
         field = leg.field(system)
         y = flow_for(plain_field(system, leg.mode), field.states_at(x, p), p, 0.5 * float(duration))
@@ -358,11 +341,9 @@ def _simulated(
     forced: bool,
     p: Array,
 ) -> Recurrence:
-    """Simulate from a state, longer and longer, until the run comes back.
-
-    Where there are resets the state may be meant as that after one, which is due again at once when a
-    run begins there; so a state a little later is tried as well.
-    """
+    """Simulate from a state, longer and longer, until the run comes back."""
+    # Where there are resets the state may be meant as that after one, which is due again at once when a
+    # run begins there; so a state a little later is tried as well.
     natural = _natural_time(system, x, p)
     starts = [x]
     if system.resets:

@@ -74,20 +74,7 @@ class Multipliers:
 
 
 def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multipliers:
-    """Multipliers of a periodic orbit.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    at : Evaluation
-        At the orbit.
-    p : ndarray
-
-    Raises
-    ------
-    DegenerateError
-        An event that is grazed.
-    """
+    """Multipliers of a periodic orbit."""
     n = problem.dimension
     reduced = _condensed(problem, at, p)
     nontrivial = np.linalg.eigvals(reduced) if len(reduced) > 1 else reduced.ravel()
@@ -216,15 +203,7 @@ def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
 
 
 def stability(values: NDArray[np.complex128], error: float) -> str:
-    """Stability in words, from the multipliers that are not the 1 of the flow.
-
-    Examples
-    --------
-    >>> stability(np.array([0.5, 0.0]), 0.0), stability(np.array([0.0]), 0.0)
-    ('asymptotically stable', 'superstable')
-    >>> stability(np.array([-1.3, 0.2]), 0.0)
-    'unstable, 1 multiplier outside the unit circle'
-    """
+    """Stability in words, from the multipliers that are not the 1 of the flow."""
     sizes, margin = np.abs(values), max(1e-9, 10.0 * error)
     outside = int(np.sum(sizes > 1.0 + margin))
     if outside:

@@ -31,15 +31,7 @@ class _Leg(Protocol):
 def orbit_run(
     system: FilippovSystem, parameters: Mapping[str, float], legs: Sequence[_Leg]
 ) -> Trajectory:
-    """Follow each leg over its duration, and put them end to end.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    parameters : mapping
-    legs : sequence
-        With mode, start, t, duration, event and kind; durations below zero are left out.
-    """
+    """Follow each leg over its duration, and put them end to end."""
     times, states, starts = list[Array](), list[Array](), list[float]()
     coefficients: list[Array] = []
     events: list[Event] = []

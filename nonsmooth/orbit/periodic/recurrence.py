@@ -46,16 +46,7 @@ def is_about(duration: float, about: float) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Recurrence:
-    """A stretch of a run that nearly closes.
-
-    Attributes
-    ----------
-    parts : tuple of Stretch
-    periods : float
-        Forcing periods, 0 without forcing.
-    distance : float
-        Of its ends, relative to the size of the run.
-    """
+    """A stretch of a run that nearly closes."""
 
     parts: tuple[Stretch, ...]
     periods: float
@@ -70,19 +61,7 @@ def recurrence(
     first: bool,
     about: float | None = None,
 ) -> Recurrence | None:
-    """The legs of a run that nearly close, None if it has none.
-
-    Parameters
-    ----------
-    run : Trajectory
-    symmetry : ndarray (n, n) or None
-    period : float or None
-        Of the forcing.
-    first : bool
-        Take the first recurrence of the run, not the last.
-    about : float, optional
-        How long it takes (see ``is_about``).
-    """
+    """The legs of a run that nearly close, None if it has none."""
     parts = [part for part in stretches(run) if part.duration > 0.0]
     if len(parts) > 1 and not parts[-1].leg.name:
         if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
@@ -219,12 +198,7 @@ def _returns(
 
 
 def require_steady(run: Trajectory) -> None:
-    """Refuse a run that chatters: it had too many events, and the times between them shrink.
-
-    Raises
-    ------
-    ConvergenceError
-    """
+    """Refuse a run that chatters: it had too many events, and the times between them shrink."""
     if run.status is not Status.TOO_MANY_EVENTS or len(run.events) < _MANY:
         return
     times = np.array([event.t for event in run.events])

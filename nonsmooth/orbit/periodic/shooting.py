@@ -17,26 +17,7 @@ _MOST_STEPS = 1000
 def shot(
     problem: BoundaryProblem, u: Array, p: Array, longest: float, most: int
 ) -> tuple[Array, Evaluation, int] | None:
-    """The orbit near some unknowns, to rounding.
-
-    Parameters
-    ----------
-    problem : BoundaryProblem
-    u : ndarray (m,)
-        A guess.
-    p : ndarray
-        All parameters.
-    longest : float
-        No leg may last longer.
-    most : int
-        Steps.
-
-    Returns
-    -------
-    unknowns, evaluation, steps
-        None where Newton's method does not converge, and for equations of other kinds: legs without
-        an event, events at one instant, orbits that slide all the time on one surface.
-    """
+    """The orbit near some unknowns, to rounding."""
     if problem.phase is not None or problem.kept:
         return None
     forcing, periods = problem.forcing, problem.periods

@@ -37,10 +37,8 @@ _SAME = 1e-7
 
 
 def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryProblem, Array]:
-    """The orbit once, where the legs go round it several times.
-
-    The half of a symmetric orbit goes round an odd number of times.
-    """
+    """The orbit once, where the legs go round it several times."""
+    # The half of a symmetric orbit goes round an odd number of times.
     starts, durations = problem.split(u)
     count, n = len(problem.legs), problem.system.dimension
     if not problem.legs[-1].name:
@@ -85,10 +83,9 @@ def _leg_once(
 
 
 def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[BoundaryProblem, Array]]:
-    """The same orbit as a half, for every reflection of coordinates that maps this to the other half.
-
-    Whether the system has that symmetry too is not asked.
-    """
+    """The same orbit as a half, for every reflection of coordinates that maps this to the other
+    half."""
+    # Whether the system has that symmetry too is not asked.
     n, count = problem.system.dimension, len(problem.legs)
     single = not problem.legs[-1].name
     if problem.symmetry is not None or n > _MOST_STATES or (not single and count % 2):
@@ -166,18 +163,7 @@ _MISS = 1e-8
 
 
 def mirror_of(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array | None:
-    """The matrix of a symmetry, (n, n); None for none.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    symmetry : "odd" or array_like (n, n), optional
-
-    Raises
-    ------
-    OptionError
-        A matrix of a wrong shape, not finite, or whose square is not 1.
-    """
+    """The matrix of a symmetry, (n, n); None for none."""
     n = system.dimension
     if symmetry is None:
         return None
@@ -202,17 +188,7 @@ def mirror_of(system: FilippovSystem, symmetry: ArrayLike | str | None) -> Array
 
 
 def require_symmetric(orbit: PeriodicOrbit) -> None:
-    """Refuse an orbit whose other half is not the mirror image of the half that was solved for.
-
-    Parameters
-    ----------
-    orbit : PeriodicOrbit
-        One that is virtual is looked at in its modes alone, whatever the guards say.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Refuse an orbit whose other half is not the mirror image of the half that was solved for."""
     if not orbit.symmetric:
         return
     surface = _surface_missed(orbit)
@@ -274,10 +250,8 @@ def _beside(orbit: PeriodicOrbit, i: int) -> tuple[Array, Array]:
 
 
 def _fields_agree(orbit: PeriodicOrbit) -> bool:
-    """Whether the fields of all modes are those of their mirror images, beside the orbit.
-
-    That is enough where nothing jumps, and far quicker than to fly; where they are not, flying decides.
-    """
+    """Whether the fields of all modes are those of their mirror images, beside the orbit."""
+    # That is enough where nothing jumps, and far quicker than to fly; where they are not, flying decides.
     problem, p, system = orbit.problem, orbit.parameter_vector, orbit.system
     legs, wrap, n = problem.legs, problem.wrap, system.dimension
     if system.impacts or system.resets or problem.symmetry is None:

@@ -255,8 +255,7 @@ class Flights:
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
-        """Matrices (x, X, P) at the starts, transposed, and those of entries that do not move; places
-        of entries that move in them and in the rows of the program."""
+        """Matrices (x, X, P) at the starts, transposed, and those of entries that do not move."""
         width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
         count, most = len(self.legs), self._most
         start, fixed = np.zeros((2, count, columns, most))
@@ -272,24 +271,7 @@ class Flights:
         return start, fixed, np.concatenate(ours), np.concatenate(theirs)
 
     def __call__(self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE) -> Flight:
-        """Fly all legs.
-
-        Parameters
-        ----------
-        starts : ndarray (L, N)
-        durations : ndarray (L,)
-        p : ndarray
-            All parameters.
-        tol : float, optional
-            Local errors of the steps.
-
-        Raises
-        ------
-        ConvergenceError
-            The field of a leg is not finite on the way.
-        DegenerateError
-            No multipliers keep the sliding at the start of a leg.
-        """
+        """Fly all legs."""
         if len(set(self.sizes)) > 1 or not has_interpreter():
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most

@@ -27,18 +27,7 @@ _NEGATIVE = 1e-9
 
 @dataclass(frozen=True)
 class Approach:
-    """A guard's extremum inside a leg that comes nearest to zero.
-
-    Attributes
-    ----------
-    guard : Guard
-    t : float
-        Since the start of the leg.
-    value : float
-        Of the guard.
-    distance : float
-        ``value/|grad|``, in the units of the states.
-    """
+    """A guard's extremum inside a leg that comes nearest to zero."""
 
     guard: Guard
     t: float
@@ -48,32 +37,14 @@ class Approach:
 
 @dataclass(frozen=True)
 class Watch:
-    """What the guards of a leg do inside it.
-
-    Attributes
-    ----------
-    approaches : list of Approach
-        Interior minima of guards that are positive in the mode; extrema of stops and resets.
-    faults : list of str
-        Guards that are negative, stops and resets that are passed.
-    """
+    """What the guards of a leg do inside it."""
 
     approaches: list[Approach]
     faults: list[str]
 
 
 def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array) -> Watch:
-    """Look at all guards inside a leg.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-    x : ndarray (N,)
-    duration : float
-        Positive.
-    p : ndarray
-    """
+    """Look at all guards inside a leg."""
     field = guarded_field(system, mode)
     y = variational_field(system, mode).states_at(x, p)
     rows = watched(field, y, p, duration, _ENDS * duration)
@@ -94,18 +65,7 @@ def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
 
 
 class LegGuards:
-    """The guards of legs that follow each other, to be watched again and again.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    legs : sequence of Leg
-
-    Attributes
-    ----------
-    fields : list of GuardedField
-        Of each leg.
-    """
+    """The guards of legs that follow each other, to be watched again and again."""
 
     def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
         self.fields = [guarded_field(system, leg.mode) for leg in legs]
@@ -170,18 +130,7 @@ def described(guard: Guard) -> str:
 def change_fault(
     system: FilippovSystem, leg: Leg, following: str, end: Array, after: Array, p: Array
 ) -> str:
-    """Why a leg cannot be followed by a mode as its event says; empty if it can.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    leg : Leg
-    following : str
-        The mode after it.
-    end, after : ndarray (N + k,), (N,)
-        States before and after the event.
-    p : ndarray
-    """
+    """Why a leg cannot be followed by a mode as its event says; empty if it can."""
     if not leg.name:
         return ""
     own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
@@ -248,19 +197,7 @@ def faults_along(
     p: Array,
     closes: bool,
 ) -> list[str]:
-    """What the guards contradict along legs that follow each other, leg by leg.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    legs : sequence of Leg
-    starts, durations : ndarray (L, N), (L,)
-    speeds : ndarray (L,)
-        Rates of the events' functions at the ends.
-    p : ndarray
-    closes : bool
-        Whether the first leg follows the last one as it is.
-    """
+    """What the guards contradict along legs that follow each other, leg by leg."""
     guards = LegGuards(system, legs)
     fields, (rows, begins, _) = guards.fields, guards(starts, p, durations)
     result, count = list[str](), len(legs)
@@ -289,10 +226,8 @@ def ending(system: FilippovSystem, leg: Leg) -> tuple[int, int]:
 
 
 def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) -> float | None:
-    """Time until the event of a leg, whatever other guards say; None if it does not come.
-
-    A zero where the leg starts is not counted.
-    """
+    """Time until the event of a leg, whatever other guards say; None if it does not come."""
+    # A zero where the leg starts is not counted.
     field = guarded_field(system, leg.mode)
     row, direction = ending(system, leg)
     y = variational_field(system, leg.mode).states_at(x, p)

@@ -72,19 +72,7 @@ class Arrival:
 
 
 def read_word(system: FilippovSystem, word: str | Sequence[str]) -> list[str]:
-    """Modes of an itinerary: ``"- s +"``, ``"-s+"`` for one surface, or a sequence of modes.
-
-    Raises
-    ------
-    DefinitionError, OptionError
-
-    Examples
-    --------
-    >>> import casadi as ca
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> read_word(FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1]), "+s")
-    ['+', 's']
-    """
+    """Modes of an itinerary: ``"- s +"``, ``"-s+"`` for one surface, or a sequence of modes."""
     modes = word.split() if isinstance(word, str) else list(word)
     width = system.surface_count + len(system.impacts)
     if isinstance(word, str) and len(modes) == 1 and width == 1:
@@ -102,21 +90,7 @@ def read_word(system: FilippovSystem, word: str | Sequence[str]) -> list[str]:
 
 
 def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "") -> Leg:
-    """The leg of a mode that another mode follows, where the letters tell by which event.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        With scalar multipliers.
-    mode, following : str
-    name : str
-        Of the event, where the letters do not tell it: a reset, a stop, an impact.
-
-    Raises
-    ------
-    OptionError
-        The letters fit no event or several, or there is none of that name.
-    """
+    """The leg of a mode that another mode follows, where the letters tell by which event."""
     resets, impacts = [n for n, _ in system.resets], list(system.impacts)
     stops = [n for n, _ in system.stops]
     if name in resets or name in stops or name in impacts:

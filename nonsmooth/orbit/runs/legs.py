@@ -118,13 +118,7 @@ def fly(
     p: Array,
     chosen: tuple[int, ...] = (),
 ) -> Flown:
-    """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives.
-
-    Raises
-    ------
-    ConvergenceError
-        The field is not finite on the way.
-    """
+    """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives."""
     field = leg.field(system, chosen)
     start = field.start(x, p)
     whole = field.blocks.unpack(flow_for(field, start, p, duration))
@@ -154,13 +148,7 @@ class Stretch:
 
 
 def stretches(run: Trajectory) -> list[Stretch]:
-    """Split a run into legs, one for each instant at which something happens.
-
-    Raises
-    ------
-    DegenerateError
-        Impacts that accumulate; two events at one instant of which neither causes the other.
-    """
+    """Split a run into legs, one for each instant at which something happens."""
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
@@ -261,20 +249,7 @@ def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
 def struck_letters(
     system: FilippovSystem, mode: str, name: str, struck: Callable[[str], AtEvent], after: Array
 ) -> str:
-    """The sides with which friction acted at an impact, of those that are possible.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    mode : str
-        Before it.
-    name : str
-        Of the impact.
-    struck : callable
-        What the impact with given letters does.
-    after : ndarray (N,)
-        The state that it led to.
-    """
+    """The sides with which friction acted at an impact, of those that are possible."""
     m, coupled = system.surface_count, coupled_of(system)
     signs, mode = system.parse_letters(mode), system.widened(mode)
     contact = system.impacts.index(name)

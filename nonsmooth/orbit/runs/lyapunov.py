@@ -207,16 +207,7 @@ def _ended(run: Trajectory, t_end: float) -> str:
 
 
 class _Frame:
-    """Orthonormal directions that travel with a run, and the growth that they saw.
-
-    Parameters
-    ----------
-    run : Trajectory
-    count : int
-        Directions.
-    begin : float
-        Time from which growth is counted.
-    """
+    """Orthonormal directions that travel with a run, and the growth that they saw."""
 
     def __init__(self, run: Trajectory, count: int, begin: float):
         self.run, self.system, self.n = run, run.system, run.system.dimension
@@ -356,12 +347,8 @@ class _Frame:
 
 
 def _spread(matrix: Array, q: Array) -> tuple[Array, Array] | None:
-    """Directions after a regular map and growths, also where these differ by more than rounding allows.
-
-    With M Q = Q' R the inverse map has M^-T Q = Q' R^-T: its QR from the last column to the first has
-    the smallest growths without cancellation, as the QR of M Q has the largest. None where growths
-    between are seen by neither: all of them have the product |det M|.
-    """
+    """Directions after a regular map and growths, also where these differ by more than rounding
+    allows."""
     m, whole = q.shape[1], np.linalg.qr(q, mode="complete")[0]
     forward, r = np.linalg.qr(matrix @ whole)
     backward, s = np.linalg.qr(np.linalg.solve(matrix.T, whole)[:, ::-1])

@@ -58,32 +58,7 @@ class Saltation:
 
 
 def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
-    """Saltation matrix of an event.
-
-    Parameters
-    ----------
-    at : AtEvent
-        Event function and reset, with their derivatives.
-    before, after : ndarray (N,)
-        Fields f- and f+.
-    what : str
-        Named in messages.
-
-    Raises
-    ------
-    DegenerateError
-        The orbit grazes the surface where the field changes.
-
-    Examples
-    --------
-    An entry to sliding on y = 0: the direction across the surface is lost.
-
-    >>> import numpy as np
-    >>> at = AtEvent(np.zeros(2), np.eye(2), np.zeros((2, 0)), 0.0, np.array([0.0, 1.0]), np.zeros(0))
-    >>> saltation(at, np.array([1.0, -2.0]), np.array([2.0, 0.0])).matrix
-    array([[ 1. , -0.5],
-           [ 0. ,  0. ]])
-    """
+    """Saltation matrix of an event."""
     found = saltations(_One.of(at, before), after[None], lambda _: what)
     return Saltation(
         found.matrix[0],
@@ -136,23 +111,7 @@ def saltations(
     named: Callable[[int], str],
     events: NDArray[np.bool_] | None = None,
 ) -> Saltation:
-    """Saltation matrices of the events of many legs, stacked.
-
-    Parameters
-    ----------
-    ends : Flight
-    after : ndarray (L, N)
-        Fields after the events.
-    named : callable
-        An event by the number of its leg, for messages.
-    events : ndarray of bool (L,), optional
-        Legs that end by an event. The others end at a time: the map alone is their matrix.
-
-    Raises
-    ------
-    DegenerateError
-        An event that is grazed.
-    """
+    """Saltation matrices of the events of many legs, stacked."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state
     speed = (e * rate).sum(axis=1)
     size = _norms(e) * _norms(rate)

@@ -58,23 +58,10 @@ def _gauss() -> tuple[Array, Array, Array]:
 
 
 class Variation:
-    """The variational equation of a system with sets.
+    """The variational equation of a system with sets."""
 
-    Derivatives y are (N, N + q): by the extended start, then by the chosen parameters. Modes have a letter
-    for each switching function and contact.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    p : ndarray
-    chosen : sequence of int
-        Parameters by which is differentiated.
-
-    Attributes
-    ----------
-    acting : ndarray (A,)
-        What acts where ``moving`` was evaluated last.
-    """
+    # Derivatives y are (N, N + q): by the extended start, then by the chosen parameters. Modes have a letter
+    # for each switching function and contact.
 
     def __init__(self, system: FilippovSystem, p: Array, chosen: Sequence[int]):
         self.system, self.p, self.chosen = system, p, list(chosen)
@@ -89,11 +76,10 @@ class Variation:
         return self._of.at(x, given, self.p, self.chosen)
 
     def moving(self, mode: str, x: Array, slip: Array | None = None) -> tuple[AtMode, Array, Array]:
-        """Values at a state of a mode, with the derivatives of what acts by states and parameters.
-
-        ``slip`` is h with all its digits, where it is known. A set that is left at h = 0 is left in
-        the direction in which the motion goes.
-        """
+        """Values at a state of a mode, with the derivatives of what acts by states and
+        parameters."""
+        # ``slip`` is h with all its digits, where it is known. A set that is left at h = 0 is left in
+        # the direction in which the motion goes.
         acting = np.zeros(self._of.size)
         known = self._coupled.held(mode)[: self.system.surface_count]
         acting[: len(known)] = known
@@ -188,10 +174,8 @@ class Variation:
     # along steps --------------------------------------------------------------------------------
 
     def across(self, mode: str, c: Array, dt: float, y: Array, leaving: Sequence[int]) -> Array:
-        """Carry derivatives over a step with the Taylor coefficients c of the states.
-
-        ``leaving`` are switching functions of sets that are left at its start.
-        """
+        """Carry derivatives over a step with the Taylor coefficients c of the states."""
+        # ``leaving`` are switching functions of sets that are left at its start.
         nodes, inner, outer = _gauss()
         n, count = len(c), y.shape[1]
         slips = self._slips(mode, c, dt * nodes, leaving)
@@ -246,11 +230,9 @@ class Variation:
         return np.asarray(y - here.field.a[:, columns] @ back)
 
     def time_of_hit(self, mode: str, members: tuple[int, ...], x: Array, y: Array) -> Array:
-        """Derivatives of the time at which a set is reached, from some way off; any M.
-
-        With u = h/|h| and dt = |h| ds the state, u and log |h| have a regular equation up to the set, and so
-        have their derivatives: u' = (1 - u u^T) h', (log |h|)' = u . h' with h' by the time.
-        """
+        """Derivatives of the time at which a set is reached, from some way off; any M."""
+        # With u = h/|h| and dt = |h| ds the state, u and log |h| have a regular equation up to the set, and so
+        # have their derivatives: u' = (1 - u u^T) h', (log |h|)' = u . h' with h' by the time.
         from scipy.integrate import solve_ivp  # here: it is not needed to import the library
 
         own, n, k, count = list(members), len(x), len(members), y.shape[1]
@@ -341,14 +323,7 @@ class Variation:
 
 
 def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
-    """Derivatives of a run of a system with sets; as ``nonsmooth.sensitivity``.
-
-    Raises
-    ------
-    DegenerateError
-        A set that is crossed exactly, a start that leaves one, an event that is grazed, events at one
-        instant that do not follow from one another, impacts that accumulate.
-    """
+    """Derivatives of a run of a system with sets; as ``nonsmooth.sensitivity``."""
     system = run.system
     chosen = [system.parameter_names.index(name) for name in names]
     passage = _Passage(run, Variation(system, system.parameter_vector(run.parameters), chosen))
@@ -482,10 +457,8 @@ class _Passage:
         return instant_map(self.system, mode, event.kind, event.name, letters)(x, p)
 
     def _pass(self, mode: str, event: Event, before: Sequence[tuple[Array, Array]]) -> list[int]:
-        """Carry the derivatives through an event; switching functions of the sets that are left there.
-
-        ``before`` are the states and derivatives at the steps since the last event.
-        """
+        """Carry the derivatives through an event."""
+        # ``before`` are the states and derivatives at the steps since the last event.
         x, following = self._extended(event.x, event.t), self.system.widened(event.mode_after)
         met = self._met(event)
         self.times.append(event.t)

@@ -41,21 +41,7 @@ _INSTANT = 1e-5
 
 
 def require_known(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
-    """Refuse a run with a graze that is within the run's own error.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    parts : sequence of Passage
-        All legs of the run in order.
-    p : ndarray
-        All parameters.
-
-    Raises
-    ------
-    DegenerateError
-        By the event, its depth and the run's error.
-    """
+    """Refuse a run with a graze that is within the run's own error."""
     flat = [k for k, part in enumerate(parts) if part.event and part.event.angle < _STEEP]
     if not flat:
         return
@@ -111,18 +97,7 @@ _STAGES = 12
 def collocated(
     run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
 ) -> Flown:
-    """Derivatives of a run's leg between two times, as ``legs.fly`` gives them.
-
-    Parameters
-    ----------
-    run : Trajectory
-        With its steps.
-    leg : Leg
-    t_start, t_end : float
-    p : ndarray
-    chosen : tuple of int
-        Parameters by which one differentiates.
-    """
+    """Derivatives of a run's leg between two times, as ``legs.fly`` gives them."""
     field = leg.field(run.system, chosen)
     n, starts = field.blocks.starts, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
@@ -219,13 +194,7 @@ class Passage:
 
 
 def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
-    """Legs and events of a run, with derivatives by the start of each and by chosen parameters.
-
-    Raises
-    ------
-    DegenerateError
-        An event that is grazed, also within the run's error; a corner, impacts that accumulate.
-    """
+    """Legs and events of a run, with derivatives by the start of each and by chosen parameters."""
     system = run.system
     p = system.parameter_vector(run.parameters)
     parts = stretches(run)
@@ -303,15 +272,8 @@ def _flown(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) ->
 def saltation_after(
     run: Trajectory, part: Stretch, flown: Flown, following: Stretch | None, p: Array
 ) -> Saltation | None:
-    """What the event that ends a leg does to neighbours; None where a time ends it.
-
-    At the end of a run that goes no further the field after it is that of the mode reached.
-
-    Raises
-    ------
-    DegenerateError
-        The run grazes there.
-    """
+    """What the event that ends a leg does to neighbours; None where a time ends it."""
+    # At the end of a run that goes no further the field after it is that of the mode reached.
     if not part.leg.name:
         return None
     system, n = run.system, len(part.start)

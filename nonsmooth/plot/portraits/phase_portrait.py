@@ -368,8 +368,7 @@ def _name(found: Special) -> str:
 
 
 def _look(found: Special) -> tuple[str, str]:
-    """Marker and fill of a special point: full where visible or stable, and equilibria that are saddles;
-    a pseudo-saddle is on a thick line, on which a black one would be lost."""
+    """Marker and fill of a special point."""
     name = _name(found)
     if name.startswith("boundary") and isinstance(found, Equilibrium):
         return "*", style.BLACK if np.all(found.eigenvalues.real < 0) else "white"

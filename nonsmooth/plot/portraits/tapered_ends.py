@@ -19,20 +19,7 @@ _FEW, _DRAWN = 4, 0.7  # parts of a dashed line, and how much of each is drawn
 def draw_orbit(
     ax: Axes, curve: Array, thins: tuple[bool, bool], box: Box, width: float, **options: Any
 ) -> None:
-    """Draw an orbit, thinner and thinner to an end that is not where the orbit ends.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    curve : ndarray (m, 2)
-    thins : (bool, bool)
-        Whether its beginning, and its end, are such.
-    box : Box
-    width : float
-        Of its line, in points.
-    **options
-        Of the line and of its thin ends: colour and so on.
-    """
+    """Draw an orbit, thinner and thinner to an end that is not where the orbit ends."""
     dashed = options.get("linestyle", "-") != "-"
     look = {name: value for name, value in options.items() if name != "linestyle"}
     for thin, step in zip(thins, (1, -1), strict=True):

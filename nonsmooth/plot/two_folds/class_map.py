@@ -127,13 +127,7 @@ def places(kind: str) -> dict[str, tuple[float, float]]:
 
 
 def areas(kind: str) -> list[tuple[str, Array]]:
-    """Classes of a kind and the polygons (m, 2) they fill in the map; later ones lie on top.
-
-    Examples
-    --------
-    >>> [label for label, _ in areas("II")]
-    ['II-F', 'II-C']
-    """
+    """Classes of a kind and the polygons (m, 2) they fill in the map; later ones lie on top."""
     r = REACH
     box = np.array([[-r, -r], [r, -r], [r, r], [-r, r]])
     if kind in ("VV", "II"):

@@ -36,30 +36,14 @@ from .labels_and_lines import TINTS, Portrait, line_style, name_places, portrait
 
 @dataclass(frozen=True)
 class Camera:
-    """Orthographic projection of (z1, z2, z3), z1 upwards, seen from above Da.
-
-    Attributes
-    ----------
-    azimuth : float
-        Direction of the viewer in the z2-z3 plane, from the z2 axis; rad.
-    elevation : float
-        Above the surface; rad.
-    stretch : float
-        Of z1: normal forms have no scale that relates it to z2 and z3.
-    """
+    """Orthographic projection of (z1, z2, z3), z1 upwards, seen from above Da."""
 
     azimuth: float = math.radians(72.0)
     elevation: float = math.radians(37.0)
     stretch: float = 1.0
 
     def __call__(self, z: ArrayLike) -> Array:
-        """Project points (..., 3) to the picture (..., 2).
-
-        Examples
-        --------
-        >>> float(Camera()([1.0, 0.0, 0.0])[0])
-        0.0
-        """
+        """Project points (..., 3) to the picture (..., 2)."""
         z = np.asarray(z, dtype=float)
         c, s = math.cos(self.azimuth), math.sin(self.azimuth)
         right = -s * z[..., 1] + c * z[..., 2]

@@ -30,15 +30,7 @@ _SIGNS = {1: "+", -1: "−"}
 
 @dataclass(frozen=True)
 class Portrait:
-    """A two-fold as the pictures need it: the linear flow and its class.
-
-    Attributes
-    ----------
-    flow : ReducedFlow
-    classification : Classification
-    coincident : bool
-        Whether both fields agree at the two-fold.
-    """
+    """A two-fold as the pictures need it: the linear flow and its class."""
 
     flow: ReducedFlow
     classification: Classification
@@ -46,20 +38,7 @@ class Portrait:
 
 
 def portrait_of(fold: object, caller: str) -> Portrait:
-    """Read what is drawn from a two-fold, or from a pair (sigma, nu).
-
-    Raises
-    ------
-    DefinitionError
-        Neither a two-fold nor a pair of pairs of numbers.
-    DegenerateError, OptionError
-        A sigma that is zero, numbers that are not finite.
-
-    Examples
-    --------
-    >>> portrait_of(((-1, 1), (-2.0, -1.0)), "two_fold").classification.label
-    'II-C'
-    """
+    """Read what is drawn from a two-fold, or from a pair (sigma, nu)."""
     if isinstance(fold, TwoFold):
         return Portrait(fold.form.flow, fold.classification, fold.coincident_fields)
     try:
@@ -80,14 +59,7 @@ def portrait_of(fold: object, caller: str) -> Portrait:
 
 
 def title_of(portrait: Portrait) -> str:
-    """Class, signs and numbers in one or two lines.
-
-    Examples
-    --------
-    >>> print(title_of(portrait_of(((-1, 1), (-2.0, -1.0)), "doctest")))
-    II-C (invisible two-fold)
-    σ = (−, +), ν = (−2, −1)
-    """
+    """Class, signs and numbers in one or two lines."""
     flow, found = portrait.flow, portrait.classification
     numbers = ", ".join(number(v) for v in flow.nu)
     signs = ", ".join(_SIGNS[s] for s in flow.sigma)
@@ -138,16 +110,8 @@ def number(value: float) -> str:
 
 
 def line_names(ax: Axes, portrait: Portrait, passages: bool = True) -> None:
-    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside them.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-        With the portrait.
-    portrait : Portrait
-    passages : bool, optional
-        Whether to name the two parts of the crossing orbits.
-    """
+    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside
+    them."""
     labels, flow, along = Labels(ax), portrait.flow, np.linspace(0.1, 0.98, 23)
     both = np.concatenate([-along[::-1], along])
     for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):

@@ -18,15 +18,7 @@ _POLYNOMIAL = {"const", "add", "sub", "mul", "div", "neg", "sq", "twice", "power
 
 
 class Algebra:
-    """Nodes of a tape as polynomials in atoms.
-
-    Parameters
-    ----------
-    tape : Tape
-    roots : sequence of int
-        The nodes of interest.
-    numbers : {"stored", "written"}
-    """
+    """Nodes of a tape as polynomials in atoms."""
 
     def __init__(self, tape: Tape, roots: Sequence[int], numbers: Numbers):
         self.tape = tape
@@ -96,22 +88,10 @@ def common_divisor(polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly | None:
 
 
 class Difference:
-    """F1 - F2 = g G with the greatest common divisor g, and b = grad h . G.
+    """F1 - F2 = g G with the greatest common divisor g, and b = grad h . G."""
 
-    L1 - L2 = g b, so where b has no zero, L1 = L2 implies F1 = F2; while sliding the field is
-    F1 - (L1/b) G, smooth where g vanishes (Filippov 1988, sec. 4).
-
-    Attributes
-    ----------
-    identical : bool
-        Whether F1 = F2 everywhere.
-    direction : list of int
-        Nodes of G.
-    transverse : int
-        Node of b.
-    factor : int
-        Node of g.
-    """
+    # L1 - L2 = g b, so where b has no zero, L1 = L2 implies F1 = F2; while sliding the field is
+    # F1 - (L1/b) G, smooth where g vanishes (Filippov 1988, sec. 4).
 
     def __init__(
         self, tape: Tape, fields: Sequence[Sequence[int]], gradient: Sequence[int], numbers: Numbers

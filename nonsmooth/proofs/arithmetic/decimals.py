@@ -35,10 +35,8 @@ def _exactly(value: Fraction) -> str:
 
 
 def inner(box: arb, core: arb) -> Enclosure:
-    """Decimals inside a box and around what it surely holds, as short as they can be.
-
-    What holds in the box holds in what is written, where existence in ``core`` is proven.
-    """
+    """Decimals inside a box and around what it surely holds, as short as they can be."""
+    # What holds in the box holds in what is written, where existence in ``core`` is proven.
     (low, high), (first, last) = ends(box), ends(core)
     places = max(0, places_of(high - low))
     while True:

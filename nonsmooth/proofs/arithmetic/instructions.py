@@ -122,17 +122,9 @@ _JUMPS = {"sign", "floor", "ceil", "fmod", "remainder", "copysign", "if_else_zer
 
 
 class Tape:
-    """Instructions, each once; an algebra of their numbers.
+    """Instructions, each once; an algebra of their numbers."""
 
-    ``input`` nodes are (vector, position): vector 0 holds states, 1 parameters, 2 further unknowns.
-
-    Examples
-    --------
-    >>> tape = Tape()
-    >>> x = tape.symbol(0, 0)
-    >>> tape.nodes[tape.apply("mul", [x, x])].op
-    'sq'
-    """
+    # ``input`` nodes are (vector, position): vector 0 holds states, 1 parameters, 2 further unknowns.
 
     def __init__(self) -> None:
         self.nodes: list[Node] = []
@@ -209,21 +201,7 @@ class Tape:
     # graphs --------------------------------------------------------------------------------------
 
     def insert(self, expressions: Sequence[Any], symbols: Sequence[Any], values: Any) -> list[Any]:
-        """Write CasADi expressions onto the tape.
-
-        Parameters
-        ----------
-        expressions : sequence of SX
-        symbols : sequence of SX
-            Vectors of symbols.
-        values : sequence of sequence of int
-            For each vector the nodes that take the symbols' places.
-
-        Returns
-        -------
-        list of list of int
-            For each expression the nodes of its entries, column by column.
-        """
+        """Write CasADi expressions onto the tape."""
         nodes, rows = instructions(symbols, expressions)
         numbers = evaluate(nodes, _Inserted(self, values))
         return [[numbers[k] for k in row] for row in rows]

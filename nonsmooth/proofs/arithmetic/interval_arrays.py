@@ -168,13 +168,7 @@ _APPLY: dict[str, Callable[..., Intervals]] = {
 
 
 class Batch:
-    """The arithmetic of many intervals at once.
-
-    Parameters
-    ----------
-    inputs : sequence of sequence of Intervals
-    numbers : {"stored", "written"}
-    """
+    """The arithmetic of many intervals at once."""
 
     power = staticmethod(power)
 

@@ -20,13 +20,7 @@ Numbers = Literal["stored", "written"]
 
 
 def exact(value: Any, numbers: Numbers = "stored", what: str = "number") -> Fraction:
-    """The rational number that is meant: a float as stored or as written, others exactly.
-
-    Examples
-    --------
-    >>> exact(0.1, "written"), exact("0.1"), exact(0.5)
-    (Fraction(1, 10), Fraction(1, 10), Fraction(1, 2))
-    """
+    """The rational number that is meant: a float as stored or as written, others exactly."""
     if isinstance(value, (str, Decimal, Fraction)) or (
         isinstance(value, int) and not isinstance(value, bool)
     ):
@@ -163,15 +157,7 @@ OPERATIONS: dict[str, Callable[..., arb]] = {
 
 
 class Enclosures:
-    """The arithmetic in which a program's values are enclosed.
-
-    Parameters
-    ----------
-    inputs : sequence of sequence of arb
-        Vectors of states, parameters and further unknowns.
-    numbers : {"stored", "written"}
-        What a constant of the graph means.
-    """
+    """The arithmetic in which a program's values are enclosed."""
 
     power = staticmethod(power)
 

@@ -21,13 +21,7 @@ _APPLY: dict[str, Callable[..., Fraction]] = {
 
 
 class Rationals:
-    """The arithmetic of fractions; None for what is not rational or not known.
-
-    Parameters
-    ----------
-    inputs : sequence of sequence of (Fraction or None)
-    numbers : {"stored", "written"}
-    """
+    """The arithmetic of fractions; None for what is not rational or not known."""
 
     def __init__(self, inputs: Sequence[Sequence[Fraction | None]], numbers: Numbers):
         self.inputs, self.numbers = inputs, numbers
@@ -58,15 +52,5 @@ class Rationals:
 def is_zero(
     program: Program, inputs: Sequence[Sequence[Fraction | None]], numbers: Numbers
 ) -> bool:
-    """Whether a program's first value is zero exactly.
-
-    Examples
-    --------
-    >>> from nonsmooth.proofs.arithmetic.instructions import Tape
-    >>> tape = Tape()
-    >>> x = tape.symbol(0, 0)
-    >>> difference = Program(tape, [[tape.apply("sub", [x, tape.constant(Fraction(1, 3))])]])
-    >>> is_zero(difference, [[Fraction(1, 3)]], "stored")
-    True
-    """
+    """Whether a program's first value is zero exactly."""
     return program(Rationals(inputs, numbers))[0][0] == 0

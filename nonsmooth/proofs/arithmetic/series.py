@@ -137,13 +137,7 @@ class Series:
 def coefficients(
     field: Program, x: Sequence[arb], p: Sequence[arb], count: int, numbers: Numbers
 ) -> list[list[arb]]:
-    """The first ``count`` Taylor coefficients of x' = field(x, p) from points x.
-
-    Returns
-    -------
-    list of list of arb
-        For each state its coefficients.
-    """
+    """The first ``count`` Taylor coefficients of x' = field(x, p) from points x."""
     with length(count):
         start = [arb_series([v]) for v in x]
         still = [arb_series([v]) for v in p]

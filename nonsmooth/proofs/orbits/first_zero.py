@@ -13,13 +13,7 @@ _MANY = 1500  # pieces of a step
 
 
 class UnsureError(Exception):
-    """The sign of a function is not decided from some time of the step on.
-
-    Attributes
-    ----------
-    since : float
-        Before it the function is proven to be positive.
-    """
+    """The sign of a function is not decided from some time of the step on."""
 
     def __init__(self, since: float):
         super().__init__(f"undecided since {since}")
@@ -28,17 +22,7 @@ class UnsureError(Exception):
 
 @dataclass(frozen=True)
 class Polynomial:
-    """A function of time in [0, h] as Taylor polynomial with enclosed remainder.
-
-    Attributes
-    ----------
-    c : sequence of arb
-        Coefficients 0..K at the start.
-    top : arb
-        Coefficient K + 1 anywhere in the step.
-    zeros : int
-        How many of the first coefficients are zero at the start, as is known otherwise.
-    """
+    """A function of time in [0, h] as Taylor polynomial with enclosed remainder."""
 
     c: Sequence[arb]
     top: arb
@@ -59,18 +43,7 @@ class Polynomial:
 
 
 def first_zero(f: Polynomial, h: float) -> arb | None:
-    """The first zero in (0, h] of a function that is positive just after 0.
-
-    Returns
-    -------
-    arb or None
-        Enclosure of the zero, which is simple, for every function enclosed; None if all are
-        positive.
-
-    Raises
-    ------
-    UnsureError
-    """
+    """The first zero in (0, h] of a function that is positive just after 0."""
     todo, count = [(0.0, h)], 0
     while todo:
         a, b = todo.pop()

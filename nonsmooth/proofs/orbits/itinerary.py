@@ -26,17 +26,7 @@ class Met:
 
 
 class Journey(Follower):
-    """A set of states followed through its events.
-
-    Parameters
-    ----------
-    modes : Modes
-    x, p : sequence of arb
-        Extended states at the start, parameters.
-    order : int
-    exact : (sequence of Range, sequence of Range)
-        Both as exact intervals.
-    """
+    """A set of states followed through its events."""
 
     def __init__(
         self,

@@ -8,13 +8,7 @@ from .motion import Watch
 
 
 def jumps_of(written: Written) -> list[Watch]:
-    """Everything that is met at a zero of its own: stops, then resets, then impacts.
-
-    Raises
-    ------
-    DefinitionError
-        An impact whose impulse depends on friction.
-    """
+    """Everything that is met at a zero of its own: stops, then resets, then impacts."""
     d, system = written.system.definition, written.system
     result: list[Watch] = []
     if d.guards.numel():

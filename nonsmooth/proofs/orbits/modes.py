@@ -22,18 +22,10 @@ Range = tuple[Fraction, Fraction]
 
 
 class Modes:
-    """Every mode of a system, built when it is entered.
+    """Every mode of a system, built when it is entered."""
 
-    A mode is a word of one letter for each surface, of which at most one is ``s``, and an ``o`` for
-    each impact.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    numbers : {"stored", "written"}
-    moving : sequence of int
-        Parameters with intervals, which are followed as states: what depends on them stays so.
-    """
+    # A mode is a word of one letter for each surface, of which at most one is ``s``, and an ``o`` for
+    # each impact.
 
     def __init__(self, system: FilippovSystem, numbers: Numbers, moving: Sequence[int] = ()):
         if any(system.nonlinear):
@@ -115,15 +107,9 @@ class Modes:
         return is_zero(Program(self.tape, [[self.h[surface]]]), inputs, self.numbers)
 
     def across(self, surface: int, word: str, x: Sequence[arb], p: Sequence[arb]) -> str:
-        """The side that is reached where a surface is met while another slides, and goes on to.
-
-        For every multiplier of the surface that is met, sliding attracts to the other one and leads
-        to one and the same side: then no other motion can continue.
-
-        Raises
-        ------
-        UnprovenError
-        """
+        """The side that is reached where a surface is met while another slides, and goes on to."""
+        # For every multiplier of the surface that is met, sliding attracts to the other one and leads
+        # to one and the same side: then no other motion can continue.
         slides = self.slides_on(word)
         assert slides is not None
 

@@ -13,23 +13,7 @@ from ..arithmetic.series import along, coefficients
 
 @dataclass(frozen=True)
 class Watch:
-    """A function whose zero means something.
-
-    Attributes
-    ----------
-    kind : {"surface", "exit", "stop", "reset", "impact"}
-        Surfaces and exits are positive inside the mode.
-    name : str
-    node : int
-    direction : int
-        Of stops, resets and impacts: -1 falling, 0 either way, 1 rising; of exits the side.
-    map : tuple of int
-        Nodes of the state after a reset or an impact.
-    index : int
-        Number of the surface, or of the stop, reset or impact among all of them.
-    impulse : int, optional
-        Node of what must be positive at an impact.
-    """
+    """A function whose zero means something."""
 
     kind: str
     name: str
@@ -46,17 +30,7 @@ class Watch:
 
 
 class Mode:
-    """Field and watched functions of a mode, evaluated in enclosures.
-
-    Parameters
-    ----------
-    tape : Tape
-    field : sequence of int
-    watches : sequence of Watch
-    x : sequence of int
-        Input nodes of the extended states.
-    numbers : {"stored", "written"}
-    """
+    """Field and watched functions of a mode, evaluated in enclosures."""
 
     def __init__(
         self,
@@ -124,11 +98,9 @@ class Mode:
         spread: tuple[arb_mat, arb_mat],
         p: Sequence[arb],
     ) -> list[list[arb]]:
-        """Taylor coefficients of affine functions along an affine motion, from middle + frame r.
-
-        They are affine in the start: those of the middle plus row A^k/k! frame r, in which the
-        states keep what ties them together.
-        """
+        """Taylor coefficients of affine functions along an affine motion, from middle + frame r."""
+        # They are affine in the start: those of the middle plus row A^k/k! frame r, in which the
+        # states keep what ties them together.
         if not self.affine or not wide:
             return wide
         frame, r = spread

@@ -64,26 +64,7 @@ _SHORTER = 5
 
 
 class Follower:
-    """A set of states that moves in one mode.
-
-    Parameters
-    ----------
-    modes : Modes
-    x : sequence of arb
-        Extended states at the start.
-    p : sequence of arb
-        Parameters.
-    order : int
-
-    Attributes
-    ----------
-    mode : str
-        The word of the mode that it is in.
-    zeros : dict of int to int
-        For watched functions that are zero here how many of their coefficients are.
-    signs : dict of int to int
-        Of stops, resets and impacts, by their index.
-    """
+    """A set of states that moves in one mode."""
 
     def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
         self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)

@@ -19,19 +19,7 @@ FOLDS = {(1, -1): "VV", (-1, 1): "II", (1, 1): "VI", (-1, -1): "IV"}
 
 @dataclass(frozen=True)
 class ProvenClass:
-    """What enclosures decide about a two-fold.
-
-    Attributes
-    ----------
-    sigma : (int, int)
-        Signs of L11 and L22, 0 where not decided.
-    label : str
-        A class, a boundary ``"boundary Delta=0: II-C|II-F"`` proven exactly, or ``""``.
-    why : str
-        What stood in the way of a label.
-    numbers : dict of str to arb
-        nu1, nu2, Delta, T and, where real and apart, eigenvalue_low and eigenvalue_high.
-    """
+    """What enclosures decide about a two-fold."""
 
     sigma: tuple[int, int]
     label: str
@@ -40,15 +28,7 @@ class ProvenClass:
 
 
 def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass:
-    """Decide the class.
-
-    Parameters
-    ----------
-    second : sequence of 4 arb
-        L11, L12, L21, L22.
-    coincident : bool
-        Whether F1 = F2 was proven there, so that L12 = L22, L21 = L11 and Delta = 0.
-    """
+    """Decide the class."""
     l11, l12, l21, l22 = second
     s = sign(l11), sign(l22)
     if 0 in s:

@@ -10,20 +10,7 @@ from ..arithmetic.intervals import sign
 
 
 def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[str, arb]]:
-    """Name a point of rest by the signs of its eigenvalues.
-
-    Parameters
-    ----------
-    jacobian : n rows of n enclosures
-
-    Returns
-    -------
-    kind : str
-        ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``""`` where undecided.
-    why : str
-    values : dict of str to arb
-        ``eigenvalue1`` ... by real part; complex ones as real and imaginary part.
-    """
+    """Name a point of rest by the signs of its eigenvalues."""
     if not jacobian:
         return "stable node", "", {}  # nothing to move along
     matrix = arb_mat([list(row) for row in jacobian])

@@ -93,20 +93,7 @@ def polish(equations: Equations, start: Sequence[arb], steps: int = 40) -> list[
 def prove_zero(
     equations: Equations, start: Sequence[arb], scales: Sequence[float] | None = None
 ) -> Zero | None:
-    """Prove that one zero is near, in as large a box as a few trials find.
-
-    Parameters
-    ----------
-    equations : Equations
-    start : sequence of arb
-        Where Newton's method begins.
-    scales : sequence of float, optional
-        Sizes of the unknowns.
-
-    Returns
-    -------
-    Zero or None
-    """
+    """Prove that one zero is near, in as large a box as a few trials find."""
     u = polish(equations, start)
     if u is None:
         return None

@@ -22,24 +22,7 @@ from .eigenvalues import eigenvalue_kind
 
 @dataclass(frozen=True)
 class Verdict:
-    """What a proven zero is.
-
-    Attributes
-    ----------
-    label : str
-        ``""`` where it is undecided.
-    title : str
-        ``"invisible two-fold"``, for sentences.
-    why : str
-        What stood in the way of a label.
-    lines : list of str
-        Further sentences.
-    values : dict of str to arb
-    facts : dict
-        For the record.
-    here : bool
-        Whether the fields that were looked at are those of the system there.
-    """
+    """What a proven zero is."""
 
     label: str
     title: str
@@ -51,17 +34,7 @@ class Verdict:
 
 
 class Question:
-    """One kind of special point of a described system.
-
-    Attributes
-    ----------
-    described : Described
-    kind : str
-    nodes : list of int
-        Its equations.
-    further : list of (str, Fraction, Fraction)
-        Unknowns beside the states, with their ranges in a complete search.
-    """
+    """One kind of special point of a described system."""
 
     kind: str
     further: Sequence[tuple[str, Fraction, Fraction]] = ()
@@ -83,8 +56,7 @@ class Question:
         return True
 
     def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
-        """Say what the zero enclosed in the inputs is; nothing where it is not proven to be in the
-        mode."""
+        """Say what the zero enclosed in the inputs is."""
         _, why = self._place(inputs)
         return Verdict("", self.kind, why, here=False) if why else self.judged(inputs)
 

@@ -27,23 +27,7 @@ _MANY = 4096  # pieces at once
 
 @dataclass
 class Search:
-    """A search in progress and what it found.
-
-    Attributes
-    ----------
-    equations : Equations
-    low, high : ndarray (n,)
-        The box, in doubles around the one that was asked for.
-    smallest : float
-        Pieces smaller than this, relative to the box, stay undecided.
-    max_boxes, max_failures : int
-    zeros : list of Zero
-    undecided : list of (ndarray (n,), ndarray (n,))
-    boxes : int
-        Pieces looked at.
-    stopped : str
-        Why the search ended before its time, ``""`` if it did not.
-    """
+    """A search in progress and what it found."""
 
     equations: Equations
     low: Floats

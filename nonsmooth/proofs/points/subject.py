@@ -24,22 +24,7 @@ from .special_points import QUESTIONS, Question
 
 @dataclass(frozen=True)
 class Subject:
-    """A question, where it is asked, and for which parameters.
-
-    Attributes
-    ----------
-    question : Question
-    start : list of float
-        Values of the unknowns to start from.
-    unknowns : list of (int, int)
-        Vector and position among the inputs.
-    names : list of str
-    values : list of (Fraction, Fraction)
-        Extended states, for those that are held.
-    normals, through : planes across sets of such points.
-    parameters : list of (Fraction, Fraction)
-    numbers : {"stored", "written"}
-    """
+    """A question, where it is asked, and for which parameters."""
 
     question: Question
     start: list[float]
@@ -84,10 +69,8 @@ class Subject:
         return replace(self, parameters=list(ranges[:count]), values=values)
 
     def halves(self, start: list[float], exists: bool) -> list[Subject]:
-        """The same question over both halves of the range that matters most.
-
-        That is the one that moves the equations, or where the point is known to exist its class.
-        """
+        """The same question over both halves of the range that matters most."""
+        # That is the one that moves the equations, or where the point is known to exist its class.
         wide = [k for k, (a, b) in enumerate(self.ranges) if a < b]
         matters = lambda k: (self._in_class(k, start) if exists else 0.0, self._influence(k, start))
         k = max(wide, key=matters)

@@ -22,12 +22,7 @@ from .curve import Curve
 
 
 def require_curve(curve: Any) -> None:
-    """Refuse what is no curve.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Refuse what is no curve."""
     if not isinstance(curve, Curve):
         raise DefinitionError(
             explain(
@@ -40,12 +35,7 @@ def require_curve(curve: Any) -> None:
 
 
 def vector(values: Any, what: str, size: int | None = None) -> Array:
-    """A vector of finite numbers, of a given length.
-
-    Raises
-    ------
-    PointError
-    """
+    """A vector of finite numbers, of a given length."""
     found = real_array(values, what)
     expected = "a vector" if size is None else f"a vector ({size},)"
     if found.ndim != 1 or (size is not None and found.size != size) or not found.size:
@@ -73,12 +63,7 @@ def check_trace(
     bounds: Any,
     report: Callable[..., Any] | None,
 ) -> tuple[list[Array], Array]:
-    """Check the arguments of ``trace``; the rows and the tangent as arrays.
-
-    Raises
-    ------
-    DefinitionError, PointError, OptionError
-    """
+    """Check the arguments of ``trace``; the rows and the tangent as arrays."""
     require_curve(curve)
     if not isinstance(rows, (Sequence, np.ndarray)) or isinstance(rows, str) or not len(rows):
         raise PointError(

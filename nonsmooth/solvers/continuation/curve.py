@@ -20,13 +20,7 @@ if TYPE_CHECKING:
 
 
 def read_tests(found: Any) -> dict[str, float]:
-    """What ``Curve.tests`` returned, as numbers by name; they may have poles.
-
-    Raises
-    ------
-    DefinitionError
-        No mapping, or one with keys that are no names or values that are no numbers.
-    """
+    """What ``Curve.tests`` returned, as numbers by name; they may have poles."""
     if type(found) is dict and all(type(k) is str and type(v) is float for k, v in found.items()):
         return found
     if isinstance(found, Mapping):

@@ -36,11 +36,9 @@ class Zero:
 
 
 def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
-    """Zeros in the step from a to b, in their order; a test that jumps or has a pole has none.
-
-    Where the equations are singular at the zero of a test that ends the curve it cannot be located
-    along the curve; then it is taken to be at the last point before it.
-    """
+    """Zeros in the step from a to b, in their order; a test that jumps or has a pole has none."""
+    # Where the equations are singular at the zero of a test that ends the curve it cannot be located
+    # along the curve; then it is taken to be at the last point before it.
     names = [k for k in a.tests if k in b.tests and a.tests[k] * b.tests[k] < 0]
     names.sort(key=lambda name: not (curve.singular(name) and curve.ends(name)))
     segment = _Segment(curve, a, b)
@@ -183,11 +181,9 @@ class _Segment:
             return None
 
     def interpolated(self, name: str) -> Point | None:
-        """Zero of a test where the corrector is singular, from points around it.
-
-        At a branch point the equations are singular across every hyperplane. Both the test and the
-        curve are smooth through it, so polynomials through points on both sides are right there.
-        """
+        """Zero of a test where the corrector is singular, from points around it."""
+        # At a branch point the equations are singular across every hyperplane. Both the test and the
+        # curve are smooth through it, so polynomials through points on both sides are right there.
         low, high = self.a.tests[name], self.b.tests[name]
         middle, width = low / (low - high), 0.5
         point: Point | None = None

@@ -17,15 +17,7 @@ _UNDER_WAY: WeakSet[Background] = WeakSet()
 
 
 class Background:
-    """A library of a C source: asked for, under way, there, or failed.
-
-    Parameters
-    ----------
-    source : callable
-        Returns the C text.
-    ready : callable
-        Makes a library fit for use; raises CompilerError.
-    """
+    """A library of a C source: asked for, under way, there, or failed."""
 
     def __init__(
         self, source: Callable[[], str], ready: Callable[[ctypes.CDLL], ctypes.CDLL]
@@ -66,12 +58,7 @@ class Background:
         return self._library
 
     def wait(self) -> ctypes.CDLL:
-        """Return the library, compiled now if it is not there.
-
-        Raises
-        ------
-        CompilerError
-        """
+        """Return the library, compiled now if it is not there."""
         thread = self._thread if self._process == os.getpid() else None
         if thread is not None:
             thread.join()

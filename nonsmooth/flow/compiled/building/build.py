@@ -57,13 +57,7 @@ _HANGING: set[Command] = set()
 
 
 class Compilation:
-    """How a compiler runs, and a way to stop it.
-
-    Parameters
-    ----------
-    quiet : bool
-        Beside the work, without a word.
-    """
+    """How a compiler runs, and a way to stop it."""
 
     def __init__(self, quiet: bool = False) -> None:
         self.quiet, self.stopped, self.hangs = quiet, False, False
@@ -116,21 +110,7 @@ def library_key(source: str, command: Command, flags: Sequence[str] = ()) -> str
 
 
 def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None) -> ctypes.CDLL:
-    """Load the library of a C source, compiled unless the cache has it.
-
-    Parameters
-    ----------
-    source : str
-    flags : sequence of str, optional
-        For the compiler, besides the usual ones.
-    run : Compilation, optional
-        How it runs.
-
-    Raises
-    ------
-    CompilerError
-        There is no compiler, or none of them can compile it.
-    """
+    """Load the library of a C source, compiled unless the cache has it."""
     commands = compilers()
     if not commands:
         raise CompilerError(f"compiler: expected a C compiler, found none. {ADVICE}")
@@ -191,13 +171,7 @@ def compile_library(
     flags: Sequence[str] = (),
     run: Compilation | None = None,
 ) -> None:
-    """Put the library of a source into its place, which has its key as name.
-
-    Raises
-    ------
-    CompilerError
-        The compiler failed, or there is no room.
-    """
+    """Put the library of a source into its place, which has its key as name."""
     try:
         _compile(source, command, flags, library, run or Compilation())
     except OSError as error:

@@ -67,12 +67,7 @@ def supports_set_lanes(coupled: Coupled) -> bool:
 
 
 def tape_order(system: FilippovSystem, options: Options) -> int:
-    """Order of the series of one trajectory: a third more where all is linear.
-
-    Coefficients of a series without products cost the same each, so more of them share what a step costs.
-    At order 22 a step along exponentials loses some ten roundings. Systems of several surfaces keep
-    theirs: most of their steps end at an event.
-    """
+    """Order of the series of one trajectory: a third more where all is linear."""
     order = options.order
     if system.coupled or not coupled_of(system).linearity.everywhere:
         return order
@@ -96,15 +91,7 @@ def interpreter_source() -> str:
 
 
 def special_source(tape: Tape, coupled: Coupled, order: int) -> str:
-    """C of the same driver with the programs of one system written out.
-
-    Parameters
-    ----------
-    tape : Tape
-    coupled : Coupled
-        The system.
-    order : int
-    """
+    """C of the same driver with the programs of one system written out."""
     sizes = special_sizes(coupled.system, order)
     return _driver(sizes, special_values(tape), special_series(tape, coupled, order))
 
@@ -153,15 +140,8 @@ def lanes_source(system: FilippovSystem, order: int, width: int) -> str:
 
 
 def device_source(system: FilippovSystem, order: int, threads: int, resident: int = 1) -> str:
-    """C++ source of the same engine with a trajectory for each thread, as CUDA or for any compiler.
-
-    Parameters
-    ----------
-    threads : int
-        Threads of a block.
-    resident : int, optional
-        Blocks that a multiprocessor is to hold at once at least; more leave fewer registers to each.
-    """
+    """C++ source of the same engine with a trajectory for each thread, as CUDA or for any
+    compiler."""
     head, program = _lanes_head(system, order)
     sizes = f"#define THREADS {threads}\n#define RESIDENT {resident}\n"
     texts = map(driver_text, ("common.h", "device/lane.h", "lanes/polynomials.h"))

@@ -27,13 +27,7 @@ Command = tuple[str, ...]
 
 
 class CompilerError(NonsmoothError, RuntimeError):
-    """No compiler was found, or it failed; the message holds the command and the file.
-
-    Attributes
-    ----------
-    brief : str
-        Of a compiler that fails: the same in one sentence without the file; otherwise empty.
-    """
+    """No compiler was found, or it failed; the message holds the command and the file."""
 
     def __init__(self, message: str, brief: str = ""):
         super().__init__(message)
@@ -41,24 +35,12 @@ class CompilerError(NonsmoothError, RuntimeError):
 
 
 def compilers() -> tuple[Command, ...]:
-    """Commands of the C compilers in the order of preference: $CC, cc, gcc, clang, ziglang's.
-
-    Raises
-    ------
-    CompilerError
-        CC is set to what is no command.
-    """
+    """Commands of the C compilers in the order of preference: $CC, cc, gcc, clang, ziglang's."""
     return _located(os.environ.get("CC", ""), os.environ.get("PATH", ""))
 
 
 def find_compiler() -> Command | None:
-    """Command of the first C compiler of :func:`compilers`; None without any.
-
-    Raises
-    ------
-    CompilerError
-        CC is set to what is no command.
-    """
+    """Command of the first C compiler of :func:`compilers`; None without any."""
     return next(iter(compilers()), None)
 
 

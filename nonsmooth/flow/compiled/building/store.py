@@ -32,13 +32,7 @@ _TAIL = len(_MARK) + hashlib.sha256().digest_size
 
 
 def cache_directory() -> Path:
-    """Folder of compiled engines: $NONSMOOTH_CACHE, or the user's cache folder.
-
-    Raises
-    ------
-    RuntimeError
-        The user has no home.
-    """
+    """Folder of compiled engines: $NONSMOOTH_CACHE, or the user's cache folder."""
     explicit = os.environ.get("NONSMOOTH_CACHE")
     if explicit:
         return Path(os.path.abspath(os.path.expanduser(explicit)))
@@ -49,13 +43,7 @@ def cache_directory() -> Path:
 
 
 def usable_folder() -> Path:
-    """Return the folder of compiled engines, or the process' own where that one cannot be used.
-
-    Raises
-    ------
-    CompilerError
-        There is no place for one.
-    """
+    """Return the folder of compiled engines, or the process' own where that one cannot be used."""
     try:
         folder = _made(cache_directory())
         why = _fault(folder) or _unwritable(folder)
@@ -170,16 +158,7 @@ def _remove(folder: Path, process: int) -> None:
 
 
 def remove_leftovers(folder: Path, prefixes: Sequence[str], age: float) -> None:
-    """Remove what processes that were killed left in a folder.
-
-    Parameters
-    ----------
-    folder : Path
-    prefixes : sequence of str
-        How its names begin.
-    age : float
-        Seconds for which nothing was put into it.
-    """
+    """Remove what processes that were killed left in a folder."""
     for found in [path for prefix in prefixes for path in folder.glob(f"{prefix}*")]:
         try:
             if time.time() - os.lstat(found).st_mtime > age:

@@ -35,13 +35,7 @@ FLAGS = ("-ffp-contract=fast",)
 
 
 class Lanes:
-    """The library that runs a system's trajectories in step, built when first needed.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    order : int
-    """
+    """The library that runs a system's trajectories in step, built when first needed."""
 
     def __init__(self, system: FilippovSystem, order: int):
         self.system, self.order = system, order
@@ -71,24 +65,8 @@ class Lanes:
         out: Chunk | None = None,
         stop: Callable[[], bool] = lambda: False,
     ) -> Chunk:
-        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,).
-
-        What is rare is run again one by one, by the interpreter.
-
-        Parameters
-        ----------
-        at : (kind, count) or None
-            Event whose state is kept.
-        out : Chunk, optional
-            Contiguous arrays for the results, which are made unless given.
-        stop : callable, optional
-            Asked now and then whether to leave the work.
-
-        Raises
-        ------
-        Stopped
-        CompilerError
-        """
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
+        # What is rare is run again one by one, by the interpreter.
         chunk = out or Chunk.empty(len(x), self.system, at is not None)
         chunk.forget()
         x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
@@ -171,6 +149,5 @@ def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
 
 
 def _order_with_sets(options: Options) -> int:
-    """Where directions of slip are expanded the work of the series counts most: the order is the optimum of
-    Jorba & Zou, of which ``Options.order`` is a fifth more."""
+    """Where directions of slip are expanded the work of the series counts most."""
     return max(6, math.ceil(options.order / 1.2))

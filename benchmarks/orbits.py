@@ -34,7 +34,7 @@ TOLERANCES = (1e-9, 1e-11, 1e-13)
 class Case:
     """A periodic orbit with its truth."""
 
-    solve: Callable[[], ns.PeriodicOrbit]
+    solve: Callable[[], ns.orbit.PeriodicOrbit]
     state: dict[int, float]
     time: float
     multipliers: tuple[complex, ...]
@@ -96,7 +96,7 @@ def errors(case: Case, state: Any, duration: float, multipliers: Any) -> dict[st
     }
 
 
-def _ours(case: Case, orbit: ns.PeriodicOrbit) -> dict[str, float]:
+def _ours(case: Case, orbit: ns.orbit.PeriodicOrbit) -> dict[str, float]:
     n = 1 if orbit.symmetric else 0
     return errors(case, orbit.start, orbit.period / (1 + n), orbit.half_multipliers)
 
@@ -157,7 +157,7 @@ def iterations(quick: bool) -> dict[str, Any]:
         t = float(x[n]) if system.time_dependent else 0.0
         # a little later: at the start itself a reset, or an entry, is due
         delay = 1e-3 * float(orbit.evaluation.durations[0])
-        later = ns.follow(
+        later = ns.flow.follow(
             system,
             x[:n],
             t + delay,
@@ -185,7 +185,7 @@ def iterations(quick: bool) -> dict[str, Any]:
     return result
 
 
-def two_blocks() -> tuple[ns.PeriodicOrbit, str, tuple[float, float]]:
+def two_blocks() -> tuple[ns.orbit.PeriodicOrbit, str, tuple[float, float]]:
     """Two coupled oscillators, one on a belt: R^4."""
     x, v, u, w, f, c = (ca.SX.sym(s) for s in ("x", "v", "u", "w", "f", "c"))
     slip = v - 0.5
@@ -200,7 +200,7 @@ def two_blocks() -> tuple[ns.PeriodicOrbit, str, tuple[float, float]]:
     return ns.periodic_orbit(system, run), "f", (0.8, 1.3)
 
 
-def bounces() -> tuple[ns.PeriodicOrbit, str, tuple[float, float]]:
+def bounces() -> tuple[ns.orbit.PeriodicOrbit, str, tuple[float, float]]:
     """A ball on a table that vibrates; its restitution is a parameter of the reset."""
     y, v, t, r = (ca.SX.sym(s) for s in ("y", "v", "t", "r"))
     speed = 0.5 * ca.cos(2 * t)

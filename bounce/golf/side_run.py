@@ -291,7 +291,7 @@ def _glides(
 
     def follow(
         mode: str, system: ns.FilippovSystem, start: Array, friction: float, bound: float
-    ) -> ns.Event:
+    ) -> ns.flow.Event:
         """Follow a stretch to the set that ends it, within a bound of its time."""
         own = {**values, "friction": friction}
         run = ns.simulate(system, start, bound, parameters=own, tol=tol)

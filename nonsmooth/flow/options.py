@@ -52,7 +52,7 @@ class Options:
                     expected=f"a time not before t_start = {self.t_start}",
                     received=repr(self.t_end),
                     advice="Backward motion is not unique in Filippov systems; "
-                    "nonsmooth.follow runs one smooth mode backward.",
+                    "nonsmooth.flow.follow runs one smooth mode backward.",
                 )
             )
         if self.max_step != math.inf:

@@ -85,4 +85,4 @@ def test_a_start_mode_with_two_sliding_solutions_is_not_unique():
     run = ns.simulate(system, [0.0, 0.0], 1.0, start_mode="ss", engine="reference")
     assert run.status is ns.Status.NON_UNIQUE
     assert "start_mode 'ss' has 2 sliding solutions here." in run.message
-    assert ns.follow(system, [0.0, 0.0], 1.0, mode="ss").status is ns.Status.NON_UNIQUE
+    assert ns.flow.follow(system, [0.0, 0.0], 1.0, mode="ss").status is ns.Status.NON_UNIQUE

@@ -120,7 +120,7 @@ def limit_directions(
     >>> block = ns.FilippovSystem(
     ...     ca.vertsplit(v), field=[0.3 - 0.5 * lam[0], -0.5 * lam[1]],
     ...     surfaces=[v], multipliers=[lam])
-    >>> for found in ns.limit_directions(block, [0.0, 0.0]):
+    >>> for found in ns.local.limit_directions(block, [0.0, 0.0]):
     ...     print(found)
     LimitDirection([1, 0], arrives, rate -0.2, attracting)
     LimitDirection([-1, 0], arrives, rate -0.8, not attracting)

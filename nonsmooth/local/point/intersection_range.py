@@ -73,7 +73,7 @@ def intersection_range(
     >>> x, y, z, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b"))
     >>> system = ns.FilippovSystem(
     ...     [x, y, z], field=[-a, -b, 1 + a * b / 2], multipliers=[a, b], surfaces=[x, y])
-    >>> low, high = ns.intersection_range(system, [0, 0, 0], of=z)
+    >>> low, high = ns.local.intersection_range(system, [0, 0, 0], of=z)
     >>> round(low, 12), round(high, 12)
     (0.5, 1.5)
     """

@@ -162,7 +162,7 @@ def intersection(
     >>> x, y, a, b = (ca.SX.sym(s) for s in ("x", "y", "a", "b"))
     >>> spiral = ns.FilippovSystem(
     ...     [x, y], field=[-a + 2 * b, -2 * a - b], multipliers=[a, b], surfaces=[x, y])
-    >>> found = ns.intersection(spiral, [0.0, 0.0])
+    >>> found = ns.local.intersection(spiral, [0.0, 0.0])
     >>> [c.mode for c in found.continuations], found.attraction
     (['ss'], 'attracting')
     """

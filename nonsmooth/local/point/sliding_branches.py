@@ -90,7 +90,7 @@ def sliding_branches(
     >>> x, y, lam = (ca.SX.sym(s) for s in ("x", "y", "lam"))
     >>> system = ns.FilippovSystem([x, y], field=[(lam - 0.5) * (lam + 0.2), 1 - lam],
     ...                            multipliers=lam, surface=x, hidden=True)
-    >>> for branch in ns.sliding_branches(system, [0.0, 0.0]):
+    >>> for branch in ns.local.sliding_branches(system, [0.0, 0.0]):
     ...     print(branch.multipliers.round(6), branch.stable, branch.velocity.round(6) + 0.0)
     [-0.2] True [0.  1.2]
     [0.5] False [0.  0.5]

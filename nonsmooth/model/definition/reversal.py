@@ -19,7 +19,7 @@ def reversed_system(system: FilippovSystem) -> FilippovSystem:
         if found:
             raise DefinitionError(
                 f"system: expected one without {what}, received {system!r}. It cannot be followed "
-                "backward as a system; nonsmooth.follow runs one smooth mode backward."
+                "backward as a system; nonsmooth.flow.follow runs one smooth mode backward."
             )
 
     def build() -> FilippovSystem:

@@ -207,7 +207,7 @@ def funnel(
     >>> import casadi as ca, nonsmooth as ns
     >>> x = ca.SX.sym("x")
     >>> system = ns.FilippovSystem([x], surface=x, above=[1], below=[-1])
-    >>> futures = ns.funnel(system, [0.0], 2.0, samples=5)
+    >>> futures = ns.orbit.funnel(system, [0.0], 2.0, samples=5)
     >>> futures
     Funnel(repelling sliding of h0 at t = 0, 5 members: 2 +, 2 -, 1 s)
     >>> futures(1.5)[:, 0]

@@ -200,7 +200,7 @@ def poincare(
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
     >>> spiral = ns.FilippovSystem([x, y], field=[-x / 10 - y, x - y / 10])
-    >>> returns = ns.poincare(spiral, y, [1.0, 0.0], count=3)
+    >>> returns = ns.orbit.poincare(spiral, y, [1.0, 0.0], count=3)
     >>> (returns.points[:, 0] * ca.exp(2 * ca.pi / 10 * ca.DM([1, 2, 3]))).T
     DM([[1, 1, 1]])
     >>> returns.jacobian(2)[0, 0].round(9), returns.points[2, 0] / returns.points[1, 0].round(9)

@@ -73,7 +73,7 @@ def saltation_matrix(
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
     >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
-    >>> ns.saltation_matrix(system, "+", "-", [0.0, 0.0])
+    >>> ns.orbit.saltation_matrix(system, "+", "-", [0.0, 0.0])
     array([[ 1. , -1. ],
            [ 0. ,  0.5]])
     """

@@ -44,7 +44,7 @@ def test_directions_are_those_of_a_scan(seed, symmetric):
     a, m = rng.normal(size=2), definite(rng, 2)
     if not symmetric:
         m = m + 0.3 * rng.normal() * np.array([[0.0, 1.0], [-1.0, 0.0]])
-    found = ns.limit_directions(frozen(a, m), [0.0, 0.0])
+    found = ns.local.limit_directions(frozen(a, m), [0.0, 0.0])
     expected = scanned(a, m)
     assert [d.attracting for d in found] == [attracting for _, attracting in expected]
     assert [d.rate for d in found] == pytest.approx([rate for rate, _ in expected], abs=2e-3)
@@ -58,7 +58,7 @@ def test_an_astroid_bounds_the_loads_with_four_directions(seed):
     rng = np.random.default_rng(seed)
     a, m = rng.uniform(-1, 1, 2), np.array([2.0, 0.6])
     inside = (np.abs(a) ** (2 / 3)).sum() < abs(m[0] - m[1]) ** (2 / 3)
-    assert len(ns.limit_directions(frozen(a, np.diag(m)), [0.0, 0.0])) == (4 if inside else 2)
+    assert len(ns.local.limit_directions(frozen(a, np.diag(m)), [0.0, 0.0])) == (4 if inside else 2)
 
 
 @pytest.mark.parametrize(
@@ -66,7 +66,7 @@ def test_an_astroid_bounds_the_loads_with_four_directions(seed):
 )
 def test_a_load_along_a_principal_axis(a, count):
     m = np.diag([2.0, 0.6])
-    found = ns.limit_directions(frozen(a, m), [0.0, 0.0])
+    found = ns.local.limit_directions(frozen(a, m), [0.0, 0.0])
     assert len(found) == count
     for d in found:
         assert (m + d.rate * np.eye(2)) @ d.direction == pytest.approx(a, abs=1e-12)
@@ -78,7 +78,7 @@ def test_one_direction_leads_away_where_friction_does_not_hold(k, seed):
     rng = np.random.default_rng(seed)
     a, m = rng.normal(size=k), definite(rng, k)
     system, origin = frozen(a, m), np.zeros(k)
-    found = ns.limit_directions(system, origin)
+    found = ns.local.limit_directions(system, origin)
     holds = np.linalg.norm(np.linalg.solve(m, a)) < 1
     assert sum(d.leaves for d in found) == (0 if holds else 1)
     assert ns.region(system, origin) is (ns.Region.SLIDING if holds else ns.Region.CROSSING)
@@ -106,7 +106,7 @@ def test_regions_of_a_block_on_an_incline():
     assert [r.sliding for r in regions] == [True, False, False]
     assert ns.region(block, [0, 0], parameters={"mu": -0.5}) is ns.Region.MIXED
     assert ns.region(block, [0, 0], parameters={"mu": 0.0}) is ns.Region.CROSSING
-    found = ns.limit_directions(block, [0, 0], parameters={"mu": 0.0})
+    found = ns.local.limit_directions(block, [0, 0], parameters={"mu": 0.0})
     assert [d.rate for d in found] == pytest.approx([0.3, -0.3])
     assert repr(pickle.loads(pickle.dumps(found))) == repr(found)
 
@@ -144,15 +144,15 @@ def test_beside_a_surface_the_side_is_known_or_asked_for():
     with pytest.raises(ns.PointError, match=r"a side of h0.*mode="):
         ns.region(system, [0, 0, 0.0], surface=1)
     with pytest.raises(ns.DefinitionError, match=r"one of \[1\], received 0"):
-        ns.limit_directions(system, [0, 0, 1.0], surface=0)
+        ns.local.limit_directions(system, [0, 0, 1.0], surface=0)
 
 
 def test_points_off_the_set_and_other_systems_are_refused():
     system = frozen([0.3, 0.0], 0.5 * np.eye(2))
     with pytest.raises(ns.PointError, match=r"on the set h0 = 0, received h = \[0.1, 0.0\]"):
-        ns.limit_directions(system, [0.1, 0.0])
+        ns.local.limit_directions(system, [0.1, 0.0])
     with pytest.raises(ns.PointError):
         ns.region(system, [np.nan, 0.0])
     x = ca.SX.sym("x")
     with pytest.raises(ns.DefinitionError, match="vector multiplier"):
-        ns.limit_directions(ns.FilippovSystem([x], surface=x, above=[-1], below=[1]), [0.0])
+        ns.local.limit_directions(ns.FilippovSystem([x], surface=x, above=[-1], below=[1]), [0.0])

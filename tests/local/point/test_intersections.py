@@ -38,7 +38,7 @@ CASES = {
 @pytest.mark.parametrize("name", CASES)
 def test_modes_that_can_go_on_and_attraction(name):
     system, modes, attraction, kind = CASES[name]
-    found = ns.intersection(system, [0.0, 0.0])
+    found = ns.local.intersection(system, [0.0, 0.0])
     assert sorted(m.mode for m in found.continuations) == sorted(modes) and found.complete
     assert found.attraction == attraction and found.surfaces == (0, 1)
     assert ns.classify(system, [0.0, 0.0]).kind == kind
@@ -56,7 +56,7 @@ def test_a_run_goes_on_in_the_only_mode(name):
 
 
 def test_everything_leaves_a_repelling_intersection():
-    found = ns.intersection(plane(a, b), [0.0, 0.0])
+    found = ns.local.intersection(plane(a, b), [0.0, 0.0])
     assert len(found.continuations) == 9 and found.attraction == "repelling"
     assert ns.classify(plane(a, b), [0.0, 0.0]).label == "repelling sliding"
 
@@ -77,7 +77,7 @@ inward = st.integers(-20, -5).map(lambda k: k / 10)  # most of what is drawn att
 def test_attraction_is_what_runs_beside_the_intersection_do(m, drift):
     """A piecewise constant field: runs from beside an attracting intersection end on it, in finite time."""
     system = plane(drift[0] + m[0] * a + m[1] * b, drift[1] + m[2] * a + m[3] * b)
-    found = ns.intersection(system, [0.0, 0.0])
+    found = ns.local.intersection(system, [0.0, 0.0])
     assume(found.distance >= 0.05 and found.attraction == "attracting")
     for start in ([1.0, 0.5], [-0.3, 1.0], [-1.0, -0.2], [0.6, -1.0]):
         run = ns.simulate(system, start, 1e4, max_events=500)
@@ -175,7 +175,7 @@ def test_many_surfaces_that_slide_for_themselves(count):
         multipliers=ca.vertsplit(lam),
         surfaces=ca.vertsplit(states),
     )
-    found = ns.intersection(system, np.zeros(count))
+    found = ns.local.intersection(system, np.zeros(count))
     expected = [pull[0] / 2]
     for i in range(1, count):
         expected.append((pull[i] + expected[-1] / 2) / 2)
@@ -188,7 +188,7 @@ def test_three_genes_in_a_loop_do_not_stay():
     system = ns.FilippovSystem(
         [x, y, z], field=[-c - x, a - y, b - z], multipliers=[a, b, c], surfaces=[x, y, z]
     )
-    found = ns.intersection(system, [0.0, 0.0, 0.0])
+    found = ns.local.intersection(system, [0.0, 0.0, 0.0])
     layer = np.sort_complex(found.sliding.eigenvalues)
     np.testing.assert_allclose(layer, np.sort_complex(np.roots([1, 0, 0, 1])), atol=1e-12)
     rest = ns.find_pseudo_equilibrium(system, [0.1, -0.1, 0.2], mode="sss")
@@ -199,21 +199,21 @@ def test_three_genes_in_a_loop_do_not_stay():
 def test_wrong_questions_are_refused():
     system = plane(-a, -b)
     with pytest.raises(ns.PointError, match="a point where surfaces meet"):
-        ns.intersection(system, [1.0, 1.0])
+        ns.local.intersection(system, [1.0, 1.0])
     with pytest.raises(ns.PointError, match=r"a point of surfaces \[0, 1\]"):
-        ns.intersection(system, [0.0, 1.0], surfaces=[0, 1])
+        ns.local.intersection(system, [0.0, 1.0], surfaces=[0, 1])
     with pytest.raises(ns.PointError, match="independent gradients"):
         touching = ns.FilippovSystem(
             [x, y], field=[-a, -b], multipliers=[a, b], surfaces=[y, y - x**2]
         )
-        ns.intersection(touching, [0.0, 0.0])
+        ns.local.intersection(touching, [0.0, 0.0])
     with pytest.raises(ns.DefinitionError, match="at most 2 surfaces"):
         three = ns.FilippovSystem(
             [x, y], field=[-a, -b - c], multipliers=[a, b, c], surfaces=[x, y, x + y]
         )
         ns.find_pseudo_equilibrium(three, [0.0, 0.0], mode="sss")
     with pytest.raises(ns.DefinitionError, match="at least one switching surface"):
-        ns.intersection(ns.FilippovSystem([x], field=[-x]), [0.0])
+        ns.local.intersection(ns.FilippovSystem([x], field=[-x]), [0.0])
     with pytest.raises(ns.PointError, match="multipliers that are determined"):
         singular = ns.FilippovSystem(
             [x, y, z], field=[-a - b, -a - b, -z], multipliers=[a, b], surfaces=[x, y]

@@ -12,11 +12,11 @@ SYSTEM = ns.FilippovSystem([x, y], surface=y, above=[-x - y, x - y], below=[1, 1
 @pytest.mark.parametrize(
     "ask",
     [
-        lambda side: ns.fold(SYSTEM, [0, 0], side=side),
+        lambda side: ns.local.fold(SYSTEM, [0, 0], side=side),
         lambda side: ns.find_fold(SYSTEM, [0, 0], side=side),
         lambda side: ns.find_equilibrium(SYSTEM, [0, 0], side=side),
         lambda side: ns.find_boundary_equilibrium(SYSTEM, [0, 0], vary="mu", side=side),
-        lambda side: ns.boundary_equilibrium(SYSTEM, [0, 0], side=side),
+        lambda side: ns.local.boundary_equilibrium(SYSTEM, [0, 0], side=side),
     ],
 )
 @pytest.mark.parametrize("side", ["above", "below", "s", "", 1, 0])
@@ -28,6 +28,6 @@ def test_other_words_are_refused(ask, side):
 def test_results_carry_the_letter():
     assert ns.find_fold(SYSTEM, [-0.9, 0.1], side="-").side == "-"
     assert ns.find_equilibrium(SYSTEM, [0.1, 0.1]).side == "+"
-    assert ns.boundary_equilibrium(SYSTEM, [0, 0]).side == "+"
+    assert ns.local.boundary_equilibrium(SYSTEM, [0, 0]).side == "+"
     assert ns.classify(SYSTEM, [-1.0, 0.0]).side == "-"
     assert ns.classify(SYSTEM, [2.0, 0.0]).side == ""

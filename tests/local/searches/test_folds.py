@@ -74,7 +74,7 @@ def test_visible_means_that_the_orbit_stays_on_its_side():
         found = find_fold(system, [start, 0.1])
         assert found.kind == kind
         for step in (-0.1, 0.1):
-            after = ns.follow(system, found.point, step, mode="+").x[-1]
+            after = ns.flow.follow(system, found.point, step, mode="+").x[-1]
             assert np.sign(after[1]) == sign
 
 

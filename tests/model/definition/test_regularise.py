@@ -216,7 +216,7 @@ def test_canard_into_repelling_sliding_is_found_between_up_and_down():
 def test_canard_of_the_smoothed_system_tends_to_filippovs():
     """With a bend in the field the canard is a curve; the smoothed one is O(eps) from it."""
     system, c = two_fold(0.5, 0.5, 0.4), 0.3
-    near = ns.follow(system, [0.0, 1e-6, 1e-6], -3.0, mode="s", until=y - c, tol=1e-13)
+    near = ns.flow.follow(system, [0.0, 1e-6, 1e-6], -3.0, mode="s", until=y - c, tol=1e-13)
     slope = near.x[-1, 2] / c
     smooth = ns.regularise(system, None)
     off = [abs(canard_slope(smooth, e, c, 0.8, 1.2, 26)[0] - slope) for e in (1e-2, 1e-3)]

@@ -101,7 +101,7 @@ def test_a_closed_curve_of_folds():
     event = branch.events[-1]
     curve = ns.continue_bifurcation(event, ("a", "b"), bounds=[(-1, 1), (-1, 1)])
     assert np.abs(np.hypot(*curve.values.T) - 0.5).max() < 1e-12
-    assert curve.ends == (ns.BranchEnd.CLOSED, ns.BranchEnd.CLOSED)
+    assert curve.ends == (ns.orbit.BranchEnd.CLOSED, ns.orbit.BranchEnd.CLOSED)
 
 
 @pytest.mark.parametrize(
@@ -133,7 +133,7 @@ def test_a_ball_on_a_table_folds_and_doubles_on_closed_forms():
         fold = np.pi * (1 - r) / (1 + r)
         wanted = fold if event.kind == "fold" else np.hypot(fold, 2 * (1 + r * r) / (1 + r) ** 2)
         assert np.abs(A - wanted).max() < 1e-11 and len(curve) > 10
-        assert curve.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+        assert curve.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
 
 
 def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(monkeypatch):
@@ -156,7 +156,7 @@ def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(
 
     monkeypatch.setattr(type(orbit.problem), "evaluate", interrupted)
     cut = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)], progress=True)
-    assert ns.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
+    assert ns.orbit.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
     assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
 
 

@@ -23,7 +23,7 @@ def test_fold_of_equilibria():
     assert event.kind == "fold" and abs(event.parameter) < 1e-13
     assert [e.kind for e in branch.at(0.25)] == ["saddle", "stable node"]
     assert [round(e.point[0], 12) for e in branch.at(0.25)] == [-0.5, 0.5]
-    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
 
 
 def test_hopf_point_and_not_a_neutral_saddle():
@@ -48,7 +48,7 @@ def test_boundary_equilibrium_is_the_one_that_is_found_and_classified(matrix, pu
     offset = ca.vertcat(x, y - (mu - 1))
     system = planar(ca.vertsplit(ca.DM(a) @ offset), [1, pull], 1.5)
     found = ns.find_boundary_equilibrium(system, [0, 0], vary="mu")
-    local = ns.boundary_equilibrium(system, found.point, parameters=found.parameters)
+    local = ns.local.boundary_equilibrium(system, found.point, parameters=found.parameters)
     branch = ns.continue_equilibrium(system, [0, 0.5], "mu", bounds=(0.5, 2))
     (event,) = branch.events
     assert event.kind == "boundary equilibrium"
@@ -76,7 +76,7 @@ def test_from_a_pseudo_equilibrium_through_the_boundary_to_the_equilibrium():
     assert isinstance(branch.solutions[-1], ns.local.Equilibrium)
     assert np.abs(branch[1.8].point - [0, 0.8]).max() < 1e-12
     halted = ns.continue_equilibrium(system, near, "mu", bounds=(0.5, 2), side=None, through=False)
-    assert halted.ends == (ns.BranchEnd.REACHED_BOUND, ns.BranchEnd.EVENT)
+    assert halted.ends == (ns.orbit.BranchEnd.REACHED_BOUND, ns.orbit.BranchEnd.EVENT)
 
 
 def test_pseudo_saddle_node_in_three_dimensions_and_hopf_of_the_sliding_flow():
@@ -236,4 +236,4 @@ def test_a_pseudo_equilibrium_that_meets_another_surface_ends_there():
     assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
         ("intersection", 0.0)
     ]
-    assert branch.ends[0] is ns.BranchEnd.EVENT
+    assert branch.ends[0] is ns.orbit.BranchEnd.EVENT

@@ -39,7 +39,7 @@ def test_sliding_cycles_end_at_a_boundary_focus_of_either_kind(slope, label, unf
     assert event.kind == "boundary equilibrium" and abs(event.parameter) < 1e-15
     assert label in event.far_side.verdict and unfolding in event.far_side.verdict
     assert event.far_side.itinerary == ""
-    assert branch.ends == (ns.BranchEnd.EVENT, ns.BranchEnd.REACHED_BOUND)
+    assert branch.ends == (ns.orbit.BranchEnd.EVENT, ns.orbit.BranchEnd.REACHED_BOUND)
     for mu in (0.5, 0.05, 1e-4):  # the flight from the fold is that of a linear system
         slide = next(leg for leg in branch[mu].legs if leg.mode == "s")
         landing = mu * (GROWTH + fold_orbit_landing(GROWTH, 1.0))  # from the fold at x = r mu

@@ -45,7 +45,7 @@ def test_crossing_sliding_and_adding_sliding_of_a_forced_relay(forced):
     assert abs(adding.parameter - number("F2", "ADDING_SLIDING_A")) < 1e-12
     assert [len(orbit.legs) for orbit in (crossing.orbit, adding.orbit)] == [2, 1]
     assert crossing.far_side.itinerary.split() == ["-", "s", "+", "s"]
-    assert forced.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert forced.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
 
 
 def test_orbits_beyond_an_event_have_the_reference_values(forced):
@@ -69,7 +69,7 @@ def test_the_branch_can_stop_at_the_event():
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
     branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), through=False)
-    assert branch.ends == (ns.BranchEnd.EVENT, ns.BranchEnd.REACHED_BOUND)
+    assert branch.ends == (ns.orbit.BranchEnd.EVENT, ns.orbit.BranchEnd.REACHED_BOUND)
     assert abs(branch.values[0] - number("F1", "A_crossing_sliding")) < 1e-12
 
 
@@ -176,7 +176,7 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
     assert abs(event.coefficients["leading multiplier"] - np.exp(-z * free)) < 1e-11
     turn = np.angle(np.exp(1j * np.sqrt(1 - z * z) * free))
     assert abs(abs(event.coefficients["its angle"]) - abs(turn)) < 1e-9
-    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
     assert "asymptotically stable" in branch[0.34].stability
     assert "unstable" in branch[0.45].stability and branch[0.45].legs[0].event == "impact"
     assert abs(branch[0.5].multipliers[0] - float(CASES["I2"]["multipliers"][0])) < 1e-10
@@ -196,7 +196,7 @@ def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
 
     monkeypatch.setattr(type(orbit.problem), "evaluation", interrupted)
     branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
-    assert ns.BranchEnd.INTERRUPTED in branch.ends
+    assert ns.orbit.BranchEnd.INTERRUPTED in branch.ends
     assert len(branch) >= calls // 10
     assert np.all(np.isfinite(branch.values))
 
@@ -219,7 +219,7 @@ def test_the_relays_sliding_bifurcations():
 def test_a_period_that_diverges_ends_a_branch():
     orbit = ns.periodic_orbit(welander(), [0.4, 0.3])
     branch = ns.continue_orbit(orbit, "eps", bounds=(-0.05, -0.005))
-    assert branch.ends[0] is ns.BranchEnd.PERIOD_DIVERGES
+    assert branch.ends[0] is ns.orbit.BranchEnd.PERIOD_DIVERGES
 
 
 @pytest.mark.parametrize(
@@ -333,7 +333,7 @@ def test_an_event_at_the_first_leg_of_a_half_orbit_is_that_of_its_own_mode():
     begun = ns.periodic_orbit(problem.system, orbit.legs[0].start, parameters=at, symmetry="odd")
     branch = ns.continue_orbit(begun, "w", bounds=(31.0, 31.8))
     assert kinds(branch) == ["adding-sliding", "grazing-sliding"]
-    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
     late = problem.run({"w": 31.8}, t_end=60.0)
     again = ns.periodic_orbit(problem.system, late, parameters={"w": 31.8}, symmetry="odd")
     assert branch[31.8].period == pytest.approx(again.period, rel=1e-12)
@@ -385,7 +385,7 @@ def test_no_event_hides_behind_another_in_a_long_step():
     orbit = ns.periodic_orbit(friction, [1.3, 0.0], symmetry="odd")
     branch = ns.continue_orbit(orbit, "f", bounds=(0.05, 0.5))
     assert kinds(branch) == ["grazing-sliding", "switching-sliding"]
-    assert branch.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
     assert not any(one.is_virtual for one in branch.orbits)
     # the speed along the flight in closed form: x = c + a cos(t - s) + b cos(0.45 t)
     leg, b = branch.events[0].orbit.legs[0], 1 / (1 - 0.45**2)
@@ -422,4 +422,4 @@ def test_where_a_force_jumps_with_a_position_a_graze_is_a_two_fold_for_an_orbit_
     first, last = branch.events[0], branch.events[-1]
     assert first.kind == last.kind == "two-fold"
     assert first.parameter == pytest.approx(last.parameter, rel=1e-11)
-    assert branch.ends == (ns.BranchEnd.EVENT,) * 2
+    assert branch.ends == (ns.orbit.BranchEnd.EVENT,) * 2

@@ -45,7 +45,7 @@ def test_a_torus_is_born_where_the_trace_vanishes(rotations):
 
 def test_a_family_ends_where_it_shrinks_to_a_hopf_point(rotations):
     first = rotations.events[0]
-    assert first.kind == "Hopf" and rotations.ends[0] is ns.BranchEnd.EVENT
+    assert first.kind == "Hopf" and rotations.ends[0] is ns.orbit.BranchEnd.EVENT
     assert abs(first.parameter + (0.6 - 0.7**3 / 3) / 0.7) < 1e-12
     assert abs(first.coefficients["frequency"] - 3) < 1e-12
     with pytest.raises(ns.DefinitionError, match="Continue an equilibrium"):
@@ -80,7 +80,7 @@ def test_a_moebius_band_doubles_the_period_and_the_doubled_orbit_is_found():
     (event,) = branch.events
     assert event.kind == "period doubling" and abs(event.parameter) < 1e-13
     double = ns.continue_orbit(event, "m", bounds=(-1, 1))
-    assert double.ends[0] is ns.BranchEnd.EVENT and double.values.min() > -1e-12
+    assert double.ends[0] is ns.orbit.BranchEnd.EVENT and double.values.min() > -1e-12
     twice = double[0.5]
     assert abs(twice.period - 4 * np.pi) < 1e-12
     assert abs(np.linalg.norm(twice.start) - np.sqrt(0.5)) < 1e-12  # v1 = sqrt(m)
@@ -118,7 +118,7 @@ def test_relaxation_oscillations_are_followed_far_from_their_hopf_point():
     )
     orbit = ns.periodic_orbit(system, ns.simulate(system, [1.1, 3.0], 60.0))
     branch = ns.continue_orbit(orbit, "b", bounds=(1.5, 12.0))
-    assert kinds(branch) == ["Hopf"] and branch.ends[1] is ns.BranchEnd.REACHED_BOUND
+    assert kinds(branch) == ["Hopf"] and branch.ends[1] is ns.orbit.BranchEnd.REACHED_BOUND
     assert abs(branch.events[0].parameter - 2) < 1e-12
     assert abs(branch.events[0].coefficients["frequency"] - 1) < 1e-12
     assert np.all(np.diff(branch.values) > 0)

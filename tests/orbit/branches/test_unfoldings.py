@@ -135,7 +135,7 @@ def test_doubled_orbits_between_two_doublings_are_followed_once():
     turn = branch.events[2]
     assert turn.parameter < branch.events[1].parameter
     assert np.abs(turn.orbit.multipliers - 1).min() < 1e-8
-    assert branch.ends == (ns.BranchEnd.EVENT,) * 2
+    assert branch.ends == (ns.orbit.BranchEnd.EVENT,) * 2
     ends = [event for event in branch.events if event.kind == "period doubling"]
     single = ns.continue_orbit(ends[0].orbit, "A", bounds=(0.4, 0.6))
     again = [event.parameter for event in single.events if event.kind == "period doubling"]
@@ -178,7 +178,7 @@ def test_a_corner_that_adds_legs_is_passed_from_either_side(k):
     branch = ns.continue_orbit(
         ns.periodic_orbit(system, run, parameters={"k": k}), "k", bounds=(1.0, 2.2)
     )
-    assert branch.ends == (ns.BranchEnd.REACHED_BOUND, ns.BranchEnd.REACHED_BOUND)
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND, ns.orbit.BranchEnd.REACHED_BOUND)
     (event,) = branch.events
     assert event.kind == "corner" and event.far_side.verdict == "persistence"
     orbit = event.orbit.trajectory

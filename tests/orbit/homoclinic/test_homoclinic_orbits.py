@@ -120,7 +120,7 @@ def test_curves_of_pseudo_homoclinics_and_their_neutral_saddle() -> None:
     found = ns.find_homoclinic(solid_spiral(0.0), [-1.4, 0.0, 0.2], "c")
     curve = ns.continue_bifurcation(found, ("c", "k"), bounds=[(-1, 0), (0.1, 2)])
     assert np.abs(curve.values[:, 0] - float(values["c_homoclinic"])).max() < 1e-10
-    assert curve.ends == (ns.BranchEnd.REACHED_BOUND,) * 2
+    assert curve.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
     height = float(values["x_pseudo_saddle"]) - 0.1
     alpha = height / (height - 1)
     neutral = (float(values["eigenvalue_sliding"]) - 0.5 * (1 - alpha)) / alpha
@@ -253,7 +253,7 @@ def test_a_branch_from_hopf_to_homoclinic() -> None:
     )
     hopf, homoclinic = branch.events
     assert (hopf.kind, homoclinic.kind) == ("Hopf", "homoclinic")
-    assert branch.ends[1] is ns.BranchEnd.PERIOD_DIVERGES
+    assert branch.ends[1] is ns.orbit.BranchEnd.PERIOD_DIVERGES
     assert abs(hopf.parameter + 1) < 1e-12
     # the orbits themselves, of finite period, come as near as exp(-T) to it
     assert abs(branch.values[-1] - homoclinic.parameter) < 1e-5

@@ -364,7 +364,7 @@ def test_what_cannot_be_cut_is_refused():
     with pytest.raises(ns.OptionError, match="length: expected a positive number"):
         ns.manifold(system, fold)
     with pytest.raises(ns.OptionError, match="expected a TwoFold with starts="):
-        ns.manifold(system, ns.fold(system, [0.0, 0.0, -1.0]), **good)
+        ns.manifold(system, ns.local.fold(system, [0.0, 0.0, -1.0]), **good)
     with pytest.raises(ns.DegenerateError, match="on both sides of a dividing surface"):
         ns.manifold(system, fold, **{**good, "box": [(1, 2), (1, 2)]})
     teixeira = ns.FilippovSystem(

@@ -46,7 +46,7 @@ def solves(run, system):
 
 def test_sign_function_fills_a_wedge():
     """x' = sgn x from 0: leaving at tau gives +-(t - tau), and all of |x| <= t is reached."""
-    futures = ns.funnel(SGN, [0.0], 2.0, samples=41)
+    futures = ns.orbit.funnel(SGN, [0.0], 2.0, samples=41)
     assert len(futures) == 41 and futures.t == 0.0 and futures.past is None
     assert futures.first_up(2.0)[0] == 2.0 and futures.first_down(2.0)[0] == -2.0
     assert futures.longest(2.0)[0] == 0.0
@@ -59,7 +59,7 @@ def test_sign_function_fills_a_wedge():
 
 
 def test_times_broadcast():
-    futures = ns.funnel(SGN, [0.0], 2.0, samples=5)
+    futures = ns.orbit.funnel(SGN, [0.0], 2.0, samples=5)
     assert futures(1.0).shape == (5, 1)
     assert futures(np.ones((2, 3))).shape == (5, 2, 3, 1)
 
@@ -69,7 +69,7 @@ def test_times_broadcast():
 def test_leaving_speeds_are_those_of_the_two_fields(up, down, t_end):
     """Repelling sliding of (1, up) above and (-1, -down) below drifts at (down - up)/(up + down)."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, up], below=[-1, -down])
-    futures = ns.funnel(system, [0.0, 0.0], t_end, samples=9)
+    futures = ns.orbit.funnel(system, [0.0, 0.0], t_end, samples=9)
     drift = (down - up) / (up + down)
     for departure, end in zip(futures.departures, futures(t_end), strict=True):
         late = t_end - departure.t
@@ -81,7 +81,7 @@ def test_leaving_speeds_are_those_of_the_two_fields(up, down, t_end):
 def test_sliding_ends_at_an_invisible_fold_and_goes_on():
     """L1 = 1 - x falls to 0 at x = 1, where F2 takes over: unique from there."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, 1 - x], below=[1, -1])
-    futures = ns.funnel(system, [0.0, 0.0], 3.0, samples=11)
+    futures = ns.orbit.funnel(system, [0.0, 0.0], 3.0, samples=11)
     assert futures.longest.itinerary == "s -"
     assert futures.departures[-1].t == pytest.approx(1.0, abs=1e-12)
     np.testing.assert_allclose(futures.longest.x[-1], [3.0, -2.0], atol=1e-9)
@@ -97,7 +97,7 @@ def test_sliding_ends_at_an_invisible_fold_and_goes_on():
 def test_the_motion_that_gets_there_is_the_past():
     """x1 slides down to s = 0 on z = 0, beyond which sliding repels (planar visible fold-fold)."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[1, -x])
-    futures = ns.funnel(system, [-1.0, 0.0], 3.0, samples=9)
+    futures = ns.orbit.funnel(system, [-1.0, 0.0], 3.0, samples=9)
     assert futures.t == pytest.approx(1.0, abs=1e-9) and futures.past is not None
     np.testing.assert_allclose(futures(0.25)[:, 0], -0.75, atol=1e-9)
     for departure, end in zip(futures.departures, futures(2.5), strict=True):
@@ -110,7 +110,7 @@ def test_the_motion_that_gets_there_is_the_past():
 
 def test_a_run_is_continued():
     run = ns.simulate(SGN, [0.0], 1.0, t_start=0.5)
-    futures = ns.funnel(run, t_end=2.0, samples=5)
+    futures = ns.orbit.funnel(run, t_end=2.0, samples=5)
     assert futures.t == 0.5 and futures(2.0).max() == 1.5
 
 
@@ -119,7 +119,7 @@ def test_parameters_and_stops_are_kept():
     system = ns.FilippovSystem(
         [x], surface=x, above=[a], below=[-a], parameters={a: 1.0}, stops=[ns.Stop(x - 1)]
     )
-    futures = ns.funnel(system, [0.0], 2.0, samples=5, parameters={"a": 2.0})
+    futures = ns.orbit.funnel(system, [0.0], 2.0, samples=5, parameters={"a": 2.0})
     assert futures.first_up.status is ns.Status.STOPPED
     assert futures.first_up.t[-1] == pytest.approx(0.5)
     assert np.isnan(futures(1.0)[0, 0]) and futures(1.0)[2, 0] == pytest.approx(-2.0)
@@ -131,7 +131,7 @@ def test_other_surfaces_keep_their_side():
     system = ns.FilippovSystem(
         [x, y], surfaces=[x, y - 1], multipliers=[l1, l2], field=[l1, 1 + 0.5 * l2]
     )
-    futures = ns.funnel(system, [0.0, 0.5], 3.0, samples=9)
+    futures = ns.orbit.funnel(system, [0.0, 0.5], 3.0, samples=9)
     assert futures.first_up.itinerary == "+- ++"
     assert futures.longest.itinerary.startswith("s-")
     assert futures.departures[-1].t == pytest.approx(1.0)  # y = 1 at t = 1
@@ -143,7 +143,7 @@ def test_other_surfaces_keep_their_side():
 
 def test_one_canard_of_a_visible_two_fold():
     """VV-C1, nu = (.5, .5): the canard is z2 = z3 = -t/4; from tau on F1 gives a parabola."""
-    futures = ns.funnel(two_fold((1, -1), (0.5, 0.5)), [0.0, 0.0, 0.0], 2.0, samples=33)
+    futures = ns.orbit.funnel(two_fold((1, -1), (0.5, 0.5)), [0.0, 0.0, 0.0], 2.0, samples=33)
     assert futures.two_fold.label == "VV-C1" and len(futures) == 33
     np.testing.assert_allclose(futures.longest(1.5), [0.0, -0.375, -0.375], atol=1e-9)
     late = [d.t for d in futures.departures]
@@ -165,7 +165,7 @@ def test_the_canard_goes_on_where_it_arrived():
     system = two_fold((1, -1), (0.5, 0.5))
     run = ns.simulate(system, [0.0, 0.5, 0.5], 4.0)
     assert run.status is ns.Status.NON_UNIQUE
-    futures = ns.funnel(run, t_end=4.0)
+    futures = ns.orbit.funnel(run, t_end=4.0)
     assert futures.t == pytest.approx(2.0, abs=1e-8)
     np.testing.assert_allclose(futures.longest(3.5), [0.0, -0.375, -0.375], atol=1e-7)
     np.testing.assert_allclose(futures([0.5, 3.5])[:, 0, 1:], 0.375, atol=1e-9)
@@ -174,7 +174,7 @@ def test_the_canard_goes_on_where_it_arrived():
 def test_a_sector_of_canards_of_the_teixeira_singularity():
     """II-C, nu = (-2, -1): every orbit of Dr comes from s, after the time of the formula."""
     system = two_fold((-1, 1), (-2.0, -1.0))
-    futures = ns.funnel(system, [0.0, 0.3, 0.4], 3.0, samples=60)
+    futures = ns.orbit.funnel(system, [0.0, 0.3, 0.4], 3.0, samples=60)
     assert futures.two_fold.label == "II-C" and futures.t == pytest.approx(1.7)
     sliding = [
         (d, run)
@@ -198,7 +198,7 @@ def test_a_sector_of_canards_of_the_teixeira_singularity():
 
 def test_faux_canards_leave_into_attracting_sliding():
     """VV-F, nu = (2, 1): from s up, down, or anywhere into Da, where sliding lasts to a fold."""
-    futures = ns.funnel(two_fold((1, -1), (2.0, 1.0)), [0.0, 0.0, 0.0], 1.0, samples=12)
+    futures = ns.orbit.funnel(two_fold((1, -1), (2.0, 1.0)), [0.0, 0.0, 0.0], 1.0, samples=12)
     sides = [d.side for d in futures.departures]
     assert sides == ["+", "-"] + ["s"] * 10
     for departure, run in zip(futures.departures[2:], futures.trajectories[2:], strict=True):
@@ -221,7 +221,7 @@ def test_faux_canards_leave_into_attracting_sliding():
 )
 def test_every_class_has_the_futures_of_the_table(sigma, nu, members):
     system = two_fold(sigma, nu)
-    futures = ns.funnel(system, [0.0, 0.0, 0.0], 0.8, samples=15)
+    futures = ns.orbit.funnel(system, [0.0, 0.0, 0.0], 0.8, samples=15)
     assert {d.side for d in futures.departures} == members
     assert all(continuous(run) for run in futures.trajectories)
     canards = futures.two_fold.canards
@@ -238,7 +238,7 @@ def test_four_states_start_at_the_two_fold_given():
         below=[z, -1, 1 + 0.3 * w * w, 0.5 + z],
     )
     s = np.array([0.0, 0.0, 0.0, 0.1])
-    futures = ns.funnel(system, s, 1.0, samples=20)
+    futures = ns.orbit.funnel(system, s, 1.0, samples=20)
     np.testing.assert_allclose(futures.point, s, atol=1e-12)
     for run in futures.trajectories:
         for early in (1e-2, 1e-3, 1e-4):
@@ -257,7 +257,7 @@ def test_explicit_time():
         below=[z, -1, 1 + 0.3 * t],
         time=t,
     )
-    futures = ns.funnel(system, [0.0, 0.0, 0.0], 1.3, t_start=0.3, samples=20)
+    futures = ns.orbit.funnel(system, [0.0, 0.0, 0.0], 1.3, t_start=0.3, samples=20)
     assert all(run.t[0] == 0.3 for run in futures.trajectories)
     assert all(solves(run, system) and continuous(run) for run in futures.trajectories)
 
@@ -270,7 +270,7 @@ def test_coincident_fields_slide_through():
         multipliers=lam,
         surface=x,
     )
-    futures = ns.funnel(system, [0.0, 1.0, 0.25], 1.5, samples=9)
+    futures = ns.orbit.funnel(system, [0.0, 1.0, 0.25], 1.5, samples=9)
     assert futures.t == pytest.approx(0.5)
     np.testing.assert_allclose(futures.longest.x[-1], [0.0, -2.0, -0.5], atol=1e-9)
     late = [d.t for d in futures.departures if d.side == "+"]
@@ -282,7 +282,7 @@ def test_coincident_fields_slide_through():
 
 def test_a_backward_piece_reads_forward():
     system = ns.FilippovSystem([x, y], surface=y, above=[y, -ca.sin(x)], below=[y, -x])
-    back = ns.follow(system, [1.0, 0.5], -3.0, mode="+", tol=1e-12)
+    back = ns.flow.follow(system, [1.0, 0.5], -3.0, mode="+", tol=1e-12)
     run = forward(back)
     assert (run.t[0], run.t[-1]) == (-3.0, 0.0)
     times = np.linspace(-3.0, 0.0, 50)
@@ -308,23 +308,23 @@ def test_cut_and_joined_it_is_the_same():
 
 def test_a_unique_future_is_said_to_be_one():
     with pytest.raises(ns.PointError, match="received a unique one until t = 1, REACHED_END"):
-        ns.funnel(SGN, [0.5], 1.0)
+        ns.orbit.funnel(SGN, [0.5], 1.0)
     stable = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])
     with pytest.raises(ns.PointError, match="itinerary 's'"):
-        ns.funnel(ns.simulate(stable, [0.0], 1.0), t_end=2.0)
+        ns.orbit.funnel(ns.simulate(stable, [0.0], 1.0), t_end=2.0)
 
 
 def test_intersections_are_refused():
     l1, l2 = ca.SX.sym("l1"), ca.SX.sym("l2")
     system = ns.FilippovSystem([x, y], surfaces=[x, y], multipliers=[l1, l2], field=[l1, l2])
     with pytest.raises(ns.PointError, match=r"2 surfaces through it \(h0, h1\)"):
-        ns.funnel(system, [0.0, 0.0], 1.0)
+        ns.orbit.funnel(system, [0.0, 0.0], 1.0)
 
 
 def test_degenerate_two_folds_are_refused_by_name():
     cusp = ns.FilippovSystem([x, y, z], surface=x, above=[-y, z, 1], below=[z, 0.5, -1])
     with pytest.raises(ns.DegenerateError):
-        ns.funnel(cusp, [0.0, 0.0, 0.0], 1.0)
+        ns.orbit.funnel(cusp, [0.0, 0.0, 0.0], 1.0)
 
 
 @pytest.mark.parametrize(
@@ -340,16 +340,16 @@ def test_degenerate_two_folds_are_refused_by_name():
 )
 def test_wrong_requests_are_refused(arguments, options, message):
     with pytest.raises(ns.OptionError, match=message):
-        ns.funnel(*arguments, **options)
+        ns.orbit.funnel(*arguments, **options)
 
 
 def test_times_before_the_start_are_refused():
     with pytest.raises(ns.PointError, match="expected values from 0 on"):
-        ns.funnel(SGN, [0.0], 1.0)(-0.1)
+        ns.orbit.funnel(SGN, [0.0], 1.0)(-0.1)
 
 
 def test_words():
-    futures = ns.funnel(SGN, [0.0], 1.0, samples=5)
+    futures = ns.orbit.funnel(SGN, [0.0], 1.0, samples=5)
     assert repr(futures) == ("Funnel(repelling sliding of h0 at t = 0, 5 members: 2 +, 2 -, 1 s)")
     assert str(futures.departures[-1]) == "slides along path 0 until t = 1"
 
@@ -357,7 +357,7 @@ def test_words():
 def test_a_planar_two_fold_is_left_by_sliding_at_the_mean_of_both_fields():
     """L1 = x, L2 = -x: beyond s sliding repels with x' = 3/2, and can be left at any time."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, -x])
-    futures = ns.funnel(system, [0.0, 0.0], 2.0, samples=9)
+    futures = ns.orbit.funnel(system, [0.0, 0.0], 2.0, samples=9)
     assert futures.longest.itinerary == "s"
     for departure, end in zip(futures.departures, futures(2.0), strict=True):
         begun, s = 1.5 * departure.t, 2.0 - departure.t
@@ -372,6 +372,6 @@ def test_a_planar_two_fold_is_left_by_sliding_at_the_mean_of_both_fields():
 def test_a_planar_visible_invisible_fold_has_one_future():
     """L1 = x and L2 = x: nothing slides, and only the orbit above is there for t > 0."""
     system = ns.FilippovSystem([x, z], surface=z, above=[1, x], below=[2, x])
-    futures = ns.funnel(system, [0.0, 0.0], 2.0, samples=9)
+    futures = ns.orbit.funnel(system, [0.0, 0.0], 2.0, samples=9)
     assert [d.side for d in futures.departures] == ["+"]
     np.testing.assert_allclose(futures(2.0)[0], [2.0, 2.0], atol=1e-9)

@@ -39,7 +39,9 @@ def test_smooth_saddle_and_its_curves_through_a_switch():
 def test_thresholds_of_the_double_well_are_on_the_orbits_through_its_fold():
     """B2: the orbits that come to the visible-visible two-fold divide the basins."""
     well = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
-    found = ns.manifold(well, ns.fold_fold(well, [0.0, 0.0]), length=30.0, spacing=0.001, tol=1e-13)
+    found = ns.manifold(
+        well, ns.local.fold_fold(well, [0.0, 0.0]), length=30.0, spacing=0.001, tol=1e-13
+    )
     thresholds = []
     for arc in found.arcs:
         p, w = arc.points[:, 0], arc.points[:, 1]

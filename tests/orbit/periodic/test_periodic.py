@@ -220,7 +220,9 @@ def test_multipliers_agree_with_differences_of_the_return_map() -> None:
     t0, t1 = orbit.legs[0].t, orbit.legs[0].t + orbit.period
     for e in h * np.eye(n):
         ends = {
-            k: ns.follow(system, orbit.start + k * e, t1, mode="+", t_start=t0, tol=1e-14).x[-1]
+            k: ns.flow.follow(system, orbit.start + k * e, t1, mode="+", t_start=t0, tol=1e-14).x[
+                -1
+            ]
             for k in (-2, -1, 1, 2)
         }
         columns.append((8 * (ends[1] - ends[-1]) - (ends[2] - ends[-2])) / (12 * h))

@@ -30,7 +30,7 @@ def relay(seed: int, *, scale: float = 1.0, unit: float = 1.0):
     return system, dict(zip("+-", sides, strict=True))
 
 
-def orbit_of(system, unit: float = 1.0) -> ns.PeriodicOrbit:
+def orbit_of(system, unit: float = 1.0) -> ns.orbit.PeriodicOrbit:
     run = ns.simulate(system, [0.3 * unit, 0.2 * unit], 40 * np.pi, tol=1e-12)
     assume(run.status is ns.Status.REACHED_END)
     try:

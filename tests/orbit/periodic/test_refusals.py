@@ -75,7 +75,7 @@ def test_a_guess_from_which_trial_steps_overflow_is_no_reason_to_give_up() -> No
 
 def test_a_section_that_is_unknown_is_named_with_those_that_are_known() -> None:
     with pytest.raises(ns.OptionError, match=r"a name of \['h0'\] .* received 'h7'"):
-        ns.poincare(forced_friction(), "h7", [1.0, 0.0], count=3)
+        ns.orbit.poincare(forced_friction(), "h7", [1.0, 0.0], count=3)
 
 
 @pytest.mark.parametrize("word", [3, [("-", "h0", "entry")], [3], [("-", 2)], [[]], [None]])
@@ -249,12 +249,12 @@ def test_a_cost_that_is_no_number_has_no_gradient(cost) -> None:
 
 def test_hits_of_a_section_are_asked_for_by_whole_numbers_and_times_by_numbers() -> None:
     system = scalar_relay()
-    hits = ns.poincare(system, "h0", [0.5], count=3, direction=0)
+    hits = ns.orbit.poincare(system, "h0", [0.5], count=3, direction=0)
     for options in ({"k": 1.5}, {"k": "a"}, {"k": 1, "since": "a"}, {"k": 1, "since": -2}):
         with pytest.raises(ns.OptionError, match="expected a whole number"):
             hits.jacobian(**options)
     with pytest.raises(ns.OptionError, match="t_start: expected a finite number"):
-        ns.poincare(system, 1.0, [0.5], count=3, t_start="a")
+        ns.orbit.poincare(system, 1.0, [0.5], count=3, t_start="a")
 
 
 @pytest.mark.parametrize("step", [2.0, 1e9])

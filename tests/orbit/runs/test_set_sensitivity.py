@@ -114,7 +114,7 @@ def test_corners_and_other_systems_are_refused():
     with pytest.raises(ns.DegenerateError, match="start off the sets"):
         ns.sensitivity(leaving)
     with pytest.raises(ns.DefinitionError, match="multipliers are scalars"):
-        ns.saltation_matrix(block(), "*", "s", [0, 0, 0, 0])
+        ns.orbit.saltation_matrix(block(), "*", "s", [0, 0, 0, 0])
 
 
 def test_gradients_are_products_of_the_derivatives():

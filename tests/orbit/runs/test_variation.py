@@ -67,7 +67,7 @@ def differences(system, x0, t_end, names, **options):
     return np.array(rows).T
 
 
-def check(system, x0, t_end, itinerary=None) -> ns.Sensitivity:
+def check(system, x0, t_end, itinerary=None) -> ns.orbit.Sensitivity:
     x0 = np.array(x0)
     run = ns.simulate(system, x0, t_end, tol=1e-14)
     if itinerary is not None:
@@ -258,11 +258,13 @@ def test_saltation_matrices_are_those_of_exact_fractions() -> None:
 
     values, at = CASES["S1"]["values"], [0.0, 0.0]
     crossing = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
-    assert np.array_equal(ns.saltation_matrix(crossing, "+", "-", at), exact(values["crossing"]))
+    assert np.array_equal(
+        ns.orbit.saltation_matrix(crossing, "+", "-", at), exact(values["crossing"])
+    )
     entry = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, 2])
-    assert np.array_equal(ns.saltation_matrix(entry, "+", "s", at), exact(values["entry"]))
+    assert np.array_equal(ns.orbit.saltation_matrix(entry, "+", "s", at), exact(values["entry"]))
     moving = ns.FilippovSystem([x, y], surface=y + 3 * t, above=[1, -5], below=[3, -4], time=t)
-    found = ns.saltation_matrix(moving, "+", "-", at)
+    found = ns.orbit.saltation_matrix(moving, "+", "-", at)
     assert np.array_equal(found, exact(values["time_dependent"]))
     after = [x + y / 4, -y / 2]
     for surface in (x, x - y):
@@ -273,7 +275,7 @@ def test_saltation_matrices_are_those_of_exact_fractions() -> None:
             below=[1, -2],
             resets=ns.Reset(y, after, -1, "jump"),
         )
-        found = ns.saltation_matrix(jump, "-", "+", at, event="jump")
+        found = ns.orbit.saltation_matrix(jump, "-", "+", at, event="jump")
         assert np.array_equal(found, exact(values["reset"]))
 
 
@@ -336,7 +338,7 @@ def test_a_point_at_which_no_such_event_happens_has_no_saltation_matrix(
     system, before, after, point, message
 ) -> None:
     with pytest.raises(ns.PointError, match=message):
-        ns.saltation_matrix(system, before, after, point)
+        ns.orbit.saltation_matrix(system, before, after, point)
 
 
 @pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
@@ -344,10 +346,10 @@ def test_points_that_are_on_the_event_to_rounding_are_taken(size) -> None:
     """The tolerance is relative: the units of the states do not matter."""
     system = ns.FilippovSystem([x, y], surface=3 * x - y, above=[1, -1], below=[2, -1])
     line = np.array([1.0, 3.0]) * size / 3.0
-    found = ns.saltation_matrix(system, "-", "+", line)  # S = 1 + (f+ - f-) e_x/(e_x f-)
+    found = ns.orbit.saltation_matrix(system, "-", "+", line)  # S = 1 + (f+ - f-) e_x/(e_x f-)
     assert np.abs(found - np.eye(2) - np.outer([-1, 0], [3, -1]) / 7).max() < 1e-15
     with pytest.raises(ns.PointError, match="happens in mode"):
-        ns.saltation_matrix(system, "-", "+", line * [1.0, 1.0 + 1e-6])
+        ns.orbit.saltation_matrix(system, "-", "+", line * [1.0, 1.0 + 1e-6])
 
 
 def test_bad_input_is_refused_in_words() -> None:

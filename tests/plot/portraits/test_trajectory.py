@@ -107,7 +107,7 @@ def test_several_surfaces_and_a_smooth_system_are_drawn():
 
 
 def test_backward_and_empty_runs_are_drawn():
-    back = ns.follow(BLOCK, [1.0, 0.5], -1.0, mode="+")
+    back = ns.flow.follow(BLOCK, [1.0, 0.5], -1.0, mode="+")
     ns.plot.trajectory(back)
     stuck = ns.simulate(ns.FilippovSystem([x], surface=x, above=[1], below=[-1]), [0.0], t_end=1.0)
     assert stuck.status is ns.Status.NON_UNIQUE

@@ -214,7 +214,7 @@ def test_without_the_package_the_error_says_what_to_install():
         "import nonsmooth as ns\n"
         "from nonsmooth import *\n"
         "try: ns.certify(None)\n"
-        "except ns.MissingError as error: print(error)\n"
+        "except ns.proofs.MissingError as error: print(error)\n"
     )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert "python-flint" in done.stdout and "nonsmooth-dynamics[proofs]" in done.stdout

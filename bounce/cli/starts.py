@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import nonsmooth as ns
 
-from ..golf.columns import Row, read_rows
+from ..golf.fits.columns import Row, read_rows
 from ..units import Landing
 from .values import KINDS, Quantity, quantity
 

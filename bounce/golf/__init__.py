@@ -19,13 +19,15 @@ Examples
 
 from ..units import GOLF
 from .air import AIRS, QUINTAVALLA, SMITS_SMITH, Air
-from .columns import DataError
-from .fit_result import FitError, FitResult, IdentifiabilityWarning, Start
-from .fitting import fit
+from .fits.columns import DataError
+from .fits.fit_result import FitResult, IdentifiabilityWarning
+from .fits.fitting import fit
+from .fits.least_squares import Start
+from .fits.measurements import Measurements, read_measurements
+from .fits.predictions import FitError
 from .flight import Flight, flight
 from .ground import ExtrapolationWarning, Rebound, rebound
 from .maps import landing_map
-from .measurements import Measurements, read_measurements
 from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
 from .side_flight import SideFlight, SideState, side_flight
 from .side_run import SideBounce, SideGlide, SideRun, side_play

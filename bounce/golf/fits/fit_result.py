@@ -18,7 +18,7 @@ from .profile import Profile
 
 Array = NDArray[np.float64]
 
-#: Half a confidence interval that is this many times the value says nothing of it.
+#: A parameter is undetermined if half its interval exceeds this many times its value.
 _WIDE = 3.0
 
 
@@ -141,7 +141,9 @@ class FitResult:
         """
         width = self.width(level)
         if self.search is None:
-            raise ns.OptionError("profile: expected a result of fit, received one without search.")
+            raise ns.OptionError(
+                "profile: this result has no search. Use one that bounce.golf.fit returned."
+            )
         return {name: self.search.interval(k, width) for k, name in enumerate(self.values)}
 
     def width(self, level: float) -> float:

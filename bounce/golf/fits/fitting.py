@@ -128,12 +128,12 @@ def fit(
     best += [0] if 0 not in best and math.isfinite(tried[0].cost) else []
     if not best:
         raise FitError(
-            f"starts: expected one at which every bounce can be simulated, received none of "
-            f"{len(tried)}. The first: {tried[0].problem}"
+            f"starts: at none of the {len(tried)} starts can every bounce be simulated. The first: "
+            f"{tried[0].problem}"
         )
     runs = {k: problem.solve(points[k], low, high, 12) for k in _bar(best, progress)}
     winner = min(runs, key=lambda k: float(runs[k].cost))
-    if runs[winner].status == 0:  # the first steps tell which is best; go on with that one
+    if runs[winner].status == 0:  # go on from the best of the first steps
         runs[winner] = problem.solve(runs[winner].x, low, high, 200)
     for k, run in runs.items():
         fitted = problem.named(run.x)
@@ -195,9 +195,9 @@ def _profiled(found: FitResult, search: Profile) -> FitResult:
 
 def _warn(found: FitResult) -> None:
     if found.undetermined:
-        said = "; ".join(f"{n}: not determined by these data" for n in found.undetermined)
+        names = "; ".join(f"{n}: not determined by these data" for n in found.undetermined)
         warnings.warn(
-            f"{said}. What was measured hardly depends on it, or only together with others (condition "
+            f"{names}. What was measured hardly depends on it, or only together with others (condition "
             f"number {found.condition:.3g}): leave it out of the fit, or measure landings that depend "
             "on it.",
             IdentifiabilityWarning,
@@ -206,8 +206,8 @@ def _warn(found: FitResult) -> None:
     if found.narrow:
         warnings.warn(
             f"{', '.join(found.narrow)}: the 95 % interval of the linearised fit is too narrow: at one "
-            "of its ends the data object less than it says. FitResult.profile() follows the sum of "
-            "squares itself, as far as the data allow.",
+            "of its ends the sum of squares rises less than its parabola. FitResult.profile() follows "
+            "the sum of squares itself.",
             IdentifiabilityWarning,
             stacklevel=3,
         )

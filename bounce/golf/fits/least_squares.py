@@ -148,18 +148,17 @@ class Problem:
         _, problems = self.predict(self.initial)
         if problems and bad_rows == "raise":
             raise DataError(
-                f"data: expected bounces that {self.model!r} can simulate, received "
-                f"{listed(problems)}. Correct them, choose other values to start from, or leave "
-                "them out with bad_rows='leave out'."
+                f"data: some bounces have no lift-off from {self.model!r} ({listed(problems)}). Correct "
+                "them, choose other values to start from, or leave them out with bad_rows='leave out'."
             )
         keep = ~np.isin(self.data.rows, list(problems))
         self.data = self.data.keep(keep, problems)
         count = len(self.data.rows) * len(self.columns)
         if count <= len(self.names):
             raise FitError(
-                f"data: expected more than {len(self.names)} numbers for {len(self.names)} "
-                f"parameters, received {count} from {len(self.data.rows)} bounces; left out: "
-                f"{listed(dict(self.data.left_out)) or 'none'}."
+                f"data: {count} numbers from {len(self.data.rows)} bounces are too few for "
+                f"{len(self.names)} parameters (left out: {listed(dict(self.data.left_out)) or 'none'}). "
+                "Measure more bounces, or fit fewer parameters."
             )
 
     def bounds(self, given: Mapping[str, tuple[float, float]] | None) -> tuple[Array, Array]:

@@ -84,7 +84,7 @@ def read_measurements(data: Any, ball: Ball = GOLF, *, bad_rows: str = "raise") 
     ball : Ball, optional
         Whose radius turns spins into surface speeds.
     bad_rows : {"raise", "leave out"}
-        What to do with rows that have a NaN, a word or no landing: name them in an error, or in
+        What to do with rows that have no number or no landing: name them in an error, or in
         ``left_out``.
 
     Returns
@@ -107,12 +107,12 @@ def read_measurements(data: Any, ball: Ball = GOLF, *, bad_rows: str = "raise") 
     """
     if bad_rows not in ("raise", "leave out"):
         raise ns.OptionError(f"bad_rows: expected 'raise' or 'leave out', received {bad_rows!r}.")
-    columns, si, titles, _, words = read_columns(data, _KINDS)
+    columns, si, titles, _, wrong_rows = read_columns(data, _KINDS)
     _check_names(columns, titles)
     radius = ball.radius if si else 1.0
     landing, lift_off = _landing(columns, radius), _lift_off(columns, radius)
     rows = np.arange(1, len(landing) + 1)
-    reasons = dict(sorted({**_bad_rows(columns, landing), **words}.items()))
+    reasons = dict(sorted({**_bad_rows(columns, landing), **wrong_rows}.items()))
     if reasons and bad_rows == "raise":
         raise DataError(
             f"data: some rows are no complete bounces ({listed(reasons)}). Correct them, or leave them "

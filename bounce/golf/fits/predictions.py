@@ -94,8 +94,8 @@ class ContactPredictions(Predictions):
             by = sensitivity(shot, list(values)).state[_STATE_ROWS]
             if not np.all(np.isfinite(by)):
                 raise FitError(
-                    f"row {row}: expected a transversal bounce, received one that grazes at "
-                    f"{dict(values)} (infinite derivative)."
+                    f"row {row}: the bounce grazes at {dict(values)}, where its derivative is infinite. "
+                    "Start elsewhere, or leave the row out."
                 )
             result.append(by * self.unit)
         return np.array(result)

@@ -45,7 +45,7 @@ class Profile:
             return False
         value = min(max(self.best[k] + side * half, self.low[k]), self.high[k])
         share = abs(value - self.best[k]) / half
-        if share < 0.1:  # on its bound: said elsewhere
+        if share < 0.1:  # on its bound, which at_bound names
             return False
         expected = self.variance * (share * width) ** 2
         return self.at(k, value) - self.least < _SHARE * expected

@@ -33,20 +33,20 @@ def test_one_line_says_what_was_expected(argv, said, command):
     assert "Traceback" not in err
 
 
-def test_a_table_without_a_column_is_told_with_the_columns_it_has(command, tmp_path):
+def test_a_missing_column_is_named_with_those_that_are_there(command, tmp_path):
     table = tmp_path / "shots.csv"
     table.write_text("speed,angle\n28.5,37.3\n")
     code, _, err = command("shot", "--input", table)
     assert code == 2
-    assert "expected columns ['spin'], received ['speed', 'angle']" in err
+    assert "['spin']" in err and "['speed', 'angle']" in err
 
 
-def test_a_table_with_semicolons_is_told_that_it_needs_commas(command, tmp_path):
+def test_a_table_with_semicolons_needs_commas(command, tmp_path):
     table = tmp_path / "shots.csv"
     table.write_text("speed [mph];angle [deg];spin [rpm]\n167;10,9;2686\n")
     code, _, err = command("flight", "--input", table)
     assert code == 1
-    assert "shots.csv: expected commas between the columns, received ';'" in err
+    assert "shots.csv" in err and "commas" in err
 
 
 def test_typeset_minus_signs_and_degrees_are_read(command, tmp_path):

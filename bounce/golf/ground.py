@@ -67,7 +67,7 @@ class ExtrapolationWarning(UserWarning):
     """A shot leaves what a law, or the friction of rolling, was measured for."""
 
 
-class _After(NamedTuple):
+class _LiftOff(NamedTuple):
     """Lift-off in the axes of the ground, spins as the contact point's velocities."""
 
     xdot: Array  # forward, to the right
@@ -129,7 +129,7 @@ class Ground:
 
     def _by_contact(
         self, model: ContactModel | Contact3D, v: Array, down: float, w: Array, flat: bool
-    ) -> _After:
+    ) -> _LiftOff:
         if not flat:
             model = (
                 model if isinstance(model, Contact3D) else model.in_3d(side_slope=self.side_slope)
@@ -147,7 +147,7 @@ class Ground:
         shot: Any = simulate(model, xdot, down / unit, omega, tol=self.tol)
         end = shot.lift_off
         spin, (x, z) = _padded(end.omega, 3 if drills else 2) * unit, _padded(end.x, 2)
-        return _After(
+        return _LiftOff(
             _padded(end.xdot, 2) * unit,
             end.ydot * unit,
             spin if drills else np.append(spin, w[2]),
@@ -164,9 +164,9 @@ def _padded(value: Any, size: int) -> Array:
     return np.append(given, np.zeros(size - given.size))
 
 
-def _by_law_in_plane(model: BounceLaw, v: Array, down: float, w: Array) -> _After:
+def _by_law_in_plane(model: BounceLaw, v: Array, down: float, w: Array) -> _LiftOff:
     off = model.lift_off(v[0], down, w[0])
-    return _After(
+    return _LiftOff(
         _padded(off.xdot, 2),
         float(off.ydot),
         _padded(off.omega, 3),
@@ -175,11 +175,11 @@ def _by_law_in_plane(model: BounceLaw, v: Array, down: float, w: Array) -> _Afte
     )
 
 
-def _by_law(model: BounceLaw, v: Array, down: float, w: Array) -> _After:
+def _by_law(model: BounceLaw, v: Array, down: float, w: Array) -> _LiftOff:
     """Bounce by a rigid law, in the plane of the law if that is tilted towards the ball."""
     if isinstance(model, RigidBounce):
         off = rigid_lift_off_3d(model, v, down, w[:2])
-        return _After(
+        return _LiftOff(
             off.xdot, float(off.ydot), np.append(off.omega, w[2]), off.slip, str(off.case)
         )
     if not isinstance(model, TiltedBounce):
@@ -208,7 +208,7 @@ def _by_law(model: BounceLaw, v: Array, down: float, w: Array) -> _After:
     forward = -hit.omega[1] * cos - normal * sin
     spin = np.array([hit.omega[0], -forward])
     vertical = -hit.omega[1] * sin + normal * cos
-    return _After(
+    return _LiftOff(
         turn.T @ velocity,
         up * cos + float(hit.xdot[0]) * sin,
         np.append(turn.T @ spin, vertical),

@@ -164,7 +164,9 @@ def _csv(path: Path) -> tuple[list[str], list[list[str]]]:
         lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
         rows = list(csv.reader(lines, strict=True))
     except (OSError, ValueError, csv.Error) as error:
-        raise DataError(f"data: {str(path)!r} is no readable CSV file: {error}.") from error
+        raise DataError(
+            f"data: expected a readable CSV file, received {str(path)!r}: {error}."
+        ) from error
     if not rows:
         raise DataError(f"data: {path} is empty. Write names in its first row, then rows.")
     titles = rows[0]

@@ -38,9 +38,7 @@ def test_it_holds_what_rebounds_give(model):
 @pytest.mark.filterwarnings("error")
 def test_landings_outside_the_fit_are_warned_of():
     law, speeds = bounce.laws.TURFS["natural"].law, [20.0, 30.0]
-    with pytest.warns(
-        bounce.golf.ExtrapolationWarning, match="2 of 4 landings are outside"
-    ) as caught:
+    with pytest.warns(bounce.golf.ExtrapolationWarning, match="2 of 4") as caught:
         bounce.golf.landing_map(law, dict(speed=speeds, angle=[0.05, 0.5]), dict(spin=200.0))
     assert caught[0].filename == __file__
     bounce.golf.landing_map(law, dict(speed=speeds, angle=[0.4, 0.5]), dict(spin=200.0))

@@ -143,6 +143,6 @@ def test_refusals():
 
 def test_a_landing_outside_of_the_fit_is_warned_of_with_side_spin_too():
     fast = bounce.Landing.polar(60.0, 30 * DEG, 2000)
-    with pytest.warns(bounce.golf.ExtrapolationWarning, match="along the ground") as caught:
+    with pytest.warns(bounce.golf.ExtrapolationWarning, match="TiltedBounce") as caught:
         rebound(bounce.laws.TURFS["natural"].law, SideState.of(fast, 50.0))
     assert caught[0].filename == __file__

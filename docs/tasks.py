@@ -159,8 +159,7 @@ GOLF = {
         "From launch to rest",
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
-        "flight Flight Air rebound Rebound side_rebound SideRebound axis_spin AxisSpin play Run Bounce "
-        "Glide landing_map SideState side_flight SideFlight side_play SideRun SideBounce SideGlide",
+        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

@@ -55,5 +55,5 @@ def test_how_constants_are_read():
 
 def test_a_tilted_law_is_not_bounced_as_if_its_plane_were_level():
     law = bounce.laws.TURFS["natural"].law
-    with pytest.raises(bounce.ModelError, match=r"expected a RigidBounce.*side_rebound"):
+    with pytest.raises(bounce.ModelError, match=r"expected a RigidBounce.*golf.rebound"):
         bounce.laws.rigid_lift_off_3d(law, [1.0, 0.0], -1.0, [0.2, 0.5])

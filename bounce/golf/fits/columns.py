@@ -1,4 +1,4 @@
-"""Columns of numbers from a CSV file, a table or a list of rows, with units in their names."""
+"""Read columns of numbers, with units in their names, from a CSV file, a table or a list of rows."""
 
 from __future__ import annotations
 
@@ -14,11 +14,9 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..units import MINUS, UNITS
+from ...units import MINUS, UNITS
 
 Array = NDArray[np.float64]
-
-_COUNTS = {2: "two", 3: "three"}
 
 
 class DataError(ns.NonsmoothError, ValueError):
@@ -26,55 +24,24 @@ class DataError(ns.NonsmoothError, ValueError):
 
 
 class Columns(NamedTuple):
-    """Columns that were asked for.
-
-    Attributes
-    ----------
-    values : dict of str to ndarray (n,)
-        By name, in m/s, rad/s and rad, or as they are where there are no units.
-    si : bool
-        Whether they have units.
-    titles : list of str
-        Of every column, as received.
-    units : dict of str to str or None
-        Of the columns that were asked for, as received.
-    words : dict of int to str
-        Rows, from 1, with something else than a number, which is NaN in ``values``; and what it is.
-    """
+    """The requested columns, in SI units where they have units; NaN where a cell is no number."""
 
     values: dict[str, Array]
     si: bool
-    titles: list[str]
+    titles: list[str]  # of every column, as received
     units: dict[str, str | None]
-    words: dict[int, str]
+    wrong_rows: dict[int, str]  # what is wrong with a row, by its number from 1
 
 
 class Row(NamedTuple):
-    """A row of a file, as it was typed.
-
-    Attributes
-    ----------
-    values : dict of str to float
-        By name, in the unit of the column; empty where something is wrong.
-    error : str
-        What is wrong with it, or nothing.
-    """
+    """The numbers of a row, in the units of the columns, or what is wrong with it."""
 
     values: dict[str, float]
     error: str
 
 
 class Rows(NamedTuple):
-    """Rows of a file, of which some may be wrong.
-
-    Attributes
-    ----------
-    rows : list of Row
-    titles : list of str
-        Of every column, as received.
-    units : dict of str to str or None
-        Of the columns that were asked for, as received.
-    """
+    """Rows of a file, the titles of all its columns, and the units of the requested ones."""
 
     rows: list[Row]
     titles: list[str]
@@ -82,28 +49,7 @@ class Rows(NamedTuple):
 
 
 def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
-    """Read the columns ``name [unit]`` of the names asked for; others are ignored.
-
-    Parameters
-    ----------
-    data : path, mapping of str to array_like, table or sequence of dicts
-        A CSV file with names in its first row, columns, or rows.
-    kinds : mapping of str to str
-        Names, in lower case with underscores, and what they measure: a key of ``UNITS``.
-
-    Returns
-    -------
-    Columns
-
-    Raises
-    ------
-    DataError
-
-    Examples
-    --------
-    >>> read_columns({"Speed (km/h)": [36, 72], "note": "ab"}, {"speed": "speed"}).values["speed"]
-    array([10., 20.])
-    """
+    """Read the columns ``name [unit]`` of the names in ``kinds``, which gives what each measures."""
     table = _table(data)
     read = [(*_title(title), str(title), values) for title, values in table]
     read = [column for column in read if column[0] in kinds]
@@ -111,45 +57,28 @@ def read_columns(data: Any, kinds: Mapping[str, str]) -> Columns:
     units = {name: unit for name, unit, _, _ in read}
     si = _in_si([(name, unit, title) for name, unit, title, _ in read], kinds)
     columns: dict[str, Array] = {}
-    words: dict[int, str] = {}
+    wrong_rows: dict[int, str] = {}
     for name, unit, title, values in read:
-        columns[name] = _numbers(values, title, words)
+        columns[name] = _numbers(values, title, wrong_rows)
         if unit is not None:
             columns[name] = columns[name] * UNITS[kinds[name]][unit]
     lengths = {name: len(values) for name, values in columns.items()}
     if len(set(lengths.values())) > 1:
-        raise DataError(f"data: expected columns of one length, received {lengths}.")
+        raise DataError(f"data: the columns have different lengths, {lengths}. Fill or cut them.")
     if columns and not next(iter(lengths.values())):
-        raise DataError("data: expected at least one row, received none.")
-    return Columns(columns, si, [str(title) for title, _ in table], units, words)
+        raise DataError("data: the table has no rows. Give at least one.")
+    return Columns(columns, si, [str(title) for title, _ in table], units, wrong_rows)
 
 
 def read_rows(path: str, kinds: Mapping[str, str]) -> Rows:
-    """Read the columns ``name [unit]`` of a file row by row; what is wrong with one is said in it.
-
-    Parameters
-    ----------
-    path : str
-        Of a CSV file with names in its first row.
-    kinds : mapping of str to str
-        As :func:`read_columns`.
-
-    Returns
-    -------
-    Rows
-
-    Raises
-    ------
-    DataError
-        Of the file: it is not readable, or has columns that cannot be understood.
-    """
+    """Read the columns ``name [unit]`` of a file row by row; a bad row keeps its error."""
     titles, cells = _csv(Path(path))
     places = [(*_title(title), k) for k, title in enumerate(titles)]
     places = [place for place in places if place[0] in kinds]
     _require_each_once([(name, titles[k]) for name, _, k in places])
     _in_si([(name, unit, titles[k]) for name, unit, k in places], kinds)
     if not cells:
-        raise DataError("data: expected at least one row, received none.")
+        raise DataError("data: the table has no rows. Give at least one.")
     rows = []
     for row in cells:
         try:
@@ -161,7 +90,7 @@ def read_rows(path: str, kinds: Mapping[str, str]) -> Rows:
 
 
 def _in_si(read: list[tuple[str, str | None, str]], kinds: Mapping[str, str]) -> bool:
-    """Whether columns (name, unit, title) have units, which must be known and in all of them or none."""
+    """Whether the columns (name, unit, title) have units; all of them must, or none."""
     si, without = False, list[str]()
     for name, unit, title in read:
         if unit is None:
@@ -176,8 +105,8 @@ def _in_si(read: list[tuple[str, str | None, str]], kinds: Mapping[str, str]) ->
         si = si or kinds[name] != "angle"
     if si and without:
         raise DataError(
-            f"data: expected units in all columns or in none, received none in {without}. Write "
-            "'speed [m/s]', 'spin [rpm]'."
+            f"data: the columns {without} have no unit, but others have one. Write 'speed [m/s]', "
+            "'spin [rpm]'."
         )
     return si
 
@@ -191,13 +120,12 @@ def _title(title: Any) -> tuple[str, str | None]:
 
 
 def _require_each_once(columns: list[tuple[str, str]]) -> None:
-    """Refuse two columns of one name: whichever were taken, it could be the wrong one."""
     for name, _ in columns:
         titles = [title for other, title in columns if other == name]
         if len(titles) > 1:
             raise DataError(
-                f"data: expected one column {name!r}, received {_COUNTS.get(len(titles), len(titles))}: "
-                f"{', '.join(map(repr, titles))}. Remove or rename all but one."
+                f"data: {len(titles)} columns are named {name!r}: {', '.join(map(repr, titles))}. Remove "
+                "or rename all but one."
             )
 
 
@@ -240,12 +168,12 @@ def _csv(path: Path) -> tuple[list[str], list[list[str]]]:
             f"data: expected a readable CSV file, received {str(path)!r}: {error}."
         ) from error
     if not rows:
-        raise DataError(f"data: expected names and rows in {path}, received an empty file.")
+        raise DataError(f"data: {path} is empty. Write names in its first row, then rows.")
     titles = rows[0]
     if len(titles) == 1 and (mark := re.search("[;\t|]", titles[0])):
         raise DataError(
-            f"{path.name}: expected commas between the columns, received {mark[0]!r} in {titles[0]!r}. Save "
-            "it with commas, and with points in numbers."
+            f"{path.name}: {titles[0]!r} has {mark[0]!r} between the columns. Save it with commas, and with "
+            "points in numbers."
         )
     return titles, rows[1:]
 
@@ -256,13 +184,6 @@ def _require_length(row: list[str], titles: list[str]) -> None:
 
 
 def _number(value: Any, title: str) -> float:
-    """A number; NaN where there is none.
-
-    Raises
-    ------
-    ValueError
-        Something else.
-    """
     text = value.strip().translate(MINUS) if isinstance(value, str) else value
     try:
         return float(text) if text not in ("", None) else math.nan
@@ -270,13 +191,13 @@ def _number(value: Any, title: str) -> float:
         raise ValueError(f"expected a number, received {value!r} in column {title!r}") from None
 
 
-def _numbers(values: Iterable[Any], title: str, words: dict[int, str]) -> Array:
-    """The numbers of a column; what is none is NaN, and is told in ``words`` by its row."""
+def _numbers(values: Iterable[Any], title: str, wrong_rows: dict[int, str]) -> Array:
+    """The numbers of a column; NaN, and an entry in ``wrong_rows``, where a cell is no number."""
     result = []
     for row, value in enumerate(values, start=1):
         try:
             result.append(_number(value, title))
         except ValueError as wrong:
-            words.setdefault(row, str(wrong))
+            wrong_rows.setdefault(row, str(wrong))
             result.append(math.nan)
     return np.array(result, dtype=float)

@@ -1,61 +1,29 @@
-"""What a fit finds: parameters, their errors, and what they leave."""
+"""The result of a fit: values, standard errors, intervals and residuals."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from .ground import Model
-from .measurements import Measurements
-
-if TYPE_CHECKING:
-    from .profile import Profile
+from ..ground import Model
+from .least_squares import Start
+from .measurements import Measurements, listed
+from .profile import Profile
 
 Array = NDArray[np.float64]
 
-#: Half a confidence interval that is this many times the value says nothing of it.
+#: A parameter is undetermined if half its interval exceeds this many times its value.
 _WIDE = 3.0
 
 
 class IdentifiabilityWarning(UserWarning):
     """The data of a fit do not determine a parameter, or its interval is too narrow."""
-
-
-class FitError(ns.NonsmoothError, RuntimeError):
-    """No fit: no start at which every bounce can be simulated, or fewer numbers than parameters."""
-
-
-@dataclass(frozen=True)
-class Start:
-    """One of the starts of a fit.
-
-    Attributes
-    ----------
-    values : dict of str to float
-        Where the search started.
-    cost : float
-        Sum of squares there; infinite where not every bounce could be simulated.
-    problem : str
-        Why not every bounce could be simulated there; empty if all could.
-    fitted : dict of str to float or None
-        Where the least squares from here ended, or was after a dozen steps if another was better
-        then; None if it was not among the best.
-    fitted_cost : float
-        Half the sum of squares that it ended with.
-    """
-
-    values: dict[str, float]
-    cost: float
-    problem: str
-    fitted: dict[str, float] | None = None
-    fitted_cost: float = math.inf
 
 
 @dataclass(frozen=True, repr=False)
@@ -173,7 +141,9 @@ class FitResult:
         """
         width = self.width(level)
         if self.search is None:
-            raise ns.OptionError("profile: expected a result of fit, received one without search.")
+            raise ns.OptionError(
+                "profile: this result has no search. Use one that bounce.golf.fit returned."
+            )
         return {name: self.search.interval(k, width) for k, name in enumerate(self.values)}
 
     def width(self, level: float) -> float:
@@ -237,10 +207,3 @@ class FitResult:
 
 def _finite(value: float) -> float | None:
     return value if math.isfinite(value) else None
-
-
-def listed(problems: Mapping[int, str], most: int = 8) -> str:
-    """Rows and reasons in one line."""
-    items = [f"row {row}: {why}" for row, why in list(problems.items())[:most]]
-    more = f"; and {len(problems) - most} more" if len(problems) > most else ""
-    return "; ".join(items) + more

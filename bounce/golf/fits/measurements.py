@@ -1,4 +1,4 @@
-"""Measured bounces from a CSV file, a table or a list, with units in the names of the columns.
+"""Read measured bounces from a CSV file, a table or a list, with units in the column names.
 
 Columns are ``name [unit]``. A landing is ``xdot, ydot, omega`` or ``speed, angle, spin`` (angle of
 descent from the ground); a lift-off is the same with ``lift_off_`` before it, any part of it that
@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..units import GOLF, Ball
+from ...units import GOLF, Ball
 from .columns import DataError, read_columns
 
 Array = NDArray[np.float64]
@@ -84,7 +84,7 @@ def read_measurements(data: Any, ball: Ball = GOLF, *, bad_rows: str = "raise") 
     ball : Ball, optional
         Whose radius turns spins into surface speeds.
     bad_rows : {"raise", "leave out"}
-        What to do with rows that have a NaN, a word or no landing: name them in an error, or in
+        What to do with rows that have no number or no landing: name them in an error, or in
         ``left_out``.
 
     Returns
@@ -107,22 +107,27 @@ def read_measurements(data: Any, ball: Ball = GOLF, *, bad_rows: str = "raise") 
     """
     if bad_rows not in ("raise", "leave out"):
         raise ns.OptionError(f"bad_rows: expected 'raise' or 'leave out', received {bad_rows!r}.")
-    columns, si, titles, _, words = read_columns(data, _KINDS)
+    columns, si, titles, _, wrong_rows = read_columns(data, _KINDS)
     _check_names(columns, titles)
     radius = ball.radius if si else 1.0
     landing, lift_off = _landing(columns, radius), _lift_off(columns, radius)
     rows = np.arange(1, len(landing) + 1)
-    reasons = dict(sorted({**_bad_rows(columns, landing), **words}.items()))
+    reasons = dict(sorted({**_bad_rows(columns, landing), **wrong_rows}.items()))
     if reasons and bad_rows == "raise":
-        listed = "; ".join(f"row {row}: {why}" for row, why in list(reasons.items())[:8])
-        more = f" and {len(reasons) - 8} more" if len(reasons) > 8 else ""
         raise DataError(
-            f"data: expected complete bounces, received {listed}{more}. Correct them, or leave them "
+            f"data: some rows are no complete bounces ({listed(reasons)}). Correct them, or leave them "
             "out with bad_rows='leave out'."
         )
     everything = Measurements(landing, lift_off, rows, si, ())
     good = np.array([row not in reasons for row in rows], dtype=bool)
     return everything.keep(good, reasons)
+
+
+def listed(problems: Mapping[int, str], most: int = 8) -> str:
+    """Rows and reasons in one line."""
+    items = [f"row {row}: {why}" for row, why in list(problems.items())[:most]]
+    more = f"; and {len(problems) - most} more" if len(problems) > most else ""
+    return "; ".join(items) + more
 
 
 def _bad_rows(columns: Mapping[str, Array], landing: Array) -> dict[int, str]:

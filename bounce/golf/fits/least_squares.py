@@ -1,9 +1,10 @@
-"""The least-squares problem behind a fit: names, data, bounds, residuals and their derivatives."""
+"""The least-squares problem of a fit: bounds, residuals and their derivatives."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,17 +12,16 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..parameters import number
-from ..units import Ball, Scaling
+from ...parameters import number
+from ...units import Ball, Scaling
+from ..ground import Model
 from .columns import DataError
-from .fit_result import FitError, FitResult, Start, listed
-from .ground import Model
-from .measurements import COMPONENTS, Measurements
-from .predictions import predictions
+from .measurements import COMPONENTS, Measurements, listed
+from .predictions import FitError, predictions
 
 Array = NDArray[np.float64]
 
-#: Bounds that the words of ``limits`` mean; a strict one keeps a hair's breadth.
+#: Bounds of the limits of parameters; an open end is moved inside a little.
 _BOUNDS = {
     "> 0": (1e-9, math.inf),
     ">= 0": (0.0, math.inf),
@@ -32,8 +32,34 @@ _BOUNDS = {
 _OPTIONS = {"restitution": (0.0, 1.0), "tilt": (0.0, 1.57)}
 
 
+@dataclass(frozen=True)
+class Start:
+    """One of the starts of a fit.
+
+    Attributes
+    ----------
+    values : dict of str to float
+        Where the search started.
+    cost : float
+        Sum of squares there; infinite where not every bounce could be simulated.
+    problem : str
+        Why not every bounce could be simulated there; empty if all could.
+    fitted : dict of str to float or None
+        Where the least squares from here ended, or was after a dozen steps if another was better
+        then; None if it was not among the best.
+    fitted_cost : float
+        Half the sum of squares that it ended with.
+    """
+
+    values: dict[str, float]
+    cost: float
+    problem: str
+    fitted: dict[str, float] | None = None
+    fitted_cost: float = math.inf
+
+
 class Problem:
-    """The least-squares problem: names, data and how to predict."""
+    """Measured bounces and a model whose named parameters are to fit them."""
 
     def __init__(
         self,
@@ -75,15 +101,12 @@ class Problem:
 
     @property
     def measured(self) -> Array:
-        """Measured lift-offs (n, m)."""
         return np.column_stack(list(self.data.lift_off.values()))
 
     def named(self, values: Array) -> dict[str, float]:
-        """Values by name."""
         return dict(zip(self.names, values.tolist(), strict=True))
 
     def predict(self, values: Array) -> tuple[Array, dict[int, str]]:
-        """Lift-offs (n, 3), NaN where there is none, and why by row."""
         return self.predictions.lift_offs(self.named(values), self.data)
 
     def residuals(self, values: Array) -> Array:
@@ -121,26 +144,24 @@ class Problem:
         return np.column_stack(columns)
 
     def leave_out(self, bad_rows: str) -> None:
-        """Rows that cannot be simulated at the model's own values."""
+        """Drop, or refuse, rows that cannot be simulated at the model's own values."""
         _, problems = self.predict(self.initial)
         if problems and bad_rows == "raise":
             raise DataError(
-                f"data: expected bounces that {self.model!r} can simulate, received "
-                f"{listed(problems)}. Correct them, choose other values to start from, or leave "
-                "them out with bad_rows='leave out'."
+                f"data: some bounces have no lift-off from {self.model!r} ({listed(problems)}). Correct "
+                "them, choose other values to start from, or leave them out with bad_rows='leave out'."
             )
         keep = ~np.isin(self.data.rows, list(problems))
         self.data = self.data.keep(keep, problems)
         count = len(self.data.rows) * len(self.columns)
         if count <= len(self.names):
             raise FitError(
-                f"data: expected more than {len(self.names)} numbers for {len(self.names)} "
-                f"parameters, received {count} from {len(self.data.rows)} bounces; left out: "
-                f"{listed(dict(self.data.left_out)) or 'none'}."
+                f"data: {count} numbers from {len(self.data.rows)} bounces are too few for "
+                f"{len(self.names)} parameters (left out: {listed(dict(self.data.left_out)) or 'none'}). "
+                "Measure more bounces, or fit fewer parameters."
             )
 
     def bounds(self, given: Mapping[str, tuple[float, float]] | None) -> tuple[Array, Array]:
-        """Lower and upper bounds."""
         limits = {**{k: "" for k in self.names}, **self.model.limits_of_values()}
         pairs = {n: _BOUNDS.get(limits[n], (-math.inf, math.inf)) for n in self.names}
         pairs |= {n: _OPTIONS[n] for n in self.names if n in _OPTIONS}
@@ -160,7 +181,6 @@ class Problem:
         return lows, highs
 
     def start(self, values: Array) -> Start:
-        """Cost of a point."""
         named = self.named(values)
         try:
             _, problems = self.predict(values)
@@ -186,41 +206,3 @@ class Problem:
             gtol=1e-12,
             max_nfev=evaluations,
         )
-
-    def result(self, run: Any, starts: tuple[Start, ...], low: Array, high: Array) -> FitResult:
-        """Errors from J^T J and the residual variance."""
-        jacobian, residuals = run.jac, run.fun
-        freedom = residuals.size - len(self.names)
-        covariance = _covariance(jacobian, float(residuals @ residuals) / freedom)
-        size = np.maximum(np.abs(run.x), np.abs(self.initial))
-        spread = np.linalg.svd(jacobian * np.where(size > 0, size, 1.0), compute_uv=False)
-        errors = np.sqrt(np.diag(covariance))
-        near = 1e-6 * np.maximum(np.abs(run.x), 1e-3)
-        on_bound = (run.x - low < near) | (high - run.x < near)
-        plain = residuals.reshape(-1, len(self.columns)) / self.weights
-        return FitResult(
-            model=self.predictions.fitted(self.named(run.x), self.data),
-            values=self.named(run.x),
-            errors=self.named(errors),
-            covariance=covariance,
-            residuals={c: plain[:, k] for k, c in enumerate(self.data.lift_off)},
-            measurements=self.data,
-            degrees_of_freedom=freedom,
-            starts=starts,
-            at_bound=tuple(n for n, on in zip(self.names, on_bound, strict=True) if on),
-            condition=float(spread[0] / spread[-1]) if spread[-1] > 0 else math.inf,
-            message=str(run.message),
-        )
-
-
-def _covariance(jacobian: Array, variance: float) -> Array:
-    """(J^T J)^-1 times the variance; infinite variances of parameters that a combination without effect contains."""
-    scale = np.linalg.norm(jacobian, axis=0)
-    safe = np.where(scale > 0, scale, 1.0)
-    _, s, vt = np.linalg.svd(jacobian / safe, full_matrices=False)
-    free = s <= 1e-9 * s[0] if s[0] > 0 else np.ones_like(s, dtype=bool)
-    inverse = np.where(free, 0.0, 1.0 / np.where(free, 1.0, s))
-    covariance: Array = variance * ((vt.T * inverse**2) @ vt) / np.outer(safe, safe)
-    undetermined = np.any(np.abs(vt[free]) > 1e-6, axis=0)
-    covariance[undetermined, undetermined] = np.inf
-    return covariance

@@ -1,4 +1,4 @@
-"""How far a parameter of a fit can go before the data object: the sum of squares, not its parabola."""
+"""Profile of the sum of squares over one parameter, the others refitted."""
 
 from __future__ import annotations
 
@@ -22,19 +22,7 @@ _FAR = 1e4
 
 
 class Profile:
-    """The least sum of squares for each value of one parameter, the others refitted.
-
-    Parameters
-    ----------
-    problem : Problem
-        The least-squares problem.
-    best : ndarray (k,)
-        Fitted values.
-    covariance : ndarray (k, k)
-        Of the linearised fit; where the search of the others starts.
-    low, high : ndarray (k,)
-        Bounds.
-    """
+    """The least sum of squares for each value of one parameter, the others refitted."""
 
     def __init__(self, problem: Problem, best: Array, covariance: Array, low: Array, high: Array):
         self.problem, self.best, self.covariance = problem, best, covariance
@@ -43,13 +31,7 @@ class Profile:
         self.variance = self.least / (problem.measured.size - len(best))
 
     def too_narrow(self, width: float) -> tuple[str, ...]:
-        """Parameters whose linear interval ends where the sum of squares has hardly risen.
-
-        Parameters
-        ----------
-        width : float
-            Half the interval in standard errors.
-        """
+        """Parameters whose linearised interval ends where the sum of squares has hardly risen."""
         return tuple(
             name
             for k, name in enumerate(self.problem.names)
@@ -63,16 +45,13 @@ class Profile:
             return False
         value = min(max(self.best[k] + side * half, self.low[k]), self.high[k])
         share = abs(value - self.best[k]) / half
-        if share < 0.1:  # on its bound: said elsewhere
+        if share < 0.1:  # on its bound, which at_bound names
             return False
         expected = self.variance * (share * width) ** 2
         return self.at(k, value) - self.least < _SHARE * expected
 
     def interval(self, k: int, width: float) -> tuple[float, float]:
-        """Return where the sum of squares has risen by ``width**2`` variances, on both sides.
-
-        An end is the bound where it does not rise so far before, and infinite without a bound.
-        """
+        """Return where the sum of squares has risen by ``width**2`` variances, else the bounds."""
         lower, upper = (self._end(k, side, width) for side in (-1, 1))
         return lower, upper
 
@@ -104,7 +83,6 @@ class Profile:
         return (inside + outside) / 2
 
     def at(self, k: int, value: float) -> float:
-        """Return the least sum of squares with parameter ``k`` at a value; infinite where none is."""
         others = np.arange(len(self.best)) != k
         point = self.best.copy()
         point[k] = value

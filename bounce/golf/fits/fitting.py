@@ -1,4 +1,4 @@
-"""The verb ``fit``: parameters of a law or contact model from measured bounces."""
+"""Fit parameters of a law or contact model to measured bounces."""
 
 from __future__ import annotations
 
@@ -13,12 +13,13 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..parameters import number
-from ..units import GOLF, Ball, Scaling
-from .fit_result import FitError, FitResult, IdentifiabilityWarning, Start
-from .ground import Model
-from .least_squares import Problem
+from ...parameters import number
+from ...units import GOLF, Ball, Scaling
+from ..ground import Model
+from .fit_result import FitResult, IdentifiabilityWarning
+from .least_squares import Problem, Start
 from .measurements import read_measurements
+from .predictions import FitError
 from .profile import Profile
 
 Array = NDArray[np.float64]
@@ -127,20 +128,61 @@ def fit(
     best += [0] if 0 not in best and math.isfinite(tried[0].cost) else []
     if not best:
         raise FitError(
-            f"starts: expected one at which every bounce can be simulated, received none of "
-            f"{len(tried)}. The first: {tried[0].problem}"
+            f"starts: at none of the {len(tried)} starts can every bounce be simulated. The first: "
+            f"{tried[0].problem}"
         )
     runs = {k: problem.solve(points[k], low, high, 12) for k in _bar(best, progress)}
     winner = min(runs, key=lambda k: float(runs[k].cost))
-    if runs[winner].status == 0:  # the first steps tell which is best; go on with that one
+    if runs[winner].status == 0:  # go on from the best of the first steps
         runs[winner] = problem.solve(runs[winner].x, low, high, 200)
     for k, run in runs.items():
         fitted = problem.named(run.x)
         tried[k] = Start(tried[k].values, tried[k].cost, "", fitted, float(2 * run.cost))
-    found = problem.result(runs[winner], tuple(tried), low, high)
+    found = _result(problem, runs[winner], tuple(tried), low, high)
     found = _profiled(found, Profile(problem, runs[winner].x, found.covariance, low, high))
     _warn(found)
     return found
+
+
+def _result(
+    problem: Problem, run: Any, starts: tuple[Start, ...], low: Array, high: Array
+) -> FitResult:
+    """Errors from J^T J and the residual variance."""
+    jacobian, residuals = run.jac, run.fun
+    freedom = residuals.size - len(problem.names)
+    covariance = _covariance(jacobian, float(residuals @ residuals) / freedom)
+    size = np.maximum(np.abs(run.x), np.abs(problem.initial))
+    spread = np.linalg.svd(jacobian * np.where(size > 0, size, 1.0), compute_uv=False)
+    errors = np.sqrt(np.diag(covariance))
+    near = 1e-6 * np.maximum(np.abs(run.x), 1e-3)
+    on_bound = (run.x - low < near) | (high - run.x < near)
+    plain = residuals.reshape(-1, len(problem.columns)) / problem.weights
+    return FitResult(
+        model=problem.predictions.fitted(problem.named(run.x), problem.data),
+        values=problem.named(run.x),
+        errors=problem.named(errors),
+        covariance=covariance,
+        residuals={c: plain[:, k] for k, c in enumerate(problem.data.lift_off)},
+        measurements=problem.data,
+        degrees_of_freedom=freedom,
+        starts=starts,
+        at_bound=tuple(n for n, on in zip(problem.names, on_bound, strict=True) if on),
+        condition=float(spread[0] / spread[-1]) if spread[-1] > 0 else math.inf,
+        message=str(run.message),
+    )
+
+
+def _covariance(jacobian: Array, variance: float) -> Array:
+    """(J^T J)^-1 times the variance; infinite variances of parameters that a combination without effect contains."""
+    scale = np.linalg.norm(jacobian, axis=0)
+    safe = np.where(scale > 0, scale, 1.0)
+    _, s, vt = np.linalg.svd(jacobian / safe, full_matrices=False)
+    free = s <= 1e-9 * s[0] if s[0] > 0 else np.ones_like(s, dtype=bool)
+    inverse = np.where(free, 0.0, 1.0 / np.where(free, 1.0, s))
+    covariance: Array = variance * ((vt.T * inverse**2) @ vt) / np.outer(safe, safe)
+    undetermined = np.any(np.abs(vt[free]) > 1e-6, axis=0)
+    covariance[undetermined, undetermined] = np.inf
+    return covariance
 
 
 def _profiled(found: FitResult, search: Profile) -> FitResult:
@@ -152,11 +194,10 @@ def _profiled(found: FitResult, search: Profile) -> FitResult:
 
 
 def _warn(found: FitResult) -> None:
-    """Say what the data do not determine, and which intervals are too narrow."""
     if found.undetermined:
-        said = "; ".join(f"{n}: not determined by these data" for n in found.undetermined)
+        names = "; ".join(f"{n}: not determined by these data" for n in found.undetermined)
         warnings.warn(
-            f"{said}. What was measured hardly depends on it, or only together with others (condition "
+            f"{names}. What was measured hardly depends on it, or only together with others (condition "
             f"number {found.condition:.3g}): leave it out of the fit, or measure landings that depend "
             "on it.",
             IdentifiabilityWarning,
@@ -165,8 +206,8 @@ def _warn(found: FitResult) -> None:
     if found.narrow:
         warnings.warn(
             f"{', '.join(found.narrow)}: the 95 % interval of the linearised fit is too narrow: at one "
-            "of its ends the data object less than it says. FitResult.profile() follows the sum of "
-            "squares itself, as far as the data allow.",
+            "of its ends the sum of squares rises less than its parabola. FitResult.profile() follows "
+            "the sum of squares itself.",
             IdentifiabilityWarning,
             stacklevel=3,
         )

@@ -27,7 +27,7 @@ def gentle(seed, size=0.1, noise=0.001):
 
 @pytest.mark.parametrize("seed", [36, 53])
 def test_an_interval_that_misses_the_truth_is_told(seed):
-    with pytest.warns(bounce.golf.IdentifiabilityWarning, match="mu: the 95 % interval.*profile"):
+    with pytest.warns(bounce.golf.IdentifiabilityWarning, match="mu"):
         found = bounce.golf.fit(TURF.replace(mu=0.4), gentle(seed), parameters=["mu"], starts=4)
     low, high = found.interval()["mu"]
     assert not low <= 0.3 <= high and found.narrow == ("mu",)

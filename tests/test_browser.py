@@ -26,6 +26,7 @@ def faults(browser, tmp_path):
     return found
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_a_page_that_is_right_has_no_faults(faults, width):

@@ -49,6 +49,7 @@ def test_peers_and_library_get_the_same_fields(name):
         assert np.allclose(problem.fields[mode](*x), np.ravel(values), rtol=1e-14, atol=1e-15)
 
 
+@pytest.mark.slow_cases("nonlinear")
 @pytest.mark.parametrize("name", NAMES)
 def test_mpmath_scipy_and_the_library_agree(name):
     starts = problems.random_starts(2, seed=7)

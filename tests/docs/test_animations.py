@@ -17,6 +17,7 @@ sys.modules[_spec.name] = animations  # dataclasses look their module up
 _spec.loader.exec_module(animations)
 
 
+@pytest.mark.slow_cases("funnel")
 @pytest.mark.parametrize("animation", animations.ANIMATIONS, ids=lambda a: a.name)
 def test_it_moves_and_ends_with_a_still(animation, tmp_path):
     moving, still = animations.write(animation, tmp_path, count=3)

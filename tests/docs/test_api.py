@@ -242,6 +242,7 @@ def neighbour(name):
     return module
 
 
+@pytest.mark.slow
 def test_parameters_described_together_show_their_own_types():
     griffe = pytest.importorskip("griffe", reason="comes with the extra docs")
     found = griffe.load(

@@ -42,6 +42,15 @@ def ran(name):
     return generate.run_example(name)
 
 
+@pytest.mark.slow_cases(
+    "two_fold",
+    "two_fold_space",
+    "stick_slip",
+    "leine",
+    "friction_cone",
+    "outcome_map",
+    "slip_directions",
+)
 @pytest.mark.parametrize("name", EACH)
 def test_picture_is_legible_on_a_page(name):
     """It fits one: as wide as a page at most, text of 8 points, nothing cut off."""
@@ -51,13 +60,8 @@ def test_picture_is_legible_on_a_page(name):
         assert figure.get_figheight() <= 9.0
 
 
-@pytest.mark.parametrize(
-    "name",
-    [
-        name if name == "two_fold" else pytest.param(name, marks=pytest.mark.slow)
-        for name in generate.GALLERY
-    ],
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("name", generate.GALLERY)
 def test_program_draws(name, tmp_path):
     for figure in generate.drawn(name, ran(name)).values():
         figure.savefig(tmp_path / "picture.svg")
@@ -191,6 +195,7 @@ def test_bounce_goes_into_reverse():
     assert shot.slip < 0
 
 
+@pytest.mark.slow
 def test_dividing_curve_divides_the_map():
     found = ran("outcome_map")
     curve, slip = found["curve"], found["outcomes"].slip

@@ -54,7 +54,7 @@ def test_on_the_processor(system):
 
 
 @needs_compiler
-@pytest.mark.parametrize("places", [kernel.PLACES, 2])
+@pytest.mark.parametrize("places", [pytest.param(kernel.PLACES, marks=pytest.mark.slow), 2])
 def test_on_a_card(system, monkeypatch, places):
     """With room for two itineraries in the card's table the other runs are counted here."""
     monkeypatch.setattr(kernel, "PLACES", places)

@@ -65,6 +65,7 @@ def compared(system, x, options, machine, monkeypatch, at=None, p=None):
     return done
 
 
+@pytest.mark.slow
 def test_same_bits_as_lanes_without_contraction(system, shim, monkeypatch):
     done = compared(system, STARTS, LOOSE, shim, monkeypatch, at=(1, 1))
     assert done.sum() > 150

@@ -17,7 +17,6 @@ import pytest
 
 from nonsmooth.flow.compiled import lanes, tape
 from nonsmooth.flow.compiled.build import CompilerError
-from nonsmooth.flow.compiled.device import shim
 
 os.environ["MPLBACKEND"] = "Agg"
 
@@ -83,5 +82,4 @@ def few_compilations(
     shipped = COMPILED in request.path.parents and (WHOLE or bool(names & SHIPPED))
     if not (slow or shipped):
         monkeypatch.setattr(lanes, "FLAGS", (*lanes.FLAGS, "-O0"))
-        monkeypatch.setattr(shim, "_FLAGS", (*shim._FLAGS, "-O0"))
     yield

@@ -8,7 +8,7 @@ import nonsmooth as ns
 from nonsmooth.flow import on_device
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device import kernel
-from nonsmooth.flow.compiled.device.shim import Shim
+from tests.flow.compiled.device.shim import Shim
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 RANGES = {"x": (-1.0, 1.0), "t": (0.0, 4.0)}

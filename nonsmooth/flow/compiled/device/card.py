@@ -31,7 +31,7 @@ class Card:
         ``cuda.core``.
     fused : bool
         Whether products and sums are fused, as in the lanes on a processor; without, the bits are those of
-        the shim compiled so.
+        the same text as C++ compiled so.
 
     Raises
     ------

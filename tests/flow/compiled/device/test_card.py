@@ -11,7 +11,7 @@ import nonsmooth as ns
 from nonsmooth.flow import on_device
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device.card import Card
-from nonsmooth.flow.compiled.device.shim import Shim
+from tests.flow.compiled.device.shim import Shim
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

@@ -10,10 +10,10 @@ from benchmarks.problems import bounce_system, random_starts
 from nonsmooth.flow import on_device
 from nonsmooth.flow.compiled import find_compiler, lanes
 from nonsmooth.flow.compiled.device.kernel import word_of
-from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.facts import HAND_OVER
 from nonsmooth.flow.options import Options
 from tests.flow.compiled.device.cases import TAKEN, block_on_a_belt, ends
+from tests.flow.compiled.device.shim import Shim
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

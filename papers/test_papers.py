@@ -92,6 +92,18 @@ def test_only_what_was_read_is_called_reproduced():
         assert "reproduced" not in paper.title and "no reproduction" in text
 
 
+@pytest.mark.slow_cases(
+    "jeffrey_colombo_2009-space",
+    "jeffrey_colombo_2009-sliding",
+    "jeffrey_colombo_2009-diabolo",
+    "jeffrey_colombo_2009-crossings",
+    "colombo_jeffrey_2011-visible",
+    "colombo_jeffrey_2011-invisible",
+    "colombo_jeffrey_2011-mixed",
+    "colombo_jeffrey_2011-space",
+    "colombo_jeffrey_2011-maps",
+    "colombo_jeffrey_2011-series",
+)
 @pytest.mark.parametrize(
     ("name", "picture"),
     [
@@ -155,6 +167,7 @@ def test_all_folders_are_listed():
     assert set(everything.NAMES) == folders
 
 
+@pytest.mark.slow
 def test_program_writes_tables_and_a_self_contained_page(tmp_path, monkeypatch, capsys):
     name = "jeffrey_colombo_2009"
     module = importlib.import_module(f"papers.{name}.__main__")

@@ -61,6 +61,7 @@ def claims():
     return [*results.claims(), *(compute() for compute in theorems.ALL)]
 
 
+@pytest.mark.slow_cases("8")
 @pytest.mark.parametrize("number", range(1, len(errata.ALL) + 1))
 def test_erratum_is_confirmed_by_computation(number):
     found = errata.erratum(number)
@@ -169,6 +170,7 @@ def test_exact_evaluation_refuses_roots():
 # Output --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow
 def test_program_writes_tables_and_a_self_contained_page(tmp_path, monkeypatch, capsys):
     chosen = tuple(p for p in figures.PICTURES if p.name in ("kv_pert_b", "geometries"))
     monkeypatch.setattr(figures, "PICTURES", chosen)
@@ -195,6 +197,7 @@ def test_a_failed_check_is_reported(tmp_path, monkeypatch, capsys):
     assert "rigid-limit" in capsys.readouterr().err
 
 
+@pytest.mark.slow_cases("trajectories", "two_fold_b", "two_fold_c", "visible_fp1", "visible_fp2")
 @pytest.mark.parametrize("picture", figures.PICTURES, ids=lambda p: p.name)
 def test_figures_are_fit_for_print(picture):
     figure = picture.draw()

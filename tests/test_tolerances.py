@@ -41,7 +41,7 @@ def test_t_end_is_taken_by_position():
 def test_what_takes_tol_and_integrates_takes_both():
     for name, function in functions().items():
         names = set(inspect.signature(function).parameters)
-        if name.rpartition(".")[2] in RUNS and "plot" not in name or {"tol", "t_end"} <= names:
+        if (name.rpartition(".")[2] in RUNS and "plot" not in name) or {"tol", "t_end"} <= names:
             assert {"tol", "rtol", "atol"} <= names, name
 
 

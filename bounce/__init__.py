@@ -25,7 +25,7 @@ from typing import TYPE_CHECKING, Any
 from . import golf, laws
 from .contact.friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
 from .contact.generalised import GeneralisedContact
-from .contact.model import ContactModel
+from .contact.model import Contact3D, ContactModel
 from .contact.models import (
     DepthDampedKelvinVoigt,
     Hertz,
@@ -36,20 +36,20 @@ from .contact.models import (
     NormalKelvinVoigt,
     Tsuji,
 )
-from .contact.space import Contact3D
 from .errors import EnergyWarning, LandingError, LiftOffError, ModelError, UnknownNameError
 from .maps.dividing import DividingCurve, critical_eta, dividing_curve
 from .maps.dividing_surface import DividingSurface, dividing_surface
 from .maps.lift_offs import lift_off
 from .maps.outcomes import OutcomeMap, outcome_map
 from .maps.proven import ProvenMap, proven_map
-from .maps.results import BounceStatus, LiftOffs, LiftOffs3D
+from .maps.results import BounceStatus, LiftOffs
 from .maps.slip_directions import SlipMap, Vortex, find_vortices, slip_map, winding_number
 from .maps.turning import SlipTurn, slip_turn
 from .shot.certify import BounceProof, certify
 from .shot.sensitivity import Sensitivity, sensitivity
-from .shot.single import Shot, State, simulate
-from .shot.space import Shot3D, State3D
+from .shot.shot import Shot
+from .shot.simulate import simulate
+from .shot.state import State
 from .units import BALLS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
@@ -79,7 +79,6 @@ __all__ = [
     "LandingError",
     "LiftOffError",
     "LiftOffs",
-    "LiftOffs3D",
     "LuGre",
     "Maxwell",
     "ModelError",
@@ -89,11 +88,9 @@ __all__ = [
     "Scaling",
     "Sensitivity",
     "Shot",
-    "Shot3D",
     "SlipMap",
     "SlipTurn",
     "State",
-    "State3D",
     "Stribeck",
     "Tsuji",
     "UnknownNameError",

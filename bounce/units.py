@@ -20,7 +20,7 @@ from typing import Literal
 import nonsmooth as ns
 
 from .parameters import LIMITS, number
-from .shot.single import State
+from .shot.state import State
 
 #: Standard gravity, m/s^2 (BIPM, The International System of Units, 9th ed.).
 GRAVITY = 9.80665

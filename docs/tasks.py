@@ -116,7 +116,7 @@ TASKS = {
         "One bounce",
         "From touch-down to lift-off: slip, rolling, forces, and derivatives of the lift-off.",
         "bounce",
-        "simulate Shot Shot3D shot.Phase shot.Forces State State3D BounceStatus sensitivity Sensitivity certify "
+        "simulate Shot shot.Phase shot.Forces State BounceStatus sensitivity Sensitivity certify "
         "BounceProof",
     ),
     "bounce_models": _task(
@@ -132,7 +132,7 @@ TASKS = {
         "Many bounces, and what divides them",
         "Arrays of landings, maps of outcomes, and the curve that divides forward from reverse slip.",
         "bounce",
-        "lift_off LiftOffs LiftOffs3D outcome_map OutcomeMap proven_map ProvenMap dividing_curve DividingCurve "
+        "lift_off LiftOffs outcome_map OutcomeMap proven_map ProvenMap dividing_curve DividingCurve "
         "maps.Arc dividing_surface DividingSurface critical_eta slip_map SlipMap find_vortices winding_number Vortex slip_turn "
         "SlipTurn",
     ),

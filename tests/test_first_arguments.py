@@ -72,7 +72,5 @@ def test_they_are_most_of_the_front_doors():
 
 
 def test_a_shot_is_named_where_another_thing_is_given():
-    with pytest.raises(
-        ns.OptionError, match=r"shot: expected Shot or Shot3D, received 3\. bounce\.simulate"
-    ):
+    with pytest.raises(ns.OptionError, match=r"shot: expected Shot, received 3"):
         bounce.sensitivity(3, ["mu"])

@@ -69,7 +69,7 @@ class FrictionLaw(Parametrised, ABC):
         coefficient : expression
             That of the contact model.
         """
-        return -coefficient * direction
+        return -direction * coefficient
 
     def extra_rates(self, s: Names, p: Names, sign: Expression) -> dict[str, Expression]:
         """Return the rates of ``extra_states`` where the slip has the sign ``sign``.

@@ -12,7 +12,7 @@ import nonsmooth as ns
 from ..contact.model import ContactModel
 from ..errors import ModelError
 from ..laws import BounceLaw
-from ..shot.single import simulate
+from ..shot.simulate import simulate
 from ..units import GOLF, Ball, Landing, Scaling
 
 #: What a ball can bounce on.

@@ -18,8 +18,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..contact.model import ContactModel
-from ..contact.space import Contact3D
+from ..contact.model import Contact3D, ContactModel
 from ..laws import BounceLaw
 from ..parameters import require_positive
 from ..units import GOLF, Ball, Scaling

@@ -18,12 +18,11 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..contact.model import ContactModel
-from ..contact.space import Contact3D
+from ..contact.model import Contact3D, ContactModel
 from ..errors import ModelError
 from ..laws import BounceLaw, RigidBounce, TiltedBounce, rigid_lift_off_3d
 from ..parameters import LIMITS, number
-from ..shot.space import simulate_3d
+from ..shot.simulate import simulate
 from ..units import GOLF, Ball, Landing, Scaling
 from .ground import require_scaling
 from .side_flight import SideState
@@ -331,7 +330,7 @@ def _by_contact(
     scale = require_scaling(surface.model, ball, scaling)
     unit = scale.speed
     spin = (w if surface.drilling else w[:2]) / unit
-    shot = simulate_3d(surface, (v / unit).tolist(), down / unit, spin.tolist(), tol=tol)
+    shot = simulate(surface, (v / unit).tolist(), down / unit, spin.tolist(), tol=tol)
     end = shot.lift_off
     about = end.omega * unit if surface.drilling else np.append(end.omega * unit, w[2])
     way = scale.length * np.array([end.x[0], end.y, end.x[1]])

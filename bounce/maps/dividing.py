@@ -26,8 +26,7 @@ import nonsmooth as ns
 
 from ..contact.model import ContactModel
 from ..parameters import number
-from ..shot.landing import require_model
-from ..shot.single import State
+from ..shot.state import State, require_model
 from .shooting import Shooting
 from .tracing import Arc, arcs_from_rest, landing_at
 

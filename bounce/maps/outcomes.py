@@ -14,7 +14,7 @@ import nonsmooth as ns
 from ..contact.model import ContactModel
 from ..errors import LandingError, ModelError
 from ..parameters import Parametrised, number, numbers
-from .batch import INPUTS
+from ..shot.state import INPUTS
 from .lift_offs import lift_off
 from .results import LiftOffs
 

@@ -1,4 +1,4 @@
-"""What becomes of many bounces: arrays of lift-offs, with a status for each."""
+"""Arrays of lift-offs, with a status for each."""
 
 from __future__ import annotations
 
@@ -7,6 +7,8 @@ from enum import IntEnum
 
 import numpy as np
 from numpy.typing import NDArray
+
+from ..shot.state import AlongTheGround
 
 Array = NDArray[np.float64]
 
@@ -45,13 +47,43 @@ _ADVICE = {
 }
 
 
-class _Ended:
-    """How the bounces of an array ended: common to the plane and to 3-D."""
+@dataclass(frozen=True, eq=False, repr=False)
+class LiftOffs(AlongTheGround):
+    """Lift-offs, each array of the broadcast shape ``(...)`` of the landings.
 
+    In 3-D ``xdot``, ``omega``, ``x`` and ``slip`` are arrays (..., 2), forward and to the right, as in
+    :class:`bounce.shot.State`.
+
+    Attributes
+    ----------
+    xdot, ydot, omega, x, y : ndarray (...)
+        State at lift-off; NaN where ``status`` is not LIFTED_OFF.
+    time : ndarray (...)
+        Duration of the contact.
+    status : ndarray of int8 (...)
+        Values of :class:`BounceStatus`.
+    itineraries : tuple of str
+        Those that occur, sorted.
+    itinerary_code : ndarray of int32 (...)
+        Position in ``itineraries``; -1 where there was no lift-off.
+    slip : ndarray (...)
+        Velocity of the contact point, ``xdot + omega``; below zero is reverse slip.
+    """
+
+    xdot: Array
+    ydot: Array
+    omega: Array
+    x: Array
+    y: Array
     time: Array
     status: NDArray[np.int8]
     itineraries: tuple[str, ...]
     itinerary_code: NDArray[np.int32]
+    slip: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.slip is None:
+            object.__setattr__(self, "slip", self.xdot + self.omega)
 
     @property
     def itinerary(self) -> NDArray[np.object_]:
@@ -72,87 +104,3 @@ class _Ended:
             ", ..." if len(self.itineraries) > 8 else ""
         )
         return f"{type(self).__name__}(shape {self.time.shape}; {counts}; itineraries {words})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs(_Ended):
-    """Lift-offs, each array of the broadcast shape ``(...)`` of the inputs.
-
-    Attributes
-    ----------
-    xdot, ydot, omega, x, y : ndarray (...)
-        State at lift-off; NaN where ``status`` is not LIFTED_OFF.
-    time : ndarray (...)
-        Duration of the contact.
-    status : ndarray of int8 (...)
-        Values of :class:`BounceStatus`.
-    itineraries : tuple of str
-        Those that occur, sorted.
-    itinerary_code : ndarray of int32 (...)
-        Position in ``itineraries``; -1 where there was no lift-off.
-    """
-
-    xdot: Array
-    ydot: Array
-    omega: Array
-    x: Array
-    y: Array
-    time: Array
-    status: NDArray[np.int8]
-    itineraries: tuple[str, ...]
-    itinerary_code: NDArray[np.int32]
-
-    @property
-    def slip(self) -> Array:
-        """Slip ``xdot + omega`` at lift-off (...); below zero is reverse slip."""
-        return self.xdot + self.omega
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs3D(_Ended):
-    """Lift-offs in 3-D, arrays of the broadcast shape ``(...)`` of the landings.
-
-    Attributes
-    ----------
-    xdot, omega, x : ndarray (..., 2)
-        Velocity, spin and place along the ground, forward and to the right, as in
-        :class:`State3D`; NaN where ``status`` is not LIFTED_OFF.
-    ydot, y : ndarray (...)
-        Velocity and place normal to the ground.
-    slip : ndarray (..., 2)
-        Velocity of the contact point.
-    time : ndarray (...)
-        Duration of the contact.
-    status : ndarray of int8 (...)
-        Values of :class:`BounceStatus`.
-    itineraries : tuple of str
-        Those that occur, sorted.
-    itinerary_code : ndarray of int32 (...)
-        Position in ``itineraries``; -1 where there was no lift-off.
-    """
-
-    xdot: Array
-    ydot: Array
-    omega: Array
-    x: Array
-    y: Array
-    slip: Array
-    time: Array
-    status: NDArray[np.int8]
-    itineraries: tuple[str, ...]
-    itinerary_code: NDArray[np.int32]
-
-    @property
-    def slip_speed(self) -> Array:
-        """Length of the slip (...)."""
-        return np.hypot(self.slip[..., 0], self.slip[..., 1])
-
-    @property
-    def slip_angle(self) -> Array:
-        """Direction of the slip (...), rad from forward to the right, in $(-pi, pi]$."""
-        return np.arctan2(self.slip[..., 1] + 0.0, self.slip[..., 0])
-
-    @property
-    def travel_angle(self) -> Array:
-        """Direction in which the ball leaves along the ground (...), as ``slip_angle``."""
-        return np.arctan2(self.xdot[..., 1] + 0.0, self.xdot[..., 0])

@@ -15,13 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..contact.model import ContactModel
-from ..contact.space import Contact3D
+from ..contact.model import Contact3D, ContactModel
 from ..errors import LandingError, ModelError
 from ..parameters import number, numbers
-from ..shot.single import simulate
+from ..shot.simulate import simulate
 from .lift_offs import lift_off
-from .results import LiftOffs3D
+from .results import LiftOffs
 from .shooting import Shooting
 
 Array = NDArray[np.float64]
@@ -64,7 +63,7 @@ class SlipMap:
     omega : (ndarray (m,), ndarray (n,))
         Spins: for ``xdot`` forward that about the lateral axis (backspin) and that about the axis of
         travel.
-    lift_offs : LiftOffs3D
+    lift_offs : LiftOffs
         Arrays (n, m).
     """
 
@@ -72,7 +71,7 @@ class SlipMap:
     xdot: Array
     ydot: float
     omega: tuple[Array, Array]
-    lift_offs: LiftOffs3D
+    lift_offs: LiftOffs
 
     @property
     def angle(self) -> Array:

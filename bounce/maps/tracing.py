@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..shot.single import simulate
+from ..shot.simulate import simulate
 from .shooting import Shooting
 
 Array = NDArray[np.float64]

@@ -12,7 +12,7 @@ import nonsmooth as ns
 from ..contact.model import ContactModel
 from ..errors import LandingError, ModelError
 from ..parameters import numbers
-from ..shot.single import simulate
+from ..shot.simulate import simulate
 from .lift_offs import lift_off
 
 Array = NDArray[np.float64]

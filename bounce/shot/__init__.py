@@ -1,5 +1,5 @@
 """One bounce: from touch-down to lift-off, and its derivatives."""
 
-from .record import Forces, Phase
+from .shot import Forces, Phase
 
 __all__ = ["Forces", "Phase"]

@@ -87,7 +87,7 @@ def test_parameters_of_a_law_belong_to_the_model():
     assert model.values["mu_kinetic"] == 0.2
     assert model.replace(mu_kinetic=0.25).values["mu_kinetic"] == 0.25
     assert "friction=Stribeck" in repr(model)
-    with pytest.raises(ns.ParameterError, match="mu_kinetic: expected a number > 0"):
+    with pytest.raises(ns.ParameterError, match="mu_kinetic"):
         model.replace(mu_kinetic=-1.0)
     with pytest.raises(ns.ParameterError, match="expected a value for"):
         bounce.Stribeck(mu_kinetic=0.2)

@@ -88,12 +88,12 @@ def test_restitution_as_a_function_of_speed_and_arrays():
     ("call", "error", "message"),
     [
         (lambda: bounce.laws.RigidBounce(mu=0.3, restitution=1.5), ns.ParameterError, r"in \[0, 1\]"),
-        (lambda: bounce.laws.RigidBounce(mu=-1, restitution=0.5), ns.ParameterError, "mu: expected .* >= 0"),
+        (lambda: bounce.laws.RigidBounce(mu=-1, restitution=0.5), ns.ParameterError, "mu"),
         (lambda: bounce.laws.RigidBounce(mu=0.3, restitution="x"), ns.ParameterError, "restitution"),
         (
             lambda: bounce.laws.RigidBounce(mu=0.3, restitution=0.5, hypothesis="newton"),
             ns.ParameterError,
-            "hypothesis: expected one of",
+            "hypothesis",
         ),
         (
             lambda: bounce.laws.RigidBounce(mu=0.3, restitution=0.5).lift_off(1.0, 1.0, 0.0),
@@ -103,7 +103,7 @@ def test_restitution_as_a_function_of_speed_and_arrays():
         (
             lambda: bounce.laws.RigidBounce(mu=0.3, restitution=0.5).lift_off(math.nan, -1.0, 0.0),
             bounce.LandingError,
-            "xdot: expected finite",
+            "xdot",
         ),
         (
             lambda: bounce.laws.RigidBounce(mu=0.3, restitution=0.5).lift_off([1, 2], [-1] * 3, 0),

@@ -46,9 +46,9 @@ def test_arrays_broadcast_and_refusals():
     law = bounce.laws.RigidBounce(mu=0.3, restitution=0.5)
     shot = bounce.laws.rigid_lift_off_3d(law, [1.0, 0.2], [[-1.0], [-2.0]], np.zeros((3, 2)))
     assert shot.xdot.shape == (2, 3, 2) and shot.ydot.shape == (2, 3)
-    with pytest.raises(bounce.LandingError, match=r"omega: expected an array \(\.\.\., 2\)"):
+    with pytest.raises(bounce.LandingError, match="omega"):
         bounce.laws.rigid_lift_off_3d(law, [1.0, 0.0], -1.0, 0.5)
-    with pytest.raises(bounce.LandingError, match="ydot: expected negative"):
+    with pytest.raises(bounce.LandingError, match="ydot"):
         bounce.laws.rigid_lift_off_3d(law, [1.0, 0.0], 0.0, [0.5, 0.1])
-    with pytest.raises(bounce.LandingError, match="xdot: expected finite"):
+    with pytest.raises(bounce.LandingError, match="xdot"):
         bounce.laws.rigid_lift_off_3d(law, [np.nan, 0.0], -1.0, [0.5, 0.1])

@@ -171,13 +171,13 @@ def test_reference_engine_gives_the_same():
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda: bounce.lift_off("turf", 1, -1, 0), bounce.ModelError, "expected a ContactModel"),
-        (lambda: bounce.lift_off(TURF, "a", -1, 0), bounce.LandingError, "xdot: expected numbers"),
+        (lambda: bounce.lift_off("turf", 1, -1, 0), bounce.ModelError, "model"),
+        (lambda: bounce.lift_off(TURF, "a", -1, 0), bounce.LandingError, "xdot"),
         (lambda: bounce.lift_off(TURF, [1, 2], -1, [1, 2, 3]), bounce.LandingError, "broadcast"),
         (
             lambda: bounce.lift_off(TURF, 1, -1, 0, parameters={"nu": 1}),
             ns.ParameterError,
-            r"received \['nu'\]",
+            "'nu'",
         ),
     ],
 )

@@ -34,7 +34,7 @@ def test_arrays_of_a_law_with_bristles_and_of_what_is_no_landing():
     assert many.itinerary.tolist() == ["*", ""]
     assert many.status.tolist() == [bounce.BounceStatus.LIFTED_OFF, bounce.BounceStatus.NOT_FINITE]
     for wrong in (dict(xdot=[1.0], omega=[0.1, 0.2]), dict(xdot=[1.0, 0.0], omega=0.1)):
-        with pytest.raises(bounce.LandingError, match=r"expected an array \(\.\.\., 2\)"):
+        with pytest.raises(bounce.LandingError, match="shape"):
             bounce.lift_off(TURF.in_3d(), ydot=-1.0, **wrong)
 
 

@@ -143,7 +143,7 @@ def test_a_ball_that_comes_to_rest_does_not_lift_off(omega):
     slow = [-0.01, -0.05, -0.1, -0.159]
     fast = np.array([-0.2, -0.5, -1.0])
     for ydot in slow:
-        with pytest.raises(bounce.LiftOffError, match=r"ball (at|came to) rest"):
+        with pytest.raises(bounce.LiftOffError, match="to rest"):
             bounce.simulate(heavy, 0.1, ydot, omega)
     many = bounce.lift_off(heavy, 0.1, [*slow, *fast], omega)
     assert many.status.tolist() == [bounce.BounceStatus.NO_LIFT_OFF] * 4 + [0] * 3

@@ -109,7 +109,7 @@ def test_the_cone_is_a_line():
     ids=repr,
 )
 def test_bristles_need_friction(law):
-    with pytest.raises(ns.ParameterError, match=r"mu: expected a number > 0"):
+    with pytest.raises(ns.ParameterError, match="mu"):
         SMOOTH.replace(friction=law)
     model = SMOOTH.replace(friction=law, mu=0.3)
     many = bounce.lift_off(model, 0.5, -1.0, 0.2, parameters=dict(mu=[0.3, 0.0]))
@@ -119,7 +119,7 @@ def test_bristles_need_friction(law):
 def test_parameters_of_the_friction_law_are_checked_in_arrays_too():
     law = bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
     model = SMOOTH.replace(friction=law, mu=0.3)
-    with pytest.raises(ns.ParameterError, match="stribeck_speed: expected a number > 0"):
+    with pytest.raises(ns.ParameterError, match="stribeck_speed"):
         model.replace(stribeck_speed=-1.0)
     many = bounce.lift_off(model, 0.5, -1.0, 0.2, parameters=dict(stribeck_speed=[0.5, -1.0]))
     assert many.status.tolist() == [0, bounce.BounceStatus.BAD_PARAMETER]

@@ -18,8 +18,7 @@ Examples
 from ..contact.models import kelvin_voigt_restitution
 from .cross import CrossBounce
 from .law import BounceLaw, LandingRange, RigidShot
-from .rigid import RigidBounce
-from .rigid_3d import RigidShot3D, rigid_lift_off_3d
+from .rigid import RigidBounce, rigid_lift_off_3d
 from .tilted import PennerBounce, TiltedBounce, penner_restitution, penner_tilt
 from .turfs import TURFS, PublishedFit
 
@@ -32,7 +31,6 @@ __all__ = [
     "PublishedFit",
     "RigidBounce",
     "RigidShot",
-    "RigidShot3D",
     "TiltedBounce",
     "kelvin_voigt_restitution",
     "penner_restitution",

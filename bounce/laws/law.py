@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import LandingError
 from ..parameters import Parametrised
+from ..shot.state import AlongTheGround
 
 Array = NDArray[np.float64]
 
@@ -25,8 +26,11 @@ CASES = {
 
 
 @dataclass(frozen=True)
-class RigidShot:
-    """Lift-off after a rigid impact; arrays of the broadcast shape of the inputs.
+class RigidShot(AlongTheGround):
+    """Lift-off after a rigid impact; arrays of the broadcast shape (...) of the inputs.
+
+    In 3-D ``xdot``, ``omega``, ``slip`` and ``tangential_impulse`` are arrays (..., 2), forward and to
+    the right.
 
     Attributes
     ----------
@@ -35,7 +39,7 @@ class RigidShot:
     case : ndarray of str
         "I", "II" or "III" with the sign of the slip at touch-down: slipping throughout, rolling
         from restitution on, rolling from compression on. "I/II+" is a boundary; no sign without
-        slip.
+        slip, and none in 3-D.
     normal_impulse, tangential_impulse : ndarray
         Impulses over the ball's mass, so speeds.
     rolling_impulse, rolling_speed : ndarray

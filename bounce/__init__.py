@@ -37,14 +37,26 @@ from .contact.models import (
     Tsuji,
 )
 from .errors import EnergyWarning, LandingError, LiftOffError, ModelError, UnknownNameError
-from .maps.dividing import DividingCurve, critical_eta, dividing_curve
-from .maps.dividing_surface import DividingSurface, dividing_surface
+from .maps.dividing import (
+    DividingCurve,
+    DividingSurface,
+    critical_eta,
+    dividing_curve,
+    dividing_surface,
+)
 from .maps.lift_offs import lift_off
 from .maps.outcomes import OutcomeMap, outcome_map
 from .maps.proven import ProvenMap, proven_map
 from .maps.results import BounceStatus, LiftOffs
-from .maps.slip_directions import SlipMap, Vortex, find_vortices, slip_map, winding_number
-from .maps.turning import SlipTurn, slip_turn
+from .maps.slip_directions import (
+    SlipMap,
+    SlipTurn,
+    Vortex,
+    find_vortices,
+    slip_map,
+    slip_turn,
+    winding_number,
+)
 from .shot.certify import BounceProof, certify
 from .shot.sensitivity import Sensitivity, sensitivity
 from .shot.shot import Shot

@@ -1,5 +1,5 @@
 """Many bounces: lift-offs over arrays, maps of outcomes, and the curve that divides them."""
 
-from .tracing import Arc
+from .dividing import Arc
 
 __all__ = ["Arc"]

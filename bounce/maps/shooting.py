@@ -1,8 +1,7 @@
-"""Shooting for the dividing surface: slip, then roll to lift-off, with the itinerary fixed.
+"""Shooting from landings to lift-off with the itinerary fixed.
 
-With the itinerary fixed every piece is a smooth flow, so the conditions at its end are smooth
-functions of the start, and Newton's method finds starts that meet them. This also holds where the
-normal motion depends on the tangential one and lift-off comes at another time for every start.
+Then every leg is a smooth flow, so the conditions at its end are smooth functions of the landing and
+Newton's method solves them, also where the time of lift-off depends on the landing.
 """
 
 from __future__ import annotations
@@ -29,14 +28,6 @@ class Shooting(ns.orbit.EventPassages):
 
     A ``Passage`` is the lift-off; its ``corner`` is H = xdot + omega, and the tangential acceleration
     A without friction.
-
-    Parameters
-    ----------
-    model : ContactModel
-    ydot : float
-        Normal speed at touch-down, < 0.
-    tol : float
-    t_max : float
     """
 
     def __init__(
@@ -117,9 +108,9 @@ class Shooting(ns.orbit.EventPassages):
 
     @contextmanager
     def _lift_off(self) -> Iterator[None]:
-        """Say of a phase that does not end that there is no lift-off."""
+        """Raise a ``LiftOffError`` where a phase does not end."""
         try:
             yield
         except ns.ConvergenceError as error:
             run = error.point if isinstance(error.point, ns.Trajectory) else None
-            raise LiftOffError(f"lift-off: {error}", run) from error
+            raise LiftOffError(f"The ball does not lift off: {error}", run) from error

@@ -291,7 +291,7 @@ def test_bristles_are_refused():
         (
             lambda: bounce.critical_eta(TURF, bounds=(0.1, 0.5)),
             ns.ConvergenceError,
-            "expected a change to forward slip",
+            "eta",
         ),
     ],
 )
@@ -301,9 +301,9 @@ def test_bad_input(call, error, words):
 
 
 def test_speeds_beyond_the_curve_and_wrong_entries(curve):
-    with pytest.raises(ns.PointError, match="larger reach"):
+    with pytest.raises(ns.PointError, match="xdot"):
         curve.omega(50.0)
     with pytest.raises(ns.OptionError, match="itinerary"):
         curve.at_entry(1.0, "s")
-    with pytest.raises(ns.PointError, match="begin to roll"):
+    with pytest.raises(ns.PointError, match="time"):
         curve.at_entry(5.0)

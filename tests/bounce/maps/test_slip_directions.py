@@ -169,17 +169,17 @@ def test_the_turn_with_eta_is_the_formula_to_first_order():
 
 
 def test_refusals():
-    with pytest.raises(ns.OptionError, match="radius, points"):
+    with pytest.raises(ns.OptionError, match="radius"):
         bounce.winding_number(TURF, [0.2, 0.0], [0.5, 0.0], 0.0)
-    with pytest.raises(ns.ConvergenceError, match="without a direction"):
+    with pytest.raises(ns.ConvergenceError, match="radius"):
         bounce.winding_number(
             bounce.NormalKelvinVoigt(mu=0.3, d2=0.1), [0.2, 0.0], [0.0, 0.0], 0.1, tol=1e-6
         )  # it rolls and keeps rolling: no direction
-    with pytest.raises(bounce.ModelError, match="the same in all directions"):
+    with pytest.raises(bounce.ModelError, match="model"):
         bounce.find_vortices(TURF.in_3d(friction_ratio=0.5), [0.2, 0.0])
-    with pytest.raises(bounce.LandingError, match="direction of travel"):
+    with pytest.raises(bounce.LandingError, match="xdot"):
         bounce.find_vortices(TURF, [0.0, 0.0])
-    with pytest.raises(ns.OptionError, match="slips throughout"):
+    with pytest.raises(ns.OptionError, match="omega"):
         bounce.slip_turn(TURF, [0.2, 0.0], [0.1, 0.1], [0.1])
-    with pytest.raises(ns.OptionError, match="two lists of spins"):
+    with pytest.raises(ns.OptionError, match="omega"):
         bounce.slip_map(TURF, [0.2, 0.0], (0.5, [0.1]))

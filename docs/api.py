@@ -85,11 +85,12 @@ def overview() -> str:
 
 
 _INTRODUCTION = (
-    "Both packages have one front door: what you need is imported as `nonsmooth.name` or `bounce.name`. "
+    "What most programs need is `nonsmooth.name` or `bounce.name`. "
     "The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`; curves of any "
     "equations are followed by `nonsmooth.continuation`; the types that questions about a point return "
-    "are in `nonsmooth.local`. What is before, between and after bounces is in `bounce.golf`, laws in "
-    "closed form are in `bounce.laws`."
+    "are in `nonsmooth.local`. More contact models and the friction laws are in `bounce.contact`, what one "
+    "bounce returns is in `bounce.shot`, what many return in `bounce.maps`, laws in closed form are in "
+    "`bounce.laws`, and `bounce.golf` is about golf balls from launch to rest."
 )
 
 

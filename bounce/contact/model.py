@@ -130,7 +130,7 @@ class ContactModel(Parametrised, ABC):
         law = Coulomb() if friction is None else friction
         if not isinstance(law, FrictionLaw):
             raise ModelError(
-                f"{who}: friction: expected a FrictionLaw such as bounce.Coulomb(), received {law!r}."
+                f"{who}: friction: expected a FrictionLaw such as bounce.contact.Coulomb(), received {law!r}."
             )
         self._set("convention", load)
         self._set("friction", law)

@@ -374,7 +374,7 @@ def dividing_surface(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> surface = bounce.dividing_surface(turf, [-0.5, -1.0])
+    >>> surface = bounce.maps.dividing_surface(turf, [-0.5, -1.0])
     >>> (surface.junction / surface.ydot[:, None]).round(9)
     array([[-0.444..., 1. , -1.59...],
            [-0.444..., 1. , -1.59...]])
@@ -432,7 +432,7 @@ def critical_eta(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> f"{bounce.critical_eta(turf):.6f}"
+    >>> f"{bounce.maps.critical_eta(turf):.6f}"
     '1.19...'
     """
     require_model(model)

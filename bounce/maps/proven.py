@@ -126,7 +126,7 @@ def proven_map(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> found = bounce.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
+    >>> found = bounce.maps.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
     >>> found.at(0.105, 1.01)
     'forward'
     """

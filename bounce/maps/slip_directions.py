@@ -208,7 +208,7 @@ def winding_number(
     --------
     >>> import bounce
     >>> turf = bounce.NormalKelvinVoigt(mu=0.3, d2=0.1)
-    >>> bounce.winding_number(turf, [0.2, 0.0], centre=[4.0, 0.0], radius=1.0, tol=1e-6)
+    >>> bounce.maps.winding_number(turf, [0.2, 0.0], centre=[4.0, 0.0], radius=1.0, tol=1e-6)
     0
     """
     surface, v, middle = _in_3d(model), _pair("xdot", xdot), _pair("centre", centre)
@@ -284,7 +284,7 @@ def find_vortices(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-    >>> (spin,) = bounce.find_vortices(turf, [0.2, 0.0])
+    >>> (spin,) = bounce.maps.find_vortices(turf, [0.2, 0.0])
     >>> f"{spin[0]:.10f}", float(spin[1])
     ('0.5505199102', 0.0)
     """
@@ -405,7 +405,7 @@ def slip_turn(
     --------
     >>> import bounce, numpy as np
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-    >>> found = bounce.slip_turn(turf, [2.0, 0.0], [0.5, 1.0], [0.01], tol=1e-9)
+    >>> found = bounce.maps.slip_turn(turf, [2.0, 0.0], [0.5, 1.0], [0.01], tol=1e-9)
     >>> [f"{np.degrees(v[0]):.5f}" for v in (found.turn, found.first_order)]
     ['0.18914', '0.18806']
     """

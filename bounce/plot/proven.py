@@ -35,7 +35,7 @@ def proven_map(
     Parameters
     ----------
     found : ProvenMap
-        The map, from :func:`bounce.proven_map`.
+        The map, from :func:`bounce.maps.proven_map`.
     curve : DividingCurve, optional
         Drawn over it; the undecided pieces surround it.
     ax : matplotlib Axes, optional
@@ -50,14 +50,14 @@ def proven_map(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> found = bounce.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
+    >>> found = bounce.maps.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
     >>> [t.get_text() for t in bounce.plot.proven_map(found).axes[0].get_legend().get_texts()]
     ['forward: 100.0%']
     """
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Patch, Rectangle
 
-    require(found, ProvenMap, "found", "bounce.proven_map returns one.")
+    require(found, ProvenMap, "found", "bounce.maps.proven_map returns one.")
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
         for k, name in enumerate(OUTCOMES):

@@ -187,6 +187,7 @@ class Shot(Generic[Model, Along]):
         Returns
         -------
         ndarray of str (...)
+            Modes as in :class:`Phase`.
         """
         ends = np.array([phase.t_end for phase in self.phases[:-1]])
         letters = np.array([phase.mode for phase in self.phases])
@@ -220,6 +221,11 @@ class Shot(Generic[Model, Along]):
 
     def energy(self, t: ArrayLike) -> Array:
         """Kinetic, gravitational and elastic energy per mass of the ball.
+
+        Parameters
+        ----------
+        t : array_like (...)
+            Times since touch-down.
 
         Raises
         ------

@@ -49,7 +49,7 @@ def test_value_semantics():
     assert turf == bounce.KelvinVoigt(**TURF, G=1e-4)
     assert turf != turf.replace(mu=0.4)
     assert turf != turf.replace(load="net")
-    assert turf != turf.replace(friction=bounce.Viscous(viscosity=0.1))
+    assert turf != turf.replace(friction=bounce.contact.Viscous(viscosity=0.1))
     assert len({turf, turf.replace(), turf.replace(mu=0.4)}) == 2
     assert turf.replace(mu=0.4).values["mu"] == 0.4
     assert turf.replace(load="net").replace(load="contact") == turf
@@ -57,7 +57,7 @@ def test_value_semantics():
 
 
 def test_pickle_with_a_built_system():
-    turf = bounce.KelvinVoigt(**TURF, friction=bounce.Viscous(viscosity=0.1))
+    turf = bounce.KelvinVoigt(**TURF, friction=bounce.contact.Viscous(viscosity=0.1))
     turf.system()
     copy = pickle.loads(pickle.dumps(turf))
     assert copy == turf and hash(copy) == hash(turf) and repr(copy) == repr(turf)
@@ -116,12 +116,14 @@ def test_slope_tilts_gravity():
 
 def test_maxwell_element_is_an_extra_state():
     """A fast branch is a damper, a slow one a spring: both limits are linear models."""
-    damper = bounce.Maxwell(mu=0.3, branch_stiffness=1e3, relaxation=2e-4)
+    damper = bounce.contact.Maxwell(mu=0.3, branch_stiffness=1e3, relaxation=2e-4)
     fast = bounce.simulate(damper, 1.0, -1.0, 0.5)
     assert fast.trajectory.system.state_names[-1] == "branch"
     kv = bounce.simulate(bounce.NormalKelvinVoigt(mu=0.3, d2=0.1), 1.0, -1.0, 0.5)
     assert abs(fast.lift_off.ydot - kv.lift_off.ydot) < 2e-3
-    slow = bounce.simulate(bounce.Maxwell(mu=0.3, branch_stiffness=3.0, relaxation=1e8), 1, -1, 0.5)
+    slow = bounce.simulate(
+        bounce.contact.Maxwell(mu=0.3, branch_stiffness=3.0, relaxation=1e8), 1, -1, 0.5
+    )
     assert slow.time == pytest.approx(np.pi / 2, abs=1e-7)
 
 
@@ -202,7 +204,7 @@ def test_both_forces_are_obligatory():
         (dict(TURF, load="gross"), bounce.ModelError, "load"),
         (dict(TURF, friction=0.3), bounce.ModelError, "friction"),
         (
-            dict(TURF, friction=bounce.Viscous(viscosity=0.1), viscosity=-1.0),
+            dict(TURF, friction=bounce.contact.Viscous(viscosity=0.1), viscosity=-1.0),
             ns.ParameterError,
             "viscosity",
         ),

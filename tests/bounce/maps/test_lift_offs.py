@@ -14,10 +14,10 @@ MODELS = [
     bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.0, eta=0.5),
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5),
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5, G=0.01, load="net"),
-    bounce.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
-    bounce.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
-    bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, d1=0.1, eta=0.5),
-    TURF.replace(friction=bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)),
+    bounce.contact.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, d1=0.1, eta=0.5),
+    TURF.replace(friction=bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)),
 ]
 
 
@@ -36,7 +36,7 @@ def test_agrees_with_single_bounces(model):
     assert many.complete.all()
     for k in range(0, 100, 9):
         shot = bounce.simulate(model, xdot[k], ydot[k], omega[k], tol=1e-12)
-        row = [getattr(many, name)[k] for name in bounce.State._fields]
+        row = [getattr(many, name)[k] for name in bounce.shot.State._fields]
         assert np.abs(np.array(row) - shot.lift_off).max() < 1e-10
         assert abs(many.time[k] - shot.time) < 1e-10
         assert abs(many.slip[k] - shot.slip) < 1e-10

@@ -57,14 +57,16 @@ def test_random_linear_bounces():
 
 
 def test_random_nonlinear_bounces():
-    soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
+    soft = bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
     compare(soft, seed=2, count=4)
 
 
 @pytest.mark.slow
 def test_five_hundred_random_bounces():
     compare(TURF, seed=3, count=250)
-    compare(bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5), seed=4, count=250)
+    compare(
+        bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5), seed=4, count=250
+    )
 
 
 def test_boxes_and_parameters_hold_their_points():
@@ -141,7 +143,7 @@ def test_the_checker_follows_a_bounce_again(change, box, tmp_path):
 @pytest.mark.slow
 def test_the_checker_follows_random_boxes_of_bounces_again(tmp_path):
     rng = np.random.default_rng(1)
-    soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
+    soft = bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
     for k in range(20):
         wide = 10.0 ** rng.uniform(-6, -2)
         xdot, omega = rng.uniform([-1, -2], [1, 2])

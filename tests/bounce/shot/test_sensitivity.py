@@ -8,8 +8,8 @@ import nonsmooth as ns
 
 KV = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-3)
 ALL = ["mu", "d1", "d2", "eta", "G", "inertia", "xdot", "ydot", "omega"]
-STRIBECK = bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
-LUGRE = bounce.LuGre(bristle_stiffness=50.0, mu_kinetic=0.2, stribeck_speed=0.5)
+STRIBECK = bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
+LUGRE = bounce.contact.LuGre(bristle_stiffness=50.0, mu_kinetic=0.2, stribeck_speed=0.5)
 POWER = dict(mu=0.3, stiffness=1.0, eta=0.4, d1=0.2)
 CASES = {
     "entry and exit": (KV, (0.2, -1.0, 1.0), ALL, "+ s +"),
@@ -20,13 +20,13 @@ CASES = {
         KV.replace(load="net", d2=5e-4, G=0.02), (0.2, -1.0, 1.0), ALL, "F + s +"
     ),
     "Hunt-Crossley": (
-        bounce.HuntCrossley(damping=0.3, **POWER), (0.2, -1.0, 1.0), ["mu", "stiffness", "damping", "ydot"], "+ s +"
+        bounce.contact.HuntCrossley(damping=0.3, **POWER), (0.2, -1.0, 1.0), ["mu", "stiffness", "damping", "ydot"], "+ s +"
     ),
     "Tsuji": (
-        bounce.Tsuji(damping=0.3, **POWER), (0.2, -1.0, 1.0), ["mu", "stiffness", "damping", "ydot"], "+ s +"
+        bounce.contact.Tsuji(damping=0.3, **POWER), (0.2, -1.0, 1.0), ["mu", "stiffness", "damping", "ydot"], "+ s +"
     ),
     "Maxwell": (
-        bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.7, eta=0.4, d1=0.2),
+        bounce.contact.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.7, eta=0.4, d1=0.2),
         (0.2, -1.0, 1.0),
         ["mu", "branch_stiffness", "relaxation", "omega"],
         "+ s +",

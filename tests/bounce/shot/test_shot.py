@@ -14,7 +14,7 @@ TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 
 def test_what_a_shot_holds():
     shot = bounce.simulate(TURF, xdot=0.3, ydot=-1.0, omega=0.1, tol=1e-12)
-    assert shot.landing == bounce.State(0.3, -1.0, 0.1, 0.0, 0.0)
+    assert shot.landing == bounce.shot.State(0.3, -1.0, 0.1, 0.0, 0.0)
     assert shot.slip == shot.lift_off.xdot + shot.lift_off.omega
     assert shot.restitution == -shot.lift_off.ydot / -1.0
     assert shot.model is TURF and shot.approach is None
@@ -173,10 +173,10 @@ POWER_LAWS = [
     bounce.Hertz(mu=0.3, stiffness=1),
     bounce.Hertz(mu=0.3, stiffness=1, G=0.01),
     bounce.Hertz(mu=0.3, stiffness=1, d1=0.1, eta=0.5, G=0.01, load="net"),
-    bounce.HuntCrossley(mu=0.3, stiffness=1, damping=0.3),
-    bounce.HuntCrossley(mu=0.3, stiffness=1, damping=0.3, d1=0.1, eta=0.5),
-    bounce.Tsuji(mu=0.3, stiffness=1, damping=0.3),
-    bounce.KuwabaraKono(mu=0.3, stiffness=1, damping=0.3, G=0.01, load="net"),
+    bounce.contact.HuntCrossley(mu=0.3, stiffness=1, damping=0.3),
+    bounce.contact.HuntCrossley(mu=0.3, stiffness=1, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.Tsuji(mu=0.3, stiffness=1, damping=0.3),
+    bounce.contact.KuwabaraKono(mu=0.3, stiffness=1, damping=0.3, G=0.01, load="net"),
 ]
 
 

@@ -99,13 +99,13 @@ def test_landings_on_a_line_are_the_planar_ones(landing, angle, load):
 
 MODELS = [
     bounce.NormalKelvinVoigt(mu=0.3, d2=0.1),
-    bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5),
+    bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5),
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5),
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5, G=1e-3, load="net"),
-    bounce.HuntCrossley(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
-    bounce.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
-    bounce.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, eta=0.5),
-    bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=1.0, d1=0.1, eta=0.5),
+    bounce.contact.HuntCrossley(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, eta=0.5),
+    bounce.contact.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=1.0, d1=0.1, eta=0.5),
     bounce.GeneralisedContact(
         mu=0.3,
         eps=0.3,
@@ -115,11 +115,13 @@ MODELS = [
         kappa=lambda s, p: 1,
     ),
     TURF.replace(mu=0.0),
-    TURF.replace(friction=bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)),
-    TURF.replace(friction=bounce.ExponentialDecay(mu_kinetic=0.2, decay_speed=0.5)),
-    TURF.replace(friction=bounce.Viscous(viscosity=0.1)),
-    TURF.replace(friction=bounce.Dahl(bristle_stiffness=20.0)),
-    TURF.replace(friction=bounce.LuGre(bristle_stiffness=20.0, mu_kinetic=0.2, stribeck_speed=0.5)),
+    TURF.replace(friction=bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)),
+    TURF.replace(friction=bounce.contact.ExponentialDecay(mu_kinetic=0.2, decay_speed=0.5)),
+    TURF.replace(friction=bounce.contact.Viscous(viscosity=0.1)),
+    TURF.replace(friction=bounce.contact.Dahl(bristle_stiffness=20.0)),
+    TURF.replace(
+        friction=bounce.contact.LuGre(bristle_stiffness=20.0, mu_kinetic=0.2, stribeck_speed=0.5)
+    ),
 ]
 
 

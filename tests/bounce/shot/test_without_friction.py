@@ -52,7 +52,7 @@ def test_the_limit_of_little_friction(xdot, omega):
         SMOOTH.replace(G=0.01, load="net"),
         bounce.NormalKelvinVoigt(mu=0.0, d2=0.1),
         bounce.Hertz(mu=0.0, stiffness=1.0, d1=0.1, eta=0.5),
-        SMOOTH.replace(friction=bounce.Viscous(viscosity=0.1)),
+        SMOOTH.replace(friction=bounce.contact.Viscous(viscosity=0.1)),
     ],
     ids=repr,
 )
@@ -103,8 +103,8 @@ def test_the_cone_is_a_line():
 @pytest.mark.parametrize(
     "law",
     [
-        bounce.Dahl(bristle_stiffness=50.0),
-        bounce.LuGre(bristle_stiffness=50.0, mu_kinetic=0.2, stribeck_speed=0.5),
+        bounce.contact.Dahl(bristle_stiffness=50.0),
+        bounce.contact.LuGre(bristle_stiffness=50.0, mu_kinetic=0.2, stribeck_speed=0.5),
     ],
     ids=repr,
 )
@@ -117,7 +117,7 @@ def test_bristles_need_friction(law):
 
 
 def test_parameters_of_the_friction_law_are_checked_in_arrays_too():
-    law = bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
+    law = bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
     model = SMOOTH.replace(friction=law, mu=0.3)
     with pytest.raises(ns.ParameterError, match="stribeck_speed"):
         model.replace(stribeck_speed=-1.0)

@@ -1,4 +1,4 @@
-"""From a ball and a landing in SI units to the dimensionless models and back.
+"""Balls and landings in SI units, and their conversion to and from dimensionless models.
 
 Both consistent scalings have a unit of time T (eps2 in seconds, 1/T the natural frequency of the
 normal spring), a unit of speed U, of length U T and of spin U/R:

@@ -54,31 +54,20 @@ class Blueprint(Protocol):
 
 
 class Equations:
-    """Symbols, forces and fields of one model.
-
-    Attributes
-    ----------
-    directions : int
-        Along the ground: 1 in the plane, 2 in 3-D. Vectors along the ground are SX (directions,).
-    names : tuple of str
-        States: the ball's, then the model's, then the friction law's.
-    start : dict
-        Values of the further states at touch-down.
-    centre, velocity : tuple of int
-        Indices of the position of the centre among the states, and of its rates.
-    drilling : bool
-        Whether friction resists the spin about the vertical too.
-    """
+    """Symbols, forces and fields of one model; ``directions`` is 1 in the plane and 2 in 3-D."""
 
     def __init__(self, model: Surface, parameters: Iterable[str], directions: int):
+        # Vectors along the ground are SX (directions,).
         self.model, self.directions = model, directions
         names = tuple(parameters)
         self.drilling = "drilling_radius" in names
         self.vectors = (*model.vector_states, *model.friction.vector_states)
         own = STATES if directions == 1 else (*STATES_3D, *(["spin"] if self.drilling else []))
         further = _further_states(model)
+        #: Values of the further states at touch-down.
         self.start = {n: v for name, v in further.items() for n in self._components(name)}
         self._symbols(own, names)
+        #: Indices of the position of the centre among the states, and of its rates.
         self.centre = (0, 2) if directions == 1 else (0, 2, 4)
         self.velocity = tuple(k + 1 for k in self.centre)
         self.along_the_ground = frozenset(own) - {"y", "ydot", "spin"}
@@ -98,7 +87,7 @@ class Equations:
                 x=ca.vertcat(x["x"], x["z"]), xdot=velocity, y=x["y"], ydot=x["ydot"],
                 omega=self.slip - velocity, **{n: x[n] for n in own if n == "spin"},
             )  # fmt: skip
-            # What a model knows of gravity is its part normal to the ground.
+            # In a model, G is the part of gravity normal to the line of the slope.
             self.q = Names("parameter", {**p, "G": p["G"] * ca.cos(p["side_slope"])})
         extra = {n: ca.vertcat(*[x[c] for c in self._components(n)]) for n in further}
         self.s = Names("state", {**ball, **extra, "slip": self._speed})
@@ -330,11 +319,9 @@ class Equations:
         )
 
     def _ends(self) -> list[ns.Stop]:
-        """What ends the contact: the model's lift-off function, and the load itself.
-
-        The friction that can hold a rolling ball vanishes with the load. Where its approximate zero
-        comes a little before that of another function, this ends the contact, not the rolling.
-        """
+        """What ends the contact: the model's lift-off function, and the load itself."""
+        # The friction that can hold a rolling ball vanishes with the load. Where its approximate zero
+        # comes a little before that of another function, this ends the contact, not the rolling.
         ends = [ns.Stop(self.lift_off, -1, "lift-off")]
         if not ca.is_equal(self.lift_off, self.load, 10):
             ends.append(ns.Stop(self.load, -1, "no load"))
@@ -369,19 +356,17 @@ class Equations:
     # functions ---------------------------------------------------------------------------------
 
     def energies(self) -> ca.Function:
-        """Return (states, parameters) -> the two energies of :func:`energy_function`."""
+        """Return (states, parameters) -> kinetic and gravitational energy, of the ball and along y."""
         s, spins = self.s, [self.s.omega, *([self.s.spin] if self.drilling else [])]
         turning = ca.sumsqr(ca.vertcat(*spins))
         along = 0.5 * (ca.sumsqr(s.xdot) + self.q.inertia * turning) + ca.dot(self._uphill, s.x)
         normal = 0.5 * s.ydot**2 + self._level * s.y
+        # The motion along y has an energy of its own only where it does not depend on the other.
         apart = not self.inputs(self.normal) & self.along_the_ground
         return self.function([along + normal, normal if apart else along + normal])
 
     def forces(self, system: ns.FilippovSystem) -> tuple[str, ca.Function]:
-        """Return letters of modes, and (states, parameters) -> load and the friction in each mode.
-
-        In 3-D the friction that would keep the ball from slipping counts where the slip is zero.
-        """
+        """Return letters of modes, and (states, parameters) -> load and the friction in each mode."""
         if self.directions == 1:
             spin = STATES.index("omega")
             friction = [self.q.inertia * system.mode_field(mode)[spin] for mode in "+-s"]
@@ -455,10 +440,7 @@ def load_inputs(blueprint: Blueprint) -> frozenset[str]:
 
 @lru_cache(maxsize=64)
 def energy_function(blueprint: Blueprint) -> ca.Function:
-    """Return (states, parameters) -> energy per mass, of the ball and of its motion along y.
-
-    Kinetic and gravitational; of the ball twice where its motion along y depends on the other.
-    """
+    """Return (states, parameters) -> energy per mass, of the ball and of its motion along y."""
     return equations(blueprint).energies()
 
 

@@ -21,8 +21,7 @@ LoadConvention = Literal["contact", "net"]
 #: Gravity that changes no bounce of unit speed: a power law's load reaches it within 1e-13 of y = 0.
 NO_GRAVITY = 1e-20
 
-
-#: Options of the contact in 3-D: what they may be, and their default.
+#: Options of the contact in 3-D: their limit and their default.
 _OPTIONS: dict[str, tuple[str, float | None]] = {
     "side_slope": ("in (-pi/2, pi/2)", 0.0),
     "friction_ratio": ("in (0, 1]", None),
@@ -32,7 +31,7 @@ _OPTIONS: dict[str, tuple[str, float | None]] = {
 
 
 class ContactModel(Parametrised, ABC):
-    """A surface: two forces written once; equations, simulation and maps follow from them.
+    """A surface, defined by a normal and a tangential force.
 
     A ball of unit radius and mass moves with centre (x, y), $y = 0$ at touch-down and negative in the
     ground, and spin $omega$:
@@ -62,7 +61,7 @@ class ContactModel(Parametrised, ABC):
        internal states such as a Maxwell element; they appear as ``s.name``.
     6. ``load(s, p)``: what ``mu`` multiplies; its first downward zero is lift-off. By default the
        normal force, or for ``load="net"`` the normal force less gravity, as in the paper. A surface
-       that also pulls (adhesion) needs a load and a ``lift_off`` that last until it lets go.
+       that also pulls (adhesion) needs a load and a ``lift_off`` that last until adhesion ends.
     7. ``lift_off(s, p)``: a function with the sign of the load that falls through zero with a
        nonzero rate, where the load itself does not (a power law that ends at $y = 0$).
     8. ``friction_coefficient(s, p)``: by default that of ``friction``; may use the slip speed
@@ -97,7 +96,7 @@ class ContactModel(Parametrised, ABC):
     ...     def tangential_force(self, s, p):
     ...         return 0
     >>> shot = bounce.simulate(Spring(), xdot=1.0, ydot=-1.0, omega=0.2)
-    >>> f"{shot.time:.10f}", shot.itinerary  # pi/2, and it stays rolling: nothing is tangential
+    >>> f"{shot.time:.10f}", shot.itinerary  # pi/2; without a tangential force it goes on rolling
     ('1.5707963268', '+ s')
     """
 
@@ -259,14 +258,14 @@ class ContactModel(Parametrised, ABC):
     def blueprint(self, weightless: bool | None = None) -> Self:
         """Return the same kind of model with default values.
 
-        Models that differ in their numbers only have equal blueprints, so what is derived from the
-        symbols (equations, jets, compiled code) is built once for all of them. Without gravity the
-        two load conventions coincide, and "contact" serves both: it knows a power law's end.
+        Models that differ in their numbers only have equal blueprints, so equations and compiled code
+        are built once for all of them. Without gravity the two load conventions coincide, and "contact"
+        is taken for both, since its lift-off function is regular where a power law ends.
 
         Parameters
         ----------
         weightless : bool, optional
-            Whether to take it as one without gravity; by default what ``G`` says.
+            Whether it is one without gravity; by default, whether ``G`` is zero.
 
         Returns
         -------
@@ -380,7 +379,7 @@ class Contact3D(Parametrised):
     nonsmooth.ParameterError
         A slope, ratio or radius outside its limits; a ``grain`` without a ``friction_ratio``.
     ModelError
-        A model whose forces are no vectors along the ground, or favour a direction.
+        A model whose forces are not vectors along the ground, or not isotropic.
 
     Examples
     --------
@@ -404,8 +403,7 @@ class Contact3D(Parametrised):
             raise ModelError(f"model: expected a ContactModel, received {model!r}.")
         if grain is not None and friction_ratio is None:
             raise ns.ParameterError(
-                f"grain: expected with friction_ratio=, received {grain!r} alone. Friction that is the "
-                "same in all directions has no grain."
+                f"grain is {grain!r}, but friction is the same in all directions. Give friction_ratio too."
             )
         if friction_ratio is not None and grain is None:
             grain = 0.0
@@ -418,7 +416,7 @@ class Contact3D(Parametrised):
         taken = sorted(set(model.values) & set(given))
         if taken:
             raise ModelError(
-                f"{type(model).__name__}: expected parameters other than {list(given)}, received {taken}."
+                f"{type(model).__name__}: its parameters {taken} are options of Contact3D too. Rename them."
             )
         self._set("model", model)
         own = {name: _checked(name, v) for name, v in given.items() if v is not None}
@@ -457,7 +455,7 @@ class Contact3D(Parametrised):
         Parameters
         ----------
         weightless : bool, optional
-            Whether to take it as one without gravity; by default what ``G`` says.
+            Whether it is one without gravity; by default, whether ``G`` is zero.
         """
         copy = object.__new__(type(self))
         copy._set("model", self.model.blueprint(weightless))

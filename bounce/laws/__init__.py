@@ -1,4 +1,4 @@
-"""Bounce laws in closed form: rigid impact, the laws that people use today, and values for turf.
+"""Bounce laws in closed form: rigid impact, the laws in use today, and values for turf.
 
 A law takes xdot, ydot and the surface speed of the spin (spin times radius) at touch-down, in one
 unit of speed (m/s where the law has a speed in it), and gives them at lift-off: no contact that

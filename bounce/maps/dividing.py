@@ -169,8 +169,8 @@ class DividingCurve:
                 guess = (1 - weight) * arc.points[k] + weight * arc.points[k + 1]
                 if min(weight, 1.0 - weight) <= _AT_POINT:
                     return sign * float(guess[1])
-                word = arc.itinerary.replace(" ", "")
-                curve = curves.setdefault(word, ns.orbit.StartCurve(shooting, word, tol=1e-15))
+                modes = arc.itinerary.replace(" ", "")
+                curve = curves.setdefault(modes, ns.orbit.StartCurve(shooting, modes, tol=1e-15))
                 guess[0] = sign * xdot
                 root = curve.correct(guess, np.array([1.0, 0.0]), max_iterations=30)
                 if root is not None:
@@ -213,14 +213,14 @@ class DividingCurve:
         >>> f"{start.xdot:.12f}, {start.omega:.12f}"
         '0.291276497193, 0.852376712353'
         """
-        word = itinerary.replace(" ", "")
-        if word not in ("+s", "-s"):
+        modes = itinerary.replace(" ", "")
+        if modes not in ("+s", "-s"):
             raise ns.OptionError(f"itinerary: expected '+ s' or '- s', received {itinerary!r}.")
         shooting = Shooting(self.model, self.ydot, tol=_integration(self.tol))
-        root = _landing_at(shooting, word[0], time, np.zeros(2))
+        root = _landing_at(shooting, modes[0], time, np.zeros(2))
         fault = "Newton's method finds none"
         if root is not None:
-            fault = shooting.slip_then_roll(root, word[0], time)[1].fault
+            fault = shooting.slip_then_roll(root, modes[0], time)[1].fault
         if root is None or fault:
             raise ns.PointError(
                 f"time is {time!r}, at which no ball begins to roll that reaches the two-fold: {fault}."

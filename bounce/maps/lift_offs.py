@@ -43,8 +43,8 @@ Array = NDArray[np.float64]
 Bools = NDArray[np.bool_]
 Rows = NDArray[np.intp]
 
-#: Plain numbers are given to NumPy: before Python 3.12 it asks the class of an enum's member for things in
-#: Python's code, and drops a Ctrl-C that comes there.
+#: A plain number: before Python 3.12 NumPy calls Python code for a member of an enum, where a Ctrl-C is
+#: lost.
 _LIFTED_OFF = int(BounceStatus.LIFTED_OFF)
 
 _FROM_RUN = {
@@ -304,7 +304,7 @@ class _Bounces:
         self, t_max: float, work: ns.Work, options: dict[str, Any]
     ) -> tuple[tuple[str, ...], NDArray[np.int32]]:
         """Follow the contact with friction; return the itineraries and each row's among them."""
-        words: list[str] = []
+        named: list[str] = []
         code = np.full(self.status.size, -1, np.int32)
         for part in self.parts:
             rows = np.flatnonzero(self._going(part))
@@ -320,8 +320,8 @@ class _Bounces:
             self.states[rows] = runs.x
             self.time[rows] += runs.t
             later = len(runs.itineraries) * self.free[rows]
-            code[rows] = len(words) + runs.itinerary_code + later
-            words += [*runs.itineraries, *(f"F {word}" for word in runs.itineraries)]
+            code[rows] = len(named) + runs.itinerary_code + later
+            named += [*runs.itineraries, *(f"F {itinerary}" for itinerary in runs.itineraries)]
             if work.checkpoint is not None:  # the second part, if any, has its own
                 work = replace(work, checkpoint=f"{os.fspath(work.checkpoint)}-weightless")
         start = np.stack([self._rows(self.given[n]) for n in ("x", "xdot", "y", "ydot")], axis=-1)
@@ -329,7 +329,7 @@ class _Bounces:
         self.status[stay] = int(BounceStatus.NO_LIFT_OFF)
         failed = self.status != _LIFTED_OFF
         self.states[failed], self.time[failed], code[failed] = np.nan, np.nan, -1
-        itineraries, code = _sorted(words, code)
+        itineraries, code = _sorted(named, code)
         return itineraries, code.reshape(self.shape)
 
     def gained(self, tol: float) -> int:
@@ -350,15 +350,13 @@ def _translate(status: NDArray[np.int8]) -> NDArray[np.int8]:
     return np.array(table, np.int8)[status]
 
 
-def _sorted(words: list[str], code: NDArray[np.int32]) -> tuple[tuple[str, ...], NDArray[np.int32]]:
-    """Itineraries that occur, sorted, and the position of each row's among them (-1: none).
-
-    A law without a set, such as one with bristles in 3-D, has no letter for its one phase.
-    """
-    words = [{"o": "*", "F o": "F *"}.get(word, word) for word in words]
+def _sorted(named: list[str], code: NDArray[np.int32]) -> tuple[tuple[str, ...], NDArray[np.int32]]:
+    """Itineraries that occur, sorted, and the position of each row's among them (-1: none)."""
+    # A law without a set, such as one with bristles in 3-D, has no letter for its one phase.
+    named = [{"o": "*", "F o": "F *"}.get(itinerary, itinerary) for itinerary in named]
     used = set(np.unique(code).tolist()) - {-1}
-    itineraries = sorted({words[k] for k in used})
-    order = np.full(len(words) + 1, -1, np.int32)
+    itineraries = sorted({named[k] for k in used})
+    order = np.full(len(named) + 1, -1, np.int32)
     for k in used:
-        order[k] = itineraries.index(words[k])
+        order[k] = itineraries.index(named[k])
     return tuple(itineraries), order[code]

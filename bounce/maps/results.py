@@ -14,7 +14,7 @@ Array = NDArray[np.float64]
 
 
 class BounceStatus(IntEnum):
-    """How a bounce of an ensemble ended; stored in arrays."""
+    """How a bounce of an ensemble ended, as a number in arrays."""
 
     LIFTED_OFF = 0
     NO_LIFT_OFF = 1
@@ -30,7 +30,7 @@ class BounceStatus(IntEnum):
 
     @property
     def advice(self) -> str:
-        """The status in a sentence, with what to do."""
+        """The meaning of the status in a sentence."""
         return _ADVICE[self]
 
 
@@ -39,11 +39,11 @@ _ADVICE = {
     BounceStatus.NO_LIFT_OFF: "The load did not vanish before t_max: the ball stays, or t_max is "
     "too short.",
     BounceStatus.NOT_A_LANDING: "The ball is above the ground or moves away from it.",
-    BounceStatus.NOT_FINITE: "An input, or a force on the way, is not a finite number.",
+    BounceStatus.NOT_FINITE: "An input or a force is not a finite number.",
     BounceStatus.BAD_PARAMETER: "A parameter is outside the model's limits.",
     BounceStatus.NO_CONTACT: "The ball passes through the surface without pressing on it.",
-    BounceStatus.NON_UNIQUE: "The motion meets a point from which it is not unique.",
-    BounceStatus.FAILED: "Too many events or steps: simulate this one to see its message.",
+    BounceStatus.NON_UNIQUE: "The motion reaches a point from which it is not unique.",
+    BounceStatus.FAILED: "Too many events or steps: the message of simulate has the details.",
 }
 
 
@@ -100,7 +100,7 @@ class LiftOffs(AlongTheGround):
             f"{BounceStatus(int(s))} {k}"
             for s, k in zip(*np.unique(self.status, return_counts=True), strict=True)
         )
-        words = ", ".join(map(repr, self.itineraries[:8])) + (
+        shown = ", ".join(map(repr, self.itineraries[:8])) + (
             ", ..." if len(self.itineraries) > 8 else ""
         )
-        return f"{type(self).__name__}(shape {self.time.shape}; {counts}; itineraries {words})"
+        return f"{type(self).__name__}(shape {self.time.shape}; {counts}; itineraries {shown})"

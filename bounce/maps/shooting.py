@@ -24,11 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Shooting(ns.orbit.EventPassages):
-    """Motions with a fixed itinerary from touch-down at x = y = 0 to lift-off.
-
-    A ``Passage`` is the lift-off; its ``corner`` is H = xdot + omega, and the tangential acceleration
-    A without friction.
-    """
+    """Motions from touch-down at x = y = 0 to lift-off, whose ``corner`` is H and the acceleration A."""
 
     def __init__(
         self, model: ContactModel, ydot: float, *, tol: float = 1e-13, t_max: float = 1000.0
@@ -66,10 +62,7 @@ class Shooting(ns.orbit.EventPassages):
     # with the itinerary fixed -------------------------------------------------------------------
 
     def passage(self, u: Array, word: str) -> ns.orbit.Passage:
-        """Move with an itinerary such as ``"+s"``; the last phase goes on to lift-off.
-
-        A last phase of rolling is not left, and one of slip does not end, where H = 0.
-        """
+        """Follow an itinerary such as ``"+s"``; its last phase continues to lift-off, even past H = 0."""
         with self._lift_off():
             return super().passage(u, word)
 

@@ -319,20 +319,18 @@ def find_vortices(
 
 
 def _polished(shooting: Shooting, speed: float, spin: float, near: float) -> float:
-    """Refine a spin to full accuracy by the secant method on the tangential force at lift-off.
-
-    Slip at lift-off after rolling is quadratic in the distance from the vortex, so its sign gives half
-    of the digits only. The tangential force at the end of rolling is linear in it.
-    """
+    """Refine a spin to full accuracy by the secant method on the tangential force at lift-off."""
+    # Slip at lift-off after rolling is quadratic in the distance from the vortex, so its sign gives half
+    # of the digits only. The tangential force at the end of rolling is linear in it.
     beside = spin + _BESIDE * near
-    word = simulate(shooting.model, speed, shooting.ydot, beside, tol=shooting.tol).itinerary
-    word = word.replace("F", "").replace(" ", "")
-    if "s" not in word:
+    modes = simulate(shooting.model, speed, shooting.ydot, beside, tol=shooting.tol).itinerary
+    modes = modes.replace("F", "").replace(" ", "")
+    if "s" not in modes:
         return spin  # slip itself is linear, and known to rounding
-    word = word[: word.rindex("s") + 1]
+    modes = modes[: modes.rindex("s") + 1]
 
     def pull(value: float) -> float:
-        return float(shooting.passage(np.array([speed, value]), word).corner[1])
+        return float(shooting.passage(np.array([speed, value]), modes).corner[1])
 
     one, other = beside, spin - _BESIDE * near
     at_one, at_other = pull(one), pull(other)

@@ -1,4 +1,4 @@
-"""Keys below the axes, clear of what is drawn and of the axis' name whatever the size of the picture."""
+"""Keys below the axes of a picture, at a fixed distance from them."""
 
 from __future__ import annotations
 
@@ -20,16 +20,7 @@ def is_narrow(ax: Axes) -> bool:
 
 
 def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int = 2) -> None:
-    """Put a key below the axes, in an artist of its own: the axes' legend stays free if it is taken.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    handles, labels : sequence
-        Of the entries.
-    columns : int, optional
-        At most so many entries on a line.
-    """
+    """Put a key below the axes, as their legend or, if they have one, as an artist of its own."""
     if not handles:
         return
     from matplotlib.transforms import ScaledTranslation

@@ -135,7 +135,7 @@ def outcome_map(
 
 
 def _keys(ax: Axes, patches: list[Patch], lines: dict[str, Any]) -> None:
-    """Say what lines are, below the map, and which regions are narrow, beside it."""
+    """Put a key of the lines below the map, and of the narrow regions beside it."""
     if is_narrow(ax):  # beside a legend little of the map would be left
         labels = [str(patch.get_label()) for patch in patches]
         below(ax, [*lines.values(), *patches], [*lines, *labels])
@@ -163,12 +163,12 @@ def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
     """What the cases of a law on the map mean, for the key; in a column there is no room for it."""
     from matplotlib.patches import Patch
 
-    met = {case for name in outcomes.regions for case in name.rstrip("+-").split("/")}
-    said = [f"{case}: {CASES[case]}" for case in CASES if case in met]
-    if is_narrow(ax) or not said:
+    cases = {case for name in outcomes.regions for case in name.rstrip("+-").split("/")}
+    texts = [f"{case}: {CASES[case]}" for case in CASES if case in cases]
+    if is_narrow(ax) or not texts:
         return {}
-    said.append("+, −: sign of the slip at touch-down")
-    return {text: Patch(alpha=0) for text in said}
+    texts.append("+, −: sign of the slip at touch-down")
+    return {text: Patch(alpha=0) for text in texts}
 
 
 def _field(
@@ -225,21 +225,7 @@ def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, An
 def draw_curve(
     ax: Axes, names: Sequence[str], curve: DividingCurve, view: Sequence[Sequence[float]]
 ) -> dict[str, Any]:
-    """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    names : (str, str)
-    curve : DividingCurve
-    view : ((low, high), (low, high))
-        The limits of the axes.
-
-    Returns
-    -------
-    dict of str: Artist
-        What is to be said of the lines and points in view, with one of each.
-    """
+    """Draw a dividing curve within ``view``, and return a label and an artist for each kind of line."""
     order = [("xdot", "omega").index(name) for name in names]
     styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
     key: dict[str, Any] = {}

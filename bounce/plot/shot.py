@@ -119,7 +119,7 @@ def _phases(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
     before = np.zeros(2)
     for phase in shot.phases:
         t = np.linspace(phase.t_start, phase.t_end, _POINTS)
-        # A transition belongs to the later phase; ask for this one's side of it.
+        # A transition belongs to the later phase: end just before it.
         t[-1] = np.nextafter(phase.t_end, phase.t_start)
         forces = shot.forces(t)
         points = np.column_stack([forces.friction, forces.load])

@@ -23,12 +23,12 @@ Model = TypeVar("Model", bound=ContactModel | Contact3D)
 
 
 class Forces(NamedTuple):
-    """Forces on the ball at the times asked for.
+    """Forces on the ball at given times.
 
     Attributes
     ----------
     load : ndarray (...)
-        What ``mu`` multiplies: the surface's force, less gravity if the model says so.
+        What ``mu`` multiplies: the surface's force, less gravity with ``load="net"``.
     friction : ndarray (...) or (..., 2)
         The friction force along the ground, with its sign.
     """
@@ -177,7 +177,7 @@ class Shot(Generic[Model, Along]):
         return state_of(self._equations, self(t))
 
     def mode(self, t: ArrayLike) -> NDArray[np.str_]:
-        """Letter of the phase at each time; at a transition the later one's.
+        """Mode at each time; at a transition that of the later phase.
 
         Parameters
         ----------
@@ -190,8 +190,8 @@ class Shot(Generic[Model, Along]):
             Modes as in :class:`Phase`.
         """
         ends = np.array([phase.t_end for phase in self.phases[:-1]])
-        letters = np.array([phase.mode for phase in self.phases])
-        return letters[np.searchsorted(ends, np.asarray(t, dtype=float), side="right")]
+        modes = np.array([phase.mode for phase in self.phases])
+        return modes[np.searchsorted(ends, np.asarray(t, dtype=float), side="right")]
 
     def forces(self, t: ArrayLike) -> Forces:
         """Load and friction force along the bounce.
@@ -262,7 +262,7 @@ class Shot(Generic[Model, Along]):
         )
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the bounce: its lift-off, then the run."""
+        """Representation in a notebook: the lift-off, then the run."""
         text = html.escape(repr(self))
         return f"<div><b>{text}</b></div>{self.trajectory._repr_html_()}"
 

@@ -1,4 +1,4 @@
-"""Simulate one bounce, from touch-down to lift-off."""
+"""Simulation of one bounce, from touch-down to lift-off."""
 
 from __future__ import annotations
 
@@ -172,11 +172,9 @@ def _require_lift_off(run: ns.Trajectory, start: Array, limit: float) -> None:
 def _with_friction(
     blueprint: Blueprint, fell: bool, start: list[float], limit: float, options: dict[str, Any]
 ) -> ns.Trajectory:
-    """The contact with friction, to lift-off.
-
-    After a frictionless phase the load has just become positive. A ball at H = 0 then rolls, also
-    where rounding in a steep load hides its sign.
-    """
+    """The contact with friction, to lift-off."""
+    # After a frictionless phase the load has just become positive. A ball at H = 0 then rolls, also
+    # where rounding in a steep load hides its sign.
     system = contact_system(blueprint)
     run = ns.simulate(system, start, limit, **options)
     undecided = run.status is ns.Status.NON_UNIQUE and run.t[-1] == options["t_start"]

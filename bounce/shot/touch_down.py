@@ -86,19 +86,14 @@ def surfaced(states: Array) -> NDArray[np.bool_]:
 
 
 def rests(states: Array, start: Array) -> NDArray[np.bool_]:
-    """Whether balls (..., n) whose load ended are at rest, with a load of rounding errors only.
-
-    Where the load is less gravity and damping is strong, it falls to zero as the ball comes to rest.
-    """
+    """Whether balls (..., n) whose load ended are at rest, with a load of rounding errors only."""
+    # Where the load is less gravity and damping is strong, it falls to zero as the ball comes to rest.
     size = np.maximum(np.abs(states[..., 2]), np.abs(start[..., [2, 3]]).max(axis=-1))
     return np.asarray(np.abs(states[..., 3]) <= _REST * size)
 
 
 def onto_zero_load(blueprint: Blueprint, x: Array, p: Array) -> Array:
-    """Move along the motion until the load is zero to rounding, not to the tolerance of the run.
-
-    A negative load of an instant before would be wrong for a ball that rolls at once.
-    """
+    """Move along the motion until the load is zero to rounding, not to the tolerance of the run."""
     for _ in range(3):
         load, rate, field, _ = ns.call(touch_down_function(blueprint), x, p)
         x = x - load / rate * field
@@ -155,7 +150,7 @@ def _finite_load(blueprint: Blueprint, x: Array, p: Array) -> float:
 
 
 def no_lift_off(run: ns.Trajectory, t_max: float) -> str:
-    """Say why a run ended without lift-off."""
+    """Why a run ended without lift-off, and what to do."""
     y, ydot = run.x[-1, 2], run.x[-1, 3]
     if run.status is not ns.Status.REACHED_END:
         return (

@@ -26,20 +26,24 @@ FAST = (MODELS[0], MODELS[1], MODELS[4])
 CASES = [m if m in FAST else pytest.param(m, marks=pytest.mark.slow) for m in MODELS]
 
 
-@pytest.mark.parametrize("model", CASES, ids=lambda m: type(m).__name__)
+IN_3D = [TURF.in_3d(side_slope=0.1), TURF.in_3d(drilling_radius=0.1), FAST[2].in_3d()]
+
+
+@pytest.mark.parametrize("model", [*CASES, *IN_3D], ids=repr)
 def test_agrees_with_single_bounces(model):
     """Also where friction begins only when the load has risen, or at a power law's zero."""
-    rng = np.random.default_rng(1)
-    xdot, omega = rng.uniform(-1, 1, 100), rng.uniform(-2, 2, 100)
+    rng, along = np.random.default_rng(1), (2,) if model in IN_3D else ()
+    xdot, omega = rng.uniform(-1, 1, (100, *along)), rng.uniform(-2, 2, (100, *along))
     ydot = rng.uniform(-2, -0.5, 100)
     many = bounce.lift_off(model, xdot, ydot, omega, tol=1e-12)
     assert many.complete.all()
     for k in range(0, 100, 9):
         shot = bounce.simulate(model, xdot[k], ydot[k], omega[k], tol=1e-12)
-        row = [getattr(many, name)[k] for name in bounce.shot.State._fields]
-        assert np.abs(np.array(row) - shot.lift_off).max() < 1e-10
+        for name, value in zip(shot.lift_off._fields, shot.lift_off, strict=True):
+            assert np.abs(getattr(many, name)[k] - value).max() < 1e-10
         assert abs(many.time[k] - shot.time) < 1e-10
-        assert abs(many.slip[k] - shot.slip) < 1e-10
+        assert np.abs(many.slip[k] - shot.slip).max() < 1e-10
+        assert many.travel_angle[k] == pytest.approx(shot.travel_angle, abs=1e-8)
         assert many.itinerary[k] == shot.itinerary
 
 

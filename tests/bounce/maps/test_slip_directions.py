@@ -14,20 +14,6 @@ import nonsmooth as ns
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 
 
-def test_arrays_are_the_bounces_one_by_one():
-    rng = np.random.default_rng(4)
-    v, w = rng.uniform(-1, 1, (4, 2)), rng.uniform(-1, 1, (4, 2))
-    for model in (TURF.in_3d(side_slope=0.1), TURF.in_3d(drilling_radius=0.1)):
-        many = bounce.lift_off(model, v, -1.0, w, tol=1e-9)
-        assert np.all(many.complete)
-        for k in range(4):
-            one = bounce.simulate(model, v[k], -1.0, w[k], tol=1e-9)
-            assert many.itinerary[k] == one.itinerary
-            assert many.slip[k] == pytest.approx(one.slip, abs=1e-8)
-            assert many.omega[k] == pytest.approx(one.lift_off.omega, abs=1e-8)
-            assert many.travel_angle[k] == pytest.approx(one.travel_angle, abs=1e-6)
-
-
 def test_arrays_of_a_law_with_bristles_and_of_what_is_no_landing():
     dahl = TURF.replace(friction=bounce.contact.Dahl(bristle_stiffness=20.0)).in_3d()
     many = bounce.lift_off(dahl, [[1.0, 0.0], [np.nan, 0.0]], [-1.0, -1.0], [0.2, 0.1])

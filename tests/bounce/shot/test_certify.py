@@ -102,9 +102,9 @@ def test_what_cannot_be_proven_says_why():
 def test_what_is_given_wrongly_is_refused():
     with pytest.raises(ns.ParameterError, match="mu"):
         bounce.certify(TURF, 1, -1, 0, parameters={"mu": (-0.1, 0.3)})
-    with pytest.raises(ns.ParameterError, match="names among"):
+    with pytest.raises(ns.ParameterError, match="'nu'"):
         bounce.certify(TURF, 1, -1, 0, parameters={"nu": 1})
-    with pytest.raises(bounce.LandingError, match="below zero"):
+    with pytest.raises(bounce.LandingError, match="ydot"):
         bounce.certify(TURF, 1, (-1, 1), 0)
     with pytest.raises(bounce.ModelError, match="ContactModel"):
         bounce.certify(3, 1, -1, 0)

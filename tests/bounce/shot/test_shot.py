@@ -67,24 +67,43 @@ def test_straight_drop_rolls():
     assert shot.itinerary == "s" and shot.lift_off.xdot == shot.lift_off.omega == 0.0
 
 
+PAIR = [1.0, 0.0]
+
+
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("landing", "name"),
     [
-        (dict(xdot=1, ydot=1.0, omega=0), "ydot"),
-        (dict(xdot=1, ydot=0.0, omega=0), "ydot"),
-        (dict(xdot=1, ydot=-1.0, omega=0, y=0.1), "y is 0.1"),
-        (dict(xdot=math.nan, ydot=-1.0, omega=0), "xdot"),
-        (dict(xdot=1, ydot=-math.inf, omega=0), "ydot"),
-        (dict(xdot=1, ydot=-1.0, omega="fast"), "omega"),
-        (dict(xdot=[1, 2], ydot=-1.0, omega=0), "xdot"),
-        (dict(xdot=np.ones(3), ydot=-1.0, omega=0), "xdot"),
-        (dict(xdot=1, ydot=-1.0, omega=None), "omega"),
+        ((1, 1.0, 0), "ydot"),
+        ((1, 0.0, 0), "ydot"),
+        ((1, -1.0, 0, 0.0, 0.1), "y is 0.1"),
+        ((math.nan, -1.0, 0), "xdot"),
+        ((1, -math.inf, 0), "ydot"),
+        ((1, -1.0, "fast"), "omega"),
+        ((1, -1.0, None), "omega"),
+        ((1, [-1.0], 0), "ydot"),
+        (([1, 2], -1.0, 0), "omega"),
+        ((1.0, -1.0, PAIR), "xdot"),
+        ((np.ones(3), -1.0, PAIR), "xdot"),
+        (([1.0], -1.0, PAIR), "xdot"),
+        ((PAIR, -1.0, [0.1, 0.2, 0.3]), "omega.*drilling_radius"),
+        ((PAIR, -1.0, [PAIR]), "omega"),
+        (([1.0, math.nan], -1.0, PAIR), r"xdot\[1\]"),
+        ((["1", "2"], -1.0, PAIR), r"xdot\[0\]"),
+        ((PAIR, 0.0, PAIR), "ydot"),
+        ((PAIR, [-1.0], PAIR), "ydot"),
+        ((PAIR, -1.0, PAIR, 0.5), "x"),
     ],
-)  # fmt: skip
-def test_not_a_landing(arguments, message):
-    with pytest.raises(bounce.LandingError, match=message) as raised:
-        bounce.simulate(TURF, **arguments)
+    ids=repr,
+)
+def test_not_a_landing(landing, name):
+    with pytest.raises(bounce.LandingError, match=name) as raised:
+        bounce.simulate(TURF, *landing)
     assert isinstance(raised.value, ns.NonsmoothError) and isinstance(raised.value, ValueError)
+
+
+def test_a_landing_in_the_plane_on_a_surface_in_3d():
+    with pytest.raises(bounce.LandingError, match=r"xdot.*in_3d"):
+        bounce.simulate(TURF.in_3d(), 1.0, -1.0, 0.1)
 
 
 def test_moving_up_without_load():
@@ -153,6 +172,8 @@ def test_not_a_model():
         bounce.simulate(bounce.KelvinVoigt, 1.0, -1.0, 0.0)
     with pytest.raises(bounce.ModelError, match="lift_off"):
         bounce.simulate(bounce.laws.RigidBounce(mu=0.3, restitution=0.5), 1.0, -1.0, 0.0)
+    with pytest.raises(bounce.ModelError, match="lift_off"):
+        bounce.simulate(bounce.laws.RigidBounce(mu=0.3, restitution=0.5), PAIR, -1.0, PAIR)
 
 
 def test_energy_needs_the_models_word():

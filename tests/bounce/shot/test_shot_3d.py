@@ -257,34 +257,11 @@ def test_drilling_takes_the_roll_from_a_ball_that_spins_about_the_vertical():
     )
 
 
-@pytest.mark.parametrize(
-    "landing, message",
-    [
-        (([1.0, 0.0], -1.0, 0.1), "omega"),
-        ((1.0, -1.0, [0.1, 0.2]), "xdot"),
-        (([1.0], -1.0, [0.1, 0.2]), "xdot"),
-        (([1.0, 0.0], -1.0, [0.1, 0.2, 0.3]), "omega"),
-        (([1.0, 0.0], -1.0, [[0.1, 0.2]]), "omega"),
-        (([1.0, math.nan], -1.0, [0.1, 0.2]), r"xdot\[1\]"),
-        (([1.0, 0.0], 0.0, [0.1, 0.2]), "ydot"),
-        (([1.0, 0.0], [-1.0], [0.1, 0.2]), "ydot"),
-        (([1.0, 0.0], -1.0, [0.1, 0.2], 0.5), "x"),
-    ],
-)
-def test_what_is_no_landing(landing, message):
-    with pytest.raises(bounce.LandingError, match=message):
-        bounce.simulate(TURF, *landing)
-
-
 def test_refusals_of_contacts():
-    with pytest.raises(bounce.LandingError, match="xdot"):
-        bounce.simulate(TURF.in_3d(), 1.0, -1.0, 0.1)
     with pytest.raises(ns.ParameterError, match="grain"):
         TURF.in_3d(grain=0.3)
     with pytest.raises(ns.ParameterError, match="friction_ratio"):
         TURF.in_3d(friction_ratio=1.5)
-    with pytest.raises(bounce.ModelError, match="model"):
-        bounce.simulate(bounce.laws.RigidBounce(mu=0.3, restitution=0.5), [1, 0], -1, [0, 0])
 
     class Cubic(bounce.ContactModel):
         parameters = dict(mu=0.3)

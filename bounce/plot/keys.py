@@ -39,3 +39,17 @@ def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int 
 
     key = ax.add_artist(Legend(ax, handles, labels, **look))
     key.set_clip_on(False)  # the layout leaves out what it takes for clipped to the axes
+
+
+def keys(ax: Axes, patches: Sequence[Any], lines: dict[str, Any], title: str) -> None:
+    """Put a key of the lines below a map, and of the patches beside it, or below a narrow one too."""
+    if is_narrow(ax):
+        labels = [str(patch.get_label()) for patch in patches]
+        below(ax, [*lines.values(), *patches], [*lines, *labels])
+        return
+    if patches:
+        ax.legend(
+            handles=patches, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
+            frameon=False, fontsize=8, title=title, title_fontsize=8,
+        )  # fmt: skip
+    below(ax, list(lines.values()), list(lines))

@@ -17,10 +17,8 @@ from ..laws.law import CASES
 from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
 from ..units import UNITS
-from .keys import below, is_narrow
-from .regions import COLOURS as COLOURS
+from .keys import is_narrow, keys
 from .regions import LISTED, regions
-from .regions import MORE as MORE
 
 style = ns.plot.style
 Array = NDArray[np.float64]
@@ -123,7 +121,7 @@ def outcome_map(
             room = LISTED - len(lines) if is_narrow(ax) else LISTED
             patches = regions(ax, outcomes, x, y, room)
             lines |= _cases(ax, outcomes)
-        _keys(ax, patches, lines)
+        keys(ax, patches, lines, "narrow regions")
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
             what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
             axis.set_label_text(f"{what} ({unit})" if unit else what)
@@ -132,20 +130,6 @@ def outcome_map(
         title = textwrap.fill(_title(outcomes, units), letters)
         ax.set_title(title.replace(_JOINED, " "), fontsize=_TITLE, loc="left", color="0.3")
     return figure
-
-
-def _keys(ax: Axes, patches: list[Patch], lines: dict[str, Any]) -> None:
-    """Put a key of the lines below the map, and of the narrow regions beside it."""
-    if is_narrow(ax):  # beside a legend little of the map would be left
-        labels = [str(patch.get_label()) for patch in patches]
-        below(ax, [*lines.values(), *patches], [*lines, *labels])
-        return
-    if patches:
-        ax.legend(
-            handles=patches, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
-            frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
-        )  # fmt: skip
-    below(ax, list(lines.values()), list(lines))
 
 
 def _without_lift_off(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:

@@ -9,7 +9,7 @@ import nonsmooth as ns
 from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.proven import OUTCOMES, ProvenMap
-from .keys import below, is_narrow
+from .keys import keys
 from .outcomes import draw_curve
 
 style = ns.plot.style
@@ -80,13 +80,5 @@ def proven_map(
             for name, share in found.area.items()
             if share > 0
         ]
-        if is_narrow(ax):
-            labels = [str(patch.get_label()) for patch in handles]
-            below(ax, [*key.values(), *handles], [*key, *labels])
-            return figure
-        ax.legend(  # beside the map, not on its pieces
-            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
-            frameon=False, fontsize=8, title="proven, share", title_fontsize=8,
-        )  # fmt: skip
-        below(ax, list(key.values()), list(key))
+        keys(ax, handles, key, "proven, share")
     return figure

@@ -170,7 +170,7 @@ def test_a_map_of_yes_and_no_has_two_colours(outcomes):
 
 def test_neighbouring_regions_differ_in_grey():
     """For readers who see no colours at all."""
-    from bounce.plot.outcomes import COLOURS
+    from bounce.plot.regions import COLOURS
 
     def grey(name):
         return float(np.dot(matplotlib.colors.to_rgb(COLOURS[name]), [0.299, 0.587, 0.114]))

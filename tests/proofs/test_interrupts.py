@@ -31,19 +31,19 @@ def test_a_map_of_proofs_keeps_its_decided_pieces(monkeypatch):
 
 @pytest.mark.parametrize("value", [None, 0.3, "ab", (0.0, float("inf"))])
 def test_a_range_of_landings_is_two_numbers(value):
-    with pytest.raises(bounce.LandingError, match=r"xdot: expected \(low, high\) with low < high"):
+    with pytest.raises(bounce.LandingError, match="xdot"):
         bounce.maps.proven_map(TURF, xdot=value, omega=(0.0, 1.0))
 
 
 @pytest.mark.parametrize("ydot", [0.0, 1.0, None, "down", (-1.0, 0.5)])
 def test_a_landing_goes_into_the_ground(ydot):
-    with pytest.raises(bounce.LandingError, match="ydot: expected a speed below zero"):
+    with pytest.raises(bounce.LandingError, match="ydot"):
         bounce.certify(TURF, 0.3, ydot, 0.1)
 
 
 @pytest.mark.parametrize("value", ["much", None, -0.3, (0.1, -0.1)])
 def test_a_parameter_is_within_its_limits(value):
-    with pytest.raises(ns.ParameterError, match="mu: expected values"):
+    with pytest.raises(ns.ParameterError, match="mu"):
         bounce.certify(TURF, 0.3, -1.0, 0.1, parameters={"mu": value})
 
 

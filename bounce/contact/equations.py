@@ -111,7 +111,7 @@ class Equations:
         self.names = (*own, *self.start)
         if len(set(self.names)) < len(self.names):
             raise ModelError(
-                f"{who}: extra_states has a name twice, or one of {own}: the states are {self.names}. "
+                f"{who}: extra_states has one of the ball's names {own}: the states are {self.names}. "
                 "Rename it."
             )
         self.x = {name: ca.SX.sym(name) for name in self.names}

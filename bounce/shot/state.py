@@ -138,7 +138,7 @@ def landings(
     x = given["x"]
     if not is_vector(x) and number(x, "x", LandingError) == 0.0:
         x = np.zeros(2)
-    v, place = _components("xdot", given["xdot"], (2,), read), _components("x", x, (2,), read)
+    v, position = _components("xdot", given["xdot"], (2,), read), _components("x", x, (2,), read)
     w = _components("omega", given["omega"], (2, 3) if model.drilling else (2,), read)
     try:
         slip_x, slip_z = v[0] + w[0], v[1] + w[1]
@@ -147,7 +147,7 @@ def landings(
             f"xdot has shape {np.shape(given['xdot'])} and omega {np.shape(given['omega'])}, which do "
             "not broadcast."
         ) from error
-    named = dict(x=place[0], z=place[1], xdot=v[0], zdot=v[1], slip_x=slip_x, slip_z=slip_z)
+    named = dict(x=position[0], z=position[1], xdot=v[0], zdot=v[1], slip_x=slip_x, slip_z=slip_z)
     turning = dict(spin=w[2] if len(w) > 2 else read(0.0, "omega")) if model.drilling else {}
     return {**named, **turning, **{name: read(given[name], name) for name in ("y", "ydot")}}
 

@@ -16,6 +16,8 @@ def test_what_a_shot_holds():
     shot = bounce.simulate(TURF, xdot=0.3, ydot=-1.0, omega=0.1, tol=1e-12)
     assert shot.landing == bounce.shot.State(0.3, -1.0, 0.1, 0.0, 0.0)
     assert shot.slip == shot.lift_off.xdot + shot.lift_off.omega
+    assert shot.slip_speed == -shot.slip and shot.slip_angle == shot.turn == math.pi
+    assert shot.travel_angle == shot.kick == 0.0 and shot.reversal
     assert shot.restitution == -shot.lift_off.ydot / -1.0
     assert shot.model is TURF and shot.approach is None
     assert shot.trajectory.status is ns.Status.STOPPED
@@ -23,6 +25,8 @@ def test_what_a_shot_holds():
     assert shot.phases[0].t_start == 0.0 and shot.phases[-1].t_end == shot.time
     assert np.allclose(shot(shot.time), shot.trajectory.x[-1], rtol=0, atol=1e-15)
     assert shot(np.linspace(0, 1, 6).reshape(2, 3)).shape == (2, 3, 5)
+    assert np.array_equal(shot.state([0.0, 1.0]).slip, shot([0.0, 1.0])[:, [1, 4]].sum(axis=1))
+    assert bounce.simulate(TURF, *shot.landing, tol=1e-12).lift_off == shot.lift_off
     middle = [0.5 * (p.t_start + p.t_end) for p in shot.phases]
     assert list(shot.mode(middle)) == ["+", "s", "-"]
     assert "slip = -0.0063" in repr(shot)

@@ -3,6 +3,7 @@ one another than friction lets them; they turn and mirror with their landings.""
 
 import json
 import math
+import pickle
 from pathlib import Path
 
 import numpy as np
@@ -178,6 +179,15 @@ def test_a_turned_landing_lifts_off_turned_to_rounding(angle, v, w, eta):
     assert (
         abs(one.time - other.time) <= 0.5 * len(one.trajectory.t) * np.finfo(float).eps * one.time
     )
+
+
+def test_a_state_is_what_simulate_takes_and_keeps_its_slip():
+    shot = bounce.simulate(TURF, [1.0, 0.0], -1.0, [0.2, 0.5])
+    again = pickle.loads(pickle.dumps(shot.lift_off))
+    assert np.array_equal(again.slip, shot.slip) and again.slip_angle == shot.slip_angle
+    assert np.array_equal(bounce.simulate(TURF, *shot.landing).slip, shot.slip)
+    moved = shot.lift_off._replace(xdot=np.zeros(2))
+    assert np.array_equal(moved.slip, shot.lift_off.omega)
 
 
 def test_forces_oppose_the_slip_and_are_inside_the_cone_while_rolling():

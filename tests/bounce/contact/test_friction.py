@@ -89,9 +89,9 @@ def test_parameters_of_a_law_belong_to_the_model():
     assert "friction=Stribeck" in repr(model)
     with pytest.raises(ns.ParameterError, match="mu_kinetic"):
         model.replace(mu_kinetic=-1.0)
-    with pytest.raises(ns.ParameterError, match="expected a value for"):
+    with pytest.raises(ns.ParameterError, match="stribeck_speed"):
         bounce.contact.Stribeck(mu_kinetic=0.2)
-    with pytest.raises(ns.ParameterError, match="finite"):
+    with pytest.raises(ns.ParameterError, match="viscosity"):
         bounce.contact.Viscous(viscosity=math.nan)
 
 

@@ -283,7 +283,7 @@ def test_bristles_are_refused():
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda: bounce.dividing_curve(TURF, 1.0), ns.OptionError, "-ydot: expected a positive"),
+        (lambda: bounce.dividing_curve(TURF, 1.0), ns.OptionError, "ydot"),
         (
             lambda: bounce.dividing_curve(TURF, reach=0),
             ns.OptionError,

@@ -119,7 +119,7 @@ def test_lift_off_that_never_comes():
     with pytest.raises(bounce.LiftOffError, match="t_max = 1") as raised:
         bounce.simulate(TURF, 1.0, -1.0, 0.0, t_max=1.0)
     assert raised.value.trajectory.status is ns.Status.REACHED_END
-    with pytest.raises(bounce.LiftOffError, match="came to rest in the ground"):
+    with pytest.raises(bounce.LiftOffError, match="came to rest"):
         bounce.simulate(TURF.replace(G=10.0), 0.1, -1.0, 0.0)
 
 
@@ -245,9 +245,9 @@ class Law(bounce.ContactModel):
 @pytest.mark.parametrize(
     ("law", "cause"),
     [
-        (lambda s: s.y, "sinks without end.*positive in compression"),
-        (lambda s: s.y - 1, "sinks without end.*positive in compression"),
-        (lambda s: ca.exp(-s.y), "above the ground: the load of this model does not vanish"),
+        (lambda s: s.y, "sinks"),
+        (lambda s: s.y - 1, "sinks"),
+        (lambda s: ca.exp(-s.y), "above the ground"),
     ],
     ids=["wrong sign", "attractive", "never vanishes"],
 )

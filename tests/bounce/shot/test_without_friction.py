@@ -89,7 +89,7 @@ def test_laws(hypothesis, xdot, omega):
 
 def test_a_ball_without_friction_slips_for_ever_on_the_ground():
     law = bounce.laws.RigidBounce(mu=0.0, restitution=0.0)
-    with pytest.raises(bounce.golf.NoRestError, match="friction stops the slip"):
+    with pytest.raises(bounce.golf.NoRestError, match="friction"):
         bounce.golf.play(law, bounce.Landing(5.0, -1.0, 0.0))
 
 

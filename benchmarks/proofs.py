@@ -59,7 +59,7 @@ def run(quick: bool) -> dict[str, Any]:
     """Time each proof, and say whether it was one."""
     side = 4 if quick else 10
     linear = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-    soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    soft = bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
     work = {
         "a two-fold with its class, to 1e-30": two_fold(),
         "a linear bounce": one_bounce(linear),

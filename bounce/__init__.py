@@ -1,20 +1,27 @@
-"""The bounce of a spinning ball on compliant ground with dry friction: the front door.
+"""The bounce of a spinning ball on compliant ground with dry friction.
 
 A ball of unit radius and mass, centre (x, y), spin omega (positive is backspin for xdot > 0), lands
-at y = 0 with ydot < 0. The ground pushes with a normal force and a tangential one, and rubs:
+at y = 0 with ydot < 0. The ground acts with a normal and a tangential force, and with dry friction:
 
     x'' = tangential_force + Lambda_T,  y'' = normal_force - G,  omega' = Lambda_T / inertia,
     Lambda_T = -lambda mu Lambda_N,  lambda in Sgn(H),  H = xdot + omega.
 
 H is the velocity of the contact point: the ball slips forward (``+``), slips in reverse (``-``) or
-rolls (``s``, sliding in Filippov's words); where the load Lambda_N first falls to zero it lifts
-off. A ball that lifts off rolling passes through a two-fold, so almost none does. A rigid ground
-cannot reverse the slip; any tangential compliance can (Biber, Champneys & Szalai 2022).
+rolls (``s``, sliding in Filippov's sense). It lifts off where the load Lambda_N first falls to zero.
+A ball that lifts off rolling passes through a two-fold, so almost none does. A rigid ground cannot
+reverse the slip; any tangential compliance can (Biber, Champneys & Szalai 2022). With side spin
+xdot, omega and H are vectors, forward and to the right.
 
-``simulate(model, xdot, ydot, omega)`` follows one bounce. A model is a ``ContactModel``: two forces
-written once, either one of those here or your own. Numbers are dimensionless as the model is;
-``Ball``, ``Landing`` and ``Scaling`` go to SI units and back. ``bounce.laws`` has the laws in closed
-form, ``bounce.golf`` what happens before, between and after bounces, ``bounce.plot`` the pictures.
+``simulate(model, xdot, ydot, omega)`` follows one bounce, ``lift_off`` many. A model is a
+``ContactModel``: two forces written once, one of ``bounce.contact`` or your own. Numbers are
+dimensionless as the model is; ``Ball``, ``Landing`` and ``Scaling`` convert from and to SI units.
+
+- ``bounce.contact``: contact models and friction laws.
+- ``bounce.shot``: what one bounce returns.
+- ``bounce.maps``: results of many bounces, the dividing surface, vortices, proven maps.
+- ``bounce.laws``: laws in closed form.
+- ``bounce.golf``: flight, bounces and roll of a golf ball, and fits to measurements.
+- ``bounce.plot``: pictures.
 """
 
 from __future__ import annotations
@@ -22,34 +29,20 @@ from __future__ import annotations
 import importlib
 from typing import TYPE_CHECKING, Any
 
-from . import golf, laws
-from .contact.friction import Coulomb, Dahl, ExponentialDecay, FrictionLaw, LuGre, Stribeck, Viscous
+from . import contact, golf, laws, maps, shot
 from .contact.generalised import GeneralisedContact
 from .contact.model import ContactModel
-from .contact.models import (
-    DepthDampedKelvinVoigt,
-    Hertz,
-    HuntCrossley,
-    KelvinVoigt,
-    KuwabaraKono,
-    Maxwell,
-    NormalKelvinVoigt,
-    Tsuji,
-)
-from .contact.space import Contact3D
+from .contact.models import Hertz, KelvinVoigt, NormalKelvinVoigt
 from .errors import EnergyWarning, LandingError, LiftOffError, ModelError, UnknownNameError
-from .maps.dividing import DividingCurve, critical_eta, dividing_curve
-from .maps.dividing_surface import DividingSurface, dividing_surface
+from .maps.dividing import dividing_curve
 from .maps.lift_offs import lift_off
-from .maps.outcomes import OutcomeMap, outcome_map
-from .maps.proven import ProvenMap, proven_map
-from .maps.results import BounceStatus, LiftOffs, LiftOffs3D
-from .maps.slip_directions import SlipMap, Vortex, find_vortices, slip_map, winding_number
-from .maps.turning import SlipTurn, slip_turn
-from .shot.certify import BounceProof, certify
-from .shot.sensitivity import Sensitivity, sensitivity
-from .shot.single import Shot, State, simulate
-from .shot.space import Shot3D, State3D
+from .maps.outcomes import outcome_map
+from .maps.results import BounceStatus
+from .maps.slip_directions import slip_map
+from .shot.certify import certify
+from .shot.sensitivity import sensitivity
+from .shot.shot import Shot
+from .shot.simulate import simulate
 from .units import BALLS, Ball, Landing, Scaling
 
 if TYPE_CHECKING:
@@ -58,73 +51,43 @@ if TYPE_CHECKING:
 __all__ = [
     "BALLS",
     "Ball",
-    "BounceProof",
     "BounceStatus",
-    "Contact3D",
     "ContactModel",
-    "Coulomb",
-    "Dahl",
-    "DepthDampedKelvinVoigt",
-    "DividingCurve",
-    "DividingSurface",
     "EnergyWarning",
-    "ExponentialDecay",
-    "FrictionLaw",
     "GeneralisedContact",
     "Hertz",
-    "HuntCrossley",
     "KelvinVoigt",
-    "KuwabaraKono",
     "Landing",
     "LandingError",
     "LiftOffError",
-    "LiftOffs",
-    "LiftOffs3D",
-    "LuGre",
-    "Maxwell",
     "ModelError",
     "NormalKelvinVoigt",
-    "OutcomeMap",
-    "ProvenMap",
     "Scaling",
-    "Sensitivity",
     "Shot",
-    "Shot3D",
-    "SlipMap",
-    "SlipTurn",
-    "State",
-    "State3D",
-    "Stribeck",
-    "Tsuji",
     "UnknownNameError",
-    "Viscous",
-    "Vortex",
     "certify",
-    "critical_eta",
+    "contact",
     "dividing_curve",
-    "dividing_surface",
-    "find_vortices",
     "golf",
     "laws",
     "lift_off",
+    "maps",
     "outcome_map",
     "plot",
-    "proven_map",
     "sensitivity",
+    "shot",
     "simulate",
     "slip_map",
-    "slip_turn",
-    "winding_number",
 ]
 
 
 def __getattr__(name: str) -> Any:
-    """Load the pictures only when they are asked for (matplotlib is slow to import)."""
+    """Load the pictures on first use (matplotlib is slow to import)."""
     if name == "plot":
         return importlib.import_module(".plot", __name__)
     raise AttributeError(f"module 'bounce' has no attribute {name!r}")
 
 
 def __dir__() -> list[str]:
-    """Return what the front door offers, without what it needs itself."""
+    """Return the public names."""
     return sorted([*__all__, *(name for name in globals() if name.startswith("__"))])

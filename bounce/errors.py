@@ -1,4 +1,4 @@
-"""What can go wrong with a bounce; every error also derives from ``nonsmooth.NonsmoothError``."""
+"""Errors of ``bounce``; every one derives from ``nonsmooth.NonsmoothError``."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ class ModelError(ns.DefinitionError):
 
 
 class UnknownNameError(ModelError, AttributeError):
-    """A force asks for a state or parameter that the model does not have."""
+    """A force uses a state or parameter that the model does not have."""
 
 
 class EnergyWarning(UserWarning):
@@ -24,31 +24,7 @@ class LandingError(ns.PointError):
 
 
 def require(value: Any, kinds: type | tuple[type, ...], name: str, advice: str) -> None:
-    """Refuse what is of another kind than the one that is asked for.
-
-    Parameters
-    ----------
-    value : object
-        What was given.
-    kinds : type or tuple of type
-        What is expected.
-    name : str
-        Of the argument.
-    advice : str
-        Where one gets what is expected.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-
-    Examples
-    --------
-    >>> require(3, (int, float), "size", "Count it.")
-    >>> require("x", (int, float), "size", "Count it.")
-    Traceback (most recent call last):
-        ...
-    nonsmooth.model.errors.OptionError: size: expected int or float, received 'x'. Count it.
-    """
+    """Raise an ``OptionError`` unless the argument has one of these types."""
     if not isinstance(value, kinds):
         names = " or ".join(k.__name__ for k in (kinds if isinstance(kinds, tuple) else (kinds,)))
         raise ns.OptionError(f"{name}: expected {names}, received {value!r}. {advice}")

@@ -1,4 +1,4 @@
-"""Named, checked, immutable parameters: what contact models and friction laws have in common."""
+"""Immutable objects with named, checked parameters: the base of contact models and laws."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import nonsmooth as ns
 
 from .errors import ModelError, UnknownNameError
 
-#: What a limit means; the keys are the words used in ``limits`` and in messages.
+#: Checks of limits by their text, which ``limits`` and messages use.
 LIMITS: dict[str, Callable[[float], bool]] = {
     "> 0": lambda v: v > 0,
     ">= 0": lambda v: v >= 0,
@@ -25,15 +25,7 @@ LIMITS: dict[str, Callable[[float], bool]] = {
 
 
 def number(value: Any, what: str, error: type[Exception] = ns.ParameterError) -> float:
-    """Turn a scalar into a finite float or raise.
-
-    Examples
-    --------
-    >>> number("3", "mu")
-    Traceback (most recent call last):
-      ...
-    nonsmooth.model.errors.ParameterError: mu: expected a finite number, received '3' (str).
-    """
+    """Return a scalar as a finite float, or raise."""
     try:
         result = math.nan if isinstance(value, (str, bytes, bool)) else float(value)
     except (TypeError, ValueError, NotImplementedError):
@@ -47,15 +39,7 @@ def number(value: Any, what: str, error: type[Exception] = ns.ParameterError) ->
 def numbers(
     value: ArrayLike, what: str, error: type[Exception] = ns.ParameterError
 ) -> NDArray[np.float64]:
-    """Turn a number or an array of numbers, finite or not, into an array or raise.
-
-    Examples
-    --------
-    >>> numbers([1, "fast"], "speed")
-    Traceback (most recent call last):
-      ...
-    nonsmooth.model.errors.ParameterError: speed: expected numbers, received [1, 'fast'].
-    """
+    """Return numbers, finite or not, as an array, or raise."""
     try:
         return np.asarray(value, dtype=float)
     except (TypeError, ValueError) as cause:
@@ -63,20 +47,7 @@ def numbers(
 
 
 def require_positive(**options: Any) -> None:
-    """Refuse options that are no positive numbers.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-
-    Examples
-    --------
-    >>> require_positive(min_height=0.005)
-    >>> require_positive(min_height=0)
-    Traceback (most recent call last):
-      ...
-    nonsmooth.model.errors.OptionError: min_height: expected a positive number, received 0.
-    """
+    """Raise an ``OptionError`` for options that are not positive numbers."""
     for name, value in options.items():
         if not number(value, name, ns.OptionError) > 0:
             raise ns.OptionError(f"{name}: expected a positive number, received {value!r}.")
@@ -101,7 +72,7 @@ class Parametrised:
 
     def __init_subclass__(cls, **kwargs: Any) -> None:
         super().__init_subclass__(**kwargs)
-        # What help() and editors show: each parameter by name instead of **values.
+        # help() and editors show each parameter by name instead of **values.
         kind = inspect.Parameter
         shown = list(inspect.signature(cls.__init__).parameters.values())[1:]
         named = [p for p in shown if p.kind is not kind.VAR_KEYWORD]
@@ -241,15 +212,7 @@ def _merged(cls: type, attribute: str) -> dict[str, Any]:
 
 
 class Names:
-    """Symbols by attribute: ``s.xdot``, ``p.mu``; an unknown name is an error that lists the known.
-
-    Examples
-    --------
-    >>> Names("parameter", {"mu": 0.3}).nu
-    Traceback (most recent call last):
-      ...
-    bounce.errors.UnknownNameError: parameter 'nu': expected one of ['mu'], received 'nu'. ...
-    """
+    """Symbols by attribute: ``s.xdot``, ``p.mu``; the error for an unknown name lists the known ones."""
 
     def __init__(self, kind: str, symbols: Mapping[str, Any]):
         self.__dict__["_kind"] = kind

@@ -1,4 +1,4 @@
-"""From a ball and a landing in SI units to the dimensionless models and back.
+"""Balls and landings in SI units, and their conversion to and from dimensionless models.
 
 Both consistent scalings have a unit of time T (eps2 in seconds, 1/T the natural frequency of the
 normal spring), a unit of speed U, of length U T and of spin U/R:
@@ -20,7 +20,7 @@ from typing import Literal
 import nonsmooth as ns
 
 from .parameters import LIMITS, number
-from .shot.single import State
+from .shot.state import State
 
 #: Standard gravity, m/s^2 (BIPM, The International System of Units, 9th ed.).
 GRAVITY = 9.80665

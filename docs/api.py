@@ -91,12 +91,14 @@ def overview() -> str:
 
 
 _INTRODUCTION = (
-    "What most programs use is imported as `nonsmooth.name` or `bounce.name`. "
+    "What most programs use is `nonsmooth.name` or `bounce.name`. "
     "Analysis at one point is in `nonsmooth.local`, parts of runs in `nonsmooth.flow`, orbits and their results "
     "in `nonsmooth.orbit`, proofs in `nonsmooth.proofs`. "
     "The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`; "
-    "`nonsmooth.continuation` follows curves of any equations. What is before, between and after bounces is in `bounce.golf`, laws in "
-    "closed form are in `bounce.laws`."
+    "`nonsmooth.continuation` follows curves of any equations. "
+    "More contact models and the friction laws are in `bounce.contact`, what one "
+    "bounce returns is in `bounce.shot`, what many return in `bounce.maps`, laws in closed form are in "
+    "`bounce.laws`, and `bounce.golf` is about golf balls from launch to rest."
 )
 
 

@@ -116,25 +116,26 @@ TASKS = {
         "One bounce",
         "From touch-down to lift-off: slip, rolling, forces, and derivatives of the lift-off.",
         "bounce",
-        "simulate Shot Shot3D shot.Phase shot.Forces State State3D BounceStatus sensitivity Sensitivity certify "
-        "BounceProof",
+        "simulate Shot shot.Phase shot.Forces shot.State BounceStatus sensitivity shot.Sensitivity certify "
+        "shot.BounceProof",
     ),
     "bounce_models": _task(
         "What the surface is",
         "A contact model is a normal and a tangential force; friction is one of the laws below. "
         "[Write your own contact model](../contact_model.md) shows how.",
         "bounce",
-        "ContactModel Contact3D KelvinVoigt NormalKelvinVoigt DepthDampedKelvinVoigt Hertz HuntCrossley Tsuji "
-        "KuwabaraKono Maxwell GeneralisedContact contact.Conditions contact.Condition FrictionLaw "
-        "Coulomb Stribeck ExponentialDecay Viscous LuGre Dahl",
+        "ContactModel contact.Contact3D KelvinVoigt NormalKelvinVoigt contact.DepthDampedKelvinVoigt Hertz "
+        "contact.HuntCrossley contact.Tsuji contact.KuwabaraKono contact.Maxwell GeneralisedContact "
+        "contact.Conditions contact.Condition contact.FrictionLaw contact.Coulomb contact.Stribeck "
+        "contact.ExponentialDecay contact.Viscous contact.LuGre contact.Dahl",
     ),
     "bounce_maps": _task(
         "Many bounces, and what divides them",
         "Arrays of landings, maps of outcomes, and the curve that divides forward from reverse slip.",
         "bounce",
-        "lift_off LiftOffs LiftOffs3D outcome_map OutcomeMap proven_map ProvenMap dividing_curve DividingCurve "
-        "maps.Arc dividing_surface DividingSurface critical_eta slip_map SlipMap find_vortices winding_number Vortex slip_turn "
-        "SlipTurn",
+        "lift_off maps.LiftOffs outcome_map maps.OutcomeMap maps.proven_map maps.ProvenMap dividing_curve "
+        "maps.DividingCurve maps.Arc maps.dividing_surface maps.DividingSurface maps.critical_eta slip_map "
+        "maps.SlipMap maps.find_vortices maps.winding_number maps.Vortex maps.slip_turn maps.SlipTurn",
     ),
     "bounce_units": _task(
         "Metres and seconds",

@@ -1,13 +1,15 @@
-"""The equations of motion of a ball on a contact model, built once per kind of model."""
+"""The equations of motion of a ball on a contact model, with one or two directions along the ground."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import lru_cache
 from typing import Any, ClassVar, Protocol
 
 import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
 
 import nonsmooth as ns
 
@@ -15,35 +17,34 @@ from ..errors import ModelError
 from ..parameters import Names, number
 from .friction import FrictionLaw
 
-#: The ball's own states, in the paper's order p = [X, X', Y, Y', Omega].
+#: The ball's own states in the plane, in the paper's order p = [X, X', Y, Y', Omega].
 STATES = ("x", "xdot", "y", "ydot", "omega")
+#: The same in 3-D. The slip is a state, so that its direction is known however small it is.
+STATES_3D = ("x", "xdot", "y", "ydot", "z", "zdot", "slip_x", "slip_z")
+
+#: Slip that counts as none in a coefficient that depends on the slip speed: |h| is not smooth at zero.
+#: Its error is that times the coefficient's slope, over times of that order.
+_NO_SLIP = 1e-8
 
 
 class Surface(Protocol):
-    """What the equations ask of a contact model; ``ContactModel`` says what each thing means."""
+    """The part of ``ContactModel`` that the equations use."""
 
     extra_states: ClassVar[Mapping[str, float]]
     vector_states: ClassVar[tuple[str, ...]]
-    values: dict[str, float]
     friction: FrictionLaw
 
     def normal_force(self, s: Names, p: Names) -> Any: ...
-
     def tangential_force(self, s: Names, p: Names) -> Any: ...
-
     def load(self, s: Names, p: Names) -> Any: ...
-
     def lift_off(self, s: Names, p: Names) -> Any: ...
-
     def friction_coefficient(self, s: Names, p: Names) -> Any: ...
-
     def extra_rates(self, s: Names, p: Names) -> Any: ...
-
     def stored_energy(self, s: Names, p: Names) -> Any: ...
 
 
 class Blueprint(Protocol):
-    """What equations of motion are derived from: a contact model, in the plane or in 3-D."""
+    """A contact model, in the plane or in 3-D, from which equations of motion are derived."""
 
     values: dict[str, float]
 
@@ -53,153 +54,274 @@ class Blueprint(Protocol):
 
 
 class Equations:
-    """Symbols, forces and fields of one blueprint.
+    """Symbols, forces and fields of one model; ``directions`` is 1 in the plane and 2 in 3-D."""
 
-    Attributes
-    ----------
-    names : tuple of str
-        States: the ball's five, then the model's, then the friction law's.
-    start : dict
-        Values of the further states at touch-down.
-    centre, velocity : tuple of int
-        Which states are the place of the centre, and which are its rates.
-    along_the_ground : frozenset of str
-        The states of the motion along the ground and of the spin.
-    steps_off_a_root : bool
-        Whether a run cannot begin where the load is zero as a power is.
-    """
-
-    steps_off_a_root = False
-    centre: tuple[int, ...] = (0, 2)
-    velocity: tuple[int, ...] = (1, 3)
-    along_the_ground = frozenset({"x", "xdot", "omega"})
-
-    def __init__(self, model: Surface):
-        self.model = model
-        self._symbols(STATES, further_states(model), model.values)
-        self.contact_speed = self.x["xdot"] + self.x["omega"]
-        self._slip, self._sign = ca.SX.sym("slip"), ca.SX.sym("sign")
-        self.s = Names("state", {**self.x, "slip": self._slip})
-        self.q = Names("parameter", self.p)
+    def __init__(self, model: Surface, parameters: Iterable[str], directions: int):
+        # Vectors along the ground are SX (directions,).
+        self.model, self.directions = model, directions
+        names = tuple(parameters)
+        self.drilling = "drilling_radius" in names
+        self.vectors = (*model.vector_states, *model.friction.vector_states)
+        own = STATES if directions == 1 else (*STATES_3D, *(["spin"] if self.drilling else []))
+        further = _further_states(model)
+        #: Values of the further states at touch-down.
+        self.start = {n: v for name, v in further.items() for n in self._components(name)}
+        self._symbols(own, names)
+        #: Indices of the position of the centre among the states, and of its rates.
+        self.centre = (0, 2) if directions == 1 else (0, 2, 4)
+        self.velocity = tuple(k + 1 for k in self.centre)
+        self.along_the_ground = frozenset(own) - {"y", "ydot", "spin"}
+        x, p = self.x, self.p
+        if directions == 1:
+            self.slip = x["xdot"] + x["omega"]
+            self._speed, self._sign = ca.SX.sym("slip"), ca.SX.sym("sign")
+            ball = {name: x[name] for name in own}
+            self.q = Names("parameter", p)
+        else:
+            velocity = ca.vertcat(x["xdot"], x["zdot"])
+            self.slip = ca.vertcat(x["slip_x"], x["slip_z"])
+            self._speed = ca.sqrt(ca.sumsqr(self.slip) + _NO_SLIP**2)
+            count = 3 if self.drilling else 2
+            self._sign = ca.vertcat(*[ca.SX.sym(f"lambda_{i}") for i in range(count)])
+            ball = dict(
+                x=ca.vertcat(x["x"], x["z"]), xdot=velocity, y=x["y"], ydot=x["ydot"],
+                omega=self.slip - velocity, **{n: x[n] for n in own if n == "spin"},
+            )  # fmt: skip
+            # In a model, G is the part of gravity normal to the line of the slope.
+            self.q = Names("parameter", {**p, "G": p["G"] * ca.cos(p["side_slope"])})
+        extra = {n: ca.vertcat(*[x[c] for c in self._components(n)]) for n in further}
+        self.s = Names("state", {**ball, **extra, "slip": self._speed})
         self._forces()
+        if directions == 2:
+            self._require_isotropy()
 
-    def _symbols(
-        self, own: tuple[str, ...], start: dict[str, float], parameters: Iterable[str]
-    ) -> None:
+    @property
+    def steps_off_a_root(self) -> bool:
+        """Whether a run cannot begin where the load is zero as a power is."""
+        return self.directions == 2
+
+    def _components(self, name: str) -> tuple[str, ...]:
+        """The states of a further state, which is a vector along the ground or a number."""
+        if self.directions == 2 and name in self.vectors:
+            return f"{name}_x", f"{name}_z"
+        return (name,)
+
+    def _symbols(self, own: tuple[str, ...], parameters: tuple[str, ...]) -> None:
         who = type(self.model).__name__
-        self.start, self.names = start, (*own, *start)
+        self.names = (*own, *self.start)
         if len(set(self.names)) < len(self.names):
             raise ModelError(
-                f"{who}: extra_states: expected names other than {own} and those of the friction law, "
-                f"received {self.names}."
+                f"{who}: extra_states has one of the ball's names {own}: the states are {self.names}. "
+                "Rename it."
             )
         self.x = {name: ca.SX.sym(name) for name in self.names}
         self.p = {name: ca.SX.sym(name) for name in parameters}
         clash = sorted(set(self.x) & set(self.p))
         if clash:
-            raise ModelError(
-                f"{who}: expected states and parameters with different names, received {clash} as both."
-            )
+            raise ModelError(f"{who}: {clash} are both states and parameters. Rename one of each.")
+
+    # forces ------------------------------------------------------------------------------------
 
     def _forces(self) -> None:
-        model, s, q = self.model, self.s, self.q
-        self.normal = self._scalar("normal_force", model.normal_force(s, q))
-        tangential = self._scalar("tangential_force", model.tangential_force(s, q))
-        self.along = tangential - q.G * ca.sin(q.slope)
-        self.load = self._scalar("load", model.load(s, q))
-        self.lift_off = self._scalar("lift_off", model.lift_off(s, q))
+        p, q = self.p, self.q
+        self.normal = self._scalar("normal_force", self._given("normal_force"))
+        tangential = self._along("tangential_force", self._given("tangential_force"))
+        uphill = [ca.sin(p["slope"])]
+        if self.directions == 2:
+            uphill.append(ca.cos(p["slope"]) * ca.sin(p["side_slope"]))
+        self._uphill = p["G"] * ca.vertcat(*uphill)
+        self.along = tangential - self._uphill
+        self._level = q.G * ca.cos(p["slope"])
+        self.load = self._scalar("load", self._given("load"))
+        self.lift_off = self._scalar("lift_off", self._given("lift_off"))
         self._require_end()
-        law = model.friction
-        set_valued = type(law).traction is FrictionLaw.traction
-        if set_valued:
-            coefficient = self._scalar("friction_coefficient", model.friction_coefficient(s, q))
-            traction = -self._sign * coefficient
+        law = self.model.friction
+        self.set_valued = type(law).traction is FrictionLaw.traction
+        if self.set_valued or self.directions == 2:
+            given = self._given("friction_coefficient")
+            self.coefficient = self._scalar("friction_coefficient", given)
+        shape = self._shape()
+        direction = shape @ self._sign[: self.directions]
+        if self.set_valued:
+            traction = self._pull()(law, self.s, q, direction, self.coefficient)
         else:
-            traction = self._scalar("traction", law.traction(s, q, self._sign))
-        self.friction_force = traction * self.load
-        rates = self._rates_of(list(self.start), self._sign)
-        self.rates = [self._scalar(f"rate of {name}", rates[name]) for name in self.start]
-        energy = model.stored_energy(s, q)
-        self.stored = None if energy is None else self._scalar("stored_energy", energy)
+            traction = law.traction(self.s, q, direction)
+        self.friction_force = self._along("traction", traction) * self.load
+        self.set = shape @ self.slip
+        if self.drilling:
+            radius = p["drilling_radius"]
+            moment = -self.coefficient * self.load * radius * self._sign[2]
+            self.friction_force = ca.vertcat(self.friction_force, moment)
+            self.set = ca.vertcat(self.set, radius * self.x["spin"])
+        self.rates = self._further_rates(direction)
+        self.stored = self._stored_energy()
 
-    def _rates_of(self, names: list[str], direction: ca.SX) -> Mapping[str, Any]:
-        """Rates of the further states, as the model and its friction law give them."""
+    def _pull(self) -> Callable[..., Any]:
+        """The traction of a set-valued law: its own form, unless the model has its own coefficient."""
+        given = type(self.model).friction_coefficient
+        own = given.__qualname__ != "ContactModel.friction_coefficient"
+        if own or self.directions == 1:
+            return FrictionLaw.vector_traction
+        return type(self.model.friction).vector_traction
+
+    def _shape(self) -> ca.SX:
+        """The symmetric matrix of elliptical friction, by which slip and multiplier are stretched."""
+        if "friction_ratio" not in self.p:
+            return ca.SX.eye(self.directions)
+        ratio, grain = self.p["friction_ratio"], self.p["grain"]
+        along = ca.vertcat(ca.cos(grain), ca.sin(grain))
+        return ratio * ca.SX.eye(2) + (1 - ratio) * along @ along.T
+
+    def _further_rates(self, direction: ca.SX) -> list[ca.SX]:
+        who, names = type(self.model).__name__, list(_further_states(self.model))
         own = self.model.extra_rates(self.s, self.q)
         if isinstance(own, Mapping):
             own = {**own, **self.model.friction.extra_rates(self.s, self.q, direction)}
         if not isinstance(own, Mapping) or set(own) != set(names):
             received = list(own) if isinstance(own, Iterable) else repr(own)
             raise ModelError(
-                f"{type(self.model).__name__}: extra_rates: expected a rate for each of {names}, "
-                f"received {received}."
+                f"{who}: extra_rates returns {received}, but the further states are {names}. Return a "
+                "rate for each."
             )
-        return own
+        flat: list[ca.SX] = []
+        for name in names:
+            read = self._along if name in self.vectors else self._scalar
+            flat += ca.vertsplit(read(f"rate of {name}", own[name]))
+        return flat
+
+    def _stored_energy(self) -> ca.SX | None:
+        energy = self.model.stored_energy(self.s, self.q)
+        if energy is None or (self.directions == 2 and ca.SX(energy).shape != (1, 1)):
+            return None
+        return self._scalar("stored_energy", energy)
+
+    # checks ------------------------------------------------------------------------------------
+
+    def _given(self, method: str) -> Any:
+        """Call a method of the model; in 3-D an error of CasADi names the method."""
+        try:
+            return getattr(self.model, method)(self.s, self.q)
+        except (RuntimeError, NotImplementedError, TypeError) as error:
+            if self.directions == 1:
+                raise
+            raise self._no_form(method, str(error).splitlines()[0]) from error
+
+    def _no_form(self, method: str, why: str) -> ModelError:
+        return ModelError(
+            f"{type(self.model).__name__}.{method} has no form in 3-D: {why}. There s.x, s.xdot and "
+            "s.omega are vectors of two components: write speeds as ca.norm_2(s.xdot), squares as "
+            "ca.sumsqr(s.x), and a force along the ground as a vector."
+        )
 
     def _require_end(self) -> None:
         if not ca.depends_on(self.lift_off, ca.vertcat(*self.x.values())):
             raise ModelError(
-                f"{type(self.model).__name__}: load: expected a function of the states, received "
-                f"{self.lift_off}. A load that does not change never vanishes, so the ball never "
-                "lifts off: normal_force must depend on s.y or s.ydot."
+                f"{type(self.model).__name__}: load is {self.lift_off}, which does not depend on the "
+                "states, so the ball never lifts off. Let normal_force depend on s.y or s.ydot."
             )
 
-    def _scalar(self, what: str, value: Any) -> ca.SX:
+    def _along(self, what: str, value: Any) -> ca.SX:
+        """A vector along the ground: a number in the plane."""
+        if self.directions == 1:
+            return self._scalar(what, value)
         try:
             result = ca.SX(value)
-            if result.shape == (1, 1) and not has_nan(result):
+        except (TypeError, ValueError, NotImplementedError):
+            raise self._no_form(what, f"it returns {value!r}") from None
+        if result.shape == (1, 1) and result.is_zero():
+            return ca.SX.zeros(2, 1)
+        if result.shape != (2, 1):
+            raise self._no_form(what, f"it returns shape {result.shape}")
+        if _has_nan(result):
+            raise self._no_form(what, f"it returns {result}")
+        return ca.densify(result)
+
+    def _scalar(self, what: str, value: Any) -> ca.SX:
+        if self.directions == 2 and isinstance(value, ca.SX) and value.shape != (1, 1):
+            raise self._no_form(what, f"it returns shape {value.shape}")
+        try:
+            result = ca.SX(value)
+            if result.shape == (1, 1) and not _has_nan(result):
                 return ca.densify(result)
             received = f"shape {result.shape}" if result.shape != (1, 1) else f"{result}"
         except (TypeError, ValueError, NotImplementedError):
             received = f"{value!r} ({type(value).__name__})"
         raise ModelError(
-            f"{type(self.model).__name__}.{what}: expected a scalar CasADi expression of the states "
-            f"and parameters, received {received}. Is the `return` missing, or a function taken from "
-            "math instead of casadi?"
+            f"{type(self.model).__name__}.{what} returns {received}, not a scalar CasADi expression of "
+            "the states and parameters. Add a missing `return`, and take functions from casadi instead "
+            "of math."
         )
+
+    def _require_isotropy(self) -> None:
+        """Refuse forces that do not turn with the ball, as powers of components do not."""
+        rng = np.random.default_rng(0)
+        x, p = rng.uniform(0.2, 0.9, (len(self.names), 3)), rng.uniform(0.2, 0.9, (len(self.p), 3))
+        x[[2]] *= -1.0
+        forces = dict(
+            normal_force=self.normal,
+            tangential_force=self.along + self._uphill,
+            load=self.load,
+            friction_coefficient=self.coefficient,
+        )
+        function = self.function(list(forces.values()))
+        pairs = [("x", "z"), ("xdot", "zdot"), ("slip_x", "slip_z")]
+        pairs += [(f"{name}_x", f"{name}_z") for name in self.vectors]
+        turn, turned = _rotation(1.0), np.array(x)
+        for pair in pairs:
+            rows = [self.names.index(name) for name in pair]
+            turned[rows] = turn @ x[rows]
+        both = zip(forces, ns.call(function, x, p), ns.call(function, turned, p), strict=True)
+        for name, a, b in both:
+            a = turn @ a if a.shape[0] == 2 else a
+            known = np.isfinite(a) & np.isfinite(b)
+            if not np.allclose(a[known], b[known], rtol=1e-9, atol=1e-12):
+                raise self._no_form(name, "it favours a direction along the ground")
 
     # fields ------------------------------------------------------------------------------------
 
     def field(self, friction: ca.SX) -> list[ca.SX]:
-        """Right-hand side for a tangential friction force."""
-        s, q = self.s, self.q
-        return [
-            s.xdot,
-            self.along + friction,
-            s.ydot,
-            self.normal - q.G * ca.cos(q.slope),
-            friction / q.inertia,
-            *self.rates,
-        ]
+        """Right-hand side for a friction force along the ground, and the moment of drilling."""
+        x, q, along = self.x, self.q, self.along
+        up = self.normal - self._level
+        if self.directions == 1:
+            spin = friction / q.inertia
+            return [x["xdot"], along + friction, x["ydot"], up, spin, *self.rates]
+        f, both = friction if friction.numel() > 1 else ca.SX.zeros(3, 1), 1 + 1 / q.inertia
+        forward, right = along[0] + f[0], along[1] + f[1]
+        slip = [along[0] + both * f[0], along[1] + both * f[1]]
+        drilling = [f[2] / q.inertia] if self.drilling else []
+        centre = [x["xdot"], forward, x["ydot"], up, x["zdot"], right]
+        return [*centre, *slip, *drilling, *self.rates]
 
     def side(self, sign: float) -> list[ca.SX]:
-        """Right-hand side of forward (+1) or reverse (-1) slip."""
-        old, new = [self._sign, self._slip], [ca.SX(sign), sign * self.contact_speed]
+        """Right-hand side of forward (+1) or reverse (-1) slip in the plane."""
+        old, new = [self._sign, self._speed], [ca.SX(sign), sign * self.slip]
         return ca.substitute(self.field(self.friction_force), old, new)
 
     def build(
         self, defaults: Mapping[str, float] | None = None, further: Sequence[ns.Stop] = ()
     ) -> ns.FilippovSystem:
         """Return the Filippov system of the contact phase, with further stops."""
-        definition: dict[str, Any]
         field = self.field(self.friction_force)
-        if ca.depends_on(ca.vertcat(*field), self._slip):
-            definition = dict(above=self.side(1.0), below=self.side(-1.0))
-        else:
-            definition = dict(field=field, multipliers=self._sign)
+        definition: dict[str, Any] = dict(field=field)
+        if self.directions == 1:
+            definition |= dict(surface=self.slip, multipliers=self._sign)
+            if ca.depends_on(ca.vertcat(*field), self._speed):
+                sides = dict(above=self.side(1.0), below=self.side(-1.0))
+                definition = dict(surface=self.slip, **sides)
+        elif self.set_valued:
+            definition |= dict(surfaces=[self.set], multipliers=[self._sign])
         return ns.FilippovSystem(
             list(self.x.values()),
-            surface=self.contact_speed,
             parameters=self._defaults(defaults),
             stops=[*self._ends(), *further],
             **definition,
         )
 
     def _ends(self) -> list[ns.Stop]:
-        """What ends the contact: the model's lift-off function, and the load itself.
-
-        The friction that can hold a rolling ball vanishes with the load. Where its approximate zero
-        comes a little before that of another function, this ends the contact, not the rolling.
-        """
+        """What ends the contact: the model's lift-off function, and the load itself."""
+        # The friction that can hold a rolling ball vanishes with the load. Where its approximate zero
+        # comes a little before that of another function, this ends the contact, not the rolling.
         ends = [ns.Stop(self.lift_off, -1, "lift-off")]
         if not ca.is_equal(self.lift_off, self.load, 10):
             ends.append(ns.Stop(self.load, -1, "no load"))
@@ -207,13 +329,14 @@ class Equations:
 
     def build_free(self) -> ns.FilippovSystem:
         """Return the smooth system of the phase before the load is positive (no friction)."""
+        field = self.field(ca.SX(0))
+        if self.directions == 1:
+            field = ca.substitute(field, [self._sign, self._speed], [ca.SX(1), self.slip])
         return ns.FilippovSystem(
             list(self.x.values()),
-            field=ca.substitute(
-                self.field(ca.SX(0)), [self._sign, self._slip], [ca.SX(1), self.contact_speed]
-            ),
+            field=field,
             parameters=self._defaults(None),
-            stops=[ns.Stop(self.lift_off, 1, "contact"), ns.Stop(self.s.y, 1, "surface")],
+            stops=[ns.Stop(self.lift_off, 1, "contact"), ns.Stop(self.x["y"], 1, "surface")],
         )
 
     def _defaults(self, values: Mapping[str, float] | None) -> dict[ca.SX, float | None]:
@@ -222,7 +345,7 @@ class Equations:
     def inputs(self, expression: ca.SX) -> frozenset[str]:
         """Names of the states and parameters on which it depends along the motion without friction."""
         rates = dict(zip(self.names, self.field(ca.SX(0)), strict=True))
-        rates["slip"] = self.contact_speed
+        rates["slip"] = self.slip
         names: set[str] = set()
         new = {str(v) for v in ca.symvar(expression)}
         while new - names:
@@ -232,23 +355,28 @@ class Equations:
 
     # functions ---------------------------------------------------------------------------------
 
-    def kinetic_along(self) -> ca.SX:
-        """Kinetic energy per mass of the motion along the ground and of the spin."""
-        return 0.5 * (self.s.xdot**2 + self.q.inertia * self.s.omega**2)
-
-    def height(self) -> tuple[ca.SX, ca.SX]:
-        """Scaled gravity times the height of the place along the ground, and over it."""
-        return (
-            self.q.G * ca.sin(self.q.slope) * self.s.x,
-            self.q.G * ca.cos(self.q.slope) * self.s.y,
-        )
-
     def energies(self) -> ca.Function:
-        """Return (states, parameters) -> the two energies of :func:`energy_function`."""
-        climbed, over = self.height()
-        along, normal = self.kinetic_along() + climbed, 0.5 * self.s.ydot**2 + over
+        """Return (states, parameters) -> kinetic and gravitational energy, of the ball and along y."""
+        s, spins = self.s, [self.s.omega, *([self.s.spin] if self.drilling else [])]
+        turning = ca.sumsqr(ca.vertcat(*spins))
+        along = 0.5 * (ca.sumsqr(s.xdot) + self.q.inertia * turning) + ca.dot(self._uphill, s.x)
+        normal = 0.5 * s.ydot**2 + self._level * s.y
+        # The motion along y has an energy of its own only where it does not depend on the other.
         apart = not self.inputs(self.normal) & self.along_the_ground
         return self.function([along + normal, normal if apart else along + normal])
+
+    def forces(self, system: ns.FilippovSystem) -> tuple[str, ca.Function]:
+        """Return letters of modes, and (states, parameters) -> load and the friction in each mode."""
+        if self.directions == 1:
+            spin = STATES.index("omega")
+            friction = [self.q.inertia * ns.local.mode_field(system, mode)[spin] for mode in "+-s"]
+            return "+-s", self.function([self.load, *friction])
+        slips, rolls = self.friction_force[:2], -self.along / (1 + 1 / self.q.inertia)
+        if self.set_valued:
+            size = ca.norm_2(self.set)
+            slips = ca.substitute(slips, self._sign, self.set / size)
+            slips = ca.if_else(size > 0, slips, rolls)
+        return "*s", self.function([self.load, ca.densify(slips), ca.densify(rolls)])
 
     def function(self, outputs: list[ca.SX]) -> ca.Function:
         """Return the function (states, parameters) -> outputs."""
@@ -256,8 +384,8 @@ class Equations:
         return ca.Function("outputs", [x, p], outputs)
 
 
-def further_states(model: Surface) -> dict[str, float]:
-    """Return the states of a model and its friction law besides the ball's, at touch-down."""
+def _further_states(model: Surface) -> dict[str, float]:
+    """The states of a model and its friction law besides the ball's, at touch-down."""
     who = type(model).__name__
     return {
         name: number(value, f"{who}: extra_states: {name}", ModelError)
@@ -265,13 +393,18 @@ def further_states(model: Surface) -> dict[str, float]:
     }
 
 
-def has_nan(expression: ca.SX) -> bool:
+def _has_nan(expression: ca.SX) -> bool:
     """Whether a constant in it is NaN, as ``math.sin`` of a symbol is."""
-    tape = ca.Function("tape", ca.symvar(expression), [expression])
+    listed = ca.Function("listed", ca.symvar(expression), [expression])
     return any(
-        tape.instruction_id(k) == ca.OP_CONST and math.isnan(tape.instruction_constant(k))
-        for k in range(tape.n_instructions())
+        listed.instruction_id(k) == ca.OP_CONST and math.isnan(listed.instruction_constant(k))
+        for k in range(listed.n_instructions())
     )
+
+
+def _rotation(angle: float) -> NDArray[np.float64]:
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s], [s, c]])
 
 
 @lru_cache(maxsize=64)
@@ -293,12 +426,9 @@ def free_system(blueprint: Blueprint) -> ns.FilippovSystem:
 
 
 @lru_cache(maxsize=64)
-def forces_function(blueprint: Blueprint) -> ca.Function:
-    """Return (states, parameters) -> load, and friction in forward slip, reverse slip and rolling."""
-    eq, system = equations(blueprint), contact_system(blueprint)
-    spin = STATES.index("omega")
-    friction = [eq.q.inertia * ns.local.mode_field(system, mode)[spin] for mode in "+-s"]
-    return eq.function([eq.load, *friction])
+def forces_function(blueprint: Blueprint) -> tuple[str, ca.Function]:
+    """Return letters of modes, and (states, parameters) -> load and the friction in each mode."""
+    return equations(blueprint).forces(contact_system(blueprint))
 
 
 @lru_cache(maxsize=64)
@@ -310,10 +440,7 @@ def load_inputs(blueprint: Blueprint) -> frozenset[str]:
 
 @lru_cache(maxsize=64)
 def energy_function(blueprint: Blueprint) -> ca.Function:
-    """Return (states, parameters) -> energy per mass, of the ball and of its motion along y.
-
-    Kinetic and gravitational; of the ball twice where its motion along y depends on the other.
-    """
+    """Return (states, parameters) -> energy per mass, of the ball and of its motion along y."""
     return equations(blueprint).energies()
 
 

@@ -69,7 +69,7 @@ class FrictionLaw(Parametrised, ABC):
         coefficient : expression
             That of the contact model.
         """
-        return -coefficient * direction
+        return -direction * coefficient
 
     def extra_rates(self, s: Names, p: Names, sign: Expression) -> dict[str, Expression]:
         """Return the rates of ``extra_states`` where the slip has the sign ``sign``.
@@ -114,7 +114,7 @@ class Stribeck(FrictionLaw):
     Examples
     --------
     >>> import bounce
-    >>> law = bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
+    >>> law = bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5)
     >>> bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, friction=law)
     KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, mu_kinetic=0.2, stribeck_speed=0.5, friction=Stribeck)
     """

@@ -1,4 +1,4 @@
-"""The paper's generalised model from four functions, and its conditions checked by sampling."""
+"""The generalised model of Biber et al. (2022) from four functions, and its conditions by sampling."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from .model import ContactModel, LoadConvention
 Expression = Any
 Coefficient = Callable[[Any, Any], Expression]
 
-#: Where the conditions are sampled unless told otherwise; just below y = 0, where power laws are
+#: Default box of the samples; it ends just below y = 0, where power laws are
 #: not differentiable.
 BOX = dict(x=(-1.0, 1.0), xdot=(-1.0, 1.0), y=(-1.0, -1e-3), ydot=(-1.0, 1.0), omega=(-1.0, 1.0))
 
@@ -87,8 +87,8 @@ class GeneralisedContact(ContactModel):
         for name, function in functions.items():
             if not callable(function):
                 raise ModelError(
-                    f"{name}: expected a function (s, p) -> expression, received {function!r}. For a "
-                    f"constant write lambda s, p: {function!r}."
+                    f"{name} is {function!r}, not a function (s, p) -> expression. For a constant write "
+                    f"lambda s, p: {function!r}."
                 )
         self._set("functions", functions)
         self._set("end", lift_off)
@@ -104,7 +104,7 @@ class GeneralisedContact(ContactModel):
     ) -> dict[str, float]:
         taken = sorted(set(self.own) & set(self.declared()) - {"mu", "eps", "G"})
         if taken:
-            raise ModelError(f"parameters: expected new names, received {taken}, which are taken.")
+            raise ModelError(f"parameters: {taken} are parameters of every model. Rename them.")
         return super()._checked({**declared, **self.own}, values)
 
     def normal_force(self, s: Names, p: Names) -> Expression:
@@ -136,7 +136,7 @@ class GeneralisedContact(ContactModel):
         order_one : float
             What still counts as O(1).
         samples : int
-            Number of states at which the conditions are looked at.
+            Number of sampled states.
 
         Returns
         -------
@@ -146,7 +146,7 @@ class GeneralisedContact(ContactModel):
         ranges = {**BOX, **(box or {})}
         unknown = sorted(set(ranges) - set(STATES))
         if unknown:
-            raise ModelError(f"box: expected ranges of {list(STATES)}, received {unknown}.")
+            raise ModelError(f"box has {unknown}, but the states are {list(STATES)}.")
         values = _derivatives(self, ranges, samples)
         worst = [
             ("upsilon_Y < 0", "functions_constraints", values["upsilon_y"].max()),
@@ -191,11 +191,11 @@ class Condition:
     Attributes
     ----------
     name : str
-        What the condition says.
+        The condition.
     equation : str
         Its label in the paper.
     verdict : {"holds", "equality", "fails"}
-        What was found at the states that were looked at.
+        Result at the sampled states.
     worst : float
         The value that is nearest to breaking it, or breaks it most.
     """

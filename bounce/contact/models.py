@@ -1,6 +1,6 @@
 """Contact models of the literature: linear, Hertzian, and with depth-dependent damping.
 
-All are dimensionless: length the ball's radius, mass the ball's, time as the stiffness says. The
+All are dimensionless: length the ball's radius, mass the ball's, and the unit of time is given by the stiffness. The
 tangential surface is linear, -(2 d1 eta X' + eta^2 X), as in Biber, Champneys & Szalai (2022).
 """
 
@@ -150,7 +150,7 @@ def kelvin_voigt_restitution(d2: float) -> float:
     return math.exp(-2 * c / (math.tan(c) if ratio < 1 else math.tanh(c)))
 
 
-class DepthDampedKelvinVoigt(_LinearTangential):
+class DepthDampedKelvinVoigt(KelvinVoigt):
     """Kelvin-Voigt whose tangential damper grows with depth: $-(2 d1 eta (-Y) X' + eta^2 X)$.
 
     The damper acts on the part of the ball that is in the ground, so it starts from zero at
@@ -165,17 +165,8 @@ class DepthDampedKelvinVoigt(_LinearTangential):
         Gravity relative to the normal spring's force.
     """
 
-    parameters = dict(mu=None, d1=None, d2=None, eta=None, G=0.0)
-    limits = dict(d2=">= 0")
-
-    def normal_force(self, s: Names, p: Names) -> Expression:
-        return -2 * p.d2 * s.ydot - s.y
-
     def tangential_force(self, s: Names, p: Names) -> Expression:
         return -(2 * p.d1 * p.eta * (-s.y) * s.xdot + p.eta**2 * s.x)
-
-    def _normal_energy(self, s: Names, p: Names) -> Expression:
-        return 0.5 * s.y**2
 
 
 class _PowerLaw(_LinearTangential):

@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from ..contact.model import ContactModel
-from ..contact.space import Contact3D
+from ..contact.model import Contact3D, ContactModel
 from ..errors import ModelError
 from ..laws import BounceLaw, RigidBounce, TiltedBounce, rigid_lift_off_3d
-from ..shot.single import simulate
+from ..shot.simulate import simulate
 from ..units import GOLF, Ball, Landing, Scaling
 from .side_spin import S, SideState, gravity_on, in_space, same_kind
 

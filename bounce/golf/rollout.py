@@ -20,7 +20,7 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..contact.space import Contact3D
+from ..contact.model import Contact3D
 from ..parameters import require_positive
 from ..units import GOLF, Ball, Scaling
 from .air import Air

@@ -1,4 +1,4 @@
-"""Bounce laws in closed form: rigid impact, the laws that people use today, and values for turf.
+"""Bounce laws in closed form: rigid impact, the laws in use today, and values for turf.
 
 A law takes xdot, ydot and the surface speed of the spin (spin times radius) at touch-down, in one
 unit of speed (m/s where the law has a speed in it), and gives them at lift-off: no contact that
@@ -18,8 +18,7 @@ Examples
 from ..contact.models import kelvin_voigt_restitution
 from .cross import CrossBounce
 from .law import BounceLaw, LandingRange, RigidShot
-from .rigid import RigidBounce
-from .rigid_3d import RigidShot3D, rigid_lift_off_3d
+from .rigid import RigidBounce, rigid_lift_off_3d
 from .tilted import PennerBounce, TiltedBounce, penner_restitution, penner_tilt
 from .turfs import TURFS, PublishedFit
 
@@ -32,7 +31,6 @@ __all__ = [
     "PublishedFit",
     "RigidBounce",
     "RigidShot",
-    "RigidShot3D",
     "TiltedBounce",
     "kelvin_voigt_restitution",
     "penner_restitution",

@@ -77,7 +77,7 @@ class CrossBounce(BounceLaw):
         most = self.values["mu"] * rigid.normal_impulse
         tangential = -sign * np.minimum(grip, most)
         change = tangential - rigid.tangential_impulse
-        letters = np.select([sign > 0, sign < 0], ["+", "-"], "")
+        signs = np.select([sign > 0, sign < 0], ["+", "-"], "")
         return replace(
             rigid,
             xdot=rigid.xdot + change,
@@ -85,7 +85,7 @@ class CrossBounce(BounceLaw):
             slip=np.where(
                 grip > most, before + tangential * (1 + 1 / self.values["inertia"]), -back * before
             ),
-            case=np.char.add(np.where(grip > most, "I", "grip"), letters),
+            case=np.char.add(np.where(grip > most, "I", "grip"), signs),
             tangential_impulse=tangential,
             rolling_impulse=np.full_like(tangential, np.nan),
             rolling_speed=np.full_like(tangential, np.nan),

@@ -1,4 +1,4 @@
-"""What a bounce law is: lift-off from landing in closed form, without a contact that takes time."""
+"""Base of bounce laws: lift-off from landing in closed form, without a contact that takes time."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..errors import LandingError
 from ..parameters import Parametrised
+from ..shot.state import AlongTheGround
 
 Array = NDArray[np.float64]
 
@@ -25,8 +26,11 @@ CASES = {
 
 
 @dataclass(frozen=True)
-class RigidShot:
-    """Lift-off after a rigid impact; arrays of the broadcast shape of the inputs.
+class RigidShot(AlongTheGround):
+    """Lift-off after a rigid impact; arrays of the broadcast shape (...) of the inputs.
+
+    In 3-D ``xdot``, ``omega``, ``slip`` and ``tangential_impulse`` are arrays (..., 2), forward and to
+    the right.
 
     Attributes
     ----------
@@ -35,7 +39,7 @@ class RigidShot:
     case : ndarray of str
         "I", "II" or "III" with the sign of the slip at touch-down: slipping throughout, rolling
         from restitution on, rolling from compression on. "I/II+" is a boundary; no sign without
-        slip.
+        slip, and none in 3-D.
     normal_impulse, tangential_impulse : ndarray
         Impulses over the ball's mass, so speeds.
     rolling_impulse, rolling_speed : ndarray
@@ -99,7 +103,7 @@ class LandingRange:
         return np.logical_and.reduce(np.broadcast_arrays(*inside))
 
     def misses(self, xdot: float, ydot: float, spin: float) -> str:
-        """Say what of a landing is outside, or nothing.
+        """Return in words which components of a landing are outside.
 
         Parameters
         ----------
@@ -119,7 +123,7 @@ class LandingRange:
         return " and ".join(words)
 
     def _pairs(self, xdot: ArrayLike, ydot: ArrayLike, spin: ArrayLike) -> list[Any]:
-        """Values as they count, their limits, and how to say them."""
+        """Values to compare, their limits, and their names and units."""
         u, v, w = (np.asarray(a, dtype=float) for a in (xdot, ydot, spin))
         return [
             (np.abs(u), self.xdot, "a speed along the ground", "m/s", 1.0),
@@ -129,7 +133,7 @@ class LandingRange:
 
 
 def _rounded(value: float) -> float:
-    """To three digits, or to whole numbers; nothing is as small as a thousandth."""
+    """To three digits, or to whole numbers from 100; values below a thousandth become zero."""
     return round(value) if abs(value) >= 100 else float(f"{round(value, 4):.3g}")
 
 
@@ -195,7 +199,7 @@ class BounceLaw(Parametrised, ABC):
         return copy
 
     def caution(self, xdot: float, ydot: float) -> str:
-        """Say why the form of the law, whatever its numbers, does not hold for a landing.
+        """Return why the form of the law, whatever its numbers, does not hold for a landing.
 
         Parameters
         ----------
@@ -213,20 +217,14 @@ class BounceLaw(Parametrised, ABC):
 def checked_landings(
     xdot: ArrayLike, ydot: ArrayLike, omega: ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """Return landings as arrays of one shape.
-
-    Raises
-    ------
-    LandingError
-        Not numbers that broadcast, not finite, or not approaching the ground.
-    """
+    """Return landings as finite arrays of one shape that approach the ground."""
     try:
         given = [np.asarray(a, dtype=float) for a in (xdot, ydot, omega)]
         u, v, w = np.broadcast_arrays(*given)
     except (TypeError, ValueError) as error:
         raise LandingError(
-            f"landing: expected numbers or arrays that broadcast, received xdot = {xdot!r}, ydot = "
-            f"{ydot!r}, omega = {omega!r}."
+            f"xdot = {xdot!r}, ydot = {ydot!r} and omega = {omega!r} are no arrays of numbers that "
+            "broadcast."
         ) from error
     for name, a in zip(("xdot", "ydot", "omega"), (u, v, w), strict=True):
         if not np.all(np.isfinite(a)):

@@ -1,8 +1,10 @@
-"""Rigid impact with Coulomb friction, in closed form.
+"""Rigid impact with Coulomb friction in closed form, with one or two directions along the ground.
 
 In the normal impulse n the contact point's velocity obeys dv_N/dn = 1 and, while it slips,
-dv_T/dn = -+ (1 + 1/inertia) mu; rolling needs no tangential force, so it lasts. For a sphere the
+dh/dn = -(1 + 1/inertia) mu u with u = h/|h|: the direction of the slip does not change, so |h| obeys
+one law in the plane and in 3-D. Rolling needs no tangential force, so it lasts. For a sphere the
 kinematic, Poisson and energetic coefficients of restitution coincide: friction does not change v_N.
+The travel is in general not along the slip, so in 3-D the ball is deflected.
 """
 
 from __future__ import annotations
@@ -15,7 +17,8 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..parameters import number
+from ..errors import LandingError, ModelError
+from ..parameters import number, numbers
 from .law import BounceLaw, RigidShot, checked_landings
 
 Array = NDArray[np.float64]
@@ -90,27 +93,36 @@ class RigidBounce(BounceLaw):
             Not finite, or not approaching.
         """
         u, v, w = checked_landings(xdot, ydot, omega)
-        r = self.restitution
-        ratio = _unit_interval(_of_speed(r, -v) if callable(r) else np.asarray(r, dtype=float))
-        inverse_mass = 1 + 1 / self.values["inertia"]
-        drag = inverse_mass * self.values["mu"]
-        slip, sign = u + w, np.sign(u + w)
-        compression = -v
-        total = _TOTAL_IMPULSE[self.hypothesis](compression, ratio)
+        slip = u + w
+        return self._impact(
+            u, v, w, np.abs(slip), np.sign(slip), np.select([slip > 0, slip < 0], "+-", "")
+        )
+
+    def _impact(
+        self, xdot: Array, ydot: Array, omega: Array, size: Array, unit: Array, sign: Any
+    ) -> RigidShot:
+        """The impact with a slip of this size and direction."""
+        r, mu, inertia = self.restitution, self.values["mu"], self.values["inertia"]
+        ratio = _unit_interval(_of_speed(r, -ydot) if callable(r) else np.asarray(r, dtype=float))
+        drag = (1 + 1 / inertia) * mu
+        total = _TOTAL_IMPULSE[self.hypothesis](-ydot, ratio)
         with np.errstate(divide="ignore", invalid="ignore"):  # without friction it never rolls
-            onset = np.where(slip == 0.0, 0.0, np.abs(slip) / drag)
+            onset = np.where(size == 0.0, 0.0, size / drag)
         slips = onset >= total
-        tangential = -sign * self.values["mu"] * np.minimum(onset, total)
+        friction, after = -mu * np.minimum(onset, total), np.where(slips, size - drag * total, 0.0)
+        if unit.ndim > size.ndim:
+            friction, after = friction[..., None], after[..., None]
+        tangential = friction * unit
         return RigidShot(
-            xdot=u + tangential,
-            ydot=v + total,
-            omega=w + tangential / self.values["inertia"],
-            slip=np.where(slips, slip - sign * drag * total, 0.0),
-            case=_cases(onset, compression, total, sign),
+            xdot=xdot + tangential,
+            ydot=ydot + total,
+            omega=omega + tangential / inertia,
+            slip=after * unit + 0.0,  # not -0.0
+            case=np.char.add(_cases(onset, -ydot, total), sign),
             normal_impulse=total,
             tangential_impulse=tangential,
             rolling_impulse=np.where(slips, np.nan, onset),
-            rolling_speed=np.where(slips, np.nan, v + onset),
+            rolling_speed=np.where(slips, np.nan, ydot + onset),
         )
 
     def _structure(self) -> tuple[Any, ...]:
@@ -121,6 +133,66 @@ class RigidBounce(BounceLaw):
         if self.hypothesis != "kinematic":
             options["hypothesis"] = self.hypothesis
         return options
+
+
+def rigid_lift_off_3d(
+    law: RigidBounce, xdot: ArrayLike, ydot: ArrayLike, omega: ArrayLike
+) -> RigidShot:
+    """Bounce balls with side spin on rigid ground.
+
+    With $J = mu$ times the normal impulse, $u = h/|h|$ at touch-down, k the inertia: a ball that slips
+    throughout, $|h| > (1 + 1/k) J$, leaves with $X' - J u$ and $W - J u/k$; else it rolls, $X' = -W = (X' - k W)/(1 + k)$.
+
+    Parameters
+    ----------
+    law : RigidBounce
+        Friction, restitution and inertia.
+    xdot, omega : array_like (..., 2)
+        At touch-down, forward and to the right; $omega = (omega_z, -omega_x)$ times the radius.
+    ydot : array_like (...)
+        Normal velocity, below zero.
+
+    Returns
+    -------
+    RigidShot
+        Speeds and spin at lift-off, and the case of the law, without a sign.
+
+    Raises
+    ------
+    LandingError
+        Not pairs, not finite, or not approaching.
+    ModelError
+        Another law than :class:`RigidBounce`.
+
+    Examples
+    --------
+    >>> import bounce
+    >>> hard = bounce.laws.RigidBounce(mu=0.3, restitution=0.5)
+    >>> shot = bounce.laws.rigid_lift_off_3d(hard, [1.0, 0.0], -1.0, [0.2, 0.5])
+    >>> str(shot.case), [round(float(v), 6) for v in shot.xdot]
+    ('II', [0.657143, -0.142857])
+    """
+    if not isinstance(law, RigidBounce):
+        raise ModelError(
+            f"law: expected a RigidBounce, received {law!r}. On a tilted plane the impact is that of its "
+            "own axes; bounce.golf.side_rebound turns a TiltedBounce."
+        )
+    pairs = [
+        numbers(value, name, LandingError) for name, value in (("xdot", xdot), ("omega", omega))
+    ]
+    for name, pair in zip(("xdot", "omega"), pairs, strict=True):
+        if pair.shape[-1:] != (2,):
+            raise LandingError(
+                f"{name} has shape {pair.shape}, but its last axis has two components, forward and to "
+                "the right."
+            )
+    down = numbers(ydot, "ydot", LandingError)[..., None]
+    v, down, w = checked_landings(pairs[0], down, pairs[1])
+    slip = v + w
+    size = np.hypot(slip[..., 0], slip[..., 1])
+    with np.errstate(invalid="ignore"):
+        unit = np.where(size[..., None] > 0, slip / size[..., None], 0.0)
+    return law._impact(v, down[..., 0], w, size, unit, "")
 
 
 def _of_speed(restitution: Callable[[Any], ArrayLike], speed: Array) -> Array:
@@ -145,11 +217,11 @@ def _unit_interval(values: Array) -> Array:
     return values
 
 
-def _cases(onset: Array, compression: Array, total: Array, sign: Array) -> NDArray[np.str_]:
+def _cases(onset: Array, compression: Array, total: Array) -> NDArray[np.str_]:
     def near(a: Array, b: Array) -> NDArray[np.bool_]:
         return np.abs(a - b) <= _BOUNDARY * np.abs(b)
 
-    names = np.select(
+    return np.select(
         [
             near(onset, total) & near(onset, compression),
             near(onset, total),
@@ -160,8 +232,6 @@ def _cases(onset: Array, compression: Array, total: Array, sign: Array) -> NDArr
         ["I/III", "I/II", "II/III", "I", "II"],
         "III",
     )
-    letters = np.select([sign > 0, sign < 0], ["+", "-"], "")
-    return np.char.add(names, letters)
 
 
 def _kinematic(speed: Array, r: Array) -> Array:

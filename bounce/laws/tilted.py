@@ -92,7 +92,7 @@ class TiltedBounce(BounceLaw):
         return replace(shot, xdot=xdot_off, ydot=ydot_off, slip=xdot_off + shot.omega)
 
     def caution(self, xdot: float, ydot: float) -> str:
-        """Say where the ball comes in beyond the normal of its tilted plane, or nothing.
+        """Return in words whether the ball comes in beyond the normal of its tilted plane.
 
         Parameters
         ----------
@@ -235,7 +235,7 @@ class PennerBounce(BounceLaw):
         return self.tilted.lift_off(xdot, ydot, omega)
 
     def caution(self, xdot: float, ydot: float) -> str:
-        """Say where the ball comes in beyond the normal of its tilted plane, or nothing.
+        """Return in words whether the ball comes in beyond the normal of its tilted plane.
 
         Parameters
         ----------

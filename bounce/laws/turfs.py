@@ -1,4 +1,4 @@
-"""The values published for turf, with their sources."""
+"""Published values of laws for turf, with their sources."""
 
 from __future__ import annotations
 

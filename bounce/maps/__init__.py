@@ -1,5 +1,25 @@
-"""Many bounces: lift-offs over arrays, maps of outcomes, and the curve that divides them."""
+"""Many bounces: results of maps, the dividing surface, vortices of the slip, and proven maps."""
 
-from .tracing import Arc
+from .dividing import Arc, DividingCurve, DividingSurface, critical_eta, dividing_surface
+from .outcomes import OutcomeMap
+from .proven import ProvenMap, proven_map
+from .results import LiftOffs
+from .slip_directions import SlipMap, SlipTurn, Vortex, find_vortices, slip_turn, winding_number
 
-__all__ = ["Arc"]
+__all__ = [
+    "Arc",
+    "DividingCurve",
+    "DividingSurface",
+    "LiftOffs",
+    "OutcomeMap",
+    "ProvenMap",
+    "SlipMap",
+    "SlipTurn",
+    "Vortex",
+    "critical_eta",
+    "dividing_surface",
+    "find_vortices",
+    "proven_map",
+    "slip_turn",
+    "winding_number",
+]

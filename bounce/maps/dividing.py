@@ -1,18 +1,19 @@
-"""The dividing surface: landings whose lift-off separates forward from reverse slip, H_F = 0.
+"""The dividing curve and surface: landings that lift off without slip, H_F = 0.
 
-For a given normal speed it is a curve in the plane of landings (xdot, omega), made of arcs:
+They separate forward from reverse slip at lift-off. For a given normal speed they form a curve in the
+plane of landings (xdot, omega), made of arcs:
 
-- on *two-fold* arcs the ball rolls into the two-fold set H = L1 = L2 = 0 at lift-off. To one side
-  it leaves rolling just before lift-off to forward slip, to the other side to reverse slip;
+- on *two-fold* arcs the ball rolls into the two-fold set H = L1 = L2 = 0 at lift-off. On one side
+  it stops rolling just before lift-off and slips forward, on the other side in reverse;
 - on *slipping* arcs it slips up to lift-off, where H vanishes just then.
 
-Arcs end where the itinerary changes. The one where a two-fold arc meets a slipping arc, since the
-last rolling phase shrinks to nothing, is their junction: H = A = 0 at lift-off after slip.
+Arcs end where the itinerary changes. A two-fold arc and a slipping arc meet at their junction, where
+the last rolling phase has length zero: H = A = 0 at lift-off after slip.
 
 Biber, Champneys & Szalai (2022) construct the two-fold arc by integration backward from the
-two-fold set. Here landings are shot forward with the itinerary fixed, a smooth problem, and
-Newton's method meets the conditions at lift-off (the same curve, to rounding); this needs no
-formula for lift-off, so it also serves models whose normal motion depends on the tangential one.
+two-fold set. Here landings are integrated forward with the itinerary fixed, a smooth problem, and
+Newton's method solves the conditions at lift-off (the same curve, to rounding). This needs no
+formula for lift-off, so it also works where the normal motion depends on the tangential one.
 """
 
 from __future__ import annotations
@@ -26,17 +27,50 @@ import nonsmooth as ns
 
 from ..contact.model import ContactModel
 from ..parameters import number
-from ..shot.landing import require_model
-from ..shot.single import State
+from ..shot.simulate import simulate
+from ..shot.state import State, require_model
 from .shooting import Shooting
-from .tracing import Arc, arcs_from_rest, landing_at
 
 Array = NDArray[np.float64]
 
 
-#: A speed this near to a point's, relative to the next one's, is the point's: at a junction an orbit
-#: that is off by rounding may be of the other arc.
+#: A speed this near to that of a point, relative to the next one, is that point: at a junction rounding
+#: may put the landing on the other arc.
 _AT_POINT = 1e-13
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Arc:
+    """Landings of one itinerary on the dividing curve.
+
+    Attributes
+    ----------
+    itinerary : str
+        Phases up to the one that meets the surface: ``"+ s"`` rolls into the two-fold, ``"+"``
+        slips to lift-off.
+    points : ndarray (n, 2)
+        ``(xdot, omega)`` along the arc.
+    entry : ndarray (n,)
+        Times at which the last phase begins; at the first point, of the arc before.
+    lift_off : ndarray (n, d)
+        States at lift-off: ``x, xdot, y, ydot, omega``, extra states.
+    end : str
+        Why the arc ends where it does.
+    """
+
+    itinerary: str
+    points: Array
+    entry: Array
+    lift_off: Array
+    end: str
+
+    @property
+    def kind(self) -> str:
+        """``"two-fold"`` or ``"slipping"``."""
+        return "two-fold" if self.itinerary.endswith("s") else "slipping"
+
+    def __repr__(self) -> str:
+        return f"Arc({self.itinerary!r}, {len(self.points)} points, {self.end})"
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -86,7 +120,7 @@ class DividingCurve:
 
     @property
     def complete(self) -> bool:
-        """Whether the curve was traced as far as asked; ``arcs[-1].end`` says why not."""
+        """Whether the curve was traced to ``reach``; ``arcs[-1].end`` is the reason if not."""
         halves = [half for half in (self.arcs, self.reverse) if half]
         return all(half[-1].end == "reach" for half in halves)
 
@@ -110,7 +144,7 @@ class DividingCurve:
         Returns
         -------
         ndarray (...)
-            Where the curve has several spins for a speed, the one first met from rest.
+            Where the curve has several spins for a speed, the first one from rest.
 
         Raises
         ------
@@ -135,8 +169,8 @@ class DividingCurve:
                 guess = (1 - weight) * arc.points[k] + weight * arc.points[k + 1]
                 if min(weight, 1.0 - weight) <= _AT_POINT:
                     return sign * float(guess[1])
-                word = arc.itinerary.replace(" ", "")
-                curve = curves.setdefault(word, ns.orbit.StartCurve(shooting, word, tol=1e-15))
+                modes = arc.itinerary.replace(" ", "")
+                curve = curves.setdefault(modes, ns.orbit.StartCurve(shooting, modes, tol=1e-15))
                 guess[0] = sign * xdot
                 root = curve.correct(guess, np.array([1.0, 0.0]), max_iterations=30)
                 if root is not None:
@@ -145,8 +179,8 @@ class DividingCurve:
         low, high = ends.min(), ends.max()
         both = " and its mirror image" if self.mirrored else ""
         raise ns.PointError(
-            f"xdot: expected a speed that the curve reaches, in [{low:.6g}, {high:.6g}]{both}, "
-            f"received {xdot!r}. Give dividing_curve a larger reach."
+            f"xdot is {xdot!r}, but the curve is known in [{low:.6g}, {high:.6g}]{both}. Give "
+            "dividing_curve a larger reach."
         )
 
     def at_entry(self, time: float, itinerary: str = "+ s") -> State:
@@ -179,18 +213,17 @@ class DividingCurve:
         >>> f"{start.xdot:.12f}, {start.omega:.12f}"
         '0.291276497193, 0.852376712353'
         """
-        word = itinerary.replace(" ", "")
-        if word not in ("+s", "-s"):
+        modes = itinerary.replace(" ", "")
+        if modes not in ("+s", "-s"):
             raise ns.OptionError(f"itinerary: expected '+ s' or '- s', received {itinerary!r}.")
         shooting = Shooting(self.model, self.ydot, tol=_integration(self.tol))
-        root = landing_at(shooting, word[0], time, np.zeros(2))
+        root = _landing_at(shooting, modes[0], time, np.zeros(2))
         fault = "Newton's method finds none"
         if root is not None:
-            fault = shooting.slip_then_roll(root, word[0], time)[1].fault
+            fault = shooting.slip_then_roll(root, modes[0], time)[1].fault
         if root is None or fault:
             raise ns.PointError(
-                f"time: expected one at which a ball that rolls into the two-fold can begin to roll, "
-                f"received {time!r}: {fault}."
+                f"time is {time!r}, at which no ball begins to roll that reaches the two-fold: {fault}."
             )
         return State(xdot=float(root[0]), ydot=self.ydot, omega=float(root[1]))
 
@@ -263,10 +296,99 @@ def dividing_curve(
     _require_two_fold(shooting)
     mirrored = _symmetric(shooting)
     halves = [
-        arcs_from_rest(shooting, mode, mirrored, checked["reach"], checked["step"])
+        _arcs_from_rest(shooting, mode, mirrored, checked["reach"], checked["step"])
         for mode in ("+" if mirrored else "+-")
     ]
     return DividingCurve(model, speed, halves[0], (*halves, ())[1], mirrored, checked["tol"])
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class DividingSurface:
+    """$H_F = 0$ in the space of landings (xdot, ydot, $omega$), as curves at several normal speeds.
+
+    Attributes
+    ----------
+    curves : tuple of DividingCurve
+        In the order of ``ydot``.
+    """
+
+    curves: tuple[DividingCurve, ...]
+
+    @property
+    def ydot(self) -> Array:
+        """Normal speeds, (k,)."""
+        return np.array([curve.ydot for curve in self.curves])
+
+    @property
+    def two_fold(self) -> list[Array]:
+        """For each normal speed (n, 3) of (xdot, ydot, $omega$)."""
+        return [_with_ydot(curve.two_fold, curve.ydot) for curve in self.curves]
+
+    @property
+    def slipping(self) -> list[Array]:
+        """For each normal speed (n, 3) of (xdot, ydot, $omega$)."""
+        return [_with_ydot(curve.slipping, curve.ydot) for curve in self.curves]
+
+    @property
+    def junction(self) -> Array:
+        """Line where the parts meet, (k, 3); NaN where they do not."""
+        rows = [np.full(2, np.nan) if c.junction is None else c.junction for c in self.curves]
+        return np.column_stack([np.array(rows)[:, 0], self.ydot, np.array(rows)[:, 1]])
+
+    def __repr__(self) -> str:
+        return f"DividingSurface({len(self.curves)} curves, ydot = {self.ydot.tolist()})"
+
+
+def dividing_surface(
+    model: ContactModel,
+    ydot: ArrayLike,
+    *,
+    reach: float = 3.0,
+    step: float = 0.05,
+    tol: float = 1e-12,
+) -> DividingSurface:
+    """Trace the dividing surface at several normal speeds.
+
+    Without gravity a linear model's field is homogeneous of degree one and the surface is a cone.
+
+    Parameters
+    ----------
+    model : ContactModel
+        The surface, with its friction.
+    ydot : array_like (k,)
+        Normal speeds at touch-down, $< 0$.
+    reach, step, tol : float, optional
+        As in :func:`dividing_curve`.
+
+    Returns
+    -------
+    DividingSurface
+        The dividing curves, one for each normal speed.
+
+    Raises
+    ------
+    LandingError, ModelError, nonsmooth.OptionError
+        As :func:`dividing_curve`.
+
+    Examples
+    --------
+    >>> import bounce
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
+    >>> surface = bounce.maps.dividing_surface(turf, [-0.5, -1.0])
+    >>> (surface.junction / surface.ydot[:, None]).round(9)
+    array([[-0.444..., 1. , -1.59...],
+           [-0.444..., 1. , -1.59...]])
+    """
+    speeds = np.atleast_1d(np.asarray(ydot, dtype=float))
+    if speeds.ndim != 1 or speeds.size == 0:
+        raise ns.OptionError(f"ydot: expected a list of speeds, received shape {speeds.shape}.")
+    return DividingSurface(
+        tuple(dividing_curve(model, v, reach=reach, step=step, tol=tol) for v in speeds.tolist())
+    )
+
+
+def _with_ydot(points: Array, ydot: float) -> Array:
+    return np.column_stack([points[:, 0], np.full(len(points), ydot), points[:, 1]])
 
 
 def critical_eta(
@@ -310,7 +432,7 @@ def critical_eta(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> f"{bounce.critical_eta(turf):.6f}"
+    >>> f"{bounce.maps.critical_eta(turf):.6f}"
     '1.19...'
     """
     require_model(model)
@@ -328,11 +450,73 @@ def critical_eta(
         if values[k] < 0 <= values[k + 1]:
             return float(brentq(pull, grid[k], grid[k + 1], xtol=1e-13, rtol=1e-14))
     raise ns.ConvergenceError(
-        f"{name}: expected a change to forward slip within {bounds}, received none: A at lift-off "
-        f"per speed is {values[0]:.4g} and {values[-1]:.4g} at the ends. Widen bounds.",
+        f"{name} has no change to forward slip within {bounds}: A at lift-off per speed is "
+        f"{values[0]:.4g} and {values[-1]:.4g} at the ends. Widen bounds.",
         residual=min(map(abs, values)),
         point=grid,
     )
+
+
+def _arcs_from_rest(
+    shooting: Shooting, mode: str, rest: bool, reach: float, step: float
+) -> tuple[Arc, ...]:
+    """Trace the curve outward from rest, which is on it or not, with slip of this mode."""
+    size, first = -shooting.ydot, _first(shooting, mode, rest)
+    itineraries = [mode + "s"] * len(first)
+    if rest:
+        itineraries[0] = "s"
+    far = reach * size
+    found = ns.manifold(
+        shooting.system,
+        _two_fold(shooting, first[-1], mode),
+        starts=ns.orbit.ComputedStarts(shooting.land, size),
+        box=[(-far, far), (-3 * far, 3 * far)],
+        duration=shooting.t_max,
+        until="lift-off",
+        begin=list(zip(itineraries, first, strict=True)),
+        spacing=step,
+        parameters=shooting.model.values,
+        tol=shooting.tol,
+    )
+    if not found.complete:
+        raise KeyboardInterrupt
+    ends = {"bound": "reach", "closed": "rest"}
+    return tuple(
+        Arc(a.itinerary, a.points, a.entry, a.decided, ends.get(a.end, a.end)) for a in found.arcs
+    )
+
+
+def _two_fold(shooting: Shooting, u: Array, mode: str) -> ns.local.TwoFold:
+    """The two-fold at lift-off that a landing rolls into."""
+    x = shooting.passage(u, mode + "s").x
+    return ns.find_two_fold(shooting.system, near=x, parameters=shooting.model.values)
+
+
+def _first(shooting: Shooting, mode: str, rest: bool) -> list[Array]:
+    """Two landings that soon roll into the two-fold; before them rest, if it is on the curve."""
+    model, ydot = shooting.model, shooting.ydot
+    contact, _ = shooting.land(np.zeros(2))
+    duration = simulate(model, 0.0, ydot, 0.0).time - contact
+    first = _landing_at(shooting, mode, contact + 0.01 * duration, np.zeros(2))
+    second = None
+    if first is not None:
+        second = _landing_at(shooting, mode, contact + 0.02 * duration, 2 * first)
+    if first is None or second is None or not np.linalg.norm(second - first) > -1e-9 * ydot:
+        raise ns.DegenerateError(
+            f"{type(model).__name__} has no landings near rest that roll into the two-fold. Let its force "
+            "along the ground depend on x or xdot."
+        )
+    return [np.zeros(2), first, second] if rest else [first, second]
+
+
+def _landing_at(shooting: Shooting, mode: str, entry: float, guess: Array) -> Array | None:
+    """Landing that slips until ``entry`` and then rolls into the two-fold."""
+
+    def both(u: Array) -> Array:
+        slip, rolls = shooting.slip_then_roll(u, mode, entry)
+        return np.array([slip, rolls.value])
+
+    return ns.orbit.joint_root(both, guess, -shooting.ydot, 1e-15, 30)
 
 
 def _bracket(values: Array, target: float) -> tuple[int, float] | None:
@@ -377,9 +561,9 @@ def _require_two_fold(shooting: Shooting) -> None:
     law = type(shooting.model.friction).__name__
     if not below > above:
         raise ns.DegenerateError(
-            f"{who}: expected dry friction, set-valued at H = 0, received {law}, which is a function "
-            "of the slip and of its own states. There is no rolling phase and no two-fold, so H_F = 0 "
-            "is a smooth level: find it with scipy from bounce.lift_off."
+            f"{who} has the friction law {law}, which is not set-valued at H = 0: there is no rolling "
+            "phase and no two-fold, and H_F = 0 is a smooth level. Find it with scipy from "
+            "bounce.lift_off."
         )
     slip = shooting.slip(u)
     rate = shooting.load(slip.x[-1])[1]
@@ -387,8 +571,7 @@ def _require_two_fold(shooting: Shooting) -> None:
     duration = float(slip.t[-1] - slip.t[0])
     if not abs(rate) * duration > 1e-3 * abs(load):
         raise ns.DegenerateError(
-            f"{who}: expected a load that falls through zero at lift-off at a nonzero rate, received "
-            f"rate {rate:.3g} (dLambda_N/dY = 0 there, as for Hertz's law without gravity). Then "
-            "L11 = L22, the two-fold at lift-off is visible-invisible, and no rolling ball reaches it: "
-            'there is no dividing curve of this kind. Gravity with load="net" restores it.'
+            f"{who}: the load falls to zero at lift-off with rate {rate:.3g} (dLambda_N/dY = 0 there, as "
+            "for Hertz's law without gravity). Then L11 = L22, the two-fold at lift-off is "
+            'visible-invisible, and no rolling ball reaches it. Take gravity with load="net".'
         )

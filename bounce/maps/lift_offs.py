@@ -1,60 +1,58 @@
-"""The verb ``lift_off``: many bounces at once, over arrays of landings and parameters."""
+"""Lift-offs of many bounces at once, over arrays of landings and parameters."""
 
 from __future__ import annotations
 
+import math
+import os
+import warnings
 from collections.abc import Mapping
-from typing import Any, overload
+from dataclasses import replace
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..contact.model import ContactModel
-from ..contact.space import Contact3D
-from ..errors import LandingError, ModelError
-from ..parameters import numbers
-from ..shot.space import state_3d
-from .batch import INPUTS, Batch
-from .results import LiftOffs, LiftOffs3D
+from ..contact.equations import (
+    Blueprint,
+    contact_system,
+    equations,
+    free_system,
+    load_inputs,
+    touch_down_function,
+)
+from ..contact.model import NO_GRAVITY, Contact3D, ContactModel
+from ..errors import EnergyWarning, LandingError, ModelError
+from ..parameters import LIMITS, numbers
+from ..shot.energy import advice, gains
+from ..shot.state import landings, state_of
+from ..shot.touch_down import (
+    INSTANT,
+    Rise,
+    instant_later,
+    leaving,
+    onto_zero_load,
+    rests,
+    rise,
+    surfaced,
+)
+from .results import BounceStatus, LiftOffs
 
 Array = NDArray[np.float64]
+Bools = NDArray[np.bool_]
+Rows = NDArray[np.intp]
 
+#: A plain number: before Python 3.12 NumPy calls Python code for a member of an enum, where a Ctrl-C is
+#: lost.
+_LIFTED_OFF = int(BounceStatus.LIFTED_OFF)
 
-@overload
-def lift_off(
-    model: ContactModel,
-    xdot: ArrayLike,
-    ydot: ArrayLike,
-    omega: ArrayLike,
-    x: ArrayLike = 0.0,
-    y: ArrayLike = 0.0,
-    *,
-    parameters: Mapping[str, ArrayLike] | None = None,
-    tol: float = 1e-10,
-    t_max: float = 100.0,
-    work: ns.Work | None = None,
-    engine: str = "auto",
-    device: str | None = None,
-) -> LiftOffs: ...
-
-
-@overload
-def lift_off(
-    model: Contact3D,
-    xdot: ArrayLike,
-    ydot: ArrayLike,
-    omega: ArrayLike,
-    x: ArrayLike = 0.0,
-    y: ArrayLike = 0.0,
-    *,
-    parameters: Mapping[str, ArrayLike] | None = None,
-    tol: float = 1e-10,
-    t_max: float = 100.0,
-    work: ns.Work | None = None,
-    engine: str = "auto",
-    device: str | None = None,
-) -> LiftOffs3D: ...
+_FROM_RUN = {
+    ns.Status.STOPPED: BounceStatus.LIFTED_OFF,
+    ns.Status.REACHED_END: BounceStatus.NO_LIFT_OFF,
+    ns.Status.NON_UNIQUE: BounceStatus.NON_UNIQUE,
+    ns.Status.NOT_FINITE: BounceStatus.NOT_FINITE,
+}
 
 
 def lift_off(
@@ -71,7 +69,7 @@ def lift_off(
     work: ns.Work | None = None,
     engine: str = "auto",
     device: str | None = None,
-) -> LiftOffs | LiftOffs3D:
+) -> LiftOffs:
     """Bounce many balls: inputs and model parameters broadcast against each other.
 
     Parameters
@@ -94,8 +92,8 @@ def lift_off(
 
     Returns
     -------
-    LiftOffs or LiftOffs3D
-        What cannot be simulated is NaN and named in ``status``; nothing is dropped.
+    LiftOffs
+        A bounce that cannot be simulated is NaN, with the reason in ``status``; nothing is dropped.
 
     Raises
     ------
@@ -130,70 +128,235 @@ def lift_off(
     """
     if not isinstance(model, (ContactModel, Contact3D)):
         raise ModelError(f"model: expected a ContactModel, received {model!r}.")
-    follow = dict(t_max=t_max, work=work, options=dict(tol=tol, engine=engine, device=device))
-    if isinstance(model, Contact3D):
-        batch = Batch(model, states_3d(model, xdot, ydot, omega, x, y), parameters)
-        return _in_3d(batch, model.drilling, follow)
-    batch = Batch(model, dict(zip(INPUTS, (xdot, ydot, omega, x, y), strict=True)), parameters)
-    ended = _ended(batch, follow)
-    ends: dict[str, Any] = {name: batch.column(name) for name in INPUTS}
-    return LiftOffs(**ends, **ended)
-
-
-def _ended(batch: Batch, follow: dict[str, Any]) -> dict[str, Any]:
-    """Follow the landings to lift-off; return what does not depend on their dimension."""
-    work = ns.Work(progress=False) if follow["work"] is None else follow["work"]
-    batch.check()
-    batch.touch_down(follow["t_max"], work, follow["options"])
-    itineraries, code = batch.contact(follow["t_max"], work, follow["options"])
-    return dict(
-        time=batch.time.reshape(batch.shape),
-        status=batch.status.reshape(batch.shape),
+    given = dict(xdot=xdot, ydot=ydot, omega=omega, x=x, y=y)
+    bounces = _Bounces(model, given, parameters)
+    work = ns.Work(progress=False) if work is None else work
+    options = dict(tol=tol, engine=engine, device=device)
+    bounces.check()
+    bounces.touch_down(t_max, work, options)
+    itineraries, code = bounces.contact(t_max, work, options)
+    count = bounces.gained(tol)
+    if count:
+        warnings.warn(advice(model, count, code.size), EnergyWarning, stacklevel=2)
+    end = state_of(bounces.equations, bounces.states.reshape(*bounces.shape, len(bounces.names)))
+    motion = {n: np.asarray(getattr(end, n)) for n in ("xdot", "ydot", "omega", "x", "y", "slip")}
+    return LiftOffs(
+        **motion,
+        time=bounces.time.reshape(bounces.shape),
+        status=bounces.status.reshape(bounces.shape),
         itineraries=itineraries,
         itinerary_code=code,
     )
 
 
-def _in_3d(batch: Batch, drilling: bool, follow: dict[str, Any]) -> LiftOffs3D:
-    ended = _ended(batch, follow)
-    # A law without a set, such as one with bristles, has no letter for its one phase.
-    words = tuple({"o": "*", "F o": "F *"}.get(word, word) for word in ended["itineraries"])
-    end = state_3d(batch.states.reshape(*batch.shape, len(batch.names)), drilling)
-    values = {n: getattr(end, n) for n in ("xdot", "ydot", "omega", "x", "y", "slip")}
-    return LiftOffs3D(**values, **{**ended, "itineraries": words})
+class _Part(NamedTuple):
+    """Rows that share their equations; ``rows`` is None where these are all."""
+
+    blueprint: Blueprint
+    rows: Bools | None
 
 
-def states_3d(
-    model: Contact3D, xdot: ArrayLike, ydot: ArrayLike, omega: ArrayLike, x: ArrayLike, y: ArrayLike
-) -> dict[str, ArrayLike]:
-    """Return landings in 3-D by the names of the states, vectors on the last axis.
+class _Bounces:
+    """Landings as rows: their checks, the frictionless phase, and the contact to lift-off."""
 
-    Raises
-    ------
-    LandingError
-    """
-    v, w = (
-        _components("xdot", xdot, (2,)),
-        _components("omega", omega, (2, 3) if model.drilling else (2,)),
-    )
-    place = _components("x", np.zeros(2) if np.ndim(x) == 0 and np.all(x == 0.0) else x, (2,))
-    try:
-        slip_x, slip_z = v[0] + w[0], v[1] + w[1]
-    except ValueError as error:
-        raise LandingError(
-            f"inputs: expected shapes that broadcast, received xdot {np.shape(xdot)} and omega "
-            f"{np.shape(omega)}."
-        ) from error
-    named = dict(x=place[0], z=place[1], xdot=v[0], zdot=v[1], slip_x=slip_x, slip_z=slip_z)
-    turning = dict(spin=w[2] if len(w) > 2 else 0.0) if model.drilling else {}
-    return {**named, **turning, "y": y, "ydot": ydot}
+    def __init__(
+        self,
+        model: ContactModel | Contact3D,
+        inputs: Mapping[str, ArrayLike],
+        parameters: Mapping[str, ArrayLike] | None,
+    ):
+        self.model = model
+        self.equations = equations(model.blueprint())
+        self.names = self.equations.names
+        self.given = landings(model, inputs, lambda v, name: numbers(v, name, LandingError))
+        self.given |= {name: np.array(value) for name, value in self.equations.start.items()}
+        self.values = self._replaced(parameters or {})
+        arrays = {**self.given, **self.values}
+        try:
+            self.shape = np.broadcast_shapes(*[a.shape for a in arrays.values()])
+        except ValueError as error:
+            shapes = {name: a.shape for name, a in arrays.items() if a.ndim}
+            raise LandingError(
+                f"landings and parameters do not broadcast: their shapes are {shapes}."
+            ) from error
+        count = math.prod(self.shape)
+        self.states = np.empty((count, len(self.names)))
+        for k, name in enumerate(self.names):
+            self.states[:, k] = self._rows(self.given[name])
+        self.time = np.zeros(count)
+        self.free = np.zeros(count, bool)
+        self.status = np.full(count, _LIFTED_OFF, np.int8)
+        self.parts = self._parts()
 
+    def _replaced(self, parameters: Mapping[str, ArrayLike]) -> dict[str, NDArray[Any]]:
+        changed = {str(n): numbers(v, str(n), LandingError) for n, v in parameters.items()}
+        unknown = sorted(set(changed) - set(self.model.values))
+        if unknown:
+            raise ns.ParameterError(
+                f"parameters has {unknown}, but the model's are {list(self.model.values)}."
+            )
+        return {**{n: np.array(v) for n, v in self.model.values.items()}, **changed}
 
-def _components(name: str, value: ArrayLike, lengths: tuple[int, ...]) -> list[Array]:
-    array = numbers(value, name, LandingError)
-    if array.ndim == 0 or array.shape[-1] not in lengths:
-        raise LandingError(
-            f"{name}: expected an array (..., {' or '.join(map(str, lengths))}), forward and to the "
-            f"right on the last axis, received shape {array.shape}."
+    def _parts(self) -> tuple[_Part, ...]:
+        """Where the load is less gravity, rows without gravity have other equations than the rest."""
+        weightless = self.values["G"] <= NO_GRAVITY
+        if self.model.convention == "contact" or np.all(weightless):
+            return (_Part(self.model.blueprint(weightless=True), None),)
+        if not np.any(weightless):
+            return (_Part(self.model.blueprint(weightless=False), None),)
+        rows = self._rows(weightless)
+        return tuple(_Part(self.model.blueprint(weightless=w), rows == w) for w in (False, True))
+
+    def _rows(self, values: NDArray[Any]) -> NDArray[Any]:
+        return np.broadcast_to(values, self.shape).ravel()
+
+    def parameters(self, rows: Any) -> dict[str, Any]:
+        """Parameters of some rows: numbers, or arrays where they vary."""
+        return {n: self._rows(v)[rows] if v.ndim else float(v) for n, v in self.values.items()}
+
+    def check(self) -> None:
+        """Mark rows that are no landings."""
+        y, ydot = self.given["y"], self.given["ydot"]
+        self._mark((y > 0) | ((y == 0) & (ydot >= 0)), BounceStatus.NOT_A_LANDING)
+        limits = self.model.limits_of_values()
+        for name, values in self.values.items():
+            if name in limits:
+                allowed = LIMITS[limits[name]]
+                bad = [not allowed(v) for v in values.ravel().tolist()]
+                self._mark(np.array(bad).reshape(values.shape), BounceStatus.BAD_PARAMETER)
+        for values in (*self.values.values(), *self.given.values()):
+            self._mark(~np.isfinite(values), BounceStatus.NOT_FINITE)
+
+    def _mark(self, where: Any, status: BounceStatus) -> None:
+        if np.any(where):
+            self.status[self._rows(np.asarray(where))] = int(status)
+
+    def _going(self, part: _Part) -> Bools:
+        """Rows of a part that nothing is wrong with so far."""
+        going = self.status == _LIFTED_OFF
+        return going if part.rows is None else going & part.rows
+
+    def touch_down(self, t_max: float, work: ns.Work, options: dict[str, Any]) -> None:
+        """Move rows whose load is not positive at once to where it is; this keeps no checkpoint."""
+        options = {**options, "work": replace(work, checkpoint=None)}
+        for part in self.parts:
+            root, short, later, longest = self._rise(part.blueprint)
+            going = self._going(part)
+            over, later = (root | short) & going, later & going
+            self.states[over] = instant_later(part.blueprint, self.states[over])
+            for step in np.unique(longest[later]):
+                rows = np.flatnonzero(later & (longest == step))
+                self._fall(part.blueprint, rows, float(step), t_max, options)
+
+    def _rise(self, blueprint: Blueprint) -> Rise:
+        """:func:`rise` of each row, computed once for each value that it depends on."""
+        names = load_inputs(blueprint)
+        states = [self.given[n] if n in names else np.array(0.0) for n in self.names]
+        values = [v if n in names else np.array(1.0) for n, v in self.values.items()]
+        arrays = np.broadcast_arrays(*states, *values)
+        shape, flat = arrays[0].shape, np.array([a.ravel() for a in arrays])
+        found = rise(blueprint, flat[: len(states)], flat[len(states) :])
+        return Rise(*(self._rows(a.reshape(shape)) for a in found))
+
+    def _fall(
+        self,
+        blueprint: Blueprint,
+        rows: Rows,
+        longest: float,
+        t_max: float,
+        options: dict[str, Any],
+    ) -> None:
+        """Move rows without friction until their load is positive."""
+        up = leaving(self.states[rows])
+        self.status[rows[up]] = int(BounceStatus.NOT_A_LANDING)
+        rows = rows[~up]
+        if not rows.size:
+            return
+        runs = ns.ensemble(
+            free_system(blueprint),
+            self.states[rows]
+            + INSTANT * self._velocities(blueprint, rows),  # off a power law's zero
+            t_max,
+            t_start=INSTANT,
+            parameters=self.parameters(rows),
+            max_step=longest,
+            **options,
         )
-    return [array[..., k] for k in range(array.shape[-1])]
+        self.states[rows], self.time[rows], self.free[rows] = runs.x, runs.t, True
+        self.status[rows] = _translate(runs.status)
+        rows = rows[self.status[rows] == _LIFTED_OFF]
+        unpressed = surfaced(self.states[rows])
+        self.status[rows[unpressed]] = int(BounceStatus.NO_CONTACT)
+        rows = rows[~unpressed]
+        self.states[rows] = onto_zero_load(blueprint, self.states[rows].T, self._columns(rows)).T
+
+    def _velocities(self, blueprint: Blueprint, rows: Rows) -> Array:
+        """Rates of the states of some rows without friction."""
+        field = ns.call(touch_down_function(blueprint), self.states[rows].T, self._columns(rows))[2]
+        return np.array(field).T
+
+    def _columns(self, rows: Rows) -> Array:
+        """Parameters of some rows, in columns."""
+        values = self.parameters(rows)
+        return np.array([np.broadcast_to(values[n], rows.size) for n in self.values])
+
+    def contact(
+        self, t_max: float, work: ns.Work, options: dict[str, Any]
+    ) -> tuple[tuple[str, ...], NDArray[np.int32]]:
+        """Follow the contact with friction; return the itineraries and each row's among them."""
+        named: list[str] = []
+        code = np.full(self.status.size, -1, np.int32)
+        for part in self.parts:
+            rows = np.flatnonzero(self._going(part))
+            runs = ns.ensemble(
+                contact_system(part.blueprint),
+                self.states if rows.size == self.status.size else self.states[rows],
+                t_max,
+                parameters=self.parameters(rows),
+                work=work,
+                **options,
+            )
+            self.status[rows] = _translate(runs.status)
+            self.states[rows] = runs.x
+            self.time[rows] += runs.t
+            later = len(runs.itineraries) * self.free[rows]
+            code[rows] = len(named) + runs.itinerary_code + later
+            named += [*runs.itineraries, *(f"F {itinerary}" for itinerary in runs.itineraries)]
+            if work.checkpoint is not None:  # the second part, if any, has its own
+                work = replace(work, checkpoint=f"{os.fspath(work.checkpoint)}-weightless")
+        start = np.stack([self._rows(self.given[n]) for n in ("x", "xdot", "y", "ydot")], axis=-1)
+        stay = (self.status == _LIFTED_OFF) & rests(self.states, start)
+        self.status[stay] = int(BounceStatus.NO_LIFT_OFF)
+        failed = self.status != _LIFTED_OFF
+        self.states[failed], self.time[failed], code[failed] = np.nan, np.nan, -1
+        itineraries, code = _sorted(named, code)
+        return itineraries, code.reshape(self.shape)
+
+    def gained(self, tol: float) -> int:
+        """Count balls that leave faster than they came, because the surface did work on them."""
+        ydot = self.states[:, 3].reshape(self.shape)
+        faster = (ydot > -self.given["ydot"]) & (self.given["y"] == 0.0)
+        count = 0
+        for part in self.parts if np.any(faster) else ():
+            rows = np.flatnonzero(faster.ravel() & self._going(part))
+            landing = np.array([self._rows(self.given[name])[rows] for name in self.names])
+            p, off = self._columns(rows), self.states[rows].T
+            count += int(np.sum(gains(part.blueprint, landing, off, p, tol)))
+        return count
+
+
+def _translate(status: NDArray[np.int8]) -> NDArray[np.int8]:
+    table = [int(_FROM_RUN.get(s, BounceStatus.FAILED)) for s in sorted(ns.Status)]
+    return np.array(table, np.int8)[status]
+
+
+def _sorted(named: list[str], code: NDArray[np.int32]) -> tuple[tuple[str, ...], NDArray[np.int32]]:
+    """Itineraries that occur, sorted, and the position of each row's among them (-1: none)."""
+    # A law without a set, such as one with bristles in 3-D, has no letter for its one phase.
+    named = [{"o": "*", "F o": "F *"}.get(itinerary, itinerary) for itinerary in named]
+    used = set(np.unique(code).tolist()) - {-1}
+    itineraries = sorted({named[k] for k in used})
+    order = np.full(len(named) + 1, -1, np.int32)
+    for k in used:
+        order[k] = itineraries.index(named[k])
+    return tuple(itineraries), order[code]

@@ -1,4 +1,4 @@
-"""Maps of outcomes: what becomes of landings over any two inputs or parameters."""
+"""Maps of outcomes: itineraries and lift-offs over any two inputs or parameters."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ import nonsmooth as ns
 from ..contact.model import ContactModel
 from ..errors import LandingError, ModelError
 from ..parameters import Parametrised, number, numbers
-from .batch import INPUTS
+from ..shot.state import INPUTS
 from .lift_offs import lift_off
 from .results import LiftOffs
 
@@ -89,13 +89,7 @@ class OutcomeMap:
 
 
 def region_name(itinerary: str) -> str:
-    """Name a region by the itinerary in it.
-
-    Examples
-    --------
-    >>> region_name("+ s -")
-    'S+ R S-'
-    """
+    """Name a region by its itinerary: "+ s -" is "S+ R S-"."""
     return " ".join({"+": "S+", "-": "S-", "s": "R"}.get(m, m) for m in itinerary.split())
 
 
@@ -105,7 +99,7 @@ def outcome_map(
     fixed: Mapping[str, float] | None = None,
     **options: Any,
 ) -> OutcomeMap:
-    """Map what becomes of landings over any two inputs or parameters.
+    """Map itineraries and lift-offs of landings over any two inputs or parameters.
 
     Parameters
     ----------
@@ -162,15 +156,7 @@ def checked_axes(
     needed: Sequence[str],
     usual: Mapping[str, float] | None = None,
 ) -> tuple[dict[str, Array], dict[str, float]]:
-    """Return the two axes of a map, and the other values, which may have usual ones.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-        Not two names, one that is not known, a needed one that is missing, or one twice.
-    nonsmooth.ParameterError, LandingError
-        What is no number.
-    """
+    """Return the two axes of a map, and the other values, which may have defaults."""
     for what, given in dict(over=over, fixed=fixed).items():
         if not isinstance(given, Mapping):
             raise ns.OptionError(f"{what}: expected a dict of names, received {given!r}.")

@@ -1,9 +1,9 @@
-"""Which landings are proven to lift off forward, and which in reverse: a map of theorems."""
+"""Map of landings that are proven to lift off forward or in reverse, by interval arithmetic."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from ..shot.certify import certify
 
 #: Outcomes by number, as in ``ProvenMap.outcome``.
 OUTCOMES = ("undecided", "forward", "reverse", "rolling")
+_Box = tuple[float, float, float, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,7 +35,7 @@ class ProvenMap:
     itinerary : tuple of str
         Proven phases, ``""`` where undecided.
     interrupted : bool
-        Whether Ctrl-C ended it before its time; the rest is undecided.
+        Whether Ctrl-C ended it; the rest is undecided.
     """
 
     model: ContactModel
@@ -69,25 +70,13 @@ class ProvenMap:
         Raises
         ------
         LandingError
-            It is not on the map.
+            It is outside the map.
         """
         b = self.boxes
         on = (b[:, 0] <= xdot) & (xdot <= b[:, 1]) & (b[:, 2] <= omega) & (omega <= b[:, 3])
         if not on.any():
-            raise LandingError(f"landing: expected one of the map, received ({xdot}, {omega}).")
+            raise LandingError(f"xdot, omega: ({xdot}, {omega}) is outside the map.")
         return OUTCOMES[int(self.outcome[on].max())]
-
-
-@dataclass
-class _Growing:
-    boxes: list[tuple[float, float, float, float]] = field(default_factory=list)
-    outcome: list[int] = field(default_factory=list)
-    itinerary: list[str] = field(default_factory=list)
-
-    def add(self, box: tuple[float, float, float, float], outcome: str, itinerary: str) -> None:
-        self.boxes.append(box)
-        self.outcome.append(OUTCOMES.index(outcome))
-        self.itinerary.append(itinerary)
 
 
 def proven_map(
@@ -137,13 +126,13 @@ def proven_map(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> found = bounce.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
+    >>> found = bounce.maps.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
     >>> found.at(0.105, 1.01)
     'forward'
     """
-    ranges = [*_range(xdot, "xdot"), *_range(omega, "omega")]
-    todo = [((ranges[0], ranges[1], ranges[2], ranges[3]), 0)]
-    found, interrupted = _Growing(), False
+    todo: list[tuple[_Box, int]] = [((*_range(xdot, "xdot"), *_range(omega, "omega")), 0)]
+    found: list[tuple[_Box, str, str]] = []
+    interrupted = False
     while todo:
         box, level = todo.pop()
         try:
@@ -151,15 +140,15 @@ def proven_map(
             proof = certify(model, (a, b), ydot, (c, d), parameters=parameters, **options)
         except KeyboardInterrupt:
             interrupted = True
-            for rest, _ in [*todo, (box, level)]:
-                found.add(rest, "undecided", "")
+            found += [(rest, "undecided", "") for rest, _ in [*todo, (box, level)]]
             break
         if proof.proven or level >= depth:
-            found.add(box, proof.outcome, proof.itinerary if proof.proven else "")
+            found.append((box, proof.outcome, proof.itinerary if proof.proven else ""))
         else:
             todo += [(part, level + 1) for part in _quarters(box)]
-    boxes, outcome = np.array(found.boxes), np.array(found.outcome)
-    return ProvenMap(model, float(ydot), boxes, outcome, tuple(found.itinerary), interrupted)
+    boxes, outcomes, itineraries = zip(*found, strict=True)
+    numbers = np.array([OUTCOMES.index(outcome) for outcome in outcomes])
+    return ProvenMap(model, float(ydot), np.array(boxes), numbers, itineraries, interrupted)
 
 
 def _range(value: Any, name: str) -> tuple[float, float]:
@@ -172,9 +161,7 @@ def _range(value: Any, name: str) -> tuple[float, float]:
     return low, high
 
 
-def _quarters(
-    box: tuple[float, float, float, float],
-) -> list[tuple[float, float, float, float]]:
+def _quarters(box: _Box) -> list[_Box]:
     a, b, c, d = box
     m, n = 0.5 * (a + b), 0.5 * (c + d)
     return [(a, m, c, n), (m, b, c, n), (a, m, n, d), (m, b, n, d)]

@@ -1,4 +1,4 @@
-"""What becomes of many bounces: arrays of lift-offs, with a status for each."""
+"""Arrays of lift-offs, with a status for each."""
 
 from __future__ import annotations
 
@@ -8,11 +8,13 @@ from enum import IntEnum
 import numpy as np
 from numpy.typing import NDArray
 
+from ..shot.state import AlongTheGround
+
 Array = NDArray[np.float64]
 
 
 class BounceStatus(IntEnum):
-    """How a bounce of an ensemble ended; stored in arrays."""
+    """How a bounce of an ensemble ended, as a number in arrays."""
 
     LIFTED_OFF = 0
     NO_LIFT_OFF = 1
@@ -28,7 +30,7 @@ class BounceStatus(IntEnum):
 
     @property
     def advice(self) -> str:
-        """The status in a sentence, with what to do."""
+        """The meaning of the status in a sentence."""
         return _ADVICE[self]
 
 
@@ -37,21 +39,51 @@ _ADVICE = {
     BounceStatus.NO_LIFT_OFF: "The load did not vanish before t_max: the ball stays, or t_max is "
     "too short.",
     BounceStatus.NOT_A_LANDING: "The ball is above the ground or moves away from it.",
-    BounceStatus.NOT_FINITE: "An input, or a force on the way, is not a finite number.",
+    BounceStatus.NOT_FINITE: "An input or a force is not a finite number.",
     BounceStatus.BAD_PARAMETER: "A parameter is outside the model's limits.",
     BounceStatus.NO_CONTACT: "The ball passes through the surface without pressing on it.",
-    BounceStatus.NON_UNIQUE: "The motion meets a point from which it is not unique.",
-    BounceStatus.FAILED: "Too many events or steps: simulate this one to see its message.",
+    BounceStatus.NON_UNIQUE: "The motion reaches a point from which it is not unique.",
+    BounceStatus.FAILED: "Too many events or steps: the message of simulate has the details.",
 }
 
 
-class _Ended:
-    """How the bounces of an array ended: common to the plane and to 3-D."""
+@dataclass(frozen=True, eq=False, repr=False)
+class LiftOffs(AlongTheGround):
+    """Lift-offs, each array of the broadcast shape ``(...)`` of the landings.
 
+    In 3-D ``xdot``, ``omega``, ``x`` and ``slip`` are arrays (..., 2), forward and to the right, as in
+    :class:`bounce.shot.State`.
+
+    Attributes
+    ----------
+    xdot, ydot, omega, x, y : ndarray (...)
+        State at lift-off; NaN where ``status`` is not LIFTED_OFF.
+    time : ndarray (...)
+        Duration of the contact.
+    status : ndarray of int8 (...)
+        Values of :class:`BounceStatus`.
+    itineraries : tuple of str
+        Those that occur, sorted.
+    itinerary_code : ndarray of int32 (...)
+        Position in ``itineraries``; -1 where there was no lift-off.
+    slip : ndarray (...)
+        Velocity of the contact point, ``xdot + omega``; below zero is reverse slip.
+    """
+
+    xdot: Array
+    ydot: Array
+    omega: Array
+    x: Array
+    y: Array
     time: Array
     status: NDArray[np.int8]
     itineraries: tuple[str, ...]
     itinerary_code: NDArray[np.int32]
+    slip: Array = None  # type: ignore[assignment]
+
+    def __post_init__(self) -> None:
+        if self.slip is None:
+            object.__setattr__(self, "slip", self.xdot + self.omega)
 
     @property
     def itinerary(self) -> NDArray[np.object_]:
@@ -68,91 +100,7 @@ class _Ended:
             f"{BounceStatus(int(s))} {k}"
             for s, k in zip(*np.unique(self.status, return_counts=True), strict=True)
         )
-        words = ", ".join(map(repr, self.itineraries[:8])) + (
+        shown = ", ".join(map(repr, self.itineraries[:8])) + (
             ", ..." if len(self.itineraries) > 8 else ""
         )
-        return f"{type(self).__name__}(shape {self.time.shape}; {counts}; itineraries {words})"
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs(_Ended):
-    """Lift-offs, each array of the broadcast shape ``(...)`` of the inputs.
-
-    Attributes
-    ----------
-    xdot, ydot, omega, x, y : ndarray (...)
-        State at lift-off; NaN where ``status`` is not LIFTED_OFF.
-    time : ndarray (...)
-        Duration of the contact.
-    status : ndarray of int8 (...)
-        Values of :class:`BounceStatus`.
-    itineraries : tuple of str
-        Those that occur, sorted.
-    itinerary_code : ndarray of int32 (...)
-        Position in ``itineraries``; -1 where there was no lift-off.
-    """
-
-    xdot: Array
-    ydot: Array
-    omega: Array
-    x: Array
-    y: Array
-    time: Array
-    status: NDArray[np.int8]
-    itineraries: tuple[str, ...]
-    itinerary_code: NDArray[np.int32]
-
-    @property
-    def slip(self) -> Array:
-        """Slip ``xdot + omega`` at lift-off (...); below zero is reverse slip."""
-        return self.xdot + self.omega
-
-
-@dataclass(frozen=True, eq=False, repr=False)
-class LiftOffs3D(_Ended):
-    """Lift-offs in 3-D, arrays of the broadcast shape ``(...)`` of the landings.
-
-    Attributes
-    ----------
-    xdot, omega, x : ndarray (..., 2)
-        Velocity, spin and place along the ground, forward and to the right, as in
-        :class:`State3D`; NaN where ``status`` is not LIFTED_OFF.
-    ydot, y : ndarray (...)
-        Velocity and place normal to the ground.
-    slip : ndarray (..., 2)
-        Velocity of the contact point.
-    time : ndarray (...)
-        Duration of the contact.
-    status : ndarray of int8 (...)
-        Values of :class:`BounceStatus`.
-    itineraries : tuple of str
-        Those that occur, sorted.
-    itinerary_code : ndarray of int32 (...)
-        Position in ``itineraries``; -1 where there was no lift-off.
-    """
-
-    xdot: Array
-    ydot: Array
-    omega: Array
-    x: Array
-    y: Array
-    slip: Array
-    time: Array
-    status: NDArray[np.int8]
-    itineraries: tuple[str, ...]
-    itinerary_code: NDArray[np.int32]
-
-    @property
-    def slip_speed(self) -> Array:
-        """Length of the slip (...)."""
-        return np.hypot(self.slip[..., 0], self.slip[..., 1])
-
-    @property
-    def slip_angle(self) -> Array:
-        """Direction of the slip (...), rad from forward to the right, in $(-pi, pi]$."""
-        return np.arctan2(self.slip[..., 1] + 0.0, self.slip[..., 0])
-
-    @property
-    def travel_angle(self) -> Array:
-        """Direction in which the ball leaves along the ground (...), as ``slip_angle``."""
-        return np.arctan2(self.xdot[..., 1] + 0.0, self.xdot[..., 0])
+        return f"{type(self).__name__}(shape {self.time.shape}; {counts}; itineraries {shown})"

@@ -1,8 +1,7 @@
-"""Shooting for the dividing surface: slip, then roll to lift-off, with the itinerary fixed.
+"""Shooting from landings to lift-off with the itinerary fixed.
 
-With the itinerary fixed every piece is a smooth flow, so the conditions at its end are smooth
-functions of the start, and Newton's method finds starts that meet them. This also holds where the
-normal motion depends on the tangential one and lift-off comes at another time for every start.
+Then every leg is a smooth flow, so the conditions at its end are smooth functions of the landing and
+Newton's method solves them, also where the time of lift-off depends on the landing.
 """
 
 from __future__ import annotations
@@ -25,19 +24,7 @@ Array = NDArray[np.float64]
 
 
 class Shooting(ns.orbit.EventPassages):
-    """Motions with a fixed itinerary from touch-down at x = y = 0 to lift-off.
-
-    A ``Passage`` is the lift-off; its ``corner`` is H = xdot + omega, and the tangential acceleration
-    A without friction.
-
-    Parameters
-    ----------
-    model : ContactModel
-    ydot : float
-        Normal speed at touch-down, < 0.
-    tol : float
-    t_max : float
-    """
+    """Motions from touch-down at x = y = 0 to lift-off, whose ``corner`` is H and the acceleration A."""
 
     def __init__(
         self, model: ContactModel, ydot: float, *, tol: float = 1e-13, t_max: float = 1000.0
@@ -75,10 +62,7 @@ class Shooting(ns.orbit.EventPassages):
     # with the itinerary fixed -------------------------------------------------------------------
 
     def passage(self, u: Array, word: str) -> ns.orbit.Passage:
-        """Move with an itinerary such as ``"+s"``; the last phase goes on to lift-off.
-
-        A last phase of rolling is not left, and one of slip does not end, where H = 0.
-        """
+        """Follow an itinerary such as ``"+s"``; its last phase continues to lift-off, even past H = 0."""
         with self._lift_off():
             return super().passage(u, word)
 
@@ -117,9 +101,9 @@ class Shooting(ns.orbit.EventPassages):
 
     @contextmanager
     def _lift_off(self) -> Iterator[None]:
-        """Say of a phase that does not end that there is no lift-off."""
+        """Raise a ``LiftOffError`` where a phase does not end."""
         try:
             yield
         except ns.ConvergenceError as error:
             run = error.point if isinstance(error.point, ns.Trajectory) else None
-            raise LiftOffError(f"lift-off: {error}", run) from error
+            raise LiftOffError(f"The ball does not lift off: {error}", run) from error

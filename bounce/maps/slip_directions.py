@@ -1,7 +1,7 @@
-"""Which way the slip at lift-off points, over the spins of a ball in 3-D: vortices and their index.
+"""Direction of the slip at lift-off in 3-D: maps over the spin, vortices and their index, and its turn.
 
-In the plane the slip at lift-off changes its sign across a curve of landings. In 3-D it is a vector,
-which is zero at single spins only; around each it turns once, a vortex.
+In the plane the slip at lift-off changes its sign across a curve of landings. In 3-D it is a vector
+that is zero at isolated spins only; around each, a vortex, it turns once.
 """
 
 from __future__ import annotations
@@ -15,13 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..contact.model import ContactModel
-from ..contact.space import Contact3D
+from ..contact.model import Contact3D, ContactModel
 from ..errors import LandingError, ModelError
 from ..parameters import number, numbers
-from ..shot.single import simulate
+from ..shot.simulate import simulate
 from .lift_offs import lift_off
-from .results import LiftOffs3D
+from .results import LiftOffs
 from .shooting import Shooting
 
 Array = NDArray[np.float64]
@@ -30,8 +29,10 @@ Array = NDArray[np.float64]
 _FINE = math.pi / 2
 #: How often the points of a circle are doubled, and cells of spins divided.
 _DOUBLINGS, _DIVISIONS = 7, 60
-#: Distance from a vortex, in cells, at which what vanishes there is looked at first, and steps to it.
+#: Distance from a vortex, in cells, of the first secant, and the number of secant steps.
 _BESIDE, _SECANTS = 0.01, 6
+#: Points of Gauss's rule over the contact.
+_POINTS = 60
 
 
 class Vortex(NamedTuple):
@@ -64,7 +65,7 @@ class SlipMap:
     omega : (ndarray (m,), ndarray (n,))
         Spins: for ``xdot`` forward that about the lateral axis (backspin) and that about the axis of
         travel.
-    lift_offs : LiftOffs3D
+    lift_offs : LiftOffs
         Arrays (n, m).
     """
 
@@ -72,7 +73,7 @@ class SlipMap:
     xdot: Array
     ydot: float
     omega: tuple[Array, Array]
-    lift_offs: LiftOffs3D
+    lift_offs: LiftOffs
 
     @property
     def angle(self) -> Array:
@@ -207,7 +208,7 @@ def winding_number(
     --------
     >>> import bounce
     >>> turf = bounce.NormalKelvinVoigt(mu=0.3, d2=0.1)
-    >>> bounce.winding_number(turf, [0.2, 0.0], centre=[4.0, 0.0], radius=1.0, tol=1e-6)
+    >>> bounce.maps.winding_number(turf, [0.2, 0.0], centre=[4.0, 0.0], radius=1.0, tol=1e-6)
     0
     """
     surface, v, middle = _in_3d(model), _pair("xdot", xdot), _pair("centre", centre)
@@ -239,8 +240,8 @@ def winding_number(
 
 def _jumps(received: str) -> ns.ConvergenceError:
     return ns.ConvergenceError(
-        f"winding_number: expected a direction that turns continuously on the circle, received {received}. "
-        "A vortex is on the circle, or a ball on it does not lift off or rolls to its end: take another "
+        f"radius: the slip does not turn continuously on the circle: {received}. "
+        "A vortex is on the circle, or a ball on it does not lift off or rolls to its end. Take another "
         "radius."
     )
 
@@ -257,7 +258,7 @@ def find_vortices(
     """Return the spins along the direction of travel at which a ball lifts off without slip.
 
     They are landings in a vertical plane, where slip is one number with a sign, so they are found
-    there: between the signs of a grid of spins, by division.
+    there: by bisection between changes of sign on a grid of spins.
 
     Parameters
     ----------
@@ -268,7 +269,7 @@ def find_vortices(
     ydot : float, optional
         Velocity into the ground.
     largest : float, optional
-        Spins up to this are looked at.
+        Largest spin searched.
     cells : int, optional
         Of the grid.
     tol : float, optional
@@ -277,13 +278,13 @@ def find_vortices(
     Returns
     -------
     tuple of ndarray (2,)
-        Places of the vortices.
+        Spins of the vortices.
 
     Examples
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
-    >>> (spin,) = bounce.find_vortices(turf, [0.2, 0.0])
+    >>> (spin,) = bounce.maps.find_vortices(turf, [0.2, 0.0])
     >>> f"{spin[0]:.10f}", float(spin[1])
     ('0.5505199102', 0.0)
     """
@@ -291,12 +292,12 @@ def find_vortices(
     speed = float(np.hypot(*v))
     if not surface.isotropic:
         raise ModelError(
-            f"model: expected one that is the same in all directions, received {surface!r}. Its vortices "
-            "are no planar bounces: look for them in a slip_map."
+            f"model: {surface!r} is not the same in all directions, so its vortices are no planar bounces. "
+            "Find them in a slip_map."
         )
     if speed == 0.0:
         raise LandingError(
-            "xdot: expected a direction of travel, received a ball that falls straight."
+            "xdot is zero, but vortices are along the direction of travel. Give a speed."
         )
     most = number(largest, "largest", ns.OptionError)
 
@@ -318,20 +319,18 @@ def find_vortices(
 
 
 def _polished(shooting: Shooting, speed: float, spin: float, near: float) -> float:
-    """A spin that is known where the slip is above rounding, to the digits of what vanishes there.
-
-    Slip at lift-off after rolling is quadratic in the distance, so its sign is known to half of the
-    digits; the tangential force at the end of rolling until lift-off is linear in it.
-    """
+    """Refine a spin to full accuracy by the secant method on the tangential force at lift-off."""
+    # Slip at lift-off after rolling is quadratic in the distance from the vortex, so its sign gives half
+    # of the digits only. The tangential force at the end of rolling is linear in it.
     beside = spin + _BESIDE * near
-    word = simulate(shooting.model, speed, shooting.ydot, beside, tol=shooting.tol).itinerary
-    word = word.replace("F", "").replace(" ", "")
-    if "s" not in word:
+    modes = simulate(shooting.model, speed, shooting.ydot, beside, tol=shooting.tol).itinerary
+    modes = modes.replace("F", "").replace(" ", "")
+    if "s" not in modes:
         return spin  # slip itself is linear, and known to rounding
-    word = word[: word.rindex("s") + 1]
+    modes = modes[: modes.rindex("s") + 1]
 
     def pull(value: float) -> float:
-        return float(shooting.passage(np.array([speed, value]), word).corner[1])
+        return float(shooting.passage(np.array([speed, value]), modes).corner[1])
 
     one, other = beside, spin - _BESIDE * near
     at_one, at_other = pull(one), pull(other)
@@ -341,6 +340,112 @@ def _polished(shooting: Shooting, speed: float, spin: float, near: float) -> flo
         one, other, at_other = one - at_one * (one - other) / (at_one - at_other), one, at_one
         at_one = pull(one)
     return one if abs(one - spin) <= near else spin
+
+
+class SlipTurn(NamedTuple):
+    """By how much the slip turns from touch-down to lift-off.
+
+    Attributes
+    ----------
+    eta : ndarray (n,)
+        Tangential over normal natural frequency.
+    turn : ndarray (n,)
+        Computed, rad in $(-pi, pi]$, from forward to the right positive.
+    first_order : ndarray (n,)
+        By the formula, for a ball that slips throughout.
+    """
+
+    eta: Array
+    turn: Array
+    first_order: Array
+
+
+def slip_turn(
+    model: ContactModel,
+    xdot: ArrayLike,
+    omega: ArrayLike,
+    eta: ArrayLike,
+    ydot: float = -1.0,
+    *,
+    tol: float = 1e-10,
+) -> SlipTurn:
+    """Turn of the slip's direction with the stiffness along the ground, beside a formula.
+
+    A rigid ground keeps the direction of the slip h. A compliant one pushes against the velocity V of
+    the centre, so where V has a component $V_n$ normal to h (to the right of it), to first order
+
+    $$
+    turn = -V_n int_0^T (2 d1 eta + eta^2 t)/(|h_0| - (1 + 1/inertia) mu J(t)) dt
+    $$
+
+    with T the duration and $J(t)$ the impulse of the load.
+
+    Parameters
+    ----------
+    model : ContactModel
+        One with parameters ``d1`` and ``eta`` and the linear surface along the ground, and the load of
+        a motion that does not depend on it.
+    xdot, omega : array_like (2,)
+        Velocity and spin at touch-down, forward and to the right.
+    eta : array_like (n,)
+        Tangential over normal natural frequency, one bounce for each.
+    ydot : float, optional
+        Velocity into the ground.
+    tol : float, optional
+        Of the bounces.
+
+    Returns
+    -------
+    SlipTurn
+        The turn as computed, and as the formula has it.
+
+    Examples
+    --------
+    >>> import bounce, numpy as np
+    >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
+    >>> found = bounce.maps.slip_turn(turf, [2.0, 0.0], [0.5, 1.0], [0.01], tol=1e-9)
+    >>> [f"{np.degrees(v[0]):.5f}" for v in (found.turn, found.first_order)]
+    ['0.18914', '0.18806']
+    """
+    if not isinstance(model, ContactModel) or not {"d1", "eta"} <= set(model.values):
+        raise ModelError(
+            f"model: expected a ContactModel with parameters d1 and eta, received {model!r}."
+        )
+    v, w, ratios = (
+        numbers(a, n, LandingError) for a, n in ((xdot, "xdot"), (omega, "omega"), (eta, "eta"))
+    )
+    if v.shape != (2,) or w.shape != (2,) or ratios.ndim != 1:
+        raise LandingError(
+            f"xdot, omega, eta: expected two numbers, two numbers and a list, received shapes {v.shape}, "
+            f"{w.shape} and {ratios.shape}."
+        )
+    slip = v + w
+    size = float(np.hypot(*slip))
+    if size == 0.0:
+        raise LandingError(
+            "xdot, omega: the ball does not slip at touch-down. Give a slip, whose turn is computed."
+        )
+    off = lift_off(model.in_3d(), v, ydot, w, parameters={"eta": ratios}, tol=tol)
+    cross = slip[0] * off.slip[:, 1] - slip[1] * off.slip[:, 0]
+    turn = np.arctan2(cross + 0.0, off.slip @ slip)
+    values = model.values
+    shot = simulate(model.replace(eta=0.0), size, ydot, 0.0, tol=tol)
+    nodes, weights = np.polynomial.legendre.leggauss(_POINTS)
+    t, weights = shot.time * (nodes + 1) / 2, weights * shot.time / 2
+    gravity = values["G"] * np.cos(values["slope"]) if model.convention == "contact" else 0.0
+    impulse = shot(t)[:, 3] - ydot + gravity * t
+    left = size - (1 + 1 / values["inertia"]) * values["mu"] * impulse
+    if np.any(left <= 0.0):
+        raise ns.OptionError(
+            f"omega: with a slip of {size:g} at touch-down the ball does not slip throughout, so the "
+            "formula does not hold. Give more slip."
+        )
+    normal = (slip[0] * v[1] - slip[1] * v[0]) / size
+    first = [
+        -normal * float(weights @ ((2 * values["d1"] * e + e**2 * t) / left))
+        for e in ratios.tolist()
+    ]
+    return SlipTurn(ratios, turn, np.array(first))
 
 
 def _in_3d(model: ContactModel | Contact3D) -> Contact3D:

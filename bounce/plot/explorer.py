@@ -6,7 +6,7 @@ from pathlib import Path
 
 import nonsmooth as ns
 
-from .outcomes import COLOURS, MORE
+from .regions import COLOURS, MORE
 
 WEB = Path(__file__).parent / "web"
 #: What the page shows first: slip, rolling, and reverse slip at lift-off.

@@ -1,4 +1,4 @@
-"""Keys below the axes, clear of what is drawn and of the axis' name whatever the size of the picture."""
+"""Keys below the axes of a picture, at a fixed distance from them."""
 
 from __future__ import annotations
 
@@ -20,16 +20,7 @@ def is_narrow(ax: Axes) -> bool:
 
 
 def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int = 2) -> None:
-    """Put a key below the axes, in an artist of its own: the axes' legend stays free if it is taken.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    handles, labels : sequence
-        Of the entries.
-    columns : int, optional
-        At most so many entries on a line.
-    """
+    """Put a key below the axes, as their legend or, if they have one, as an artist of its own."""
     if not handles:
         return
     from matplotlib.transforms import ScaledTranslation
@@ -48,3 +39,17 @@ def below(ax: Axes, handles: Sequence[Any], labels: Sequence[str], columns: int 
 
     key = ax.add_artist(Legend(ax, handles, labels, **look))
     key.set_clip_on(False)  # the layout leaves out what it takes for clipped to the axes
+
+
+def keys(ax: Axes, patches: Sequence[Any], lines: dict[str, Any], title: str) -> None:
+    """Put a key of the lines below a map, and of the patches beside it, or below a narrow one too."""
+    if is_narrow(ax):
+        labels = [str(patch.get_label()) for patch in patches]
+        below(ax, [*lines.values(), *patches], [*lines, *labels])
+        return
+    if patches:
+        ax.legend(
+            handles=patches, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
+            frameon=False, fontsize=8, title=title, title_fontsize=8,
+        )  # fmt: skip
+    below(ax, list(lines.values()), list(lines))

@@ -17,10 +17,8 @@ from ..laws.law import CASES
 from ..maps.dividing import DividingCurve
 from ..maps.outcomes import OutcomeMap
 from ..units import UNITS
-from .keys import below, is_narrow
-from .regions import COLOURS as COLOURS
+from .keys import is_narrow, keys
 from .regions import LISTED, regions
-from .regions import MORE as MORE
 
 style = ns.plot.style
 Array = NDArray[np.float64]
@@ -123,7 +121,7 @@ def outcome_map(
             room = LISTED - len(lines) if is_narrow(ax) else LISTED
             patches = regions(ax, outcomes, x, y, room)
             lines |= _cases(ax, outcomes)
-        _keys(ax, patches, lines)
+        keys(ax, patches, lines, "narrow regions")
         for axis, name in zip((ax.xaxis, ax.yaxis), outcomes.names, strict=True):
             what, unit, _ = units.get(name, (_LABELS.get(name, name), "", 1.0))
             axis.set_label_text(f"{what} ({unit})" if unit else what)
@@ -132,20 +130,6 @@ def outcome_map(
         title = textwrap.fill(_title(outcomes, units), letters)
         ax.set_title(title.replace(_JOINED, " "), fontsize=_TITLE, loc="left", color="0.3")
     return figure
-
-
-def _keys(ax: Axes, patches: list[Patch], lines: dict[str, Any]) -> None:
-    """Say what lines are, below the map, and which regions are narrow, beside it."""
-    if is_narrow(ax):  # beside a legend little of the map would be left
-        labels = [str(patch.get_label()) for patch in patches]
-        below(ax, [*lines.values(), *patches], [*lines, *labels])
-        return
-    if patches:
-        ax.legend(
-            handles=patches, loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=8,
-            frameon=False, title="narrow regions", title_fontsize=8, borderaxespad=0.0,
-        )  # fmt: skip
-    below(ax, list(lines.values()), list(lines))
 
 
 def _without_lift_off(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
@@ -163,12 +147,12 @@ def _cases(ax: Axes, outcomes: OutcomeMap) -> dict[str, Any]:
     """What the cases of a law on the map mean, for the key; in a column there is no room for it."""
     from matplotlib.patches import Patch
 
-    met = {case for name in outcomes.regions for case in name.rstrip("+-").split("/")}
-    said = [f"{case}: {CASES[case]}" for case in CASES if case in met]
-    if is_narrow(ax) or not said:
+    cases = {case for name in outcomes.regions for case in name.rstrip("+-").split("/")}
+    texts = [f"{case}: {CASES[case]}" for case in CASES if case in cases]
+    if is_narrow(ax) or not texts:
         return {}
-    said.append("+, −: sign of the slip at touch-down")
-    return {text: Patch(alpha=0) for text in said}
+    texts.append("+, −: sign of the slip at touch-down")
+    return {text: Patch(alpha=0) for text in texts}
 
 
 def _field(
@@ -225,21 +209,7 @@ def _contour(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array) -> dict[str, An
 def draw_curve(
     ax: Axes, names: Sequence[str], curve: DividingCurve, view: Sequence[Sequence[float]]
 ) -> dict[str, Any]:
-    """Draw a dividing curve over axes that show xdot and omega, in the order of ``names``.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    names : (str, str)
-    curve : DividingCurve
-    view : ((low, high), (low, high))
-        The limits of the axes.
-
-    Returns
-    -------
-    dict of str: Artist
-        What is to be said of the lines and points in view, with one of each.
-    """
+    """Draw a dividing curve within ``view``, and return a label and an artist for each kind of line."""
     order = [("xdot", "omega").index(name) for name in names]
     styles: dict[str, Any] = {"two-fold": "-", "slipping": (0, (4, 1.5))}
     key: dict[str, Any] = {}

@@ -9,7 +9,7 @@ import nonsmooth as ns
 from ..errors import require
 from ..maps.dividing import DividingCurve
 from ..maps.proven import OUTCOMES, ProvenMap
-from .keys import below, is_narrow
+from .keys import keys
 from .outcomes import draw_curve
 
 style = ns.plot.style
@@ -35,7 +35,7 @@ def proven_map(
     Parameters
     ----------
     found : ProvenMap
-        The map, from :func:`bounce.proven_map`.
+        The map, from :func:`bounce.maps.proven_map`.
     curve : DividingCurve, optional
         Drawn over it; the undecided pieces surround it.
     ax : matplotlib Axes, optional
@@ -50,14 +50,14 @@ def proven_map(
     --------
     >>> import bounce
     >>> turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
-    >>> found = bounce.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
+    >>> found = bounce.maps.proven_map(turf, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
     >>> [t.get_text() for t in bounce.plot.proven_map(found).axes[0].get_legend().get_texts()]
     ['forward: 100.0%']
     """
     from matplotlib.collections import PatchCollection
     from matplotlib.patches import Patch, Rectangle
 
-    require(found, ProvenMap, "found", "bounce.proven_map returns one.")
+    require(found, ProvenMap, "found", "bounce.maps.proven_map returns one.")
     with style.settings():
         figure, ax = style.axes_for(ax, (7.0, 5.4))
         for k, name in enumerate(OUTCOMES):
@@ -80,13 +80,5 @@ def proven_map(
             for name, share in found.area.items()
             if share > 0
         ]
-        if is_narrow(ax):
-            labels = [str(patch.get_label()) for patch in handles]
-            below(ax, [*key.values(), *handles], [*key, *labels])
-            return figure
-        ax.legend(  # beside the map, not on its pieces
-            handles=handles, loc="upper left", bbox_to_anchor=(1.01, 1.0), borderaxespad=0.0,
-            frameon=False, fontsize=8, title="proven, share", title_fontsize=8,
-        )  # fmt: skip
-        below(ax, list(key.values()), list(key))
+        keys(ax, handles, key, "proven, share")
     return figure

@@ -58,25 +58,7 @@ _POINTS = 9.0  # of the names of regions
 
 
 def regions(ax: Axes, outcomes: OutcomeMap, x: Array, y: Array, room: int) -> list[Patch]:
-    """Colour the regions and name them; a key of those without room for their name.
-
-    The key lists at most ``room`` of them, the largest; the others have one colour, so that each colour
-    has one meaning.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    outcomes : OutcomeMap
-    x, y : ndarray
-        Its axes in the units of the picture.
-    room : int
-        How many regions are listed, and one more for the others.
-
-    Returns
-    -------
-    list of Patch
-        The entries of the key.
-    """
+    """Colour the regions and name them; return a key of the ``room`` largest without room for a name."""
     from matplotlib.colors import ListedColormap
     from matplotlib.patches import Patch
 

@@ -1,4 +1,4 @@
-"""Pictures of a fit: what it leaves (matplotlib; reached as ``bounce.plot.residuals``)."""
+"""Pictures of the residuals of a fit (matplotlib; reached as ``bounce.plot.residuals``)."""
 
 from __future__ import annotations
 

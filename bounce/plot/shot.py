@@ -9,7 +9,8 @@ import numpy as np
 import nonsmooth as ns
 
 from ..contact.equations import equations
-from ..shot.single import Shot
+from ..contact.model import Contact3D, ContactModel
+from ..shot.shot import Shot
 from .keys import below, is_narrow
 
 if TYPE_CHECKING:
@@ -31,7 +32,7 @@ _SEEN = 0.04  # of the width of the picture: a shorter jump has no name
 _LONG = 0.33  # of a column: over a shorter jump its name takes two lines
 
 
-def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
+def friction_cone(shot: Shot[ContactModel, float], ax: Axes | None = None) -> Figure:
     """Draw the friction force against the load, with the cone that bounds it.
 
     Parameters
@@ -59,10 +60,9 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
     >>> bounce.plot.friction_cone(shot).axes[0].get_xlabel()
     'friction force $\\\\Lambda_T$'
     """
-    if not isinstance(shot, Shot):
+    if not isinstance(shot, Shot) or isinstance(shot.model, Contact3D):
         raise ns.OptionError(
-            f"shot: expected a bounce in the plane, received {shot!r}. In 3-D the cone is one in space: draw "
-            "shot.forces(t) against the load."
+            f"shot: expected a bounce in the plane, received {shot!r}. In 3-D draw the components of shot.forces(t)."
         )
     with style.settings():
         figure, ax = style.axes_for(ax, (6.4, 5.2))
@@ -77,7 +77,7 @@ def friction_cone(shot: Shot, ax: Axes | None = None) -> Figure:
     return figure
 
 
-def _cone(ax: Axes, shot: Shot, names: Any) -> None:
+def _cone(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
     """Shade |Lambda_T| <= mu Lambda_N, with mu that of rest, and set the limits of the axes."""
     forces = shot.forces(np.linspace(0.0, shot.time, _POINTS))
     top = 1.15 * float(forces.load.max())
@@ -101,7 +101,7 @@ def _cone(ax: Axes, shot: Shot, names: Any) -> None:
     ax.locator_params(nbins=5)
 
 
-def _static_coefficient(shot: Shot) -> float:
+def _static_coefficient(shot: Shot[ContactModel, float]) -> float:
     import casadi as ca
 
     model = shot.model
@@ -112,14 +112,14 @@ def _static_coefficient(shot: Shot) -> float:
     return float(eq.function([rest])(x, p))
 
 
-def _phases(ax: Axes, shot: Shot, names: Any) -> None:
+def _phases(ax: Axes, shot: Shot[ContactModel, float], names: Any) -> None:
     """One line per phase, with an arrow in the direction of time, and a thin one where friction jumps."""
     labelled: set[str] = set()
     jumps: list[np.ndarray] = []
     before = np.zeros(2)
     for phase in shot.phases:
         t = np.linspace(phase.t_start, phase.t_end, _POINTS)
-        # A transition belongs to the later phase; ask for this one's side of it.
+        # A transition belongs to the later phase: end just before it.
         t[-1] = np.nextafter(phase.t_end, phase.t_start)
         forces = shot.forces(t)
         points = np.column_stack([forces.friction, forces.load])
@@ -152,7 +152,7 @@ def _arrow(ax: Axes, curve: np.ndarray, color: str) -> None:
         style.arrowhead(ax, curve, 0.45, color, scale=scale, mutation_scale=16, zorder=4)
 
 
-def _markers(ax: Axes, shot: Shot) -> None:
+def _markers(ax: Axes, shot: Shot[ContactModel, float]) -> None:
     """Touch-down, transitions and lift-off."""
     start = shot.forces(0.0)
     inner = np.array([phase.t_start for phase in shot.phases[1:]])

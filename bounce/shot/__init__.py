@@ -1,5 +1,8 @@
-"""One bounce: from touch-down to lift-off, and its derivatives."""
+"""One bounce from touch-down to lift-off: its states, phases, forces, derivatives and proof."""
 
-from .record import Forces, Phase
+from .certify import BounceProof
+from .sensitivity import Sensitivity
+from .shot import Forces, Phase
+from .state import State
 
-__all__ = ["Forces", "Phase"]
+__all__ = ["BounceProof", "Forces", "Phase", "Sensitivity", "State"]

@@ -1,4 +1,4 @@
-"""One bounce proven: how it lifts off, by interval arithmetic (``nonsmooth.certify_orbit``)."""
+"""Prove how a ball lifts off, in interval arithmetic (``nonsmooth.certify_orbit``)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ class BounceProof:
     orbit : nonsmooth.proofs.OrbitProof
         Itinerary, events and lift-off in enclosures; its states are those of the model's system.
     why : str
-        What stood in the way.
+        Reason if nothing is proven.
     """
 
     proven: bool
@@ -52,7 +52,7 @@ class BounceProof:
 
     @property
     def statement(self) -> str:
-        """The theorem in words."""
+        """The theorem as text."""
         if not self.proven:
             return f"Not proven: {self.why}.\n{self.orbit}"
         how = "rolling" if self.outcome == "rolling" else f"with {self.outcome} slip"
@@ -89,14 +89,14 @@ def certify(
     parameters : mapping, optional
         Values that replace the model's, or pairs (low, high), within their limits.
     t_max : number or string, optional
-        Longest contact looked at.
+        Longest contact.
     **options
         ``numbers``, ``bits``, ``max_bits``, ``max_steps`` of :func:`nonsmooth.certify_orbit`.
 
     Returns
     -------
     BounceProof
-        What was proven about the lift-off, and with what bounds.
+        The theorem, with enclosures of the lift-off.
 
     Raises
     ------
@@ -105,9 +105,9 @@ def certify(
     nonsmooth.ParameterError
         An unknown parameter, or an interval that leaves its limits.
     LandingError
-        A ball that does not move into the ground.
+        The ball does not move into the ground.
     ModelError
-        No contact model of bounces in the plane.
+        Not a contact model in the plane.
     nonsmooth.OptionError
         A landing or a time that is not finite; an option out of its range.
 
@@ -132,7 +132,7 @@ def certify(
         return BounceProof(True, outcome, orbit, "")
     why = orbit.why
     if orbit.status == _FIRST_LOAD:
-        why = "the load is negative at first, and what happens before it is positive is not proven"
+        why = "the load is negative at first, and the phase until it is positive is not proven"
     elif orbit.proven:
         why = f"no lift-off until t = {t_max}"
     return BounceProof(False, "undecided", orbit, why)
@@ -151,7 +151,7 @@ def _within_limits(model: ContactModel, given: Mapping[str, Any]) -> dict[str, A
     for name, value in given.items():
         if name not in model.values:
             raise ns.ParameterError(
-                f"parameters: expected names among {list(model.values)}, received {name!r}."
+                f"parameters has {name!r}, but the model's are {list(model.values)}."
             )
         ends = value if isinstance(value, (tuple, list)) else (value,)
         for end in ends:
@@ -161,10 +161,7 @@ def _within_limits(model: ContactModel, given: Mapping[str, Any]) -> dict[str, A
             except (TypeError, ValueError):
                 fits = False
             if not fits:
-                raise ns.ParameterError(
-                    f"{name}: expected values {limit}, received {value!r}. It is physically "
-                    "impossible otherwise."
-                )
+                raise ns.ParameterError(f"{name} is {value!r}, but must be {limit}.")
     return dict(given)
 
 
@@ -175,6 +172,4 @@ def _require_landing(ydot: Any) -> None:
     except (TypeError, ValueError):
         down = False
     if not down:
-        raise LandingError(
-            f"ydot: expected a speed below zero (into the ground), received {ydot!r}."
-        )
+        raise LandingError(f"ydot is {ydot!r}, but a ball that lands has a speed below zero.")

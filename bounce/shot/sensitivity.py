@@ -1,32 +1,31 @@
 """Derivatives of the lift-off by parameters and landing, exact through the events of one itinerary.
 
-``nonsmooth.sensitivity`` differentiates the approach and the contact; their derivatives are chained here.
+The derivatives of the frictionless phase and of the contact (``nonsmooth.sensitivity``) are chained.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
 import nonsmooth as ns
 
+from ..contact.equations import equations
 from ..errors import require
-from .single import Shot
-from .space import Shot3D
+from .shot import Shot
 
 Array = NDArray[np.float64]
 
-#: Landing components by which one can differentiate, and the states that change with each.
-LANDING = {name: (name,) for name in ("xdot", "ydot", "omega", "x")}
-#: The same in 3-D, where slip is a state in the place of spin.
-LANDING_3D = {
+#: Components of the landing by which one can differentiate, and the states that change with each: in
+#: 3-D slip is a state in the place of spin.
+_LANDING = {
     "xdot": ("xdot", "slip_x"),
     "zdot": ("zdot", "slip_z"),
     "ydot": ("ydot",),
-    "omega": ("slip_x",),
+    "omega": ("omega", "slip_x"),
     "side_omega": ("slip_z",),
     "spin": ("spin",),
     "x": ("x",),
@@ -53,7 +52,7 @@ class Sensitivity(NamedTuple):
     time: Array
 
 
-def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
+def sensitivity(shot: Shot[Any, Any], names: Sequence[str]) -> Sensitivity:
     """Differentiate a bounce by parameters of its model or by components of its landing.
 
     The derivative is that of the shot's own itinerary: across a change of itinerary the lift-off is
@@ -62,7 +61,7 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
 
     Parameters
     ----------
-    shot : Shot or Shot3D
+    shot : Shot
         The bounce, from :func:`bounce.simulate`.
     names : sequence of str
         Parameters of ``shot.model``, or "xdot", "ydot", "omega", "x" at touch-down; in 3-D also "zdot"
@@ -95,42 +94,42 @@ def sensitivity(shot: Shot | Shot3D, names: Sequence[str]) -> Sensitivity:
     >>> f"{s.state[3, 1]:.10f}", f"{-r(0.1):.10f}", bool(abs(s.state[3, 2]) < 1e-12)
     ('-0.7440793977', '-0.7440793977', True)
     """
-    require(shot, (Shot, Shot3D), "shot", "bounce.simulate returns one.")
-    model = shot.model
-    landing = _landing(shot)
-    known = [*model.values, *landing]
+    require(shot, Shot, "shot", "bounce.simulate returns one.")
+    known = [*shot.model.values, *_landing(shot)]
     for name in names:
         if name not in known:
             raise ns.ParameterError(
-                f"sensitivity: expected names among {known}, received {name!r}."
+                f"names has {name!r}, which is no parameter or component of the landing. Choose among "
+                f"{known}."
             )
     return _lift_off(shot, tuple(names))
 
 
-def _landing(shot: Shot | Shot3D) -> dict[str, tuple[str, ...]]:
+def _landing(shot: Shot[Any, Any]) -> dict[str, tuple[str, ...]]:
     """The landing components of a shot, and the states that change with each."""
-    known = LANDING_3D if isinstance(shot, Shot3D) else LANDING
-    states = shot.trajectory.system.state_names
-    return {name: changed for name, changed in known.items() if set(changed) <= set(states)}
+    eq = equations(shot.model.blueprint())
+    own = set(eq.names) - set(eq.start)
+    changed = {name: tuple(s for s in states if s in own) for name, states in _LANDING.items()}
+    return {name: states for name, states in changed.items() if states}
 
 
-def _lift_off(shot: Shot | Shot3D, names: tuple[str, ...]) -> Sensitivity:
+def _lift_off(shot: Shot[Any, Any], names: tuple[str, ...]) -> Sensitivity:
     """Chain the derivatives of the approach and of the contact."""
     values = shot.model.values
     varied = [name for name in names if name in values]
-    place = {name: k for k, name in enumerate(names)}
+    column = {name: k for k, name in enumerate(names)}
     states = shot.trajectory.system.state_names
     state, time = np.zeros((len(states), len(names))), np.zeros(len(names))
     for name in names:
         for changed in () if name in values else _landing(shot)[name]:
-            state[states.index(changed), place[name]] = 1.0
+            state[states.index(changed), column[name]] = 1.0
     for run in (shot.approach, shot.trajectory):
         if run is None or not len(run.steps):
             continue
         s = ns.sensitivity(run, wrt=["x0", *varied])
         by_parameters = np.zeros((len(states) + 1, len(names)))
         for k, name in enumerate(s.names):
-            by_parameters[:, place[name]] = [*s.dx_dp[:, k], s.dt_end_dp[k]]
+            by_parameters[:, column[name]] = [*s.dx_dp[:, k], s.dt_end_dp[k]]
         time = time + s.dt_end_dx0 @ state + by_parameters[-1]
         state = s.dx_dx0 @ state + by_parameters[:-1]
     return Sensitivity(names, state, time)

@@ -1,9 +1,8 @@
-"""Between touch-down and the first positive load there is no friction: the phase ``F``.
+"""The phase ``F`` from touch-down to the first positive load, without friction.
 
-The load can be negative at first where it is less gravity (``load="net"``). That can last from the
-scale of the bounce down to nothing, and begin at a power law's zero, so a few Euler points ahead
-tell how long it lasts before the motion is computed. What is decided here is decided for one bounce
-and for arrays of them; only the run itself is one trajectory there and an ensemble here.
+The load can be negative at first where it is less gravity (``load="net"``). This lasts from the
+scale of the bounce down to nothing, and can begin at a power law's zero. Its length is estimated
+from a few Euler points before the motion is integrated.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ Array = NDArray[np.float64]
 #: A phase shorter than this is passed by one Euler step of that length: it is below rounding in the
 #: speeds, and far enough from a power law's zero.
 INSTANT = 1e-13
-#: Times ahead at which the load is looked at.
+#: Times ahead at which the load is evaluated.
 _AHEAD = 1e-17 * 4.0 ** np.arange(25)
 #: How many of them are shorter than an instant.
 _SHORT = int(np.searchsorted(_AHEAD, INSTANT))
@@ -34,42 +33,21 @@ _REST = 1e-12
 
 
 class Rise(NamedTuple):
-    """When the load of landings becomes positive; none of the three: it is so already.
+    """When the load of landings becomes positive; if none of the first three, it is positive already."""
 
-    Attributes
-    ----------
-    root : ndarray of bool (m,)
-        At once, from a zero at which there is no Taylor series, such as a power law's. A lone run
-        in the plane can begin on it; arrays and runs in 3-D step off it.
-    short : ndarray of bool (m,)
-        Within an instant, which is stepped over.
-    later : ndarray of bool (m,)
-        After a phase without friction.
-    longest : ndarray (m,)
-        Longest step that does not miss its end; infinite where that was not seen ahead.
-    """
-
+    #: At once, from a zero without a Taylor series, such as a power law's. One run in the plane can
+    #: begin on it; ensembles and runs in 3-D step off it.
     root: NDArray[np.bool_]
+    #: Within an instant, which is passed by one Euler step.
     short: NDArray[np.bool_]
+    #: After a phase without friction.
     later: NDArray[np.bool_]
+    #: Longest step that does not miss the end of that phase; infinite where no end was found ahead.
     longest: Array
 
 
 def rise(blueprint: Blueprint, x: Array, p: Array) -> Rise:
-    """Look ahead along the motion without friction.
-
-    Parameters
-    ----------
-    blueprint : ContactModel or Contact3D
-    x : ndarray (n, m)
-        States at touch-down, in columns.
-    p : ndarray (k, m)
-        Parameters.
-
-    Returns
-    -------
-    Rise
-    """
+    """Estimate it for states (n, m) and parameters (k, m) in columns, without friction."""
     function = touch_down_function(blueprint)
     load, _, field, change = ns.call(function, x, p)
     never = _AHEAD.size + 1
@@ -108,29 +86,14 @@ def surfaced(states: Array) -> NDArray[np.bool_]:
 
 
 def rests(states: Array, start: Array) -> NDArray[np.bool_]:
-    """Whether balls (..., n) whose load ended only rest: what is left of it is rounding.
-
-    Where the load is less gravity and damping is strong, it falls to zero as the ball comes to rest.
-    """
+    """Whether balls (..., n) whose load ended are at rest, with a load of rounding errors only."""
+    # Where the load is less gravity and damping is strong, it falls to zero as the ball comes to rest.
     size = np.maximum(np.abs(states[..., 2]), np.abs(start[..., [2, 3]]).max(axis=-1))
     return np.asarray(np.abs(states[..., 3]) <= _REST * size)
 
 
 def onto_zero_load(blueprint: Blueprint, x: Array, p: Array) -> Array:
-    """Move along the motion until the load is zero to rounding, not to the tolerance of the run.
-
-    A ball that rolls at once must not see the negative load of an instant before.
-
-    Parameters
-    ----------
-    blueprint : ContactModel or Contact3D
-    x, p : ndarray (n, m), (k, m)
-        States and parameters, in columns.
-
-    Returns
-    -------
-    ndarray (n, m)
-    """
+    """Move along the motion until the load is zero to rounding, not to the tolerance of the run."""
     for _ in range(3):
         load, rate, field, _ = ns.call(touch_down_function(blueprint), x, p)
         x = x - load / rate * field
@@ -144,27 +107,7 @@ def approach(
     tol: float,
     t_max: float,
 ) -> tuple[ns.Trajectory | None, float, list[float]]:
-    """Follow one ball without friction until the load is positive.
-
-    Parameters
-    ----------
-    blueprint : ContactModel or Contact3D
-    parameters : dict
-    start : list of float (n,)
-        State at touch-down.
-    tol, t_max : float
-
-    Returns
-    -------
-    run : nonsmooth.Trajectory or None
-        None if the load is positive at once.
-    t_start, start : float, list of float
-        Time and state in which the contact with friction begins.
-
-    Raises
-    ------
-    LandingError, LiftOffError
-    """
+    """The motion until the load is positive (None if at once), and time and state at its end."""
     x, p = np.array(start)[:, None], np.array(list(parameters.values()))[:, None]
     positive = _finite_load(blueprint, x, p) > 0.0
     if positive and not equations(blueprint).steps_off_a_root:
@@ -177,8 +120,8 @@ def approach(
         return None, 0.0, (instant_later(blueprint, x[:, 0]) if off else x[:, 0]).tolist()
     if leaving(x[:, 0]):
         raise LandingError(
-            f"load: expected a positive load in a ball that moves up in the ground, received y = "
-            f"{start[2]!r}, ydot = {start[3]!r}, where it is not. The ball has lifted off already."
+            f"y = {start[2]!r}, ydot = {start[3]!r}: the load is not positive and the ball moves up. The "
+            "ball has lifted off already."
         )
     run = ns.simulate(
         free_system(blueprint), start, t_max, parameters=parameters, tol=tol, max_step=longest[0]
@@ -187,8 +130,8 @@ def approach(
         raise LiftOffError(no_lift_off(run, t_max), run)
     if surfaced(run.x[-1]):
         raise LiftOffError(
-            f"lift-off: expected a load that becomes positive, received none before the ball was back "
-            f"at y = 0 at t = {run.t[-1]:.6g}. It passes through the surface without pressing on it.",
+            f"The load is not positive before the ball is back at y = 0 at t = {run.t[-1]:.6g}. It passes "
+            "through the surface without pressing on it.",
             run,
         )
     onto = onto_zero_load(blueprint, run.x[-1][:, None], p)[:, 0].tolist()
@@ -200,19 +143,18 @@ def _finite_load(blueprint: Blueprint, x: Array, p: Array) -> float:
     load, _, field, _ = (v.ravel() for v in ns.call(touch_down_function(blueprint), x, p))
     if not (np.isfinite(load[0]) and np.all(np.isfinite(field))):
         raise LandingError(
-            f"load: expected finite forces at touch-down, received a load of {load[0]} and rates of "
-            f"{field.tolist()} at {x[:, 0].tolist()}. Look at the model's logarithms, roots and "
-            "divisions."
+            f"The load at touch-down is {load[0]}, and the rates are {field.tolist()}, at the state "
+            f"{x[:, 0].tolist()}. Check the model's logarithms, roots and divisions."
         )
     return float(load[0])
 
 
 def no_lift_off(run: ns.Trajectory, t_max: float) -> str:
-    """Say why a run ended without lift-off."""
+    """Why a run ended without lift-off, and what to do."""
     y, ydot = run.x[-1, 2], run.x[-1, 3]
     if run.status is not ns.Status.REACHED_END:
         return (
-            f"lift-off: expected at some time, received {run.status} at t = {run.t[-1]:.6g}: "
+            f"The ball does not lift off: the run ended with {run.status} at t = {run.t[-1]:.6g}. "
             f"{run.message}"
         )
     if abs(ydot) < 1e-2:
@@ -227,6 +169,6 @@ def no_lift_off(run: ns.Trajectory, t_max: float) -> str:
     else:
         cause = "Give a larger t_max, or check that the model's load vanishes."
     return (
-        f"lift-off: expected before t_max = {t_max:g}, received none; at the end y = {y:.6g}, "
-        f"ydot = {ydot:.6g}. {cause}"
+        f"The ball does not lift off before t_max = {t_max:g}; at the end y = {y:.6g}, ydot = "
+        f"{ydot:.6g}. {cause}"
     )

@@ -9,7 +9,7 @@ from matplotlib.colors import to_rgb
 
 import bounce
 import nonsmooth as ns
-from bounce.plot.outcomes import COLOURS
+from bounce.plot.regions import COLOURS
 from bounce.plot.shot import STYLES
 from nonsmooth.plot.basin_map import COLORS
 

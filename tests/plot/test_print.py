@@ -161,7 +161,7 @@ BALLS = {
     "outcome_map": [lambda: bounce.plot.outcome_map(bounce.outcome_map(TURF, over=GRID, tol=1e-6))],
     "proven_map": [
         lambda: bounce.plot.proven_map(
-            bounce.proven_map(TURF, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
+            bounce.maps.proven_map(TURF, xdot=(0.1, 0.11), omega=(1.0, 1.02), depth=1)
         )
     ],
     "residuals": [lambda: bounce.plot.residuals(residuals())],

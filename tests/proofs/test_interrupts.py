@@ -22,7 +22,7 @@ def test_a_map_of_proofs_keeps_its_decided_pieces(monkeypatch):
         return real(*args, **options)
 
     monkeypatch.setattr(proven_module, "certify", certify)
-    found = bounce.proven_map(TURF, xdot=(0.2, 0.26), omega=(0.6, 0.7), depth=1)
+    found = bounce.maps.proven_map(TURF, xdot=(0.2, 0.26), omega=(0.6, 0.7), depth=1)
     assert found.interrupted
     sizes = (found.boxes[:, 1] - found.boxes[:, 0]) * (found.boxes[:, 3] - found.boxes[:, 2])
     assert sizes.sum() == pytest.approx(0.06 * 0.1)  # the whole range, decided or not
@@ -32,7 +32,7 @@ def test_a_map_of_proofs_keeps_its_decided_pieces(monkeypatch):
 @pytest.mark.parametrize("value", [None, 0.3, "ab", (0.0, float("inf"))])
 def test_a_range_of_landings_is_two_numbers(value):
     with pytest.raises(bounce.LandingError, match="xdot"):
-        bounce.proven_map(TURF, xdot=value, omega=(0.0, 1.0))
+        bounce.maps.proven_map(TURF, xdot=value, omega=(0.0, 1.0))
 
 
 @pytest.mark.parametrize("ydot", [0.0, 1.0, None, "down", (-1.0, 0.5)])

@@ -17,7 +17,7 @@ from ...laws import BounceLaw, LandingRange
 from ...maps.lift_offs import lift_off
 from ...maps.results import BounceStatus
 from ...shot.sensitivity import sensitivity
-from ...shot.single import simulate
+from ...shot.simulate import simulate
 from ...units import Ball, Scaling
 from ..ground import Model, require_model, require_scaling
 from .measurements import Measurements

@@ -11,19 +11,19 @@ import nonsmooth as ns
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 COULOMB = bounce.simulate(TURF, 0.3, -1.0, 0.1, tol=1e-12)
 SET_VALUED = [
-    bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.3),
-    bounce.ExponentialDecay(mu_kinetic=0.2, decay_speed=0.3),
-    bounce.Viscous(viscosity=0.1),
+    bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.3),
+    bounce.contact.ExponentialDecay(mu_kinetic=0.2, decay_speed=0.3),
+    bounce.contact.Viscous(viscosity=0.1),
 ]
 
 
 def coefficient(law, slip):
     q, mu = law.values, 0.3
-    if isinstance(law, bounce.Stribeck):
+    if isinstance(law, bounce.contact.Stribeck):
         return q["mu_kinetic"] + (mu - q["mu_kinetic"]) * np.exp(
             -((slip / q["stribeck_speed"]) ** 2)
         )
-    if isinstance(law, bounce.ExponentialDecay):
+    if isinstance(law, bounce.contact.ExponentialDecay):
         return q["mu_kinetic"] + (mu - q["mu_kinetic"]) * np.exp(-slip / q["decay_speed"])
     return mu + q["viscosity"] * slip
 
@@ -53,9 +53,9 @@ def test_mirror(law):
 @pytest.mark.parametrize(
     "law",
     [
-        bounce.Stribeck(mu_kinetic=0.3, stribeck_speed=0.3),
-        bounce.ExponentialDecay(mu_kinetic=0.3, decay_speed=0.3),
-        bounce.Viscous(viscosity=0.0),
+        bounce.contact.Stribeck(mu_kinetic=0.3, stribeck_speed=0.3),
+        bounce.contact.ExponentialDecay(mu_kinetic=0.3, decay_speed=0.3),
+        bounce.contact.Viscous(viscosity=0.0),
     ],
     ids=lambda law: type(law).__name__,
 )
@@ -70,9 +70,9 @@ def test_stiff_bristles_approach_coulomb(kind):
     gaps = []
     for stiffness in (100.0, 400.0):
         if kind == "dahl":
-            law = bounce.Dahl(bristle_stiffness=stiffness)
+            law = bounce.contact.Dahl(bristle_stiffness=stiffness)
         else:
-            law = bounce.LuGre(
+            law = bounce.contact.LuGre(
                 bristle_stiffness=stiffness, bristle_damping=1.0, mu_kinetic=0.3, stribeck_speed=1.0
             )
         shot = bounce.simulate(TURF.replace(friction=law), 0.3, -1.0, 0.1, tol=1e-9)
@@ -83,16 +83,16 @@ def test_stiff_bristles_approach_coulomb(kind):
 
 
 def test_parameters_of_a_law_belong_to_the_model():
-    model = TURF.replace(friction=bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5))
+    model = TURF.replace(friction=bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5))
     assert model.values["mu_kinetic"] == 0.2
     assert model.replace(mu_kinetic=0.25).values["mu_kinetic"] == 0.25
     assert "friction=Stribeck" in repr(model)
-    with pytest.raises(ns.ParameterError, match="mu_kinetic: expected a number > 0"):
+    with pytest.raises(ns.ParameterError, match="mu_kinetic"):
         model.replace(mu_kinetic=-1.0)
-    with pytest.raises(ns.ParameterError, match="expected a value for"):
-        bounce.Stribeck(mu_kinetic=0.2)
-    with pytest.raises(ns.ParameterError, match="finite"):
-        bounce.Viscous(viscosity=math.nan)
+    with pytest.raises(ns.ParameterError, match="stribeck_speed"):
+        bounce.contact.Stribeck(mu_kinetic=0.2)
+    with pytest.raises(ns.ParameterError, match="viscosity"):
+        bounce.contact.Viscous(viscosity=math.nan)
 
 
 def test_a_coefficient_of_ones_own():
@@ -113,7 +113,7 @@ def test_a_coefficient_of_ones_own():
 
 def test_bristles_at_rest_do_not_stop_a_vertical_landing():
     """The bristle law is continuous across H = 0, so there is nothing to decide there."""
-    law = bounce.LuGre(bristle_stiffness=200.0, mu_kinetic=0.2, stribeck_speed=0.1)
+    law = bounce.contact.LuGre(bristle_stiffness=200.0, mu_kinetic=0.2, stribeck_speed=0.1)
     model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, friction=law)
     shot = bounce.simulate(model, xdot=0.0, ydot=-1.0, omega=0.0)
     assert shot.slip == 0.0 and shot.time == pytest.approx(2.956075324749550, abs=1e-9)

@@ -65,7 +65,7 @@ def test_laws_are_values():
         (
             lambda: bounce.laws.TiltedBounce(mu=0.4, restitution=0.5, tilt=18.4),
             ns.ParameterError,
-            "tilt: .*math.radians",
+            "tilt",
         ),
         (
             lambda: bounce.laws.TiltedBounce(mu=0.4, restitution=1.5, tilt=0.1),
@@ -75,18 +75,18 @@ def test_laws_are_values():
         (
             lambda: bounce.laws.CrossBounce(mu=0.4, restitution=0.5, tangential_restitution=1.2),
             ns.ParameterError,
-            "tangential_restitution: .*in \\[0, 1\\]",
+            "tangential_restitution",
         ),
-        (lambda: bounce.laws.PennerBounce(mu=-0.1), ns.ParameterError, "mu: .*>= 0"),
+        (lambda: bounce.laws.PennerBounce(mu=-0.1), ns.ParameterError, "mu"),
         (
             lambda: bounce.laws.TURFS["natural"].law.lift_off(1.0, 1.0, 0.0),
             bounce.LandingError,
-            "does not approach",
+            "ydot",
         ),
         (
             lambda: bounce.laws.PennerBounce().lift_off(200.0, -200.0, 0.0),
             ns.ParameterError,
-            "tilt: .*extrapolates",
+            "tilt",
         ),
     ],
 )

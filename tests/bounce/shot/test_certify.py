@@ -58,14 +58,16 @@ def test_random_linear_bounces():
 
 @pytest.mark.slow
 def test_random_nonlinear_bounces():
-    soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
+    soft = bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
     compare(soft, seed=2, count=4)
 
 
 @pytest.mark.slow
 def test_five_hundred_random_bounces():
     compare(TURF, seed=3, count=250)
-    compare(bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5), seed=4, count=250)
+    compare(
+        bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5), seed=4, count=250
+    )
 
 
 def test_boxes_and_parameters_hold_their_points():
@@ -101,9 +103,9 @@ def test_what_cannot_be_proven_says_why():
 def test_what_is_given_wrongly_is_refused():
     with pytest.raises(ns.ParameterError, match="mu"):
         bounce.certify(TURF, 1, -1, 0, parameters={"mu": (-0.1, 0.3)})
-    with pytest.raises(ns.ParameterError, match="names among"):
+    with pytest.raises(ns.ParameterError, match="'nu'"):
         bounce.certify(TURF, 1, -1, 0, parameters={"nu": 1})
-    with pytest.raises(bounce.LandingError, match="below zero"):
+    with pytest.raises(bounce.LandingError, match="ydot"):
         bounce.certify(TURF, 1, (-1, 1), 0)
     with pytest.raises(bounce.ModelError, match="ContactModel"):
         bounce.certify(3, 1, -1, 0)
@@ -143,7 +145,7 @@ def test_the_checker_follows_a_bounce_again(change, box, tmp_path):
 @pytest.mark.slow
 def test_the_checker_follows_random_boxes_of_bounces_again(tmp_path):
     rng = np.random.default_rng(1)
-    soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
+    soft = bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
     for k in range(20):
         wide = 10.0 ** rng.uniform(-6, -2)
         xdot, omega = rng.uniform([-1, -2], [1, 2])

@@ -67,7 +67,7 @@ def test_adhesion_that_is_let_go_where_it_ends():
         bounce.KelvinVoigt(mu=0.0, d1=0.0, d2=0.0, eta=1.5, G=0.01, slope=0.3),
         bounce.KelvinVoigt(mu=0.3, d1=0.0, d2=0.0, eta=1.5, G=0.01, slope=-0.3, load="net"),
         bounce.Hertz(mu=0.3, stiffness=1.0),
-        bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=1e6),
+        bounce.contact.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=1e6),
     ],
     ids=repr,
 )

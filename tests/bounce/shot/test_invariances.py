@@ -21,10 +21,10 @@ LANDING = st.tuples(st.floats(-2, 2), st.floats(-2, -0.2), st.floats(-3, 3))
 LOAD = st.sampled_from(["contact", "net"])
 POWER_LAWS = [
     bounce.Hertz(mu=0.3, stiffness=1.0, eta=0.7),
-    bounce.HuntCrossley(mu=0.3, stiffness=1.0, damping=0.3, eta=0.7, d1=0.1),
-    bounce.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, eta=0.7, d1=0.1, G=0.01),
-    bounce.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, eta=0.7, d1=0.1),
-    bounce.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, eta=0.7, d1=0.1),
+    bounce.contact.HuntCrossley(mu=0.3, stiffness=1.0, damping=0.3, eta=0.7, d1=0.1),
+    bounce.contact.Tsuji(mu=0.3, stiffness=1.0, damping=0.3, eta=0.7, d1=0.1, G=0.01),
+    bounce.contact.KuwabaraKono(mu=0.3, stiffness=1.0, damping=0.3, eta=0.7, d1=0.1),
+    bounce.contact.Maxwell(mu=0.3, branch_stiffness=1.0, relaxation=0.5, eta=0.7, d1=0.1),
 ]
 
 

@@ -73,7 +73,7 @@ def test_hertz_contact_time():
 def test_hunt_crossley_energy_relation():
     """With c = damping/stiffness: c(v + v') = ln((1 + c v)/(1 - c v')), Hunt & Crossley 1975."""
     c = 0.3
-    model = bounce.HuntCrossley(mu=MU, stiffness=1.7, damping=1.7 * c)
+    model = bounce.contact.HuntCrossley(mu=MU, stiffness=1.7, damping=1.7 * c)
     shot = bounce.simulate(model, 0.1, -1.0, 5.0, tol=1e-13)
     out = shot.lift_off.ydot
     assert c * (1 + out) == pytest.approx(math.log((1 + c) / (1 - c * out)), abs=1e-11)
@@ -82,7 +82,7 @@ def test_hunt_crossley_energy_relation():
 def test_depth_damping_vanishes_with_its_coefficient():
     common = dict(mu=MU, d1=0.0, d2=D2, eta=0.5, G=1e-3)
     a = bounce.simulate(bounce.KelvinVoigt(**common), 0.3, -1.0, 0.2, tol=1e-13)
-    b = bounce.simulate(bounce.DepthDampedKelvinVoigt(**common), 0.3, -1.0, 0.2, tol=1e-13)
+    b = bounce.simulate(bounce.contact.DepthDampedKelvinVoigt(**common), 0.3, -1.0, 0.2, tol=1e-13)
     assert np.abs(np.array(a.lift_off) - b.lift_off).max() < 1e-13
 
 
@@ -91,7 +91,7 @@ def free_time(model):
     g, v = model.values["G"], 1.0
     if isinstance(model, bounce.Hertz):
         return (g / model.values["stiffness"]) ** (2 / 3) / v
-    power = 0.25 if isinstance(model, bounce.Tsuji) else 0.5
+    power = 0.25 if isinstance(model, bounce.contact.Tsuji) else 0.5
     return (g / (model.values["damping"] * v)) ** (1 / power) / v
 
 
@@ -102,8 +102,8 @@ def test_the_frictionless_phase_at_every_scale(g):
     for model in (
         bounce.KelvinVoigt(mu=MU, d1=0.1, d2=0.0, eta=0.5, G=g, load="net"),
         bounce.Hertz(mu=MU, stiffness=1.0, G=g, load="net", eta=0.5),
-        bounce.KuwabaraKono(mu=MU, stiffness=1.0, damping=0.1, G=g, load="net", eta=0.5),
-        bounce.Tsuji(mu=MU, stiffness=1.0, damping=0.1, G=g, load="net", eta=0.5),
+        bounce.contact.KuwabaraKono(mu=MU, stiffness=1.0, damping=0.1, G=g, load="net", eta=0.5),
+        bounce.contact.Tsuji(mu=MU, stiffness=1.0, damping=0.1, G=g, load="net", eta=0.5),
     ):
         for xdot, omega in ((0.3, 0.2), (0.0, 0.0), (0.3, -0.3)):
             shot = bounce.simulate(model, xdot, -1.0, omega, tol=1e-11)
@@ -116,8 +116,8 @@ def test_the_frictionless_phase_at_every_scale(g):
     "model",
     [
         bounce.Hertz(mu=MU, stiffness=1.0, G=0.01, load="net", eta=0.5),
-        bounce.KuwabaraKono(mu=MU, stiffness=1.0, damping=0.1, G=0.01, load="net", eta=0.5),
-        bounce.Tsuji(mu=MU, stiffness=1.0, damping=0.1, G=0.01, load="net", eta=0.5),
+        bounce.contact.KuwabaraKono(mu=MU, stiffness=1.0, damping=0.1, G=0.01, load="net", eta=0.5),
+        bounce.contact.Tsuji(mu=MU, stiffness=1.0, damping=0.1, G=0.01, load="net", eta=0.5),
     ],
     ids=lambda m: type(m).__name__,
 )
@@ -140,7 +140,7 @@ def test_a_ball_that_comes_to_rest_does_not_lift_off(omega):
     slow = [-0.01, -0.05, -0.1, -0.159]
     fast = np.array([-0.2, -0.5, -1.0])
     for ydot in slow:
-        with pytest.raises(bounce.LiftOffError, match=r"ball (at|came to) rest"):
+        with pytest.raises(bounce.LiftOffError, match="to rest"):
             bounce.simulate(heavy, 0.1, ydot, omega)
     many = bounce.lift_off(heavy, 0.1, [*slow, *fast], omega)
     assert many.status.tolist() == [bounce.BounceStatus.NO_LIFT_OFF] * 4 + [0] * 3

@@ -14,8 +14,10 @@ TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 
 def test_what_a_shot_holds():
     shot = bounce.simulate(TURF, xdot=0.3, ydot=-1.0, omega=0.1, tol=1e-12)
-    assert shot.landing == bounce.State(0.3, -1.0, 0.1, 0.0, 0.0)
+    assert shot.landing == bounce.shot.State(0.3, -1.0, 0.1, 0.0, 0.0)
     assert shot.slip == shot.lift_off.xdot + shot.lift_off.omega
+    assert shot.slip_speed == -shot.slip and shot.slip_angle == shot.turn == math.pi
+    assert shot.travel_angle == shot.kick == 0.0 and shot.reversal
     assert shot.restitution == -shot.lift_off.ydot / -1.0
     assert shot.model is TURF and shot.approach is None
     assert shot.trajectory.status is ns.Status.STOPPED
@@ -23,6 +25,8 @@ def test_what_a_shot_holds():
     assert shot.phases[0].t_start == 0.0 and shot.phases[-1].t_end == shot.time
     assert np.allclose(shot(shot.time), shot.trajectory.x[-1], rtol=0, atol=1e-15)
     assert shot(np.linspace(0, 1, 6).reshape(2, 3)).shape == (2, 3, 5)
+    assert np.array_equal(shot.state([0.0, 1.0]).slip, shot([0.0, 1.0])[:, [1, 4]].sum(axis=1))
+    assert bounce.simulate(TURF, *shot.landing, tol=1e-12).lift_off == shot.lift_off
     middle = [0.5 * (p.t_start + p.t_end) for p in shot.phases]
     assert list(shot.mode(middle)) == ["+", "s", "-"]
     assert "slip = -0.0063" in repr(shot)
@@ -67,36 +71,55 @@ def test_straight_drop_rolls():
     assert shot.itinerary == "s" and shot.lift_off.xdot == shot.lift_off.omega == 0.0
 
 
+PAIR = [1.0, 0.0]
+
+
 @pytest.mark.parametrize(
-    ("arguments", "message"),
+    ("landing", "name"),
     [
-        (dict(xdot=1, ydot=1.0, omega=0), "ydot: expected a negative number at y = 0, received 1.0"),
-        (dict(xdot=1, ydot=0.0, omega=0), "does not approach"),
-        (dict(xdot=1, ydot=-1.0, omega=0, y=0.1), "The ball is in the air"),
-        (dict(xdot=math.nan, ydot=-1.0, omega=0), "xdot: expected a finite number, received nan"),
-        (dict(xdot=1, ydot=-math.inf, omega=0), "ydot: expected a finite number, received -inf"),
-        (dict(xdot=1, ydot=-1.0, omega="fast"), r"omega: expected a finite number, .*\(str\)"),
-        (dict(xdot=[1, 2], ydot=-1.0, omega=0), r"xdot: expected one number, received \(2,\)"),
-        (dict(xdot=np.ones(3), ydot=-1.0, omega=0), r"xdot: expected one number, received \(3,\)"),
-        (dict(xdot=1, ydot=-1.0, omega=None), "omega: expected a finite number, received None"),
+        ((1, 1.0, 0), "ydot"),
+        ((1, 0.0, 0), "ydot"),
+        ((1, -1.0, 0, 0.0, 0.1), "y is 0.1"),
+        ((math.nan, -1.0, 0), "xdot"),
+        ((1, -math.inf, 0), "ydot"),
+        ((1, -1.0, "fast"), "omega"),
+        ((1, -1.0, None), "omega"),
+        ((1, [-1.0], 0), "ydot"),
+        (([1, 2], -1.0, 0), "omega"),
+        ((1.0, -1.0, PAIR), "xdot"),
+        ((np.ones(3), -1.0, PAIR), "xdot"),
+        (([1.0], -1.0, PAIR), "xdot"),
+        ((PAIR, -1.0, [0.1, 0.2, 0.3]), "omega.*drilling_radius"),
+        ((PAIR, -1.0, [PAIR]), "omega"),
+        (([1.0, math.nan], -1.0, PAIR), r"xdot\[1\]"),
+        ((["1", "2"], -1.0, PAIR), r"xdot\[0\]"),
+        ((PAIR, 0.0, PAIR), "ydot"),
+        ((PAIR, [-1.0], PAIR), "ydot"),
+        ((PAIR, -1.0, PAIR, 0.5), "x"),
     ],
-)  # fmt: skip
-def test_not_a_landing(arguments, message):
-    with pytest.raises(bounce.LandingError, match=message) as raised:
-        bounce.simulate(TURF, **arguments)
+    ids=repr,
+)
+def test_not_a_landing(landing, name):
+    with pytest.raises(bounce.LandingError, match=name) as raised:
+        bounce.simulate(TURF, *landing)
     assert isinstance(raised.value, ns.NonsmoothError) and isinstance(raised.value, ValueError)
 
 
+def test_a_landing_in_the_plane_on_a_surface_in_3d():
+    with pytest.raises(bounce.LandingError, match=r"xdot.*in_3d"):
+        bounce.simulate(TURF.in_3d(), 1.0, -1.0, 0.1)
+
+
 def test_moving_up_without_load():
-    with pytest.raises(bounce.LandingError, match="has lifted off already"):
+    with pytest.raises(bounce.LandingError, match="lifted off"):
         bounce.simulate(TURF.replace(load="net"), 1.0, 2.0, 0.0, y=-1e-5)
 
 
 def test_lift_off_that_never_comes():
-    with pytest.raises(bounce.LiftOffError, match="before t_max = 1, received none") as raised:
+    with pytest.raises(bounce.LiftOffError, match="t_max = 1") as raised:
         bounce.simulate(TURF, 1.0, -1.0, 0.0, t_max=1.0)
     assert raised.value.trajectory.status is ns.Status.REACHED_END
-    with pytest.raises(bounce.LiftOffError, match="came to rest in the ground"):
+    with pytest.raises(bounce.LiftOffError, match="came to rest"):
         bounce.simulate(TURF.replace(G=10.0), 0.1, -1.0, 0.0)
 
 
@@ -113,7 +136,7 @@ def test_a_load_that_never_becomes_positive():
         def tangential_force(self, s, p):
             return 0
 
-    with pytest.raises(bounce.LiftOffError, match=r"expected before t_max = 3"):
+    with pytest.raises(bounce.LiftOffError, match="t_max = 3"):
         bounce.simulate(Hole(), 1.0, -1.0, 0.0, t_max=3.0)
 
 
@@ -130,17 +153,17 @@ def test_a_ball_that_returns_without_pressing():
         def tangential_force(self, s, p):
             return 0
 
-    with pytest.raises(bounce.LiftOffError, match="passes through the surface without pressing"):
+    with pytest.raises(bounce.LiftOffError, match="without pressing"):
         bounce.simulate(Trampoline(), 1.0, -1.0, 0.0)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        (dict(tol=0.0), "tol: expected"),
-        (dict(tol=-1e-6), "tol: expected"),
-        (dict(t_max=0.0), "t_max: expected a positive time"),
-        (dict(t_max=math.inf), "t_max: expected a finite number"),
+        (dict(tol=0.0), "tol"),
+        (dict(tol=-1e-6), "tol"),
+        (dict(t_max=0.0), "t_max"),
+        (dict(t_max=math.inf), "t_max"),
     ],
 )
 def test_options(options, message):
@@ -149,10 +172,12 @@ def test_options(options, message):
 
 
 def test_not_a_model():
-    with pytest.raises(bounce.ModelError, match="make an instance"):
+    with pytest.raises(bounce.ModelError, match="instance"):
         bounce.simulate(bounce.KelvinVoigt, 1.0, -1.0, 0.0)
-    with pytest.raises(bounce.ModelError, match=r"use its lift_off\(xdot, ydot, omega\)"):
+    with pytest.raises(bounce.ModelError, match="lift_off"):
         bounce.simulate(bounce.laws.RigidBounce(mu=0.3, restitution=0.5), 1.0, -1.0, 0.0)
+    with pytest.raises(bounce.ModelError, match="lift_off"):
+        bounce.simulate(bounce.laws.RigidBounce(mu=0.3, restitution=0.5), PAIR, -1.0, PAIR)
 
 
 def test_energy_needs_the_models_word():
@@ -173,10 +198,10 @@ POWER_LAWS = [
     bounce.Hertz(mu=0.3, stiffness=1),
     bounce.Hertz(mu=0.3, stiffness=1, G=0.01),
     bounce.Hertz(mu=0.3, stiffness=1, d1=0.1, eta=0.5, G=0.01, load="net"),
-    bounce.HuntCrossley(mu=0.3, stiffness=1, damping=0.3),
-    bounce.HuntCrossley(mu=0.3, stiffness=1, damping=0.3, d1=0.1, eta=0.5),
-    bounce.Tsuji(mu=0.3, stiffness=1, damping=0.3),
-    bounce.KuwabaraKono(mu=0.3, stiffness=1, damping=0.3, G=0.01, load="net"),
+    bounce.contact.HuntCrossley(mu=0.3, stiffness=1, damping=0.3),
+    bounce.contact.HuntCrossley(mu=0.3, stiffness=1, damping=0.3, d1=0.1, eta=0.5),
+    bounce.contact.Tsuji(mu=0.3, stiffness=1, damping=0.3),
+    bounce.contact.KuwabaraKono(mu=0.3, stiffness=1, damping=0.3, G=0.01, load="net"),
 ]
 
 
@@ -221,9 +246,9 @@ class Law(bounce.ContactModel):
 @pytest.mark.parametrize(
     ("law", "cause"),
     [
-        (lambda s: s.y, "sinks without end.*positive in compression"),
-        (lambda s: s.y - 1, "sinks without end.*positive in compression"),
-        (lambda s: ca.exp(-s.y), "above the ground: the load of this model does not vanish"),
+        (lambda s: s.y, "sinks"),
+        (lambda s: s.y - 1, "sinks"),
+        (lambda s: ca.exp(-s.y), "above the ground"),
     ],
     ids=["wrong sign", "attractive", "never vanishes"],
 )

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...model import Array, FilippovSystem, OptionError
 from ..compiled.building.codegen import supports_lanes
+from ..compiled.device.card import machine_for
 from ..compiled.device.kernel import Bins, Kernel, Reduced, Source
-from ..compiled.device.machine import machine_for
 from ..constants import HAND_OVER
 from ..options import Options
 from ..results import Chunk

@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .machine import Argument, DeviceError, numbers
+from ....model import OptionError
+from .machine import DEVICES, Argument, DeviceError, Machine, numbers
 
 _INSTALL = (
     "pip install 'nonsmooth-dynamics[cuda]' on a machine with an NVIDIA card and its driver; without "
@@ -117,3 +118,10 @@ def card(fused: bool = True) -> Card:
             f"device: expected the package cuda-core for 'cuda', received {error}. {_INSTALL}"
         ) from error
     return Card(core, fused)
+
+
+def machine_for(device: str) -> Machine:
+    """Return what runs ``device="cuda"``."""
+    if device not in DEVICES:
+        raise OptionError(f"device: expected None or one of {DEVICES}, received {device!r}.")
+    return card()

@@ -8,7 +8,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from ....model import NonsmoothError, OptionError
+from ....model import NonsmoothError
 
 #: What a kernel takes: numbers of 64 bits, memory, or none.
 Argument = Any
@@ -74,12 +74,3 @@ def numbers(arguments: Sequence[Argument]) -> list[Argument]:
         else:
             made.append(np.float64(a) if isinstance(a, float) else a)
     return made
-
-
-def machine_for(device: str) -> Machine:
-    """Return what runs ``device="cuda"``."""
-    if device not in DEVICES:
-        raise OptionError(f"device: expected None or one of {DEVICES}, received {device!r}.")
-    from .card import card
-
-    return card()

@@ -1,28 +1,25 @@
-"""Every paper: its claims hold, its README shows them, its figures have labels, its program runs."""
+"""Every paper: its claims hold, its README shows them, its figures are legible, its record is written."""
 
 from __future__ import annotations
 
-import csv
 import dataclasses
 import importlib
-import json
 import math
-import re
 from functools import cache
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from papers import __main__ as everything
-from papers import look, program
-from papers.claims import ADDED, HERE, HOLDS, MEMORY, NOT_CHECKABLE, Check
+from papers import __main__ as program
+from papers import pictures
+from papers.claims import ADDED, HERE, HOLDS, MEMORY, NOT_CHECKABLE, Check, failures
 from papers.pictures import faults
-from papers.report import readme_table
+from papers.record import readme_table
 
 FOLDER = Path(__file__).parent
-NAMES = [name for name in everything.NAMES if name != "biber_2022"]  # it has tests of its own
-PAPERS = {name: importlib.import_module(f"papers.{name}.__main__").PAPER for name in NAMES}
+NAMES = [name for name in program.NAMES if name != "biber_2022"]  # it has tests of its own
+PAPERS = {name: program.paper_of(name) for name in NAMES}
 PICTURES = [(name, picture) for name, paper in PAPERS.items() for picture in paper.pictures]
 
 
@@ -56,16 +53,17 @@ def computed(request):
     """A paper, its claims, and whether these are all of them."""
     name, whole = request.param
     dear = [] if whole else DEAR_CLAIMS[name]
-    claims = [compute_once(c) for c in PAPERS[name].claims if c.__name__ not in dear]
-    assert len(claims) == len(PAPERS[name].claims) - len(dear)
+    (table,) = PAPERS[name].tables
+    claims = [compute_once(c) for c in table.rows if c.__name__ not in dear]
+    assert len(claims) == len(table.rows) - len(dear)
     return PAPERS[name], claims, whole
 
 
 def test_all_claims_hold(computed):
     _, claims, _ = computed
-    assert [c.id for c in claims if not c.holds] == []
+    assert [c.name for c in claims if failures(c)] == []
     assert all(c.checks and c.how and c.statement for c in claims)
-    assert len({c.id for c in claims}) == len(claims)
+    assert len({c.name for c in claims}) == len(claims)
 
 
 def test_readme_shows_the_computed_claims(computed):
@@ -80,8 +78,8 @@ def test_readme_shows_the_computed_claims(computed):
 def test_what_is_quoted_from_memory_says_so(computed):
     paper, claims, _ = computed
     text = (FOLDER / paper.name / "README.md").read_text(encoding="utf-8")
-    assert "memory" in paper.note and "from memory" in text
-    assert {c.basis for c in claims} <= {MEMORY, HERE}
+    assert "from memory" in paper.source and "from memory" in text
+    assert all(c.place.startswith((MEMORY, HERE)) for c in claims)
     assert {c.verdict for c in claims} <= {HOLDS, ADDED, NOT_CHECKABLE}
 
 
@@ -105,13 +103,13 @@ def test_figures_are_fit_for_print(name, picture):
     texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
     assert any(t.get_text() for t in texts)
     assert picture.caption
-    with look.settings():
+    with pictures.settings():
         assert faults(figure) == []
 
 
 def test_faults_of_print_are_found():
-    with look.settings():
-        figure = look.new_figure(7.5, 3.0)
+    with pictures.settings():
+        figure = pictures.new_figure(7.5, 3.0)
         axes = figure.add_subplot()
         axes.plot([0, 1], [0, 1])
         figure.set_layout_engine("none")
@@ -126,8 +124,8 @@ def test_faults_of_print_are_found():
 
 
 def test_long_legends_and_texts_on_one_another_are_found():
-    with look.settings():
-        figure = look.new_figure(7.0, 3.0)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 3.0)
         axes = figure.add_subplot()
         for k in range(7):
             axes.plot([0, 1], [k, k], label=f"line {k}")
@@ -141,48 +139,64 @@ def test_long_legends_and_texts_on_one_another_are_found():
 
 
 def test_curves_are_sampled_where_they_bend():
-    x, y = look.sampled(lambda t: [math.exp(-30 * t), math.sqrt(t)], [0.0, 0.3, 1.0])
+    x, y = pictures.sampled(lambda t: [math.exp(-30 * t), math.sqrt(t)], [0.0, 0.3, 1.0])
     assert y.shape == (len(x), 2) and np.all(np.diff(x) > 0) and 30 < len(x) <= 200
     assert np.array_equal(y[:, 0], [math.exp(-30 * t) for t in x])
     steps = np.column_stack([np.diff(x), np.diff(y[:, 0])])
     turn = np.degrees(np.abs(np.diff(np.arctan2(*steps.T[::-1]))))
     assert turn.max() < 4.5
-    assert len(look.sampled(lambda t: 2 * t, [0.0, 0.4, 1.0])[0]) == 3  # straight
+    assert len(pictures.sampled(lambda t: 2 * t, [0.0, 0.4, 1.0])[0]) == 3  # straight
 
 
 def test_all_folders_are_listed():
-    folders = {p.parent.name for p in FOLDER.glob("*/__main__.py")}
-    assert set(everything.NAMES) == folders
+    folders = {p.parent.name for p in FOLDER.glob("*/model.py")}
+    assert set(program.NAMES) == folders
 
 
-def test_program_writes_tables_and_a_self_contained_page(tmp_path, monkeypatch, capsys):
-    name = "jeffrey_colombo_2009"
-    module = importlib.import_module(f"papers.{name}.__main__")
-    cheap = [p for p in module.PAPER.pictures if f"{name}-{p.name}" not in DEAR_FIGURES]
-    short = dataclasses.replace(
-        module.PAPER, claims=module.PAPER.claims[:2], pictures=tuple(cheap[:1])
-    )
-    monkeypatch.setattr(module, "PAPER", short)
-    assert everything.main([name, "--out", str(tmp_path)]) == 0
-    printed = capsys.readouterr().out
-    assert "2 statements" in printed
-    folder = tmp_path / name
-    assert len(list(csv.reader((folder / "claims.csv").open(encoding="utf-8")))) == 3
-    assert "memory" in json.loads((folder / "claims.json").read_text())["note"]
-    page = (folder / "report.html").read_text(encoding="utf-8")
-    assert "name='viewport'" in page and page.index("<h2>Figures") < page.index("<table>")
-    assert page.count("data:image/png;base64,") == 1 and not re.search("https?:", page)
-
-
-def test_a_failed_check_is_reported(tmp_path, capsys):
+def of_few_steps(monkeypatch, *rows):
+    """Let the program find a paper with these rows and one figure."""
     paper = PAPERS["welander_1982"]
-    broken = dataclasses.replace(paper.claims[0](), checks=(Check("2 is 3", False),))
-    paper = dataclasses.replace(paper, claims=(lambda: broken,), pictures=())
-    assert program.reproduce(paper, ["--out", str(tmp_path)]) == 1
-    assert broken.id in capsys.readouterr().err
+    (table,) = paper.tables
+    axes = pictures.Picture("axes", "empty axes", "Two axes.", lambda: pictures.canvas(2, 2)[0])
+    short = dataclasses.replace(table, rows=rows or table.rows[:2])
+    paper = dataclasses.replace(paper, tables=(short,), pictures=(axes,))
+    monkeypatch.setattr(importlib.import_module("papers.welander_1982"), "PAPER", paper)
+    return short.rows[0]()
+
+
+def test_program_prints_claims_and_writes_the_record_and_the_figures(tmp_path, monkeypatch, capsys):
+    first = of_few_steps(monkeypatch)
+    assert program.main(["welander_1982", "--out", str(tmp_path)]) == 0
+    assert f"{first.name}: {first.value}\n" in capsys.readouterr().out
+    record = (tmp_path / "welander_1982" / "results.md").read_text(encoding="utf-8")
+    assert "2 claims: 2 holds; 1 figures." in record and "![empty axes](axes.png)" in record
+    assert "| " + " | ".join(first.cells()) + " |" in record.splitlines()
+    for kind in ("png", "pdf"):
+        assert (tmp_path / "welander_1982" / f"axes.{kind}").stat().st_size > 500
+
+
+def test_a_failed_check_is_reported(tmp_path, monkeypatch, capsys):
+    broken = dataclasses.replace(
+        PAPERS["welander_1982"].tables[0].rows[0](), checks=(Check("2 is 3", False),)
+    )
+    of_few_steps(monkeypatch, lambda: broken)
+    assert program.main(["welander_1982", "--out", str(tmp_path)]) == 1
+    printed = capsys.readouterr().err
+    assert "FAILS: 2 is 3" in printed and f"welander_1982: {broken.name}" in printed
+
+
+def test_an_interruption_keeps_what_was_computed(tmp_path, monkeypatch, capsys):
+    def interrupted():
+        raise KeyboardInterrupt
+
+    first = PAPERS["welander_1982"].tables[0].rows[0]
+    of_few_steps(monkeypatch, first, interrupted)
+    assert program.main(["welander_1982", "kuznetsov_2003", "--out", str(tmp_path)]) == 130
+    assert "python -m papers welander_1982 kuznetsov_2003" in capsys.readouterr().err
+    assert first().value in (tmp_path / "welander_1982" / "results.md").read_text(encoding="utf-8")
 
 
 def test_unknown_paper_is_refused(capsys):
     with pytest.raises(SystemExit):
-        everything.main(["nobody_1900"])
+        program.main(["nobody_1900"])
     assert "no paper named nobody_1900" in capsys.readouterr().err

@@ -35,14 +35,14 @@ grad_H = ca.jacobian(H, p).T
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """One of the paper's models: the two fields of equation (sliding) and what derives from them.
+    """One of the paper's models: the two fields of eq. (20) and what derives from them.
 
     Attributes
     ----------
     A : SX
         Tangential acceleration besides friction.
     Lambda_N : SX
-        Normal load, equation (nforce).
+        Normal load, eq. (16).
     parameters : dict
         Symbols and their default values (None where there is none).
     name : str
@@ -77,12 +77,12 @@ class Equations:
 
     @property
     def alpha(self) -> ca.SX:
-        """Equation (alpha)."""
+        """Equation (21)."""
         return self.lie(1) / ca.dot(self.F1 - self.F2, grad_H)
 
     @property
     def F_s(self) -> ca.SX:
-        """Rolling, equation (sliding)."""
+        """Rolling, eq. (20)."""
         return (1 - self.alpha) * self.F1 + self.alpha * self.F2
 
     @cached_property
@@ -113,7 +113,7 @@ def along(field_: ca.SX, expression: Expression) -> ca.SX:
 
 
 def linear(**values: float | None) -> Equations:
-    """Equation (kv_rescaled), the linear Kelvin-Voigt model.
+    """Equation (15), the linear Kelvin-Voigt model.
 
     Parameters
     ----------
@@ -137,7 +137,7 @@ def generalised(
     parameters: Mapping[ca.SX, float | None],
     name: str,
 ) -> Equations:
-    """Equation (generic_rescaled).
+    """Equation (37).
 
     Parameters
     ----------

@@ -85,7 +85,7 @@ def overview() -> str:
 
 
 _INTRODUCTION = (
-    "Both packages have one front door: what you need is imported as `nonsmooth.name` or `bounce.name`. "
+    "Both packages have one public module: what you need is imported as `nonsmooth.name` or `bounce.name`. "
     "The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`; curves of any "
     "equations are followed by `nonsmooth.continuation`; the types that questions about a point return "
     "are in `nonsmooth.local`. What is before, between and after bounces is in `bounce.golf`, laws in "
@@ -146,12 +146,12 @@ def members(path: str, names: Iterable[str]) -> str:
 
 
 def _member(path: str, name: str) -> str:
-    """One name; where a module has the same name, it is asked for by the place of its definition."""
-    asked, shown = place(path, name), f"{path}.{name}"
-    if asked == shown:
-        return f"::: {asked}\n{_OPTIONS.get(name, '')}"
+    """The entry of a name; where a module has the same name, by the path of its definition."""
+    defined, shown = place(path, name), f"{path}.{name}"
+    if defined == shown:
+        return f"::: {defined}\n{_OPTIONS.get(name, '')}"
     options = f"    options:\n      heading: {shown}\n      toc_label: {shown}\n"
-    return f"[](){{#{shown}}}\n\n::: {asked}\n{options}"
+    return f"[](){{#{shown}}}\n\n::: {defined}\n{options}"
 
 
 def place(path: str, name: str) -> str:

@@ -1,7 +1,6 @@
-"""What `make docs` does besides turning pages into HTML (an mkdocs hook).
+"""Hooks of mkdocs: draw the gallery, write the pages of the API, fill in tables, typeset formulas.
 
-It draws the gallery by running the programs of docs/examples, writes the API's pages, puts the
-generated parts into the pages, and typesets mathematics. All of it lands in build/, nothing in docs/.
+Everything that is generated is written to build/.
 """
 
 from __future__ import annotations

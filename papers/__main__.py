@@ -33,10 +33,7 @@ def paper_of(name: str) -> Paper:
 
 
 def reproduce(paper: Paper, folder: Path) -> list[str]:
-    """Compute the tables and draw the figures of a paper; return the names of rows that do not hold.
-
-    ``folder/results.md`` is written after each step, so an interruption loses one step at most.
-    """
+    """Compute a paper into ``folder``, saved after each step; return the names of rows that do not hold."""
     folder.mkdir(parents=True, exist_ok=True)
     done, wrong = Done(paper), list[str]()
 

@@ -63,11 +63,7 @@ def corrects(verdict: str, errata: Sequence[int]) -> str:
 
 @dataclass(frozen=True)
 class Claim:
-    """A statement of a paper.
-
-    ``place`` is a section or an equation, or begins with :data:`MEMORY` or :data:`HERE`; ``value`` is what
-    the computation gives, and ``how`` the method.
-    """
+    """A statement of a paper; ``place`` may begin with MEMORY or HERE, ``value`` is what was computed."""
 
     name: str
     place: str

@@ -100,17 +100,7 @@ PAGE, SMALLEST, LISTED = 7.0, 8.0, 6
 
 
 def faults(figure: Figure) -> list[str]:
-    """What would not do in print: the width, texts too small, cut off or on others, long legends.
-
-    Parameters
-    ----------
-    figure : matplotlib Figure
-
-    Returns
-    -------
-    list of str
-        A sentence for each fault.
-    """
+    """Sentences on what is not legible in print: width, small, cut or overlapping texts, long legends."""
     width, found = figure.get_figwidth(), list[str]()
     if width > PAGE:
         found.append(f"it is {width:g} inches wide, more than the {PAGE:g} of a page.")

@@ -20,10 +20,7 @@ FROM_MEMORY = (
 
 @dataclass(frozen=True)
 class Table:
-    """A table of the record; each of ``rows`` computes one row.
-
-    ``evidence``: a last column shows the checks of a row that no row above it shows.
-    """
+    """A table, a function for each row; ``evidence``: its last column has the checks not shown above."""
 
     title: str
     introduction: str

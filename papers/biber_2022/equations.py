@@ -117,7 +117,7 @@ def sign_conditions() -> Checks:
         )
     return (
         Check(
-            "largest dLambda_N/dY over Y in {-1, -.1}, Y' in {-1, 0, .5} for the three laws used "
+            "largest dLambda_N/dY over Y in {-1, -0.1}, Y' in {-1, 0, 0.5} for the three laws used "
             "here: " + ", ".join(f"{r:.3g}" for r in rows),
             max(rows) < 0,
         ),

@@ -96,7 +96,7 @@ def both_positive() -> Erratum:
         "both terms on the right-hand side are positive",
         "the second has the sign of 7 d2 - 5 d1 eta (erratum 11); the sum is positive for small "
         "eta because Lambda_N = O(eta)",
-        (Check(f"d1 = 1, d2 = .01, eta = .1: 7 d2 - 5 d1 eta = {number:.2f} < 0", number < 0),),
+        (Check(f"d1 = 1, d2 = 0.01, eta = 0.1: 7 d2 - 5 d1 eta = {number:.2f} < 0", number < 0),),
     )
 
 

@@ -253,9 +253,9 @@ def visible_condition() -> Erratum:
                 "(F1.grad)^2 H + (F2.grad)^2 H = 2 (X' A_X + Y' A_Y) at s for every law",
                 identical(both, 2 * drift, given=g.at_two_fold),
             ),
-            row("slow", "linear, eta = 2, X' = .05, Y' = .7", "visible"),
+            row("slow", "linear, eta = 2, X' = 0.05, Y' = 0.7", "visible"),
             row(
-                "stiff", "linear, eta = 2, X' = .5: 2 eta^2 abs(X') > 7 mu Y'", "visible-invisible"
+                "stiff", "linear, eta = 2, X' = 0.5: 2 eta^2 abs(X') > 7 mu Y'", "visible-invisible"
             ),
             row(
                 "hertz",
@@ -268,7 +268,7 @@ def visible_condition() -> Erratum:
 
 @cache
 def reverse_slip_with_backspin() -> tuple[float, float]:
-    """H_F and Omega_F for d=.1, eta=.5, mu=.3, G=1e-4 and start (0,.3,0,-1,.6)."""
+    """H_F and Omega_F for d=0.1, eta=0.5, mu=0.3, G=1e-4 and start (0,0.3,0,-1,0.6)."""
     last = law("linear").bounce([0, 0.3, 0, -1, 0.6]).x[-1]
     return float(last[1] + last[4]), float(last[4])
 
@@ -282,7 +282,9 @@ def topspin() -> Erratum:
         "the surface divides lift-off with backspin from lift-off with topspin",
         "it divides forward from reverse slip, the signs of H_F; the spin Omega_F may differ",
         (
-            close("d=.1, eta=.5, mu=.3, G=1e-4, start (0,.3,0,-1,.6): H_F", slip, -7.33e-4, 5e-7),
+            close(
+                "d=0.1, eta=0.5, mu=0.3, G=1e-4, start (0,0.3,0,-1,0.6): H_F", slip, -7.33e-4, 5e-7
+            ),
             close("Omega_F", spin, 0.0582, 5e-5),
             Check("reverse slip with backspin", slip < 0 < spin),
         ),

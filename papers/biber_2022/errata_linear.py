@@ -182,7 +182,7 @@ def gravity_twice() -> Erratum:
                 identical(model.Lambda_N, 0, given=rest)
                 and identical(model.Lambda_N + G, G, given=rest),
             ),
-            close("lift-off time, d2 = .1, G = .05, printed load", net, 3.0063, 5e-5),
+            close("lift-off time, d2 = 0.1, G = 0.05, printed load", net, 3.0063, 5e-5),
             close("lift-off time with the contact force", contact, 3.0746, 5e-5),
             Check(
                 f"printed load at touch-down with d2 = 0, G = 1e-4: {touch_down:.1e} < 0, which "
@@ -219,8 +219,7 @@ def which_is_soft() -> Erratum:
 
 
 def scaling_residuals(length: ca.SX, spin: ca.SX, force: ca.SX) -> list[ca.SX]:
-    """What is left of eq. (15) and of H for X = length x, Omega = spin omega, Lambda = force
-    lambda and tau = t/eps2: the X and Omega equations and the slope mismatch of H."""
+    """Residuals of eq. (15) and of H for X = length x, Omega = spin omega, Lambda = force lambda."""
     x, xt, e1, lam_T = (ca.SX.sym(n) for n in ("x", "xt", "e1", "lT"))
     acceleration = lam_T - 2 * d1 / e1 * xt - x / e1**2  # eq. (11)
     ratio = EPS2 / e1
@@ -340,7 +339,7 @@ def alpha() -> Erratum:
                 and identical(model.alpha, 0.5, given=[(eta, 0)]),
             ),
             Check(
-                f"at X = .2, X' = .3, Y = -.5, Y' = .4 (mu .3, d .1, eta .5): {ours:.6f} against "
+                f"at X = 0.2, X' = 0.3, Y = -0.5, Y' = 0.4 (mu 0.3, d 0.1, eta 0.5): {ours:.6f} against "
                 f"printed {theirs:.6f}",
                 abs(ours - model.value(model.alpha, state, **values)) < 1e-15
                 and abs(ours - theirs) > 0.1,
@@ -414,7 +413,7 @@ def second_lie() -> Erratum:
 
 @cache
 def exit_in_compression() -> ns.Event:
-    """Return the end of rolling for mu=.3, eta=1, d1=0, d2=.1, G=0 and start (0,2,0,-1,-2)."""
+    """Return the end of rolling for mu=0.3, eta=1, d1=0, d2=0.1, G=0 and start (0,2,0,-1,-2)."""
     run = linear(mu=0.3, d1=0.0, d2=0.1, eta=1.0, G=0.0).bounce([0, 2, 0, -1, -2])
     return next(e for e in run.events if e.kind == "exit")
 
@@ -429,7 +428,7 @@ def roll_to_slip_in_compression() -> Erratum:
         "true as eta -> 0; false when eta^2 abs(X') is of the order of (7/2) mu abs(Y') or more",
         (
             close(
-                "mu=.3, eta=1, d1=0, d2=.1, G=0, start (0,2,0,-1,-2): rolling ends at tau",
+                "mu=0.3, eta=1, d1=0, d2=0.1, G=0, start (0,2,0,-1,-2): rolling ends at tau",
                 leave.t,
                 0.2038,
                 5e-5,
@@ -462,7 +461,7 @@ def which_compliance() -> Erratum:
                 runs[0.0].itinerary.endswith("s"),
             ),
             Check(
-                "eta = .05 and .5: "
+                "eta = 0.05 and 0.5: "
                 + ", ".join(
                     f'"{runs[v].itinerary}" with H_F = {runs[v].x[-1, 1] + runs[v].x[-1, 4]:.3g}'
                     for v in (0.05, 0.5)
@@ -492,11 +491,11 @@ def isotropic() -> Erratum:
         "only without friction",
         (
             Check(
-                f"mu = 0: (X', Y') = (.5, -1) leaves as ({without[0]:.6f}, {without[1]:.6f})",
+                f"mu = 0: (X', Y') = (0.5, -1) leaves as ({without[0]:.6f}, {without[1]:.6f})",
                 abs(without[0] + 0.5) < 1e-9 and abs(without[1] - 1) < 1e-9,
             ),
             Check(
-                f"mu = .3: it leaves as ({with_friction[0]:.6f}, {with_friction[1]:.6f})",
+                f"mu = 0.3: it leaves as ({with_friction[0]:.6f}, {with_friction[1]:.6f})",
                 abs(with_friction[0] + 0.5) > 0.05,
             ),
         ),

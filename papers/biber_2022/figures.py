@@ -1,4 +1,4 @@
-"""Every figure by the paper's label, with its caption."""
+"""Every figure with its number and its caption."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ PICTURES: tuple[pictures.Picture, ...] = (
         "Fig. 4",
         "Simulated, not measured: the measurements are not public. Slip at lift-off against slip at "
         "touch-down, for 256 landings spread evenly over the ranges of Table 1. Circles: the "
-        "paper's linear compliant model (d1 = .1, eta = .5, G = 0, with the r and mu that the "
+        "paper's linear compliant model (d1 = 0.1, eta = 0.5, G = 0, with the r and mu that the "
         "companion experiments fitted). Crosses: the rigid law with the same r and mu; ticks: where it "
         "rolls at lift-off. Of the two "
         "classes that the paper describes, small negative slip appears in the compliant model on "
@@ -68,7 +68,7 @@ PICTURES: tuple[pictures.Picture, ...] = (
     pictures.Picture(
         "trajectories",
         "Fig. 6",
-        "Tangential and normal velocity during a rigid bounce (mu = .3, r = .6). Dots: touch-down; "
+        "Tangential and normal velocity during a rigid bounce (mu = 0.3, r = 0.6). Dots: touch-down; "
         "diamonds: lift-off.",
         figures_data.trajectories,
     ),
@@ -90,7 +90,7 @@ PICTURES: tuple[pictures.Picture, ...] = (
         "geometries",
         "Fig. 9",
         "What a bounce can do near lift-off, computed with the normal form of the linear ball's "
-        "two-fold (mu = .3, d1 = d2 = .1, eta = .5, G = 1e-4): (a) forward slip throughout, (b) "
+        "two-fold (mu = 0.3, d1 = d2 = 0.1, eta = 0.5, G = 1e-4): (a) forward slip throughout, (b) "
         "reverse slip throughout, (c, d) slip, roll, and slip again through a fold. Diamonds: "
         "lift-off. Dotted: from a start straight to the surface, at a cross. Pale: behind or below a "
         "surface.",
@@ -100,7 +100,7 @@ PICTURES: tuple[pictures.Picture, ...] = (
         "kv_pert_a",
         "Fig. 10 (a)",
         "The end of bounces (A), (B), (C) in the friction cone. The paper gives mu and p0 only; "
-        "here d1 = .098, d2 = .007, eta = .09, G = 0, and X'0 changed by -+.02 with Omega0 = -X'0.",
+        "here d1 = 0.098, d2 = 0.007, eta = 0.09, G = 0, and X'0 changed by -+0.02 with Omega0 = -X'0.",
         figures_bounce.kv_pert_cone,
     ),
     pictures.Picture(
@@ -127,13 +127,13 @@ PICTURES: tuple[pictures.Picture, ...] = (
     pictures.Picture(
         "two_fold_b",
         "Fig. 12 (b)",
-        "An invisible two-fold, nu = (-.5, -.5), which the library calls II-F." + _SPACE,
+        "An invisible two-fold, nu = (-0.5, -0.5), which the library calls II-F." + _SPACE,
         invisible,
     ),
     pictures.Picture(
         "two_fold_c",
         "Fig. 12 (c)",
-        "A visible-invisible two-fold, nu = (0, .5), which the library calls mix-0." + _SPACE,
+        "A visible-invisible two-fold, nu = (0, 0.5), which the library calls mix-0." + _SPACE,
         visible_invisible,
     ),
     pictures.Picture(

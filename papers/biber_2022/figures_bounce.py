@@ -1,4 +1,4 @@
-"""Figures of section 3: trajectories in the friction cone and their slip (kv_pert)."""
+"""Figures of section 3: trajectories in the friction cone and their slip."""
 
 from __future__ import annotations
 
@@ -27,11 +27,7 @@ def _cone(axes: Axes, mu: float, top: float) -> None:
 
 
 def kv_pert_cone() -> Figure:
-    """Figure 10 (a): the end of three bounces in the friction cone.
-
-    The perturbations are not given in the paper; with +-.02 in X' the runs leave the inside of the
-    cone so late that the whole of it (inset) shows them as one line.
-    """
+    """Figure 10 (a): the end of three bounces in the friction cone; the paper gives no perturbations."""
     mu = kv_pert_data()["parameters"]["mu"]
     top = 11.0
     with pictures.settings():

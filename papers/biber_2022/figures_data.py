@@ -172,13 +172,7 @@ def experiment_ranges() -> Figure:
 
 @cache
 def predictions(surface: str, count: int = 256) -> tuple[Array, Array, Array]:
-    """H_0, H_F of the compliant model and of the rigid law over the published ranges.
-
-    Returns
-    -------
-    tuple of ndarray (count,)
-        In 1/s.
-    """
+    """H_0 and H_F (1/s) of the compliant model and of the rigid law over the published ranges."""
     r, mu = FITS[surface]
     d2 = brentq(lambda d: np.exp(log_restitution_value(2 * d)) - r, 1e-6, 1 - 1e-9)
     ball = bounce.KelvinVoigt(mu=mu, d1=TANGENTIAL_DAMPING, d2=d2, eta=ETA, G=0.0)

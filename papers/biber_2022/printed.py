@@ -1,4 +1,4 @@
-"""Formulas as the paper prints them, where they are wrong: what the corrected ones are held against."""
+"""Formulas as the paper prints them, where they are wrong, to compare with the corrected ones."""
 
 from __future__ import annotations
 

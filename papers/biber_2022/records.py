@@ -35,10 +35,7 @@ class Erratum:
 
 @dataclass(frozen=True)
 class Equation:
-    """A displayed equation: its number among all of them, the paper's or a few words, and its checks.
-
-    ``verdict`` is ``agrees``, ``corrected``, ``definition`` (nothing to compute) or ``assumption``.
-    """
+    """A displayed equation; its verdict is agrees, corrected, definition or assumption."""
 
     number: int
     label: str

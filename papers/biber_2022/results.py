@@ -95,7 +95,7 @@ def rigid_cases() -> Claim:
         f"{sum(right)} of {len(right)} starts, on both sides of each boundary and of both signs, "
         "behave as stated",
         AGREES,
-        "impact integrated over the normal impulse, a Filippov system; mu = .3, r = .5",
+        "impact integrated over the normal impulse, a Filippov system; mu = 0.3, r = 0.5",
         (Check("every start falls in its case", all(right)),),
     )
 
@@ -137,7 +137,7 @@ def slip_classes() -> Claim:
         + "; ".join(counts)
         + ". The measurements themselves are not public",
         NOT_CHECKABLE,
-        "256 landings for each surface, r and mu of the companion fits, d1 = .1, eta = .5, G = 0",
+        "256 landings for each surface, r and mu of the companion fits, d1 = 0.1, eta = 0.5, G = 0",
         tuple(checks),
     )
 
@@ -239,7 +239,7 @@ def roll_to_slip() -> Claim:
         "simulation",
     )
     extra = Check(
-        f"d = .1, eta = .5, start (0, .7, 0, -1, .6): rolling ends at Y' = {leave.x[3]:.4f} > 0",
+        f"d = 0.1, eta = 0.5, start (0, 0.7, 0, -1, 0.6): rolling ends at Y' = {leave.x[3]:.4f} > 0",
         bool(leave.x[3] > 0),
     )
     return Claim(**{**claim.__dict__, "checks": (*claim.checks, extra)})
@@ -301,7 +301,7 @@ def normal_compliance() -> Claim:
         "compliance in the normal direction makes the ball lift off slipping",
         "tangential compliance does; with normal compliance only (eta = 0) it lifts off rolling",
         13,
-        "simulation with eta = 0, .05, .5",
+        "simulation with eta = 0, 0.05, 0.5",
     )
 
 
@@ -315,7 +315,7 @@ def slip_reversal() -> Claim:
         "tangential stiffness and damping enable slip reversal",
         f"H0 = {landing:+.2f} -> H_F = {shot.slip:+.6f}, itinerary {shot.itinerary!r}",
         AGREES,
-        "simulation, mu = .3, d1 = d2 = .1, eta = .5, G = 1e-4, start (0, .7, 0, -1, .6)",
+        "simulation, mu = 0.3, d1 = d2 = 0.1, eta = 0.5, G = 1e-4, start (0, 0.7, 0, -1, 0.6)",
         (
             Check(
                 "H changes sign through rolling",
@@ -364,9 +364,9 @@ def kv_pert_parameters() -> Claim:
     return Claim(
         "kv-pert-parameters",
         "Sec. 3.2, Fig. 10",
-        "p0 = (.3543, -.1603128, -.1608, 3.4739, .1603128) with mu = .3 lifts off rolling",
+        "p0 = (0.3543, -0.1603128, -0.1608, 3.4739, 0.1603128) with mu = 0.3 lifts off rolling",
         "d1, d2, eta, eps2 are not given. p0 reaches the two-fold if 2 d1 X' + eta X = 0 at "
-        f"lift-off; d1 = .098, d2 = .007, eta = .09, G = 0 does, with X'0 = {required:.10f}",
+        f"lift-off; d1 = 0.098, d2 = 0.007, eta = 0.09, G = 0 does, with X'0 = {required:.10f}",
         NOT_CHECKABLE,
         "simulation of the family's roundest member",
         (
@@ -397,7 +397,7 @@ def kv_pert() -> Claim:
         f"(A) {names['A_exact']}, H_F = {abs(slips['A_printed']):.0e}; (B) {names['B']}, H_F = "
         f"{slips['B']:.4e}; (C) {names['C']}, H_F = {slips['C']:.4e}",
         AGREES,
-        "bounce.simulate with the parameters above; B and C: X'0 -+ .02, Omega0 = -X'0",
+        "bounce.simulate with the parameters above; B and C: X'0 -+ 0.02, Omega0 = -X'0",
         (
             Check(f"lift-off states and times within {worst:.1e} of the reference", worst < 1e-10),
             Check(
@@ -435,7 +435,7 @@ def sigma() -> Claim:
         "sigma1 = 1, sigma2 = -1: a visible two-fold",
         "; ".join(f"{n} law: sigma = {f.sigma}, {f.kind}" for n, f in folds.items()),
         AGREES,
-        "ns.find_two_fold near X' = .2, Y' = .7 for three laws",
+        "ns.find_two_fold near X' = 0.2, Y' = 0.7 for three laws",
         tuple(
             Check(f"{n}: {f.sigma}", f.sigma == (1, -1) and f.kind == "visible")
             for n, f in folds.items()

@@ -17,12 +17,7 @@ DATA = Path(__file__).parent / "data" / "table_ics.json"
 
 @dataclass(frozen=True)
 class Row:
-    """One entry of the table, ``computed`` in 1/s (velocity over radius) or rad/s.
-
-    ``radius``: ball radii in mm for which both printed roundings are right; None for spins.
-    ``consistent``: both printed numbers agree, within their roundings, for the stated radius;
-    ``fits_all``: they do for the radius that suits most entries (spins: at all).
-    """
+    """An entry in 1/s or rad/s; ``radius``: ball radii (mm) for which both printed numbers are right."""
 
     surface: str
     quantity: str
@@ -31,8 +26,8 @@ class Row:
     printed: str
     computed: float
     radius: tuple[float, float] | None
-    consistent: bool
-    fits_all: bool
+    consistent: bool  # within the roundings, for the stated radius
+    fits_all: bool  # for the radius that suits most entries (spins: at all)
     checks: tuple[Check, ...] = ()
 
     @property

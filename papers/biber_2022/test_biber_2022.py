@@ -155,6 +155,7 @@ def test_identity_test_sees_a_tiny_difference():
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     assert identical((x**2 - y**2) / (x - y), x + y)
     assert not identical((x**2 - y**2) / (x - y), x + y + 1e-30 * x)
+    assert identical(x**2, y**2, given=[(x, -y)])
 
 
 def test_exact_evaluation_refuses_roots():

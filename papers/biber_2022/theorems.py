@@ -62,9 +62,9 @@ def nu_product() -> Claim:
         "proven-nu-product",
         "eq. (54)",
         "nu1 nu2 = 1 + O(eps^3) < 1 at the two-fold of the ball",
-        "theorem: for all mu in [.2, .4], d1 in [.08, .12], d2 in [.05, .15], eta in [.4, .6], G in "
-        "[0, .001], inertia in [.38, .42], ground inclined by up to .01, Y' in [.6, 1], Omega in "
-        "[-.6, .6] there is exactly one two-fold (in a named box), F1 = F2 there and nu1 nu2 = 1 "
+        "theorem: for all mu in [0.2, 0.4], d1 in [0.08, 0.12], d2 in [0.05, 0.15], eta in [0.4, 0.6], G in "
+        "[0, 0.001], inertia in [0.38, 0.42], ground inclined by up to 0.01, Y' in [0.6, 1], Omega in "
+        "[-0.6, 0.6] there is exactly one two-fold (in a named box), F1 = F2 there and nu1 nu2 = 1 "
         "exactly, nu1, nu2 < 0",
         18,
         "ns.certify: Krawczyk's operator for existence and uniqueness, exact common factor of F1 - F2",
@@ -114,8 +114,8 @@ def slip_reversal() -> Claim:
         "proven-slip-reversal",
         "Fig. 10",
         "trajectories on both sides of the canard lift off in forward and in reverse slip",
-        "theorem: from the printed p0 with X'(0) lowered by .02 (B) the ball rolls, then lifts off in "
-        "forward slip; raised by .02 (C), in reverse",
+        "theorem: from the printed p0 with X'(0) lowered by 0.02 (B) the ball rolls, then lifts off in "
+        "forward slip; raised by 0.02 (C), in reverse",
         AGREES,
         "ns.certify_orbit: validated Taylor steps, events by interval Newton, decimals as written",
         tuple(checks),
@@ -129,10 +129,7 @@ LAST = Fraction(1, 10**9)
 
 
 def rolling_ball() -> tuple[ns.FilippovSystem, dict[str, str]]:
-    """A system whose points of rest (t, V) are zero load and force of Fig. 10's rolling ball.
-
-    From p0 with X'(0) = V: X'' = -(5/7)(2 d1 eta X' + eta^2 X), Y'' = -2 d2 Y' - Y - G.
-    """
+    """A system whose points of rest (t, V) are zero load and force of Fig. 10's rolling ball."""
     data = kv_pert_data()
     numbers = {k: str(v) for k, v in data["parameters"].items()}
     x0, _, y0, w0, _ = data["trajectories"]["A_exact"]["p0"]
@@ -215,7 +212,7 @@ def canard() -> Claim:
         "Sec. 4.2, Fig. 10",
         "a single trajectory of the rolling region reaches s",
         "theorem: for X'(0) from B's to C's there is exactly one at which load and tangential force of "
-        f"the rolling ball vanish together before t = .1, X'(0) = {speed}; until 1e-9 before, that ball "
+        f"the rolling ball vanish together before t = 0.1, X'(0) = {speed}; until 1e-9 before, that ball "
         "is inside the friction cone",
         AGREES,
         "ns.prove_all on the closed form of rolling; ns.certify_orbit with the cone's edges as stops",

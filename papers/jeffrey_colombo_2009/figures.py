@@ -86,8 +86,7 @@ def sliding() -> Figure:
 
 
 def _arcs(start: Array, above: bool) -> tuple[Array, Array, Array]:
-    """Surface of the arcs from the ray through ``start``, scaled so that its edges cross the axis of the
-    diabolo at right angles: along and across that axis, and x."""
+    """Surface of the arcs from the ray through ``start``; its edges cross the diabolo's axis at right angles."""
     share = np.linspace(0.0, 1.0, 81)
     y, z = start
     t = -2 * (y if above else z) * share

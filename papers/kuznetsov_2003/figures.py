@@ -258,7 +258,7 @@ PICTURES: tuple[pictures.Picture, ...] = (
     pictures.Picture(
         "regimes",
         "four regimes",
-        "Stable node (.75), stable pseudo-node (.88), with pseudo-saddle and unstable focus (1.05), "
+        "Stable node (0.75), stable pseudo-node (0.88), with pseudo-saddle and unstable focus (1.05), "
         "stable sliding cycle (1.3).",
         whole,
     ),

@@ -163,14 +163,14 @@ PICTURES: tuple[pictures.Picture, ...] = (
     pictures.Picture(
         "portraits",
         "portraits",
-        "The box for six thresholds: mixed all the time (-.06), oscillating (-.03, -.01), the stable "
-        "fused focus (0), balanced on the surface (.05), resting (.22).",
+        "The box for six thresholds: mixed all the time (-0.06), oscillating (-0.03, -0.01), the stable "
+        "fused focus (0), balanced on the surface (0.05), resting (0.22).",
         portraits,
     ),
     pictures.Picture(
         "oscillation",
         "oscillation",
-        "Three periods of the oscillation at eps = -.01: while the box rests it slowly warms and takes "
+        "Three periods of the oscillation at eps = -0.01: while the box rests it slowly warms and takes "
         "up salt; when its density reaches the threshold it mixes, for a short time.",
         oscillation,
     ),
@@ -178,7 +178,7 @@ PICTURES: tuple[pictures.Picture, ...] = (
         "diagram",
         "bifurcation diagram",
         "Equilibria, pseudo-equilibria and the cycle over the threshold. Two pseudo-equilibria in "
-        "repelling sliding merge at eps = -.0702. The cycle begins at the fused "
+        "repelling sliding merge at eps = -0.0702. The cycle begins at the fused "
         "focus and ends in a homoclinic orbit of the boundary equilibrium at eps = -7/165; there its "
         "period has no bound.",
         diagram,

@@ -1,10 +1,11 @@
-"""The page of a paper is its README, and its record where `make reproduce` has written one."""
+"""The page of a paper shows its record where there is one; the picture of the architecture is legible."""
 
 import importlib
 
 import pytest
 
 from papers.__main__ import NAMES
+from papers.pictures import faults
 
 
 @pytest.fixture
@@ -36,3 +37,8 @@ def test_the_record_takes_the_place_of_the_table_of_claims(elsewhere, monkeypatc
     assert "Before." in page and "After." in page and "## Claims" in page
     assert "![One](welander_1982/one.png)" in page
     assert "papers/welander_1982/one.png" in elsewhere.pictures()
+
+
+def test_the_picture_of_the_architecture_is_legible(monkeypatch, pytestconfig):
+    monkeypatch.syspath_prepend(pytestconfig.rootpath / "docs")
+    assert faults(importlib.import_module("architecture").figure()) == []

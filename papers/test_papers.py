@@ -107,35 +107,26 @@ def test_figures_are_fit_for_print(name, picture):
         assert faults(figure) == []
 
 
-def test_faults_of_print_are_found():
+def test_what_is_not_legible_is_found():
     with pictures.settings():
-        figure = pictures.new_figure(7.5, 3.0)
-        axes = figure.add_subplot()
-        axes.plot([0, 1], [0, 1])
-        figure.set_layout_engine("none")
-        axes.text(0.5, 0.5, "small", fontsize=6)
-        figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
-        axes.text(5.0, 0.5, "outside", clip_on=True)
-        axes.set_title("high", y=1.5)
-        found = " ".join(faults(figure))
-    assert "7.5 inches wide" in found and "'small' is in 6 point" in found
-    assert "right side' is cut off" in found and "outside" not in found
-    assert "'high' is cut off" in found
-
-
-def test_long_legends_and_texts_on_one_another_are_found():
-    with pictures.settings():
-        figure = pictures.new_figure(7.0, 3.0)
-        axes = figure.add_subplot()
+        axes = (figure := pictures.new_figure(7.5, 3.0)).add_subplot()
         for k in range(7):
             axes.plot([0, 1], [k, k], label=f"line {k}")
         axes.legend(loc="upper left")
-        assert faults(figure) == ["a legend has 7 entries: label the things themselves."]
-        axes.get_legend().remove()
+        figure.set_layout_engine("none")
+        axes.text(0.5, 3.0, "small", fontsize=6)
         axes.text(0.5, 1.0, "one text", rotation=40)
         axes.text(0.5, 1.1, "another", rotation=40)
         axes.text(0.6, 1.0, "beside", rotation=40)
-        assert faults(figure) == ["'one text' is on 'another'."]
+        axes.text(5.0, 0.5, "outside", clip_on=True)
+        figure.text(0.9, 0.5, "a text that leaves the figure on its right side")
+        assert faults(figure) == [
+            "it is 7.5 inches wide, more than the 7 of a page.",
+            "a legend has 7 entries: label the things themselves.",
+            "'one text' is on 'another'.",
+            "'small' is in 6 point.",
+            "'a text that leaves the figure on its right side' is cut off.",
+        ]
 
 
 def test_curves_are_sampled_where_they_bend():

@@ -15,9 +15,10 @@ from pathlib import Path
 
 import pytest
 
-from nonsmooth.flow.compiled import lanes, tape
-from nonsmooth.flow.compiled.build import CompilerError
+from nonsmooth.flow.compiled import tape
+from nonsmooth.flow.compiled.building.build import CompilerError
 from nonsmooth.flow.compiled.device import shim
+from nonsmooth.flow.compiled.lanes import engine
 from tests.halves import NAME, elsewhere
 
 os.environ["MPLBACKEND"] = "Agg"
@@ -37,7 +38,7 @@ DEAR = {
 SHIPPED = {
     "test_every_operation",
     "test_random_landings_agree_with_the_interpreter",
-    "test_ensemble.py",
+    "test_lanes.py",
 }
 COMPILED = HERE / "tests" / "flow" / "compiled"
 WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
@@ -96,6 +97,6 @@ def few_compilations(
     names = {request.path.name, request.node.name}
     shipped = COMPILED in request.path.parents and (WHOLE or bool(names & SHIPPED))
     if not (slow or shipped):
-        monkeypatch.setattr(lanes, "FLAGS", (*lanes.FLAGS, "-O0"))
+        monkeypatch.setattr(engine, "FLAGS", (*engine.FLAGS, "-O0"))
         monkeypatch.setattr(shim, "_FLAGS", (*shim._FLAGS, "-O0"))
     yield

@@ -24,16 +24,7 @@ Make = Callable[[str, float], Callable[[Array], Ends]]
 
 @dataclass(frozen=True)
 class Solver:
-    """A solver in the comparison.
-
-    Attributes
-    ----------
-    label : str
-    make : (name of a problem, tolerance) -> function of the starts
-    tolerances : what to try, loosest first
-    count, timed : trajectories for the errors at most, and in one timed turn (about 0.1 s)
-    available : whether it is installed
-    """
+    """A solver in the comparison."""
 
     label: str
     make: Make

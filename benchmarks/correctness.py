@@ -57,11 +57,9 @@ def letters(number: int) -> str:
 
 
 def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, dict[str, Any]]:
-    """For each pair of neighbours: starts, and how many mpmath says are wrong.
-
-    mpmath is the judge of every start; the engine at a tight tolerance, which found the boundaries,
-    is not, since it may be wrong in the same way.
-    """
+    """For each pair of neighbours: starts, and how many mpmath says are wrong."""
+    # mpmath is the judge of every start; the engine at a tight tolerance, which found the boundaries,
+    # is not, since it may be wrong in the same way.
     low, high, a, b = pairs(name, starts, codes, each, GAP)
     solve = ours.make(name, DEFAULT)
     keys = [
@@ -86,12 +84,8 @@ def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, 
 def pairs(
     name: str, starts: Array, codes: Codes, each: int, gap: float
 ) -> tuple[Array, Array, Codes, Codes]:
-    """Bisect segments between starts of different itineraries until their ends are ``gap`` apart.
-
-    With a gap of zero they are neighbours: no number lies between them. A third itinerary met on the way
-    replaces one end, so that what is left are neighbours. An end may lie anywhere within the gap of the
-    boundary, also in a sliver far thinner than that.
-    """
+    """Bisect segments between starts of different itineraries until their ends are ``gap``
+    apart."""
     rng = np.random.default_rng(6)
     low, high = [], []
     for one, other in combinations(np.unique(codes), 2):

@@ -50,10 +50,9 @@ def _outward(low: Array, high: Array) -> Array:
 def _farthest(
     name: str, solve: Any, ends: Array, outward: Array, believed: Codes
 ) -> tuple[float, int]:
-    """Largest distance at which mpmath contradicts the engine, -1 if none, and how often it was asked.
-
-    It is asked where the engine's answer is not that of the end, which is on the same side.
-    """
+    """Largest distance at which mpmath contradicts the engine, -1 if none, and how often it was
+    asked."""
+    # It is asked where the engine's answer is not that of the end, which is on the same side.
     judged = 0
     for distance in reversed(DISTANCES):
         moved = ends[:, [1, 4]] + distance * outward

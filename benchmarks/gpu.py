@@ -17,7 +17,7 @@ from nonsmooth.flow.compiled.device.card import card
 from nonsmooth.flow.compiled.device.kernel import Kernel, Source
 from nonsmooth.flow.compiled.device.machine import DeviceError, Machine
 from nonsmooth.flow.compiled.device.shim import Shim
-from nonsmooth.flow.facts import HAND_OVER
+from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
 

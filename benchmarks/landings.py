@@ -61,8 +61,7 @@ def ball(load: str) -> ns.FilippovSystem:
 
 
 def drawn(piece: int, count: int) -> dict[str, Array]:
-    """Landings of a piece: turfs and balls; of eight one nearly without slip, one along an axis, one
-    along another line. (A slip that lasts shorter than 1e-12 is none for the engines.)"""
+    """Landings of a piece."""
     rng = np.random.default_rng([14, piece])
     p = dict(
         mu=rng.uniform(0.05, 1.5, count),

@@ -51,15 +51,7 @@ class Timing:
 def alternate(
     work: Mapping[str, Callable[[], Any]], turns: int, clock: Clock = time.process_time
 ) -> dict[str, Timing]:
-    """Time pieces of work in turns; each runs once beforehand, unmeasured.
-
-    Parameters
-    ----------
-    work : mapping of name to function
-    turns : int
-    clock : function, optional
-        Processor time of the process unless given; ``time.perf_counter`` where threads share.
-    """
+    """Time pieces of work in turns; each runs once beforehand, unmeasured."""
     for run in work.values():
         run()
     seconds: dict[str, list[float]] = {name: [] for name in work}
@@ -95,16 +87,7 @@ print("\\n" + json.dumps(dict(
 
 
 def fresh(script: str, environment: Mapping[str, str] | None = None) -> dict[str, Any]:
-    """Run a script in a fresh interpreter.
-
-    Returns
-    -------
-    dict
-        ``inside``: seconds from the first line to the last; ``cpu``: processor time of that, child
-        processes included; ``process``: seconds of the whole process, the interpreter's own start
-        included; ``peak_mib``: peak resident memory; ``note``: what the script left in a variable of
-        this name.
-    """
+    """Run a script in a fresh interpreter."""
     begin = time.perf_counter()
     done = subprocess.run(
         [sys.executable, "-c", _WRAPPER.format(script=script)],

@@ -22,7 +22,7 @@ import casadi as ca
 import numpy as np
 
 import nonsmooth as ns
-from nonsmooth.orbit.flight import Flights
+from nonsmooth.orbit.runs.flight import Flights
 
 from .measure import Timing, alternate
 from .peers import scipy_shooting
@@ -32,21 +32,9 @@ TOLERANCES = (1e-9, 1e-11, 1e-13)
 
 @dataclass(frozen=True)
 class Case:
-    """A periodic orbit with its truth.
+    """A periodic orbit with its truth."""
 
-    Attributes
-    ----------
-    solve : callable
-        The orbit by this library.
-    state : dict of int to float
-        Entries of the state after a return, in the order of the peer.
-    time : float
-        Of a return.
-    multipliers : tuple of complex
-        Of the return map, without structural ones.
-    """
-
-    solve: Callable[[], ns.PeriodicOrbit]
+    solve: Callable[[], ns.orbit.PeriodicOrbit]
     state: dict[int, float]
     time: float
     multipliers: tuple[complex, ...]
@@ -108,7 +96,7 @@ def errors(case: Case, state: Any, duration: float, multipliers: Any) -> dict[st
     }
 
 
-def _ours(case: Case, orbit: ns.PeriodicOrbit) -> dict[str, float]:
+def _ours(case: Case, orbit: ns.orbit.PeriodicOrbit) -> dict[str, float]:
     n = 1 if orbit.symmetric else 0
     return errors(case, orbit.start, orbit.period / (1 + n), orbit.half_multipliers)
 
@@ -169,7 +157,7 @@ def iterations(quick: bool) -> dict[str, Any]:
         t = float(x[n]) if system.time_dependent else 0.0
         # a little later: at the start itself a reset, or an entry, is due
         delay = 1e-3 * float(orbit.evaluation.durations[0])
-        later = ns.follow(
+        later = ns.flow.follow(
             system,
             x[:n],
             t + delay,
@@ -197,7 +185,7 @@ def iterations(quick: bool) -> dict[str, Any]:
     return result
 
 
-def two_blocks() -> tuple[ns.PeriodicOrbit, str, tuple[float, float]]:
+def two_blocks() -> tuple[ns.orbit.PeriodicOrbit, str, tuple[float, float]]:
     """Two coupled oscillators, one on a belt: R^4."""
     x, v, u, w, f, c = (ca.SX.sym(s) for s in ("x", "v", "u", "w", "f", "c"))
     slip = v - 0.5
@@ -212,7 +200,7 @@ def two_blocks() -> tuple[ns.PeriodicOrbit, str, tuple[float, float]]:
     return ns.periodic_orbit(system, run), "f", (0.8, 1.3)
 
 
-def bounces() -> tuple[ns.PeriodicOrbit, str, tuple[float, float]]:
+def bounces() -> tuple[ns.orbit.PeriodicOrbit, str, tuple[float, float]]:
     """A ball on a table that vibrates; its restitution is a parameter of the reset."""
     y, v, t, r = (ca.SX.sym(s) for s in ("y", "v", "t", "r"))
     speed = 0.5 * ca.cos(2 * t)

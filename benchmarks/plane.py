@@ -46,23 +46,7 @@ def rate(follow: Callable[[], object], count: int, turns: int = 3) -> float:
 
 @dataclass(frozen=True)
 class Ride:
-    """A body that slips and sticks on a floor that may turn.
-
-    Attributes
-    ----------
-    name : str
-    mu, load, push : float
-        Friction, normal force, and force along the first axis.
-    turning : float
-        Rate at which the floor turns.
-    start, speed : tuple of float
-        Place and velocity; with the spin's part of the contact point's velocity for a sphere.
-    inertia : float
-        Of a sphere; 0 for a block.
-    t_end : float
-    end : tuple of float
-        The place then, to 16 digits and more.
-    """
+    """A body that slips and sticks on a floor that may turn."""
 
     name: str
     mu: float
@@ -97,10 +81,8 @@ class Ride:
         )
 
     def peer(self, step: float) -> dict[str, Any]:
-        """The floor's frame for Siconos: the floor rests; a sphere's spin is a velocity of its own.
-
-        The step is that next to the one asked for of which there is a whole number.
-        """
+        """The floor's frame for Siconos."""
+        # The step is that next to the one asked for of which there is a whole number.
         step = self.t_end / round(self.t_end / step)
         size = 5 if self.inertia else 3
         mass, damping, stiffness = np.eye(size), np.zeros((size, size)), np.zeros((size, size))

@@ -32,10 +32,9 @@ T_MAX = 100.0
 
 @dataclass(frozen=True)
 class Guard:
-    """A function that is positive inside a mode; where it falls to zero, ``goes_to`` continues.
+    """A function that is positive inside a mode; where it falls to zero, ``goes_to`` continues."""
 
-    ``goes_to`` is a mode, or ``DECIDE`` (cross or slide) or ``STOP``.
-    """
+    # ``goes_to`` is a mode, or ``DECIDE`` (cross or slide) or ``STOP``.
 
     value: Callable[..., Any]
     goes_to: int
@@ -46,18 +45,7 @@ DECIDE, STOP = 8, 9
 
 @dataclass(frozen=True)
 class Problem:
-    """A system with one surface as three smooth modes and their guards.
-
-    Attributes
-    ----------
-    name : str
-    dimension : int
-    fields : three functions of the states -> derivatives, in the order ``+``, ``s``, ``-``
-    guards : three tuples of Guard
-    slopes : function of the states -> (L1, L2), the Lie derivatives of h along both fields
-    surface : function of the states -> h
-    free : index of the state that h contains with coefficient 1
-    """
+    """A system with one surface as three smooth modes and their guards."""
 
     name: str
     dimension: int

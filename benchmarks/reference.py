@@ -107,12 +107,7 @@ class _Expansion:
 
 
 def first_fall(c: Series, h: Any, drop: int) -> Any | None:
-    """First zero in (0, h] where a series goes from positive to negative; None without one.
-
-    Between its extrema the series is monotone, so that its signs there tell of every zero, also of two
-    that are closer than double precision tells apart. ``drop`` leading coefficients are zero by
-    construction and left out.
-    """
+    """First zero in (0, h] where a series goes from positive to negative; None without one."""
     high = c[drop:]
     slope = [k * v for k, v in enumerate(high)][1:]
     places = [mp.mpf(0), *sorted(_extrema(slope, h)), h]

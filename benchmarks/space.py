@@ -27,10 +27,9 @@ TARGETS = {
 
 
 def system(name: str) -> ns.FilippovSystem:
-    """Return the ``linear`` or ``nonlinear`` bounce of ``problems`` with two directions along the ground.
-
-    States X, X', Z, Z', Y, Y' and the two components of slip.
-    """
+    """Return the ``linear`` or ``nonlinear`` bounce of ``problems`` with two directions along
+    the ground."""
+    # States X, X', Z, Z', Y, Y' and the two components of slip.
     x = [ca.SX.sym(s) for s in ("X", "V", "Z", "U", "Y", "W", "h1", "h2")]
     lam, place, speed = ca.SX.sym("lam", 2), ca.vertcat(x[0], x[2]), ca.vertcat(x[1], x[3])
     y, w = x[4], x[5]

@@ -24,16 +24,7 @@ BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
 
 @dataclass
 class Lists:
-    """What was counted over random systems.
-
-    Attributes
-    ----------
-    systems, complete, zeros, starts : int
-        Systems, those with a complete list, zeros on the lists, starts of Newton's method.
-    missed, twice, unfound : list
-        Zeros that Newton's method found and the list has not; points that the list has twice; zeros
-        of the list to which Newton's method does not lead from close by.
-    """
+    """What was counted over random systems."""
 
     systems: int = 0
     complete: int = 0

@@ -170,12 +170,7 @@ def inverse(J: Matrix) -> Matrix:
 
 
 def check(record: dict[str, Any]) -> str:
-    """Check one proof; what was checked, in words.
-
-    Raises
-    ------
-    CheckError
-    """
+    """Check one proof; what was checked, in words."""
     equations = Equations(record)
     box = [Iv.of(*pair) for pair in record["box"]]
     matrix = [[Iv.of(v) for v in row] for row in record["matrix"]]

@@ -115,10 +115,8 @@ class Place:
         return after, zeros, "entry" if after[j] == "s" else "crossing"
 
     def _across(self, at: At, word: str, j: int) -> str:
-        """Beyond a surface that is met while another slides.
-
-        For every multiplier of the one that is met the other attracts, and sliding on it leads across.
-        """
+        """Beyond a surface that is met while another slides."""
+        # For every multiplier of the one that is met the other attracts, and sliding on it leads across.
         i, found = word.index("s"), []
         for s in (1, -1):
             lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(word)]
@@ -140,10 +138,8 @@ class Place:
     def jumped(
         self, x: list[Iv], p: list[Iv], word: str, index: int
     ) -> tuple[list[Iv], bool, int | None]:
-        """The state after a reset or an impact.
-
-        Also whether its own function stays zero, and the surface that slides if it is not left.
-        """
+        """The state after a reset or an impact."""
+        # Also whether its own function stays zero, and the surface that slides if it is not left.
         kind, _, _, node = self.ends[index]
         if kind == "reset":
             rows = self.graph["maps"][index - self.stops]

@@ -165,13 +165,7 @@ def product(a: Matrix, b: Matrix) -> Matrix:
 
 
 def inverse(matrix: Matrix) -> Matrix:
-    """An enclosure of the inverse, by elimination.
-
-    Raises
-    ------
-    CheckError
-        It is not proven to have one.
-    """
+    """An enclosure of the inverse, by elimination."""
     n = len(matrix)
     rows = [[*row, *(whole(int(i == j)) for j in range(n))] for i, row in enumerate(matrix)]
     for c in range(n):
@@ -185,10 +179,8 @@ def inverse(matrix: Matrix) -> Matrix:
 
 
 def _frame(g: Matrix, r: list[Iv], skew: bool) -> Matrix:
-    """Directions of the longest edges of a set, or orthogonal ones near them, as exact points.
-
-    Edges that nearly depend on longer ones are replaced by what is orthogonal to those.
-    """
+    """Directions of the longest edges of a set, or orthogonal ones near them, as exact points."""
+    # Edges that nearly depend on longer ones are replaced by what is orthogonal to those.
     n = len(g)
     wide = max(v.b - v.a for v in r)
     share = [(v.b - v.a) / wide for v in r]

@@ -92,10 +92,8 @@ def _ends(f: Callable[[Iv], Iv], x: Iv) -> Iv:
 
 
 def _series(first: Iv, factor: Callable[[Iv, int], Iv]) -> Iv:
-    """Sum of terms, each from the last; the rest is below twice the first term left out.
-
-    The terms must come to fall at least by half each; the remainder is added on both sides.
-    """
+    """Sum of terms, each from the last; the rest is below twice the first term left out."""
+    # The terms must come to fall at least by half each; the remainder is added on both sides.
     total, term, n = first, first, 0
     while max(abs(term.a), abs(term.b)) > 2 or n < 4:
         n += 1

@@ -12,10 +12,8 @@ _PIECES, _SMALLEST = 20_000, 1e-9
 
 
 def check_cover(ranges: list[list[str]], records: list[dict[str, Any]]) -> str:
-    """Check that the pieces of the records are the whole of the ranges.
-
-    They are where they lie inside, do not overlap, and have its volume.
-    """
+    """Check that the pieces of the records are the whole of the ranges."""
+    # They are where they lie inside, do not overlap, and have its volume.
     whole_box = [(Fraction(a), Fraction(b)) for a, b in ranges]
     pieces = [[(Fraction(a), Fraction(b)) for a, b in _ranges(r)] for r in records]
     wide = [k for k, (a, b) in enumerate(whole_box) if a < b]
@@ -47,12 +45,7 @@ def _volume(box: list[tuple[Fraction, Fraction]], wide: list[int]) -> Fraction:
 
 
 def check_list(record: dict[str, Any]) -> str:
-    """Check that a list of special points is complete.
-
-    Raises
-    ------
-    CheckError
-    """
+    """Check that a list of special points is complete."""
     if not record["complete"]:
         raise CheckError("the list is not claimed to be complete")
     bounds = [Iv.of(*pair) for pair in record["bounds"]]

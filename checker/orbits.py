@@ -18,14 +18,8 @@ class RefutedError(CheckError):
 
 
 def check_orbit(record: dict[str, Any]) -> str:
-    """Follow a recorded orbit again and compare modes, events and end with what is claimed.
-
-    A box of starts and parameters is divided where it is too wide to be followed in one piece.
-
-    Raises
-    ------
-    CheckError
-    """
+    """Follow a recorded orbit again and compare modes, events and end with what is claimed."""
+    # A box of starts and parameters is divided where it is too wide to be followed in one piece.
     if record.get("format") != FORMAT:
         raise CheckError(f"expected the format {FORMAT!r}, received {record.get('format')!r}")
     if not record["proven"]:

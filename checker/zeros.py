@@ -26,10 +26,8 @@ def value(c: list[Iv], t: Iv) -> Iv:
 
 
 def first_zero(c: list[Iv], h: int, drop: int) -> Iv | None:
-    """The first zero in (0, h] of what is positive just after 0; it is simple.
-
-    So many coefficients as ``drop`` says are zero, whatever their enclosures are.
-    """
+    """The first zero in (0, h] of what is positive just after 0; it is simple."""
+    # So many coefficients as ``drop`` says are zero, whatever their enclosures are.
     rough, falls = [span(v) for v in c], slope([span(v) for v in c])
     todo, count = [(0, h)], 0
     while todo:

@@ -87,7 +87,7 @@ def funnel(count: int) -> Iterator[Figure]:
     fold = ns.find_two_fold(system, near=[0.0, 0.0, 0.0])
     slope = fold.classification.into.low
     run = ns.simulate(system, [0.0, 0.5, 0.5 * slope], t_end=10.0)
-    futures = ns.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
+    futures = ns.orbit.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
     figure = Figure(figsize=(7.0, 3.5), layout="constrained")
     for t in np.linspace(0.02, futures.t + 1.0, count):
         figure.clear()

@@ -1,4 +1,4 @@
-"""The pages of the API, by task: every public name of both packages, on one page each."""
+"""Pages of the API by task: every public name of both packages, on one page each."""
 
 from __future__ import annotations
 
@@ -20,7 +20,13 @@ sys.path.append(str(Path(__file__).parent))  # docs is not a package
 from markdown_table import first_line, table
 from tasks import ERRORS, GOLF, TASKS, Task
 
-PACKAGES = {"nonsmooth": ns, "bounce": bounce, "bounce.golf": bounce.golf}
+PACKAGES = {
+    "nonsmooth": ns,
+    "nonsmooth.orbit": ns.orbit,
+    "nonsmooth.proofs": ns.proofs,
+    "bounce": bounce,
+    "bounce.golf": bounce.golf,
+}
 
 #: Whole modules that are a page each: file name, module, title.
 MODULES = (
@@ -85,10 +91,11 @@ def overview() -> str:
 
 
 _INTRODUCTION = (
-    "Both packages have one public module: what you need is imported as `nonsmooth.name` or `bounce.name`. "
-    "The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`; curves of any "
-    "equations are followed by `nonsmooth.continuation`; the types that questions about a point return "
-    "are in `nonsmooth.local`. What is before, between and after bounces is in `bounce.golf`, laws in "
+    "What most programs use is imported as `nonsmooth.name` or `bounce.name`. "
+    "Analysis at one point is in `nonsmooth.local`, parts of runs in `nonsmooth.flow`, orbits and their results "
+    "in `nonsmooth.orbit`, proofs in `nonsmooth.proofs`. "
+    "The algebra of two-folds, which needs no system, is in `nonsmooth.two_folds`; "
+    "`nonsmooth.continuation` follows curves of any equations. What is before, between and after bounces is in `bounce.golf`, laws in "
     "closed form are in `bounce.laws`."
 )
 
@@ -100,8 +107,9 @@ def _rows(title: str, path: str, names: Iterable[str]) -> str:
 
 
 def returned_types() -> list[str]:
-    """What questions about a point return, and the top level does not name."""
-    names = [n for n in ns.local.__all__ if n not in ns.__all__]
+    """Types that functions about a point return, and that no page lists by name."""
+    shown = {n.removeprefix("local.") for task in TASKS.values() for n in task.names}
+    names = [n for n in ns.local.__all__ if n not in shown]
     return [n for n in names if inspect.isclass(getattr(ns.local, n))]
 
 
@@ -156,7 +164,7 @@ def _member(path: str, name: str) -> str:
 
 def place(path: str, name: str) -> str:
     """By which path mkdocstrings finds a name."""
-    if name not in _module_names():
+    if name.rpartition(".")[2] not in _module_names():
         return f"{path}.{name}"
     thing: Any = inspect.unwrap(attrgetter(name)(sys.modules[path]))
     return f"{thing.__module__}.{thing.__qualname__}"

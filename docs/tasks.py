@@ -37,44 +37,44 @@ TASKS = {
         "Follow an orbit",
         "From a point and for a time: events, modes, dense output, and the reason why a run ended.",
         "nonsmooth",
-        "simulate Trajectory Segment Event Status Section follow first_crossing first_root load",
+        "simulate Trajectory flow.Segment flow.Event Status Section flow.follow flow.first_crossing flow.first_root load",
     ),
     "many": _task(
         "Run many starts",
         "Arrays of starts or of parameters, in threads, on a cluster, with checkpoints; and which "
         "attractor each start goes to.",
         "nonsmooth",
-        "ensemble Ensemble Grid RandomStarts Work outcomes Outcomes basins orbit.Basins",
+        "ensemble Ensemble Grid RandomStarts Work outcomes flow.Outcomes basins orbit.Basins",
     ),
     "points": _task(
         "Ask what a point is",
         "What the fields do at a point of a surface, and what is special about it. Nothing here "
         "steps in time.",
         "nonsmooth",
-        "classify region Region alpha sliding_field sliding_branches fold fold_fold two_fold "
-        "boundary_equilibrium intersection intersection_range limit_directions",
+        "classify region Region alpha sliding_field local.sliding_branches local.fold local.fold_fold local.two_fold "
+        "local.boundary_equilibrium local.intersection local.intersection_range local.limit_directions",
     ),
     "search": _task(
         "Find special points",
         "Folds, two-folds, equilibria and pseudo-equilibria near a guess, or all that can be found "
         "from many guesses. That a list is complete is proven on another page, [Prove](proofs.md).",
         "nonsmooth",
-        "find_two_fold TwoFold find_fold find_equilibrium find_pseudo_equilibrium "
-        "find_boundary_equilibrium find_all trace_two_folds",
+        "find_two_fold local.TwoFold find_fold find_equilibrium find_pseudo_equilibrium "
+        "find_boundary_equilibrium find_all orbit.trace_two_folds",
     ),
     "orbits": _task(
         "Find periodic orbits",
         "An orbit that closes, stable or not, with its itinerary, its period and its multipliers; "
         "and the successive returns of any orbit to a section.",
         "nonsmooth",
-        "periodic_orbit PeriodicOrbit poincare orbit.PoincareOrbit FixedItinerary",
+        "periodic_orbit orbit.PeriodicOrbit orbit.poincare orbit.PoincareOrbit orbit.FixedItinerary",
     ),
     "derivatives": _task(
         "Differentiate a run",
         "How the end of a run changes with its start and its parameters, through crossings, sliding "
         "and jumps; and the mean rates of that over a long time.",
         "nonsmooth",
-        "sensitivity Sensitivity gradient orbit.Gradient vjp saltation_matrix lyapunov_spectrum "
+        "sensitivity orbit.Sensitivity gradient orbit.Gradient vjp orbit.saltation_matrix lyapunov_spectrum "
         "orbit.LyapunovSpectrum",
     ),
     "branches": _task(
@@ -82,7 +82,7 @@ TASKS = {
         "Orbits and equilibria followed as a parameter varies, the events on the way, and their curves "
         "in two parameters. [Branches and bifurcations](../branches.md) shows them at work.",
         "nonsmooth",
-        "continue_orbit continue_equilibrium orbit.Branch orbit.BranchEvent orbit.FarSide BranchEnd "
+        "continue_orbit continue_equilibrium orbit.Branch orbit.BranchEvent orbit.FarSide orbit.BranchEnd "
         "continue_bifurcation orbit.BifurcationCurve orbit.CodimensionTwo find_homoclinic orbit.Connection",
     ),
     "futures": _task(
@@ -90,7 +90,7 @@ TASKS = {
         "Every future of a point whose future is not unique, and the orbits that come to a special "
         "point or leave it.",
         "nonsmooth",
-        "funnel orbit.Funnel manifold orbit.Manifold orbit.DividingCurves orbit.DividingArc "
+        "orbit.funnel orbit.Funnel manifold orbit.Manifold orbit.DividingCurves orbit.DividingArc "
         "orbit.ComputedStarts",
     ),
     "proofs": _task(
@@ -98,7 +98,7 @@ TASKS = {
         "Theorems in interval arithmetic, by the extra `proofs` (python-flint). "
         "[Proofs](../proofs.md) says what a proof rests on.",
         "nonsmooth",
-        "certify Proof Enclosure prove_all Census certify_orbit OrbitProof",
+        "certify proofs.Proof proofs.Enclosure prove_all proofs.Census certify_orbit proofs.OrbitProof",
     ),
     "bounce_shot": _task(
         "One bounce",
@@ -135,6 +135,8 @@ TASKS = {
 #: Exceptions and warnings, by package.
 ERRORS = (
     "nonsmooth",
+    "nonsmooth.orbit",
+    "nonsmooth.proofs",
     "bounce",
     "bounce.golf",
 )
@@ -145,8 +147,7 @@ GOLF = {
         "From launch to rest",
         "Flight, bounces and roll of a golf ball in SI units.",
         "bounce.golf",
-        "flight Flight Air rebound Rebound side_rebound SideRebound axis_spin AxisSpin play Run Bounce "
-        "Glide landing_map SideState side_flight SideFlight side_play SideRun SideBounce SideGlide",
+        "flight Flight Air rebound Rebound play Run Bounce Glide landing_map SideState axis_spin AxisSpin",
     ),
     "bounce_fits": _task(
         "Fit measured bounces",

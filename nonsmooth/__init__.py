@@ -1,4 +1,4 @@
-"""Nonsmooth dynamics on automatic Lie derivatives: the front door.
+"""Nonsmooth dynamics on automatic Lie derivatives: the public API.
 
 A Filippov system is x' = f(x, lambda; p) with lambda in Sgn(h(x)). The surface h = 0 separates
 the field F1 (h > 0, lambda = +1) from F2 (h < 0, lambda = -1). With L_i = F_i . grad h the surface
@@ -19,41 +19,34 @@ Conventions: one letter per surface names a mode, ``+`` ``-`` or ``s`` (sliding)
 is the sequence of modes. States are on the last axis, float64. Every run ends in a named status and
 never guesses where the future is not unique. Every error derives from NonsmoothError.
 
-Here are the verbs, the nouns and the errors. The algebra of two-folds, which needs no system, is in
-``two_folds``; the types that questions about a point return are in ``local``, those that questions about
-orbits return in ``orbit``; curves of any equations are followed by ``continuation``; pictures are in
-``plot`` and named systems with their closed-form answers in ``textbook``.
+The top level has the functions, the classes and the errors that most programs use. Analysis at one point
+and its results are in ``local``, events and parts of runs in ``flow``, orbits, derivatives and their results
+in ``orbit``, proofs and enclosures in ``proofs``. The algebra of two-folds, which needs no system, is in
+``two_folds``; ``continuation`` follows curves of any equations; ``plot`` draws, and ``textbook`` has named
+systems with closed-form answers.
 """
 
 from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from . import local, orbit
+from . import flow, local, orbit
 from .flow import (
     Ensemble,
-    Event,
     Grid,
-    Outcomes,
     RandomStarts,
     Section,
-    Segment,
     Status,
     Trajectory,
     Work,
     ensemble,
-    first_crossing,
-    first_root,
-    follow,
     load,
     outcomes,
     simulate,
 )
 from .local import (
     Region,
-    TwoFold,
     alpha,
-    boundary_equilibrium,
     classify,
     find_all,
     find_boundary_equilibrium,
@@ -61,15 +54,8 @@ from .local import (
     find_fold,
     find_pseudo_equilibrium,
     find_two_fold,
-    fold,
-    fold_fold,
-    intersection,
-    intersection_range,
-    limit_directions,
     region,
-    sliding_branches,
     sliding_field,
-    two_fold,
     two_folds,
 )
 from .model import (
@@ -90,52 +76,30 @@ from .model import (
     regularise,
 )
 from .orbit import (
-    BranchEnd,
-    FixedItinerary,
-    PeriodicOrbit,
-    Sensitivity,
-    TraceError,
-    VirtualOrbitError,
     basins,
-    continuation,
     continue_bifurcation,
     continue_equilibrium,
     continue_orbit,
     find_homoclinic,
-    funnel,
     gradient,
     lyapunov_spectrum,
     manifold,
     periodic_orbit,
-    poincare,
-    saltation_matrix,
     sensitivity,
-    trace_two_folds,
     vjp,
 )
+from .solvers import continuation
 
 if TYPE_CHECKING:
-    from . import plot, textbook
+    from . import plot, proofs, textbook
     from .proofs import (
-        Census,
-        Enclosure,
-        MissingError,
-        OrbitProof,
-        Proof,
-        UnprovenError,
         certify,
         certify_orbit,
         prove_all,
     )
 
-#: Names that come from the floor of proofs, loaded when asked for.
+#: Functions of ``proofs``, which is imported on first use.
 _OF_PROOFS = (
-    "Census",
-    "Enclosure",
-    "MissingError",
-    "OrbitProof",
-    "Proof",
-    "UnprovenError",
     "certify",
     "certify_orbit",
     "prove_all",
@@ -144,46 +108,29 @@ _OF_PROOFS = (
 __version__ = "0.1.0.dev0"
 
 __all__ = [
-    "BranchEnd",
-    "Census",
     "Clock",
     "ConvergenceError",
     "DefinitionError",
     "DegenerateError",
-    "Enclosure",
     "Ensemble",
-    "Event",
     "FilippovSystem",
-    "FixedItinerary",
     "Grid",
     "Impact",
-    "MissingError",
     "NonsmoothError",
     "NotSmoothError",
     "OptionError",
-    "OrbitProof",
-    "Outcomes",
     "ParameterError",
-    "PeriodicOrbit",
     "PointError",
-    "Proof",
     "RandomStarts",
     "Region",
     "Reset",
     "Section",
-    "Segment",
-    "Sensitivity",
     "Status",
     "Stop",
-    "TraceError",
     "Trajectory",
-    "TwoFold",
-    "UnprovenError",
-    "VirtualOrbitError",
     "Work",
     "alpha",
     "basins",
-    "boundary_equilibrium",
     "call",
     "certify",
     "certify_orbit",
@@ -200,16 +147,8 @@ __all__ = [
     "find_homoclinic",
     "find_pseudo_equilibrium",
     "find_two_fold",
-    "first_crossing",
-    "first_root",
-    "fold",
-    "fold_fold",
-    "follow",
-    "funnel",
+    "flow",
     "gradient",
-    "intersection",
-    "intersection_range",
-    "limit_directions",
     "load",
     "local",
     "lyapunov_spectrum",
@@ -218,25 +157,21 @@ __all__ = [
     "outcomes",
     "periodic_orbit",
     "plot",
-    "poincare",
+    "proofs",
     "prove_all",
     "region",
     "regularise",
-    "saltation_matrix",
     "sensitivity",
     "simulate",
-    "sliding_branches",
     "sliding_field",
     "textbook",
-    "trace_two_folds",
-    "two_fold",
     "two_folds",
     "vjp",
 ]
 
 
 def __getattr__(name: str) -> object:
-    """Load pictures, textbook and proofs only when they are asked for (matplotlib is slow to import)."""
+    """Import pictures, textbook and proofs on first use (matplotlib is slow to import)."""
     import importlib
 
     if name in ("plot", "proofs", "textbook"):

@@ -56,31 +56,7 @@ def _draw(problem: Problem, path: Path) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run one command; the exit status is 0, or 2 for a mistake in it.
-
-    Parameters
-    ----------
-    arguments : sequence of str, optional
-        Those of the command line by default.
-
-    Returns
-    -------
-    int
-
-    Examples
-    --------
-    >>> main(["show", "scalar_sliding"])
-    scalar_sliding: Scalar system that slides at 0
-      source: classical; closed form
-      FilippovSystem(1 state: x; 1 surface)
-      start: x = -1; until t = 1
-      - switch time: 0.3333333333333333 (to 1e-09; time of the entry)
-      - end: 0 (to 1e-09; x at t_end, sliding)
-      - alpha: 0.25 (to 1e-09; weight of the field below while sliding)
-      run: Trajectory(t = 0 .. 1, 3 points, 2 events, itinerary '- s', REACHED_END)
-      t_end = 1 reached. The run reached t_end.
-    0
-    """
+    """Run one command; the exit status is 0, or 2 for a mistake in it."""
     given = _parser().parse_args(arguments)
     if given.verb == "explore":
         return _explore(given.output, given.open)

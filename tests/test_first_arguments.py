@@ -17,7 +17,7 @@ ROOMS = [
     *(bounce, bounce.golf, bounce.laws, bounce.plot),
 ]
 #: Of what a user hands over; other classes are what functions return.
-CLASSES = [ns.FilippovSystem, ns.Clock, ns.Grid, ns.RandomStarts, ns.FixedItinerary, ns.Work]
+CLASSES = [ns.FilippovSystem, ns.Clock, ns.Grid, ns.RandomStarts, ns.orbit.FixedItinerary, ns.Work]
 
 #: What Python says of a function's inside.
 INSIDE = (

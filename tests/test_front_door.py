@@ -58,7 +58,9 @@ def test_dir_is_the_front_door_and_nothing_else():
 
 def test_modules_at_the_front_door_are_those_it_speaks_of():
     modules = {n for n in ns.__all__ if isinstance(getattr(ns, n), types.ModuleType)}
-    assert modules == {"continuation", "local", "orbit", "plot", "textbook", "two_folds"}
+    assert modules == {
+        *("continuation", "flow", "local", "orbit", "plot", "proofs", "textbook", "two_folds"),
+    }
     for name in modules:
         assert name in inspect.getdoc(ns)
 

@@ -14,10 +14,6 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 LONGEST_FUNCTION = 60  # lines, from `def` to its last, the docstring not counted
-LONGEST_MODULE = 400  # lines
-
-# Modules that are longer, with their length: they may only become shorter.
-LONG_MODULES = {}
 
 # Words of the client. The bouncing ball is also a classic of the general theory (impacts that
 # accumulate), so nonsmooth/textbook may say those two words, and no others.
@@ -160,21 +156,6 @@ def test_no_function_is_longer_than_a_screen():
                 if lines > LONGEST_FUNCTION:
                     long.append(f"{path.relative_to(ROOT)}:{node.lineno} {node.name}: {lines}")
     assert not long, "\n".join(long)
-
-
-def test_no_module_is_longer_than_one_idea():
-    lengths = {
-        path.relative_to(ROOT).as_posix(): len(path.read_text(encoding="utf-8").splitlines())
-        for path in sources("nonsmooth", "bounce")
-    }
-    long = {
-        name: lines
-        for name, lines in lengths.items()
-        if lines > LONG_MODULES.get(name, LONGEST_MODULE)
-    }
-    assert not long, long
-    short = [name for name in LONG_MODULES if lengths.get(name, 0) <= LONGEST_MODULE]
-    assert not short, f"no longer long, so no longer to be listed: {short}"
 
 
 def is_private(name):

@@ -18,11 +18,11 @@ SMOOTH = ns.FilippovSystem([X, Y], field=[Y, -X])
     [
         lambda s: ns.simulate(s, [0.0], t_end=1.0),
         lambda s: ns.region(s, [0.0]),
-        lambda s: ns.fold_fold(s, [0.0, 0.0]),
+        lambda s: ns.local.fold_fold(s, [0.0, 0.0]),
         lambda s: ns.find_equilibrium(s, [0.0]),
         lambda s: ns.find_boundary_equilibrium(s, [0.0], vary="a"),
         lambda s: ns.continue_equilibrium(s, [0.0], "a", bounds=(0, 1)),
-        lambda s: ns.trace_two_folds(s, [0.0], over="a", values=[0.0]),
+        lambda s: ns.orbit.trace_two_folds(s, [0.0], over="a", values=[0.0]),
         lambda s: ns.certify_orbit(s, [0], t_end=1),
     ],
 )
@@ -33,9 +33,9 @@ def test_what_is_no_system(ask):
 
 def test_a_smooth_system_has_no_sliding():
     with pytest.raises(ns.DefinitionError, match="at least one switching surface"):
-        ns.sliding_branches(SMOOTH, [0.0, 0.0])
+        ns.local.sliding_branches(SMOOTH, [0.0, 0.0])
     with pytest.raises(ns.DefinitionError, match="mode: expected 0 letter"):
-        ns.saltation_matrix(SMOOTH, "+", "-", [0.0, 0.0])
+        ns.orbit.saltation_matrix(SMOOTH, "+", "-", [0.0, 0.0])
 
 
 def test_what_is_no_work():
@@ -55,5 +55,5 @@ def test_how_constants_are_read():
 
 def test_a_tilted_law_is_not_bounced_as_if_its_plane_were_level():
     law = bounce.laws.TURFS["natural"].law
-    with pytest.raises(bounce.ModelError, match=r"expected a RigidBounce.*side_rebound"):
+    with pytest.raises(bounce.ModelError, match=r"expected a RigidBounce.*golf.rebound"):
         bounce.laws.rigid_lift_off_3d(law, [1.0, 0.0], -1.0, [0.2, 0.5])

@@ -21,20 +21,7 @@ Map = Callable[[Array, float], tuple[Array, float]]
 
 @dataclass(frozen=True)
 class Shooting:
-    """A return map of whole states, and the coordinates of its section.
-
-    Attributes
-    ----------
-    name : str
-    map : callable
-        State at the start, tolerance -> state after one return, time that it took.
-    guess : ndarray
-        Two digits of a state on the orbit.
-    place : callable
-        Coordinates on the section -> state.
-    coordinates : tuple of int
-        Of the state that are those on the section.
-    """
+    """A return map of whole states, and the coordinates of its section."""
 
     name: str
     map: Map
@@ -154,16 +141,7 @@ SHOOTING = {
 
 
 def solve(case: str, tol: float, whole: bool) -> tuple[Array, float, Array]:
-    """Orbit by shooting: state on the section, time of a return, multipliers of the return.
-
-    Parameters
-    ----------
-    case : str
-    tol : float
-        Of the integrator; differences and Newton's method follow from it.
-    whole : bool
-        Difference every state of the start.
-    """
+    """Orbit by shooting: state on the section, time of a return, multipliers of the return."""
     shooting = SHOOTING[case]
     place = (lambda z: z) if whole else shooting.place
     chosen = slice(None) if whole else list(shooting.coordinates)

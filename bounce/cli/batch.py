@@ -1,4 +1,4 @@
-"""Tables of starts: a row is written as soon as it is computed, and an interrupted table goes on."""
+"""Results of one start, or a table of them: rows are written as they are computed and can be resumed."""
 
 from __future__ import annotations
 
@@ -15,36 +15,34 @@ from tqdm import tqdm
 
 import nonsmooth as ns
 
+from ..units import Landing
 from .report import Units, opening, print_json
-from .starts import Start
+from .starts import Start, read_starts
 
 #: Exit code after Ctrl-C, as shells give it.
 INTERRUPTED = 130
 Report = Callable[[Start], dict[str, Any]]
 
 
-def tabulate(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> int:
-    """Report on each start, as CSV or JSON; what is wrong with one is said in its row.
+def answer(
+    args: argparse.Namespace, up: bool, report: Report, lines: Callable[[Landing, Units], list[str]]
+) -> int:
+    """Print what becomes of one start, or of each in a table, and return the exit code."""
+    given = read_starts(args, up)
+    if args.input is not None:
+        return _tabulate(args, given, report)
+    units, state = Units(args.units), given[0].state
+    assert state is not None
+    if args.json:
+        shown = units.report(report(given[0]))
+        print_json({**opening(args), "units": units.names, **shown})
+    else:
+        print("\n".join(lines(state, units)))
+    return 0
 
-    Parameters
-    ----------
-    args : argparse.Namespace
-        With ``units``, ``json``, ``output`` and ``resume``.
-    starts : sequence of Start
-        What the rows begin with.
-    report : callable
-        What becomes of a start, in SI units.
 
-    Returns
-    -------
-    int
-        0, or 1 if something is wrong with one, or 130 after an interrupt.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-        A table to go on with that is none, or not of these inputs.
-    """
+def _tabulate(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> int:
+    """Write a report on each start as CSV or JSON, with the error of a row in that row."""
     if args.resume and (args.output is None or args.json):
         raise ns.OptionError("--resume: expected with --output FILE and without --json.")
     if args.json:
@@ -59,7 +57,7 @@ def tabulate(args: argparse.Namespace, starts: Sequence[Start], report: Report) 
 
 
 class _Kept(NamedTuple):
-    """What a file has already: names, rows, and how many bytes of it are whole rows."""
+    """What a file already holds: names, rows, and the size of its whole rows in bytes."""
 
     names: list[str]
     rows: list[dict[str, str]]
@@ -75,13 +73,13 @@ def _as_json(args: argparse.Namespace, starts: Sequence[Start], report: Report) 
     except KeyboardInterrupt:
         count.interrupted = True
     print_json({**opening(args), "units": units.names, "rows": rows})
-    return count.said("they are printed. To have them all, begin again")
+    return count.finish("they are printed. To have them all, begin again")
 
 
 def _as_csv(
     args: argparse.Namespace, starts: Sequence[Start], report: Report, file: TextIO, kept: _Kept
 ) -> int:
-    """Write the rows that are not kept; the names are those of the first row that has results."""
+    """Write the missing rows; the names are those of the first row that has results."""
     units, count, names = Units(args.units), _Count(len(starts)), kept.names
     for old in kept.rows:
         count.add(old)
@@ -104,8 +102,8 @@ def _as_csv(
             "".join(_line(_BARE, one) for one in [dict(zip(_BARE, _BARE, strict=True)), *waiting])
         )
     if args.output is None:
-        return count.said("they are printed. With --output FILE the next time --resume goes on")
-    return count.said(f"they are in {args.output}. To go on, add --resume to the same command")
+        return count.finish("they are printed. With --output FILE the next time --resume goes on")
+    return count.finish(f"they are in {args.output}. To go on, add --resume to the same command")
 
 
 #: The names of a row that has no results.
@@ -142,10 +140,7 @@ def _line(names: list[str], row: dict[str, Any]) -> str:
 
 
 def _kept(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> _Kept:
-    """The whole rows of the output, which must be the first of those that are asked for.
-
-    The first and the last row with results are computed again: they show other inputs and options.
-    """
+    """Read the rows of an earlier output; its first and last results must come out again."""
     if not os.path.exists(args.output):
         return _Kept([], [], 0)
     with open(args.output, newline="", encoding="utf-8") as file:
@@ -172,10 +167,10 @@ def _kept(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> 
 
 
 def _begins(row: dict[str, str], start: Start, units: Units) -> bool:
-    """Whether a row says the speed and the angle of a start (its spin depends on a tilted axis)."""
+    """Whether a row has the speed and the angle of a start (its spin depends on a tilted axis)."""
     for name in ("speed", "angle"):
-        said = [row.get(f"{what}_{name} [{units.names[name]}]") for what in ("launch", "landing")]
-        value = said[0] or said[1]
+        column = f"{name} [{units.names[name]}]"
+        value = row.get(f"launch_{column}") or row.get(f"landing_{column}")
         if value and (start.state is None or value != str(units.show(name, start.typed[name]))):
             return False
     return True
@@ -189,20 +184,17 @@ def _others(args: argparse.Namespace, received: str) -> ns.OptionError:
 
 
 class _Count:
-    """How many rows there are, with errors and cautions among them."""
-
     def __init__(self, total: int):
         self.total, self.done, self.wrong, self.warned = total, 0, 0, 0
         self.interrupted = False
 
     def add(self, row: dict[str, Any]) -> None:
-        """Count a row."""
         self.done += 1
         self.wrong += bool(row["error"])
         self.warned += bool(row.get("cautions"))
 
-    def said(self, kept: str) -> int:
-        """Say what is to be said of the rows, and return the exit code."""
+    def finish(self, kept: str) -> int:
+        """Print the counts of errors and cautions, and return the exit code."""
         lines = []
         if self.warned:
             lines.append(f"bounce: caution: {self.warned} of {self.done} rows: see cautions")

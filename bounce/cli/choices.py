@@ -1,4 +1,4 @@
-"""What one can choose by name: models, laws, friction, balls; and the model that was chosen."""
+"""Choices by name on the command line: models, laws, friction, balls, air and slopes."""
 
 from __future__ import annotations
 
@@ -61,15 +61,7 @@ EXTRA: dict[type[BounceLaw], list[str]] = {
 
 
 class Chosen(NamedTuple):
-    """What a ball bounces on, and the ball.
-
-    Attributes
-    ----------
-    model : BounceLaw or ContactModel
-    ball : Ball
-    scaling : Scaling or None
-        Units of a contact model, where a stiffness was given.
-    """
+    """The ground, the ball, and the units of a contact model where a stiffness was given."""
 
     model: BounceLaw | ContactModel
     ball: Ball
@@ -77,7 +69,7 @@ class Chosen(NamedTuple):
 
 
 def ground_arguments(parser: argparse.ArgumentParser, turf: str | None = "natural") -> None:
-    """Add what chooses ground, ball and units."""
+    """Add the arguments of ground, ball and units."""
     parser.set_defaults(usual_turf=turf)
     which = parser.add_mutually_exclusive_group()
     which.add_argument("--turf", choices=list(TURFS), help=f"a published law{_default(turf)}")
@@ -114,12 +106,7 @@ def _default(turf: str | None) -> str:
 
 
 def chosen_model(args: argparse.Namespace) -> Chosen:
-    """Return the model and ball that the arguments name.
-
-    Raises
-    ------
-    nonsmooth.OptionError, nonsmooth.ParameterError
-    """
+    """Return the model and the ball that the arguments name."""
     ball = BALLS[args.ball]
     values: dict[str, Any] = {"inertia": ball.inertia}
     values |= {name: in_si(name, typed, args.units) for name, typed in args.set}
@@ -148,9 +135,14 @@ def chosen_model(args: argparse.Namespace) -> Chosen:
 
 
 def surroundings(args: argparse.Namespace) -> dict[str, Any]:
-    """The air and the slope of the ground, as the verbs of ``bounce.golf`` take them."""
+    """The air and the slopes of the ground, as the functions of ``bounce.golf`` take them."""
     air = None if args.air == "none" else AIRS[args.air]
-    return dict(air=air, slope=_slope(args))
+    return dict(air=air, slope=_slope(args), side_slope=side_slope(args))
+
+
+def side_slope(args: argparse.Namespace) -> float:
+    """The side slope in radians, 0 unless it was given."""
+    return 0.0 if args.side_slope is None else float(args.side_slope.si(args.units))
 
 
 def _slope(args: argparse.Namespace) -> float:
@@ -158,12 +150,7 @@ def _slope(args: argparse.Namespace) -> float:
 
 
 def require_scale(args: argparse.Namespace, chosen: Chosen) -> None:
-    """Refuse a contact model without a scale, where landings have units.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-    """
+    """Refuse a contact model without a scale, where landings have units."""
     if isinstance(chosen.model, ContactModel) and chosen.scaling is None:
         raise ns.OptionError(
             f"--stiffness: expected N/m, because landings have units and {args.model} is dimensionless, "
@@ -172,10 +159,10 @@ def require_scale(args: argparse.Namespace, chosen: Chosen) -> None:
 
 
 def _require_tilt(args: argparse.Namespace) -> None:
-    """Refuse a tilt in the words of who typed it."""
+    """Refuse a tilt out of its range, in the unit in which it was typed."""
     for name, typed in args.set:
         if name == "tilt" and not 0.0 <= in_si(name, typed, args.units) < math.pi / 2:
             raise ns.ParameterError(
                 "--set tilt: expected an angle from 0 to below 90 deg, received "
-                f"{typed.said(args.units)}."
+                f"{typed.text(args.units)}."
             )

@@ -1,4 +1,4 @@
-"""``bounce explore``: one bounce in a browser, as a page without a network."""
+"""The command ``bounce explore``: one bounce in a browser, as a page that works offline."""
 
 from __future__ import annotations
 

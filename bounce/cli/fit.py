@@ -1,4 +1,4 @@
-"""``bounce fit``: parameters from a CSV file of measured bounces."""
+"""The command ``bounce fit``: parameters from a CSV file of measured bounces."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Fit, and print what was found."""
+    """Fit the parameters and print the result."""
     chosen = chosen_model(args)
     try:
         found = fit(

@@ -1,4 +1,4 @@
-"""The command ``bounce``: its parser, its exit codes, its errors in one line."""
+"""The command ``bounce``: parser, exit codes, and errors in one line."""
 
 from __future__ import annotations
 
@@ -18,19 +18,19 @@ _USAGE = (ns.ParameterError, ns.OptionError, ns.DefinitionError, ns.PointError)
 
 
 class _Parser(argparse.ArgumentParser):
-    """Errors in one line."""
+    """A parser that prints errors in one line."""
 
     def error(self, message: str) -> NoReturn:
         self.exit(2, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
 class _Help(argparse.ArgumentDefaultsHelpFormatter):
-    """Help that says every default there is."""
+    """Help that shows every default."""
 
     def _get_help_string(self, action: argparse.Action) -> str | None:
-        said = "(default" in (action.help or "")
+        given = "(default" in (action.help or "")
         none = action.default is None or action.default is False or action.default == []
-        return action.help if said or none else super()._get_help_string(action)
+        return action.help if given or none else super()._get_help_string(action)
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -44,8 +44,8 @@ def main(argv: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 not computable or readable, 2 wrong usage, 3 a fit whose data do not determine a
-        parameter.
+        0 done, 1 a computation or a file failed, 2 wrong arguments, 3 a fit whose data do not
+        determine a parameter.
 
     Examples
     --------
@@ -89,17 +89,16 @@ def _arguments() -> argparse.ArgumentParser:
 
 
 def _joined(argv: Sequence[str]) -> list[str]:
-    """Give an option its negative number with a unit, which argparse would take for an option."""
+    """Join an option and its negative number with a unit, which argparse takes for an option."""
     joined: list[str] = []
-    for word in argv:
+    for argument in argv:
         before = joined[-1] if joined else ""
-        if re.match(r"-[\d.]", word) and re.fullmatch(r"--[a-z-]+", before):
-            joined[-1] = f"{before}={word}"
+        if re.match(r"-[\d.]", argument) and re.fullmatch(r"--[a-z-]+", before):
+            joined[-1] = f"{before}={argument}"
         else:
-            joined.append(word)
+            joined.append(argument)
     return joined
 
 
 def _caution(message: Warning | str, *_: Any, **__: Any) -> None:
-    """Show a warning as one line."""
     print(f"bounce: caution: {' '.join(str(message).split())}", file=sys.stderr)

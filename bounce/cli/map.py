@@ -1,4 +1,4 @@
-"""``bounce map``: what becomes of landings over two inputs, to a file."""
+"""The command ``bounce map``: outcomes of landings over two inputs, written to a file."""
 
 from __future__ import annotations
 
@@ -15,16 +15,16 @@ from ..laws import BounceLaw
 from ..maps.dividing import DividingCurve, dividing_curve
 from ..maps.outcomes import OutcomeMap, outcome_map
 from .choices import Chosen, chosen_model, ground_arguments, require_scale
-from .report import in_course, opening, print_json
+from .report import opening, print_json, with_meaning
 from .starts import NAMES
 from .values import SYSTEMS, assignment, in_si, span
 
-HELP = "what becomes of landings over two inputs, to a file"
+HELP = "outcomes of landings over two inputs, to a file"
 ABOUT = "Map the itinerary, or a quantity at lift-off, of one bounce over two inputs."
 _QUANTITIES = dict(
     region="itinerary", slip="slip", omega="omega", angle="lift_off_angle", reversal="spin_reversal"
 )
-#: What is mapped unless told, so that every kind of bounce is on the map: in units that golfers know, and in those of a contact model without.
+#: Defaults that show every kind of bounce: with units, and for a contact model without.
 _LANDINGS = ("angle=5deg:75deg:150", "spin=-10000rpm:10000rpm:150")
 _USUAL = ("speed=28m/s", "angle=40deg", "spin=2500rpm")
 _DIMENSIONLESS = ("xdot=-2:2:150", "omega=-4:4:150")
@@ -90,12 +90,12 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _in_words(name: str) -> str:
-    """A region with what it means, unless that is long."""
-    return name if name == "no lift-off" or len(name.split()) > 4 else in_course(name)
+    """A region with its meaning, unless that is long."""
+    return name if name == "no lift-off" or len(name.split()) > 4 else with_meaning(name)
 
 
 def _map(args: argparse.Namespace, chosen: Chosen) -> OutcomeMap:
-    """A map in SI units where these are known or asked for, else in those of the model."""
+    """A map in SI units where these are known or requested, else in those of the model."""
     model = chosen.model
     spans, fixed = args.over, dict(args.fix)
     given = {*(s.name for s in spans or ()), *fixed}
@@ -120,7 +120,7 @@ def _map(args: argparse.Namespace, chosen: Chosen) -> OutcomeMap:
 
 
 def _curve(result: OutcomeMap) -> DividingCurve | None:
-    """The dividing curve of a map of a contact model's own landings, where it has one."""
+    """The dividing curve of a contact model over xdot and omega, where there is one."""
     if not isinstance(result.model, ContactModel) or {*result.names} != {"xdot", "omega"}:
         return None
     xdot = result.axes[result.names.index("xdot")]

@@ -1,4 +1,4 @@
-"""``bounce models``: what one can choose, with sources."""
+"""The command ``bounce models``: models, laws, friction, air and balls with their sources."""
 
 from __future__ import annotations
 
@@ -55,7 +55,6 @@ def run(args: argparse.Namespace) -> int:
 
 
 def _covers(fit: PublishedFit) -> dict[str, Any] | None:
-    """Landings that a law was fitted to."""
     covers = fit.law.covers
     if covers is None:
         return None

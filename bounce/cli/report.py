@@ -1,4 +1,4 @@
-"""What a command prints: numbers in the units asked for, and everything that it was given."""
+"""Output of the commands: numbers in the chosen units, and every input."""
 
 from __future__ import annotations
 
@@ -13,11 +13,11 @@ from ..laws.law import CASES
 from ..units import Landing
 from .values import SYSTEMS, Quantity, Span, factor
 
-#: What argparse keeps that is no input of the computation.
+#: Names in the parsed arguments that are no inputs of the computation.
 _NO_INPUTS = ("run", "json", "command", "output", "resume", "usual_turf")
 
 
-#: What the names of a report measure.
+#: Kinds of the quantities in a report.
 _MEASURES = dict(
     speed="speed", angle="angle", spin="spin", slip="speed", carry="length", bounced="length",
     rolled="length", run_out="length", total="length", height="height", first_height="height",
@@ -27,14 +27,12 @@ _MEASURES = dict(
 
 
 class Units:
-    """The units of the output."""
-
     def __init__(self, system: str):
         self.names = SYSTEMS[system]
         self._system = system
 
     def show(self, kind: str, value: float | Quantity) -> float:
-        """Return a value in SI units, or as it was typed, in those asked for."""
+        """Return a value in SI units, or as it was typed, in the chosen units."""
         if isinstance(value, Quantity):
             if value.named(self._system) == self.names[kind]:
                 return value.value
@@ -42,11 +40,11 @@ class Units:
         return value / factor(kind, self.names[kind])
 
     def say(self, kind: str, value: float, digits: int = 2) -> str:
-        """Return a value in SI units with the unit asked for."""
+        """Return a value in SI units as text in the chosen unit."""
         return f"{self.show(kind, value):.{digits}f} {self.names[kind]}"
 
     def report(self, report: dict[str, Any]) -> dict[str, Any]:
-        """Return a report in SI units in those asked for."""
+        """Return a report in SI units in the chosen units."""
         shown: dict[str, Any] = {}
         for name, value in report.items():
             kind = _MEASURES.get(name)
@@ -76,10 +74,8 @@ def polar(state: Landing) -> dict[str, float]:
 
 
 def echoed(report: dict[str, float], typed: dict[str, Quantity], system: str) -> dict[str, Any]:
-    """A reported state in SI units, its numbers as they were typed where they are the same.
-
-    A speed or an angle that went through the components of a velocity differs in its last digit.
-    """
+    """A reported state in SI units, with its numbers as they were typed where they are the same."""
+    # a speed or angle computed from components differs in its last digit
     shown: dict[str, Any] = dict(report)
     for name, given in typed.items():
         if math.isclose(given.si(system), report[name], rel_tol=1e-12):
@@ -93,15 +89,20 @@ def in_words(state: Landing, units: Units) -> str:
     return ", ".join(units.say(name, value, digits[name]) for name, value in polar(state).items())
 
 
-def in_course(itinerary: str) -> str:
-    """An itinerary of modes, or the case of a rigid impact, with what it means in words."""
+def sideways(way: float, units: Units) -> str:
+    """A way to the side in words."""
+    return f"{units.say('length', abs(way))} to the {'left' if way < 0 else 'right'}"
+
+
+def with_meaning(itinerary: str) -> str:
+    """An itinerary, or the case of a rigid impact, with its meaning in words."""
     cases = itinerary.rstrip("+-").split("/")
     if all(case in CASES for case in cases):
         return f"{itinerary}: {' or '.join(CASES[case] for case in cases)}"
     return f"{itinerary}: {', '.join(_MODES.get(mode, mode) for mode in itinerary.split())}"
 
 
-#: What the letters of a mode mean, of a course and of a map.
+#: Modes in words, of an itinerary and of a map.
 _MODES = {
     "+": "slips forward", "-": "slips in reverse", "*": "slips", "s": "rolls",
     "S+": "slips forward", "S-": "slips in reverse", "R": "rolls",
@@ -109,7 +110,7 @@ _MODES = {
 
 
 def opening(args: argparse.Namespace) -> dict[str, Any]:
-    """Return what every JSON report begins with: version, command, and every input with its unit."""
+    """Return the head of a JSON report: version, command, and every input with its unit."""
     given = {name: value for name, value in vars(args).items() if name not in _NO_INPUTS}
     if given.get("turf") is None and given.get("model") is None and "turf" in given:
         given["turf"] = args.usual_turf
@@ -119,7 +120,6 @@ def opening(args: argparse.Namespace) -> dict[str, Any]:
 
 
 def _plain(value: Any, system: str) -> Any:
-    """An input as JSON can have it."""
     if isinstance(value, Quantity):
         if not value.kind:
             return value.value
@@ -135,5 +135,4 @@ def _plain(value: Any, system: str) -> Any:
 
 
 def print_json(report: dict[str, Any]) -> None:
-    """Print a report that any reader of JSON can read."""
     print(json.dumps(report, indent=2, allow_nan=False))

@@ -1,32 +1,20 @@
-"""``bounce shot``: one landing, or a table of them: the bounce, and the run until rest."""
+"""The command ``bounce shot``: a landing, the bounce, and the run until rest."""
 
 from __future__ import annotations
 
 import argparse
 from typing import Any
 
-from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideRebound, SideRun, play, rebound
+from ..golf import AIRS, GREEN_ROLLING_FRICTION, Rebound, Run, SideState, play, rebound
 from ..units import Landing
-from .batch import tabulate
-from .choices import Chosen, chosen_model, ground_arguments, require_scale, surroundings
-from .report import Units, echoed, in_course, in_words, opening, polar, print_json
-from .side import (
-    asked_for_side,
-    counted,
-    side_arguments,
-    side_bounce,
-    side_lines,
-    side_report,
-    side_run_lines,
-    side_run_report,
-    side_state,
-    side_to_rest,
-)
-from .starts import Start, start_arguments, starts
+from .batch import answer
+from .choices import Chosen, chosen_model, ground_arguments, require_scale, side_slope, surroundings
+from .report import Units, echoed, in_words, polar, sideways, with_meaning
+from .side import require_side, side_arguments, with_side
+from .starts import Start, start_arguments
 from .values import number, quantity
 
 HELP = "a landing: the bounce, and the run until rest"
-#: What every run until rest must be read with.
 UNVALIDATED = (
     "How a run splits into bounces and roll has not been compared with measurements: the laws of turf "
     "were fitted to single bounces."
@@ -55,67 +43,38 @@ def run_arguments(parser: argparse.ArgumentParser) -> None:
 
 
 def run(args: argparse.Namespace) -> int:
-    """Bounce the ball, and print what becomes of it."""
+    """Bounce the ball and print the results."""
     chosen = chosen_model(args)
     require_scale(args, chosen)
-    side = asked_for_side(args)
+    require_side(args)
 
     def report_on(start: Start) -> dict[str, Any]:
         assert start.state is not None
-        if side:
-            report = _side_report(chosen, *_bounce_aside(args, chosen, start.state))
-        else:
-            report = _report(chosen, *_bounce(args, chosen, start.state))
+        landing, state = with_side(args, start.state)
+        report = _report(chosen, landing, *_bounce(args, chosen, state))
         return {**report, "landing": echoed(report["landing"], start.typed, args.units)}
 
-    given = starts(args, up=False)
-    if args.input is not None:
-        return tabulate(args, given, report_on)
-    units, landing = Units(args.units), given[0].state
-    assert landing is not None
-    if args.json:
-        report = units.report(report_on(given[0]))
-        print_json({**opening(args), "units": units.names, **report})
-    elif side:
-        kick, run_aside = _bounce_aside(args, chosen, landing)
-        lines = side_lines(kick, units)
-        print("\n".join(lines + (side_run_lines(run_aside, units) if run_aside else [])))
-    else:
-        print("\n".join(_lines(*_bounce(args, chosen, landing), chosen, units)))
-    return 0
+    def lines(landing: Landing, units: Units) -> list[str]:
+        return _lines(*_bounce(args, chosen, with_side(args, landing)[1]), chosen, units)
 
-
-def _bounce_aside(
-    args: argparse.Namespace, chosen: Chosen, landing: Landing
-) -> tuple[SideRebound, SideRun | None]:
-    hit = side_bounce(args, chosen, landing)
-    if args.first_only:
-        return hit, None
-    return hit, side_to_rest(args, chosen, side_state(args, landing))
-
-
-def _side_report(chosen: Chosen, hit: SideRebound, rest: SideRun | None) -> dict[str, Any]:
-    """What becomes of a landing with side spin, in SI units."""
-    report = side_report(chosen, hit)
-    if rest is not None:
-        report |= dict(run=side_run_report(rest), cautions=list(rest.cautions))
-    return report
+    return answer(args, False, report_on, lines)
 
 
 def _bounce(
-    args: argparse.Namespace, chosen: Chosen, landing: Landing
-) -> tuple[Rebound, Run | None]:
+    args: argparse.Namespace, chosen: Chosen, state: Landing | SideState
+) -> tuple[Rebound[Any], Run[Any] | None]:
     if args.first_only:
-        return rebound(chosen.model, landing, chosen.ball, scaling=chosen.scaling), None
-    rest = to_rest(args, chosen, landing)
+        options: dict[str, Any] = dict(scaling=chosen.scaling, side_slope=side_slope(args))
+        return rebound(chosen.model, state, chosen.ball, **options), None
+    rest = to_rest(args, chosen, state)
     return rest.bounces[0].rebound, rest
 
 
-def to_rest(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> Run:
+def to_rest(args: argparse.Namespace, chosen: Chosen, state: Landing | SideState) -> Run[Any]:
     """Follow a shot from its first touch-down to rest."""
     return play(
         chosen.model,
-        landing,
+        state,
         chosen.ball,
         scaling=chosen.scaling,
         **surroundings(args),
@@ -123,24 +82,30 @@ def to_rest(args: argparse.Namespace, chosen: Chosen, landing: Landing) -> Run:
     )
 
 
-def _report(chosen: Chosen, hit: Rebound, rest: Run | None) -> dict[str, Any]:
-    """What becomes of a landing, in SI units."""
-    report: dict[str, Any] = dict(
-        model=repr(chosen.model),
-        landing=polar(hit.landing),
-        lift_off=polar(hit.lift_off),
-        slip=hit.lift_off.xdot + chosen.ball.radius * hit.lift_off.omega,
-        itinerary=hit.itinerary,
-        contact_time=hit.time,
-    )
+def _report(
+    chosen: Chosen, landing: Landing, hit: Rebound[Any], rest: Run[Any] | None
+) -> dict[str, Any]:
+    """Results of a landing in SI units; angles right positive."""
+    off, report = hit.lift_off, dict[str, Any](model=repr(chosen.model), landing=polar(landing))
+    if isinstance(off, SideState):
+        report |= dict(
+            side_spin=float(hit.landing.spin[0]),
+            lift_off=polar(off.in_plane),
+            side_spin_after=off.side_spin,
+            kick=off.heading,
+            slip_angle=hit.slip_angle,
+        )
+    else:
+        report |= dict(lift_off=polar(off), slip=off.xdot + chosen.ball.radius * off.omega)
+    report |= dict(itinerary=hit.itinerary, contact_time=hit.time)
     if rest is not None:
         report |= dict(run=run_report(rest), cautions=list(rest.cautions))
     return report
 
 
-def run_report(rest: Run) -> dict[str, float]:
-    """Numbers of a run until rest, in SI units."""
-    return dict(
+def run_report(rest: Run[Any]) -> dict[str, float]:
+    """Numbers of a run until rest, in SI units; right is positive."""
+    report: dict[str, float] = dict(
         bounces=len(rest.bounces),
         extrapolated=rest.extrapolated,
         first_height=rest.first_height,
@@ -149,23 +114,41 @@ def run_report(rest: Run) -> dict[str, float]:
         run_out=rest.run_out,
         time=rest.time,
     )
+    if isinstance(rest.bounces[0].rebound.landing, SideState):
+        report |= dict(kick=rest.kick, run_side=rest.side)
+    return report
 
 
-def _lines(hit: Rebound, rest: Run | None, chosen: Chosen, units: Units) -> list[str]:
-    slip = hit.lift_off.xdot + chosen.ball.radius * hit.lift_off.omega
-    shown = f"{units.show('speed', slip):.3g} {units.names['speed']}"
-    lines = [
-        f"lift-off  {in_words(hit.lift_off, units)}, slip {shown} ({in_course(hit.itinerary)})"
-    ]
+def _lines(hit: Rebound[Any], rest: Run[Any] | None, chosen: Chosen, units: Units) -> list[str]:
+    off, course = hit.lift_off, with_meaning(hit.itinerary)
+    if isinstance(off, SideState):
+        digits = 4 if units.names["angle"] == "rad" else 1
+        turn = off.heading
+        towards = "right" if turn > 0 else "left" if turn < 0 else "to neither side"
+        lines = [
+            f"lift-off  {in_words(off.in_plane, units)} ({course})",
+            f"kick      {units.say('angle', abs(turn), digits)} {towards}, side spin "
+            f"{units.say('spin', hit.landing.spin[0], 0)} before, {units.say('spin', off.side_spin, 0)} "
+            "after",
+        ]
+    else:
+        slip = units.show("speed", off.xdot + chosen.ball.radius * off.omega)
+        shown = f"slip {slip:.3g} {units.names['speed']}"
+        lines = [f"lift-off  {in_words(off, units)}, {shown} ({course})"]
     if hit.time:
         lines.append(f"contact   {1e3 * hit.time:.3g} ms")
-    return lines if rest is None else [*lines, *run_lines(rest, units)]
+    return lines if rest is None else [*lines, run_line(rest, units)]
 
 
-def run_lines(rest: Run, units: Units) -> list[str]:
+def run_line(rest: Run[Any], units: Units) -> str:
     """A run until rest in words."""
-    return [
-        f"run       {units.say('length', rest.run_out)} in {rest.time:.2f} s: {counted(rest)}, "
-        f"the first {units.say('height', rest.first_height)} high, over "
-        f"{units.say('length', rest.bounced)}; rolls {units.say('length', rest.rolled)}"
-    ]
+    way, count = units.say("length", rest.run_out), len(rest.bounces)
+    if isinstance(rest.bounces[0].rebound.landing, SideState):
+        way += f" on and {sideways(rest.side, units)}"
+    bounces = "1 bounce" if count == 1 else f"{count} bounces"
+    bounces += f" ({rest.extrapolated} of them outside the fit)" if rest.extrapolated else ""
+    return (
+        f"run       {way} in {rest.time:.2f} s: {bounces}, the first "
+        f"{units.say('height', rest.first_height)} high, over {units.say('length', rest.bounced)}; "
+        f"rolls {units.say('length', rest.rolled)}"
+    )

@@ -1,4 +1,4 @@
-"""What a ball starts with: one speed, angle and spin, or a table of them."""
+"""Starts on the command line: one speed, angle and spin, or a table of them."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import NamedTuple
 
 import nonsmooth as ns
 
-from ..golf.columns import Row, read_rows
+from ..golf.fits.columns import Row, read_rows
 from ..units import Landing
 from .values import KINDS, Quantity, quantity
 
@@ -21,16 +21,7 @@ _HELP = dict(
 
 
 class Start(NamedTuple):
-    """A start, or what is wrong with it.
-
-    Attributes
-    ----------
-    state : Landing or None
-        None where something is wrong.
-    typed : dict of str to Quantity
-        Speed, angle and spin as they were given.
-    error : str
-    """
+    """A start and its speed, angle and spin as typed; or no start, and what is wrong with it."""
 
     state: Landing | None
     typed: dict[str, Quantity]
@@ -54,14 +45,8 @@ def start_arguments(parser: argparse.ArgumentParser, what: str) -> None:
     )
 
 
-def starts(args: argparse.Namespace, up: bool) -> list[Start]:
-    """Return each start, or what is wrong with it.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-        Neither one start nor a table, or both; of one start also what is wrong with it.
-    """
+def read_starts(args: argparse.Namespace, up: bool) -> list[Start]:
+    """Return one start, or the rows of a table with what is wrong with each."""
     given = {name: getattr(args, name) for name in NAMES}
     missing = [name for name, value in given.items() if value is None]
     if args.input is None:
@@ -98,13 +83,13 @@ def _start(given: dict[str, Quantity], system: str, up: bool, prefix: str) -> La
     speed, angle, spin = (given[name].si(system) for name in NAMES)
     if not 0.0 < speed < math.inf:
         raise ns.OptionError(
-            f"{prefix}speed: expected a positive speed, received {given['speed'].said(system)}."
+            f"{prefix}speed: expected a positive speed, received {given['speed'].text(system)}."
         )
     if not 0.0 < angle <= math.pi / 2 * (1 + 1e-12):
         most = "pi/2 rad" if given["angle"].named(system) == "rad" else "90 deg"
         raise ns.OptionError(
             f"{prefix}angle: expected an angle between path and ground, above 0 and at most {most}, "
-            f"received {given['angle'].said(system)}."
+            f"received {given['angle'].text(system)}."
         )
     if not math.isfinite(spin):
         raise ns.OptionError(f"{prefix}spin: expected a number, received {given['spin'].value!r}.")

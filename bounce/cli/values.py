@@ -1,4 +1,4 @@
-"""What an argument of the command line means: numbers with units, assignments and ranges."""
+"""Read arguments of the command line: numbers with units, assignments and ranges."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ import nonsmooth as ns
 
 from ..units import MINUS, UNITS
 
-#: What each system says for the kinds of quantities: of numbers without a unit, and of the output.
+#: Units of each system, for numbers without a unit and for the output.
 SYSTEMS: dict[str, dict[str, str]] = {
     "golf": dict(speed="m/s", angle="deg", spin="rpm", length="m", height="m", time="s"),
     "us": dict(speed="mph", angle="deg", spin="rpm", length="yd", height="ft", time="s"),
     "si": dict(speed="m/s", angle="rad", spin="rad/s", length="m", height="m", time="s"),
 }
-#: Kinds of the names that have units; a height is a length that golfers measure apart.
+#: Kinds of the names that have units; a height is a length with its own unit.
 KINDS = dict(speed="speed", angle="angle", spin="spin", slope="angle", tilt="angle")
 _NUMBER = re.compile(r"\s*([+-]?(?:\d+\.?\d*|\.\d+)(?:[eE][+-]?\d+)?)\s*([^\d\s].*?)?\s*")
 
@@ -46,25 +46,20 @@ class Quantity(NamedTuple):
         """Return it in SI units."""
         return self.value * factor(self.kind, self.named(system))
 
-    def said(self, system: str) -> str:
-        """Return it as the user would say it."""
+    def text(self, system: str) -> str:
+        """Return it with its unit."""
         return f"{self.value:g} {self.named(system)}"
 
 
 def angle_within(
     option: str, typed: Quantity, system: str, least: float, most: float, closed: bool = True
 ) -> float:
-    """Return an angle in radians; the ends of its range, in degrees, are in it if that is ``closed``.
-
-    Raises
-    ------
-    nonsmooth.OptionError
-    """
+    """Return an angle in radians, if it is from ``least`` to ``most`` degrees."""
     angle = math.degrees(typed.si(system))
     if not (least <= angle <= most if closed else least < angle < most):
         within = f"from {least} to {most}" if closed else f"between {least} and {most}"
         raise ns.OptionError(
-            f"{option}: expected an angle {within} deg, received {typed.said(system)}."
+            f"{option}: expected an angle {within} deg, received {typed.text(system)}."
         )
     return typed.si(system)
 
@@ -157,5 +152,4 @@ def _require_unit(text: str, name: str, unit: str | None) -> None:
 
 
 def fail(text: str, form: str) -> NoReturn:
-    """Say what was expected."""
     raise argparse.ArgumentTypeError(f"expected {form}, received {text!r}")

@@ -297,7 +297,7 @@ def forces_function(blueprint: Blueprint) -> ca.Function:
     """Return (states, parameters) -> load, and friction in forward slip, reverse slip and rolling."""
     eq, system = equations(blueprint), contact_system(blueprint)
     spin = STATES.index("omega")
-    friction = [eq.q.inertia * system.mode_field(mode)[spin] for mode in "+-s"]
+    friction = [eq.q.inertia * ns.local.mode_field(system, mode)[spin] for mode in "+-s"]
     return eq.function([eq.load, *friction])
 
 

@@ -1,11 +1,11 @@
-"""The whole shot, in SI units: launch, flight, bounces, roll; measured bounces and fits to them.
+"""The whole shot in SI units: launch, flight, bounces, roll; measured bounces and fits to them.
 
 ``flight(launch, air=...)`` flies a ball to the ground; ``play(ground, landing)`` follows it from
 there to rest; ``rebound`` is one bounce. The ground is a law of ``bounce.laws``, such as
 ``bounce.laws.TURFS["natural"].law``, or a contact model with the ``bounce.Scaling`` that gives its
-numbers their units; with side spin they are ``side_flight``, ``side_play`` and
-``side_rebound``. ``read_measurements`` reads measured bounces, ``fit`` finds the parameters
-behind them. Speeds are m/s, spins rad/s, angles rad.
+numbers their units. A launch or landing is a ``bounce.Landing`` in a vertical plane, or a ``SideState``
+with side spin. ``read_measurements`` reads measured bounces, ``fit`` finds the parameters behind them.
+Speeds are m/s, spins rad/s, angles rad.
 
 Examples
 --------
@@ -19,17 +19,17 @@ Examples
 
 from ..units import GOLF
 from .air import AIRS, QUINTAVALLA, SMITS_SMITH, Air
-from .columns import DataError
-from .fit_result import FitError, FitResult, IdentifiabilityWarning, Start
-from .fitting import fit
+from .fits.columns import DataError
+from .fits.fit_result import FitResult, IdentifiabilityWarning
+from .fits.fitting import fit
+from .fits.least_squares import Start
+from .fits.measurements import Measurements, read_measurements
+from .fits.predictions import FitError
 from .flight import Flight, flight
 from .ground import ExtrapolationWarning, Rebound, rebound
 from .maps import landing_map
-from .measurements import Measurements, read_measurements
 from .rollout import GREEN_ROLLING_FRICTION, Bounce, Glide, NoRestError, Run, play
-from .side_flight import SideFlight, SideState, side_flight
-from .side_run import SideBounce, SideGlide, SideRun, side_play
-from .side_spin import AxisSpin, SideRebound, axis_spin, side_rebound
+from .side_spin import AxisSpin, SideState, axis_spin
 
 __all__ = [
     "AIRS",
@@ -51,11 +51,6 @@ __all__ = [
     "NoRestError",
     "Rebound",
     "Run",
-    "SideBounce",
-    "SideFlight",
-    "SideGlide",
-    "SideRebound",
-    "SideRun",
     "SideState",
     "Start",
     "axis_spin",
@@ -65,7 +60,4 @@ __all__ = [
     "play",
     "read_measurements",
     "rebound",
-    "side_flight",
-    "side_play",
-    "side_rebound",
 ]

@@ -1,4 +1,4 @@
-"""Drag and lift of a ball in still air: what a law of them is, and the published ones."""
+"""Drag and lift of a ball in still air, with published coefficients."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ class Air:
     source: str = ""
 
     def cautions(self, speed: float, ball: Ball) -> tuple[str, ...]:
-        """Say whether a ball is faster than any that the coefficients were measured for.
+        """Return a caution for a ball faster than any that the coefficients were measured for.
 
         Parameters
         ----------

@@ -1,13 +1,13 @@
-"""Ballistic flight between bounces, in a vertical plane, with published drag and lift or without.
+"""Flight between bounces, with published drag and lift or without, and with side spin or without.
 
-Axes are along the ground (x, uphill) and normal to it (y); the ball is a point with spin:
+Axes are along the ground (x forward and uphill, z to the right) and normal to it (y); the ball is a point
+with a spin vector whose direction stays:
 
-    xddot = -g sin(slope) - k v (Cd xdot + Cl ydot),  yddot = -g cos(slope) - k v (Cd ydot - Cl xdot),
-    omegadot = -decay v omega / radius,  k = density area / (2 mass),
+    v' = g - k |v| (Cd v - Cl e x v),  omega' = -decay |v| omega / radius,  e = omega/|omega|,
 
-with Cd and Cl of the spin ratio S = radius |omega| / v and the Reynolds number Re = 2 radius v /
-viscosity; Cl has the sign of the backspin. Still air, no side spin. Without air the path is the
-parabola, in closed form.
+with k = density area / (2 mass), and Cd and Cl of the spin ratio S = radius |omega| / |v| and the Reynolds
+number Re = 2 radius |v| / viscosity; the lift falls as the sine of the angle between axis and path. Still
+air. Without air the path is the parabola, in closed form.
 """
 
 from __future__ import annotations
@@ -17,53 +17,54 @@ import warnings
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from typing import Any, NamedTuple
+from typing import Any, Generic, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..errors import require
-from ..parameters import LIMITS, number
-from ..units import GOLF, GRAVITY, Ball, Landing
+from ..parameters import number
+from ..units import GOLF, Ball, Landing
 from .air import Air
 from .ground import ExtrapolationWarning
+from .side_spin import S, SideState, gravity_on, in_space, same_kind
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Flight:
+class Flight(Generic[S]):
     """A flight that ended on the ground.
 
     Attributes
     ----------
-    launch, landing : Landing
-        Start and end; ``landing.ydot < 0``.
+    launch, landing : Landing or SideState
+        Start and end, of one kind; the ball lands with a speed into the ground.
     time : float
         s.
     start : tuple of float
-        x and y at launch, m.
-    range : float
-        x at landing less x at launch, m.
+        x and y at launch, m; with a SideState x, y and z.
+    range, side : float
+        Way forward and to the right until landing, m.
     height : float
         Largest y, m.
     cautions : tuple of str
         What of it is an extrapolation.
     """
 
-    launch: Landing
-    landing: Landing
+    launch: S
+    landing: S
     time: float
-    start: tuple[float, float]
+    start: tuple[float, ...]
     range: float
+    side: float
     height: float
     _path: Callable[[Array], Array]
     cautions: tuple[str, ...] = ()
 
     def __call__(self, t: ArrayLike) -> Array:
-        """Return x and y at times after launch.
+        """Return x and y, with a SideState x, y and z, at times after launch.
 
         Parameters
         ----------
@@ -72,49 +73,51 @@ class Flight:
 
         Returns
         -------
-        ndarray (..., 2)
+        ndarray (..., 2) or (..., 3)
         """
-        return self._path(np.asarray(t, dtype=float))
+        return self._path(np.asarray(t, dtype=float))[..., : len(self.start)]
 
 
 def flight(
-    launch: Landing,
+    launch: S,
     ball: Ball = GOLF,
     *,
     air: Air | None = None,
     slope: float = 0.0,
-    start: tuple[float, float] = (0.0, 0.0),
+    side_slope: float = 0.0,
+    start: tuple[float, ...] = (0.0, 0.0),
     tol: float = 1e-10,
-) -> Flight:
+) -> Flight[S]:
     """Fly a ball until it comes down to $y = 0$.
 
     Parameters
     ----------
-    launch : Landing
-        With ``ydot > 0``, or any where ``start`` is above the ground.
+    launch : Landing or SideState
+        A launch in a vertical plane, or with side spin. It rises, unless ``start`` is above the ground.
     ball : Ball, optional
         Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     air : Air, optional
         Drag and lift; none by default.
-    slope : float, optional
-        Of the ground, rad, uphill for positive x.
+    slope, side_slope : float, optional
+        Of the ground, rad, uphill forward and to the right; a side slope needs a SideState.
     start : tuple of float, optional
-        x and y of the centre relative to a ball that touches the ground, m; y may be a little
-        below 0, as at lift-off from soft ground.
+        x, y and perhaps z of the centre relative to a ball that touches the ground, m; y may be a
+        little below 0, as at lift-off from soft ground.
     tol : float, optional
         Relative tolerance (with air only).
 
     Returns
     -------
     Flight
-        Carry, height, time and landing; called with a time, the place.
+        Carry, way to the side, height, time and landing; called with a time, the place.
 
     Raises
     ------
     nonsmooth.PointError
         A launch that never rises above the ground.
     nonsmooth.OptionError
-        A slope outside of $-pi/2$ to $pi/2$.
+        A launch of another type; a slope outside of $-pi/2$ to $pi/2$; coefficients of air with which the
+        ball never comes down.
 
     Warns
     -----
@@ -126,101 +129,81 @@ def flight(
     >>> out = flight(Landing(10.0, 9.80665, 0.0))
     >>> out.time, out.range, round(out.height, 12)
     (2.0, 20.0, 4.903325)
-    >>> from bounce.golf import SMITS_SMITH
+
+    A drive, and one whose axis is tilted by ten degrees, a fade of a right-handed player:
+
+    >>> from bounce.golf import SMITS_SMITH, axis_spin
     >>> drive = flight(Landing(70 * math.cos(0.19), 70 * math.sin(0.19), 283.0), air=SMITS_SMITH)
     >>> f"{drive.range:.0f} m, lands at {math.degrees(drive.landing.angle):.0f} deg"
     '215 m, lands at 39 deg'
+    >>> back, side, vertical = axis_spin(283.0, math.radians(10), 0.19)
+    >>> launch = Landing(70 * math.cos(0.19), 70 * math.sin(0.19), back)
+    >>> fade = flight(SideState.of(launch, side, vertical), air=SMITS_SMITH)
+    >>> f"{fade.range:.0f} m, {fade.side:.0f} m to the right"
+    '212 m, 19 m to the right'
     """
-    require(launch, Landing, "launch", "bounce.Landing(xdot, ydot, omega) is one, in SI units.")
-    tilt = number(slope, "slope", ns.OptionError)
-    if not LIMITS["in (-pi/2, pi/2)"](tilt):
-        raise ns.OptionError(f"slope: expected radians in (-pi/2, pi/2), received {slope!r}.")
-    x0, y0 = (number(value, "start", ns.PointError) for value in start)
-    lift = GRAVITY * math.cos(tilt)
-    rises = launch.ydot > 0 and launch.ydot**2 > -2 * lift * y0
-    if y0 <= 0.0 and not rises:
+    gravity, state = gravity_on(launch, "launch", slope, side_slope), in_space(launch)
+    given = [number(value, "start", ns.PointError) for value in start]
+    if len(given) not in (2, 3):
+        raise ns.PointError(f"start: expected x, y and perhaps z, received {start!r}.")
+    place = np.array([*given, 0.0][:3])
+    up, height, down = float(state.velocity[1]), float(place[1]), -float(gravity[1])
+    if height <= 0.0 and not (up > 0.0 and up**2 > -2 * down * height):
         raise ns.PointError(
-            f"launch: expected a ball that rises above the ground, received ydot = {launch.ydot!r} at "
-            f"y = {y0!r}."
+            f"launch: the ball never rises above the ground, from y = {height!r} with ydot = {up!r}. "
+            "Give a launch with a larger ydot, or a start above the ground."
         )
+    in_vacuum = (up + math.sqrt(up**2 + 2 * down * height)) / down
+    cautions: tuple[str, ...] = ()
     if air is None:
-        return _parabola(launch, tilt, x0, y0)
-    found = _through_air(launch, ball, air, tilt, x0, y0, tol)
-    for caution in found.cautions:
+        fall = _parabola(state, gravity, place, in_vacuum)
+    else:
+        fall = _through_air(state, ball, air, gravity, place, in_vacuum, tol)
+        cautions = air.cautions(math.hypot(*state.velocity), ball)
+    for caution in cautions:
         warnings.warn(caution, ExtrapolationWarning, stacklevel=2)
-    return found
+    landing = same_kind(launch, fall.velocity, fall.spin)
+    begin = tuple(place.tolist()[: 2 if isinstance(launch, Landing) else 3])
+    way = (float(fall.way[0]), float(fall.way[2]))
+    return Flight(launch, landing, fall.time, begin, *way, fall.height, fall.path, cautions)
 
 
-def _parabola(launch: Landing, slope: float, x0: float, y0: float) -> Flight:
-    along, down = GRAVITY * math.sin(slope), GRAVITY * math.cos(slope)
-    u, v = launch.xdot, launch.ydot
-    time = (v + math.sqrt(v**2 + 2 * down * y0)) / down
+class _Fall(NamedTuple):
+    """A flight in numbers: the way from the start and the state at the end, and the path."""
 
-    def path(t: Array) -> Array:
-        x, y = x0 + u * t - along * t**2 / 2, y0 + v * t - down * t**2 / 2
-        return np.stack([x, y], axis=-1)
-
-    landing = Landing(u - along * time, v - down * time, launch.omega)
-    height = y0 + max(v, 0.0) ** 2 / (2 * down)
-    return Flight(launch, landing, time, (x0, y0), u * time - along * time**2 / 2, height, path)
-
-
-def _through_air(
-    launch: Landing, ball: Ball, air: Air, slope: float, x0: float, y0: float, tol: float
-) -> Flight:
-    start = [x0, y0, launch.xdot, launch.ydot, launch.omega]
-    in_vacuum = _parabola(launch, slope, x0, y0).time
-    fall = fly(_field(ball, air, slope), start, 2, in_vacuum, tol)
-    x, _, xdot, ydot, omega = (float(value) for value in fall.end)
-    landing = Landing(xdot, ydot, omega)
-    cautions = air.cautions(launch.speed, ball)
-    return Flight(launch, landing, fall.time, (x0, y0), x - x0, fall.height, fall.path, cautions)
-
-
-class Fall(NamedTuple):
-    """A flight through air in numbers.
-
-    Attributes
-    ----------
-    end : ndarray
-        The state on the ground.
-    time : float
-    height : float
-        The greatest.
-    path : callable
-        The place at times.
-    """
-
-    end: Array
+    way: Array
+    velocity: Array
+    spin: Array
     time: float
     height: float
     path: Callable[[Array], Array]
 
 
-def fly(
-    field: Callable[[float, Any], Any], start: ArrayLike, axes: int, in_vacuum: float, tol: float
-) -> Fall:
-    """Integrate a flight through air until the ball is on the ground.
+def _parabola(state: SideState, gravity: Array, place: Array, time: float) -> _Fall:
+    def path(t: Array) -> Array:
+        t = t[..., None]
+        return np.asarray(place + state.velocity * t + gravity * t**2 / 2)
 
-    Parameters
-    ----------
-    field : callable
-        Rate of the state: the place, then the velocity, then the spin; the second axis is up.
-    start : array_like
-        The state at first.
-    axes : int
-        Of the place.
-    in_vacuum : float
-        How long it would fly there, s.
-    tol : float
-        Relative and absolute tolerance.
+    way = state.velocity * time + gravity * time**2 / 2
+    height = float(place[1] - max(state.velocity[1], 0.0) ** 2 / (2 * gravity[1]))
+    return _Fall(way, state.velocity + gravity * time, state.spin, time, height, path)
 
-    Raises
-    ------
-    nonsmooth.OptionError
-        It does not come down.
-    """
+
+def _through_air(
+    state: SideState,
+    ball: Ball,
+    air: Air,
+    gravity: Array,
+    place: Array,
+    in_vacuum: float,
+    tol: float,
+) -> _Fall:
+    """Integrate place, velocity and spin, in a vertical plane only those that change."""
     from scipy.integrate import solve_ivp
+
+    velocity, spin = state.velocity.copy(), state.spin.copy()
+    flat = not (velocity[2] or gravity[2] or spin[0] or spin[1])
+    axes, turning = (2, slice(2, 3)) if flat else (3, slice(3))
 
     def ground(t: float, z: Any) -> float:
         return float(z[1])
@@ -233,9 +216,9 @@ def fly(
 
     def solve(dense: bool) -> Any:
         return solve_ivp(
-            field,
+            _field(ball, air, gravity.tolist(), flat),
             (0.0, 10 * in_vacuum + 10.0),
-            start,
+            np.concatenate([place[:axes], state.velocity[:axes], state.spin[turning]]),
             method="DOP853",
             rtol=max(tol, 1e-13),
             atol=max(tol, 1e-13),
@@ -247,41 +230,50 @@ def fly(
     run = solve(False)
     if run.status != 1:
         raise ns.OptionError(
-            f"air: expected a ball that comes down, received {run.message} after {run.t[-1]:g} s. Are "
-            "the coefficients of drag and lift sensible?"
+            f"air: the ball does not come down within {run.t[-1]:g} s ({run.message}). Check the "
+            "coefficients of drag and lift."
         )
 
     @cache
     def between() -> Any:
-        return solve(True).sol  # three evaluations a step more: only for those who ask for the path
+        return solve(True).sol  # three more evaluations a step, for the path only
 
     def path(t: Array) -> Array:
-        return np.moveaxis(between()(t.ravel())[:axes].reshape(axes, *t.shape), 0, -1)
+        places = np.repeat(place[:, None], t.size, axis=1)
+        places[:axes] = between()(t.ravel())[:axes]
+        return np.moveaxis(places.reshape(3, *t.shape), 0, -1)
 
-    tops = [float(state[1]) for state in run.y_events[1]]
-    return Fall(run.y[:, -1], float(run.t[-1]), max([float(run.y[1, 0]), *tops]), path)
+    end, way = run.y[:, -1], np.zeros(3)
+    way[:axes] = end[:axes] - place[:axes]
+    velocity[:axes], spin[turning] = end[axes : 2 * axes], end[2 * axes :]
+    height = max([float(place[1]), *(float(top[1]) for top in run.y_events[1])])
+    return _Fall(way, velocity, spin, float(run.t[-1]), height, path)
 
 
-def _field(ball: Ball, air: Air, slope: float) -> Callable[[float, Any], list[float]]:
+def _field(
+    ball: Ball, air: Air, gravity: list[float], flat: bool
+) -> Callable[[float, Any], list[float]]:
     area = math.pi * ball.radius**2
     k = air.density * area / (2 * ball.mass)
-    along, down = GRAVITY * math.sin(slope), GRAVITY * math.cos(slope)
+    gx, gy, gz = gravity
 
     def field(t: float, z: Any) -> list[float]:
-        _, _, u, v, omega = z.tolist()  # plain numbers: NumPy's are slow one by one
-        speed = math.hypot(u, v)
-        if speed == 0.0:
-            return [u, v, -along, -down, 0.0]
-        ratio = min(ball.radius * abs(omega) / speed, air.largest_spin_ratio)
-        reynolds = 2 * ball.radius * speed / air.viscosity
-        drag = k * speed * air.drag(ratio, reynolds)
-        lift = k * speed * air.lift(ratio, reynolds) * ((omega > 0) - (omega < 0))
-        return [
-            u,
-            v,
-            -along - drag * u - lift * v,
-            -down - drag * v + lift * u,
-            -air.spin_decay * speed * omega / ball.radius,
-        ]
+        x = z.tolist()  # plain numbers: NumPy's are slow one by one
+        u, v, w, p, q, r = (*x[2:4], 0.0, 0.0, 0.0, x[4]) if flat else x[3:]
+        speed, turning = math.hypot(u, v, w), math.hypot(p, q, r)
+        drag, lift, decay, (a, b, c) = 0.0, 0.0, -air.spin_decay * speed, (0.0, 0.0, 0.0)
+        if speed > 0.0:
+            ratio = min(ball.radius * turning / speed, air.largest_spin_ratio)
+            reynolds = 2 * ball.radius * speed / air.viscosity
+            drag = k * speed * air.drag(ratio, reynolds)
+            lift = k * speed * air.lift(ratio, reynolds)
+        if turning > 0.0:
+            a, b, c = p / turning, q / turning, r / turning
+        forward = gx - drag * u + lift * (b * w - c * v)
+        up = gy - drag * v + lift * (c * u - a * w)
+        if flat:
+            return [u, v, forward, up, decay * r / ball.radius]
+        right = gz - drag * w + lift * (a * v - b * u)
+        return [u, v, w, forward, up, right, *(decay * s / ball.radius for s in (p, q, r))]
 
     return field

@@ -1,4 +1,4 @@
-"""Maps of landings in SI units, on laws and contact models alike."""
+"""Outcome maps of landings in SI units, on laws and contact models."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ from .ground import ExtrapolationWarning, Model, ground, require_scaling
 
 Array = NDArray[np.float64]
 
-#: What a landing is given by: m/s, rad below the horizontal, rad/s (backspin).
+#: Components of a landing: m/s, rad below the horizontal, rad/s (backspin).
 POLAR = ("speed", "angle", "spin")
 
 
@@ -33,7 +33,7 @@ def landing_map(
     scaling: Scaling | None = None,
     **options: Any,
 ) -> OutcomeMap:
-    """Map what becomes of landings over any two of speed, angle, spin and the model's parameters.
+    """Map outcomes of landings over any two of speed, angle, spin and the model's parameters.
 
     Parameters
     ----------
@@ -80,7 +80,7 @@ def landing_map(
     >>> m.regions, m.slip.shape
     (('II+', 'III+'), (4, 5))
     """
-    ground(model, ball, scaling, 1e-10)  # refuses what does not fit together
+    ground(model, ball, scaling, 1e-10)  # raises if they do not fit together
     known = [*POLAR, *([] if isinstance(model, BounceLaw) else model.values)]
     axes, others = checked_axes(over, fixed or {}, known, POLAR)
     first, second = axes
@@ -94,7 +94,7 @@ def landing_map(
     landing = (speed * np.cos(angle), -speed * np.sin(angle), values["spin"] * ball.radius)
     if isinstance(model, BounceLaw):
         off = _of_law(model, np.broadcast_arrays(*landing))
-        _look_at_range(model, landing[0], landing[1], values["spin"])
+        _warn_outside(model, landing[0], landing[1], values["spin"])
     else:
         unit = require_scaling(model, ball, scaling)
         parameters = {name: v for name, v in values.items() if name not in POLAR}
@@ -105,15 +105,14 @@ def landing_map(
     return OutcomeMap(model, (first, second), (axes[first], axes[second]), others, off, spin)
 
 
-def _look_at_range(law: BounceLaw, xdot: Array, ydot: Array, spin: Array) -> None:
-    """Warn of landings outside those that a law was fitted to."""
+def _warn_outside(law: BounceLaw, xdot: Array, ydot: Array, spin: Array) -> None:
     if law.covers is None:
         return
     inside = law.covers.holds(xdot, ydot, spin)
     if not np.all(inside):
         warnings.warn(
-            f"{type(law).__name__}: {np.size(inside) - np.sum(inside)} of {np.size(inside)} landings are outside those that it "
-            "was fitted to; their rebounds are extrapolations.",
+            f"{type(law).__name__}: {np.size(inside) - np.sum(inside)} of {np.size(inside)} landings are "
+            "outside those that it was fitted to; their rebounds are extrapolations.",
             ExtrapolationWarning,
             stacklevel=3,
         )

@@ -1,37 +1,38 @@
 """The rest of the shot: bounces with flight between them, then sliding, then rolling to rest.
 
-What is modelled: one vertical plane; flat ground of constant slope; each bounce by one and the same
-law or contact model; flight in still air or none; a ball that stays down slides under Coulomb
-friction until it rolls, and rolls against a constant resistance. What is not: side spin (``side_run``), wind,
-ground that changes, plugging, spin that decays while rolling, and the small hops left out below
-``min_height``.
+The ground is flat with a constant slope. Each bounce follows one law or contact model, and each hop is a flight
+in still air or none. A ball that stays down slides under Coulomb friction until it rolls, and rolls against a
+constant resistance opposite to its velocity; on a side slope the direction of friction turns. Not modelled: wind,
+plugging, ground that changes, spin that decays while rolling, and hops below ``min_height``.
 """
 
 from __future__ import annotations
 
-import math
 import warnings
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import lru_cache, partial
+from typing import Generic
 
+import casadi as ca
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 import nonsmooth as ns
 
-from ..parameters import LIMITS, number, require_positive
-from ..units import GOLF, GRAVITY, Ball, Landing, Scaling
+from ..contact.space import Contact3D
+from ..parameters import require_positive
+from ..units import GOLF, Ball, Scaling
 from .air import Air
 from .flight import Flight, flight
 from .ground import ExtrapolationWarning, Model, Rebound, ground
+from .side_spin import S, SideState, gravity_on, in_space, upward
 
 Array = NDArray[np.float64]
 
-#: Penner's rolling friction of a putting green (2002, The run of a golf ball, p. 935; greens span
-#: 0.065 to 0.196, The physics of putting, p. 85), as quoted by public golf simulators. A fairway
-#: has more.
+#: Penner's rolling friction of a putting green (2002, The run of a golf ball, p. 935; greens span 0.065
+#: to 0.196, The physics of putting, p. 85), as quoted by golf simulators. A fairway has more.
 GREEN_ROLLING_FRICTION = 0.131
-
-
 #: A putt across a whole green, some 15 m with that friction, m/s.
 _FASTEST_PUTT = 5.0
 
@@ -41,13 +42,13 @@ class NoRestError(ns.NonsmoothError, RuntimeError):
 
 
 @dataclass(frozen=True)
-class Bounce:
+class Bounce(Generic[S]):
     """One bounce and the hop after it.
 
     Attributes
     ----------
-    t, x : float
-        Touch-down, s and m.
+    t, x, z : float
+        Touch-down, s, and its place forward and to the right, m.
     rebound : Rebound
         The bounce itself: landing, lift-off and how it was found.
     hop : Flight or None
@@ -56,24 +57,25 @@ class Bounce:
 
     t: float
     x: float
-    rebound: Rebound
-    hop: Flight | None
+    rebound: Rebound[S]
+    hop: Flight[S] | None
+    z: float = 0.0
 
 
 @dataclass(frozen=True)
 class Glide:
-    """A stretch on the ground with constant acceleration: ``mode`` is "+", "-" (slip) or "s" (rolls).
+    """A stretch on the ground, sliding or rolling.
 
     Attributes
     ----------
     mode : str
-        Whether the ball slips or rolls.
+        "+" or "-" (slips forward or in reverse), with side spin "*" (slips), or "s" (rolls).
     t, x, xdot : float
-        At its start.
+        At its start: time, place forward and velocity forward.
     time : float
         Duration, s.
     acceleration : float
-        m/s².
+        Forward, at its start, m/s². It is constant unless a side slope bends the path.
     """
 
     mode: str
@@ -82,15 +84,31 @@ class Glide:
     xdot: float
     time: float
     acceleration: float
+    _path: Callable[[Array], Array]
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """Return place and velocity along the ground at times after its start.
+
+        Parameters
+        ----------
+        t : array_like (...)
+            From 0 to ``time``, s.
+
+        Returns
+        -------
+        ndarray (..., 4)
+            x, z, xdot, zdot: forward and to the right.
+        """
+        return self._path(np.asarray(t, dtype=float))[..., :4]
 
     @property
     def end(self) -> float:
-        """Where it ends, m."""
-        return self.x + self.xdot * self.time + self.acceleration * self.time**2 / 2
+        """Where it ends, forward, m."""
+        return float(self(self.time)[0])
 
 
-@dataclass(frozen=True)
-class Run:
+@dataclass(frozen=True, repr=False)
+class Run(Generic[S]):
     """A shot from its first touch-down to rest.
 
     Attributes
@@ -101,11 +119,10 @@ class Run:
         Sliding and rolling, in order; empty if the ball stops dead.
     time : float
         Until rest, s.
-    run_out : float
-        From the first touch-down to rest, m; negative is back.
+    run_out, side : float
+        From the first touch-down to rest, forward (negative is back) and to the right, m.
     left_out : float
-        Estimate of the distance of the hops below ``min_height``, m: that of the hop that the last
-        bounce would have made.
+        Estimate of the way forward of the hops below ``min_height``: that of the first of them, m.
     extrapolated : int
         How many of the landings are outside those that the law was fitted to; most later hops are
         slower than any that was measured.
@@ -113,13 +130,14 @@ class Run:
         What of the first landing and of the roll is an extrapolation.
     """
 
-    bounces: tuple[Bounce, ...]
+    bounces: tuple[Bounce[S], ...]
     glides: tuple[Glide, ...]
     time: float
     run_out: float
     left_out: float
     extrapolated: int = 0
     cautions: tuple[str, ...] = ()
+    side: float = 0.0
 
     @property
     def first_height(self) -> float:
@@ -128,14 +146,23 @@ class Run:
         return 0.0 if hop is None else hop.height
 
     @property
+    def kick(self) -> float:
+        """Of the first bounce, rad, right positive."""
+        return self.bounces[0].rebound.kick
+
+    @property
     def bounced(self) -> float:
-        """Distance from the first to the last touch-down, m."""
+        """Distance from the first to the last touch-down, forward, m."""
         return self.bounces[-1].x
 
     @property
     def rolled(self) -> float:
-        """Distance that the ball rolls, m (negative is back)."""
+        """Distance that the ball rolls, forward, m (negative is back)."""
         return sum(g.end - g.x for g in self.glides if g.mode == "s")
+
+    @property
+    def _in_space(self) -> bool:
+        return isinstance(self.bounces[0].rebound.landing, SideState)
 
     def path(self, points: int = 50) -> Array:
         """Return points of the path.
@@ -147,10 +174,11 @@ class Run:
 
         Returns
         -------
-        ndarray (n, 3)
-            t (s), x and y (m) from the first touch-down.
+        ndarray (n, 3) or (n, 4)
+            t (s), x and y (m) from the first touch-down; z too if it landed with a SideState.
         """
-        rows = [np.array([[0.0, 0.0, 0.0]])]
+        axes = 4 if self._in_space else 3
+        rows = [np.zeros((1, axes))]
         for bounce in self.bounces:
             if bounce.hop is not None:
                 t = np.linspace(0.0, bounce.hop.time, points)
@@ -158,32 +186,34 @@ class Run:
                 rows.append(np.column_stack([start + t, bounce.hop(t)]))
         for glide in self.glides:
             t = np.linspace(0.0, glide.time, points)
-            x = glide.x + glide.xdot * t + glide.acceleration * t**2 / 2
-            rows.append(np.column_stack([glide.t + t, x, np.zeros_like(t)]))
+            x, z = glide(t)[:, :2].T
+            rows.append(np.column_stack([glide.t + t, x, np.zeros_like(t), z])[:, :axes])
         return np.concatenate(rows)
 
     def __repr__(self) -> str:
+        side = f" and {self.side:.3g} m to the right" if self._in_space else ""
         return (
             f"Run({len(self.bounces)} bounces, first {self.first_height:.3g} m high, bounced "
-            f"{self.bounced:.3g} m, rolled {self.rolled:.3g} m, run-out {self.run_out:.4g} m in "
+            f"{self.bounced:.3g} m, rolled {self.rolled:.3g} m, run-out {self.run_out:.4g} m{side} in "
             f"{self.time:.3g} s)"
         )
 
 
 def play(
-    model: Model,
-    landing: Landing,
+    model: Model | Contact3D,
+    landing: S,
     ball: Ball = GOLF,
     *,
     scaling: Scaling | None = None,
     air: Air | None = None,
     slope: float = 0.0,
+    side_slope: float = 0.0,
     rolling_friction: float = GREEN_ROLLING_FRICTION,
     sliding_friction: float | None = None,
     min_height: float = 5e-3,
     max_bounces: int = 1000,
     tol: float = 1e-10,
-) -> Run:
+) -> Run[S]:
     """Follow a shot from its first touch-down to rest.
 
     The ball bounces until it would hop less than ``min_height`` above the ground, or a law keeps it
@@ -192,18 +222,19 @@ def play(
 
     Parameters
     ----------
-    model : BounceLaw or ContactModel
-        What every bounce follows.
-    landing : Landing
-        The first landing, in SI units.
+    model : BounceLaw, ContactModel or Contact3D
+        What every bounce follows; see :func:`rebound`.
+    landing : Landing or SideState
+        The first landing, in SI units and in the axes of the ground; a SideState has side spin.
     ball : Ball, optional
         Radius, mass and moment of inertia; default ``bounce.golf.GOLF``.
     scaling : Scaling, optional
         Needed for a contact model, see :func:`rebound`.
     air : Air, optional
         Drag and lift; none by default.
-    slope : float, optional
-        Of the ground, rad, uphill for positive x; speeds are along and normal to it.
+    slope, side_slope : float, optional
+        Of the ground, rad, uphill forward and to the right; speeds are along and normal to it. A side
+        slope needs a SideState.
     rolling_friction : float, optional
         The lever of the rolling torque over the radius; default that of a putting green.
     sliding_friction : float, optional
@@ -211,7 +242,7 @@ def play(
     min_height : float, optional
         m; 5 mm is Penner's choice (2002, p. 935).
     max_bounces : int, optional
-        After so many the run ends with a status that says so.
+        The most bounces before an error.
     tol : float, optional
         Relative tolerance.
 
@@ -248,46 +279,42 @@ def play(
     Run(13 bounces, first 2.14 m high, bounced 23 m, rolled 0.183 m, run-out 23.19 m in 4.94 s)
     """
     require_positive(rolling_friction=rolling_friction, min_height=min_height)
-    if not LIMITS["in (-pi/2, pi/2)"](number(slope, "slope", ns.OptionError)):
-        raise ns.OptionError(f"slope: expected radians in (-pi/2, pi/2), received {slope!r}.")
-    turf = ground(model, ball, scaling, tol)
+    turf = ground(model, ball, scaling, tol, side_slope)
+    gravity = gravity_on(landing, "landing", slope, side_slope)
     turf.require_slope(slope)
-    bounces: list[Bounce] = []
-    t, x = 0.0, 0.0
+    bounces: list[Bounce[S]] = []
+    t, x, z, state = 0.0, 0.0, 0.0, landing
     while True:
         if len(bounces) >= max_bounces:
             raise NoRestError(
-                f"max_bounces: expected rest within {max_bounces} bounces, received a hop of "
-                f"{_height(landing, slope):.3g} m before the next. Raise max_bounces or min_height "
-                f"({min_height:g} m); with a restitution of 1, or down a slope, there may be no rest."
+                f"max_bounces: the ball still hops {_height(state, gravity):.3g} m after {max_bounces} "
+                f"bounces. Raise max_bounces or min_height ({min_height:g} m); with a restitution of 1, "
+                "or down a slope, there may be no rest."
             )
-        hit = turf.rebound(landing)
+        hit = turf.rebound(state)
         off, hop = hit.lift_off, None
-        if off.ydot > 0.0 and hit.y + _height(off, slope) >= min_height:
-            hop = flight(off, ball, air=air, slope=slope, start=(x + hit.x, hit.y), tol=tol)
-        bounces.append(Bounce(t, x, hit, hop))
-        t, x = t + hit.time, x + hit.x
+        if upward(off) > 0.0 and hit.y + _height(off, gravity) >= min_height:
+            options = dict(slope=slope, side_slope=side_slope, tol=tol)
+            hop = flight(off, ball, air=air, start=(x + hit.x, hit.y, z + hit.z), **options)
+        bounces.append(Bounce(t, x, hit, hop, z))
+        t, x, z = t + hit.time, x + hit.x, z + hit.z
         if hop is None:
             break
-        t, x, landing = t + hop.time, x + hop.range, hop.landing
-    mu = turf.mu if sliding_friction is None else sliding_friction
-    glides = _glides(off, ball, t, x, slope, mu, rolling_friction)
-    left_out = 2 * max(off.ydot, 0.0) * off.xdot / (GRAVITY * math.cos(slope))
+        t, x, z, state = t + hop.time, x + hop.range, z + hop.side, hop.landing
+    mu = turf.model.values["mu"] if sliding_friction is None else sliding_friction
+    glides, fastest = _glides(off, ball, t, np.array([x, z]), gravity, mu, rolling_friction, tol)
     if glides:
-        t, x = t + sum(g.time for g in glides), glides[-1].end
-    fastest = max((abs(g.xdot) for g in glides if g.mode == "s"), default=0.0)
-    cautions = (
-        *turf.cautions(bounces[0].rebound.landing),
-        *roll_cautions(fastest, rolling_friction),
-    )
+        t, (x, z) = t + sum(g.time for g in glides), glides[-1](glides[-1].time)[:2].tolist()
+    forward = float(in_space(off).velocity[0])
+    left_out = 2 * max(upward(off), 0.0) * forward / -float(gravity[1])
+    cautions = (*turf.cautions(landing), *_roll_cautions(fastest, rolling_friction))
     for caution in cautions:
         warnings.warn(caution, ExtrapolationWarning, stacklevel=2)
     extrapolated = sum(bool(turf.cautions(b.rebound.landing)) for b in bounces)
-    return Run(tuple(bounces), glides, t, x, left_out, extrapolated, cautions)
+    return Run(tuple(bounces), tuple(glides), t, x, left_out, extrapolated, cautions, z)
 
 
-def roll_cautions(fastest: float, rolling_friction: float) -> tuple[str, ...]:
-    """Say where the default friction is used for a ball that rolls as no putt does."""
+def _roll_cautions(fastest: float, rolling_friction: float) -> tuple[str, ...]:
     if rolling_friction != GREEN_ROLLING_FRICTION or fastest <= _FASTEST_PUTT:
         return ()
     return (
@@ -297,40 +324,77 @@ def roll_cautions(fastest: float, rolling_friction: float) -> tuple[str, ...]:
     )
 
 
-def _height(launch: Landing, slope: float) -> float:
-    return launch.ydot**2 / (2 * GRAVITY * math.cos(slope))
+def _height(state: S, gravity: Array) -> float:
+    """Height of a parabola that begins or ends with a state."""
+    return float(upward(state) ** 2 / (-2 * gravity[1]))
 
 
 def _glides(
-    off: Landing, ball: Ball, t: float, x: float, slope: float, mu: float, rolling: float
-) -> tuple[Glide, ...]:
-    """Slide until the ball rolls, then roll to rest."""
-    down, along = GRAVITY * math.cos(slope), GRAVITY * math.sin(slope)
-    k = ball.inertia
-    glides: list[Glide] = []
-    u, slip = off.xdot, off.xdot + ball.radius * off.omega
-    if abs(slip) > 1e-12 * abs(u):
-        sign = math.copysign(1.0, slip)
-        decay = sign * mu * down * (1 + 1 / k) + along  # of the slip
-        if decay * sign <= 0.0:
-            raise NoRestError(
-                f"slope: expected one on which friction stops the slip, received {slope:g} rad with "
-                f"mu = {mu:g}: the ball slides down for ever."
-            )
-        slide = Glide("+" if sign > 0 else "-", t, x, u, slip / decay, -sign * mu * down - along)
-        glides.append(slide)
-        t, x, u = t + slide.time, slide.end, u + slide.acceleration * slide.time
-    resist, pull = rolling * down / (1 + k), -along / (1 + k)
-    while True:
-        moving = math.copysign(1.0, u) if u != 0.0 else math.copysign(1.0, pull)
-        acceleration = pull - moving * resist
-        if u == 0.0 and acceleration * moving <= 0.0:
-            return tuple(glides)
-        if acceleration * moving >= 0.0:
-            raise NoRestError(
-                f"slope: expected one on which a rolling ball stops, received {slope:g} rad with a "
-                f"rolling friction of {rolling:g}: it needs |tan(slope)| below that."
-            )
-        glide = Glide("s", t, x, u, -u / acceleration, acceleration)
-        glides.append(glide)
-        t, x, u = t + glide.time, glide.end, 0.0
+    off: S, ball: Ball, t: float, x: Array, gravity: Array, mu: float, rolling: float, tol: float
+) -> tuple[list[Glide], float]:
+    """Slide until the ball rolls, then roll to rest; and the speed with which it begins to roll."""
+    state, normal, pull, k = in_space(off), -float(gravity[1]), gravity[[0, 2]], ball.inertia
+    glides, v = list[Glide](), state.velocity[[0, 2]]
+    slip = v + ball.radius * np.array([state.spin[2], -state.spin[0]])
+    if np.hypot(*slip) > 1e-12 * np.hypot(*v):
+        mode = "*" if isinstance(off, SideState) else "+" if slip[0] > 0 else "-"
+        start = np.concatenate([x, v, slip])
+        glides.append(_glide(mode, t, start, pull, mu * normal, 1 + 1 / k, tol))
+        t, (x, v) = t + glides[0].time, np.split(glides[0](glides[0].time), 2)
+    if np.hypot(*pull) >= rolling * normal:
+        raise _no_rest("rolling", pull, rolling * normal)
+    speed = float(np.hypot(*v))
+    if speed > 0.0:
+        start, share = np.concatenate([x, v, v]), 1 + k
+        glides.append(_glide("s", t, start, pull / share, rolling * normal / share, 1.0, tol))
+    return glides, speed
+
+
+def _glide(
+    mode: str, t: float, start: Array, pull: Array, friction: float, lever: float, tol: float
+) -> Glide:
+    """Follow place, velocity and h, the slip or the velocity, until h is zero."""
+    place, v, h = np.split(start, 3)
+    size = float(np.hypot(*h))
+    e = h / size
+    acceleration = pull - friction * e
+    straight = pull[0] * h[1] == pull[1] * h[0]  # the direction of friction stays
+    decay = friction * lever - float(pull @ e if straight else np.hypot(*pull))
+    if decay <= 0.0:
+        raise _no_rest("the slip", pull, friction * lever)
+    time = size / decay
+    path: Callable[[Array], Array] = partial(_parabola, place, v, acceleration)
+    if not straight:
+        values = dict(pull_0=pull[0], pull_1=pull[1], friction=friction, lever=lever)
+        run = ns.simulate(_ground_system(), start, 1.01 * time, parameters=values, tol=tol)
+        ends = (e.t for e in run.events if e.kind in ("entry", "crossing"))
+        time, path = next(ends, run.events[-1].t), run
+    return Glide(mode, t, float(place[0]), float(v[0]), time, float(acceleration[0]), path)
+
+
+def _parabola(place: Array, v: Array, acceleration: Array, t: Array) -> Array:
+    s = t[..., None]
+    places = place + v * s + acceleration * s**2 / 2
+    return np.concatenate([places, v + acceleration * s], axis=-1)
+
+
+def _no_rest(what: str, pull: Array, friction: float) -> NoRestError:
+    return NoRestError(
+        f"slope: gravity pulls along the ground with {np.hypot(*pull):.3g} m/s2, and friction against "
+        f"{what}, {friction:.3g} m/s2, does not stop the ball. Use a gentler slope or more friction."
+    )
+
+
+@lru_cache
+def _ground_system() -> ns.FilippovSystem:
+    """A ball that slides or rolls until h, its slip or its velocity, is zero."""
+    x, v, h, pull, lam = (ca.SX.sym(n, 2) for n in ("x", "v", "h", "pull", "lambda"))
+    friction, lever = ca.SX.sym("friction"), ca.SX.sym("lever")
+    force = -friction * lam
+    return ns.FilippovSystem(
+        ca.vertcat(x, v, h),
+        field=ca.vertcat(v, pull + force, pull + force * lever),
+        surfaces=[h],
+        multipliers=[lam],
+        parameters=ca.vertcat(pull, friction, lever),
+    )

@@ -89,7 +89,7 @@ def rigid_lift_off_3d(
     if not isinstance(law, RigidBounce):
         raise ModelError(
             f"law: expected a RigidBounce, received {law!r}. On a tilted plane the impact is that of its "
-            "own axes; bounce.golf.side_rebound turns a TiltedBounce."
+            "own axes; bounce.golf.rebound turns a TiltedBounce."
         )
     v, w = (_pairs(name, value) for name, value in (("xdot", xdot), ("omega", omega)))
     try:

@@ -130,7 +130,7 @@ def proven_map(
         No contact model of bounces in the plane.
     nonsmooth.ParameterError
         An unknown parameter, or an interval that leaves its limits.
-    nonsmooth.MissingError
+    nonsmooth.proofs.MissingError
         python-flint is not installed.
 
     Examples

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import nonsmooth as ns
 
 from ..errors import require
-from ..golf.fit_result import FitResult
+from ..golf.fits.fit_result import FitResult
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

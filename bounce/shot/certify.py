@@ -29,7 +29,7 @@ class BounceProof:
         Whether it is proven to lift off, and how.
     outcome : {"forward", "reverse", "rolling", "undecided"}
         Slip at lift-off.
-    orbit : nonsmooth.OrbitProof
+    orbit : nonsmooth.proofs.OrbitProof
         Itinerary, events and lift-off in enclosures; its states are those of the model's system.
     why : str
         What stood in the way.
@@ -37,7 +37,7 @@ class BounceProof:
 
     proven: bool
     outcome: str
-    orbit: ns.OrbitProof
+    orbit: ns.proofs.OrbitProof
     why: str
 
     @property
@@ -46,7 +46,7 @@ class BounceProof:
         return self.orbit.itinerary
 
     @property
-    def time(self) -> ns.Enclosure:
+    def time(self) -> ns.proofs.Enclosure:
         """Duration, where it is proven."""
         return self.orbit.t
 
@@ -100,7 +100,7 @@ def certify(
 
     Raises
     ------
-    nonsmooth.MissingError
+    nonsmooth.proofs.MissingError
         python-flint is not installed.
     nonsmooth.ParameterError
         An unknown parameter, or an interval that leaves its limits.

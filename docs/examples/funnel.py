@@ -13,7 +13,7 @@ system = ns.textbook.two_fold("VV-C1").system
 fold = ns.find_two_fold(system, near=[0.0, 0.0, 0.0])
 slope = fold.classification.into.low  # z3/z2 on the canard
 run = ns.simulate(system, [0.0, 0.5, 0.5 * slope], t_end=10.0)
-futures = ns.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
+futures = ns.orbit.funnel(run, t_end=run.t[-1] + 1.0, samples=41)
 
 figure = ns.plot.style.new_figure((7.0, 3.6))
 height, plane = figure.subplots(1, 2)

@@ -56,7 +56,7 @@ blown.set(
     xticks=range(-180, 181, 90),
 )
 blown.set(xlim=(-180, 180), ylim=(0, 1))
-directions = ns.limit_directions(block, [0.0, 0.0])
+directions = ns.local.limit_directions(block, [0.0, 0.0])
 paths.plot([], [], label="a = 0.6 c: comes to rest", **RESTS)
 paths.plot([], [], label="a = 1.5 c: goes on", **GOES)
 paths.plot(0, 0, "k.", zorder=5)
@@ -68,7 +68,11 @@ strengths = {"m1": 2.0, "m2": 0.6}
 counts = np.array(
     [
         [
-            len(ns.limit_directions(block, [0.0, 0.0], parameters={"a1": x, "a2": y, **strengths}))
+            len(
+                ns.local.limit_directions(
+                    block, [0.0, 0.0], parameters={"a1": x, "a2": y, **strengths}
+                )
+            )
             for x in loads
         ]
         for y in loads

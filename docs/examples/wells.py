@@ -21,7 +21,7 @@ system = ns.FilippovSystem(
 )
 grid = {"x": np.linspace(-4, 4, 160), "v": np.linspace(-3.5, 3.5, 140)}
 found = ns.basins(system, grid, t_end=150.0, work=ns.Work(progress=False))
-edge = ns.manifold(system, ns.fold_fold(system, [0.0, 0.0]), length=34.0, spacing=0.01)
+edge = ns.manifold(system, ns.local.fold_fold(system, [0.0, 0.0]), length=34.0, spacing=0.01)
 
 outward = next(arc for arc in edge.arcs if arc.points[5, 0] > 0).points
 turn = int(np.flatnonzero(outward[:-1, 1] * outward[1:, 1] < 0)[0])

@@ -19,10 +19,11 @@ The contract of events, the same in every engine (``tests/flow/test_contract.py`
    on from the side where it was to the other.
 """
 
-from .drawn import Grid, RandomStarts
-from .ensemble import ensemble
+from .ensembles.ensemble import ensemble
+from .ensembles.lazy_starts import Grid, RandomStarts
+from .ensembles.outcomes import Outcomes, outcomes
+from .ensembles.work import Work
 from .follow import follow
-from .outcomes import Outcomes, outcomes
 from .reference.polynomial import first_crossing, first_root
 from .results import Ensemble
 from .saving import load
@@ -30,7 +31,6 @@ from .section import Section
 from .simulate import simulate
 from .status import Status
 from .trajectory import Event, Segment, Trajectory
-from .work import Work
 
 __all__ = [
     "Ensemble",

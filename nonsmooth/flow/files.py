@@ -22,16 +22,7 @@ _CAREFULLY = os.O_RDONLY | sum(
 
 
 def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
-    """Return what a file holds, or None where there is no such file.
-
-    Parameters
-    ----------
-    path : Path
-    most : int
-        Size in bytes from which on the file is none of ours.
-    private : bool, optional
-        Read it only if it belongs to this user and nobody else can write it.
-    """
+    """Return what a file holds, or None where there is no such file."""
     try:
         handle = os.open(path, _CAREFULLY)
     except (OSError, ValueError):
@@ -51,13 +42,7 @@ def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
 
 
 def replace(path: Path, data: bytes) -> None:
-    """Write a file at once.
-
-    Raises
-    ------
-    OSError
-        It cannot be written; what was there before still is.
-    """
+    """Write a file at once."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=PART)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -69,15 +54,7 @@ def replace(path: Path, data: bytes) -> None:
 
 
 def fault(facts: os.stat_result) -> str:
-    """Why a file or folder is not this user's alone to write; empty where it is.
-
-    Examples
-    --------
-    >>> import os, tempfile
-    >>> with tempfile.TemporaryDirectory() as folder:
-    ...     fault(os.stat(folder))
-    ''
-    """
+    """Why a file or folder is not this user's alone to write; empty where it is."""
     if not hasattr(os, "geteuid"):  # a system without owners and modes of this kind
         return ""
     if facts.st_uid != os.geteuid():

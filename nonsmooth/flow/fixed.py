@@ -16,8 +16,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, ConvergenceError, Evaluator
+from ..model.derivatives.variational import ORDER
 from ..model.printing.tape import Series, Values
-from ..model.variational import ORDER
 from .compiled.shooting import FollowedProgram
 from .compiled.smooth import LegsProgram, SmoothProgram, ValuesProgram
 from .compiled.tape import library
@@ -60,27 +60,7 @@ class CompiledField(SmoothField, Protocol):
 def flow_for(
     field: CompiledField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
 ) -> Array:
-    """State of a smooth flow after a duration of either sign.
-
-    Parameters
-    ----------
-    field : SmoothField
-    z : ndarray (m,)
-    p : ndarray
-    duration : float
-    tol : float, optional
-        Local error relative to the size of each group of states, which is at least the distance
-        that its rate covers in the whole duration.
-
-    Returns
-    -------
-    ndarray (m,)
-
-    Raises
-    ------
-    ConvergenceError
-        The field is not finite on the way, or steps become too small.
-    """
+    """State of a smooth flow after a duration of either sign."""
     if duration and has_interpreter():
         end, left = program_of(field).flow(z, p, duration, tol, MOST_STEPS)
         if left:
@@ -125,15 +105,8 @@ class Evaluated(Protocol):
 def legs_program(
     fields: Sequence[CompiledField], events: Sequence[Evaluated | None], parameters: int
 ) -> LegsProgram:
-    """Legs of smooth fields, with expressions of the state at their ends, to be flown in one call.
-
-    Parameters
-    ----------
-    fields : sequence of CompiledField
-        Of each leg.
-    events : sequence of Evaluated or None
-    parameters : int
-    """
+    """Legs of smooth fields, with expressions of the state at their ends, to be flown in one
+    call."""
     return LegsProgram(
         [program_of(field) for field in fields],
         [None if event is None else values_program(event) for event in events],
@@ -148,19 +121,7 @@ def followed_program(
     plain: Sequence[Evaluated],
     dimensions: tuple[int, int, int],
 ) -> FollowedProgram:
-    """Legs to be followed one after the other.
-
-    Parameters
-    ----------
-    fields : sequence of CompiledField
-        Of each leg, with functions that are watched.
-    ends : sequence of tuple of int
-        The function that ends a leg, and its direction.
-    events, plain : sequence of Evaluated
-        What happens there, with derivatives and without.
-    dimensions : tuple of int
-        States with the time, and without; parameters.
-    """
+    """Legs to be followed one after the other."""
     own = [[values_program(event) for event in each] for each in (events, plain)]
     rows, directions = zip(*ends, strict=True)
     programs = [program_of(field) for field in fields]
@@ -176,10 +137,8 @@ def values_program(event: Evaluated) -> ValuesProgram:
 def steps_for(
     field: SmoothField, z: Array, p: Array, duration: float, tol: float = TOLERANCE
 ) -> Iterator[tuple[float, Array, Array]]:
-    """The steps of ``flow_for``: length (with its sign), coefficients (m, order + 1), end (m,).
-
-    The coefficients are overwritten by the next step.
-    """
+    """The steps of ``flow_for``: length (with its sign), coefficients (m, order + 1), end (m,)."""
+    # The coefficients are overwritten by the next step.
     left, sign = abs(duration), math.copysign(1.0, duration)
     for _ in range(MOST_STEPS):
         if left == 0.0:

@@ -102,7 +102,7 @@ def follow(
     >>> import casadi as ca, nonsmooth as ns
     >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
     >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[1, 1])
-    >>> run = ns.follow(system, [2.0, 0.0], -10.0, mode="+", until="h0")
+    >>> run = ns.flow.follow(system, [2.0, 0.0], -10.0, mode="+", until="h0")
     >>> run.status.name, run.x[-1].round(12) + 0.0
     ('STOPPED', array([-2.,  0.]))
     """

@@ -7,33 +7,13 @@ import sys
 from dataclasses import dataclass
 
 from ..model import OptionError, explain, real, whole
-from .facts import SAFETY
+from .constants import SAFETY
 from .section import Hits
 
 
 @dataclass(frozen=True)
 class Options:
-    """Tolerances and limits of a run.
-
-    Parameters
-    ----------
-    t_end : float
-        Final time, after ``t_start``.
-    t_start : float
-    rtol, atol : float
-        Local error of state i is kept below ``atol + rtol*abs(x_i)``.
-    max_step : float
-    max_steps, max_events : int
-    start_mode : str or None
-        Continue in this mode from a start where more than one is possible.
-    hits : Hits or None
-        Events that are kept, the last of which may end the run.
-
-    Raises
-    ------
-    OptionError
-        A value out of range.
-    """
+    """Tolerances and limits of a run."""
 
     t_end: float
     t_start: float = 0.0
@@ -72,7 +52,7 @@ class Options:
                     expected=f"a time not before t_start = {self.t_start}",
                     received=repr(self.t_end),
                     advice="Backward motion is not unique in Filippov systems; "
-                    "nonsmooth.follow runs one smooth mode backward.",
+                    "nonsmooth.flow.follow runs one smooth mode backward.",
                 )
             )
         if self.max_step != math.inf:
@@ -84,11 +64,9 @@ class Options:
 
     @property
     def order(self) -> int:
-        """Order of the Taylor method for the relative tolerance.
-
-        A fifth above the optimum of Jorba & Zou (2005, eq. 3-7; 0.5 there), which counts the work of
-        the series only: guards, roots and step size cost as much, and are paid by the step.
-        """
+        """Order of the Taylor method for the relative tolerance."""
+        # A fifth above the optimum of Jorba & Zou (2005, eq. 3-7; 0.5 there), which counts the work of
+        # the series only: guards, roots and step size cost as much, and are paid by the step.
         return max(6, math.ceil(-0.6 * math.log(SAFETY * self.rtol)) + 1)
 
     @property

@@ -11,9 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model import Array, FilippovSystem
-from ..model.cards import card
+from ..notebook import card
 from . import tables
-from .facts import KINDS, SIMPLE_KINDS
+from .constants import KINDS, SIMPLE_KINDS
 from .saving import Savable
 from .status import Status
 
@@ -33,11 +33,10 @@ def kinds_of(system: FilippovSystem) -> tuple[str, ...]:
 
 
 def _block(arrays: Mapping[str, tuple[tuple[int, ...], type]]) -> dict[str, Any]:
-    """Arrays of some shapes and types, large numbers first, in one piece of memory unless they are large.
-
-    The C library gives free memory back to the system when it is twice its largest piece, and pages that
-    were given back take long to get again.
-    """
+    """Arrays of some shapes and types, large numbers first, in one piece of memory unless they
+    are large."""
+    # The C library gives free memory back to the system when it is twice its largest piece, and pages that
+    # were given back take long to get again.
     sizes = [math.prod(shape) * np.dtype(kind).itemsize for shape, kind in arrays.values()]
     if sum(sizes) > _LARGE:
         return {name: np.empty(shape, kind) for name, (shape, kind) in arrays.items()}
@@ -240,20 +239,7 @@ class Ensemble(Savable):
 
 
 class Collected:
-    """Arrays of all trajectories, filled as chunks arrive in any order.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    shape : tuple of int
-        Of the broadcast starts and parameters.
-    at : bool
-        Whether the state at an event is kept.
-    room : int or None
-        Samples kept of each trajectory.
-    arrays : Chunk, optional
-        Where the results go; new arrays in memory unless given.
-    """
+    """Arrays of all trajectories, filled as chunks arrive in any order."""
 
     def __init__(
         self,

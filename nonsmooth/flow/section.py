@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..model import Array, OptionError, periods, whole
-from .facts import KINDS
+from .constants import KINDS
 from .saving import savable
 from .trajectory import Event
 
@@ -86,20 +86,7 @@ class Section:
 
 @dataclass(frozen=True)
 class Hits:
-    """Events that a section keeps.
-
-    Attributes
-    ----------
-    kinds : tuple of str
-    names : tuple of str or None
-        Any name where None.
-    letter : (int, str) or None
-        Only where this surface has this letter before.
-    every, skip, count, after
-        As in :class:`Section`.
-    begin : float
-        What happens up to this time is no hit.
-    """
+    """Events that a section keeps."""
 
     kinds: tuple[str, ...]
     names: tuple[str, ...] | None
@@ -139,18 +126,8 @@ class Hits:
 
 @dataclass(frozen=True)
 class Times:
-    """Times at which runs are looked at, the same for all, or multiples of each one's own period.
-
-    Attributes
-    ----------
-    given : tuple of float
-        The times; without them
-    period : float or str
-        a number, or a serialised function of the parameters, of whose multiples those numbered
-        ``skip + every``, ``skip + 2*every``, ... are taken,
-    count : int
-        so many.
-    """
+    """Times at which runs are looked at, the same for all, or multiples of each one's own
+    period."""
 
     given: tuple[float, ...] = ()
     period: float | str = math.nan

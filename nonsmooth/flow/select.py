@@ -7,7 +7,7 @@ from typing import TypeVar
 from weakref import WeakSet
 
 from ..model import OptionError, explain
-from .compiled.compilers import ADVICE, CompilerError, find_compiler
+from .compiled.building.compilers import ADVICE, CompilerError, find_compiler
 from .warn import CompilerWarning, warn_once
 
 __all__ = ["ENGINES", "CompilerWarning", "compiled_or_none", "use_compiled"]
@@ -24,21 +24,7 @@ _SLOWLY = "The slow reference driver is used."
 
 
 def use_compiled(engine: str, supported: bool = True) -> bool:
-    """Whether to run the compiled engine.
-
-    Parameters
-    ----------
-    engine : {"auto", "reference", "compiled"}
-    supported : bool
-        Whether the system has a compiled engine.
-
-    Raises
-    ------
-    OptionError
-        Another word, or ``"compiled"`` for a system that has none.
-    CompilerError
-        ``"compiled"`` without a compiler.
-    """
+    """Whether to run the compiled engine."""
     if engine not in ENGINES:
         raise OptionError(
             explain("engine", expected=f"one of {ENGINES}", received=repr(engine), advice="")
@@ -67,20 +53,7 @@ def use_compiled(engine: str, supported: bool = True) -> bool:
 
 
 def compiled_or_none(engine: str, of: object, work: Callable[[], T]) -> T | None:
-    """Return what work with the compiled engine returns, or None where it cannot be compiled.
-
-    Parameters
-    ----------
-    engine : {"auto", "compiled"}
-        ``"auto"`` warns where the compiler fails, once; ``"compiled"`` raises.
-    of : object
-        What is compiled; what failed once is not tried again by ``"auto"``.
-    work : callable
-
-    Raises
-    ------
-    CompilerError
-    """
+    """Return what work with the compiled engine returns, or None where it cannot be compiled."""
     if engine == "compiled":
         return work()
     if of in _GIVEN_UP:

@@ -13,12 +13,12 @@ from ..model import Array, FilippovSystem, Parameters, require_system
 from .compiled.arrays import Run
 from .compiled.convert import trajectory
 from .compiled.tape import library, tape_for
-from .facts import HAND_OVER
+from .constants import HAND_OVER
+from .ensembles.starts import require_start_mode
 from .options import Options
 from .reference.driver import Driver
 from .section import Section, Times
 from .select import compiled_or_none, use_compiled
-from .starts import require_start_mode
 from .trajectory import Trajectory
 from .view import read_view, sampled, sectioned
 

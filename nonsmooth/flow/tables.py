@@ -16,13 +16,7 @@ if TYPE_CHECKING:
 
 
 def library(name: str, what: str) -> Any:
-    """Import an optional library.
-
-    Raises
-    ------
-    OptionError
-        It is not installed.
-    """
+    """Import an optional library."""
     try:
         return importlib.import_module(name)
     except ImportError as error:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..model import Array, FilippovSystem, PointError, real_array
-from ..model.cards import card, lines
+from ..notebook import card, lines
 from . import tables
 from .saving import Savable, savable
 from .status import Status
@@ -163,22 +163,7 @@ class Trajectory(Savable):
         return " ".join(s.mode or "o" for s in self.segments)
 
     def __call__(self, t: ArrayLike) -> Array:
-        """Evaluate the dense output.
-
-        Parameters
-        ----------
-        t : array_like (...)
-            Times within the run. At a reset the state after it is returned.
-
-        Returns
-        -------
-        ndarray (..., n)
-
-        Raises
-        ------
-        PointError
-            A time outside the run.
-        """
+        """Evaluate the dense output."""
         times = real_array(t, "time")
         low, high = sorted((float(self.t[0]), float(self.t[-1])))
         slack = 1e-12 * max(1.0, abs(low), abs(high))

@@ -23,7 +23,7 @@ from ..model import (
     surface_of,
     with_section,
 )
-from .facts import AT_END
+from .constants import AT_END
 from .options import Options
 from .section import KINDS_OF_SECTIONS, Hits, Section, Times
 from .trajectory import Trajectory
@@ -31,16 +31,7 @@ from .trajectory import Trajectory
 
 @dataclass(frozen=True)
 class View:
-    """What of a run is looked at.
-
-    Attributes
-    ----------
-    options : Options
-        Those of the run, with the hits that are kept.
-    times : Times or None
-    room : int or None
-        States kept of each run; None where nothing is, or as many as there are.
-    """
+    """What of a run is looked at."""
 
     options: Options
     times: Times | None = None
@@ -50,12 +41,7 @@ class View:
 def read_view(
     system: FilippovSystem, t_eval: ArrayLike | None, at: Any, options: Options, p: Array
 ) -> View:
-    """Read what a user asked for, with the parameters (np,) or (m, np) of all runs.
-
-    Raises
-    ------
-    OptionError
-    """
+    """Read what a user asked for, with the parameters (np,) or (m, np) of all runs."""
     if t_eval is not None and at is not None:
         raise OptionError("t_eval, at: expected one of them, received both. Run twice.")
     if t_eval is not None:
@@ -72,12 +58,8 @@ def read_view(
 
 
 def sectioned(system: FilippovSystem, at: Any) -> tuple[FilippovSystem, Any]:
-    """Give the system the section ``at`` if it is a function of the states, and call it by its name.
-
-    Raises
-    ------
-    DefinitionError, NotSmoothError, OptionError
-    """
+    """Give the system the section ``at`` if it is a function of the states, and call it by its
+    name."""
     section = at if isinstance(at, Section) else None if at is None else Section(at)
     if section is None or isinstance(section.at, str) or is_real(section.at):
         return system, at

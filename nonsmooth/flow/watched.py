@@ -12,44 +12,15 @@ from functools import cached_property
 import numpy as np
 
 from ..model import Array
-from ..model.variational import GuardedField
+from ..model.derivatives.variational import GuardedField
 from .compiled.smooth import WatchProgram
-from .fixed import (
-    MOST_STEPS,
-    TOLERANCE,
-    flow_for,
-    has_interpreter,
-    program_of,
-    steps_for,
-    stuck,
-)
+from .fixed import MOST_STEPS, TOLERANCE, flow_for, has_interpreter, program_of, steps_for, stuck
 from .reference.polynomial import first_crossing, first_root, sign_changes
 
 
 def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: float) -> Array:
-    """Extrema of the guards of a mode along its flow, and their values at the ends of its steps and beside its own.
-
-    Parameters
-    ----------
-    field : GuardedField
-    y : ndarray (N,)
-        Where the flow starts.
-    p : ndarray
-    duration : float
-        Positive.
-    margin : float
-        What is nearer than this to either end of the flow is left out; values at this distance are given.
-
-    Returns
-    -------
-    ndarray (m, 4 + N)
-        Number of the guard, time, value, second derivative (0 at the end of a step), state.
-
-    Raises
-    ------
-    ConvergenceError
-        The field is not finite on the way.
-    """
+    """Extrema of the guards of a mode along its flow, and their values at the ends of its steps
+    and beside its own."""
     if not has_interpreter():
         return _watched(field, y, p, duration, margin)
     if not field.motion.guards:
@@ -62,13 +33,7 @@ def watched(field: GuardedField, y: Array, p: Array, duration: float, margin: fl
 
 
 class LegsWatch:
-    """Guards along many legs at once; legs of no positive duration are not followed.
-
-    Parameters
-    ----------
-    fields : sequence of GuardedField
-        Of each leg.
-    """
+    """Guards along many legs at once; legs of no positive duration are not followed."""
 
     def __init__(self, fields: Sequence[GuardedField]):
         self._fields = list(fields)
@@ -80,30 +45,7 @@ class LegsWatch:
     def __call__(
         self, starts: Sequence[Array], p: Array, durations: Array, ends: float
     ) -> tuple[list[Array], list[Array], list[Array]]:
-        """Watch them.
-
-        Parameters
-        ----------
-        starts : sequence of ndarray (N,)
-        p : ndarray
-        durations : ndarray (L,)
-        ends : float
-            Part of a leg's duration beside its ends that is left out.
-
-        Returns
-        -------
-        rows : list of ndarray (m, 4 + N)
-            Of each leg, as of ``watched``.
-        begins : list of ndarray (N + g, 4)
-            First coefficients of states and guards at its start.
-        values : list of ndarray (g,)
-            Of the guards at its end, if it is followed.
-
-        Raises
-        ------
-        ConvergenceError
-            The field is not finite on the way.
-        """
+        """Watch them."""
         if has_interpreter():
             found = self._program(starts, p, durations, TOLERANCE, MOST_STEPS, ends)
             if found.failed >= 0:
@@ -170,26 +112,7 @@ def passing(
     direction: int,
     still: float,
 ) -> float | None:
-    """Time at which a guard passes zero, whatever the others say; None if it does not.
-
-    Parameters
-    ----------
-    field : GuardedField
-    row : int
-        Which guard.
-    y : ndarray (N,)
-    p : ndarray
-    t_max : float
-    direction : int
-        -1 falling, 1 rising, 0 either.
-    still : float
-        First coefficients of the guard below this are a start on its zero, which does not count.
-
-    Raises
-    ------
-    ConvergenceError
-        The field is not finite on the way.
-    """
+    """Time at which a guard passes zero, whatever the others say; None if it does not."""
     if has_interpreter():
         program = program_of(field)
         t = program.march(y, p, t_max, TOLERANCE, MOST_STEPS, row, direction, still)

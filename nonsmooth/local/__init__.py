@@ -1,27 +1,27 @@
 """WHAT HAPPENS at a point of a surface, without time stepping: regions, folds, two-folds."""
 
+from ..model import mode_field
 from . import two_folds
-from .boundary_equilibria import (
+from .classify import classify
+from .local_object import LocalObject
+from .point.higher_codimension import LimitDirection, limit_directions
+from .point.intersection_range import intersection_range
+from .point.intersections import Continuation, Intersection, intersection
+from .point.regions import Region, alpha, region, sliding_field
+from .point.sliding_branches import SlidingBranch, sliding_branches
+from .searches.boundary_equilibria import (
     BoundaryBifurcation,
     BoundaryEquilibrium,
     boundary_equilibrium,
     find_boundary_equilibrium,
 )
-from .branches import SlidingBranch, sliding_branches
-from .classify import classify
-from .equilibria import Equilibrium, find_equilibrium
-from .find_two_fold import find_two_fold, two_fold
-from .fold_folds import FoldFold, fold_fold
-from .folds import Fold, find_fold, fold
-from .intersection import intersection_range
-from .intersections import Continuation, Intersection, intersection
-from .local_object import LocalObject
-from .pseudo_equilibria import find_pseudo_equilibrium
-from .pseudo_equilibrium import PseudoEquilibrium
-from .regions import Region, alpha, region, sliding_field
-from .search import find_all
-from .two_fold import TwoFold
-from .vector_sets import LimitDirection, limit_directions
+from .searches.equilibria import Equilibrium, find_equilibrium
+from .searches.find_two_fold import find_two_fold, two_fold
+from .searches.fold_folds import FoldFold, fold_fold
+from .searches.folds import Fold, find_fold, fold
+from .searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
+from .searches.search import find_all
+from .searches.two_fold import TwoFold
 
 __all__ = [
     "BoundaryBifurcation",
@@ -51,6 +51,7 @@ __all__ = [
     "intersection",
     "intersection_range",
     "limit_directions",
+    "mode_field",
     "region",
     "sliding_branches",
     "sliding_field",

@@ -2,23 +2,10 @@
 
 from __future__ import annotations
 
-import math
-
-from ..model import DefinitionError, FilippovSystem, explain, real, require_system
+from ..model import DefinitionError, FilippovSystem, explain, require_system
 
 #: A class that is closer than this to a change is not named.
 MARGIN = 1e-6
-
-
-def positive(value: float, name: str) -> float:
-    """Return a positive finite number or raise OptionError."""
-    return real(
-        value,
-        name,
-        expected="a positive finite number",
-        advice="Leave it out for the default.",
-        low=math.nextafter(0.0, 1.0),
-    )
 
 
 def require_surface(system: FilippovSystem) -> None:
@@ -65,13 +52,7 @@ def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
 def parameter_index(
     system: FilippovSystem, name: str, what: str = "parameter", advice: str = "Give its name."
 ) -> int:
-    """Return which of its parameters a system calls by a name.
-
-    Raises
-    ------
-    DefinitionError
-        None of them.
-    """
+    """Return which of its parameters a system calls by a name."""
     if name not in system.parameter_names:
         raise DefinitionError(
             explain(

@@ -9,7 +9,7 @@ from typing import Any
 from numpy.typing import NDArray
 
 from ..model import Array
-from .sides import FIELDS
+from .point.sides import FIELDS
 
 
 @dataclass(frozen=True, eq=False)

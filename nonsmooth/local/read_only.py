@@ -9,20 +9,7 @@ V = TypeVar("V")
 
 
 class ReadOnly(Mapping[str, V]):
-    """A mapping without assignment. Unlike ``types.MappingProxyType`` it can be pickled and copied.
-
-    Parameters
-    ----------
-    values : mapping
-        Copied.
-
-    Examples
-    --------
-    >>> import pickle
-    >>> values = ReadOnly({"L11": 1.0})
-    >>> values, pickle.loads(pickle.dumps(values)) == values == {"L11": 1.0}
-    ({'L11': 1.0}, True)
-    """
+    """A mapping without assignment."""
 
     def __init__(self, values: Mapping[str, V]):
         self._values = dict(values)

@@ -1,11 +1,18 @@
 """WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
 
-from . import complementarity
 from .calls import call
-from .checks import is_real, real, real_array, require_system, whole
-from .clock import Clock
-from .coupled import Coupled, coupled_of
-from .definition import read_function
+from .checks import is_real, real, real_array, whole
+from .definition.clock import Clock
+from .definition.events import Impact, Reset, Stop
+from .definition.found_switches import LiftedSwitch
+from .definition.parse_definition import read_function
+from .definition.periods import is_function, periods, read_period
+from .definition.regularise import regularise
+from .definition.reversal import reversed_system
+from .definition.system import FilippovSystem, require_system
+from .definition.vectors import multiplier_enters
+from .derivatives.sections import SECTION, surface_of, with_section
+from .derivatives.start_maps import StartMap
 from .errors import (
     ConvergenceError,
     DefinitionError,
@@ -17,23 +24,15 @@ from .errors import (
     PointError,
     explain,
 )
-from .evaluators import Evaluator, Resets, Surfaces, evaluator
-from .events import Impact, Reset, Stop
-from .found_switches import LiftedSwitch
-from .layer import Layer, LayerNumbers, Loop, layer_of, loop_at
-from .motion import Motion, followed, motion, watched_functions
-from .multipliers import sliding_multipliers
-from .periods import is_function, periods, read_period
+from .laws import complementarity
+from .laws.coupled import Coupled, Yardsticks, coupled_of
+from .laws.evaluators import Evaluator, Resets, Surfaces, evaluator
+from .laws.layer import Layer, LayerNumbers, Loop, layer_of, loop_at
+from .laws.motion import Motion, followed, mode_field, motion, watched_functions
+from .laws.multipliers import sliding_multipliers
+from .laws.switches import Guard
 from .reading import Parameters
-from .regularise import regularise
-from .reversal import reversed_system
-from .sections import SECTION, surface_of, with_section
-from .start_maps import StartMap
-from .switches import Guard
-from .system import FilippovSystem
 from .values import Array
-from .vectors import multiplier_enters
-from .yardsticks import Yardsticks
 
 __all__ = [
     "SECTION",
@@ -74,6 +73,7 @@ __all__ = [
     "is_real",
     "layer_of",
     "loop_at",
+    "mode_field",
     "motion",
     "multiplier_enters",
     "periods",

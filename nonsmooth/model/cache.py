@@ -15,23 +15,9 @@ CAPACITY = 256
 
 
 class Cache:
-    """A mapping from keys to what they stand for; the least recently used leaves first.
+    """A mapping from keys to what they stand for; the least recently used leaves first."""
 
-    Two threads may use it at once: at worst both build the same thing.
-
-    Parameters
-    ----------
-    capacity : int
-        Things kept.
-
-    Examples
-    --------
-    >>> cache = Cache(2)
-    >>> [cache.get(k, lambda k=k: 10 * k) for k in (1, 2, 1, 3)]
-    [10, 20, 10, 30]
-    >>> len(cache), 2 in cache
-    (2, False)
-    """
+    # Two threads may use it at once: at worst both build the same thing.
 
     def __init__(self, capacity: int = CAPACITY):
         self._capacity = capacity
@@ -56,21 +42,7 @@ class Cache:
 
 
 class Content:
-    """An expression as a key: equal to another one with the same graph over the same symbols.
-
-    Parameters
-    ----------
-    symbols : sequence of SX
-        Symbol vectors.
-    expression : SX
-        In these symbols.
-
-    Examples
-    --------
-    >>> x = ca.SX.sym("x")
-    >>> Content([x], 2 * x + 1) == Content([x], 2 * x + 1), Content([x], x) == Content([x], 2 * x)
-    (True, False)
-    """
+    """An expression as a key: equal to another one with the same graph over the same symbols."""
 
     def __init__(self, symbols: list[ca.SX], expression: ca.SX):
         self._text = ca.Function("content", symbols, [expression]).serialize()

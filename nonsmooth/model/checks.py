@@ -14,7 +14,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import DefinitionError, NonsmoothError, OptionError, PointError, explain
+from .errors import NonsmoothError, OptionError, PointError, explain
 
 _NO_NUMBER = (str, bytes, bool, np.bool_, complex, np.complexfloating)
 
@@ -47,13 +47,7 @@ def real(
     high: float = math.inf,
     error: type[NonsmoothError] = OptionError,
 ) -> float:
-    """Return a finite number from ``low`` to ``high`` or raise.
-
-    Examples
-    --------
-    >>> real(np.float32(0.5), "eps")
-    0.5
-    """
+    """Return a finite number from ``low`` to ``high`` or raise."""
     if not is_real(value) or not low <= float(value) <= high:
         raise error(explain(what, expected=expected, received=repr(value), advice=advice).rstrip())
     return float(value)
@@ -71,10 +65,8 @@ def whole(value: Any, what: str, *, least: int = 1, advice: str = "") -> int:
 
 
 def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArray[np.float64]:
-    """Return an array of real numbers, NaN and inf included, or raise PointError.
-
-    A CasADi column or row is one axis.
-    """
+    """Return an array of real numbers, NaN and inf included, or raise PointError."""
+    # A CasADi column or row is one axis.
     if isinstance(values, np.ndarray) and values.dtype == np.float64 and type(values) is np.ndarray:
         return values
     if isinstance(values, ca.DM) and 1 in values.shape:
@@ -111,30 +103,12 @@ def _number(value: Any) -> bool:
     return is_real(value) or (isinstance(value, float) and not math.isfinite(value))
 
 
-def require_system(value: Any, sets: bool = False) -> None:
-    """Raise DefinitionError unless a value is a FilippovSystem.
-
-    ``sets`` says whether it may have sets of codimension two or more, where multipliers are vectors.
-    """
-    from .system import FilippovSystem
-
-    if not isinstance(value, FilippovSystem):
-        raise DefinitionError(
-            explain(
-                "system",
-                expected="a FilippovSystem",
-                received=f"{value!r} ({type(value).__name__})",
-                advice="Make one with FilippovSystem(states, ...) or "
-                "FilippovSystem.from_expression(states, rhs).",
-            )
-        )
-    if value.sets and not sets:
-        raise DefinitionError(
-            explain(
-                "system",
-                expected="one whose multipliers are scalars, here",
-                received=repr(value),
-                advice="Vector multipliers, sets of codimension two and three, are known to simulate, "
-                "ensemble, sensitivity, region and limit_directions.",
-            )
-        )
+def positive(value: float, name: str) -> float:
+    """Return a positive finite number or raise OptionError."""
+    return real(
+        value,
+        name,
+        expected="a positive finite number",
+        advice="Leave it out for the default.",
+        low=math.nextafter(0.0, 1.0),
+    )

@@ -48,6 +48,10 @@ class DegenerateError(NonsmoothError, ValueError):
     """A genericity condition of the theory fails; the message names which one."""
 
 
+class MissingError(NonsmoothError, ImportError):
+    """A package that an extra of this library installs is missing."""
+
+
 def explain(what: str, *, expected: object, received: object, advice: str) -> str:
     """Compose a message in the one form that the library uses.
 

@@ -34,12 +34,7 @@ def listed(value: Any) -> list[Any]:
 
 
 def scalar(value: Any, what: str) -> ca.SX:
-    """Read a scalar expression or number.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Read a scalar expression or number."""
     if isinstance(value, ca.MX):
         raise DefinitionError(
             f"{what}: expected CasADi SX expressions, received MX. Make the symbols with "
@@ -69,12 +64,7 @@ def matrix(value: Any) -> ca.SX:
 
 
 def column(values: Any, what: str, length: int) -> ca.SX:
-    """Read ``length`` scalars as a column.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Read ``length`` scalars as a column."""
     if values is None:
         raise DefinitionError(
             f"{what}: expected {length} expressions, received none. Give above= and below= with "
@@ -100,12 +90,7 @@ def column(values: Any, what: str, length: int) -> ca.SX:
 
 
 def symbols(values: Any, what: str) -> ca.SX:
-    """Read scalar symbols as a column.
-
-    Raises
-    ------
-    DefinitionError
-    """
+    """Read scalar symbols as a column."""
     items = listed(values)
     for i, item in enumerate(items):
         if not (isinstance(item, ca.SX) and item.is_scalar() and item.is_symbolic()):

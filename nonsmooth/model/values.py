@@ -18,13 +18,7 @@ Array = NDArray[np.float64]
 def parameter_values(
     names: Sequence[str], defaults: Mapping[str, float | None], parameters: Parameters | None
 ) -> Array:
-    """Numbers for all parameters, defaults replaced by ``parameters`` (keys: symbols or names).
-
-    Raises
-    ------
-    ParameterError
-        An unknown name, a missing value or one that is not a finite number.
-    """
+    """Numbers for all parameters, defaults replaced by ``parameters`` (keys: symbols or names)."""
     values, given = dict(defaults), dict[str, Any]()
     if parameters is not None and not isinstance(parameters, Mapping):
         raise ParameterError(
@@ -63,13 +57,7 @@ def parameter_values(
 
 
 def state_values(names: Sequence[str], point: ArrayLike) -> Array:
-    """Numbers for all states.
-
-    Raises
-    ------
-    PointError
-        Wrong shape, not numbers, NaN or inf.
-    """
+    """Numbers for all states."""
     values = real_array(point, "point", f"{len(names)} numbers")
     if values.shape != (len(names),):
         raise PointError(

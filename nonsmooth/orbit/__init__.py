@@ -1,38 +1,28 @@
 """What needs a place and a motion: derivatives of runs, periodic orbits, branches, basins, futures."""
 
-from . import continuation
-from .basins import (
-    Basins,
-    basins,
-)
-from .bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
-from .branch import Branch, BranchEnd, BranchEvent, FarSide
-from .canards import Path, Slider, paths_from
-from .connections import Connection, find_homoclinic
-from .dividing import DividingCurves
-from .dividing_arcs import DividingArc, DividingTracer, Passage, StartCurve, joint_root
-from .dividing_passages import ComputedStarts, EventPassages
-from .find_periodic import VirtualOrbitError, periodic_orbit
-from .follow_equilibria import continue_equilibrium
-from .follow_orbits import continue_orbit
-from .funnels import Departure, Funnel
-from .futures import funnel
-from .itinerary import Arrival, FixedItinerary
-from .lyapunov import (
-    LyapunovSpectrum,
-    lyapunov_spectrum,
-)
-from .manifold import manifold
-from .manifold_growth import Manifold
-from .periodic import PeriodicOrbit
-from .poincare import (
-    PoincareOrbit,
-    poincare,
-)
-from .saltation_matrix import saltation_matrix
-from .sensitivity import Gradient, gradient, sensitivity, vjp
-from .two_fold_curves import TraceError, trace_two_folds
-from .variation import Sensitivity
+from ..solvers import continuation
+from .basins import Basins, basins
+from .branches.bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
+from .branches.branch import Branch, BranchEnd, BranchEvent, FarSide
+from .branches.follow_equilibria import continue_equilibrium
+from .branches.follow_orbits import continue_orbit
+from .branches.two_fold_curves import TraceError, trace_two_folds
+from .homoclinic.homoclinic_orbits import Connection, find_homoclinic
+from .manifolds.canards import Path, Slider, paths_from
+from .manifolds.dividing import DividingCurves
+from .manifolds.dividing_arcs import DividingArc, DividingTracer, Passage, StartCurve, joint_root
+from .manifolds.dividing_passages import ComputedStarts, EventPassages
+from .manifolds.forward_reachable_set import Departure, Funnel, funnel
+from .manifolds.manifold import manifold
+from .manifolds.manifold_growth import Manifold
+from .periodic.find_periodic import VirtualOrbitError, periodic_orbit
+from .periodic.orbit import PeriodicOrbit
+from .runs.itinerary import Arrival, FixedItinerary
+from .runs.lyapunov import LyapunovSpectrum, lyapunov_spectrum
+from .runs.poincare import PoincareOrbit, poincare
+from .runs.saltation_matrix import saltation_matrix
+from .runs.sensitivity import Gradient, gradient, sensitivity, vjp
+from .runs.variation import Sensitivity
 
 __all__ = [
     "Arrival",

@@ -9,20 +9,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..flow.ensemble import ensemble
+from ..flow.ensembles.ensemble import ensemble
+from ..flow.ensembles.work import Work
 from ..flow.saving import savable
 from ..flow.section import Section
 from ..flow.status import Status
-from ..flow.work import Work
-from ..model import (
-    Array,
-    FilippovSystem,
-    OptionError,
-    Parameters,
-    PointError,
-    periods,
-    read_period,
-)
+from ..model import Array, FilippovSystem, OptionError, Parameters, PointError, periods, read_period
 
 #: Labels that are no attractors.
 UNDECIDED, NON_UNIQUE, ACCUMULATION, STOPPED, FAILED = 0, -1, -2, -3, -4
@@ -56,20 +48,7 @@ class Attractor:
 
 
 class Search:
-    """Runs in rounds, and the attractors that they show.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    starts : ndarray (m, n)
-    t_start, t_end, section, near, samples, rounds, parameters, tol, work
-        As in :func:`basins`, read.
-
-    Attributes
-    ----------
-    labels : ndarray of int32 (m,)
-    found : list of Attractor
-    """
+    """Runs in rounds, and the attractors that they show."""
 
     def __init__(
         self,

@@ -17,8 +17,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..flow.ensembles.work import Work, checked_work
 from ..flow.saving import Savable
-from ..flow.work import Work, checked_work
 from ..model import (
     Array,
     FilippovSystem,
@@ -30,15 +30,7 @@ from ..model import (
     require_system,
     whole,
 )
-from .attractors import (
-    ACCUMULATION,
-    FAILED,
-    NON_UNIQUE,
-    STOPPED,
-    UNDECIDED,
-    Attractor,
-    Search,
-)
+from .attractors import ACCUMULATION, FAILED, NON_UNIQUE, STOPPED, UNDECIDED, Attractor, Search
 
 _NAMES = {
     UNDECIDED: "undecided or lost",

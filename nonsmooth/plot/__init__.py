@@ -6,25 +6,21 @@ What they share of colours, dashes and arrows is in ``style``, for pictures of o
 """
 
 from . import style
-from .basin_map import (
-    basins,
-)
+from .basin_map import basins
 from .branches import bifurcation_curves, branch
-from .dividing_picture import dividing_curves
-from .manifold_picture import (
-    manifold,
-)
 from .offline_page import offline_page
 from .orbits import multipliers, periodic_orbit
-from .phase_portrait import phase_portrait
+from .portraits.dividing_curves import dividing_curves
+from .portraits.manifolds import manifold
+from .portraits.phase_portrait import phase_portrait
+from .portraits.sliding_portrait import sliding_portrait
+from .portraits.trajectory import trajectory
 from .proven_ranges import proof_map
-from .sliding_portrait import sliding_portrait
-from .trajectory import trajectory
-from .two_fold_atlas import two_fold_atlas, two_fold_atlas_pages
-from .two_fold_explorer import two_fold_explorer
-from .two_fold_map import two_fold_map
-from .two_fold_portrait import two_fold
-from .two_fold_space import two_fold_3d
+from .two_folds.atlas import two_fold_atlas, two_fold_atlas_pages
+from .two_folds.class_map import two_fold_map
+from .two_folds.explorer import two_fold_explorer
+from .two_folds.flow_in_space import two_fold_3d
+from .two_folds.sliding_portrait import two_fold
 
 __all__ = [
     "basins",

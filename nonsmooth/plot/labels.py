@@ -72,24 +72,7 @@ class _Spot:
 
 
 class Labels(Artist):
-    """Names of things in axes, placed anew each time the figure is drawn.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-        Axes in which the named things are.
-
-    Examples
-    --------
-    >>> from nonsmooth.plot import style
-    >>> figure = style.new_figure((3, 2))
-    >>> ax = figure.add_subplot()
-    >>> line, = ax.plot([0, 1], [0, 1])
-    >>> labels = Labels(ax)
-    >>> labels.name("diagonal", line.get_xydata())
-    >>> [text.get_text() for text in labels.get_children()]
-    ['diagonal']
-    """
+    """Names of things in axes, placed anew each time the figure is drawn."""
 
     def __init__(self, ax: Axes):
         super().__init__()
@@ -110,24 +93,7 @@ class Labels(Artist):
         keep: Keep | None = None,
         **options: Any,
     ) -> None:
-        """Name a thing.
-
-        Parameters
-        ----------
-        text : str
-            Its name.
-        anchors : array_like (m, 2) or (2,)
-            Points of the thing, in data coordinates: the name is put beside one of them.
-        color : str, optional
-            The colour of the thing.
-        inside : bool, optional
-            Put the name on a point instead, as for a region.
-        keep : callable, optional
-            Of points (m, 2) in data coordinates whether the name may cover them, for example that
-            they are in the region in which the thing is.
-        **options
-            Of ``matplotlib.text.Text``.
-        """
+        """Name a thing."""
         points = np.atleast_2d(np.asarray(anchors, dtype=float))
         step = max(1, -(-len(points) // _ANCHORS))
         look = {"fontsize": 8.0, "ha": "center", "va": "center", "color": color, "linespacing": 1.0}

@@ -17,27 +17,8 @@ def is_narrow(ax: Axes) -> bool:
 
 
 def beside(ax: Axes, handles: list[Any], **options: Any) -> None:
-    """Explain what is drawn to the right of the axes, or below them where they fill a narrow figure.
-
-    Parameters
-    ----------
-    ax : matplotlib Axes
-    handles : list
-        Of the legend.
-    **options
-        Of the legend beside the axes, instead of its upper end.
-
-    Examples
-    --------
-    >>> from nonsmooth.plot import style
-    >>> wide, narrow = (style.new_figure((w, 3)).add_subplot() for w in (7, 3.4))
-    >>> for ax in (wide, narrow):
-    ...     beside(ax, [style.line("black", "a line")])
-    >>> wide.get_legend() is None, len(wide.figure.legends)
-    (False, 0)
-    >>> narrow.get_legend() is None, len(narrow.figure.legends)
-    (True, 1)
-    """
+    """Explain what is drawn to the right of the axes, or below them where they fill a narrow
+    figure."""
     if is_narrow(ax):
         figure: Any = ax.get_figure(root=True)
         longest = max((len(str(handle.get_label())) for handle in handles), default=0)

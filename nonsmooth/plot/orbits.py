@@ -13,7 +13,7 @@ from ..model import DefinitionError, OptionError, explain
 from ..orbit import Branch, PeriodicOrbit
 from . import style
 from .labels import Labels
-from .surfaces import draw_surfaces
+from .portraits.surfaces import draw_surfaces
 
 _MODES: dict[str, tuple[str, Any, float]] = {
     "+": (style.ABOVE, "-", 1.8),

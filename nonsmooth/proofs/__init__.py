@@ -10,15 +10,16 @@ from __future__ import annotations
 
 from typing import Any
 
-from .census import Census, Undecided
-from .enclosure import Enclosure
-from .orbit_proof import OrbitProof, ProvenEvent
-from .proof import MissingError, Proof, UnprovenError
+from ..model.errors import MissingError
+from .arithmetic.enclosure import Enclosure
+from .orbits.orbit_proof import OrbitProof, ProvenEvent
+from .points.census import Census, Undecided
+from .proof import Proof, UnprovenError
 
 try:
-    from .certify import certify
-    from .everything import prove_all
-    from .orbits import certify_orbit
+    from .orbits.certify_orbit import certify_orbit
+    from .points.certify import certify
+    from .points.prove_all import prove_all
 except MissingError as error:  # the names are there, and say what is missing when they are called
     _reason = str(error)
 

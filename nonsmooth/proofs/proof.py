@@ -10,13 +10,9 @@ from pathlib import Path
 from typing import Any
 
 from ..model import NonsmoothError
-from .enclosure import Enclosure
+from .arithmetic.enclosure import Enclosure
 
 _WIDTH = 98
-
-
-class MissingError(NonsmoothError, ImportError):
-    """A package that an extra of this library installs is missing."""
 
 
 class UnprovenError(NonsmoothError, RuntimeError):

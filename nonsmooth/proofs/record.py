@@ -7,11 +7,11 @@ from fractions import Fraction
 from typing import Any
 
 from ..model import FilippovSystem
-from .algebra import Difference
-from .arithmetic import Numbers, ends, exact, fraction
-from .described import Written
-from .flint import arb
-from .tape import Program
+from .arithmetic.algebra import Difference
+from .arithmetic.flint import arb
+from .arithmetic.instructions import Program
+from .arithmetic.intervals import Numbers, ends, exact, fraction
+from .surface_functions import Written
 
 FORMAT = "nonsmooth proof 1"
 
@@ -27,11 +27,9 @@ def interval(a: arb) -> list[str]:
 
 
 def graph_of(question: Any, coincident: bool) -> dict[str, Any]:
-    """The surface and the fields as instructions, with constants as exact fractions.
-
-    An instruction is [operation, arguments ...]; ``const`` has its value, ``input`` its vector (0
-    states, 1 parameters, 2 further unknowns) and position, ``power`` its argument and exponent.
-    """
+    """The surface and the fields as instructions, with constants as exact fractions."""
+    # An instruction is [operation, arguments ...]; ``const`` has its value, ``input`` its vector (0
+    # states, 1 parameters, 2 further unknowns) and position, ``power`` its argument and exponent.
     described = question.described
     rows = [[described.h], *described.fields]
     elsewhere = [node for _, node in described.elsewhere]
@@ -64,11 +62,9 @@ def _instructions(program: Program, numbers: Numbers) -> list[list[Any]]:
 
 
 def motion_of(system: FilippovSystem, numbers: Numbers, words: Iterable[str]) -> dict[str, Any]:
-    """A system as instructions: surfaces, field, guards, maps, gaps and restitutions.
-
-    Inputs of vector 3 are multipliers, of vector 4 reactions. Of the modes ``words`` that slide, where
-    F1 - F2 = g G has a common factor g, its node and those of G are named.
-    """
+    """A system as instructions: surfaces, field, guards, maps, gaps and restitutions."""
+    # Inputs of vector 3 are multipliers, of vector 4 reactions. Of the modes ``words`` that slide, where
+    # F1 - F2 = g G has a common factor g, its node and those of G are named.
     written, d = Written(system), system.definition
     tape = written.tape
     lam = [tape.symbol(3, i) for i in range(d.multipliers.numel())]

@@ -98,21 +98,7 @@ class Reference:
 def stated(
     quantity: str, how: str, *digits: str, at: Mapping[str, float] | None = None
 ) -> Reference:
-    """Reference from decimal digits; few digits make the tolerance wider than 1e-9.
-
-    Parameters
-    ----------
-    quantity, how : str
-        See :class:`Reference`.
-    *digits : str
-        One number for each component, as printed in the source.
-    at : mapping, optional
-
-    Examples
-    --------
-    >>> stated("slope", "by differences", ".06665833").tolerance
-    7.500937...e-08
-    """
+    """Reference from decimal digits; few digits make the tolerance wider than 1e-9."""
     numbers = [Decimal(d) for d in digits]
     tolerance = RELATIVE
     for text, number in zip(digits, numbers, strict=True):

@@ -47,7 +47,7 @@ def law(name: str) -> Equations:
 
 
 @cache
-def fold_of(name: str, xp: float = 0.2, yp: float = 0.7) -> ns.TwoFold:
+def fold_of(name: str, xp: float = 0.2, yp: float = 0.7) -> ns.local.TwoFold:
     """Find the two-fold of a named law with X' = xp, Y' = yp."""
     model = law(name)
     return ns.find_two_fold(model.system, near=two_fold_point(model, xp, yp))

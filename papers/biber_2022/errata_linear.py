@@ -135,7 +135,7 @@ def lift_off_time(d2_value: float, gravity: float, load: str = "net") -> float:
     """Time of the first downward zero of the load for touch-down at Y' = -1."""
     equations = linear(mu=0.3, d1=0.1, d2=d2_value, eta=0.5, G=gravity)
     extra = gravity if load == "contact" else 0.0
-    run = ns.follow(
+    run = ns.flow.follow(
         equations.system,
         [0, 0, 0, -1, 1],
         100.0,
@@ -412,7 +412,7 @@ def second_lie() -> Erratum:
 
 
 @cache
-def exit_in_compression() -> ns.Event:
+def exit_in_compression() -> ns.flow.Event:
     """Return the end of rolling for mu=0.3, eta=1, d1=0, d2=0.1, G=0 and start (0,2,0,-1,-2)."""
     run = linear(mu=0.3, d1=0.0, d2=0.1, eta=1.0, G=0.0).bounce([0, 2, 0, -1, -2])
     return next(e for e in run.events if e.kind == "exit")
@@ -480,7 +480,7 @@ def isotropic() -> Erratum:
         if friction:
             run = model.bounce([0, 0.5, 0, -1, 0])
         else:
-            run = ns.follow(model.system, [0, 0.5, 0, -1, 0], 4.0, mode="+", until="lift-off")
+            run = ns.flow.follow(model.system, [0, 0.5, 0, -1, 0], 4.0, mode="+", until="lift-off")
         return float(run.x[-1, 1]), float(run.x[-1, 3])
 
     without, with_friction = end(0.0), end(0.3)

@@ -30,7 +30,7 @@ LIFT_OFF = {"ydot": ("0.6", "1"), "omega": ("-0.6", "0.6")}
 
 
 @cache
-def two_fold_proof() -> ns.Proof:
+def two_fold_proof() -> ns.proofs.Proof:
     """The ball's two-fold for all parameters and lift-off speeds of the ranges."""
     fold = ns.find_two_fold(
         paper_ball().system(), near=[-0.06, 0.1, -0.1, 0.8, -0.1], hold=["ydot", "omega"]
@@ -39,7 +39,7 @@ def two_fold_proof() -> ns.Proof:
 
 
 @cache
-def neighbour(name: str) -> ns.OrbitProof:
+def neighbour(name: str) -> ns.proofs.OrbitProof:
     """Trajectory B or C of Fig. 10, with its parameters as decimals."""
     data = kv_pert_data()
     ball = bounce.KelvinVoigt(load="net", **data["parameters"])
@@ -47,7 +47,7 @@ def neighbour(name: str) -> ns.OrbitProof:
     return ns.certify_orbit(ball.system(), start, 10, numbers="written")
 
 
-def _everywhere(proof: ns.Proof, word: str) -> bool:
+def _everywhere(proof: ns.proofs.Proof, word: str) -> bool:
     pieces = proof.pieces or (proof,)
     return proof.proven and all(word in p.statement for p in pieces)
 
@@ -156,7 +156,7 @@ def _oscillation(t: ca.SX, u: ca.SX, rate: ca.SX, d: ca.SX, stiff: ca.SX) -> tup
 
 
 @cache
-def canard_speed() -> ns.Census:
+def canard_speed() -> ns.proofs.Census:
     """Every speed and time at which load and tangential force of the rolling ball vanish together."""
     both, values = rolling_ball()
     return ns.prove_all(
@@ -170,7 +170,7 @@ def canard_speed() -> ns.Census:
 
 
 @cache
-def canard_orbit() -> ns.OrbitProof:
+def canard_orbit() -> ns.proofs.OrbitProof:
     """The canard until shortly before its lift-off, with an edge of the friction cone as a stop."""
     data = kv_pert_data()
     speed, time = (canard_speed().zeros[0].point[name] for name in ("V", "t"))
@@ -224,7 +224,7 @@ def canard() -> Claim:
     )
 
 
-def _only(found: ns.Census) -> bool:
+def _only(found: ns.proofs.Census) -> bool:
     return found.complete and len(found.zeros) == 1
 
 

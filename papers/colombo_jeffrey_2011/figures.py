@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 from nonsmooth.plot import style as look
-from nonsmooth.plot.two_fold_map import FILLS
+from nonsmooth.plot.two_folds.class_map import FILLS
 
 from .. import pictures
 from .model import BEND, CALM, CLASSES, RECURRENT, excursions, recurrent, slid_from

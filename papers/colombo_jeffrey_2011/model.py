@@ -64,7 +64,9 @@ def arrivals(numbers: Numbers) -> int:
 def repelling_arrivals(numbers: Numbers) -> int:
     """How many of the opposite ring, in repelling sliding, end there if they stay in the surface."""
     system, folds = normal_form(numbers), ["L_F1 h", "L_F2 h"]
-    runs = [ns.follow(system, [0.0, *-p], 20.0, mode="s", until=folds, tol=1e-9) for p in ring()]
+    runs = [
+        ns.flow.follow(system, [0.0, *-p], 20.0, mode="s", until=folds, tol=1e-9) for p in ring()
+    ]
     return sum(float(np.abs(r.x[-1]).max()) < 1e-6 for r in runs)
 
 
@@ -121,7 +123,7 @@ def excursions(count: int = 40, seed: int = 1) -> tuple[Excursion, ...]:
 @cache
 def slid_from(start: tuple[float, ...]) -> Array:
     """Sliding orbit from the two-fold to a point of repelling sliding near it; (m, 3)."""
-    back = ns.follow(recurrent(), start, -5.0, mode="s", until=_close(), tol=1e-8)
+    back = ns.flow.follow(recurrent(), start, -5.0, mode="s", until=_close(), tol=1e-8)
     return back(np.linspace(back.t[0], back.t[-1], 60))[::-1]
 
 

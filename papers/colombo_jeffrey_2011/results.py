@@ -114,7 +114,7 @@ def severed() -> Claim:
     runs = [ns.simulate(system, [0.0, *p], 20.0, tol=1e-11) for p in ring()]
     worst = float(np.abs([r.t[-1] for r in runs] - fold.reach_time(ring())).max())
     past = sum(r.status is ns.Status.NON_UNIQUE for r in runs)
-    onward = ns.funnel(system, [0.0, 0.0, 0.0], 0.5)
+    onward = ns.orbit.funnel(system, [0.0, 0.0, 0.0], 0.5)
     sides = "".join(sorted({d.side for d in onward.departures}))
     gap = float(np.linalg.norm(np.ptp(onward(0.5), axis=0)))
     return Claim(

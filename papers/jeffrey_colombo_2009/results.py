@@ -289,7 +289,7 @@ def determinacy() -> Claim:
     expected = fold.reach_time(ring(RING))
     worst = max(abs(r.t[-1] - t) for r, t in zip(runs, expected, strict=True))
     stopped = sum(r.status is ns.Status.NON_UNIQUE for r in runs)
-    onward = ns.funnel(system(), [0.0, 0.0, 0.0], 0.5)
+    onward = ns.orbit.funnel(system(), [0.0, 0.0, 0.0], 0.5)
     sides = "".join(sorted({d.side for d in onward.departures}))
     spread = float(np.linalg.norm(np.ptp(onward(0.5), axis=0)))
     return Claim(

@@ -49,7 +49,7 @@ def pseudo_equilibria(alpha: float) -> list[float]:
 @cache
 def landing(alpha: float) -> tuple[float, float]:
     """Time and x1 at which the orbit from the fold of the free field comes back to the threshold."""
-    run = ns.follow(
+    run = ns.flow.follow(
         SYSTEM, [FREE_FOLD, alpha], 200.0, mode="-", parameters=at(alpha), until="h0", tol=1e-13
     )
     return float(run.t[-1]), float(run.x[-1, 0])
@@ -91,7 +91,7 @@ def free_cycle() -> tuple[float, Array]:
     x1 = SYSTEM.extended_states[0]
     top = 2.4
     for _ in range(8):  # the return map contracts by some 1e-4
-        run = ns.follow(
+        run = ns.flow.follow(
             SYSTEM,
             [FREE_FOLD, top],
             200.0,

@@ -35,7 +35,7 @@ from benchmarks.peers import (
     scipy_dop853,
     scipy_shooting,
 )
-from nonsmooth.flow import on_device
+from nonsmooth.flow.ensembles import on_device
 
 NAMES = ("linear", "nonlinear")
 

@@ -8,7 +8,7 @@ import pytest
 
 import bounce
 import nonsmooth as ns
-from bounce.golf.least_squares import Problem
+from bounce.golf.fits.least_squares import Problem
 
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.15, eta=0.5)
 LAW = bounce.laws.TURFS["natural"].law

@@ -247,7 +247,7 @@ def neighbour(name):
 def test_parameters_described_together_show_their_own_types():
     griffe = pytest.importorskip("griffe", reason="comes with the extra docs")
     found = griffe.load(
-        "nonsmooth.local.regions",
+        "nonsmooth.local.point.regions",
         search_paths=[DOCS.parent],
         docstring_parser="numpy",
         extensions=griffe.load_extensions(str(DOCS / "shared_entries.py")),

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.facts import KINDS
+from nonsmooth.flow.constants import KINDS
 
 x, y, v, w, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "w", "t", "lam"))
 G = 9.81

@@ -4,7 +4,7 @@ import casadi as ca
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled.build import find_compiler
+from nonsmooth.flow.compiled.building.build import find_compiler
 
 x, y, u, v, lam, kap, r = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "lam", "kap", "r"))
 
@@ -85,4 +85,4 @@ def test_a_start_mode_with_two_sliding_solutions_is_not_unique():
     run = ns.simulate(system, [0.0, 0.0], 1.0, start_mode="ss", engine="reference")
     assert run.status is ns.Status.NON_UNIQUE
     assert "start_mode 'ss' has 2 sliding solutions here." in run.message
-    assert ns.follow(system, [0.0, 0.0], 1.0, mode="ss").status is ns.Status.NON_UNIQUE
+    assert ns.flow.follow(system, [0.0, 0.0], 1.0, mode="ss").status is ns.Status.NON_UNIQUE

@@ -8,7 +8,7 @@ from scipy.linalg import expm
 import nonsmooth as ns
 from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
-from nonsmooth.model.variational import variational_field
+from nonsmooth.model.derivatives.variational import variational_field
 
 x, y, k = (ca.SX.sym(name) for name in ("x", "y", "k"))
 LINEAR = ns.FilippovSystem([x, y], field=[y, -k * x - 0.3 * y], parameters={k: 4.0})

@@ -13,7 +13,7 @@ PARABOLA = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[1, 1])
 
 
 def test_backward_along_a_parabola_to_the_surface():
-    run = ns.follow(PARABOLA, [2.0, 0.0], -10.0, mode="+", until="h0", tol=1e-13)
+    run = ns.flow.follow(PARABOLA, [2.0, 0.0], -10.0, mode="+", until="h0", tol=1e-13)
     assert run.status is ns.Status.STOPPED
     assert run.t[-1] == pytest.approx(-4.0, abs=1e-12)
     np.testing.assert_allclose(run.x[-1], [-2.0, 0.0], atol=1e-12)
@@ -21,7 +21,7 @@ def test_backward_along_a_parabola_to_the_surface():
 
 
 def test_no_switching_and_every_zero_is_reported():
-    run = ns.follow(PARABOLA, [-2.0, 0.0], 10.0, mode="+", watch=[x, x - 5])
+    run = ns.flow.follow(PARABOLA, [-2.0, 0.0], 10.0, mode="+", watch=[x, x - 5])
     assert run.itinerary == "+"
     assert [(e.name, round(e.t, 9)) for e in run.events if e.kind == "zero"] == [
         ("f0", 2.0),
@@ -31,7 +31,7 @@ def test_no_switching_and_every_zero_is_reported():
 
 
 def test_off_the_surface_the_sliding_field_keeps_its_level():
-    run = ns.follow(PARABOLA, [2.0, 1.0], 3.0, mode="s", until=[x - 3])
+    run = ns.flow.follow(PARABOLA, [2.0, 1.0], 3.0, mode="s", until=[x - 3])
     np.testing.assert_allclose(run.x[-1], [3.0, 1.0], atol=1e-12)
 
 
@@ -46,26 +46,26 @@ PENDULUM = ns.FilippovSystem(
 
 @given(st.floats(-1, 1), st.floats(-1, 1), st.floats(0.1, 5.0), st.sampled_from("+-s"))
 def test_forward_then_backward_is_the_identity(a, b, span, mode):
-    there = ns.follow(PENDULUM, [a, b], span, mode=mode, tol=1e-12)
-    back = ns.follow(PENDULUM, there.x[-1], 0.0, t_start=span, mode=mode, tol=1e-12)
+    there = ns.flow.follow(PENDULUM, [a, b], span, mode=mode, tol=1e-12)
+    back = ns.flow.follow(PENDULUM, there.x[-1], 0.0, t_start=span, mode=mode, tol=1e-12)
     np.testing.assert_allclose(back.x[-1], [a, b], atol=1e-9)
 
 
 def test_wrong_requests_are_refused():
     with pytest.raises(ns.OptionError, match=r"until: expected a name among \['h0'\]"):
-        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until="h7")
+        ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until="h7")
     with pytest.raises(ns.DefinitionError, match="mode"):
-        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="up")
+        ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="up")
     with pytest.raises(ns.DefinitionError, match=r"also \['q'\]"):
-        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", watch=[ca.SX.sym("q")])
+        ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", watch=[ca.SX.sym("q")])
     with pytest.raises(ns.NotSmoothError):
-        ns.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until=[ca.fabs(x)])
+        ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until=[ca.fabs(x)])
 
 
 def test_a_power_law_is_followed_from_its_singular_point():
     """v' = -x^(3/2) from x = 0 keeps v^2/2 + x^(5/2)/2.5."""
     system = ns.FilippovSystem([x, y], field=[y, -x * ca.sqrt(x)])
-    run = ns.follow(system, [0.0, 1.0], 10.0, mode="", until=[y], tol=1e-12)
+    run = ns.flow.follow(system, [0.0, 1.0], 10.0, mode="", until=[y], tol=1e-12)
     assert run.x[-1, 0] == pytest.approx(1.25**0.4, abs=1e-10)
 
 
@@ -78,23 +78,23 @@ def test_sliding_along_a_corner_is_followed_with_both_multipliers():
         multipliers=[lam, kap],
         surfaces=[x, y],
     )
-    run = ns.follow(system, [0.0, 0.0, 0.0], 1.5, mode="ss", watch=[q - 1], tol=1e-12)
+    run = ns.flow.follow(system, [0.0, 0.0, 0.0], 1.5, mode="ss", watch=[q - 1], tol=1e-12)
     assert run.x[-1, 2] == pytest.approx(4 * np.tan(1.5 / 4), abs=1e-10)
     (met,) = [e for e in run.events if e.kind == "zero" and e.name == "f0"]
     assert met.t == pytest.approx(4 * np.arctan(0.25), abs=1e-10)
-    back = ns.follow(system, run.x[-1], 0.0, t_start=1.5, mode="ss", tol=1e-12)
+    back = ns.flow.follow(system, run.x[-1], 0.0, t_start=1.5, mode="ss", tol=1e-12)
     np.testing.assert_allclose(back.x[-1], 0.0, atol=1e-10)
 
 
 def test_a_field_that_ends_or_is_nowhere_defined_ends_the_run():
     root = ns.FilippovSystem([x, y], field=[ca.sqrt(y), -1])
-    run = ns.follow(root, [0.0, -1.0], 1.0, mode="")
+    run = ns.flow.follow(root, [0.0, -1.0], 1.0, mode="")
     assert run.status is ns.Status.NOT_FINITE
     assert "(0, -1)" in run.message
-    assert ns.follow(root, [0.0, 0.0], -1.0, mode="").status is ns.Status.NOT_FINITE
+    assert ns.flow.follow(root, [0.0, 0.0], -1.0, mode="").status is ns.Status.NOT_FINITE
 
 
 def test_a_run_has_no_more_steps_than_were_allowed():
-    run = ns.follow(PENDULUM, [1.0, 0.5], 100.0, mode="+", max_steps=3)
+    run = ns.flow.follow(PENDULUM, [1.0, 0.5], 100.0, mode="+", max_steps=3)
     assert run.status is ns.Status.TOO_MANY_STEPS
     assert len(run.steps) == 3

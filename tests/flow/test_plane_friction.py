@@ -287,10 +287,10 @@ def test_what_is_no_set_is_refused():
     "question",
     [
         lambda system: ns.sliding_field(system, [0, 0, 0, 0]),
-        lambda system: ns.two_fold(system, [0, 0, 0, 0]),
+        lambda system: ns.local.two_fold(system, [0, 0, 0, 0]),
         lambda system: ns.regularise(system, 1e-3),
         lambda system: ns.find_fold(system, near=[0, 0, 0, 0]),
-        lambda system: ns.sliding_branches(system, [0, 0, 0, 0]),
+        lambda system: ns.local.sliding_branches(system, [0, 0, 0, 0]),
     ],
 )
 def test_what_knows_surfaces_only_says_so(question):

@@ -7,7 +7,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow import select
-from nonsmooth.flow.compiled.compilers import CompilerError
+from nonsmooth.flow.compiled.building.compilers import CompilerError
 from nonsmooth.flow.warn import CompilerWarning, warn_once
 
 

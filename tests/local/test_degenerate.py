@@ -70,7 +70,7 @@ def test_a_surface_is_named_by_its_number():
     with pytest.raises(
         ns.DefinitionError, match=r"surface: expected an index \(int\), received 'x'"
     ):
-        ns.intersection_range(system, [0.0, 0.0, 0.0], z, surfaces="x")
+        ns.local.intersection_range(system, [0.0, 0.0, 0.0], z, surfaces="x")
 
 
 def test_derivatives_that_do_not_exist_are_told_with_the_order():
@@ -78,4 +78,4 @@ def test_derivatives_that_do_not_exist_are_told_with_the_order():
     system = ns.FilippovSystem([x, y], surface=y, above=[1, x**2.5], below=[1, 1])
     message = r"derivatives of h up to order \d+, received NaN or inf.*lower max_order"
     with pytest.raises(ns.PointError, match=message):
-        ns.fold(system, [0.0, 0.0], side="+")
+        ns.local.fold(system, [0.0, 0.0], side="+")

@@ -32,15 +32,15 @@ RESULTS = {
     "PseudoEquilibrium": lambda: ns.find_pseudo_equilibrium(
         ns.FilippovSystem([x, y], surface=y, above=[-x, -1], below=[-x, 1]), [0.3, 0.0]
     ),
-    "BoundaryEquilibrium": lambda: ns.boundary_equilibrium(FOCUS, [0, 0]),
+    "BoundaryEquilibrium": lambda: ns.local.boundary_equilibrium(FOCUS, [0, 0]),
     "BoundaryBifurcation": lambda: ns.find_boundary_equilibrium(FOCUS, [0.1, 0.1], vary="mu"),
-    "FoldFold": lambda: ns.fold_fold(
+    "FoldFold": lambda: ns.local.fold_fold(
         ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[-1, -x]), [0, 0]
     ),
     "LocalObject": lambda: ns.classify(SPACE, [0.0, 0.0, 0.0]),
-    "SlidingBranch": lambda: ns.sliding_branches(HIDDEN, [0.0, 0.0])[0],
-    "Intersection": lambda: ns.intersection(MEETING, [0.0, 0.0]),
-    "Continuation": lambda: ns.intersection(MEETING, [0.0, 0.0]).continuations[0],
+    "SlidingBranch": lambda: ns.local.sliding_branches(HIDDEN, [0.0, 0.0])[0],
+    "Intersection": lambda: ns.local.intersection(MEETING, [0.0, 0.0]),
+    "Continuation": lambda: ns.local.intersection(MEETING, [0.0, 0.0]).continuations[0],
     "Region": lambda: ns.region(PLANE, [0.5, 0.0]),
 }
 

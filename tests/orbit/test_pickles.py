@@ -48,11 +48,11 @@ RESULTS = {
     "Branch": (branch, lambda r: [e.parameter for e in r.events]),
     "BifurcationCurve": (curve, lambda r: r.values),
     "FixedItinerary": (
-        lambda: ns.FixedItinerary(SPRINGS, "+ -", until="h0"),
+        lambda: ns.orbit.FixedItinerary(SPRINGS, "+ -", until="h0"),
         lambda r: r.arrive([0.5, 1.0]).x,
     ),
     "PoincareOrbit": (
-        lambda: ns.poincare(SPRINGS, "h0", [0.5, 1.0], count=4),
+        lambda: ns.orbit.poincare(SPRINGS, "h0", [0.5, 1.0], count=4),
         lambda r: r.jacobian(2),
     ),
     "LyapunovSpectrum": (

@@ -4,7 +4,7 @@ import casadi as ca
 import mpmath
 import numpy as np
 
-from nonsmooth.model.graph import instructions
+from nonsmooth.model.expressions.graph import instructions
 
 UNARY = (
     *("neg", "sq", "twice", "sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan"),

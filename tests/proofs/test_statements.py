@@ -8,8 +8,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 import nonsmooth as ns
-from nonsmooth.proofs.enclosure import rounded
-from nonsmooth.proofs.tape import Tape
+from nonsmooth.proofs.arithmetic.enclosure import rounded
+from nonsmooth.proofs.arithmetic.instructions import Tape
 
 x, y, z, p, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "p", "a", "b"))
 BOX = [(-1, 1)] * 3

@@ -360,7 +360,9 @@ def exits_allowed(problem, reference):
 
     def time(end):
         z = problem.system.extended_states[2]
-        at = [ns.intersection_range(problem.system, [0, 0, v], z)[end] for v in (0.0, 1.0, 2.0)]
+        at = [
+            ns.local.intersection_range(problem.system, [0, 0, v], z)[end] for v in (0.0, 1.0, 2.0)
+        ]
         assert at[1] == pytest.approx((at[0] + at[2]) / 2, rel=1e-12)
         speed = at[0] + (at[2] - at[0]) / 2 * x3
         reduced = ns.FilippovSystem([x3], field=[speed], stops=[ns.Stop(x3 - 2)])
@@ -451,7 +453,7 @@ def critical_spin(problem, reference):
     def miss(spin):
         run = problem.run({**reference.at, "Omega": spin}, tol=TOL)
         entry = events(run, "entry")[0]
-        roll = ns.follow(
+        roll = ns.flow.follow(
             problem.system, entry.x, 5.0, t_start=entry.t, mode="s", until="separation", tol=TOL
         )
         assert roll.status is ns.Status.STOPPED

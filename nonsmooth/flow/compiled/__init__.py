@@ -1,8 +1,8 @@
 """The compiled engines: the interpreter of any system, programs generated for one, and lanes."""
 
 from .arrays import Run
-from .build import CompilerError, find_compiler
-from .lanes import Lanes, lanes_for
+from .building.build import CompilerError, find_compiler
+from .lanes.engine import Lanes, lanes_for
 from .tape import TapeEngine, tape_for
 
 __all__ = [

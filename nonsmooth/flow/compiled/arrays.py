@@ -11,11 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
-from ..facts import GUARDS, KINDS
+from ..constants import GUARDS, KINDS
 from ..options import Options
 from ..results import Chunk
 from ..section import Hits
-from .build import CompilerError
+from .building.build import CompilerError
 
 #: Steps of one call of C; between calls Python hears Ctrl-C and requests to stop.
 BURST = 4096
@@ -152,12 +152,7 @@ class Run:
 
 
 def require_size(size: Any, structure: type[ctypes.Structure]) -> None:
-    """Refuse a library whose structure is not laid out as ours.
-
-    Raises
-    ------
-    CompilerError
-    """
+    """Refuse a library whose structure is not laid out as ours."""
     size.restype = _I64
     if size() != ctypes.sizeof(structure):
         raise CompilerError(

@@ -1,6 +1,6 @@
 /* What the driver and the lanes share: limits, operations on double, first root of a polynomial.
  *
- * The generated text defines before this file: the facts of nonsmooth/flow/facts.py under their names in
+ * The generated text defines before this file: the facts of nonsmooth/flow/constants.py under their names in
  * capitals (EPSILON, SAFETY, ..., the enumerations of statuses, kinds of events and guards, reasons); P the
  * order or more, MODES a number of modes or more.
  */

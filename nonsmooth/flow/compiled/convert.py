@@ -6,7 +6,7 @@ import math
 
 from ...model import Array, FilippovSystem
 from .. import messages
-from ..facts import KINDS, REASONS
+from ..constants import KINDS, REASONS
 from ..options import Options
 from ..status import ADVICE, Status
 from ..trajectory import Event, Segment, Steps, Trajectory
@@ -14,21 +14,7 @@ from .arrays import Run
 
 
 def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> Trajectory:
-    """Convert a dense run.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    p : ndarray
-        Parameter values of the run.
-    options : Options
-    run : Run
-        As :func:`simulate_arrays` returns it.
-
-    Returns
-    -------
-    Trajectory
-    """
+    """Convert a dense run."""
     status, modes = Status(run.status), run.letters
     limit = None if math.isnan(run.limit) else run.limit
     events = _events(system, run)

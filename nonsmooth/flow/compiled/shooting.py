@@ -42,25 +42,7 @@ class _Returns(ctypes.Structure):
 
 
 class Demands(ctypes.Structure):
-    """What is asked of Newton's method; lengths of steps are in units of the unknowns.
-
-    Attributes
-    ----------
-    tol : float
-        Full steps end where the next one would be below this,
-    noise : float
-        or where steps below this do not shrink.
-    finest, coarse, extended : float
-        Local errors of legs: the least, the largest far from the orbit, those in extended precision.
-    final, rounding : float
-        Steps that do not change derivatives, and those that do not change the orbit.
-    longest : float
-        No leg may last longer.
-    periods, period : float, int or None
-        The legs advance the last state by so many periods, which a program at this address gives.
-    most, most_steps : int
-        Of Newton's method, and along a leg.
-    """
+    """What is asked of Newton's method; lengths of steps are in units of the unknowns."""
 
     _fields_ = [
         *[(name, _D) for name in ("tol", "noise", "finest", "coarse", "extended")],
@@ -120,21 +102,7 @@ def _library() -> ctypes.CDLL:
 
 
 class OrbitProgram:
-    """The equations of orbits with a fixed itinerary, every leg of which ends by one event.
-
-    Parameters
-    ----------
-    legs, plain : LegsProgram
-        With derivatives by the starts and by free parameters, and the states alone.
-    n, parameters : int
-        States of a start, and parameters.
-    chosen : tuple of int
-        The free ones.
-    own, row : ndarray of int
-        Entries of (x, X, P) that move: places in ``start``, and in the rows of ``legs``.
-    start, fixed : ndarray (L, 1 + n + k, n)
-        Matrices (x, X, P) at the starts, transposed, and those of the entries that do not move.
-    """
+    """The equations of orbits with a fixed itinerary, every leg of which ends by one event."""
 
     def __init__(
         self,
@@ -163,19 +131,7 @@ class OrbitProgram:
     def newton(
         self, u: Array, p: Array, scales: Array, wrap: Array | None, demands: Demands
     ) -> SolvedOrbit | None:
-        """Solve from unknowns ``u``; None where that does not converge.
-
-        Parameters
-        ----------
-        u : ndarray (m,)
-            Starts of the legs, then durations; no parameter is free.
-        p : ndarray
-        scales : ndarray (m,)
-            Sizes of the unknowns.
-        wrap : ndarray (n, n) or None
-            Symmetry that maps the end of the last leg.
-        demands : Demands
-        """
+        """Solve from unknowns ``u``; None where that does not converge."""
         memory, scales = self._memory(u, p), np.ascontiguousarray(scales)
         wrap = None if wrap is None else np.ascontiguousarray(wrap, float)
         steps = _library().orbit_newton(
@@ -241,20 +197,8 @@ class OrbitProgram:
 
 
 def bordered_direction(jacobian: Array, before: Array) -> tuple[Array, float] | None:
-    """Direction in which equations stay as they are, and the determinant of their bordered Jacobian.
-
-    Parameters
-    ----------
-    jacobian : ndarray (N - 1, N)
-    before : ndarray (N,)
-        A direction near the one that is looked for.
-
-    Returns
-    -------
-    direction, determinant : ndarray (N,), float
-        Of length 1; with the direction as last row. None where the Jacobian bordered by ``before`` is
-        singular.
-    """
+    """Direction in which equations stay as they are, and the determinant of their bordered
+    Jacobian."""
     wide, found = before.size, ctypes.c_double()
     jacobian, before = np.ascontiguousarray(jacobian), np.ascontiguousarray(before)
     memory = np.empty(wide * (wide + 2))
@@ -265,19 +209,7 @@ def bordered_direction(jacobian: Array, before: Array) -> tuple[Array, float] | 
 
 
 class FollowedProgram:
-    """Legs that are followed one after the other, each to its event.
-
-    Parameters
-    ----------
-    fields : sequence of SmoothProgram
-        Of each leg, with functions that are watched.
-    rows, directions : sequence of int
-        Which of them ends the leg, and its direction.
-    events, plain : sequence of ValuesProgram
-        What happens there, with derivatives and without.
-    dimensions : tuple of int
-        States with the time, and without; parameters.
-    """
+    """Legs that are followed one after the other, each to its event."""
 
     def __init__(
         self,
@@ -300,11 +232,9 @@ class FollowedProgram:
     def __call__(
         self, x: Array, p: Array, times: float, tol: float, most_steps: int
     ) -> tuple[Array, Array] | None:
-        """Starts (L + 1, n) of the legs, with the end of the last one, and durations (L,).
-
-        None where a leg does not come to its event within so many of the times in which the state
-        changes by its size.
-        """
+        """Starts (L + 1, n) of the legs, with the end of the last one, and durations (L,)."""
+        # None where a leg does not come to its event within so many of the times in which the state
+        # changes by its size.
         first, count, n = len(p) + 1, self._count, self._n
         memory = np.empty(first + (count + 1) * n + count + self._work)
         memory[: len(p)] = p
@@ -325,28 +255,7 @@ def reduced_map(
     grazing: float,
     lost: float,
 ) -> Array | None:
-    """The return map of legs on what it keeps of some directions; None where an event is grazed.
-
-    Parameters
-    ----------
-    legs : tuple of ndarray
-        Derivatives (L, S, N) of the ends by the starts, fields (L, S) there, gradients (L, S) of the
-        events and derivatives (L, N, S) of the states after them.
-    wrap : ndarray (N, N) or None
-        Symmetry that maps the end of the last leg.
-    units : ndarray (N,)
-        Sizes of the states.
-    basis : ndarray (N, m)
-        Directions at the first start.
-    grazing : float
-        Angles between orbit and surface below this are a grazing.
-    lost : float
-        A direction of which a leg leaves no more than this part is lost.
-
-    Returns
-    -------
-    ndarray (r, r)
-    """
+    """The return map of legs on what it keeps of some directions; None where an event is grazed."""
     given, kept = _returns(legs, wrap, units)
     count, n, s = legs[3].shape
     memory = np.empty((2 * count + 5) * n * n + s * n)

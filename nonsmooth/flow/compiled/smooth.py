@@ -59,16 +59,7 @@ def _library() -> ctypes.CDLL:
 
 
 class SmoothProgram:
-    """A smooth field, and functions that are watched along it.
-
-    Parameters
-    ----------
-    series : Series
-        Of the field, then of the functions, in states and parameters.
-    group : ndarray of int (n,)
-        Which states' errors have one scale; -1 for what is exact.
-    order : int
-    """
+    """A smooth field, and functions that are watched along it."""
 
     def __init__(self, series: Series, group: NDArray[np.int32], order: int):
         self._kept: list[NDArray[Any]] = [np.ascontiguousarray(group, np.int32)]
@@ -99,10 +90,9 @@ class SmoothProgram:
     def watch(
         self, z: Array, p: Array, duration: float, tol: float, most_steps: int, margin: float
     ) -> tuple[Array, Array, float]:
-        """Extrema of the functions and their values at the ends of steps, the end, and what is left.
-
-        Rows: number, time, value, second derivative (0 at the end of a step), state.
-        """
+        """Extrema of the functions and their values at the ends of steps, the end, and what is
+        left."""
+        # Rows: number, time, value, second derivative (0 at the end of a step), state.
         count, room = ctypes.c_int64(), _ROOM
         while True:
             memory, at, state, work = self._given(z, p)
@@ -136,12 +126,7 @@ class SmoothProgram:
 
 
 class ValuesProgram:
-    """Expressions of states and parameters.
-
-    Parameters
-    ----------
-    values : Values
-    """
+    """Expressions of states and parameters."""
 
     def __init__(self, values: Values):
         self._kept: list[NDArray[Any]] = []
@@ -151,19 +136,7 @@ class ValuesProgram:
 
 
 class FlownLegs(NamedTuple):
-    """Legs flown in one call.
-
-    Attributes
-    ----------
-    ends, before, after : ndarray (L, width)
-        States at the ends, fields at the starts and at the ends.
-    results : ndarray (L, results)
-        Of the events' programs.
-    failed : int
-        Number of a leg that fails, or -1.
-    left : float
-        Time that is left of it.
-    """
+    """Legs flown in one call."""
 
     ends: Array
     before: Array
@@ -174,16 +147,7 @@ class FlownLegs(NamedTuple):
 
 
 class LegsProgram:
-    """Legs of smooth fields, with what happens at their ends, flown in one call.
-
-    Parameters
-    ----------
-    fields : sequence of SmoothProgram
-        Of each leg.
-    events : sequence of ValuesProgram or None
-        What is evaluated at the end of each leg.
-    parameters : int
-    """
+    """Legs of smooth fields, with what happens at their ends, flown in one call."""
 
     def __init__(
         self,
@@ -240,8 +204,7 @@ class LegsProgram:
     def extended(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
     ) -> tuple[Array, Array] | None:
-        """Results (L, results) in extended precision, rounded, and what that leaves; None where a leg
-        fails. Every leg must have an event."""
+        """Results (L, results) in extended precision, rounded, and what that leaves."""
         memory, parts = self._given(z, p, durations)
         left, rest = ctypes.c_double(), np.empty(len(parts[5]))
         failed = _library().fly_legs_extended(
@@ -258,22 +221,7 @@ class LegsProgram:
 
 
 class WatchedLegs(NamedTuple):
-    """Functions along many legs.
-
-    Attributes
-    ----------
-    rows : list of ndarray (m, 4 + N)
-        Of each leg: number of the function, time, value, second derivative (0 at the end of a step),
-        state.
-    begins : list of ndarray (N + g, 4)
-        First coefficients of the states and of the functions at the starts.
-    values : list of ndarray (g,)
-        Of the functions at the ends of legs of positive duration.
-    failed : int
-        Number of a leg that fails, or -1.
-    left : float
-        Time that is left of it.
-    """
+    """Functions along many legs."""
 
     rows: list[Array]
     begins: list[Array]
@@ -283,13 +231,7 @@ class WatchedLegs(NamedTuple):
 
 
 class WatchProgram:
-    """Flows of which functions are watched, all in one call.
-
-    Parameters
-    ----------
-    fields : sequence of SmoothProgram
-        Of each.
-    """
+    """Flows of which functions are watched, all in one call."""
 
     def __init__(self, fields: Sequence[SmoothProgram]):
         self._fields, self._count = list(fields), len(fields)

@@ -2,26 +2,48 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from itertools import pairwise
+
 from ...model import Array, FilippovSystem
 from .. import messages
+from ..constants import AT_ONCE, BLOCKS, LAGS, REMAINING, SHRINKS, SPREAD
 from ..options import Options
 from ..status import Status
 from ..trajectory import Segment, Trajectory
-from .accumulation import remaining_time
 from .record import Record
+
+# Events that accumulate in finite time, recognised by their geometric intervals.
+
+
+def remaining_time(
+    intervals: Sequence[float], patterns: Sequence[str], elapsed: float
+) -> float | None:
+    """Estimate the time left until events accumulate, or None if they do not (yet)."""
+    if len(intervals) > AT_ONCE and not any(intervals[-AT_ONCE:]):
+        return 0.0
+    for lag in LAGS:
+        need = lag * BLOCKS
+        if len(intervals) < need + lag:
+            return None
+        recent = list(patterns[-need:])
+        if recent != list(patterns[-need - lag : -lag]):
+            continue
+        tail = list(intervals[-need:])
+        blocks = [sum(tail[k : k + lag]) for k in range(0, need, lag)]
+        if min(blocks) <= 0.0:
+            continue
+        ratios = [b / a for a, b in pairwise(blocks)]
+        r = ratios[-1]
+        if max(ratios) < SHRINKS and max(ratios) - min(ratios) <= SPREAD * (1.0 - r):
+            left = blocks[-1] * r / (1.0 - r)
+            if left < REMAINING * elapsed:
+                return left
+    return None
 
 
 class Bookkeeping:
-    """State of one run, and what is known of its past.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    x : ndarray (N,)
-        Extended start.
-    p : ndarray
-    options : Options
-    """
+    """State of one run, and what is known of its past."""
 
     def __init__(self, system: FilippovSystem, x: Array, p: Array, options: Options):
         self.system, self.p, self.options = system, p, options

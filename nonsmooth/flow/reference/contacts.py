@@ -17,22 +17,13 @@ from itertools import product
 import numpy as np
 
 from ...model import Array, Coupled, Evaluator, FilippovSystem, Surfaces
-from ..facts import ON_SURFACE
+from ..constants import ON_SURFACE
 from ..options import Options
 from .modes import rounding_scale
 
 
 class Contacts:
-    """The impacts of a system at given parameters.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    coupled : Coupled
-    surfaces : Surfaces
-    p : ndarray
-    options : Options
-    """
+    """The impacts of a system at given parameters."""
 
     def __init__(
         self,
@@ -75,10 +66,8 @@ class Contacts:
         return next((j for j in involved if not 0.0 <= e[j] <= 1.0), None)
 
     def strike(self, x: Array, mode: str, involved: Sequence[int], plastic: bool) -> Array | None:
-        """State after the impulses at some closed gaps; None if none are consistent.
-
-        ``plastic`` leaves no rates, whatever the restitution.
-        """
+        """State after the impulses at some closed gaps; None if none are consistent."""
+        # ``plastic`` leaves no rates, whatever the restitution.
         rates = self._surfaces.values(x, self._p)[0][self._first + self._count :]
         e = np.zeros(self._count) if plastic else self._restitution(x, self._p)[0][:, 0]
         target = np.where(rates < 0.0, -(1.0 + e) * rates, -rates)

@@ -8,21 +8,13 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...model import Array, Coupled, FilippovSystem, Guard, Yardsticks, coupled_of
-from ...model.frozen import Frozen, frozen
-from ...model.layer import spirals_in
-from ...model.multiplier_series import MultiplierSeries, set_values
-from ...model.multipliers import newton_multipliers, sliding_multipliers
+from ...model.laws.frozen import Frozen, frozen
+from ...model.laws.layer import spirals_in
+from ...model.laws.multiplier_series import MultiplierSeries, set_values
+from ...model.laws.multipliers import newton_multipliers, sliding_multipliers
 from ..options import Options
 from .laws_of_sets import unknowns_of_sets
-from .modes import (
-    Expansion,
-    Modes,
-    SeparateModes,
-    powers,
-    relative,
-    rounding_scale,
-    tolerances,
-)
+from .modes import Expansion, Modes, SeparateModes, powers, relative, rounding_scale, tolerances
 
 
 def modes_of(system: FilippovSystem, p: Array, options: Options) -> Modes:
@@ -33,17 +25,7 @@ def modes_of(system: FilippovSystem, p: Array, options: Options) -> Modes:
 
 
 class CoupledModes:
-    """Modes of one program, with multipliers as numbers or series, in Python's doubles.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    coupled : Coupled
-    p : ndarray
-    options : Options
-    kinds : callable, optional
-        Guards of a mode, where they have other meanings than the program's.
-    """
+    """Modes of one program, with multipliers as numbers or series, in Python's doubles."""
 
     def __init__(
         self,

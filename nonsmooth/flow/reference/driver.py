@@ -16,7 +16,7 @@ import numpy as np
 
 from ...model import Array, Coupled, FilippovSystem, Guard, Resets, Surfaces, coupled_of
 from .. import messages
-from ..facts import ON_SURFACE, PRIORITY, VANISHES, change
+from ..constants import ON_SURFACE, PRIORITY, VANISHES, change
 from ..options import Options
 from ..status import Status
 from ..trajectory import Trajectory
@@ -29,16 +29,7 @@ from .switching import Continuation, decide, is_two_fold
 
 
 class Driver(Bookkeeping):
-    """One run of one system.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    x : ndarray (N,)
-        Extended start.
-    p : ndarray
-    options : Options
-    """
+    """One run of one system."""
 
     def __init__(self, system: FilippovSystem, x: Array, p: Array, options: Options):
         super().__init__(system, x, p, options)
@@ -310,10 +301,8 @@ class Driver(Bookkeeping):
             self.end(Status.NON_UNIQUE, messages.impossible_start(asked))
 
     def arm(self, fired: Guard | None = None) -> None:
-        """Look at the stops and resets on whose zero the run stands: is one of them met?
-
-        ``fired`` is the reset that led here, if one did.
-        """
+        """Look at the stops and resets on whose zero the run stands: is one of them met?"""
+        # ``fired`` is the reset that led here, if one did.
         self._due, due = None, list[tuple[int, int]]()
         guards = self.stepper.guards(self.mode)
         if self.ended is not None or not any(g.kind in ("stop", "reset") for g in guards):

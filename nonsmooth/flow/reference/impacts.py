@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import Guard, coupled_of
 from .. import messages
-from ..facts import change
+from ..constants import change
 from ..status import Status
 from .contacts import Contacts
 
@@ -39,8 +39,7 @@ def resting(driver: Driver) -> list[int]:
 
 
 def strike_due(driver: Driver) -> None:
-    """Look at the closed gaps: one that is closing further is struck at once, one that opens has
-    a known zero."""
+    """Look at the closed gaps."""
     if driver.contacts is None or driver.ended is not None:
         return
     gaps, rates = driver.contacts.gaps(driver.x)

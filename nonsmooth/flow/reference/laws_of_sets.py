@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Array, Coupled
-from ...model.frozen import Frozen, frozen
-from ...model.limit_directions import leaving_direction, limit_directions_of
-from ...model.multipliers import is_stable, sliding_multipliers
-from ..facts import EPSILON
+from ...model.laws.frozen import Frozen, frozen
+from ...model.laws.limit_directions import leaving_direction, limit_directions_of
+from ...model.laws.multipliers import is_stable, sliding_multipliers
+from ..constants import EPSILON
 
 if TYPE_CHECKING:
     from .modes import Expansion
@@ -21,10 +21,8 @@ if TYPE_CHECKING:
 def unknowns_of_sets(
     coupled: Coupled, mode: str, x: Array, p: Array, kept: Array, stable_only: bool
 ) -> list[Array]:
-    """Unknowns (m,) of a mode in which sets slide or are left: none, one, or several.
-
-    ``kept`` are h of sets that were just left.
-    """
+    """Unknowns (m,) of a mode in which sets slide or are left: none, one, or several."""
+    # ``kept`` are h of sets that were just left.
     carried = np.where(np.array(list(mode)) == "b", kept, 0.0) if mode else kept
     leaving = [s for s in coupled.system.sets if mode[s[0]] == "l"]
     if not leaving:
@@ -71,20 +69,7 @@ def _leaving_directions(law: Frozen, sizes: Sequence[int]) -> list[Array]:
 
 
 def bounded_multipliers(law: Frozen, sizes: Sequence[int]) -> Array | None:
-    """Multipliers of several sets at h = 0 together, each of at most length 1: those for which a - M lambda
-    is zero or points along lambda, where |lambda| = 1.
-
-    Parameters
-    ----------
-    law : Frozen
-        Of all of them, one after the other.
-    sizes : sequence of int
-
-    Returns
-    -------
-    ndarray (k,) or None
-        None where M is not symmetric and positive definite, for which there is exactly one.
-    """
+    """Multipliers of several sets at h = 0 together, each of at most length 1."""
     size = np.abs(law.m).max(initial=0.0)
     if not law.definite or np.abs(law.m - law.m.T).max() > 1e-12 * size:
         return None

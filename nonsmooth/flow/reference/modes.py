@@ -13,8 +13,8 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...model import Array, Evaluator, FilippovSystem, Guard, Motion, motion
-from ...model.frozen import Frozen
-from ..facts import SAFETY
+from ...model.laws.frozen import Frozen
+from ..constants import SAFETY
 from ..options import Options
 
 #: What is larger may have derivatives that are infinite.
@@ -23,35 +23,7 @@ _HUGE = 1e300
 
 @dataclass(frozen=True)
 class Expansion:
-    """Jets of a mode at a point, and how exact they have to be and can be.
-
-    Attributes
-    ----------
-    mode : str
-    states : ndarray (N, P+1)
-        Coefficients of the extended states.
-    guards : ndarray (m, P+1)
-        Coefficients of the guards.
-    allowed : ndarray (N,)
-        Local errors of the states that are allowed; 0 for the time, which is exact.
-    guard_allowed : ndarray (m,)
-        What they come to in the guards.
-    scales : ndarray (m,)
-        Rounding in a guard is that times epsilon.
-    steepness : ndarray (m,)
-        Sums of the magnitudes of the guards' slopes.
-    finite : bool
-    unknowns : ndarray (surfaces, P+1)
-        Series of the multipliers that slide; empty where sliding is written out.
-    inverse : ndarray
-        Of the slope of the layer problem, in magnitude; empty likewise.
-    directions : ndarray (k, P+1)
-        Series whose relative accuracy counts: directions of slip close to a set that is left.
-    radii : ndarray (sets,)
-        |h| at the start, of sets off which the mode is.
-    limits : ndarray (sets, P+1)
-        Series of the factors n of sets: friction's limit is |nu| = |n|.
-    """
+    """Jets of a mode at a point, and how exact they have to be and can be."""
 
     mode: str
     states: Array
@@ -89,8 +61,7 @@ class Modes(Protocol):
         ...
 
     def at(self, e: Expansion, s: float, nudge: Array | float = 0.0) -> tuple[Array, Array, Array]:
-        """Field (N,), guards (m,) at the polynomials' state at time s, moved by ``nudge``;
-        multipliers' errors."""
+        """Field (N,), guards (m,) at the polynomials' state at time s, moved by ``nudge``."""
         ...
 
     def gradient(self, mode: str, x: Array) -> Array:
@@ -129,10 +100,8 @@ class Modes(Protocol):
 
 
 def rounding_scale(gradient: Array, x: Array, size: float) -> Array:
-    """``sum_i |d guard/d x_i| (size + |x_i|)``: rounding in a guard is that times epsilon.
-
-    Entries that are not finite, those of a square root at zero, say nothing and are left out.
-    """
+    """``sum_i |d guard/d x_i| (size + |x_i|)``: rounding in a guard is that times epsilon."""
+    # Entries that are not finite, those of a square root at zero, say nothing and are left out.
     return np.where(np.isfinite(gradient), gradient, 0.0) @ (size + np.abs(x))
 
 
@@ -151,16 +120,7 @@ def tolerances(system: FilippovSystem, x: Array, options: Options) -> Array:
 
 
 class SeparateModes:
-    """Modes that have their jets one by one, evaluated by CasADi.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    p : ndarray
-    options : Options
-    motion_of : callable, optional
-        Where the motion of a mode comes from.
-    """
+    """Modes that have their jets one by one, evaluated by CasADi."""
 
     def __init__(
         self,

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...model import OptionError
-from ..facts import DEPTH, ROUNDING
+from ..constants import DEPTH, ROUNDING
 
 
 @lru_cache(maxsize=64)
@@ -35,16 +35,9 @@ def _to_bernstein(degree: int) -> NDArray[np.float64]:
 
 
 def sign_changes(coefficients: NDArray[np.float64], h: float) -> NDArray[np.int64]:
-    """Sign changes of the Bernstein coefficients of polynomials (rows, in powers of t) on 0 .. h.
-
-    None says that there is surely no zero between 0 and h, one that there is exactly one; where rounding
-    leaves a coefficient at zero the answer is at least two, and more says nothing.
-
-    Examples
-    --------
-    >>> sign_changes(np.array([[1.0, -0.5], [1.0, -2.0]]), 1.0).tolist()
-    [0, 1]
-    """
+    """Sign changes of the Bernstein coefficients of polynomials (rows, in powers of t) on 0 .."""
+    # None says that there is surely no zero between 0 and h, one that there is exactly one; where rounding
+    # leaves a coefficient at zero the answer is at least two, and more says nothing.
     degree = coefficients.shape[1] - 1
     b = np.sign((coefficients * h ** np.arange(degree + 1)) @ _to_bernstein(degree).T)
     changes = np.count_nonzero(b[:, 1:] != b[:, :-1], axis=1)
@@ -208,13 +201,7 @@ def _newton(c: list[float], low: float, high: float, x: float) -> float:
 
 
 def shift(coefficients: Sequence[float], t: float) -> list[float]:
-    """Coefficients of p(t + s) in powers of s (Horner's scheme).
-
-    Examples
-    --------
-    >>> shift([1.0, 2.0, 1.0], 1.0)
-    [4.0, 4.0, 1.0]
-    """
+    """Coefficients of p(t + s) in powers of s (Horner's scheme)."""
     c = [float(v) for v in coefficients]
     n = len(c)
     for i in range(n - 1):
@@ -266,25 +253,7 @@ def first_crossing(coefficients: Sequence[float], h: float, direction: int) -> f
 
 
 def side_before(coefficients: Sequence[float], t: float, rounding: float) -> int:
-    """Sign of a polynomial just before t > 0; 0 where rounding hides it.
-
-    Parameters
-    ----------
-    coefficients : sequence of float
-        In increasing powers of t.
-    t : float
-    rounding : float
-        Of the function that the polynomial stands for.
-
-    Returns
-    -------
-    {-1, 0, 1}
-
-    Examples
-    --------
-    >>> side_before([0.3, -1.0], 0.3, 1e-16)
-    1
-    """
+    """Sign of a polynomial just before t > 0; 0 where rounding hides it."""
     c = _floats(coefficients)
     value, slope = _horner(c, t)
     noise = rounding + ROUNDING * _horner([abs(v) for v in c], t)[0]
@@ -296,13 +265,7 @@ def side_before(coefficients: Sequence[float], t: float, rounding: float) -> int
 
 
 def passed(coefficients: Sequence[float], side: int, direction: int) -> bool:
-    """Whether a function that was on a side just before has passed zero at once, in a direction.
-
-    Examples
-    --------
-    >>> passed([0.0, -1.0], 1, -1), passed([0.0, 1.0], 1, -1), passed([-1e-17, 1.0], 1, 0)
-    (True, False, True)
-    """
+    """Whether a function that was on a side just before has passed zero at once, in a direction."""
     if side * direction > 0:
         return False
     return next((float(v) for v in coefficients if v != 0.0), 0.0) * side < 0.0

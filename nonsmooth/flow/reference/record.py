@@ -10,14 +10,7 @@ from ..trajectory import Event, Segment, Steps, Trajectory
 
 
 class Record:
-    """Points, steps, events and segments of one run.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    p : ndarray
-        Parameter values.
-    """
+    """Points, steps, events and segments of one run."""
 
     def __init__(self, system: FilippovSystem, p: Array):
         self.system, self.p = system, p

@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ...model import Array, FilippovSystem, Guard, multiplier_enters
-from ...model.frozen import field_at, frozen
-from ...model.multiplier_series import unit
-from ..facts import EPSILON, LEFT, OVERFLOW, REACHED, SHORTEST, TENFOLD, VANISHES
+from ...model.laws.frozen import field_at, frozen
+from ...model.laws.multiplier_series import unit
+from ..constants import EPSILON, LEFT, OVERFLOW, REACHED, SHORTEST, TENFOLD, VANISHES
 from .modes import rounding_scale, tolerances
 
 if TYPE_CHECKING:
@@ -30,10 +30,8 @@ CLOSE = 1e-8
 
 
 def near(driver: Driver, guard: Guard, fell: bool = True) -> None:
-    """|h| has fallen tenfold, or is small: the set is reached or passed now, or looked at again nearer.
-
-    What has fallen to rounding is zero, whatever its direction says.
-    """
+    """|h| has fallen tenfold, or is small."""
+    # What has fallen to rounding is zero, whatever its direction says.
     own = list(driver.system.set_of[guard.index])
     if driver.mode[own[0]] == "s":
         return  # friction's limit has fallen: the next step sees its digits

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem, Guard
 from .. import messages
-from ..facts import (
+from ..constants import (
     AT_END,
     BEFORE_EVENT,
     CHECKS,
@@ -57,10 +57,9 @@ class Hit:
 
 @dataclass(frozen=True)
 class Plan:
-    """A step: how long, the hits at its end (or at most a tie later), whether it reaches t_end.
+    """A step: how long, the hits at its end (or at most a tie later), whether it reaches t_end."""
 
-    ``fault`` says why there is none.
-    """
+    # ``fault`` says why there is none.
 
     dt: float
     hits: list[Hit]
@@ -69,15 +68,7 @@ class Plan:
 
 
 class Stepper:
-    """Steps of one run: its modes, with fixed parameters and tolerances.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    modes : Modes
-    options : Options
-        Tolerances: the local error of state i is kept below ``atol + rtol*abs(x_i)``.
-    """
+    """Steps of one run: its modes, with fixed parameters and tolerances."""
 
     def __init__(self, system: FilippovSystem, modes: Modes, options: Options):
         self.system, self.modes = system, modes
@@ -112,10 +103,8 @@ class Stepper:
         return h
 
     def leading(self, e: Expansion, row: int, known_zeros: int) -> tuple[int, float]:
-        """First coefficient of a guard that is not zero to rounding, and its value.
-
-        Returns ``(order + 1, 0.0)`` if there is none.
-        """
+        """First coefficient of a guard that is not zero to rounding, and its value."""
+        # Returns ``(order + 1, 0.0)`` if there is none.
         speed, steepness = np.abs(e.states).max(axis=0), float(e.steepness[row])
         for k in range(known_zeros, e.guards.shape[1]):
             noise = e.scales[row] if k == 0 else steepness * float(speed[k]) * (k + 1)
@@ -141,12 +130,7 @@ class Stepper:
         repelling: bool = False,
         sides: Sides | None = None,
     ) -> Hit | None:
-        """Earliest guard to end the mode within h; ``drops[row]`` leading coefficients are zero.
-
-        In repelling sliding the exit guards are negative, and rise to zero where it ends. ``sides``
-        are those just before the step: a stop or a reset may be passed at its start, where rounding
-        hid it from the step before.
-        """
+        """Earliest guard to end the mode within h; ``drops[row]`` leading coefficients are zero."""
         if repelling:
             exits = [guard.kind == "exit" for guard in self.guards(e.mode)]
             e = replace(e, guards=np.where(np.array(exits)[:, None], -e.guards, e.guards))
@@ -204,11 +188,9 @@ class Stepper:
         find: Callable[[float], list[Hit]],
         sign: float = 1.0,
     ) -> Plan:
-        """Choose the next step, up to the first of the hits that ``find`` sees within a step.
-
-        ``left`` is the time to the end of the run; ``sign`` is that of the direction of time. The
-        step is halved until field and guards agree with the polynomials.
-        """
+        """Choose the next step, up to the first of the hits that ``find`` sees within a step."""
+        # ``left`` is the time to the end of the run; ``sign`` is that of the direction of time. The
+        # step is halved until field and guards agree with the polynomials.
         by_series = self.step_size(e)
         h = min(by_series, max_step)
         if h <= SHORTEST * max(abs(t - self._begun), abs(t)) and h < left:
@@ -249,13 +231,11 @@ class Stepper:
         return FIRST * natural if h > FAR * natural else math.inf
 
     def _verified(self, e: Expansion, dt: float, end: float, safe: float, sign: float) -> float:
-        """Return dt where the polynomials of states and guards are those of the equation, as far as
-        the part ``end`` of it and points inside show, else half of the first point where they are
-        not.
-
-        A solution may reach what its series does not see: a pulse, or the branch point of a root
-        (x' = -sqrt(x) is solved by a polynomial, but not beyond its zero).
-        """
+        """Return dt where the polynomials of states and guards are those of the equation, as far
+        as the part ``end`` of it and points inside show, else half of the first point where
+        they are not."""
+        # A solution may reach what its series does not see: a pulse, or the branch point of a root
+        # (x' = -sqrt(x) is solved by a polynomial, but not beyond its zero).
         if self.modes.affine(e.mode):
             return dt
         for s in _points(dt, end, safe):
@@ -308,15 +288,9 @@ class Stepper:
         return result
 
     def singular_step(self, e: Expansion, h_max: float) -> tuple[Array, float]:
-        """Short step from a point where high derivatives do not exist (a power law at zero).
-
-        Each state keeps the coefficients before its first non-finite one; the step is shortened
-        until the defect of the equation at its end is below the tolerance.
-
-        Returns
-        -------
-        coefficients (N, P+1), h; h is 0 where not even the field is finite.
-        """
+        """Short step from a point where high derivatives do not exist (a power law at zero)."""
+        # Each state keeps the coefficients before its first non-finite one; the step is shortened
+        # until the defect of the equation at its end is below the tolerance.
         c = e.states.copy()
         for row in c:
             bad = np.flatnonzero(~np.isfinite(row))

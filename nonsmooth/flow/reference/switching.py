@@ -16,10 +16,11 @@ from itertools import product
 
 import numpy as np
 
-from ...model import Array, complementarity
-from ...model.frozen import Frozen
+from ...model import Array
+from ...model.laws import complementarity
+from ...model.laws.frozen import Frozen
 from .. import messages
-from ..facts import TANGENT, VANISHES
+from ..constants import TANGENT, VANISHES
 from ..status import Status
 from .laws_of_sets import bounded_multipliers
 from .modes import Expansion, Modes
@@ -64,25 +65,7 @@ def decide(
     layer: tuple[float, int] | None = None,
     kept: Array | None = None,
 ) -> Decision:
-    """Choose the motion that continues from a point of the surfaces ``active``.
-
-    Parameters
-    ----------
-    stepper : Stepper
-    x : ndarray (N,)
-        Extended state, on the active surfaces.
-    mode : str
-        Letters of the surfaces that are not active; those of the active ones are a first guess.
-    active : sequence of int
-        Surfaces through the point and, numbered after all surfaces, contacts at rest there.
-    known : mapping
-        Coefficients known to vanish, besides the values of h at the active surfaces.
-    layer : (float, {-1, 1}), optional
-        With hidden dynamics and one active surface: where its multiplier comes from and which way
-        it moves through the layer lambda in [-1, 1].
-    kept : ndarray (m,), optional
-        Unknowns up to here: h of sets that were just left.
-    """
+    """Choose the motion that continues from a point of the surfaces ``active``."""
     if not active:
         carried = stepper.modes.solutions(mode, x, True, kept) if stepper.system.sets else []
         return Decision(Continuation(mode, {}, True, *(carried or [np.zeros(len(mode))])))
@@ -136,8 +119,7 @@ def decide(
 
 
 def _where_sliding_ends(stepper: Stepper, x: Array, mode: str, surface: int) -> Known:
-    """Coefficients that vanish where the multiplier of a surface is at its bound, to rounding: there the
-    rate of that side is zero too, whatever its own terms have left."""
+    """Coefficients that vanish where the multiplier of a surface is at its bound, to rounding."""
     slides = mode[:surface] + "s" + mode[surface + 1 :]
     for unknowns in stepper.modes.solutions(slides, x, False):
         e = stepper.expand(slides, x, unknowns)
@@ -168,11 +150,9 @@ def _held_there(stepper: Stepper, x: Array, mode: str, active: Sequence[int]) ->
 def _by_rates(
     stepper: Stepper, x: Array, mode: str, active: Sequence[int], known: Known
 ) -> dict[int, str] | Decision:
-    """Letters that are possible: one where the rates decide, else all.
-
-    A surface or contact that is being left has a multiplier at its bound, to the tolerance of the run:
-    its rates decide nothing.
-    """
+    """Letters that are possible: one where the rates decide, else all."""
+    # A surface or contact that is being left has a multiplier at its bound, to the tolerance of the run:
+    # its rates decide nothing.
     first = stepper.system.surface_count
     leaving = {j + first * (kind in ("impact", "release")) for kind, j, _ in known}
     undecided = {i: "+-s" if i < first else "oc" for i in active}
@@ -220,8 +200,7 @@ def _of_sets(
     known: Known,
     kept: Array | None,
 ) -> dict[int, str] | Decision:
-    """Letters that are possible where sets of codimension two and more are met: those that hold are
-    found together where friction is monotone; what is at its limit is undecided."""
+    """Letters that are possible where sets of codimension two and more are met."""
     system = stepper.system
     undecided = {
         i: "sl" if i in system.set_of else "+-s" if i < system.surface_count else "oc"
@@ -338,9 +317,7 @@ def _finite_prefix(e: Expansion) -> Expansion:
 
 
 def is_two_fold(modes: Modes, mode: str, x: Array, surface: int, tolerance: float = 0.0) -> bool:
-    """Whether both fields are tangent to a surface at a point, and the sliding field 0/0.
-
-    ``tolerance`` is on the angles between fields and surface; rounding is always allowed.
-    """
+    """Whether both fields are tangent to a surface at a point, and the sliding field 0/0."""
+    # ``tolerance`` is on the angles between fields and surface; rounding is always allowed.
     angles = modes.angles(mode, x, surface)
     return angles is not None and bool(np.all(np.abs(angles) <= tolerance + TANGENT))

@@ -16,7 +16,7 @@ from dataclasses import dataclass
 from typing import Any
 
 from ...model import OptionError
-from ..checks import positive
+from ...model.checks import positive
 from .reduced_flow import ReducedFlow
 
 MIXED = ("VI", "IV")
@@ -24,11 +24,10 @@ MIXED = ("VI", "IV")
 
 @dataclass(frozen=True)
 class Row:
-    """One class of the table.
+    """One class of the table."""
 
-    ``into`` says which orbits of Da reach s, ``out_of`` which orbits of Da come from s (and, along
-    the same lines, which orbits of Dr reach s): none, one, all or a sector.
-    """
+    # ``into`` says which orbits of Da reach s, ``out_of`` which orbits of Da come from s (and, along
+    # the same lines, which orbits of Dr reach s): none, one, all or a sector.
 
     label: str
     folds: tuple[str, ...]

@@ -15,20 +15,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...model import Array, OptionError, PointError, real, real_array
-from ..checks import positive
+from ...model.checks import positive
 from .reduced_flow import ReducedFlow
 
 Nu = tuple[float, float]
 
 
 def pair(values: Any, what: str) -> tuple[float, float]:
-    """Return two finite numbers or raise OptionError.
-
-    Examples
-    --------
-    >>> pair([1, 2], "nu")
-    (1.0, 2.0)
-    """
+    """Return two finite numbers or raise OptionError."""
     try:
         items = list(values)
     except TypeError:
@@ -162,13 +156,8 @@ def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
 
 
 def has_diabolo(flow: ReducedFlow) -> bool:
-    """Whether the return map of an invisible two-fold has invariant lines in the crossing region.
-
-    Examples
-    --------
-    >>> has_diabolo(ReducedFlow((-1, 1), (-2.0, -1.0)))
-    True
-    """
+    """Whether the return map of an invisible two-fold has invariant lines in the crossing
+    region."""
     n1, n2 = flow.nu
     return flow.folds == "II" and n1 < 0 and n2 < 0 and n1 * n2 > 1 + 1e-12
 

@@ -124,23 +124,7 @@ class ReducedFlow:
 
 
 def exponential(matrix: ArrayLike, r: ArrayLike) -> Array:
-    """Matrix exponential exp(M r) of a real 2 x 2 matrix, in closed form.
-
-    Parameters
-    ----------
-    matrix : array_like (2, 2)
-    r : array_like (...)
-
-    Returns
-    -------
-    ndarray (..., 2, 2)
-
-    Examples
-    --------
-    >>> exponential([[0.0, -1.0], [1.0, 0.0]], np.pi).round(12) + 0.0
-    array([[-1.,  0.],
-           [ 0., -1.]])
-    """
+    """Matrix exponential exp(M r) of a real 2 x 2 matrix, in closed form."""
     m, r = np.asarray(matrix, dtype=float), np.asarray(r, dtype=float)[..., None, None]
     half = np.trace(m) / 2
     rest = m - half * np.eye(2)
@@ -156,20 +140,8 @@ def exponential(matrix: ArrayLike, r: ArrayLike) -> Array:
 
 
 def leaving(matrix: ArrayLike, z: ArrayLike) -> tuple[float, int]:
-    """Return the time r > 0 at which exp(M r) z leaves the open first quadrant, and through what.
-
-    Returns
-    -------
-    r : float
-        inf if it stays.
-    component : {0, 1, -1}
-        The coordinate that vanishes, -1 if none does.
-
-    Examples
-    --------
-    >>> leaving([[0.0, -1.0], [1.0, 0.0]], [1.0, 0.0])[0] / np.pi
-    0.5
-    """
+    """Return the time r > 0 at which exp(M r) z leaves the open first quadrant, and through
+    what."""
     m, z = np.asarray(matrix, dtype=float), np.asarray(z, dtype=float)
     half = np.trace(m) / 2
     rest = m - half * np.eye(2)
@@ -193,14 +165,7 @@ def _first_zero(value: float, slope: float, square: float) -> float:
 
 @dataclass(frozen=True)
 class Orbit:
-    """One sliding orbit of Da in the direction of real time; ``-points[::-1]`` is one of Dr.
-
-    Attributes
-    ----------
-    points : ndarray (m, 2)
-    comes_from, goes_to : {"z2=0", "z3=0", "s", "infinity", "equilibrium"}
-        Where it begins and ends, to leading order.
-    """
+    """One sliding orbit of Da in the direction of real time; ``-points[::-1]`` is one of Dr."""
 
     points: Array
     comes_from: str
@@ -208,22 +173,7 @@ class Orbit:
 
 
 def orbit(flow: ReducedFlow, z: ArrayLike, count: int = 250) -> Orbit:
-    """Return the whole stay in Da of the sliding orbit through a point.
-
-    Parameters
-    ----------
-    flow : ReducedFlow
-    z : array_like (2,)
-        (z2, z3), both positive.
-    count : int, optional
-        Number of points, about evenly spaced relative to their distance from s.
-
-    Examples
-    --------
-    >>> run = orbit(ReducedFlow((-1, 1), (-2.0, -1.0)), [1.0, 1.0])
-    >>> run.comes_from, run.goes_to
-    ('z2=0', 's')
-    """
+    """Return the whole stay in Da of the sliding orbit through a point."""
     z = np.asarray(z, dtype=float)
     forward, goes_to = _end(flow.matrix, z)
     backward, comes_from = _end(-flow.matrix, z)
@@ -265,15 +215,7 @@ def _cut(size: Array, start: float) -> int:
 
 @dataclass(frozen=True)
 class Sector:
-    """A sector of Da between neighbouring eigenlines and folds; its orbits are scaled copies.
-
-    Attributes
-    ----------
-    low, high : float
-        Angles from the z2 axis, in rad.
-    orbit : Orbit
-        Through the unit vector of the middle angle.
-    """
+    """A sector of Da between neighbouring eigenlines and folds; its orbits are scaled copies."""
 
     low: float
     high: float
@@ -287,13 +229,7 @@ class Sector:
 
 
 def eigenlines(flow: ReducedFlow) -> list[tuple[float, float]]:
-    """Return (eigenvalue, slope) of the eigenlines that lie in the sliding regions.
-
-    Examples
-    --------
-    >>> eigenlines(ReducedFlow((1, -1), (-2.0, -0.5)))
-    [(-2.5, 2.0)]
-    """
+    """Return (eigenvalue, slope) of the eigenlines that lie in the sliding regions."""
     if flow.discriminant < -1e-9:
         return []
     pairs = zip(np.real(flow.eigenvalues), np.real(flow.slopes), strict=True)

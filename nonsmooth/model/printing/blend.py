@@ -12,11 +12,11 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..graph import instructions
-from ..jets import Coefficient, expansion_of, scaled, value_of
-from ..motion import motion
-from ..span import in_span
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
+from ..expressions.dependent_rows import in_span
+from ..expressions.graph import instructions
+from ..expressions.jets import Coefficient, expansion_of, scaled, value_of
+from ..laws.motion import motion
 
 #: A field made of these is as safe to evaluate at lambda = +-1 as at a fixed sign.
 _ENTIRE = {"const", "input", "add", "sub", "mul", "neg", "sq", "twice", "sin", "cos", "not"}
@@ -24,20 +24,7 @@ _ENTIRE = {"const", "input", "add", "sub", "mul", "neg", "sq", "twice", "sin", "
 
 @dataclass(frozen=True)
 class Blend:
-    """Symbols and jets.
-
-    Attributes
-    ----------
-    extra : SX (3,)
-        Masks "slides" and "above", and lambda.
-    states : SX (N, P+1)
-    guards : SX (m, P+1)
-        The surface's guard (sliding: the exit to +), the exit to - (only while sliding), stops.
-    affine : list of bool
-        Guards whose gradient is constant in the states.
-    checked : (rows, slots)
-        Rows of the field and guards with which a step is compared.
-    """
+    """Symbols and jets."""
 
     extra: ca.SX
     states: ca.SX
@@ -47,10 +34,8 @@ class Blend:
 
 
 def blended_jet(system: FilippovSystem, order: int) -> Blend:
-    """Expand the modes ``+``, ``-`` and ``s`` of a system with one surface together.
-
-    A system without surfaces has one mode; its masks are not used.
-    """
+    """Expand the modes ``+``, ``-`` and ``s`` of a system with one surface together."""
+    # A system without surfaces has one mode; its masks are not used.
     slides, above, lam = (ca.SX.sym(n) for n in ("slides_", "above_", "lambda_"))
     extra = ca.vertcat(slides, above, lam)
     stops = (
@@ -87,9 +72,8 @@ def blended_jet(system: FilippovSystem, order: int) -> Blend:
 def _checked(
     system: FilippovSystem, fields: list[ca.SX]
 ) -> tuple[tuple[int, ...], tuple[int, ...]]:
-    """Rows of the field that are not affine in every mode, without combinations of the others, and
-    guards that show more than they.
-    """
+    """Rows of the field that are not affine in every mode, without combinations of the others,
+    and guards that show more than they."""
     x, p = system.extended_states, system.parameter_symbols
     rows = [i for i in range(x.numel()) if not all(ca.is_linear(f[i], x) for f in fields)]
     modes = [motion(system, mode).field for mode in ("+-s" if system.surface_count else ("",))]

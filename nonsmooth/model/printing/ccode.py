@@ -16,7 +16,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..graph import Node, instructions
+from ..expressions.graph import Node, instructions
 
 #: C for operations on T; ``{0}`` and ``{1}`` are the arguments.
 _ARITHMETIC = {
@@ -149,11 +149,10 @@ class _Graph:
         self.divisors = {j for j, k in count.items() if k > 1 or not self.moving[j]}
 
     def _find_sums(self, rows: Sequence[Sequence[int]]) -> None:
-        """Terms, with their signs, of sums whose partial sums nobody else uses, those that are ready first first.
-
-        A convolution's oldest terms can then be added while its newest are still computed. The difference of
-        two sums stays one: where they are equal it is zero.
-        """
+        """Terms, with their signs, of sums whose partial sums nobody else uses, those that are
+        ready first first."""
+        # A convolution's oldest terms can then be added while its newest are still computed. The difference of
+        # two sums stays one: where they are equal it is zero.
         users = [0] * len(self.nodes)
         for j in [a for node in self.nodes for a in node.args] + [j for row in rows for j in row]:
             users[j] += 1
@@ -291,10 +290,8 @@ class _Graph:
         return sorted(found)
 
     def _early(self, outputs: Sequence[Sequence[int]]) -> list[int]:
-        """Nodes in an order for their statements: what only later outputs need follows what it is made of.
-
-        At the end, where their numbers put them, all of that would have to be read again.
-        """
+        """Nodes in an order for their statements."""
+        # At the end, where their numbers put them, all of that would have to be read again.
         first = self._reachable(list(outputs[0]), moving=True)
         key = {j: j for j in first}
         for j in self._reachable([j for row in outputs for j in row], moving=True):

@@ -4,18 +4,13 @@ from __future__ import annotations
 
 import casadi as ca
 
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
 from .blend import Blend, blended_jet
 from .ccode import Program
 
 
 def lanes_program(system: FilippovSystem, order: int) -> tuple[str, Blend]:
-    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, and the blended modes.
-
-    ``lie_values`` are L_F1 h and L_F2 h; each comes with its gradient, which measures rounding.
-    ``check_values`` are the rows of the field and the guards that are not affine, which a step is
-    checked with; ``checked`` of the blend says which.
-    """
+    """C of ``jet``, ``surface_values``, ``lie_values``, ``stop_values``, and the blended modes."""
     x, p = system.extended_states, system.parameter_symbols
     blend = blended_jet(system, order)
     program = Program(x, p, blend.extra, ("I", "I", "T"))

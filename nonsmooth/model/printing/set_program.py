@@ -16,12 +16,12 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from ..coupled import Coupled
-from ..economy import economise
-from ..graph import depends_on, instructions
-from ..jets import Coefficient, Expansion, Expressions, scaled, value_of
-from ..rules import lower, touched
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
+from ..expressions.graph import depends_on, instructions
+from ..expressions.jets import Coefficient, Expansion, Expressions, scaled, value_of
+from ..expressions.simplification import economise
+from ..expressions.taylor_rules import lower, touched
+from ..laws.coupled import Coupled
 from .ccode import Program
 
 #: Lines of functions that are short.
@@ -30,21 +30,7 @@ _SHORT = 150
 
 @dataclass(frozen=True)
 class SetProgram:
-    """A program and its sizes.
-
-    Attributes
-    ----------
-    text : str
-        C of ``off_jet``, ``on_jet``, ``leave_jet``, ``heights``, ``frozen_values``, ``field_values``,
-        ``flow_values`` (|h| times the field, in h and |h|), ``stop_values``, ``slip_values``, ``off_check``,
-        ``on_check``.
-    rows, on_rows : tuple of int
-        Rows of the field that are not affine off the set and on it, which a step is checked with.
-    bent_slip, bent_stops : bool
-        Whether what a step on the set ends with, and stops, have to be checked too.
-    states : tuple of int
-        The states that the switching functions are, or nothing.
-    """
+    """A program and its sizes."""
 
     text: str
     rows: tuple[int, ...]
@@ -221,8 +207,7 @@ class _Writer:
         )
 
     def _leave(self) -> dict[str, ca.SX]:
-        """Leaving the set at no rate yet: coefficients of states, stops, direction, and of the distance
-        from that of t^2."""
+        """Leaving the set at no rate yet."""
         expansion, late = self._expansion([self.off_field, self.off_layer, self.stops], self.lam)
         jet = self._begin()
         start = self.lam
@@ -259,8 +244,7 @@ class _Writer:
         )  # fmt: skip
 
     def _stretched(self, fields: Sequence[Sequence[Coefficient]]) -> list[Coefficient]:
-        """The next coefficients of states, from those of (1 - w s/3)^2 times the field: what is known
-        early stands apart from the last, which everything waits for."""
+        """The next coefficients of states, from those of (1 - w s/3)^2 times the field."""
         w, per = self.stretch, 1.0 / len(fields)
         weights = (per, w * (-2 / 3 * per), w * w * (1 / 9 * per))
         result = []

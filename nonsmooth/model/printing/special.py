@@ -8,8 +8,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 
-from ..coupled import Coupled
-from ..system import FilippovSystem
+from ..definition.system import FilippovSystem
+from ..laws.coupled import Coupled
 from .recurrences import Writer, literal
 from .tape import OPERATIONS, TAPE_RULES, Integers, Series, Tape, Values
 

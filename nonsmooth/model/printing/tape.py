@@ -14,11 +14,11 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from ..coupled import Coupled
-from ..economy import economise
-from ..graph import depends_on, instructions
-from ..numbers import BINARY, UNARY
-from ..rules import RULES, Rule, entered, lower
+from ..expressions.float_arithmetic import BINARY, UNARY
+from ..expressions.graph import depends_on, instructions
+from ..expressions.simplification import economise
+from ..expressions.taylor_rules import RULES, Rule, entered, lower
+from ..laws.coupled import Coupled
 from ..values import Array
 
 Integers = NDArray[np.int32]
@@ -125,13 +125,7 @@ class Tape:
 
 
 def tape_of(coupled: Coupled) -> Tape:
-    """Write a system as a tape.
-
-    Parameters
-    ----------
-    coupled : Coupled
-        With multipliers that enter linearly.
-    """
+    """Write a system as a tape."""
     system, d = coupled.system, coupled.system.definition
     x, p = system.extended_states, system.parameter_symbols
     slope, gradients = _sparse(coupled.slope), [_sparse(g) for g in coupled.gradients]
@@ -167,8 +161,7 @@ def tape_of(coupled: Coupled) -> Tape:
 def values_of(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], free: Sequence[int] = ()
 ) -> Values:
-    """Write expressions in two vectors of symbols, of which the first moves; ``free`` are the numbers of
-    the outputs that are asked for where nothing slides."""
+    """Write expressions in two vectors of symbols, of which the first moves."""
     nodes, rows = instructions(inputs, outputs)
     moving = depends_on(nodes, [True, False])
     number = {op: k for k, op in enumerate(OPERATIONS)}
@@ -231,17 +224,7 @@ def _series(
     unknown: Callable[[int], bool],
     time: int | None = None,
 ) -> Series:
-    """Rules as the interpreter reads them.
-
-    Parameters
-    ----------
-    wanted : sequence of int
-        Numbers of the outputs that are asked for.
-    moves, unknown : callable
-        Whether an entry of the first vector of inputs moves in time, and is an unknown multiplier.
-    time : int, optional
-        The entry that is the time.
-    """
+    """Rules as the interpreter reads them."""
     still = [_is_still(rule) for rule in rules]
     moving, late = entered(rules, moves), entered(rules, lambda k: unknown(k) and moves(k))
     operations = {op: k for k, op in enumerate(OPERATIONS)}
@@ -341,8 +324,7 @@ def _sparse(matrix: ca.SX) -> tuple[ca.SX, Entries]:
 
 
 def _moving_slopes(coupled: Coupled) -> tuple[Integers, Integers, ca.SX]:
-    """Series that the stability of sliding is read from: the slope's entries, if any moves; their
-    numbers or -1 for each place, and which of them move."""
+    """Series that the stability of sliding is read from."""
     output, moves = np.full((coupled.count, coupled.count), -1), coupled.slope_moves
     if not moves.any():
         return _integers(output.ravel()), _integers(moves.ravel()), ca.SX(0, 1)

@@ -62,7 +62,7 @@ def test_an_interrupted_table_goes_on_to_the_same_file(command, table, tmp_path,
     stopped(at=4)
     code, said, err = command("flight", "--input", table(), "--output", out)
     assert (code, said) == (130, "")
-    assert f"interrupted after 3 of 5 rows; they are in {out}. To go on, add --resume" in err
+    assert "3 of 5 rows" in err and str(out) in err and "--resume" in err
     text = whole.read_text().splitlines(keepends=True)
     assert out.read_text() == "".join(text[:4])
     if cut:  # a process that was killed left a part of a row
@@ -83,15 +83,15 @@ def test_other_inputs_are_refused_and_nothing_is_lost(command, table, tmp_path):
     command("flight", "--input", table(), "--output", out)
     before = out.read_text()
     changed = [*LAUNCHES[:2], (51, 18, 5000), *LAUNCHES[3:]]
-    for launches, options, said in [
-        (changed, [], "another start in row 3"),
-        (LAUNCHES[:3], [], "5 rows for 3"),
-        (LAUNCHES, ["--air", "none"], "other results in row 1"),
-        (LAUNCHES, ["--turf", "natural"], "other results in row 1"),
+    for launches, options, where in [
+        (changed, [], "row 3"),
+        (LAUNCHES[:3], [], "5 rows"),
+        (LAUNCHES, ["--air", "none"], "row 1"),
+        (LAUNCHES, ["--turf", "natural"], "row 1"),
     ]:
         argv = ["flight", "--input", table(launches), "--output", out, "--resume"]
         code, _, err = command(*argv, *options)
-        assert code == 2 and f"received {said}" in err
+        assert code == 2 and "--resume" in err and where in err
         assert out.read_text() == before
 
 
@@ -102,7 +102,7 @@ def test_resume_needs_a_file_to_go_on_with(command, table):
         "flight --speed 70 --angle 11 --spin 2700 --resume".split(),
     ):
         code, _, err = command(*argv)
-        assert code == 2 and "--resume: expected with" in err
+        assert code == 2 and "--resume" in err
 
 
 def test_what_was_computed_is_printed_at_an_interrupt(command, table, stopped):
@@ -110,16 +110,16 @@ def test_what_was_computed_is_printed_at_an_interrupt(command, table, stopped):
         stopped(at=3)
         code, out, err = command("flight", "--input", table(), *options)
         assert code == 130 and len(count(out)) == 2
-        assert "interrupted after 2 of 5 rows; they are printed" in err
+        assert "2 of 5 rows" in err
 
 
 WRONG = [
-    ("fast,11,2700", "expected a number, received 'fast' in column 'speed [m/s]'"),
-    ("70,11", "expected 3 values, received 2"),
-    ("70,,2700", "angle: expected an angle"),
-    ("-70,11,2700", "received -70 m/s"),
-    ("1e400,11,2700", "speed: expected a positive speed, received inf m/s"),
-    ("70,11,nan", "spin: expected a number, received nan"),
+    ("fast,11,2700", "'fast' in column 'speed [m/s]'"),
+    ("70,11", "3 values"),
+    ("70,,2700", "angle"),
+    ("-70,11,2700", "-70 m/s"),
+    ("1e400,11,2700", "inf m/s"),
+    ("70,11,nan", "spin"),
 ]
 
 
@@ -134,7 +134,7 @@ def test_what_is_wrong_with_a_row_is_in_it_and_the_others_are_computed(
     out = tmp_path / "out.csv"
     code, _, err = command(name, "--input", path, "--output", out)
     rows = rows_of(out.read_text())
-    assert code == 1 and "6 of 7 rows: see the column error" in err
+    assert code == 1 and "6 of 7 rows" in err
     computed = rows.pop(-1 if first else 0)
     assert computed["error"] == "" and float(computed[f"{_echo(name)}_speed [m/s]"]) == 70.0
     for row, (_, said) in zip(rows, WRONG, strict=True):
@@ -182,7 +182,7 @@ def test_a_launch_beyond_what_was_measured_is_cautioned(command, tmp_path):
     assert command(*argv, 85)[2] == ""
     for more in ([], ["--side-spin", "100"]):
         code, _, err = command(*argv, 1e9, *more)
-        assert code == 0 and "a launch at 1e+09 m/s, faster than 88.8 m/s" in err
+        assert code == 0 and "1e+09 m/s" in err and "88.8 m/s" in err
     (caution,) = json.loads(command(*argv, 1e9, "--json")[1])["cautions"]
     assert "extrapolation" in caution
     path = tmp_path / "rows.csv"

@@ -33,7 +33,7 @@ def test_a_map_is_drawn_in_the_units_asked_for(command, tmp_path, monkeypatch):
     ax = asked[0].axes[0]
     assert code == 0 and ax.get_xlabel() == "landing speed (mph)"
     assert ax.get_xlim() == pytest.approx((40.0, 80.0))
-    with pytest.raises(ns.OptionError, match="speeds: expected one of"):
+    with pytest.raises(ns.OptionError, match="speeds"):
         drawn(
             bounce.outcome_map(
                 bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5),

@@ -1,4 +1,4 @@
-"""Flight is the parabola without air, meets closed forms with it, and published drives in between."""
+"""Flight is the parabola without air, and with it agrees with closed forms and published drives; side spin curves it."""
 
 import math
 
@@ -9,8 +9,10 @@ from hypothesis import strategies as st
 
 import bounce
 import nonsmooth as ns
+from bounce.golf import SMITS_SMITH, SideState, axis_spin, flight
 
 G = 9.80665
+DEG = math.pi / 180
 
 
 def constant(drag, lift=0.0, **kwargs):
@@ -102,17 +104,71 @@ def test_tiny_hops_are_not_stepped_over():
     assert out.time == pytest.approx(exact.time, rel=1e-9)
 
 
+def curved():
+    spin = axis_spin(283.0, 10 * DEG, 11 * DEG)
+    launch = bounce.Landing(70 * math.cos(11 * DEG), 70 * math.sin(11 * DEG), spin.backspin)
+    return SideState.of(launch, spin.side, spin.vertical)
+
+
+@pytest.mark.parametrize("air", [None, *bounce.golf.AIRS.values()], ids=["none", *bounce.golf.AIRS])
+def test_a_flight_without_side_spin_is_the_planar_one(air):
+    launch = bounce.Landing(60.0, 15.0, 300.0)
+    one = flight(launch, air=air, slope=0.1, start=(1.0, 0.5))
+    other = flight(SideState.of(launch), air=air, slope=0.1, start=(1.0, 0.5, 2.0))
+    assert (other.range, other.side, other.height, other.time) == (
+        one.range, 0.0, one.height, one.time
+    )  # fmt: skip
+    assert other.landing.in_plane == one.landing and other.start == (*one.start, 2.0)
+    t = np.linspace(0.0, one.time, 5)
+    assert other(t)[:, :2].tolist() == one(t).tolist() and other(t)[:, 2].tolist() == [2.0] * 5
+
+
+def test_a_little_side_spin_changes_a_flight_a_little():
+    launch = bounce.Landing(60.0, 15.0, 300.0)
+    one = flight(launch, air=SMITS_SMITH, tol=1e-12)
+    other = flight(SideState.of(launch, side_spin=1e-9), air=SMITS_SMITH, tol=1e-12)
+    assert other.range == pytest.approx(one.range, rel=1e-10) and 0.0 < other.side < 1e-9
+    assert other.height == pytest.approx(one.height, rel=1e-9)
+    assert other.landing.in_plane.omega == pytest.approx(one.landing.omega, rel=1e-10)
+    assert other(0.7)[:2] == pytest.approx(one(0.7), rel=1e-9)
+
+
+def test_a_fade_curves_right_as_a_draw_curves_left_and_turns_with_the_launch():
+    fade = flight(curved(), air=SMITS_SMITH)
+    mirror = np.array([1, 1, -1])
+    drawn = SideState(curved().velocity * mirror, -curved().spin * mirror)
+    draw = flight(drawn, air=SMITS_SMITH)
+    assert fade.side > 10 and draw.side == -fade.side and draw.range == fade.range
+    c, s = math.cos(0.4), math.sin(0.4)
+    turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    other = flight(SideState(turn @ curved().velocity, turn @ curved().spin), air=SMITS_SMITH)
+    assert other.range == pytest.approx(c * fade.range - s * fade.side, rel=1e-8)
+    assert other.side == pytest.approx(s * fade.range + c * fade.side, rel=1e-8)
+    assert fade.landing.heading > 0 and other.time == pytest.approx(fade.time, rel=1e-9)
+
+
+def test_a_side_slope_pulls_a_ball_in_the_air_to_its_foot():
+    hop = flight(SideState([10.0, 8.0, 0.0], [0.0, 0.0, 0.0]), slope=0.1, side_slope=0.2)
+    across, down = G * math.cos(0.1) * math.sin(0.2), G * math.cos(0.1) * math.cos(0.2)
+    assert hop.time == pytest.approx(16.0 / down, rel=1e-12)
+    assert hop.side == pytest.approx(-across * hop.time**2 / 2, rel=1e-12)
+
+
+UP = bounce.Landing(1.0, 1.0, 0.0)
+
+
 @pytest.mark.parametrize(
     ("make", "error", "message"),
     [
-        (lambda: bounce.golf.flight(bounce.Landing(1.0, -1.0, 0.0)), ns.PointError, "rises above"),
-        (
-            lambda: bounce.golf.flight(bounce.Landing(1.0, 1.0, 0.0), slope=2.0),
-            ns.OptionError,
-            "slope",
-        ),
-        (lambda: constant(0.3, density=-1.0), ns.ParameterError, "density: .*> 0"),
-        (lambda: bounce.golf.Air(drag=0.3, lift=0.0), ns.ParameterError, "drag: .*lambda s, re"),
+        (lambda: flight(bounce.Landing(1.0, -1.0, 0.0)), ns.PointError, "launch"),
+        (lambda: flight(SideState([1.0, -2.0, 0.0], [0.0, 0.0, 0.0])), ns.PointError, "launch"),
+        (lambda: flight((1.0, 1.0, 0.0)), ns.OptionError, "launch"),
+        (lambda: flight(UP, start=(1.0,)), ns.PointError, "start"),
+        (lambda: flight(UP, slope=2.0), ns.OptionError, "slope"),
+        (lambda: flight(SideState.of(UP), side_slope=2.0), ns.OptionError, "side_slope"),
+        (lambda: flight(UP, side_slope=0.1), ns.OptionError, "side_slope: .*SideState"),
+        (lambda: constant(0.3, density=-1.0), ns.ParameterError, "density"),
+        (lambda: bounce.golf.Air(drag=0.3, lift=0.0), ns.ParameterError, "drag"),
     ],
 )
 def test_messages(make, error, message):

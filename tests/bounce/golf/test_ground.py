@@ -26,18 +26,18 @@ def test_rebound_of_a_contact_model_scales():
 @pytest.mark.parametrize(
     ("make", "error", "message"),
     [
-        (lambda: bounce.golf.rebound("turf", DRIVE), bounce.ModelError, "model: .*TURFS"),
+        (lambda: bounce.golf.rebound("turf", DRIVE), bounce.ModelError, "model"),
         (
             lambda: bounce.golf.rebound(bounce.KelvinVoigt(mu=0.4, d1=0.1, d2=0.3, eta=0.5), DRIVE),
             bounce.ModelError,
-            "scaling: .*from_stiffness",
+            "scaling",
         ),
         (
             lambda: bounce.golf.rebound(
                 bounce.laws.TURFS["natural"].law, DRIVE, bounce.BALLS["tennis"]
             ),
             bounce.ModelError,
-            "inertia: .*replace",
+            "inertia",
         ),
     ],
 )

@@ -38,9 +38,7 @@ def test_it_holds_what_rebounds_give(model):
 @pytest.mark.filterwarnings("error")
 def test_landings_outside_the_fit_are_warned_of():
     law, speeds = bounce.laws.TURFS["natural"].law, [20.0, 30.0]
-    with pytest.warns(
-        bounce.golf.ExtrapolationWarning, match="2 of 4 landings are outside"
-    ) as caught:
+    with pytest.warns(bounce.golf.ExtrapolationWarning, match="2 of 4") as caught:
         bounce.golf.landing_map(law, dict(speed=speeds, angle=[0.05, 0.5]), dict(spin=200.0))
     assert caught[0].filename == __file__
     bounce.golf.landing_map(law, dict(speed=speeds, angle=[0.4, 0.5]), dict(spin=200.0))
@@ -78,17 +76,17 @@ def test_pictures_speak_of_degrees_and_rpm(quantity):
 @pytest.mark.parametrize(
     ("model", "over", "fixed", "options", "error", "message"),
     [
-        (TURF, OVER, dict(spin=0.0), {}, bounce.ModelError, "scaling: .*from_stiffness"),
-        ("turf", OVER, dict(spin=0.0), {}, bounce.ModelError, "model: .*TURFS"),
-        (TURF, OVER, {}, dict(scaling=SCALING), ns.OptionError, r"values for \['spin'\]"),
-        (TURF, dict(speed=[1.0]), {}, dict(scaling=SCALING), ns.OptionError, "two names"),
+        (TURF, OVER, dict(spin=0.0), {}, bounce.ModelError, "scaling"),
+        ("turf", OVER, dict(spin=0.0), {}, bounce.ModelError, "model"),
+        (TURF, OVER, {}, dict(scaling=SCALING), ns.OptionError, "spin"),
+        (TURF, dict(speed=[1.0]), {}, dict(scaling=SCALING), ns.OptionError, "over"),
         (
             bounce.laws.TURFS["natural"].law,
             dict(OVER, angle=[1.0, 2.0]),
             dict(spin=0.0),
             {},
             ns.OptionError,
-            r"angles of descent in \(0, pi/2\]",
+            "angle",
         ),
         (
             bounce.laws.TURFS["natural"].law,
@@ -96,7 +94,7 @@ def test_pictures_speak_of_degrees_and_rpm(quantity):
             dict(spin=0.0, angle=1.0),
             {},
             ns.OptionError,
-            r"received \['mu'\]",
+            "mu",
         ),
     ],
 )

@@ -29,14 +29,14 @@ def test_every_turf_knows_its_range(name):
 @pytest.mark.parametrize(
     ("name", "hit", "words"),
     [
-        ("natural", landing(28, 90, 0), "along the ground of 0 m/s .*0.0171 to 36.8"),
-        ("natural", landing(60, 30, 2000), "along the ground of 52 m/s"),
-        ("natural", landing(50, 60, 2000), "into the ground of 43.3 m/s .*2.14 to 33"),
-        ("natural", landing(20, 5, 2000), "into the ground of 1.74 m/s"),
-        ("artificial", landing(20, 40, 12000), "spin of 12000 rpm .*-4550 to 10400"),
-        ("artificial", landing(20, 40, -5000), "spin of -5000 rpm"),
-        ("penner", landing(40, 30, 2000), "along the ground of 34.6 m/s"),
-        ("natural", landing(28, 80, 3000), "steeper than 71.6 deg"),
+        ("natural", landing(28, 90, 0), "along.* 0 m/s .*0.0171 to 36.8"),
+        ("natural", landing(60, 30, 2000), "along.* 52 m/s"),
+        ("natural", landing(50, 60, 2000), "into.* 43.3 m/s .*2.14 to 33"),
+        ("natural", landing(20, 5, 2000), "into.* 1.74 m/s"),
+        ("artificial", landing(20, 40, 12000), "spin.* 12000 rpm .*-4550 to 10400"),
+        ("artificial", landing(20, 40, -5000), "spin.* -5000 rpm"),
+        ("penner", landing(40, 30, 2000), "along.* 34.6 m/s"),
+        ("natural", landing(28, 80, 3000), "71.6 deg"),
         ("artificial-rigid", landing(28, 85, 12000), "spin"),
     ],
 )
@@ -70,9 +70,7 @@ def test_hops_below_the_range_are_counted_not_shouted():
 
 
 def test_a_ball_that_rolls_like_no_putt():
-    with pytest.warns(
-        bounce.golf.ExtrapolationWarning, match=r"rolls from 14\.\d m/s.*putting green"
-    ):
+    with pytest.warns(bounce.golf.ExtrapolationWarning, match=r"rolling_friction: .*14\.\d m/s"):
         run = bounce.golf.play(TURFS["natural-rigid"].law, landing(28, 38, 2500))
     assert run.rolled > 100.0 and len(run.cautions) == 1
     with warnings.catch_warnings():
@@ -87,7 +85,7 @@ def test_a_law_of_ones_own_has_no_range():
         warnings.simplefilter("error")
         run = bounce.golf.play(law, landing(60, 40, 12000))
     assert run.extrapolated == 0
-    with pytest.warns(bounce.golf.ExtrapolationWarning, match="steeper than"):
+    with pytest.warns(bounce.golf.ExtrapolationWarning, match="TiltedBounce"):
         bounce.golf.rebound(law, landing(20, 85, 0))
 
 

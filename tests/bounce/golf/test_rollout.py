@@ -1,4 +1,5 @@
-"""The run-out agrees with closed forms: the Zeno sum of bounces, sliding into rolling, rolling to rest."""
+"""The run-out agrees with closed forms: the Zeno sum of bounces, sliding into rolling, rolling to rest; with side
+spin it turns and mirrors with the landing."""
 
 import math
 
@@ -9,11 +10,15 @@ from hypothesis import strategies as st
 
 import bounce
 import nonsmooth as ns
+from bounce.golf import SMITS_SMITH, SideState, play
 from tests.drawing import at_most
 
 G = 9.80665
 R = bounce.golf.GOLF.radius
 DRIVE = bounce.Landing.polar(28.5, math.radians(37.3), 2094)
+NATURAL = bounce.laws.TURFS["natural"].law
+SOFT = bounce.KelvinVoigt(mu=0.5, d1=0.1, d2=0.5, eta=0.3)
+SCALING = bounce.Scaling.from_stiffness(bounce.golf.GOLF, 20e3)
 
 
 @at_most(20)
@@ -112,10 +117,113 @@ def test_slopes():
     assert up < level < down
     steep = bounce.golf.play(law, landing, slope=0.2, rolling_friction=0.25)
     assert len(steep.glides) == 1
-    with pytest.raises(bounce.golf.NoRestError, match="rolling ball stops"):
+    with pytest.raises(bounce.golf.NoRestError, match="slope"):
         bounce.golf.play(law, landing, slope=0.2)
-    with pytest.raises(bounce.golf.NoRestError, match="friction stops the slip"):
+    with pytest.raises(bounce.golf.NoRestError, match="slope"):
         bounce.golf.play(law, bounce.Landing(-5.0, -1e-3, -400.0), slope=1.0)
+
+
+@pytest.mark.filterwarnings("ignore::bounce.golf.ExtrapolationWarning")
+@pytest.mark.parametrize(
+    "model, more",
+    [(NATURAL, {}), (NATURAL, dict(slope=0.03, air=SMITS_SMITH)), (SOFT, dict(scaling=SCALING))],
+    ids=["natural", "natural uphill in air", "compliant"],
+)
+def test_a_run_without_side_spin_is_the_planar_one(model, more):
+    one = play(model, DRIVE, tol=1e-12, **more)
+    other = play(model, SideState.of(DRIVE), tol=1e-12, **more)
+    assert len(one.bounces) == len(other.bounces) and one.extrapolated == other.extrapolated
+    assert one.cautions == other.cautions
+    assert [other.run_out, other.side] == pytest.approx([one.run_out, 0.0], rel=1e-8, abs=1e-8)
+    for name in ("bounced", "rolled", "left_out"):
+        assert getattr(other, name) == pytest.approx(getattr(one, name), rel=1e-8, abs=1e-8)
+    assert other.time == pytest.approx(one.time, rel=1e-8)
+    assert other.first_height == pytest.approx(one.first_height, rel=1e-8)
+    flat = np.column_stack([one.path(), np.zeros(len(one.path()))])
+    assert other.path() == pytest.approx(flat, rel=1e-7, abs=1e-7)
+
+
+@pytest.mark.filterwarnings("ignore::bounce.golf.ExtrapolationWarning")
+def test_a_run_turns_and_mirrors_with_its_landing():
+    landing = SideState.of(DRIVE, 80.0, -200.0)
+    one = play(NATURAL, landing)
+    left = play(NATURAL, SideState.of(DRIVE, -80.0, 200.0))
+    assert [left.run_out, -left.side] == pytest.approx([one.run_out, one.side], rel=1e-12)
+    c, s = math.cos(0.7), math.sin(0.7)
+    turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]])
+    other = play(NATURAL, SideState(turn @ landing.velocity, turn @ landing.spin))
+    rest = turn @ [one.run_out, 0.0, one.side]
+    assert [other.run_out, other.side] == pytest.approx(rest[[0, 2]], rel=1e-8)
+    hit = bounce.golf.rebound(NATURAL, landing)
+    assert left.kick == -one.kick and one.kick == pytest.approx(hit.kick, rel=1e-12)
+
+
+def test_a_ball_that_stays_down_is_a_cue_ball():
+    """Coriolis: it slides for 2|h|/(7 mu g) on a parabola and rolls on with 2/7 of the slip taken off."""
+    ball = bounce.golf.GOLF
+    law = bounce.laws.RigidBounce(mu=0.05, restitution=0.0)
+    run = play(law, SideState([3.0, -1.0, 0.5], [60.0, 5.0, 200.0]), rolling_friction=0.2)
+    (first,) = run.bounces
+    off = first.rebound.lift_off
+    v = off.velocity[[0, 2]]
+    h = v + ball.radius * np.array([off.spin[2], -off.spin[0]])
+    slid = 2 * np.hypot(*h) / (7 * 0.05 * G)
+    rolls = v - 2 / 7 * h
+    at = v * slid - 0.05 * G * h / np.hypot(*h) * slid**2 / 2
+    way = 1.4 * np.hypot(*rolls) / (2 * 0.2 * G)
+    slides, rolling = run.glides
+    assert slides.time == pytest.approx(slid, rel=1e-9) and off.velocity[1] == 0.0
+    assert [run.run_out, run.side] == pytest.approx(at + way * rolls, rel=1e-9)
+    assert rolling.time == pytest.approx(1.4 * np.hypot(*rolls) / (0.2 * G), rel=1e-9)
+    assert "to the right" in repr(run)
+
+
+def test_a_ball_rolls_down_a_side_slope_and_comes_to_rest():
+    """Energy: what gravity and the resistance along the way leave is nothing."""
+    law = bounce.laws.RigidBounce(mu=0.5, restitution=0.0)
+    state = SideState([4.0, -1.0, 0.0], [0.0, 0.0, -4.0 / bounce.golf.GOLF.radius])
+    run = play(law, state, side_slope=0.05, rolling_friction=0.2)
+    (glide,) = run.glides
+    t = np.linspace(0.0, glide.time, 20001)
+    x = glide(t)
+    length = float(np.sum(np.hypot(*np.diff(x[:, :2], axis=0).T)))
+    begun = 0.7 * float(x[0, 2:] @ x[0, 2:])
+    fallen = -math.sin(0.05) * G * run.side
+    assert run.side < 0 and begun + fallen == pytest.approx(
+        0.2 * G * math.cos(0.05) * length, rel=1e-7
+    )
+    with pytest.raises(bounce.golf.NoRestError, match="slope"):
+        play(law, state, side_slope=0.3)
+    with pytest.raises(bounce.golf.NoRestError, match="slope"):
+        slippery = bounce.laws.RigidBounce(mu=0.01, restitution=0.0)
+        play(slippery, SideState([4.0, -1.0, 0.0], [0.0, 0.0, 0.0]), side_slope=0.3)
+
+
+def test_on_a_side_slope_a_ball_slides_until_it_rolls():
+    """Sliding friction does not change v - 2/7 of the slip; only 5/7 of the pull along the ground does."""
+    law, ball = bounce.laws.RigidBounce(mu=0.1, restitution=0.0), bounce.golf.GOLF
+    state = SideState([4.0, -1.0, 0.0], [0.0, 0.0, 200.0])
+    run = play(law, state, side_slope=0.05, rolling_friction=0.2)
+    slides, rolls = run.glides
+    assert (slides.mode, rolls.mode) == ("*", "s") and rolls.t == run.bounces[0].t + slides.time
+    assert slides(slides.time) == pytest.approx(rolls(0.0), abs=1e-9)
+    off = run.bounces[0].rebound.lift_off
+    v = off.velocity[[0, 2]]
+    slip = v + ball.radius * np.array([off.spin[2], -off.spin[0]])
+    pull = np.array([0.0, -math.sin(0.05) * G])
+    expected = v - 2 / 7 * slip + 5 / 7 * pull * slides.time
+    assert rolls(0.0)[2:] == pytest.approx(expected, rel=1e-8)
+
+
+def test_times_of_the_path_include_those_of_contact():
+    run = play(SOFT, SideState.of(DRIVE, 80.0), scaling=SCALING)
+    first, second = run.bounces[:2]
+    assert first.rebound.time > 0.0
+    assert second.t == pytest.approx(first.rebound.time + first.hop.time)
+    assert run.path(2)[2, 0] == pytest.approx(second.t)
+    assert (second.x, second.z) == pytest.approx(
+        (first.rebound.x + first.hop.range, first.rebound.z + first.hop.side)
+    )
 
 
 @pytest.mark.parametrize(
@@ -124,7 +232,7 @@ def test_slopes():
         (dict(rolling_friction=0.0), ns.OptionError, "rolling_friction"),
         (dict(min_height=-1.0), ns.OptionError, "min_height"),
         (dict(slope=3.0), ns.OptionError, "slope"),
-        (dict(max_bounces=3), bounce.golf.NoRestError, "within 3 bounces"),
+        (dict(max_bounces=3), bounce.golf.NoRestError, "max_bounces"),
     ],
 )
 def test_messages(options, error, message):
@@ -135,7 +243,16 @@ def test_messages(options, error, message):
 def test_model_messages():
     turf = bounce.KelvinVoigt(mu=0.5, d1=0.2, d2=0.4, eta=0.7)
     scaling = bounce.Scaling.from_stiffness(bounce.golf.GOLF, 2e4)
-    with pytest.raises(ns.OptionError, match=r"slope: .*model\.replace"):
+    with pytest.raises(ns.OptionError, match="slope"):
         bounce.golf.play(turf, DRIVE, scaling=scaling, slope=0.1)
-    with pytest.raises(bounce.LandingError, match="does not approach"):
-        bounce.golf.play(bounce.laws.TURFS["natural"].law, bounce.Landing(1.0, 1.0, 0.0))
+    with pytest.raises(bounce.LandingError):
+        bounce.golf.play(NATURAL, bounce.Landing(1.0, 1.0, 0.0))
+    state = SideState([1.0, -2.0, 0.0], [0.0, 0.0, 0.0])
+    with pytest.raises(ns.OptionError, match="slope"):
+        play(SOFT, state, scaling=SCALING, slope=0.1)
+    with pytest.raises(ns.OptionError, match="min_height"):
+        play(NATURAL, state, min_height=0.0)
+    with pytest.raises(bounce.golf.NoRestError, match="max_bounces"):
+        play(bounce.laws.RigidBounce(mu=0.3, restitution=1.0), state, max_bounces=5)
+    with pytest.raises(ns.OptionError, match="side_slope"):
+        play(NATURAL, DRIVE, side_slope=0.1)

@@ -48,7 +48,7 @@ def test_no_bounce_is_left_to_the_slow_driver(model, monkeypatch):
     def refuse(*_):
         raise AssertionError("a bounce was handed to the reference driver")
 
-    monkeypatch.setattr("nonsmooth.flow.chunks._run_reference", refuse)
+    monkeypatch.setattr("nonsmooth.flow.ensembles.chunks._run_reference", refuse)
     rng = np.random.default_rng(2)
     xdot, omega = rng.uniform(-1, 1, 500), rng.uniform(-2, 2, 500)
     many = bounce.lift_off(model, xdot, -1.0, omega, tol=1e-12)  # compiled above

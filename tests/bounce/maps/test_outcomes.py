@@ -58,7 +58,7 @@ def test_large_maps_are_all_run_in_lanes(count, monkeypatch):
     def refuse(*_):
         raise AssertionError("a bounce was handed to the reference driver")
 
-    monkeypatch.setattr("nonsmooth.flow.chunks._run_reference", refuse)
+    monkeypatch.setattr("nonsmooth.flow.ensembles.chunks._run_reference", refuse)
     over = dict(xdot=np.linspace(-2, 2, count), omega=np.linspace(-4, 4, count))
     assert bounce.outcome_map(TURF, over).regions == PAPER
 

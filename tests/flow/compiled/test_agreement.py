@@ -8,12 +8,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-import nonsmooth.flow.compiled.build as build_module
-import nonsmooth.flow.compiled.lanes as lanes_module
+import nonsmooth.flow.compiled.building.build as build_module
+import nonsmooth.flow.compiled.lanes.engine as lanes_module
 import nonsmooth.textbook as textbook
 from nonsmooth.flow.compiled import find_compiler, lanes_for, tape_for
-from nonsmooth.flow.compiled.codegen import lanes_source
-from nonsmooth.flow.facts import HAND_OVER, KINDS
+from nonsmooth.flow.compiled.building.codegen import lanes_source
+from nonsmooth.flow.constants import HAND_OVER, KINDS
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.reference.driver import Driver
 from nonsmooth.model import FilippovSystem, Reset, Stop

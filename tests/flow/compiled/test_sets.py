@@ -7,10 +7,9 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow.compiled.tape import tape_for
-from nonsmooth.flow.facts import HAND_OVER
+from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.options import Options
-
-from .. import plane_friction as plane
+from tests.flow import plane_friction as plane
 
 
 def landings(count, seed):

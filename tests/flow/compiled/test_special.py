@@ -16,12 +16,13 @@ import pytest
 import nonsmooth as ns
 import nonsmooth.flow.compiled.tape as tape_module
 import nonsmooth.textbook as textbook
-from nonsmooth.flow.compiled import background, build, find_compiler, tape_for
+from nonsmooth.flow.compiled import find_compiler, tape_for
+from nonsmooth.flow.compiled.building import background, build
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.warn import CompilerWarning, warn_once
+from tests.flow.compiled.test_tape import OPERATIONS, P
 
 from ..independent.family import Size, draw, system, values
-from .test_tape import OPERATIONS, P
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

@@ -7,7 +7,7 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.compiled import find_compiler, tape_for
 from nonsmooth.flow.compiled.convert import trajectory
-from nonsmooth.flow.facts import HAND_OVER
+from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.reference.driver import Driver
 

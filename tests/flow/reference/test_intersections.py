@@ -115,7 +115,7 @@ def test_the_ambiguity_of_the_exit_is_reported():
         surfaces=[x, y],
     )
     for height in (0.0, 0.7, 1.9):
-        low, high = ns.intersection_range(system, [0.0, 0.0, height], of=z)
+        low, high = ns.local.intersection_range(system, [0.0, 0.0, height], of=z)
         assert low == pytest.approx(0.5 + 3 * height / 8, abs=1e-12)
         assert high == pytest.approx(1.5 - height / 8, abs=1e-12)
         assert low <= 1 + height**2 / 16 <= high
@@ -130,7 +130,7 @@ def test_no_motion_along_an_intersection_has_no_range():
         [x, y], field=[2 + lam, kap], multipliers=[lam, kap], surfaces=[x, y]
     )
     with pytest.raises(ns.PointError, match="leaves the intersection"):
-        ns.intersection_range(system, [0.0, 0.0], of=x)
+        ns.local.intersection_range(system, [0.0, 0.0], of=x)
 
 
 @pytest.mark.parametrize("tol", [1e-3, 1e-4, 1e-5, 1e-7, 1e-8, 1e-10, 1e-13])

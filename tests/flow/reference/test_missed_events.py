@@ -102,7 +102,7 @@ def test_two_dips_within_one_step_are_four_crossings(depth, centre, gap):
 def test_a_watched_function_is_not_missed_either(depth, centre):
     x = ca.SX.sym("x")
     system = ns.FilippovSystem([x], field=[1])
-    run = ns.follow(system, [0.0], 10.0, mode="", watch=[(x - centre) ** 2 - depth])
+    run = ns.flow.follow(system, [0.0], 10.0, mode="", watch=[(x - centre) ** 2 - depth])
     assert [e.kind for e in run.events] == ["zero", "zero", "end"]
 
 

@@ -74,9 +74,9 @@ numbers = st.floats(-3, 3)
 @given(numbers, numbers, st.floats(-2, -0.01), st.floats(-2, 2))
 def test_flights_are_orbits_of_the_normal_form(n1, n2, down, other):
     nu, s = (n1, n2), system((-1, 1), (n1, n2))
-    run = ns.follow(s, [0, down, other], 2 * abs(down), mode="+")
+    run = ns.flow.follow(s, [0, down, other], 2 * abs(down), mode="+")
     np.testing.assert_allclose(run.x[-1], [0, *flight_above([down, other], nu)], atol=1e-12)
-    run = ns.follow(s, [0, other, down], 2 * abs(down), mode="-")
+    run = ns.flow.follow(s, [0, other, down], 2 * abs(down), mode="-")
     np.testing.assert_allclose(run.x[-1], [0, *flight_below([other, down], nu)], atol=1e-12)
 
 

@@ -23,21 +23,7 @@ _THREADS, _RESIDENT = 128, 2
 
 
 class Card:
-    """One CUDA device.
-
-    Parameters
-    ----------
-    core : module
-        ``cuda.core``.
-    fused : bool
-        Whether products and sums are fused, as in the lanes on a processor; without, the bits are those of
-        the shim compiled so.
-
-    Raises
-    ------
-    DeviceError
-        No driver, or no device.
-    """
+    """One CUDA device."""
 
     threads = _THREADS
 
@@ -109,13 +95,7 @@ class Card:
 
 @lru_cache(maxsize=2)
 def card(fused: bool = True) -> Card:
-    """Return the card of this process.
-
-    Raises
-    ------
-    DeviceError
-        cuda-core is not installed; no driver; no device.
-    """
+    """Return the card of this process."""
     try:
         core = importlib.import_module("cuda.core")
     except ImportError as error:

@@ -12,11 +12,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ....model import Array, FilippovSystem
-from ...facts import HAND_OVER, SIMPLE_KINDS
+from ...constants import HAND_OVER, SIMPLE_KINDS
 from ...options import Options
 from ...results import Chunk
 from ...status import Status
-from ..codegen import device_source
+from ..building.codegen import device_source
 from .machine import Machine
 
 #: Kinds of starts, by number in kernel.c.
@@ -28,16 +28,7 @@ _MOST = 2**62
 
 @dataclass(frozen=True)
 class Source:
-    """Where the starts of a kernel come from.
-
-    Attributes
-    ----------
-    kind, seed : int
-    values : ndarray
-        Rows of states; the axes of a grid one after the other; both corners of a box.
-    lengths : ndarray of int64
-        Of the axes of a grid, 0 for a single number.
-    """
+    """Where the starts of a kernel come from."""
 
     kind: int
     seed: int
@@ -64,13 +55,7 @@ class Source:
 
 @dataclass(frozen=True)
 class Bins:
-    """Bins of equal width for the states and the time.
-
-    Attributes
-    ----------
-    count : int
-    low, high : ndarray (n + 1,)
-    """
+    """Bins of equal width for the states and the time."""
 
     count: int
     low: Array
@@ -86,8 +71,7 @@ class Bins:
 
 @dataclass(frozen=True)
 class Reduced:
-    """What became of some runs: numbers by itinerary and status, sums of the ends and of their squares
-    (n + 1, 2), numbers in bins (n + 1, bins), and which runs are left to another engine."""
+    """What became of some runs."""
 
     words: dict[str, int]
     status: dict[int, int]
@@ -97,15 +81,7 @@ class Reduced:
 
 
 class Kernel:
-    """What runs a system's trajectories on a machine, compiled when first needed.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-        One that ``supports_lanes``.
-    order : int
-    machine : Machine
-    """
+    """What runs a system's trajectories on a machine, compiled when first needed."""
 
     def __init__(self, system: FilippovSystem, order: int, machine: Machine):
         self.system, self.order, self.machine = system, order, machine
@@ -133,22 +109,8 @@ class Kernel:
         at: tuple[int, int] | None,
         out: Chunk,
     ) -> None:
-        """Run ``count`` trajectories, the first of which has the number ``first`` in its source.
-
-        Those that are rare keep the status HAND_OVER and have no results.
-
-        Parameters
-        ----------
-        p : ndarray (np,) or (count, np)
-        at : (kind, count) or None
-            Event whose state is kept.
-        out : Chunk
-            Its arrays are filled.
-
-        Raises
-        ------
-        CompilerError
-        """
+        """Run ``count`` trajectories, the first of which has the number ``first`` in its source."""
+        # Those that are rare keep the status HAND_OVER and have no results.
         memory = self.start(source, first, count, p, options, at)
         found = _results(count, self.system.dimension, at is not None)
         for name, array in found.items():
@@ -262,13 +224,7 @@ def _fill(out: Chunk, found: dict[str, NDArray[Any]], modes: Sequence[str]) -> N
 
 
 def word_of(code: int, modes: Sequence[str]) -> str:
-    """Return an itinerary from its code: digits from 1 to base 4, the last mode lowest.
-
-    Examples
-    --------
-    >>> word_of(0b011110, ("+", "-", "s"))
-    '+ s -'
-    """
+    """Return an itinerary from its code: digits from 1 to base 4, the last mode lowest."""
     letters = []
     while code:
         letters.append(modes[(code & 3) - 1] or "o")

@@ -77,15 +77,7 @@ def numbers(arguments: Sequence[Argument]) -> list[Argument]:
 
 
 def machine_for(device: str) -> Machine:
-    """Return what runs ``device="cuda"``.
-
-    Raises
-    ------
-    OptionError
-        Another device.
-    DeviceError
-        No card, no driver, or no packages that drive it.
-    """
+    """Return what runs ``device="cuda"``."""
     if device not in DEVICES:
         raise OptionError(f"device: expected None or one of {DEVICES}, received {device!r}.")
     from .card import card

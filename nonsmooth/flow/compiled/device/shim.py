@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..build import build
+from ..building.build import build
 from .machine import Argument, numbers
 
 _STAND = """
@@ -22,17 +22,7 @@ _FLAGS = ("-x", "c++", "-std=gnu++17", "-fno-exceptions", "-fno-rtti")
 
 
 class Shim:
-    """A device that is none.
-
-    Parameters
-    ----------
-    fused : bool
-        Whether the compiler may fuse products and sums.
-    blocks, threads : int
-        Threads run one after the other, each what would be its share.
-    flags : sequence of str
-        More for the compiler.
-    """
+    """A device that is none."""
 
     name = "this processor, as a GPU"
 
@@ -43,12 +33,7 @@ class Shim:
         self._flags = (*_FLAGS, f"-ffp-contract={'fast' if fused else 'off'}", *flags)
 
     def compile(self, source: str) -> ctypes.CDLL:
-        """Return the kernels of a source.
-
-        Raises
-        ------
-        CompilerError
-        """
+        """Return the kernels of a source."""
         return build(source + _STAND, self._flags)
 
     def empty(self, size: int) -> NDArray[np.uint8]:

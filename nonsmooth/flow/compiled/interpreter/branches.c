@@ -1,4 +1,4 @@
-/* Points of branches of periodic orbits: nonsmooth/orbit/orbit_branches.py ------------------------------------ */
+/* Points of branches of periodic orbits: nonsmooth/orbit/branches/orbit_branches.py ------------------------------------ */
 
 /* Below this part of the step before, steps with the same derivatives are worth their while. */
 #define CONTRACTS 0.05
@@ -50,7 +50,7 @@ static int chord_converges(Shooting *w, const double *across, double level, doub
 }
 
 /* Move the unknowns in ``memory`` across a direction (in units of the unknowns, ``scales``) to the branch: see
- * ``correct`` of nonsmooth/orbit/continuation/curve.py. One parameter is free; parameters are where the memory of the
+ * ``correct`` of nonsmooth/solvers/continuation/curve.py. One parameter is free; parameters are where the memory of the
  * legs begins. Left there as by ``orbit_evaluate``. The number of full steps, or 0. */
 int64_t orbit_correct(const Orbit *o, const Demands *d, const double *scales, const double *wrap, const double *across,
                       double *memory) {

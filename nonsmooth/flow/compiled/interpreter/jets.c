@@ -1,4 +1,4 @@
-/* Series of a mode: nonsmooth/model/coupled.py ---------------------------------------------------------- */
+/* Series of a mode: nonsmooth/model/laws/coupled.py ---------------------------------------------------------- */
 
 static const double *row_of(const Run *r, int output) {
   return r->series + (int64_t)r->s->series.output[output] * stride_of(r);

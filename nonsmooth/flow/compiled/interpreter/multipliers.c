@@ -1,4 +1,4 @@
-/* The return map of an orbit on what it keeps: nonsmooth/orbit/multipliers.py -------------------------------- */
+/* The return map of an orbit on what it keeps: nonsmooth/orbit/periodic/multipliers.py -------------------------------- */
 
 /* Legs as they were flown, stacked and dense: ends of s states, starts of n. */
 typedef struct {

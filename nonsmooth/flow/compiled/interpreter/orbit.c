@@ -1,4 +1,4 @@
-/* Periodic orbits by Newton's method: nonsmooth/orbit/shooting.py -------------------------------------------- */
+/* Periodic orbits by Newton's method: nonsmooth/orbit/periodic/shooting.py -------------------------------------------- */
 
 /* An orbit of a fixed itinerary. Unknowns are the starts of all legs, then their durations, then free parameters. */
 typedef struct {
@@ -10,7 +10,7 @@ typedef struct {
   int64_t of_legs, of_plain;   /* sizes of their memory */
 } Orbit;
 
-/* What is asked for: see ``converge`` in nonsmooth/local/newton.py and ``_polished`` in orbit/find_periodic.py. Legs
+/* What is asked for: see ``converge`` in nonsmooth/solvers/newton.py and ``_polished`` in orbit/periodic/find_periodic.py. Legs
  * advance the last state by ``periods`` times what a program gives of the parameters, with its derivatives. */
 typedef struct {
   double tol, noise, finest, coarse, extended, final, rounding, longest, periods;

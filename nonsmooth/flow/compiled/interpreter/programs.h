@@ -12,7 +12,7 @@ typedef struct {
   const double *constant;
 } Values;
 
-/* Power series by rules (nonsmooth/model/rules.py), order by order. Those of ``moving`` have a coefficient
+/* Power series by rules (nonsmooth/model/expressions/taylor_rules.py), order by order. Those of ``moving`` have a coefficient
  * zero, those of ``later`` further ones; ``late`` are those of them that unknown multipliers enter, which
  * follow from the equations of the same order. */
 typedef struct {

@@ -1,4 +1,4 @@
-/* Surfaces: nonsmooth/model/evaluators.py ---------------------------------------------------------- */
+/* Surfaces: nonsmooth/model/laws/evaluators.py ---------------------------------------------------------- */
 
 /* Surfaces, gaps and their rates at x; gradients stay among the program's values. */
 static const double *surface_values(Run *r, const double *x) {

@@ -4,7 +4,7 @@ import casadi as ca
 
 import nonsmooth as ns
 import nonsmooth.textbook as textbook
-from nonsmooth.flow.compiled.codegen import supports_lanes
+from nonsmooth.flow.compiled.building.codegen import supports_lanes
 from nonsmooth.flow.compiled.device.kernel import Kernel, Source
 from nonsmooth.flow.results import Chunk
 

@@ -4,7 +4,7 @@ known to need: what spills more than that was made slower by a change."""
 import pytest
 
 from benchmarks.problems import bounce_system
-from nonsmooth.flow.compiled.codegen import device_source
+from nonsmooth.flow.compiled.building.codegen import device_source
 from nonsmooth.flow.compiled.device.card import Card
 from nonsmooth.flow.options import Options
 from tests.flow.compiled.device.nvrtc import compiled, library

@@ -8,9 +8,9 @@ import pytest
 import nonsmooth as ns
 import nonsmooth.textbook as textbook
 from benchmarks.problems import bounce_system, random_starts
-from nonsmooth.flow import on_device
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device.shim import Shim
+from nonsmooth.flow.ensembles import on_device
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.status import Status
 from tests.flow.compiled.device.cases import TAKEN, block_on_a_belt, ends

@@ -7,11 +7,12 @@ import pytest
 import nonsmooth as ns
 import nonsmooth.textbook as textbook
 from benchmarks.problems import bounce_system, random_starts
-from nonsmooth.flow import on_device
-from nonsmooth.flow.compiled import find_compiler, lanes
+from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device.kernel import word_of
 from nonsmooth.flow.compiled.device.shim import Shim
-from nonsmooth.flow.facts import HAND_OVER
+from nonsmooth.flow.compiled.lanes import engine
+from nonsmooth.flow.constants import HAND_OVER
+from nonsmooth.flow.ensembles import on_device
 from nonsmooth.flow.options import Options
 from tests.flow.compiled.device.cases import TAKEN, block_on_a_belt, ends
 
@@ -41,10 +42,10 @@ def as_card(monkeypatch, shim):
 
 def plain_lanes(system, x, p, options, at, monkeypatch):
     """What four lanes say without fused operations, those of what they hand over left out."""
-    monkeypatch.setattr(lanes, "FLAGS", (*lanes.FLAGS, "-ffp-contract=off"))
-    monkeypatch.setattr(lanes, "lane_width", lambda: 4)
-    monkeypatch.setattr(lanes.Lanes, "_run_rest", lambda *_: None)
-    return lanes.Lanes(system, options.order).run_many(x, p, options, at)
+    monkeypatch.setattr(engine, "FLAGS", (*engine.FLAGS, "-ffp-contract=off"))
+    monkeypatch.setattr(engine, "lane_width", lambda: 4)
+    monkeypatch.setattr(engine.Lanes, "_run_rest", lambda *_: None)
+    return engine.Lanes(system, options.order).run_many(x, p, options, at)
 
 
 def compared(system, x, options, machine, monkeypatch, at=None, p=None):

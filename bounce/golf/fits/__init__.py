@@ -1,0 +1,1 @@
+"""Parameters of laws and contact models, fitted to measured bounces."""

@@ -1,0 +1,1 @@
+"""Compilation: C sources, compilers, and the cache of compiled libraries."""

@@ -1,0 +1,245 @@
+"""From C source to a loaded library: compile once, keep the result, load it.
+
+The key of an entry hashes the source, the flags, the compiler's path and version, and the processor,
+so a change of any of them is another entry. Entries appear by an atomic rename: processes that build
+the same one at once do double work and no harm. An entry that is damaged, or that does not load, is
+built again. A compiler that fails is told once and the next one is tried.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import hashlib
+import os
+import shlex
+import shutil
+import signal
+import subprocess
+import sys
+import tempfile
+from collections.abc import Sequence
+from pathlib import Path
+
+from ... import files
+from ...warn import warn_once
+from .compilers import (
+    ADVICE,
+    FLAGS,
+    Command,
+    CompilerError,
+    compilers,
+    find_compiler,
+    lane_width,
+    processor,
+    version,
+)
+from .store import cache_directory, is_intact, remove_leftovers, sealed, usable_folder
+
+__all__ = [
+    "Compilation",
+    "CompilerError",
+    "build",
+    "cache_directory",
+    "compile_library",
+    "find_compiler",
+    "lane_width",
+    "library_key",
+]
+
+#: Seconds after which a compilation says that it is under way, and after which it is ended.
+_QUIET, _LONGEST = 1.0, 600.0
+
+#: How folders in which a compiler works begin.
+_WORK = "build-"
+
+#: Compilers that were ended so; each is waited for once in a process.
+_HANGING: set[Command] = set()
+
+
+class Compilation:
+    """How a compiler runs, and a way to stop it."""
+
+    def __init__(self, quiet: bool = False) -> None:
+        self.quiet, self.stopped, self.hangs = quiet, False, False
+        self._process: subprocess.Popen[str] | None = None
+
+    def stop(self) -> None:
+        """End the compiler that runs, and let none begin."""
+        self.stopped, process = True, self._process
+        if process is not None and process.poll() is None:
+            _end(process)
+
+    def call(self, command: list[str]) -> str:
+        """Run a compiler; what went wrong, or nothing. One that takes long says so on stderr."""
+        if self.stopped:
+            return "stopped"
+        name = "ziglang" if "ziglang" in command[:3] else command[0]
+        try:
+            process = subprocess.Popen(
+                command,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.PIPE,
+                text=True,
+                errors="replace",
+                start_new_session=True,  # of which all processes can be ended together
+            )
+        except (OSError, ValueError) as error:
+            return str(error)
+        self._process = process
+        with process:
+            try:
+                if self.stopped:
+                    self.stop()
+                errors = _errors(process, "" if self.quiet else name)
+            except BaseException as error:
+                _end(process)
+                if not isinstance(error, subprocess.TimeoutExpired):
+                    raise
+                self.hangs = True
+                return _no_end()
+        if not process.returncode:
+            return ""
+        return errors.strip() or f"exit status {process.returncode} and no word about why"
+
+
+def library_key(source: str, command: Command, flags: Sequence[str] = ()) -> str:
+    """Content hash of a build."""
+    parts = (source, " ".join([*FLAGS, *flags]), version(command), processor(), sys.platform)
+    return hashlib.sha256("\0".join(parts).encode()).hexdigest()[:32]
+
+
+def build(source: str, flags: Sequence[str] = (), run: Compilation | None = None) -> ctypes.CDLL:
+    """Load the library of a C source, compiled unless the cache has it."""
+    commands = compilers()
+    if not commands:
+        raise CompilerError(f"compiler: expected a C compiler, found none. {ADVICE}")
+    failures: list[CompilerError] = []
+    for command in commands:
+        try:
+            library = _library(source, command, usable_folder(), flags, run or Compilation())
+        except CompilerError as error:
+            if run is not None and run.stopped:
+                raise
+            failures.append(error)
+            continue
+        if failures:
+            warn_once(f"{failures[0].brief or failures[0]} {shlex.join(command)} is used instead.")
+        return library
+    raise failures[0]
+
+
+def _library(
+    source: str, command: Command, folder: Path, flags: Sequence[str], run: Compilation
+) -> ctypes.CDLL:
+    key = library_key(source, command, flags)
+    library = folder / f"{key}.so"
+    if is_intact(library):
+        try:
+            return _loaded(library, key)
+        except OSError:
+            pass  # what it was built for is gone since: once more
+    compile_library(source, command, library, flags, run)
+    try:
+        return _loaded(library, key)
+    except OSError as error:
+        library.unlink(missing_ok=True)
+        raise CompilerError(
+            f"library {library}: compiled by {shlex.join(command)} but does not load ({error}). "
+            "Is it built for another machine, or the folder mounted noexec? Set NONSMOOTH_CACHE to "
+            "another folder.",
+            f"compiler: what {shlex.join(command)} makes does not load.",
+        ) from error
+
+
+def _loaded(library: Path, key: str) -> ctypes.CDLL:
+    """Load a library; OSError if that fails or if it is not the one of this key."""
+    loaded = ctypes.CDLL(str(library))
+    try:
+        found = (ctypes.c_char * (len(key) + 1)).in_dll(loaded, "nonsmooth_key").value
+    except ValueError:
+        found = b""
+    if found != key.encode():
+        raise OSError("it is not the library of this source")
+    return loaded
+
+
+def compile_library(
+    source: str,
+    command: Command,
+    library: Path,
+    flags: Sequence[str] = (),
+    run: Compilation | None = None,
+) -> None:
+    """Put the library of a source into its place, which has its key as name."""
+    try:
+        _compile(source, command, flags, library, run or Compilation())
+    except OSError as error:
+        raise CompilerError(
+            f"cache: expected to write {library}, received {error}. Make room, or set "
+            "NONSMOOTH_CACHE to another folder."
+        ) from error
+
+
+def _compile(
+    source: str, command: Command, flags: Sequence[str], library: Path, run: Compilation
+) -> None:
+    remove_leftovers(library.parent, [_WORK, files.PART], 6 * _LONGEST)
+    # No TemporaryDirectory: it would go before the compiler does where a program ends meanwhile.
+    work = Path(tempfile.mkdtemp(dir=library.parent, prefix=_WORK))
+    try:
+        text, output = work / "engine.c", work / "engine.so"
+        key = f'const char nonsmooth_key[] = "{library.stem}";\n'
+        text.write_text(f"{source}\n{key}", encoding="utf-8")
+        call = [*command, *FLAGS, *flags, str(text), "-o", str(output), "-lm"]
+        failure = _no_end() if command in _HANGING else run.call(call)
+        if run.hangs:
+            _HANGING.add(command)
+        if not failure and not output.is_file():
+            failure = "no error, but no library either"
+        if run.stopped:
+            raise CompilerError("compiler: stopped, because the program ends.")
+        if failure:
+            kept = library.with_suffix(".c")
+            files.replace(kept, source.encode())
+            raise CompilerError(
+                f"compiler: expected a library from\n  {shlex.join(call)}\nreceived\n"
+                f"{failure[:2000]}\nThe source is kept in {kept}. {ADVICE}",
+                f"compiler: {shlex.join(command)} failed ({failure.splitlines()[0][:200]}).",
+            )
+        files.replace(library, sealed(library.name, output.read_bytes()))
+    finally:
+        shutil.rmtree(work, ignore_errors=True)
+
+
+def _errors(process: subprocess.Popen[str], name: str) -> str:
+    """What a compiler says; if it has a name and takes long, that is said on stderr."""
+    if not name:
+        return process.communicate(timeout=_LONGEST)[1]
+    try:
+        return process.communicate(timeout=_QUIET)[1]
+    except subprocess.TimeoutExpired:
+        _say(f"nonsmooth: compiling a fast engine with {name} (once; it is kept) ... ")
+    try:
+        return process.communicate(timeout=_LONGEST)[1]
+    finally:
+        _say("done\n" if process.returncode == 0 else "failed\n")
+
+
+def _no_end() -> str:
+    return f"no end within {_LONGEST:g} s"
+
+
+def _end(process: subprocess.Popen[str]) -> None:
+    """End a compiler and what it has started."""
+    try:
+        os.killpg(process.pid, signal.SIGKILL)
+    except (OSError, AttributeError):
+        process.kill()
+
+
+def _say(text: str) -> None:
+    """Write to stderr, if there is one."""
+    if sys.stderr is not None:
+        sys.stderr.write(text)
+        sys.stderr.flush()

@@ -1,0 +1,1 @@
+"""Lanes: several trajectories in step, by one vectorised C text."""

@@ -1,0 +1,153 @@
+"""Several trajectories in step, from Python: one system of at most one surface, one order."""
+
+from __future__ import annotations
+
+import ctypes
+import math
+import threading
+from collections.abc import Callable, Mapping, Sequence
+
+import numpy as np
+
+from ....model import Array, FilippovSystem, coupled_of
+from ...constants import HAND_OVER
+from ...options import Options
+from ...results import Chunk, Stopped
+from ..arrays import (
+    BURST,
+    BatchStructure,
+    OptionsStructure,
+    address,
+    batch_of,
+    options_of,
+    require_size,
+    words_of,
+)
+from ..building.build import build
+from ..building.codegen import lanes_source, set_lanes_source, supports_lanes, supports_set_lanes
+from ..building.compilers import lane_width
+from ..tape import tape_for
+
+_I64, _POINTER = ctypes.c_int64, ctypes.c_void_p
+
+#: Lanes have a text of their own, and no bits in common with another: sums of products may be fused.
+FLAGS = ("-ffp-contract=fast",)
+
+
+class Lanes:
+    """The library that runs a system's trajectories in step, built when first needed."""
+
+    def __init__(self, system: FilippovSystem, order: int):
+        self.system, self.order = system, order
+        self._library: ctypes.CDLL | None = None
+        self._lock = threading.Lock()
+
+    @property
+    def library(self) -> ctypes.CDLL:
+        """The library, loaded."""
+        with self._lock:
+            if self._library is None:
+                source = self._source(lane_width())
+                self._library = _declare(build(source, FLAGS))
+            return self._library
+
+    def _source(self, width: int) -> str:
+        if self.system.sets:
+            return set_lanes_source(coupled_of(self.system), self.order, width)
+        return lanes_source(self.system, self.order, width)
+
+    def run_many(
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+        out: Chunk | None = None,
+        stop: Callable[[], bool] = lambda: False,
+    ) -> Chunk:
+        """Run trajectories from extended starts (m, N) with parameters (m, np) or (np,)."""
+        # What is rare is run again one by one, by the interpreter.
+        chunk = out or Chunk.empty(len(x), self.system, at is not None)
+        chunk.forget()
+        x, p = np.ascontiguousarray(x, float), np.ascontiguousarray(p, float)
+        c_options = options_of(self.system, options, dense=False, at=at)
+        library = self.library
+        tree = library.tree_new()
+        try:
+            batch = batch_of(x, p, options.t_start, chunk, None, None)
+            _call(library, batch, c_options, tree, stop)
+            used = np.flatnonzero(np.bincount(chunk.itinerary))
+            chunk.rename(_words(library, tree, self.system.modes, used.tolist()))
+        finally:
+            library.tree_free(tree)
+        self._run_rest(x, p, options, at, chunk, stop)
+        return chunk
+
+    def _run_rest(
+        self,
+        x: Array,
+        p: Array,
+        options: Options,
+        at: tuple[int, int] | None,
+        out: Chunk,
+        stop: Callable[[], bool],
+    ) -> None:
+        """Give what the lanes hand over to the interpreter."""
+        rest, tape = np.flatnonzero(out.status == HAND_OVER), tape_for(self.system, options)
+        if not rest.size or tape is None:
+            return
+        own = p if p.ndim == 1 else p[rest]
+        out.replace(rest, tape.run_many(x[rest], own, options, at, None, stop))
+
+
+def _call(
+    library: ctypes.CDLL,
+    batch: BatchStructure,
+    options: OptionsStructure,
+    tree: int,
+    stop: Callable[[], bool],
+) -> None:
+    memory = np.zeros(library.many_size() + 64, np.uint8)
+    state = memory.ctypes.data + -memory.ctypes.data % 64
+    call = (state, ctypes.byref(batch), ctypes.byref(options), tree, BURST)
+    while library.run_many(*call):
+        if stop():
+            raise Stopped
+
+
+def _declare(library: ctypes.CDLL) -> ctypes.CDLL:
+    require_size(library.options_size, OptionsStructure)
+    require_size(library.batch_size, BatchStructure)
+    library.tree_new.restype = _POINTER
+    library.tree_size.argtypes = [_POINTER]
+    library.tree_read.argtypes = [_POINTER] * 3
+    library.tree_free.argtypes = [_POINTER]
+    library.many_size.restype = _I64
+    library.run_many.argtypes = [*[_POINTER] * 4, _I64]
+    return library
+
+
+def _words(
+    library: ctypes.CDLL, tree: int, modes: Sequence[str], nodes: Sequence[int]
+) -> Mapping[int, str]:
+    """Itineraries of some nodes of a tree, as strings."""
+    size = library.tree_size(tree)
+    parent, mode = np.empty(size, np.int32), np.empty(size, np.int32)
+    library.tree_read(tree, address(parent), address(mode))
+    return words_of(parent, mode, modes, nodes)
+
+
+def lanes_for(system: FilippovSystem, options: Options) -> Lanes | None:
+    """Return what runs a system's trajectories in step at the options' tolerance, or None where they
+    cannot be: several surfaces, resets, a start's mode that is asked for."""
+    if options.start_mode is not None:
+        return None
+    if not (supports_set_lanes(coupled_of(system)) if system.sets else supports_lanes(system)):
+        return None
+    order = _order_with_sets(options) if system.sets else options.order
+    return system.cached(("lanes", order), lambda: Lanes(system, order))
+
+
+def _order_with_sets(options: Options) -> int:
+    """Where directions of slip are expanded the work of the series counts most."""
+    return max(6, math.ceil(options.order / 1.2))

@@ -1,0 +1,1 @@
+"""Ensembles: many starts and parameters, in chunks, on several workers, in memory or in files."""

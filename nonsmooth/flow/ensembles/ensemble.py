@@ -1,0 +1,209 @@
+"""The verb ``ensemble``: many starts, many parameters, one result for each."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from contextlib import nullcontext
+from typing import Any
+
+from numpy.typing import ArrayLike
+
+from ...model import FilippovSystem, OptionError, explain, require_system
+from ..compiled.lanes.engine import lanes_for
+from ..compiled.tape import library, tape_for
+from ..constants import KINDS
+from ..options import Options
+from ..results import Chunk, Collected, Ensemble
+from ..section import KINDS_OF_SECTIONS
+from ..select import compiled_or_none, use_compiled
+from ..view import read_view, sectioned
+from .chunks import Job
+from .lazy_starts import Drawn
+from .on_device import CHUNK, require_device, run_there
+from .starts import Starts
+from .stored import Stored
+from .work import Work, checked_work, run_all, size_of_chunk
+
+#: Fewer trajectories than this are not worth compiling the engine that runs several in step; nor those of
+#: systems with a set, which takes longer, unless it is asked for.
+_FEW, _FEW_WITH_SETS = 64, 4000
+
+
+def ensemble(
+    system: FilippovSystem,
+    x0: ArrayLike | Drawn,
+    t_end: float,
+    *,
+    t_start: float = 0.0,
+    parameters: Mapping[Any, ArrayLike] | None = None,
+    tol: float = 1e-10,
+    rtol: float | None = None,
+    atol: float | None = None,
+    start_mode: str | None = None,
+    max_step: float = math.inf,
+    max_steps: int = 1_000_000,
+    max_events: int = 100_000,
+    at_event: tuple[str, int] | None = None,
+    t_eval: ArrayLike | None = None,
+    at: Any = None,
+    work: Work | None = None,
+    engine: str = "auto",
+    device: str | None = None,
+) -> Ensemble:
+    """Integrate many trajectories and keep their ends.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        As for :func:`simulate`.
+    x0 : array_like (..., n), Grid or RandomStarts
+        Starts. Those that are not finite get the status NOT_FINITE; the others go on.
+    t_end : float
+        Time at which every run ends, unless something ends it before.
+    t_start : float, optional
+        Time at which every run starts; default 0.
+    parameters : mapping, optional
+        Values that replace defaults: numbers, or arrays that broadcast with the starts.
+    tol, rtol, atol, start_mode, max_step, max_steps, max_events : optional
+        As in :func:`simulate`; a start with another side than ``start_mode`` says gets the status
+        NON_UNIQUE.
+    at_event : (kind, k), optional
+        Keep the state at the k-th event (from 1) of a kind, e.g. ``("crossing", 1)``.
+    t_eval : array_like (K,), optional
+        Keep the states at these times, sorted, in ``sample_t`` and ``sample_x``.
+    at : Section, str, number or expression, optional
+        Keep the states at a section; one at events needs a ``count``. See :class:`Section`.
+    work : Work, optional
+        Threads or an executor, size of a chunk, progress bar, checkpoint; see :class:`Work`.
+    engine : {"auto", "reference", "compiled"}
+        Which driver: ``"auto"`` takes the compiled one where there is a compiler.
+    device : {None, "cuda"}, optional
+        ``"cuda"`` runs on an NVIDIA card; what is rare still runs here, by ``engine``. Needs the packages
+        of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
+
+    Returns
+    -------
+    Ensemble
+        Independent of ``work`` to the last bit.
+
+    Raises
+    ------
+    PointError
+        Starts whose last axis has not the length n, or that do not broadcast with the parameters.
+    ParameterError
+        An unknown parameter, or one without a value.
+    OptionError
+        A tolerance, a limit, a time, a section or an engine out of its range.
+    DefinitionError
+        ``system`` is none; a ``start_mode`` that it does not have.
+    CompilerError
+        ``engine="compiled"`` where nothing compiles.
+    DeviceError
+        ``device="cuda"`` without a card, its driver or the packages.
+
+    Examples
+    --------
+    >>> import casadi as ca, numpy as np, nonsmooth as ns
+    >>> x = ca.SX.sym("x")
+    >>> system = ns.FilippovSystem([x], surface=x, above=[-1], below=[3])
+    >>> many = ns.ensemble(system, np.array([[-1.0], [0.5], [np.nan]]), t_end=0.4)
+    >>> many.itinerary.tolist(), [str(ns.Status(s)) for s in many.status]
+    (['- s', '+', ''], ['REACHED_END', 'REACHED_END', 'NOT_FINITE'])
+    """
+    options = Options(
+        t_end=t_end,
+        t_start=t_start,
+        rtol=tol if rtol is None else rtol,
+        atol=tol if atol is None else atol,
+        max_step=max_step,
+        max_steps=max_steps,
+        max_events=max_events,
+        start_mode=start_mode,
+    )
+    require_system(system, sets=True)
+    work = checked_work(work)
+    if start_mode is not None:
+        system.require_mode(start_mode)
+    system, at = sectioned(system, at)
+    starts = Starts(system, x0, parameters, t_start)
+    number = _event_number(at_event)
+    p = starts.p if at is None else starts.every_parameter()
+    view = read_view(system, t_eval, at, options, p)
+    options = view.options
+    if options.hits is not None and view.room is None:
+        raise OptionError(
+            "at: expected count= with a section at events in an ensemble, received none. It says how "
+            "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
+        )
+    step = view.room is None and t_end > t_start and device is None
+    chosen = engine_for(system, options, engine, starts.count, step)
+    job = Job(system, options, number, view.times, view.room, chosen)
+    if device is not None:
+        require_device(job, device, work.executor is not None)
+    return _run(job, starts, work, device)
+
+
+def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
+    system, count = starts.system, starts.count
+    there = (
+        None if device is None else lambda first, out: run_there(job, device, starts, first, out)
+    )
+    none = Chunk.empty(0, system, job.at is not None, job.room)
+    most = work.largest(none.row_size)
+    size = lambda: (
+        work.chunk or (size_of_chunk(job, starts, work.workers, most) if there is None else CHUNK)
+    )
+    saved = work.saved(lambda: _problem(system, starts, job, device), size)
+    with saved.alone() if isinstance(saved, Stored) else nullcontext():
+        arrays, codes = None, None
+        if isinstance(saved, Stored):
+            arrays, codes = saved.arrays(none, count), saved.codes(count)
+        results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
+        run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)
+        return results.ensemble(codes)
+
+
+def engine_for(
+    system: FilippovSystem, options: Options, engine: str, count: int, step: bool
+) -> str:
+    """Return which of ``chunks.ENGINES`` runs."""
+    # It is compiled here, so that all chunks run the same one.
+    lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
+    if not use_compiled(engine, tape is not None) or tape is None:
+        return "reference"
+    few = _FEW_WITH_SETS if system.sets and engine == "auto" else _FEW
+    if lanes is not None and count >= few:
+        found = compiled_or_none(engine, lanes, lambda: lanes.library)
+        return "reference" if found is None else "lanes"
+    work = tape.compile if engine == "compiled" else library
+    done = compiled_or_none(engine, library, lambda: (work(), True))
+    return "reference" if done is None else "tape"
+
+
+def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:
+    if at_event is None:
+        return None
+    try:
+        kind, count = at_event
+        if kind in KINDS_OF_SECTIONS and int(count) == count and count >= 1:
+            return KINDS.index(kind), int(count)
+    except (TypeError, ValueError):
+        pass
+    raise OptionError(
+        explain(
+            "at_event",
+            expected=f"(kind, k) with a kind of {KINDS_OF_SECTIONS} and k from 1",
+            received=repr(at_event),
+            advice='For example ("crossing", 1). The ends of all runs are x of the result.',
+        )
+    )
+
+
+def _problem(system: FilippovSystem, starts: Starts, job: Job, device: str | None) -> str:
+    code = hashlib.sha256(system.content_hash().encode())
+    engine = job.engine if device is None else (job.engine, device)
+    code.update(repr((job.options, job.at, job.times, engine)).encode())
+    code.update(starts.digest().encode())
+    return code.hexdigest()

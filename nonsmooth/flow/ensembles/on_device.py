@@ -1,0 +1,101 @@
+"""Ensembles on a GPU: what it is given of the starts, and what is left for this processor."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...model import Array, FilippovSystem, OptionError
+from ..compiled.building.codegen import supports_lanes
+from ..compiled.device.kernel import Bins, Kernel, Reduced, Source
+from ..compiled.device.machine import machine_for
+from ..constants import HAND_OVER
+from ..options import Options
+from ..results import Chunk
+from .chunks import Job, run_chunk
+from .lazy_starts import Grid, RandomStarts
+from .starts import Starts
+
+#: Trajectories of one call; each needs some 150 bytes of memory here and there.
+CHUNK = 1 << 22
+
+
+def require_device(job: Job, device: str, executor: bool) -> None:
+    """Refuse what a GPU does not run, and a GPU that is not there."""
+    system = job.system
+    assert isinstance(system, FilippovSystem)
+    wrong = _unsupported(system, job.options) or (
+        "t_eval or at" if job.room is not None else "an executor" if executor else ""
+    )
+    if wrong:
+        raise OptionError(
+            f"device: expected runs of a system with at most one surface, without sets, resets and "
+            f"contacts, for {device!r}, received {wrong}. Leave out device=."
+        )
+    _kernel(job, device)
+
+
+def _unsupported(system: FilippovSystem, options: Options) -> str:
+    """What of a system or its options no kernel is made for."""
+    if system.sets:
+        return "a system with a set of directions"
+    if not supports_lanes(system):
+        several = system.surface_count > 1
+        return "a system of several surfaces" if several else "a system with resets or contacts"
+    if options.start_mode is not None:
+        return "a start_mode"
+    return "" if options.t_end > options.t_start else "t_end = t_start"
+
+
+def _kernel(job: Job, device: str) -> Kernel:
+    system, order, machine = job.system, job.options.order, machine_for(device)
+    assert isinstance(system, FilippovSystem)
+    key = ("device", order, machine)
+    return system.cached(key, lambda: Kernel(system, order, machine))
+
+
+def run_there(job: Job, device: str, starts: Starts, first: int, out: Chunk) -> Chunk:
+    """Run the trajectories from ``first`` on that ``out`` has rows for; what is rare runs here."""
+    kernel, count = _kernel(job, device), len(out.t)
+    drawn = _drawn(starts)
+    if drawn is not None:
+        kernel.run(drawn, first, count, starts.p, job.options, job.at, out)
+    else:
+        own, p, x = _rows(starts, first, count)
+        kernel.run(own, 0, count, p, job.options, job.at, out)
+        refused = np.isnan(own.values).any(axis=1)
+        out.x[refused] = x[refused]
+    rest = np.flatnonzero(out.status == HAND_OVER)
+    if rest.size:
+        out.replace(rest, run_chunk(job, *starts.rows(first + rest)))
+    return out
+
+
+def reduced_there(
+    job: Job, device: str, starts: Starts, first: int, count: int, bins: Bins
+) -> Reduced:
+    """Run some trajectories and return what becomes of them, with the numbers of those left for here."""
+    kernel, drawn = _kernel(job, device), _drawn(starts)
+    if drawn is not None:
+        return kernel.reduced(drawn, first, count, starts.p, job.options, bins)
+    own, p, _ = _rows(starts, first, count)
+    return kernel.reduced(own, 0, count, p, job.options, bins)
+
+
+def _rows(starts: Starts, first: int, count: int) -> tuple[Source, Array, Array]:
+    """Starts one by one, their parameters, and their states as given: NaN goes where a parameter is no number."""
+    n = starts.system.dimension
+    x, p = starts.part(first, first + count)
+    bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(count, bool)
+    return Source.rows(np.where(bad[:, None], np.nan, x[:, :n])), p, x[:, :n]
+
+
+def _drawn(starts: Starts) -> Source | None:
+    """Starts that a GPU makes from their numbers."""
+    x0 = starts.x0
+    if starts.varied or isinstance(x0, np.ndarray) or x0.shape != starts.shape:
+        return None
+    if isinstance(x0, Grid):
+        return Source.grid(x0.axes)
+    if isinstance(x0, RandomStarts):
+        return Source.box(np.asarray(x0.low), np.asarray(x0.high), x0.seed)
+    return None

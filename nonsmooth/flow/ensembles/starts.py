@@ -1,0 +1,185 @@
+"""What many runs start from: states and parameters broadcast against each other."""
+
+from __future__ import annotations
+
+import hashlib
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces, explain
+from ..constants import ON_SURFACE
+from ..options import Options
+from ..reference.modes import rounding_scale
+from .lazy_starts import Drawn, Grid, Index, RandomStarts, part_of
+
+
+@dataclass(frozen=True)
+class Cut:
+    """Starts and parameters of some trajectories on their way to another process, small where a
+    rule makes them."""
+
+    p: Array
+    x: Array | None = None
+    drawn: Drawn | None = None
+    shape: tuple[int, ...] = ()
+    first: int = 0
+    last: int = 0
+    t_start: float | None = None
+
+    def rows(self) -> tuple[Array, Array]:
+        """Return the extended starts (m, N) and parameters."""
+        if self.x is not None or self.drawn is None:
+            assert self.x is not None
+            return self.x, self.p
+        x = part_of(self.drawn, self.shape, np.arange(self.first, self.last))
+        return _extended(x, self.t_start), self.p
+
+
+class Starts:
+    """Starts and parameters, given out chunk by chunk."""
+
+    def __init__(
+        self,
+        system: FilippovSystem,
+        x0: ArrayLike | Drawn,
+        parameters: Mapping[Any, ArrayLike] | None,
+        t_start: float,
+    ):
+        self.system, self.t_start = system, t_start
+        self.x0 = x0 if isinstance(x0, Drawn) else _numbers(x0, "x0")
+        own = (*x0.shape, x0.dimension) if isinstance(x0, Drawn) else np.shape(self.x0)
+        if own == () or own[-1] != system.dimension:
+            raise PointError(
+                explain(
+                    "x0",
+                    expected=f"shape (..., {system.dimension}) for the states {system.state_names}",
+                    received=f"shape {own}",
+                    advice="States are on the last axis.",
+                )
+            )
+        if parameters is not None and not isinstance(parameters, Mapping):
+            system.parameter_vector(parameters)  # refuses what is no mapping
+        arrays = {str(k): _numbers(v, f"parameter {k}") for k, v in (parameters or {}).items()}
+        sample = {k: _sample(v) for k, v in arrays.items()}
+        self.p = system.parameter_vector(sample)
+        self.varied = {system.parameter_names.index(k): v for k, v in arrays.items() if v.ndim > 0}
+        shapes = [own[:-1], *[v.shape for v in self.varied.values()]]
+        try:
+            self.shape = np.broadcast_shapes(*shapes)
+        except ValueError as error:
+            raise PointError(
+                f"x0 and parameters: expected shapes that broadcast, received {shapes}."
+            ) from error
+        self.count = math.prod(self.shape)
+
+    def digest(self) -> str:
+        """Return a hash of all numbers."""
+        code = hashlib.sha256(repr((self.shape, np.shape(self.x0))).encode())
+        if not isinstance(self.x0, np.ndarray):
+            code.update(repr(self.x0.state()).encode())
+        else:
+            code.update(np.ascontiguousarray(self.x0).data)
+        code.update(self.p.tobytes())
+        for column, values in sorted(self.varied.items()):
+            code.update(repr((column, values.shape)).encode())
+            code.update(np.ascontiguousarray(values).data)
+        return code.hexdigest()
+
+    def every_parameter(self) -> Array:
+        """Parameters (np,) or (m, np) of all trajectories."""
+        return self.part(0, self.count)[1]
+
+    def part(self, first: int, last: int) -> tuple[Array, Array]:
+        """Extended starts and parameters of the trajectories first to last - 1."""
+        return self.rows(slice(first, last))
+
+    def cut(self, first: int, last: int) -> Cut:
+        """Return the same for another process."""
+        if not isinstance(self.x0, (Grid, RandomStarts)):
+            x, p = self.part(first, last)
+            return Cut(p, x)
+        t_start = self.t_start if self.system.time_dependent else None
+        p = self._parameters(slice(first, last), last - first)
+        return Cut(p, None, self.x0, self.shape, first, last, t_start)
+
+    def rows(self, which: slice | Index) -> tuple[Array, Array]:
+        """Extended starts and parameters of some trajectories, by their numbers."""
+        n = self.system.dimension
+        if not isinstance(self.x0, np.ndarray):  # asking for a protocol takes long
+            x = part_of(self.x0, self.shape, _numbered(which))
+        else:
+            x = _rows(self.x0, self.shape, which, n)
+        x = _extended(x, self.t_start if self.system.time_dependent else None)
+        return x, self._parameters(which, len(x))
+
+    def _parameters(self, which: slice | Index, count: int) -> Array:
+        if not self.varied:
+            return self.p
+        p = np.tile(self.p, (count, 1))
+        for column, values in self.varied.items():
+            p[:, column] = _rows(values[..., None], self.shape, which, 1)[:, 0]
+        return p
+
+
+def _extended(x: Array, t_start: float | None) -> Array:
+    """States (m, n) with the time where there is one."""
+    return x if t_start is None else np.concatenate([x, np.full((len(x), 1), t_start)], axis=1)
+
+
+def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Options) -> None:
+    """Refuse a start mode with another side than the start (N,) has."""
+    if options.start_mode is None or not system.surface_count:
+        return
+    asked = options.start_mode
+    system.require_mode(asked)
+    h, gradient = Surfaces(system).values(x, p)
+    scale = rounding_scale(np.abs(gradient), x, options.size)
+    sides = np.sign(np.where(np.abs(h) <= ON_SURFACE * scale, 0.0, h))
+    said = []
+    for k, members in enumerate(system.entries):
+        own = list(members)
+        letter = "*" if len(own) > 1 else "+" if sides[own[0]] > 0 else "-"
+        if np.any(sides[own]) and asked[k] != letter:
+            value = ", ".join(f"{v:.6g}" for v in h[own])
+            said.append(f"h{k} = {value if len(own) == 1 else f'[{value}]'} ({letter!r})")
+    if said:
+        raise OptionError(
+            explain(
+                "start_mode",
+                expected=f"the sides of the start, where {', '.join(said)}",
+                received=repr(asked),
+                advice="Only on a surface or set, h = 0, is there a choice.",
+            )
+        )
+
+
+def _numbered(which: slice | Index) -> Index:
+    return np.arange(which.start, which.stop) if isinstance(which, slice) else which
+
+
+def _rows(values: Array, shape: tuple[int, ...], which: slice | Index, n: int) -> Array:
+    """Some rows of values broadcast to ``(*shape, n)``, which is never made."""
+    if values.shape == (*shape, n):
+        return values.reshape(-1, n)[which]
+    index = np.unravel_index(_numbered(which), shape) if shape else ()
+    return np.broadcast_to(values, (*shape, n))[index]
+
+
+def _numbers(value: ArrayLike, what: str) -> Array:
+    try:
+        return np.asarray(value, dtype=float, order="C")
+    except (TypeError, ValueError) as error:
+        raise PointError(f"{what}: expected numbers, received {value!r}.") from error
+
+
+def _sample(values: Array) -> float:
+    """Any finite entry: names are checked with it, entries later, one by one."""
+    if values.ndim == 0:
+        return float(values)
+    finite = values[np.isfinite(values)]
+    return float(finite.flat[0]) if finite.size else 0.0

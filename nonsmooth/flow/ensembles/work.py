@@ -1,0 +1,353 @@
+"""How the work of an ensemble is done: chunks, threads or an executor, progress, checkpoints."""
+
+from __future__ import annotations
+
+import math
+import os
+import threading
+import time
+from collections.abc import Callable, Generator, Iterator
+from concurrent.futures import CancelledError, Executor, Future, ThreadPoolExecutor
+from contextlib import closing
+from dataclasses import dataclass
+from functools import partial
+from queue import Empty, SimpleQueue
+from typing import Any, Protocol, TypeVar
+
+import numpy as np
+
+from ...model import Array, OptionError, explain
+from ..results import Chunk
+from .checkpoint import Checkpoint
+from .chunks import Job, run_away, run_chunk, shipped
+from .progress import progress_bar
+from .starts import Starts
+from .stored import Stored
+
+#: Chunks under way at once with an executor, and bytes of results of each: so much is on its way at most.
+_IN_FLIGHT, _SHIPPED = 64, 1 << 22
+
+#: How long a chunk should take, a run of several that is worth more than one chunk, and one that tells
+#: how long they take (seconds).
+_SECONDS, _WORTH, _PROBE = 1.0, 0.02, 0.002
+
+#: Trajectories in a chunk: at least so many where they are short, at most so many.
+_LEAST, _LARGEST = 256, 1 << 18
+
+
+@dataclass(frozen=True)
+class Work:
+    """How the work of an ensemble is done; the results do not depend on it.
+
+    Parameters
+    ----------
+    threads : int, optional
+        Threads in this process; all processors that it may use unless given.
+    executor : concurrent.futures.Executor, optional
+        Runs the chunks instead: processes, or ``dask.distributed.Client(...).get_executor()``.
+    chunk : int, optional
+        Trajectories in one piece of work; a few are timed to choose it unless given.
+    progress : bool, optional
+        A bar for runs of some seconds on a terminal; nothing in logs.
+    checkpoint : path, optional
+        A folder for finished chunks. A later call with the same problem goes on from there, with
+        bit-identical results; a checkpoint of another problem is refused.
+    store : path, optional
+        A folder for the results themselves: arrays (``x.npy``, ...) that are mapped into memory,
+        written as chunks are finished. It is a checkpoint too. Results of any size need no memory;
+        starts need none as a :class:`Grid` or :class:`RandomStarts`.
+
+    Raises
+    ------
+    OptionError
+        A number of threads or a chunk that is not positive; no executor; no path of a folder.
+
+    Examples
+    --------
+    >>> import casadi as ca, numpy as np, nonsmooth as ns
+    >>> x = ca.SX.sym("x")
+    >>> system = ns.FilippovSystem([x], surface=x, above=[-1], below=[3])
+    >>> starts = np.linspace(-1, 1, 5)[:, None]
+    >>> ns.ensemble(system, starts, t_end=2.0, work=ns.Work(threads=1, progress=False)).x[:, 0]
+    array([0., 0., 0., 0., 0.])
+    """
+
+    threads: int | None = None
+    executor: Executor | None = None
+    chunk: int | None = None
+    progress: bool = True
+    checkpoint: str | os.PathLike[str] | None = None
+    store: str | os.PathLike[str] | None = None
+
+    def __post_init__(self) -> None:
+        _positive("chunk", 1 if self.chunk is None else self.chunk)
+        _positive("threads", 1 if self.threads is None else self.threads)
+        _require_path("checkpoint", self.checkpoint)
+        _require_path("store", self.store)
+        if self.checkpoint is not None and self.store is not None:
+            raise OptionError(
+                "checkpoint, store: expected one of them, received both. A store is a checkpoint too."
+            )
+        if self.executor is not None and not isinstance(self.executor, Executor):
+            raise OptionError(
+                explain(
+                    "executor",
+                    expected="a concurrent.futures.Executor",
+                    received=f"{self.executor!r} ({type(self.executor).__name__})",
+                    advice="ProcessPoolExecutor(), or dask.distributed.Client(...).get_executor().",
+                )
+            )
+
+    def saved(self, problem: Callable[[], str], size: Callable[[], int]) -> Checkpoint | None:
+        """Return where chunks are kept, if they are to be.
+
+        Parameters
+        ----------
+        problem : callable
+            Returns the hash of what the results depend on.
+        size : callable
+            Returns the size of a chunk, if nothing kept says it.
+
+        Raises
+        ------
+        OptionError
+            A folder that holds the results of another problem, or of another version.
+        """
+        if self.store is not None:
+            return Stored(self.store, problem(), size)
+        return None if self.checkpoint is None else Checkpoint(self.checkpoint, problem(), size)
+
+    @property
+    def workers(self) -> int:
+        """Number of chunks at once: the threads, or as many as an executor is given ahead."""
+        return (self.threads or _processors()) if self.executor is None else _IN_FLIGHT
+
+    def largest(self, row: int) -> int:
+        """Trajectories in a chunk at most, unless the user says how many.
+
+        Parameters
+        ----------
+        row : int
+            Bytes of the results of one.
+        """
+        return _LARGEST if self.executor is None else min(_LARGEST, max(1, _SHIPPED // row))
+
+
+def _positive(name: str, value: int) -> None:
+    if not (isinstance(value, int) and value > 0):
+        raise OptionError(f"{name}: expected a positive integer, received {value!r}.")
+
+
+def _require_path(name: str, value: object) -> None:
+    if value is not None and not (isinstance(value, (str, os.PathLike)) and str(value)):
+        raise OptionError(
+            explain(
+                name,
+                expected="the path of a folder",
+                received=f"{value!r} ({type(value).__name__})",
+                advice=f'For example {name}="sweep".',
+            )
+        )
+
+
+class Sink(Protocol):
+    """What takes finished chunks."""
+
+    def part(self, first: int, last: int) -> Chunk:
+        """Return arrays for the results of some trajectories."""
+        ...
+
+    def put(self, first: int, chunk: Chunk) -> None:
+        """Take a chunk that begins with a trajectory."""
+        ...
+
+
+def run_all(
+    job: Job,
+    starts: Starts,
+    results: Sink,
+    work: Work,
+    size: int,
+    saved: Checkpoint | None,
+    there: Callable[[int, Chunk], Chunk] | None = None,
+) -> None:
+    """Run all trajectories, chunk by chunk, except those that are kept."""
+    bar = progress_bar(starts.count, work.progress)
+    missing = []
+    for number in range(math.ceil(starts.count / size)):
+        first = number * size
+        like = results.part(first, min(first + size, starts.count))
+        done = saved.load(number, like) if saved is not None else None
+        if done is None:
+            missing.append(number)
+        else:
+            results.put(first, done)
+            bar.update(len(done.t))
+    ends = ((k, k * size, min((k + 1) * size, starts.count)) for k in missing)
+    workers = min(work.threads or _processors(), len(missing))
+    try:
+        if there is not None:
+            chunks = ((k, there(a, results.part(a, b))) for k, a, b in ends)
+        else:
+            chunks = _chunks(job, starts, results, ends, workers, work.executor)
+        with closing(chunks) as finished:
+            for number, chunk in finished:
+                results.put(number * size, chunk)
+                if saved is not None:
+                    saved.save(number, chunk)
+                bar.update(len(chunk.t))
+    finally:
+        bar.close()
+
+
+def size_of_chunk(job: Job, starts: Starts, workers: int, most: int = _LARGEST) -> int:
+    """Trajectories that take about as long as one chunk should; a few of them are run to know."""
+    count, k, spent = starts.count, 1, 0.0
+    if count < 2:
+        return 1  # nothing to divide
+    while True:
+        spent = _probe(job, starts, k)
+        if _PROBE < spent < _SECONDS and 64 * k <= count:
+            spent = min(spent, _probe(job, starts, k))  # what is done once was done now
+        if spent > _PROBE or 64 * k > count or (k >= _LEAST and 8 * spent > _PROBE):
+            break
+        k *= 8
+    every = max(spent / k, 1e-9)
+    if count * every < _WORTH:
+        return max(count, 1)
+    size = min(_SECONDS / every, count / (4 * workers))
+    least = min(_LEAST, math.ceil(count / workers)) if every < 1e-3 else 1
+    return min(max(math.ceil(size), least), most)
+
+
+def _probe(job: Job, starts: Starts, k: int) -> float:
+    """Seconds that k of the trajectories take."""
+    x, p = starts.rows(np.linspace(0, starts.count - 1, k).astype(np.int64))
+    began = _clock()
+    run_chunk(job, x, p)
+    return _clock() - began
+
+
+def _clock() -> float:
+    """Time that this thread has had a processor, however busy the machine is."""
+    fine = time.get_clock_info("thread_time").resolution < 1e-4
+    return time.thread_time() if fine else time.perf_counter()
+
+
+#: The number of a chunk, its first trajectory and the one after its last.
+_Piece = tuple[int, int, int]
+
+
+def _chunks(
+    job: Job,
+    starts: Starts,
+    results: Sink,
+    pieces: Iterator[_Piece],
+    workers: int,
+    executor: Executor | None,
+) -> Generator[tuple[int, Chunk], None, None]:
+    """Finished chunks in the order in which they finish; a bounded number is under way."""
+    if isinstance(executor, ThreadPoolExecutor):
+        rows = ((k, *starts.part(a, b)) for k, a, b in pieces)
+        yield from _submit(rows, lambda x, p: executor.submit(run_chunk, job, x, p), _IN_FLIGHT)
+    elif executor is not None:
+        job = shipped(job)
+        cuts = ((k, starts.cut(a, b)) for k, a, b in pieces)
+        yield from _submit(cuts, lambda cut: executor.submit(run_away, job, cut), _IN_FLIGHT)
+    else:
+        work = ((k, *starts.part(a, b), results.part(a, b)) for k, a, b in pieces)
+        if workers < 2:
+            for number, x, p, out in work:
+                yield number, run_chunk(job, x, p, out)
+        else:
+            yield from _in_threads(job, work, workers)
+
+
+def _in_threads(
+    job: Job, work: Iterator[tuple[int, Array, Array, Chunk]], workers: int
+) -> Generator[tuple[int, Chunk], None, None]:
+    pool, stop = ThreadPoolExecutor(workers), threading.Event()
+    here = lambda x, p, out: pool.submit(run_chunk, job, x, p, out, stop.is_set)
+    try:
+        yield from _submit(work, here, 2 * workers)
+    except BaseException:
+        stop.set()
+        raise
+    finally:
+        pool.shutdown(cancel_futures=True)
+
+
+_T = TypeVar("_T")
+
+
+def _submit(
+    work: Iterator[tuple[Any, ...]], submit: Callable[..., Future[_T]], limit: int
+) -> Iterator[tuple[int, _T]]:
+    """Results with their numbers, as they are finished."""
+    # A future is let go as soon as its result is there: a cluster keeps what a future stands for, and
+    # computes it again where the worker that had it is lost.
+    pending: dict[int, Future[_T]] = {}
+    finished: SimpleQueue[tuple[int, _T | None, BaseException | None]] = SimpleQueue()
+    count = 0
+
+    def note(number: int, future: Future[_T]) -> None:
+        pending.pop(number, None)
+        error = CancelledError() if future.cancelled() else future.exception()
+        finished.put((number, None if error else future.result(), error))
+
+    try:
+        while True:
+            while count < limit and (item := next(work, None)) is not None:
+                try:
+                    pending[item[0]] = submit(*item[1:])
+                except Exception:
+                    yield from _taken(finished)  # what is finished is saved first
+                    raise
+                count += 1
+                pending[item[0]].add_done_callback(partial(note, item[0]))
+            if not count:
+                return
+            number, result, error = finished.get()
+            count -= 1
+            if error is not None:
+                yield from _taken(finished)
+                raise error
+            yield number, result  # type: ignore[misc]  # there is one where there is no error
+            del result
+    finally:
+        for future in list(pending.values()):
+            future.cancel()
+
+
+def _taken(
+    finished: SimpleQueue[tuple[int, Any, BaseException | None]],
+) -> Iterator[tuple[int, Any]]:
+    """What is there, without the errors."""
+    try:
+        while True:
+            number, result, error = finished.get_nowait()
+            if error is None:
+                yield number, result
+    except Empty:
+        return
+
+
+def checked_work(work: Any) -> Work:
+    """What was given, or the default; OptionError where it is no Work."""
+    if work is not None and not isinstance(work, Work):
+        raise OptionError(
+            explain(
+                "work",
+                expected="a Work",
+                received=f"{work!r} ({type(work).__name__})",
+                advice="For example work=nonsmooth.Work(threads=2).",
+            )
+        )
+    return work or Work()
+
+
+def _processors() -> int:
+    try:
+        return len(os.sched_getaffinity(0))
+    except AttributeError:
+        return os.cpu_count() or 1

@@ -1,0 +1,1 @@
+"""Analysis at one point: Lie derivatives, regions, sliding fields, intersections of surfaces."""

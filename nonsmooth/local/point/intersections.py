@@ -1,0 +1,371 @@
+"""Where several surfaces meet: the modes in which the motion can go on, and whether sliding attracts.
+
+At a point of k surfaces the rates are w_i = grad h_i . f(x, lambda). A mode can go on if a surface that is
+left upward has lambda_i = +1 and w_i > 0, one that is left downward lambda_i = -1 and w_i < 0, and one that
+slides w_i = 0 with lambda_i between: a box-constrained complementarity problem. Filippov's set-valued
+field may leave more freedom than independent multipliers do (``intersection_range``).
+
+Source: Filippov 1988, sec. 4 and 23; Dieci & Lopez 2011, "Sliding motion on discontinuity surfaces of high
+co-dimension", Numer. Math. 117; Jeffrey 2014 for independent multipliers.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    LayerNumbers,
+    Parameters,
+    PointError,
+    coupled_of,
+    explain,
+    layer_of,
+    loop_at,
+    require_system,
+    sliding_multipliers,
+)
+from ...model.checks import positive
+from ...model.laws import complementarity
+from ..checks import require_surface
+from .surface_point import TOLERANCE
+
+#: So many surfaces are decided by trying all 3^k modes.
+_TRIED = 5
+
+#: Growth across a layer below this, relative to its slope, is none.
+_NEUTRAL = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Continuation:
+    """A mode in which the motion can go on.
+
+    Attributes
+    ----------
+    mode : str
+        One letter for each surface of the system.
+    multipliers : ndarray (m,)
+        Of all surfaces.
+    velocity : ndarray (n,)
+        Velocity of the states in that mode.
+    rates : ndarray (k,)
+        $d h_i/dt$ of the surfaces that meet at the point.
+    eigenvalues : ndarray
+        Of the layer problem of those that slide: all with negative real part where it attracts.
+    slack : float
+        How far the mode is from being impossible: the least of $1 - abs(lambda_i)$ and of the angles
+        between the motion and the surfaces that it leaves.
+    """
+
+    mode: str
+    multipliers: Array
+    velocity: Array
+    rates: Array
+    eigenvalues: NDArray[np.complex128]
+    slack: float
+
+
+@dataclass(frozen=True, eq=False)
+class Intersection:
+    """A point where several surfaces meet.
+
+    Attributes
+    ----------
+    point : ndarray (n,)
+        The point, in the order of the states.
+    surfaces : tuple of int
+        Which surfaces meet there, by index.
+    continuations : tuple of Continuation
+        Modes that can go on. One: the future is unique for independent multipliers.
+    attraction : str
+        Whether orbits beside the intersection reach it and slide along it: ``"attracting"`` (in finite
+        time, shown by a Lyapunov function), ``"repelling"``, ``"spiralling in"`` and ``"spiralling out"``
+        (round a point of the plane, by the return map to second order), ``"unstable across"`` (the layer
+        problem grows), ``"not shown"``, or ``""`` where not all of its surfaces can slide.
+    distance : float
+        To the nearest change of the modes that can go on.
+    complete : bool
+        Whether all modes are known: by trying them, or because one solution was shown to be the only one.
+    """
+
+    point: Array
+    surfaces: tuple[int, ...]
+    continuations: tuple[Continuation, ...]
+    attraction: str
+    distance: float
+    complete: bool
+
+    @property
+    def sliding(self) -> Continuation | None:
+        """Sliding along all surfaces of the intersection, if that can go on."""
+        whole = [c for c in self.continuations if all(c.mode[i] == "s" for i in self.surfaces)]
+        return whole[0] if whole else None
+
+    def __str__(self) -> str:
+        names = " = ".join(f"h{i}" for i in self.surfaces)
+        modes = ", ".join(c.mode for c in self.continuations) or "none"
+        tail = f"; sliding along it: {self.attraction}" if self.attraction else ""
+        return f"{names} = 0 at {self.point.tolist()}: modes that can go on: {modes}{tail}."
+
+
+def intersection(
+    system: FilippovSystem,
+    point: ArrayLike,
+    *,
+    surfaces: Sequence[int] | None = None,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    tol: float = TOLERANCE,
+) -> Intersection:
+    """Say in which modes the motion can go on from a point where surfaces meet.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        Contacts of impacts count as open.
+    point : array_like (n,)
+        The point, in the order of the states.
+    surfaces : sequence of int, optional
+        Those that meet at the point; by default those closer than ``tol``.
+    parameters, t : optional
+        As in :func:`region`.
+    tol : float, optional
+        A point is on a surface where $abs(h)/|grad h| <= tol (1 + |x|)$.
+
+    Returns
+    -------
+    Intersection
+        The modes that can go on from the point, and what attracts.
+
+    Raises
+    ------
+    PointError
+        On no surface, or where the surfaces are not transversal; a wrong shape; not finite.
+    DefinitionError
+        ``system`` is none, or has no surface, or vector multipliers; a surface that it does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` is not positive.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, a, b = (ca.SX.sym(s) for s in ("x", "y", "a", "b"))
+    >>> spiral = ns.FilippovSystem(
+    ...     [x, y], field=[-a + 2 * b, -2 * a - b], multipliers=[a, b], surfaces=[x, y])
+    >>> found = ns.local.intersection(spiral, [0.0, 0.0])
+    >>> [c.mode for c in found.continuations], found.attraction
+    (['ss'], 'attracting')
+    """
+    require_system(system)
+    x, p = system.extended_point(point, t), system.parameter_vector(parameters)
+    return Meeting.at_point(system, x, p, surfaces, positive(tol, "tol")).intersection()
+
+
+def _meeting(
+    system: FilippovSystem, x: Array, p: Array, surfaces: Sequence[int] | None, tol: float
+) -> list[int]:
+    """Surfaces through a point, checked."""
+    require_surface(system)
+    found = layer_of(system).at(x, np.zeros(system.surface_count), p)
+    lengths = np.linalg.norm(found.h_x, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        away = np.abs(found.h) / lengths / (1 + np.linalg.norm(x))
+    near = [i for i in range(system.surface_count) if away[i] <= tol]
+    chosen = near if surfaces is None else [system.surface_index(i) for i in surfaces]
+    if not chosen or set(chosen) - set(near):
+        raise PointError(
+            explain(
+                f"point {x}",
+                expected="a point where surfaces meet"
+                if surfaces is None
+                else f"a point of surfaces {chosen}",
+                received=f"h = {found.h.tolist()}",
+                advice="find_pseudo_equilibrium(system, near, mode=...) finds points of intersections; "
+                "raise tol if the point is rounded.",
+            )
+        )
+    if np.linalg.matrix_rank(found.h_x[chosen] / lengths[chosen, None]) < min(len(chosen), x.size):
+        raise PointError(
+            explain(
+                f"point {x}",
+                expected=f"independent gradients of surfaces {chosen}",
+                received=f"{found.h_x[chosen].tolist()}",
+                advice="Two surfaces that touch are no intersection of this kind.",
+            )
+        )
+    return chosen
+
+
+class Meeting:
+    """A point of some surfaces with its parameters."""
+
+    def __init__(
+        self,
+        system: FilippovSystem,
+        x: Array,
+        p: Array,
+        surfaces: Sequence[int],
+        letters: Array | None = None,
+    ):
+        self.system, self.x, self.p, self.surfaces = system, x, p, list(surfaces)
+        self.layer = layer_of(system)
+        h = self.layer.at(x, np.zeros(system.surface_count), p).h
+        self.held = np.where(h > 0.0, 1.0, -1.0) if letters is None else letters.copy()
+        self.held[self.surfaces] = 0.0
+
+    @classmethod
+    def at_point(
+        cls,
+        system: FilippovSystem,
+        x: Array,
+        p: Array,
+        surfaces: Sequence[int] | None,
+        tol: float,
+    ) -> Meeting:
+        """The surfaces through a point, or those that are asked for."""
+        return cls(system, x, p, _meeting(system, x, p, surfaces, tol))
+
+    def at(self, multipliers: Array) -> LayerNumbers:
+        """Evaluate at multipliers (m,)."""
+        return self.layer.at(self.x, multipliers, self.p)
+
+    def intersection(self) -> Intersection:
+        """Look at all modes, or at the one that is the only one."""
+        candidates, complete = self._candidates()
+        slacks = [(self._slack(lam, mode), mode, lam) for mode, lam in candidates]
+        going = [self._continuation(mode, lam, s) for s, mode, lam in slacks if s >= 0.0]
+        whole = [c for c in going if all(c.mode[i] == "s" for i in self.surfaces)]
+        return Intersection(
+            point=self.x[: self.system.dimension],
+            surfaces=tuple(self.surfaces),
+            continuations=tuple(going),
+            attraction=self.attraction(whole[0].multipliers) if whole else "",
+            distance=min((abs(s) for s, _, _ in slacks), default=float("inf")),
+            complete=complete,
+        )
+
+    def _candidates(self) -> tuple[list[tuple[str, Array]], bool]:
+        """Modes with their multipliers, those outside [-1, 1] included; whether they are all."""
+        k = len(self.surfaces)
+        if self.layer.affine:
+            found = self.at(self.held)
+            a = found.rates[self.surfaces]
+            m = found.rates_l[np.ix_(self.surfaces, self.surfaces)]
+            if k > _TRIED and complementarity.is_unique(m):
+                lam = complementarity.solve(a, m, np.zeros(k))
+                if lam is not None:
+                    letters = np.where(np.abs(lam) < 1.0, 0.0, lam)
+                    return [(self._mode(letters), self._with(lam))], True
+        if k > _TRIED:
+            raise DefinitionError(
+                explain(
+                    f"surfaces {self.surfaces}",
+                    expected=f"at most {_TRIED}, or rates whose complementarity problem is shown to have "
+                    "one solution (P-matrix)",
+                    received=f"{k} surfaces",
+                    advice="simulate says where a run goes from there.",
+                )
+            )
+        every = list(product((1.0, -1.0, 0.0), repeat=k))
+        return [pair for letters in every for pair in self._solved(np.array(letters))], True
+
+    def _solved(self, letters: Array) -> Iterable[tuple[str, Array]]:
+        mode = self._mode(letters)
+        coupled = coupled_of(self.system)
+        for unknowns in sliding_multipliers(coupled, mode, self.x, self.p, stable_only=False):
+            lam = self._with(letters)
+            held = coupled.held(mode)
+            factors = coupled.yardsticks(self.x, held, unknowns, self.p).factors
+            slides = [i for i in self.surfaces if mode[i] == "s"]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                lam[slides] = (unknowns / factors)[slides]
+            if np.all(np.isfinite(lam)):
+                yield mode, lam
+
+    def _mode(self, letters: Array) -> str:
+        values = self._with(letters)
+        signs = {1.0: "+", -1.0: "-", 0.0: "s"}
+        return "".join(signs[v] for v in values.tolist())
+
+    def _with(self, multipliers: Array) -> Array:
+        values = self.held.copy()
+        values[self.surfaces] = multipliers
+        return values
+
+    def _slack(self, lam: Array, mode: str) -> float:
+        """Least of what keeps a mode possible; negative where it is not."""
+        found = self.at(lam)
+        sizes = np.linalg.norm(found.h_x, axis=1) * np.linalg.norm(found.field)
+        slack = []
+        for i in self.surfaces:
+            if mode[i] == "s":
+                slack.append(1.0 - abs(float(lam[i])))
+            else:
+                angle = found.rates[i] / sizes[i] if sizes[i] else 0.0
+                slack.append(float(angle if mode[i] == "+" else -angle))
+        return min(slack)
+
+    def _continuation(self, mode: str, lam: Array, slack: float) -> Continuation:
+        found = self.at(lam)
+        slides = [i for i in self.surfaces if mode[i] == "s"]
+        return Continuation(
+            mode,
+            lam,
+            found.field[: self.system.dimension],
+            found.rates[self.surfaces],
+            np.linalg.eigvals(found.rates_l[np.ix_(slides, slides)]).astype(complex),
+            slack,
+        )
+
+    def attraction(self, lam: Array) -> str:
+        """Whether sliding along all surfaces attracts (see ``Intersection``)."""
+        chosen, k = self.surfaces, len(self.surfaces)
+        m = self.at(lam).rates_l[np.ix_(chosen, chosen)]
+        if self._shrinks(lam, m, -1.0):
+            return "attracting"
+        if self._shrinks(lam, m, 1.0):
+            return "repelling"
+        if k == 2 and self.system.extended_dimension == 2:
+            loop = loop_at(self.layer, self.x, chosen, self.held, self.p)
+            if loop is not None and loop.attracts is not None:
+                return "spiralling in" if loop.attracts else "spiralling out"
+        growth = float(np.linalg.eigvals(m).real.max())
+        return "unstable across" if growth > _NEUTRAL * np.abs(m).max() else "not shown"
+
+    def _shrinks(self, lam: Array, m: Array, sign: float) -> bool:
+        """Whether V = sum_i d_i abs(h_i) (1 - lambda_i sgn h_i) is found that falls (sign -1) or rises
+        (+1) beside the intersection: in all regions, and sliding on fewer surfaces."""
+        if self.layer.affine and complementarity.attracts(-sign * m):
+            return True
+        if len(self.surfaces) > _TRIED:
+            return False
+        from scipy.optimize import linprog
+
+        rows = []
+        for mode, values in self._candidates()[0]:
+            if all(mode[i] == "s" for i in self.surfaces) or np.abs(values).max() > 1.0 + _NEUTRAL:
+                continue
+            terms = ((values - lam) * self.at(values).rates)[self.surfaces]
+            rows.append(
+                [0.0 if mode[i] == "s" else t for i, t in zip(self.surfaces, terms, strict=True)]
+            )
+        table = sign * np.array(rows)
+        table /= np.abs(table).max(axis=1, initial=1e-300, keepdims=True)
+        # weights d from 0 to 1 with the largest rate of change of V below zero
+        found = linprog(
+            [*[0.0] * len(self.surfaces), -1.0],
+            A_ub=np.hstack([-table, np.ones((len(table), 1))]),
+            b_ub=np.zeros(len(table)),
+            bounds=[(0.0, 1.0)] * len(self.surfaces) + [(None, None)],
+        )
+        return found.x is not None and bool(found.x[-1] > _NEUTRAL)

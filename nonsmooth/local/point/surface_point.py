@@ -1,0 +1,300 @@
+"""A place to ask questions: one surface of a system with its parameters, and the numbers at a point.
+
+Everything in this floor is read from here: h, the two fields, L_i = F_i . grad h, L_ij = F_i . grad
+L_j (so L12 is F1 . grad L2), and every derivative of these, exact. Vectors have a time component
+where the system depends on time.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...model import (
+    Array,
+    DefinitionError,
+    FilippovSystem,
+    Parameters,
+    PointError,
+    call,
+    evaluator,
+    explain,
+    motion,
+    require_system,
+)
+from ..checks import require_surface
+from .lie_derivatives import ManyNumbers, Numbers
+from .sides import SIDES
+
+#: Default of ``tol`` for questions about a given point: an angle, and a relative distance.
+TOLERANCE = 1e-10
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """One surface of a system with its parameters: where questions of this floor are asked.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+    surface : int
+    mode : str
+        One letter per surface, ``s`` for this one; empty for a smooth system.
+    parameters : ndarray
+    """
+
+    system: FilippovSystem
+    surface: int
+    mode: str
+    parameters: Array
+
+    def side(self, letter: str) -> str:
+        """Return the mode above (``+``) or below (``-``) the surface; of a smooth system its one mode."""
+        if not self.mode:
+            return ""
+        return self.mode[: self.surface] + letter + self.mode[self.surface + 1 :]
+
+    @property
+    def values(self) -> dict[str, float]:
+        """Names and values of the parameters."""
+        names = self.system.parameter_names
+        return dict(zip(names, map(float, self.parameters), strict=True))
+
+    def _expressions(self) -> tuple[Any, list[Any], list[Any]]:
+        """h, (L1, L2) and (F1, F2); of a smooth system h = 1 and both fields are the one."""
+        system, modes = self.system, [self.side(letter) for letter in SIDES]
+        if not system.surface_count:
+            field = system.field("")
+            number = type(field)
+            return number(1.0), [number(0.0)] * 2, [field] * 2
+        lie = [system.lie_derivative([mode], self.surface) for mode in modes]
+        return system.surface_function(self.surface), lie, [system.field(mode) for mode in modes]
+
+    def _build(self) -> Sequence[Any]:
+        h, lie, fields = self._expressions()
+        return [h, *lie, *(self.system.gradient(e) for e in (h, *lie)), *fields]
+
+    def _rows(self, what: str, build: Callable[[], Sequence[Any]], x: Array) -> Array:
+        """Evaluate expressions of N numbers each at a point; (k, N)."""
+        evaluate = evaluator(self.system, (what, self.surface, self.mode), build)
+        return np.array([v.ravel() for v in evaluate.copied(x, self.parameters)])
+
+    def at(self, x: Array) -> Numbers:
+        """Evaluate at an extended point (N,); entries may be NaN where a field is undefined."""
+        evaluate = evaluator(self.system, ("local", self.surface, self.mode), self._build)
+        h, l1, l2, *vectors = evaluate.copied(x, self.parameters)
+        g, g1, g2, f1, f2 = (v.ravel() for v in vectors)
+        lie = np.array([l1[0, 0], l2[0, 0]])
+        return Numbers(x, float(h[0, 0]), g, np.array([f1, f2]), lie, np.array([g1, g2]))
+
+    def finite_at(self, x: Array) -> Numbers:
+        """Evaluate as ``at`` does and refuse NaN and inf.
+
+        Raises
+        ------
+        PointError
+        """
+        numbers = self.at(x)
+        if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
+            raise PointError(
+                explain(
+                    f"point {x}",
+                    expected="a state where the fields and the derivatives of h, L1 and L2 are "
+                    "finite",
+                    received=f"h={numbers.h}, F1={numbers.fields[0]}, F2={numbers.fields[1]}, "
+                    f"grad L1={numbers.lie_gradients[0]}, grad L2={numbers.lie_gradients[1]}",
+                    advice="A root or logarithm left its domain, or a form such as sqrt(x)*x has "
+                    "an infinite factor in its derivative: write it as one power.",
+                )
+            )
+        return numbers
+
+    def many(self, x: Array) -> ManyNumbers:
+        """Evaluate at points (k, N)."""
+        function = self.system.function(("local", self.surface, self.mode), self._build)
+        count, size = x.shape
+        if not count:
+            vectors = np.zeros((0, 2, size))
+            return ManyNumbers(x, np.zeros(0), x, vectors, np.zeros((0, 2)), vectors)
+        outputs = call(function, x.T, self.parameters)
+        h, l1, l2 = (v[0] for v in outputs[:3])
+        g, g1, g2 = (v.reshape(count, size) for v in outputs[3:6])
+        fields = np.stack([f.T for f in outputs[6:]], axis=1)
+        return ManyNumbers(x, h, g, fields, np.column_stack([l1, l2]), np.stack([g1, g2], axis=1))
+
+    def many_h(self, x: Array) -> tuple[Array, Array]:
+        """h (k,) and its gradient (k, N) at points (k, N)."""
+        system = self.system
+
+        def build() -> Sequence[Any]:
+            h = system.surface_function(self.surface)
+            return [h, system.gradient(h)]
+
+        h, gradient = call(system.function(("h", self.surface), build), x.T, self.parameters)
+        return h[0], gradient.reshape(x.shape)
+
+    def switches(self, x: Array) -> Array:
+        """The functions of all surfaces at a point; (m,)."""
+        return _switches(self.system, x, self.parameters)
+
+    @property
+    def others(self) -> tuple[int, ...]:
+        """The surfaces that are not looked at."""
+        return tuple(j for j in range(self.system.surface_count) if j != self.surface)
+
+    # derivatives -------------------------------------------------------------------------------
+
+    def jacobians(self, x: Array) -> Array:
+        """DF1 and DF2 at a point; (2, N, N)."""
+        system, size = self.system, self.system.extended_dimension
+
+        def build() -> Sequence[Any]:
+            return [system.gradient(f[i]) for f in self._expressions()[2] for i in range(size)]
+
+        return self._rows("jacobians", build, x).reshape(2, size, size)
+
+    def hessians(self, x: Array) -> tuple[Array, Array]:
+        """Hessians of h, L1, L2 (3, N, N) and of the numerator L2 F1 - L1 F2 of sliding (N, N, N)."""
+        system, size = self.system, self.system.extended_dimension
+
+        def build() -> Sequence[Any]:
+            h, (l1, l2), (f1, f2) = self._expressions()
+            numerator = [l2 * f1[i] - l1 * f2[i] for i in range(size)]
+            gradients = [system.gradient(e) for e in (h, l1, l2, *numerator)]
+            return [system.gradient(g[i]) for g in gradients for i in range(size)]
+
+        found = self._rows("hessians", build, x).reshape(3 + size, size, size)
+        return found[:3], found[3:]
+
+    def parameter_derivatives(self, x: Array) -> tuple[Array, Array]:
+        """Derivatives of h (q,) and of F1, F2 (2, N, q) by the q parameters, at a point."""
+        system, size = self.system, self.system.extended_dimension
+
+        def build() -> Sequence[Any]:
+            h, _, fields = self._expressions()
+            entries = [h, *(f[i] for f in fields for i in range(size))]
+            return [system.parameter_gradient(e) for e in entries]
+
+        found = self._rows("parameters", build, x)
+        return found[0], found[1:].reshape(2, size, -1)
+
+    def lie_parameter_derivatives(self, x: Array) -> Array:
+        """Derivatives of h, L1 and L2 by the q parameters, at a point; (3, q)."""
+
+        def build() -> Sequence[Any]:
+            h, lie, _ = self._expressions()
+            return [self.system.parameter_gradient(e) for e in (h, *lie)]
+
+        return self._rows("lie parameters", build, x)
+
+    def orbit(self, x: Array, letter: str, order: int) -> tuple[Array, Array]:
+        """Taylor coefficients of the orbit of F1 or F2 (N, order + 1) and of h on it (order + 1,).
+
+        Coefficient k of h is its Lie derivative L^k h over k!.
+        """
+        jet = motion(self.system, self.side(letter)).jet_function(order)
+        states, guards = call(jet, x, self.parameters)
+        # the guard of a side is h there, and positive
+        return states, (1.0 if letter == "+" else -1.0) * guards[self.surface]
+
+
+def place(
+    system: FilippovSystem,
+    point: ArrayLike,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    *,
+    smooth: bool = False,
+) -> tuple[Place, Array]:
+    """Check the arguments that every function of this floor shares."""
+    require_system(system)
+    x = system.extended_point(point, t)
+    p = system.parameter_vector(parameters)
+    if system.surface_count == 0 and smooth:
+        if surface or mode:
+            raise DefinitionError(
+                explain(
+                    "surface and mode",
+                    expected="none, as the system has no surface",
+                    received=f"surface {surface!r}, mode {mode!r}",
+                    advice="Leave them out.",
+                )
+            )
+        return Place(system, 0, "", p), x
+    require_surface(system)
+    system.surface_function(surface)  # refuses what is no index or out of range
+    letters = list(_signs(system, x, p, surface) if mode is None else mode)
+    if mode is not None:
+        system.require_mode(mode)
+    letters[surface] = "s"
+    if letters.count("s") > 1:
+        raise DefinitionError(
+            explain(
+                f"mode {''.join(letters)!r}",
+                expected="one sliding surface",
+                received=str(letters.count("s")),
+                advice="This floor looks at one surface: give + or - to the others. For several "
+                "that slide at once see sliding_branches and intersection_range.",
+            )
+        )
+    return Place(system, int(surface), "".join(letters), p), x
+
+
+def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
+    if system.surface_count == 1:
+        return "s"
+    values = _switches(system, x, p).tolist()
+    for i, value in enumerate(values):
+        if i != surface and value == 0:
+            raise PointError(
+                explain(
+                    f"point {x}",
+                    expected=f"a side of surface {i}",
+                    received=f"a point on surfaces {surface} and {i}",
+                    advice="Choose the side with mode=, one letter per surface.",
+                )
+            )
+    return "".join("+" if value > 0 else "-" for value in values)
+
+
+def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
+    if not system.surface_count:
+        return np.zeros(0)
+
+    def build() -> Sequence[Any]:
+        return [system.surface_function(i) for i in range(system.surface_count)]
+
+    return np.array([v.item() for v in call(system.function(("local", "surfaces"), build), x, p)])
+
+
+def on_surface(where: Place, x: Array, tol: float) -> Numbers:
+    """Evaluate at a point of the surface."""
+    # The point counts as on the surface when its distance is at most ``tol (1 + |x|)``.
+    numbers = where.finite_at(x)
+    if not np.any(numbers.gradient):
+        raise PointError(
+            explain(
+                f"point {x}",
+                expected=f"a regular point of surface {where.surface}",
+                received="grad h = 0",
+                advice="The zero set of h is not a surface there; write h with a nonzero gradient.",
+            )
+        )
+    if numbers.distance > tol * (1 + np.linalg.norm(x)):
+        foot = x - numbers.h * numbers.gradient / (numbers.gradient @ numbers.gradient)
+        raise PointError(
+            explain(
+                f"point {x}",
+                expected=f"a point on surface {where.surface}, h = 0",
+                received=f"h = {numbers.h:.6g} (about {numbers.distance:.3g} away)",
+                advice=f"The nearest point of the surface is about {foot.tolist()} (one Newton "
+                "step along grad h; repeat it where the surface is curved), or raise tol.",
+            )
+        )
+    return numbers

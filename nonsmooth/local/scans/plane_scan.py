@@ -1,0 +1,190 @@
+"""Everything special of a planar system in a box: its surface in pieces, folds and equilibria.
+
+Found by sign changes on a grid and then solved for, so two of a kind closer than the grid (1/160 of
+the box) can be missed: a scan is no proof. Names follow Kuznetsov, Rinaldi & Gragnani 2003.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, replace
+from functools import cached_property, partial
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, FilippovSystem
+from ...solvers.newton import solve_many
+from ..point.lie_derivatives import ManyNumbers
+from ..point.sides import SIDES, Side
+from ..point.surface_point import Place
+from ..searches.equilibria import Equilibrium, find_equilibrium
+from ..searches.folds import Fold, find_fold
+from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
+from ..searches.search import find_all
+from .box import Box
+from .contours import inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
+
+_GRID = 161  # for the surface
+_CELLS = 61  # for equilibria
+_MOST = 100  # starts of one search
+_ON_SURFACE = 1e-3  # an equilibrium closer to its field's fold, in units of the box, is drawn on it
+
+
+@dataclass(frozen=True, eq=False)
+class Piece:
+    """A stretch of the surface of one kind: "attracting", "repelling" or "crossing"."""
+
+    kind: str
+    points: Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlaneScan:
+    """A planar system with one surface in a box."""
+
+    where: Place
+    box: Box
+
+    @classmethod
+    def of(cls, system: FilippovSystem, parameters: Mapping[str, float], box: Box) -> PlaneScan:
+        """Scan a system of two states, one surface and no explicit time."""
+        return cls(Place(system, 0, "s", system.parameter_vector(parameters)), box)
+
+    def at(self, points: Array) -> ManyNumbers:
+        """Numbers at points (k, 2)."""
+        return self.where.many(points)
+
+    def project(self, points: Array) -> Array:
+        """Move points onto the surface along its gradient."""
+
+        def equations(x: Array, _: NDArray[np.int64]) -> tuple[Array, Array]:
+            h, gradient = self.where.many_h(x)
+            return h[:, None], gradient[:, None, :]
+
+        return solve_many(equations, points, tol=1.0, iterations=4)[0]
+
+    # the surface -------------------------------------------------------------------------------
+
+    @cached_property
+    def curves(self) -> list[Array]:
+        """The surface as polylines (m, 2), with at most a grid step between neighbours."""
+        h = self.where.many_h(self.box.grid(_GRID))[0].reshape(_GRID, _GRID)
+        found = zero_lines(self.box.lines(_GRID), h)
+        return [self.project(refined(line, self.box.size, 1 / _GRID)) for line in found]
+
+    @cached_property
+    def pieces(self) -> list[Piece]:
+        """The surface cut at its folds."""
+        found = [_pieces(self, curve) for curve in self.curves]
+        return [piece for pieces in found for piece in pieces]
+
+    # special points ----------------------------------------------------------------------------
+
+    def _from_curves(
+        self, what: Callable[[ManyNumbers], Array], look: Callable[[Array], Any]
+    ) -> list[Any]:
+        """Look from where a function changes sign along the surface; no result twice."""
+        starts = [np.empty((0, 2))]
+        for curve in self.curves:
+            values = what(self.at(curve))
+            k = sign_changes(values)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                share = np.nan_to_num(values[k] / (values[k] - values[k + 1]))
+            starts.append(curve[k] + share[:, None] * (curve[k + 1] - curve[k]))
+        found = find_all(look, np.vstack(starts)[:_MOST])
+        return [f for f in found if self.box.contains(f.point)]
+
+    @cached_property
+    def tangencies(self) -> list[Fold]:
+        """Where a field is tangent to the surface or zero: folds, and boundary equilibria."""
+        return [fold for k, side in enumerate(SIDES) for fold in self._folds(k, side)]
+
+    def _folds(self, k: int, side: Side) -> list[Fold]:
+        where = self.where
+
+        def look(x: Array) -> Fold:
+            return find_fold(where.system, x, side=side, parameters=where.values, max_order=3)
+
+        return self._from_curves(lambda numbers: numbers.lie[:, k], look)
+
+    @cached_property
+    def boundary_equilibria(self) -> list[Equilibrium]:
+        """Equilibria of a field on the surface, or too close to it for a picture of the box."""
+        # There the field is not only tangent but zero: it has no visible or invisible fold, and no
+        # pseudo-equilibrium beside it.
+        found = list[Equilibrium]()
+        for fold in self.tangencies:
+            for at in find_all(partial(self._equilibrium, side=fold.side), fold.point[None, :]):
+                if self._close(at.point, fold.point):
+                    found.append(replace(at, status="boundary"))
+        return found
+
+    def _close(self, one: Array, other: Array) -> bool:
+        return float(np.linalg.norm((one - other) / self.box.size)) < _ON_SURFACE
+
+    def _apart(self, points: list[Any]) -> list[Any]:
+        """Those that are not boundary equilibria."""
+        rests = [at.point for at in self.boundary_equilibria]
+        return [f for f in points if not any(self._close(f.point, at) for at in rests)]
+
+    @cached_property
+    def folds(self) -> list[Fold]:
+        """Folds of both fields."""
+        return self._apart(self.tangencies)
+
+    @cached_property
+    def pseudo_equilibria(self) -> list[PseudoEquilibrium]:
+        """Real pseudo-equilibria."""
+        where = self.where
+
+        def along(numbers: ManyNumbers) -> Array:
+            tangent = np.column_stack([numbers.gradient[:, 1], -numbers.gradient[:, 0]])
+            return np.sum(numbers.numerator * tangent, axis=1)
+
+        def look(x: Array) -> PseudoEquilibrium:
+            return find_pseudo_equilibrium(where.system, x, parameters=where.values)
+
+        found = self._from_curves(along, look)
+        return self._apart([e for e in found if e.status == "real"])
+
+    @cached_property
+    def equilibria(self) -> list[Equilibrium]:
+        """Equilibria of each field on its own side."""
+        numbers = self.at(self.box.grid(_CELLS))
+        return [e for k, side in enumerate(SIDES) for e in self._equilibria(numbers, k, side)]
+
+    def _equilibria(self, numbers: ManyNumbers, k: int, side: Side) -> list[Equilibrium]:
+        field = numbers.fields[:, k].reshape(_CELLS, _CELLS, 2)
+        components = [field[:, :, 0], field[:, :, 1]]
+        starts = middle_of_sign_changes(self.box.lines(_CELLS), components)
+
+        found = find_all(partial(self._equilibrium, side=side), starts[:_MOST])
+        found = [e for e in found if e.status == "real" and self.box.contains(e.point)]
+        return self._apart(found)
+
+    def _equilibrium(self, near: Array, side: Side) -> Equilibrium:
+        return find_equilibrium(self.where.system, near, side=side, parameters=self.where.values)
+
+    def eigenvectors(self, found: Equilibrium) -> Array:
+        """Real eigenvectors of a saddle as rows: the stable one, then the unstable one; (2, 2)."""
+        jacobian = self.where.jacobians(found.point)[SIDES.index(found.side)]
+        values, vectors = np.linalg.eig(jacobian)
+        return np.real(vectors).T[np.argsort(np.real(values))]
+
+
+def _pieces(scan: PlaneScan, curve: Array) -> list[Piece]:
+    """Cut a polyline of the surface at the folds and name the pieces."""
+    near = [
+        fold.point
+        for fold in scan.tangencies
+        if np.min(np.linalg.norm((curve - fold.point) / scan.box.size, axis=1)) < 2 / _GRID
+    ]
+    full = inserted(curve, np.reshape(near, (-1, 2)))
+    lie = scan.at((full[1:] + full[:-1]) / 2).lie
+    slides = lie[:, 0] * lie[:, 1] < 0
+    kinds = np.where(slides, np.where(lie[:, 0] < 0, "attracting", "repelling"), "crossing")
+    cuts = [0, *(np.flatnonzero(kinds[1:] != kinds[:-1]) + 1), len(kinds)]
+    return [Piece(str(kinds[a]), full[a : b + 1]) for a, b in pairwise(cuts)]

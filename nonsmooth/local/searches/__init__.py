@@ -1,0 +1,1 @@
+"""Searches for special points: folds, two-folds, equilibria, pseudo-equilibria, boundary equilibria."""

@@ -1,0 +1,200 @@
+"""Equilibria of the two fields, found by Newton's method in R^n and named by their eigenvalues."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ...model import Array, FilippovSystem, OptionError, Parameters
+from ..checks import require_autonomous
+from ..point.sides import FIELDS, Side, side_index
+from ..point.surface_point import TOLERANCE, Place, place
+from .search import Found, search
+
+#: Eigenvalues whose real part is below this, relative to the largest, decide nothing.
+HYPERBOLIC = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Equilibrium:
+    """A zero of one of the two fields, or of a smooth system's one field.
+
+    Attributes
+    ----------
+    point : ndarray (n,)
+        The point, in the order of the states.
+    side : {"+", "-"}
+        Of the field $F1$ above the surface or $F2$ below it; ``"+"`` for a smooth system.
+    status : {"real", "virtual", "boundary"}
+        Whether it is on its field's own side, on the other side of a surface, or on the surface.
+    kind : str
+        ``"stable node"``, ``"unstable focus"``, ``"saddle"``, ...; ``"degenerate"`` if an
+        eigenvalue has no real part.
+    eigenvalues : ndarray (n,)
+        Of DF_i, by real part.
+    h : float
+        Value of the switching function there: on which side it is, and how far; inf without one.
+    margin : float
+        Smallest real part relative to the largest modulus: distance from a degenerate one.
+    distance : float
+        From the start of the search.
+    residual : float
+        What is left of the equations at the point.
+    iterations : int
+        Iterations that Newton's method took; 0 where nothing was searched.
+    mode : str
+        Whose field: one letter for each surface.
+    """
+
+    point: Array
+    side: Side
+    status: str
+    kind: str
+    eigenvalues: NDArray[Any]
+    h: float
+    margin: float
+    distance: float
+    residual: float
+    iterations: int
+    mode: str
+
+    def __str__(self) -> str:
+        values = ", ".join(f"{v:.6g}" for v in self.eigenvalues)
+        if not self.mode:
+            return f"{self.kind} at {self.point.tolist()}, eigenvalues {values}."
+        return (
+            f"{self.status} {self.kind} of {FIELDS[self.side]} at {self.point.tolist()}, h = {self.h:.6g}, "
+            f"eigenvalues {values}."
+        )
+
+
+def equilibrium_distance(field: Array, derivative: Array, x: Array) -> float:
+    """How far the next zero of a field is, to first order, relative to $1 + |x|$."""
+    # Infinite where the linearised equations have no solution.
+    length, size = 1 + float(np.linalg.norm(x)), float(np.linalg.norm(derivative, 2))
+    norm = float(np.linalg.norm(field))
+    if norm <= TOLERANCE * size * length or norm == 0.0:
+        return norm / (size * length) if norm else 0.0
+    step = np.linalg.lstsq(derivative, -field, rcond=1e-12)[0]
+    if np.linalg.norm(derivative @ step + field) > 0.5 * norm:
+        return float("inf")
+    return float(np.linalg.norm(step)) / length
+
+
+def by_real_part(matrix: Array) -> NDArray[Any]:
+    """Eigenvalues, ascending by real part."""
+    values = np.linalg.eigvals(matrix) if matrix.size else np.zeros(0)
+    return np.array(sorted(values, key=lambda v: (v.real, v.imag)))
+
+
+def kind_of(eigenvalues: NDArray[Any], scale: float) -> tuple[str, float]:
+    """Name an equilibrium by its eigenvalues; also the smallest real part over ``scale``."""
+    real = eigenvalues.real
+    margin = float(np.min(np.abs(real))) / scale if scale > 0 else 0.0
+    if margin <= HYPERBOLIC:
+        return "degenerate", margin
+    shape = "focus" if np.any(np.abs(eigenvalues.imag) > 0) else "node"
+    if np.all(real < 0):
+        return f"stable {shape}", margin
+    return (f"unstable {shape}", margin) if np.all(real > 0) else ("saddle", margin)
+
+
+def find_equilibrium(
+    system: FilippovSystem,
+    near: ArrayLike,
+    *,
+    side: Side = "+",
+    parameters: Parameters | None = None,
+    surface: int = 0,
+    mode: str | None = None,
+    tol: float = 1e-12,
+    max_iterations: int = 50,
+) -> Equilibrium:
+    """Find an equilibrium of one field close to a point, on whichever side of the surface it is.
+
+    Parameters
+    ----------
+    system, parameters, surface, mode
+        As in :func:`region`; the point need not be on the surface. A smooth system has none.
+    near : array_like (n,)
+        Where the search starts.
+    side : {"+", "-"}
+        Of the field $F1$ or $F2$; a smooth system has one field, of ``"+"``.
+    tol : float, optional
+        Accepted residual (a distance), relative to $1 + |x|$.
+    max_iterations : int, optional
+        Newton's method gives up after this many.
+
+    Returns
+    -------
+    Equilibrium
+        The equilibrium found, with its eigenvalues.
+
+    Raises
+    ------
+    ConvergenceError
+        Newton's method does not converge from this start; ``residual`` and ``point`` are the last ones.
+    DefinitionError
+        Explicit time or vector multipliers; a ``mode``, ``surface`` or ``side`` that the system does
+        not have.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``max_iterations`` is not positive.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[y - x, 1 - 2 * y], below=[1, 1])
+    >>> found = find_equilibrium(s, [1.0, 1.0])
+    >>> found.point, found.status, found.kind
+    (array([0.5, 0.5]), 'real', 'stable node')
+    """
+    k = side_index(side)
+    require_autonomous(system, "equilibrium")
+    where, x = place(system, near, parameters, 0.0, surface, mode, smooth=True)
+    if not system.surface_count and side != "+":
+        raise OptionError(
+            f"side: expected '+', as a smooth system has one field, received {side!r}. Leave it out."
+        )
+
+    def equations(u: Array) -> tuple[Array, Array]:
+        return where.at(u).fields[k], where.jacobians(u)[k]
+
+    what = f"equilibrium of {FIELDS[side]}" if where.mode else "equilibrium"
+    found = search(equations, x, tol=tol, max_iterations=max_iterations, what=what)
+    return equilibrium_at(where, found, side)
+
+
+def equilibrium_at(where: Place, found: Found, side: Side) -> Equilibrium:
+    """Describe the equilibrium at a point where a field vanishes."""
+    x, numbers = found.x, where.at(found.x)
+    eigenvalues = by_real_part(where.jacobians(x)[side_index(side)])
+    kind, margin = kind_of(eigenvalues, float(np.max(np.abs(eigenvalues))))
+    h, mode = (numbers.h if where.mode else np.inf), where.side(side)
+    if not where.mode:
+        status = "real"
+    elif numbers.distance <= TOLERANCE * (1 + float(np.linalg.norm(x))):
+        status = "boundary"
+    else:
+        signs = np.where(where.switches(x) > 0, "+", "-")
+        status = "real" if "".join(signs) == mode else "virtual"
+    return Equilibrium(
+        x,
+        side,
+        status,
+        kind,
+        eigenvalues,
+        h,
+        margin,
+        found.distance,
+        found.residual,
+        found.iterations,
+        mode,
+    )

@@ -1,0 +1,289 @@
+"""Lifting: sign, fabs, fmin, fmax and if_else in an expression become surfaces and multipliers.
+
+Each switch of the right-hand side is replaced by what it is on the two sides of the zero set of a
+smooth switching function h, with one multiplier lam = sgn h for all switches on the same set:
+
+    sign(h)        lam                           h
+    fabs(h)        lam h                         h
+    fmax(a, b)     (1+lam)/2 a + (1-lam)/2 b     a - b
+    fmin(a, b)     (1-lam)/2 a + (1+lam)/2 b     a - b
+    a < b          (1+lam)/2                     b - a     also <=, and the condition of if_else
+    copysign(a, b) fabs(a) sign(b)
+
+``not``, ``and``, ``or`` act on conditions. Two functions that differ by a constant factor are one
+surface; the first one met is used, and a negative factor turns the sign of the multiplier.
+
+A switch inside a switch, such as fmax(fmin(x, 1), -1), is expanded over the sides of the inner one:
+sgn h(x, lam) = sum over lam = +1, -1 of its weight times sgn h(x, +-1). This is exact off the
+surfaces. It adds a surface for each side, which does nothing where the inner switch is on its
+other side.
+
+The result is affine in each multiplier: Filippov's convention (Filippov 1988, sec. 4), by which
+only the values beside a surface count. Where a multiplier enters in another way, as in sign(x)**2
+or exp(sign(x)), it is replaced by the affine function with the same values at +1 and -1; this too
+is exact off the surfaces. On the surface the expression as written could be read as Jeffrey's
+hidden dynamics instead (Jeffrey 2018), with another sliding field: ``LiftedSwitch.hidden`` says
+so, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are continuous and bring no such choice: fabs(h) = 0 on h = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import casadi as ca
+
+from ..errors import DefinitionError, NotSmoothError, explain
+from ..expressions.graph import NOT_SMOOTH, evaluate, instructions, operation
+from .found_switches import LiftedSwitch, Switches
+
+#: A switch that depends on more switches than this is refused: 2^n copies of it would be needed.
+_MOST_NESTED = 6
+
+_INFINITELY_MANY = (
+    "It switches on infinitely many surfaces. Declare those that the motion can meet, each as "
+    "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset."
+)
+_EQUALITY = (
+    "Equality holds on a surface only, and what a field is there does not matter in Filippov's "
+    "convention. Write the comparison as < or >, or leave the case out."
+)
+_REFUSED: dict[str, str] = {
+    "eq": _EQUALITY,
+    "ne": _EQUALITY,
+    "floor": _INFINITELY_MANY,
+    "ceil": _INFINITELY_MANY,
+    "fmod": _INFINITELY_MANY,
+    "remainder": _INFINITELY_MANY,
+}
+
+
+@dataclass(frozen=True)
+class Lifting:
+    """A right-hand side with its switches replaced: field (n,), multipliers and surfaces (m,)."""
+
+    field: ca.SX
+    multipliers: ca.SX
+    surfaces: ca.SX
+    switches: tuple[LiftedSwitch, ...]
+
+
+@dataclass(frozen=True)
+class _Value:
+    """An expression and the numbers of the switches in it."""
+
+    e: ca.SX
+    inside: frozenset[int] = frozenset()
+
+
+def lift(
+    rhs: ca.SX, states: ca.SX, time: ca.SX, parameters: ca.SX, *, hidden: bool = False
+) -> Lifting:
+    """Replace the switches of a right-hand side by multipliers."""
+    return _Lifter(rhs, states, time, parameters, hidden).run()
+
+
+class _Lifter:
+    """One expression graph on its way to a field with multipliers."""
+
+    def __init__(self, rhs: ca.SX, states: ca.SX, time: ca.SX, parameters: ca.SX, hidden: bool):
+        self.hidden = hidden
+        self.inputs = [ca.vertcat(states, time), parameters]
+        self.states, self.moving = states, self.inputs[0]
+        self.nodes, self.rows = instructions(self.inputs, [rhs])
+        self.switches = Switches(states, self.inputs)
+        self.done = 0  # nodes evaluated: the number of the one under way
+
+    def run(self) -> Lifting:
+        values = evaluate(self.nodes, self)
+        entries = [self._affine(values[k]) for k in self.rows[0]]
+        return self._finish(ca.vertcat(*entries))
+
+    def _finish(self, f: ca.SX) -> Lifting:
+        kept, told = self.switches.report(f)
+        lam = ca.vertcat(*[s.lam for s in kept]) if kept else ca.SX(0, 1)
+        h = ca.vertcat(*[s.h for s in kept]) if kept else ca.SX(0, 1)
+        return Lifting(f, lam, h, told)
+
+    # one node ----------------------------------------------------------------------------------
+
+    def constant(self, value: float) -> _Value:
+        """Part of the graph's evaluation."""
+        return self._counted(_Value(ca.SX(value)))
+
+    def symbol(self, vector: int, position: int) -> _Value:
+        """Part of the graph's evaluation."""
+        return self._counted(_Value(self.inputs[vector][position]))
+
+    def apply(self, op: str, args: Sequence[_Value]) -> _Value:
+        """Part of the graph's evaluation."""
+        try:
+            return self._counted(self._operation(op, args))
+        except (NotSmoothError, DefinitionError) as error:
+            raise type(error)(f"{self._entry_of(self.done)}: {error}") from None
+
+    def _counted(self, value: _Value) -> _Value:
+        self.done += 1
+        return value
+
+    def _operation(self, op: str, args: Sequence[_Value]) -> _Value:
+        if op == "if_else_zero":
+            return self._if_else(*args)
+        inside = frozenset().union(*(a.inside for a in args))
+        if op in NOT_SMOOTH:
+            return self._over_sides(list(args), inside, lambda e: self._switch(op, e))
+        if op == "sqrt" and args[0].e.op() == ca.OP_SQ:  # CasADi would make it fabs by itself
+            inner = [_Value(args[0].e.dep(0), inside)]
+            return self._over_sides(inner, inside, lambda e: self._switch("fabs", e))
+        return _Value(operation(op, [a.e for a in args]), inside)
+
+    def _over_sides(
+        self,
+        args: list[_Value],
+        inside: frozenset[int],
+        build: Callable[[list[_Value]], _Value],
+    ) -> _Value:
+        """Sum ``build`` over the sides of the switches ``inside``, with their weights."""
+        if not inside:
+            return build(args)
+        if len(inside) > _MOST_NESTED:
+            raise DefinitionError(
+                explain(
+                    "a switch inside a switch",
+                    expected=f"one that depends on at most {_MOST_NESTED} others",
+                    received=str(len(inside)),
+                    advice="Write the cases out as a field with multipliers=.",
+                )
+            )
+        numbers, found = sorted(inside), set(inside)
+        weights, values = [], []
+        for sides in product((1, -1), repeat=len(numbers)):
+            chosen = dict(zip(numbers, sides, strict=True))
+            value = build([_Value(self._at(a.e, chosen), a.inside - inside) for a in args])
+            weight = ca.SX(1)
+            for i, side in chosen.items():
+                weight = weight * (1 + side * self._symbol(i, args)) / 2
+            weights.append(weight)
+            values.append(value.e)
+            found |= value.inside
+        return _Value(_weighted(weights, values), frozenset(found))
+
+    def _symbol(self, i: int, args: list[_Value]) -> ca.SX:
+        """Multiplier of a switch for a function of arguments that may all be continuous there."""
+        s = self.switches[i]
+        return s.lam if any(ca.depends_on(a.e, s.lam) for a in args) else s.even
+
+    def _at(self, e: ca.SX, sides: dict[int, int]) -> ca.SX:
+        """Return an expression on given sides of some switches."""
+        for i, side in sides.items():
+            s = self.switches[i]
+            e = ca.substitute(e, ca.vertcat(s.lam, s.even), ca.DM([side, side]))
+        return e
+
+    # the switches, of smooth arguments ---------------------------------------------------------
+
+    def _if_else(self, condition: _Value, value: _Value) -> _Value:
+        """Only the condition decides; the value is looked at on each of its sides if it must."""
+        if condition.inside & value.inside:
+            return self._over_sides([condition, value], condition.inside, self._if_else_zero)
+        one = _Value(ca.SX(1))
+        factor = self._over_sides([condition, one], condition.inside, self._if_else_zero)
+        return _Value(factor.e * value.e, factor.inside | value.inside)
+
+    def _if_else_zero(self, args: list[_Value]) -> _Value:
+        condition, value = args
+        if ca.depends_on(condition.e, self.moving):
+            raise _cannot("if_else", "a condition that is not a comparison", condition.e, _EQUALITY)
+        return _Value(operation("if_else_zero", [condition.e, value.e]), value.inside)
+
+    def _switch(self, op: str, args: list[_Value]) -> _Value:
+        e = [a.e for a in args]
+        if not any(ca.depends_on(a, self.moving) for a in e):
+            return _Value(operation(op, e))
+        if op == "sign":
+            return self._sign(e[0], "sign")
+        if op == "fabs":
+            return self._choice(e[0], e[0], -e[0], "fabs")
+        if op in ("lt", "le"):
+            side = self._sign(e[1] - e[0], "comparison")
+            if side.e.is_zero():  # both sides are the same function
+                return _Value(ca.SX(op == "le"))
+            return _Value((1 + side.e) / 2, side.inside)
+        if op in ("fmax", "fmin"):
+            larger, smaller = (0, 1) if op == "fmax" else (1, 0)
+            return self._choice(e[0] - e[1], e[larger], e[smaller], op)
+        if op == "copysign":
+            size, side = self._choice(e[0], e[0], -e[0], op), self._sign(e[1], op, of_zero=1)
+            return _Value(size.e * side.e, size.inside | side.inside)
+        advice = _REFUSED.get(op, "A number that moves is no condition: compare it with another.")
+        raise _cannot(NOT_SMOOTH[op], "one of the states", operation(op, e), advice)
+
+    def _sign(self, h: ca.SX, origin: str, of_zero: int = 0) -> _Value:
+        number, side = self.switches.find(h, origin)
+        if number is None:
+            return _Value(ca.SX(side or of_zero))
+        return _Value(side * self.switches[number].lam, frozenset([number]))
+
+    def _choice(self, h: ca.SX, above: ca.SX, below: ca.SX, origin: str) -> _Value:
+        """Return ``above`` where h > 0 and ``below`` where h < 0; they are equal on h = 0."""
+        number, side = self.switches.find(h, origin)
+        if number is None:
+            return _Value(above if side >= 0 else below)
+        lam = side * self.switches[number].even
+        if ca.is_equal(above, -below, 20):
+            return _Value(lam * above, frozenset([number]))
+        return _Value((1 + lam) / 2 * above + (1 - lam) / 2 * below, frozenset([number]))
+
+    # the result --------------------------------------------------------------------------------
+
+    def _affine(self, value: _Value) -> ca.SX:
+        """Make one entry of the field affine in every multiplier, exactly off the surfaces."""
+        f = value.e
+        hidden = {i for i in value.inside if not ca.is_linear(f, self.switches[i].lam)}
+        for i in sorted(value.inside):
+            s = self.switches[i]
+            s.hidden = s.hidden or i in hidden
+            written = ca.substitute(f, s.even, s.lam)
+            if ca.is_linear(written, s.lam) or (self.hidden and i in hidden):
+                f = written
+                continue
+            above, below = self._at(f, {i: 1}), self._at(f, {i: -1})
+            same = ca.is_equal(above, below, 20)
+            f = above if same else (1 + s.lam) / 2 * above + (1 - s.lam) / 2 * below
+        return f
+
+    def _entry_of(self, number: int) -> str:
+        """Name the first entry of the right-hand side that uses a node."""
+        for entry, row in enumerate(self.rows[0]):
+            todo, seen = [row], {row}
+            while todo:
+                for k in self.nodes[todo.pop()].args:
+                    if k not in seen:
+                        seen.add(k)
+                        todo.append(k)
+            if number in seen:
+                return f"rhs[{entry}]"
+        return "rhs"
+
+
+def _weighted(weights: list[ca.SX], values: list[ca.SX]) -> ca.SX:
+    """Sum of weight times value; the weights add up to one, which shortens conditions."""
+    ones = [w for w, v in zip(weights, values, strict=True) if v.is_one()]
+    zeros = [w for w, v in zip(weights, values, strict=True) if v.is_zero()]
+    if len(ones) + len(zeros) == len(values) > 1:
+        return sum(ones, ca.SX(0)) if len(ones) <= len(zeros) else 1 - sum(zeros, ca.SX(0))
+    terms = [w * v for w, v in zip(weights, values, strict=True)]
+    return sum(terms[1:], terms[0])
+
+
+def _cannot(op: str, received: str, e: ca.SX, advice: str) -> NotSmoothError:
+    return NotSmoothError(
+        explain(
+            f"{op}",
+            expected="a switch that can be lifted (sign, fabs, fmin, fmax, copysign, if_else, "
+            "comparisons, and logic on these)",
+            received=f"{received}: {e}",
+            advice=advice,
+        )
+    )

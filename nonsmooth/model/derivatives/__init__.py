@@ -1,0 +1,1 @@
+"""Derivatives of fields, events and starts: variational equations and maps of events."""

@@ -1,0 +1,210 @@
+"""What an event does to the state, with exact derivatives.
+
+At the end of a leg an event e(x, p) = 0 happens and the state goes through a reset g(x, p), the identity
+if there is none. Both are read off the definition of the system, and come with their gradients.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import casadi as ca
+
+from ..cache import Content
+from ..definition.system import FilippovSystem
+from ..errors import DegenerateError
+from ..laws.coupled import coupled_of
+from ..laws.evaluators import Evaluator
+from ..laws.explicit import explicit, guard_named, solved
+from ..laws.switches import Guard
+from ..printing.tape import Values, values_of
+from ..values import Array
+
+
+@dataclass(frozen=True, eq=False)
+class PlainMap:
+    """An event's state after it and function, without derivatives.
+
+    Attributes
+    ----------
+    values : Values
+    """
+
+    values: Values
+
+
+class EventMap:
+    """What happens at the end of a leg: the event's function e, and the state g after it.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    states, event, after : SX
+        States of the leg (multipliers included), e (a scalar), g (N,).
+    guard : Guard
+        What the event is.
+
+    Attributes
+    ----------
+    smooth : bool
+        Whether g is the identity.
+    """
+
+    def __init__(
+        self,
+        system: FilippovSystem,
+        states: ca.SX,
+        event: ca.SX,
+        guard: Guard,
+        after: ca.SX | None = None,
+    ):
+        self.guard, self.smooth = guard, after is None
+        n, p = system.extended_dimension, system.parameter_symbols
+        g = states[:n] if after is None else after
+        outputs = [g, ca.jacobian(g, states), ca.jacobian(g, p)]
+        outputs += [event, ca.jacobian(event, states), ca.jacobian(event, p)]
+        self._inputs, self._outputs = [states, p], [ca.densify(e) for e in outputs]
+
+    @cached_property
+    def _function(self) -> Evaluator:
+        return Evaluator(ca.Function("event", self._inputs, self._outputs, {"cse": True}))
+
+    @cached_property
+    def values(self) -> Values:
+        """The entries of g, g_x, g_p, e, e_x and e_p, column after column, as a graph."""
+        return values_of(self._inputs, self._outputs)
+
+    @cached_property
+    def plain(self) -> PlainMap:
+        """g and e alone."""
+        return PlainMap(values_of(self._inputs, [self._outputs[0], self._outputs[3]]))
+
+    def __call__(self, y: Array, p: Array) -> AtEvent:
+        """Evaluate at the end of a leg."""
+        g, gx, gp, e, ex, ep = self._function.copied(y, p)
+        return AtEvent(g[:, 0], gx, gp, float(e[0, 0]), ex[0], ep[0])
+
+
+@dataclass(frozen=True)
+class AtEvent:
+    """An event's function and the state after it, with their derivatives.
+
+    Attributes
+    ----------
+    after : ndarray (N,)
+        g.
+    after_state, after_parameters : ndarray (N, N + k), (N, all parameters)
+    value : float
+        e.
+    gradient, by_parameters : ndarray (N + k,), (all parameters,)
+        Of e.
+    """
+
+    after: Array
+    after_state: Array
+    after_parameters: Array
+    value: float
+    gradient: Array
+    by_parameters: Array
+
+
+def event_map(
+    system: FilippovSystem, mode: str, name: str, side: int = 0, letters: str = ""
+) -> EventMap:
+    """The map of an event of a mode, by the name of its guard; built once."""
+
+    def build() -> EventMap:
+        of_mode = explicit(system, mode)
+        found = guard_named(of_mode, name, side)
+        if found is None:
+            names = sorted({g.name for g in of_mode.guards})
+            raise DegenerateError(
+                f"leg in mode {mode!r}: expected an event among {names}, received {name!r}. "
+                "What is no zero of a function, as a branch of hidden sliding that ends, has no "
+                "derivative."
+            )
+        guard, function = found
+        return EventMap(
+            system, of_mode.states, function, guard, _after(system, mode, guard, letters)
+        )
+
+    return system.cached(("event map", mode, name, side, letters), build)
+
+
+def instant_map(
+    system: FilippovSystem, mode: str, kind: str, name: str, letters: str = ""
+) -> EventMap:
+    """The map of a crossing, entry, stop, reset or impact as one of the extended states alone."""
+
+    def build() -> EventMap:
+        d = system.definition
+        if kind in ("stop", "reset"):
+            own = [n for n, _ in (system.stops if kind == "stop" else system.resets)]
+            i = own.index(name)
+            function = d.guards[i if kind == "stop" else len(system.stops) + i]
+        elif kind == "impact":
+            i = system.impacts.index(name)
+            function = d.gaps[i]
+        else:
+            i = system.entries[int(name.removeprefix("h"))][0]
+            function = d.surfaces[i]
+        guard = Guard("surface" if kind in ("crossing", "entry") else kind, i, 0, name)
+        after = _after(system, mode, guard, letters)
+        return EventMap(system, system.extended_states, function, guard, after)
+
+    return system.cached(("instant map", mode, kind, name, letters), build)
+
+
+def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap:
+    """The map of a leg that ends where a function of states, parameters and time is zero."""
+    symbols = [system.extended_states, system.parameter_symbols]
+
+    def build() -> EventMap:
+        guard = Guard("zero", 0, 0, str(function)[:40])
+        return EventMap(system, explicit(system, mode).states, function, guard)
+
+    return system.cached(("function map", mode, Content(symbols, function)), build)
+
+
+def _after(system: FilippovSystem, mode: str, guard: Guard, letters: str) -> ca.SX | None:
+    """The state after an event, None where it does not change."""
+    time = system.definition.time
+    if guard.kind == "reset":
+        return ca.vertcat(system.definition.maps[:, guard.index], time)
+    if guard.kind == "impact":
+        return struck(system, mode, guard.index, letters)
+    return None
+
+
+def struck(system: FilippovSystem, mode: str, contact: int, letters: str = "") -> ca.SX:
+    """The state after the impulses at a gap that closes (``flow/reference/contacts.py``)."""
+    # Contacts that are closed take part with the rate zero; friction on them acts with the impulse
+    # in the same proportion as with the reaction, and ``letters`` say to which side.
+    coupled, m, d = coupled_of(system), system.surface_count, system.definition
+    signs = system.parse_letters(mode)
+    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
+    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
+    held = dict(zip(carried, letters or [mode[i] for i in carried], strict=True))
+    numbers = ca.SX([{"+": 1.0, "-": -1.0}.get(held.get(i, mode[i]), 0.0) for i in range(m)])
+    stuck = [i for i in carried if held[i] == "s"]
+    every = [*stuck, *[m + j for j in taking]]
+    columns = ca.jacobian(coupled.field, coupled.symbols_of(every))
+    columns = ca.substitute(columns, coupled.multipliers, numbers) if m else columns
+    kept = ca.vertcat(d.surfaces, d.gap_rates)
+    gradient = ca.jacobian(kept, system.extended_states)
+    wanted = [-d.surfaces[i] for i in stuck]
+    wanted += [-(1 + (d.restitutions[j] if j == contact else 0)) * d.gap_rates[j] for j in taking]
+    slope = ca.mtimes(gradient[every, :], columns)
+    impulses = solved(slope, ca.vertcat(*wanted))
+    return ca.densify(system.extended_states + ca.mtimes(columns, impulses))
+
+
+def surface_map(system: FilippovSystem, surface: int) -> EventMap:
+    """A switching function as a map on the extended states, with its gradients."""
+
+    def build() -> EventMap:
+        guard = Guard("zero", surface, 0, f"h{surface}")
+        return EventMap(system, system.extended_states, system.surface_function(surface), guard)
+
+    return system.cached(("surface map", surface), build)

@@ -1,0 +1,104 @@
+"""The period of a forced system, as a function of its parameters."""
+
+from __future__ import annotations
+
+from functools import cached_property
+from typing import Any
+
+import casadi as ca
+import numpy as np
+
+from ..checks import is_real
+from ..definition.periods import read_period
+from ..definition.system import FilippovSystem
+from ..errors import OptionError, explain
+from ..laws.evaluators import Evaluator
+from ..printing.tape import Values, values_of
+from ..values import Array
+
+
+class Forcing:
+    """The period of a forced system as a function of its parameters.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    period : SX or float
+    found : bool, optional
+        Whether it was read off the system, which then has it.
+
+    Attributes
+    ----------
+    expression : SX
+    found : bool
+
+    Raises
+    ------
+    OptionError
+        Neither a number nor an expression in the parameters.
+    """
+
+    def __init__(self, system: FilippovSystem, period: ca.SX | float, found: bool = False):
+        self.found, self._system = found, system
+        if not is_real(period) and read_period(system, period) is None:
+            raise OptionError(
+                explain(
+                    "period",
+                    expected="a number, or an expression in the parameters "
+                    f"{list(system.parameter_names)}",
+                    received=repr(period),
+                    advice="Give period=2*pi/w.",
+                )
+            )
+        self.expression = ca.SX(period)
+        p = system.parameter_symbols
+        slope = ca.jacobian(self.expression, p)
+        self._outputs = [ca.densify(e) for e in (self.expression, slope)]
+        self._inputs = [ca.SX(0, 1), p]
+        self._function = Evaluator(ca.Function("period", self._inputs, self._outputs))
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        """Pickled with its system, as a function of the parameters."""
+        function = ca.Function("period", [self._system.parameter_symbols], [self.expression])
+        return _restored, (self._system, function.serialize(), self.found)
+
+    @cached_property
+    def values(self) -> Values:
+        """The period and its derivatives as a graph."""
+        return values_of(self._inputs, self._outputs)
+
+    def __call__(self, p: Array) -> tuple[float, Array]:
+        """The period, and its derivatives by all parameters."""
+        value, slope = self._function.copied(np.zeros(0), p)
+        return float(value[0, 0]), slope[0]
+
+
+def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:
+    period = ca.Function.deserialize(text)
+    return Forcing(system, period(system.parameter_symbols), found)
+
+
+def frequencies(system: FilippovSystem) -> list[ca.SX]:
+    """Rates of the arguments of sines and cosines that are linear in the time, without
+    repetition."""
+    if not system.time_dependent:
+        return []
+    d = system.definition
+    expressions = [d.field, d.surfaces, d.guards, d.maps, d.gaps]
+    found: list[ca.SX] = []
+    seen: set[int] = set()
+    stack = [e for block in expressions for e in ca.vertsplit(ca.densify(ca.vec(block)))]
+    while stack:
+        node = stack.pop()
+        if node.element_hash() in seen:
+            continue
+        seen.add(node.element_hash())
+        if node.is_leaf():
+            continue
+        if node.op() in (ca.OP_SIN, ca.OP_COS):
+            rate = ca.simplify(ca.jacobian(node.dep(0), d.time))
+            if not rate.is_zero() and not ca.depends_on(rate, system.extended_states):
+                if not any(ca.is_equal(rate, other, 10) for other in found):
+                    found.append(rate)
+        stack += [node.dep(k) for k in range(node.n_dep())]
+    return found

@@ -1,0 +1,55 @@
+"""Second and third derivatives of fields and functions along them, as normal forms and touches need them."""
+
+from __future__ import annotations
+
+import casadi as ca
+
+from ..definition.system import FilippovSystem
+from ..laws.evaluators import Evaluator, evaluator
+from ..laws.motion import mode_field
+from .variational import guarded_field
+
+
+def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
+    """(x, u), p -> A, B(u, .), C(u, u, .) of the field of a mode, and gradient and Hessian of
+    the function of the surface on which it slides (zero without)."""
+
+    def build() -> Evaluator:
+        f, x, p = mode_field(system, mode), system.extended_states, system.parameter_symbols
+        u = ca.SX.sym("u", x.numel())
+        first = ca.jtimes(f, x, u)
+        third = ca.jacobian(ca.jtimes(first, x, u), x)
+        h = system.surface_function(mode.index("s")) if "s" in mode else ca.SX(0.0)
+        hessian, gradient = ca.hessian(h, x)
+        outputs = [ca.jacobian(f, x), ca.jacobian(first, x), third, gradient, hessian]
+        dense = [ca.densify(e) for e in outputs]
+        return Evaluator(ca.Function("forms", [ca.vertcat(x, u), p], dense, {"cse": True}))
+
+    return system.cached(("field expansion", mode), build)
+
+
+def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int) -> Evaluator:
+    """x, p -> the field of a mode, the field across one of its surfaces, and the gradient of L_F
+    h of the first along that surface's function."""
+
+    def build() -> list[ca.SX]:
+        turned = mode[:surface] + ("-" if side > 0 else "+") + mode[surface + 1 :]
+        own = mode_field(system, mode)
+        rate = ca.mtimes(system.gradient(system.surface_function(surface)), own)
+        return [own, mode_field(system, turned), system.gradient(rate)]
+
+    return evaluator(system, ("contact", mode, surface, side), build)
+
+
+def guard_rate_gradient(system: FilippovSystem, mode: str, name: str) -> Evaluator:
+    """x, p -> the gradient of the rate of a guard along the field of its mode."""
+    motion = guarded_field(system, mode).motion
+
+    def build() -> Evaluator:
+        k = next(k for k, g in enumerate(motion.guards) if g.name == name)
+        rate = ca.mtimes(ca.jacobian(motion.functions[k], motion.states), motion.field)
+        row = ca.densify(ca.jacobian(rate, motion.states))
+        inputs = [motion.states, system.parameter_symbols]
+        return Evaluator(ca.Function("rate", inputs, [row], {"cse": True}))
+
+    return system.cached(("rate of a guard", mode, name), build)

@@ -1,0 +1,65 @@
+"""Sections that a system does not have itself: a function of the states, looked at where it is zero."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import chain, count
+from typing import Any
+
+import casadi as ca
+
+from ..cache import Content
+from ..definition.parse_definition import read_function
+from ..definition.system import FilippovSystem
+from ..errors import DefinitionError
+
+#: Name of the section of a system that was given one.
+SECTION = "section"
+
+
+def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
+    """Return the system with a last reset, at a function's zeros, that changes nothing."""
+    d = system.definition
+    h = read_function(d, function, SECTION)
+    if not ca.depends_on(h, d.extended_states):
+        raise DefinitionError(f"section: expected a function of the states, received {h}.")
+    known = ca.vertcat(d.extended_states, d.parameters)
+    taken = {*d.impacts, *(n for n, _ in (*d.stops, *d.resets))}
+    numbered = (f"{SECTION} {k}" for k in count(2))
+    name = next(n for n in chain([SECTION], numbered) if n not in taken)
+
+    def build() -> FilippovSystem:
+        definition = replace(
+            d,
+            guards=ca.vertcat(d.guards, h) if d.guards.numel() else h,
+            maps=ca.horzcat(d.maps, d.states) if d.resets else d.states,
+            resets=(*d.resets, (name, direction)),
+        )
+        wider = FilippovSystem.__new__(FilippovSystem)
+        wider.__setstate__({**definition.state(), "lifted": system.lifted})
+        return wider
+
+    return system.cached((SECTION, Content([known], h), direction), build)
+
+
+def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
+    """Name of the surface where a function is zero, written alike, and its sign there."""
+    # A component of a set is none: it is zero elsewhere too.
+    for i in range(system.surface_count):
+        if i in system.set_of:
+            continue
+        for sign in (1, -1):
+            h, other = system.surface_function(i), sign * ca.SX(function)
+            if ca.is_equal(h, other, 20) or _vanishes(ca.simplify(h - other)):
+                return system.surface_names[i], sign
+    return None
+
+
+def _vanishes(expression: ca.SX) -> bool:
+    """Whether an expression is a sum in which everything cancels; only linear ones are seen through."""
+    symbols = ca.vertcat(*ca.symvar(expression))
+    if not ca.is_linear(expression, symbols):
+        return False
+    slope = ca.simplify(ca.jacobian(expression, symbols))
+    rest = ca.simplify(ca.substitute(expression, symbols, ca.SX.zeros(symbols.numel(), 1)))
+    return bool(slope.is_zero() or ca.densify(slope).is_zero()) and bool(rest.is_zero())

@@ -1,0 +1,1 @@
+"""Expression graphs: Taylor rules, jets, simplification and tests of identity and linearity."""

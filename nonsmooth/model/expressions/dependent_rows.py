@@ -1,0 +1,52 @@
+"""Which functions are combinations of others and of an affine function: they show nothing new.
+
+A polynomial that agrees with a field agrees with every such function too, so a step need not be
+checked with it (normal forces and Lie derivatives are combinations of the rows of the field).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import casadi as ca
+import numpy as np
+
+from .cancel import Forms, Monomial, Sum, normal_forms
+from .graph import NOT_SMOOTH, instructions
+
+#: Part of a function that may be left over by rounding.
+_LEFT = 1e-9
+
+
+def in_span(
+    functions: Sequence[ca.SX], rows: Sequence[ca.SX], variables: ca.SX, others: ca.SX
+) -> list[bool]:
+    """Whether each function is a combination of rows and of an affine function of the variables."""
+    # The coefficients may depend on ``others``, smoothly. False where it is not seen.
+    nodes, _ = instructions([variables, others], [ca.vertcat(*rows, *functions)])
+    if any(node.op in NOT_SMOOTH for node in nodes):
+        return [False for _ in functions]  # other values of ``others`` have other combinations
+    numbers = np.random.default_rng(1).uniform(0.3, 1.7, others.numel())
+    fixed = [ca.substitute(ca.SX(e), others, ca.DM(numbers)) for e in [*rows, *functions]]
+    forms, sums = normal_forms([variables, others], fixed)
+    bent = [_nonlinear(row[0], forms) for row in sums]
+    monomials = sorted({m for form in bent for m in form})
+    table = np.array([[form.get(m, 0.0) for m in monomials] for form in bent])
+    table = table.reshape(len(bent), len(monomials))
+    known = table[: len(rows)]
+    basis, result = known[np.isfinite(known).all(axis=1)].T, []
+    for function, target in zip(functions, table[len(rows) :], strict=True):
+        unseen = not target.any() and not ca.is_linear(function, variables)
+        if unseen or not np.isfinite(target).all():
+            result.append(False)
+            continue  # coefficients below the least number, or none for these ``others``
+        weights = np.linalg.lstsq(basis, target, rcond=None)[0] if basis.size else np.zeros(0)
+        left = target - basis @ weights if basis.size else target
+        result.append(bool(np.abs(left).max(initial=0.0) <= _LEFT * np.abs(target).max(initial=0)))
+    return result
+
+
+def _nonlinear(form: Sum, forms: Forms) -> dict[Monomial, float]:
+    """Leave out the constant and multiples of one variable."""
+    linear = lambda m: len(m) == 1 and m[0][1] == 1 and forms.atoms[m[0][0]].is_symbolic()
+    return {m: c for m, c in form.items() if m and not linear(m)}

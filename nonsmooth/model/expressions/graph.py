@@ -1,0 +1,169 @@
+"""CasADi expressions as value-numbered instruction lists, and the refusal of what is not smooth.
+
+Everything that walks an expression graph (Taylor recurrences, cancellation of common factors,
+the smoothness check) reads it through :func:`instructions`, so CasADi's numbering of operations
+is known here only.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+from typing import Protocol, TypeVar, cast
+
+import casadi as ca
+
+from ..errors import NotSmoothError
+
+#: CasADi's operation codes by number, e.g. ``OPERATIONS[4] == "mul"``.
+OPERATIONS: dict[int, str] = {
+    getattr(ca, name): name[3:].lower() for name in dir(ca) if name.startswith("OP_")
+}
+
+#: Operations without derivatives of every order, and the declaration that replaces each.
+NOT_SMOOTH: dict[str, str] = {
+    "sign": "sign",
+    "fabs": "fabs (absolute value; sqrt(e**2) becomes fabs(e) in CasADi)",
+    "fmin": "fmin",
+    "fmax": "fmax",
+    "if_else_zero": "if_else",
+    "lt": "a comparison (<)",
+    "le": "a comparison (<=)",
+    "eq": "a comparison (==)",
+    "ne": "a comparison (!=)",
+    "not": "logic_not",
+    "and": "logic_and",
+    "or": "logic_or",
+    "floor": "floor",
+    "ceil": "ceil",
+    "fmod": "fmod",
+    "remainder": "remainder",
+    "copysign": "copysign",
+}
+
+
+#: Smooth operations that are no longer so where one of their arguments is always zero.
+_BESIDE_ZERO: dict[str, str] = {
+    "atan2": "atan2 with an argument that is zero (a jump where the other one changes its sign)",
+    "hypot": "hypot with an argument that is zero (the absolute value of the other one)",
+}
+
+
+@dataclass(frozen=True)
+class Node:
+    """One operation: its name, its arguments (node numbers) and a payload."""
+
+    # The payload is the value of a ``const`` node and ``(input, position)`` of an ``input`` node.
+
+    op: str
+    args: tuple[int, ...]
+    payload: Hashable = None
+
+    @property
+    def place(self) -> tuple[int, int]:
+        """Input vector and position of an ``input`` node."""
+        return cast("tuple[int, int]", self.payload)
+
+
+def instructions(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
+) -> tuple[list[Node], list[list[int]]]:
+    """Value-number the graph of dense ``outputs`` over ``inputs``."""
+    function = ca.Function("graph", list(inputs), [ca.densify(ca.SX(o)) for o in outputs])
+    nodes: list[Node] = []
+    known: dict[Node, int] = {}
+    register: dict[int, int] = {}
+    rows: list[list[int]] = [[-1] * function.numel_out(k) for k in range(function.n_out())]
+
+    def number(node: Node) -> int:
+        if node not in known:
+            known[node] = len(nodes)
+            nodes.append(node)
+        return known[node]
+
+    for k in range(function.n_instructions()):
+        op = OPERATIONS[function.instruction_id(k)]
+        source, target = function.instruction_input(k), function.instruction_output(k)
+        if op == "const":
+            register[target[0]] = number(Node(op, (), float(function.instruction_constant(k))))
+        elif op == "input":
+            register[target[0]] = number(Node(op, (), (source[0], source[1])))
+        elif op == "output":
+            rows[target[0]][target[1]] = register[source[0]]
+        else:
+            register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
+    return nodes, rows
+
+
+V = TypeVar("V")
+
+
+class Algebra(Protocol[V]):
+    """What a graph can be evaluated in: expressions, numbers, enclosures, normal forms."""
+
+    def constant(self, value: float) -> V:
+        """Return a constant of the graph."""
+        ...
+
+    def symbol(self, vector: int, position: int) -> V:
+        """Return an entry of an input vector."""
+        ...
+
+    def apply(self, op: str, args: Sequence[V]) -> V:
+        """Return the value of an operation, named as in ``OPERATIONS``."""
+        ...
+
+
+def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
+    """Values of all nodes of a graph in an algebra."""
+    values: list[V] = []
+    for node in nodes:
+        if node.op == "const":
+            values.append(algebra.constant(cast("float", node.payload)))
+        elif node.op == "input":
+            values.append(algebra.symbol(*node.place))
+        else:
+            values.append(algebra.apply(node.op, [values[k] for k in node.args]))
+    return values
+
+
+def operation(op: str, args: Sequence[ca.SX]) -> ca.SX:
+    """Return the expression of an operation, named as in ``OPERATIONS``."""
+    code = getattr(ca, "OP_" + op.upper())
+    return ca.SX.unary(code, args[0]) if len(args) == 1 else ca.SX.binary(code, *args)
+
+
+def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
+    """Which nodes depend on an input vector marked true in ``variable``."""
+    result: list[bool] = []
+    for node in nodes:
+        if node.op == "input":
+            result.append(variable[node.place[0]])
+        else:
+            result.append(any(result[a] for a in node.args))
+    return result
+
+
+def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str) -> None:
+    """Raise NotSmoothError if ``expression`` is not smooth in ``variables``."""
+    # A non-smooth operation on ``others`` alone (parameters) is harmless: it is a constant.
+    nodes, _ = instructions([variables, others], [expression])
+    moving = depends_on(nodes, [True, False])
+    for node, moves in zip(nodes, moving, strict=True):
+        if not moves:
+            continue
+        if found := NOT_SMOOTH.get(node.op) or _beside_zero(node, nodes):
+            raise NotSmoothError(
+                f"{what}: expected an expression with derivatives of every order, received one "
+                f"with {found} of the states. Declare the switch as a surface: "
+                "give the smooth pieces as above= and below= with surface= the argument whose "
+                "sign decides, or write sign(h) as a multiplier lam with surfaces=[h], "
+                "multipliers=[lam] (fabs(h) is lam*h, fmax(a, b) is (a + b + lam*(a - b))/2 with "
+                "h = a - b)."
+            )
+
+
+def _beside_zero(node: Node, nodes: Sequence[Node]) -> str | None:
+    """Name an operation of something and zero that is not smooth."""
+    zero = any(nodes[a].op == "const" and nodes[a].payload == 0.0 for a in node.args)
+    return _BESIDE_ZERO.get(node.op) if zero else None

@@ -1,0 +1,102 @@
+"""Where the first coefficients of a system's series tell all others, so that no step needs to be checked.
+
+That is where it is affine in its states with sines of the time added: those are states of a larger system,
+u' = omega v and v' = -omega u, that is affine. Two coefficients in a row of a sine are not both small, so
+that no part of it hides from the step size. A product of sines, or a sine of a state, is no such part:
+cos(t)^40 rests for a while and comes back.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import IntEnum
+
+import casadi as ca
+
+from .graph import evaluate, instructions
+
+_NO_TIME = ca.SX(0, 1)
+
+
+@dataclass(frozen=True)
+class Linearity:
+    """What of a system is affine."""
+
+    everywhere: bool
+    free: bool
+    bent_rows: list[bool]
+    bent_free_rows: list[bool]
+    bent_guards: list[bool]
+
+
+def linearity(
+    field: ca.SX,
+    layer: ca.SX,
+    guards: ca.SX,
+    factors: ca.SX,
+    x: ca.SX,
+    unknowns: ca.SX,
+    smooth: bool = True,
+    time: ca.SX = _NO_TIME,
+) -> Linearity:
+    """Return what is affine."""
+    every = ca.vertcat(x, unknowns)
+    bent_rows, bent_guards = bent(field, every, time), bent(guards, x, time)
+    bent_free_rows = bent(field, x, time)
+    others = bent(ca.vertcat(layer, guards, factors), every, time)
+    return Linearity(
+        everywhere=smooth and not any(bent_rows + others),
+        free=smooth and not any(bent_free_rows + bent_guards),
+        bent_rows=bent_rows if smooth else [True] * field.numel(),
+        bent_free_rows=bent_free_rows if smooth else [True] * field.numel(),
+        bent_guards=bent_guards,
+    )
+
+
+class _Kind(IntEnum):
+    """What an expression is; sums are the larger of their terms."""
+
+    CONSTANT = 0
+    LINE = 1  # affine in the time
+    WAVE = 2  # and with sines of such
+    AFFINE = 3  # and affine in the states
+    BENT = 4
+
+
+class _Kinds:
+    """The algebra of kinds."""
+
+    def __init__(self, time: int | None):
+        self._time = time
+
+    def constant(self, value: float) -> _Kind:
+        return _Kind.CONSTANT
+
+    def symbol(self, vector: int, position: int) -> _Kind:
+        if vector:
+            return _Kind.CONSTANT
+        return _Kind.LINE if position == self._time else _Kind.AFFINE
+
+    def apply(self, op: str, args: Sequence[_Kind]) -> _Kind:
+        most = max(args)
+        if most is _Kind.CONSTANT or op in ("assign", "neg", "twice", "add", "sub"):
+            return most
+        if op == "mul" and min(args) is _Kind.CONSTANT:
+            return most
+        if op == "div" and args[1] is _Kind.CONSTANT:
+            return most
+        return _Kind.WAVE if op in ("sin", "cos") and most is _Kind.LINE else _Kind.BENT
+
+
+def bent(expressions: ca.SX, x: ca.SX, time: ca.SX = _NO_TIME) -> list[bool]:
+    """Which expressions are not affine in states, with sines of the time added."""
+    found = [not ca.is_linear(e, x) for e in ca.vertsplit(ca.vec(ca.densify(expressions)))]
+    if not time.numel() or not any(found):
+        return found
+    places = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
+    place = places.get(time.element_hash())
+    others = [s for s in ca.symvar(expressions) if s.element_hash() not in places]
+    nodes, rows = instructions([x, ca.vertcat(*others)], [expressions])
+    kinds = evaluate(nodes, _Kinds(place))
+    return [kinds[j] is _Kind.BENT for j in rows[0]]

@@ -1,0 +1,288 @@
+"""Rewrite expressions so that their jets need fewer products of functions of the state.
+
+In a jet a product of two such functions is a convolution at every order, while a sum or a product
+with a constant is one operation. So constant coefficients are collected, terms that several sums
+have in common are added once, and what products in a sum have in common is taken out:
+a b + a c = a (b + c) is one convolution instead of two. What is used several times stays shared,
+and no product is multiplied out.
+"""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import casadi as ca
+
+from .graph import Node, depends_on, instructions, operation
+
+Product = tuple[int, ...]  # factors, sorted; () is the constant term
+Sum = dict[Product, ca.SX]  # coefficients that do not depend on the variables
+
+_LEAST = 1e-100  # coefficients smaller than this, or larger than its inverse, stay where they are
+
+_DEPTH = 12  # coefficients count as equal when their expressions are, to this depth
+
+
+def economise(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], variable: Sequence[bool]
+) -> list[ca.SX]:
+    """Rewrite ``outputs`` with fewer products of functions of the variables."""
+    reader = _Reader(inputs, outputs, variable)
+    writer = _Writer(reader, [reader.sum(j) for row in reader.rows for j in row])
+    entries = iter(writer.expressions())
+    results = []
+    for output, row in zip(outputs, reader.rows, strict=True):
+        result = ca.SX.zeros(*output.shape)
+        for k in range(len(row)):
+            result[k] = next(entries)
+        results.append(result)
+    return results
+
+
+@dataclass(frozen=True)
+class _Factor:
+    """An operation on sums; a single sum where ``node`` is None."""
+
+    node: Node | None
+    sums: tuple[Sum, ...] = ()
+
+
+class _Reader:
+    """Every node of a graph as a sum of products of factors."""
+
+    def __init__(self, inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], variable: Sequence[bool]):
+        self._inputs = inputs
+        self._nodes, self.rows = instructions(inputs, outputs)
+        self._moving = depends_on(self._nodes, variable)
+        self._users = Counter(a for node in self._nodes for a in node.args)
+        self._users.update(j for row in self.rows for j in row)
+        self.factors: list[_Factor] = []
+        self.whole: dict[Product, Product] = {}  # products that are also factors
+        self._several: set[Product] = set()  # products with several users
+        self._sums: list[Sum] = []
+        for j, node in enumerate(self._nodes):
+            if self._moving[j]:
+                terms = self._terms(node)
+                if self._users[j] > 1 and len(terms) > 1:
+                    terms = {self._new(_Factor(None, (terms,))): ca.SX(1)}
+                elif self._users[j] > 1:
+                    self._several.update(terms)
+            else:
+                terms = {(): self.apply(node, [self._constant(a) for a in node.args])}
+            self._sums.append(terms)
+
+    def sum(self, j: int) -> Sum:
+        """Return node j."""
+        return self._sums[j]
+
+    def apply(self, node: Node, args: Sequence[ca.SX]) -> ca.SX:
+        """Return the expression of an operation."""
+        if node.op == "const":
+            return ca.SX(node.payload)
+        if node.op == "input":
+            vector, position = node.place
+            return self._inputs[vector][position]
+        return operation(node.op, args)
+
+    def _constant(self, j: int) -> ca.SX:
+        return self._sums[j][()]
+
+    def _new(self, factor: _Factor) -> Product:
+        self.factors.append(factor)
+        return (len(self.factors) - 1,)
+
+    def _terms(self, node: Node) -> Sum:
+        args = node.args
+        if node.op == "assign":
+            return self._sums[args[0]]
+        if node.op in ("add", "sub"):
+            return _add(self._sums[args[0]], self._sums[args[1]], node.op == "sub")
+        if node.op in ("neg", "twice"):
+            return self._scaled(args[0], ca.SX(-1.0 if node.op == "neg" else 2.0))
+        if node.op == "mul" and not all(self._moving[a] for a in args):
+            moving, constant = args if self._moving[args[0]] else args[::-1]
+            return self._scaled(moving, self._constant(constant))
+        if node.op in ("mul", "sq"):
+            return self._product(args[0], args[-1])
+        if node.op == "div" and not self._moving[args[1]]:
+            return self._scaled(args[0], 1.0 / self._constant(args[1]))
+        return {self._new(_Factor(node, tuple(self._sums[a] for a in args))): ca.SX(1)}
+
+    def _scaled(self, j: int, factor: ca.SX) -> Sum:
+        """One scaling of a sum instead of one for each of its terms."""
+        coefficient, product = self._single(j)
+        new = coefficient * factor
+        if _is_extreme(new) and not factor.is_zero():
+            return {self._inside(j): factor}
+        return {} if new.is_zero() else {product: new}
+
+    def _product(self, a: int, b: int) -> Sum:
+        total, factors = ca.SX(1), Product()
+        (c, product), (d, _) = self._single(a), self._single(b)
+        # The powers of a coefficient overflow or underflow before those of what it belongs to.
+        if _is_extreme(c * d) or (a == b and len(product) > 1 and not c.is_one()):
+            return {tuple(sorted(self._inside(a) + self._inside(b))): ca.SX(1)}
+        for coefficient, product in (self._single(a), self._single(b)):
+            # A square costs half as much as a product.
+            whole = len(product) > 1 and (a == b or product in self._several)
+            factors += self._as_factor(product) if whole else product
+            total = total * coefficient
+        return {} if total.is_zero() else {tuple(sorted(factors)): total}
+
+    def _single(self, j: int) -> tuple[ca.SX, Product]:
+        """Node j as one coefficient times one product; a sum becomes a factor."""
+        terms = self._sums[j]
+        if len(terms) != 1 or () in terms:
+            terms = {self._new(_Factor(None, (terms,))): ca.SX(1)}
+            self._sums[j] = terms
+        ((product, coefficient),) = terms.items()
+        return coefficient, product
+
+    def _inside(self, j: int) -> Product:
+        """Node j as one factor, its coefficient included."""
+        terms = self._sums[j]
+        if terms.keys() and next(iter(terms.values())).is_one() and len(next(iter(terms))) == 1:
+            return next(iter(terms))
+        self._sums[j] = {self._new(_Factor(None, (terms,))): ca.SX(1)}
+        return next(iter(self._sums[j]))
+
+    def _as_factor(self, product: Product) -> Product:
+        if product not in self.whole:
+            self.whole[product] = self._new(_Factor(None, ({product: ca.SX(1)},)))
+        return self.whole[product]
+
+
+def _is_extreme(coefficient: ca.SX) -> bool:
+    """Whether a number is so large or small that products with it leave the range of doubles."""
+    if not coefficient.is_constant():
+        return False
+    return not _LEAST < abs(float(coefficient)) < 1.0 / _LEAST
+
+
+def _add(a: Sum, b: Sum, subtract: bool) -> Sum:
+    result = dict(a)
+    for product, coefficient in b.items():
+        old = result.pop(product, None)
+        if old is not None:
+            new = old - coefficient if subtract else old + coefficient
+        else:
+            new = -coefficient if subtract else coefficient
+        if not new.is_zero():
+            result[product] = new
+    return result
+
+
+def _power(u: ca.SX, n: int) -> ca.SX:
+    half = _power(u * u, n // 2) if n > 1 else ca.SX(1)
+    return u * half if n % 2 else half
+
+
+class _Writer:
+    """Expressions of sums, after their common parts were found."""
+
+    def __init__(self, reader: _Reader, roots: Sequence[Sum]):
+        self._reader = reader
+        self._factors = list(reader.factors)
+        self._expressions: dict[int, ca.SX] = {}
+        self._sums = [*roots, *(s for factor in reader.factors for s in factor.sums)]
+        self._group()
+        self._count = Counter(product for s in self._sums for product in s)
+        self._count.update(list(reader.whole))
+        self._roots = [self._take_out(terms) for terms in roots]
+        for j, factor in enumerate(self._factors):  # which grows
+            sums = tuple(self._take_out(terms) for terms in factor.sums)
+            self._factors[j] = _Factor(factor.node, sums)
+
+    def _group(self) -> None:
+        """Add terms once that are found together, up to a sign, in the same several sums."""
+        places: dict[Product, list[int]] = {}
+        for k, terms in enumerate(self._sums):
+            for product in terms:
+                places.setdefault(product, []).append(k)
+        together: dict[tuple[tuple[int, ...], tuple[int, ...]], list[Product]] = {}
+        for product, found in places.items():
+            if len(found) > 1 and 0 not in (signs := self._signs(product, found)):
+                together.setdefault((tuple(found), signs), []).append(product)
+        for (where, signs), products in together.items():
+            if len(products) > 1:
+                self._replace(products, where, signs)
+
+    def _signs(self, product: Product, where: Sequence[int]) -> tuple[int, ...]:
+        """Signs of a term's coefficients beside the first; 0 for one of another size."""
+        plus = self._sums[where[0]][product]
+        minus = -plus
+        return tuple(
+            int(ca.is_equal(plus, c, _DEPTH)) - int(ca.is_equal(minus, c, _DEPTH))
+            for c in (self._sums[k][product] for k in where)
+        )
+
+    def _replace(
+        self, products: Sequence[Product], where: Sequence[int], signs: Sequence[int]
+    ) -> None:
+        common = {p: self._sums[where[0]][p] for p in products}
+        self._factors.append(_Factor(None, (common,)))
+        for k, sign in zip(where, signs, strict=True):
+            for p in products:
+                del self._sums[k][p]
+            self._sums[k][(len(self._factors) - 1,)] = ca.SX(sign)
+        self._sums.append(common)
+
+    def expressions(self) -> list[ca.SX]:
+        """Return the expressions of the roots."""
+        for j in range(len(self._factors)):
+            self._express(j)
+        return [self._write(terms) for terms in self._roots]
+
+    def _express(self, first: int) -> None:
+        """Write a factor and those it needs; a stack, because graphs can be deep."""
+        stack = [first]
+        while stack:
+            if stack[-1] in self._expressions:
+                stack.pop()
+                continue
+            factor = self._factors[stack[-1]]
+            needed = {f for terms in factor.sums for product in terms for f in product}
+            missing = needed.difference(self._expressions)
+            if missing:
+                stack += missing
+                continue
+            j, args = stack.pop(), [self._write(terms) for terms in factor.sums]
+            node = factor.node
+            self._expressions[j] = args[0] if node is None else self._reader.apply(node, args)
+
+    def _write(self, terms: Sum) -> ca.SX:
+        total = ca.SX(0)
+        for product, coefficient in terms.items():
+            if coefficient.is_minus_one():
+                total = total - self._multiply(product)
+            else:
+                total = total + coefficient * self._multiply(product)
+        return total
+
+    def _multiply(self, product: Product) -> ca.SX:
+        result = ca.SX(1)
+        for factor, n in Counter(product).items():
+            result = result * _power(self._expressions[factor], n)
+        return result
+
+    def _take_out(self, terms: Sum) -> Sum:
+        """Take factors that several products have in common out of them, the commonest first."""
+        # Products that are needed elsewhere too stay what they are.
+        terms = dict(terms)
+        free = {p for p in terms if len(p) > 1 and self._count[p] < 2}
+        while True:
+            count = Counter(f for product in free for f in set(product))
+            common, times = max(count.items(), key=lambda item: item[1], default=(-1, 0))
+            if times < 2:
+                return terms
+            rest: Sum = {}
+            for product in [p for p in terms if p in free and common in p]:
+                k = product.index(common)
+                rest[product[:k] + product[k + 1 :]] = terms.pop(product)
+                free.remove(product)
+            self._factors.append(_Factor(None, (rest,)))
+            product = tuple(sorted((common, len(self._factors) - 1)))
+            terms[product] = ca.SX(1)
+            free.add(product)

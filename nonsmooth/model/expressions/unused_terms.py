@@ -1,0 +1,117 @@
+"""Terms that a mode multiplies by an exact zero are not looked at: their functions may have no value there.
+
+One program serves all modes, with the multipliers as numbers: a field log(1 - x) of one side stands in it as
+(1 - lambda)/2 log(1 - x), and 0 times what has no value would be none. So a product that vanishes at a
+value at which some mode holds a multiplier, and whose other factor may have no value, is made zero where
+the first factor is.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+
+import casadi as ca
+
+from .graph import evaluate, instructions, operation
+
+#: Operations that have a finite value wherever their arguments have one of moderate size.
+_SAFE = frozenset(
+    "assign neg twice sq add sub mul sin cos atan tanh asinh erf sign fabs fmin fmax copysign lt le eq ne not "
+    "and or".split()
+)
+
+_VALUES: dict[str, Callable[..., float]] = {
+    "assign": lambda a: a,
+    "neg": lambda a: -a,
+    "twice": lambda a: a + a,
+    "sq": lambda a: a * a,
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+}
+
+Side = tuple[int, float]  # place of a multiplier and its value
+
+
+@dataclass(frozen=True)
+class _Term:
+    """An expression, whether it may have no value, and its values where a multiplier is held."""
+
+    e: ca.SX
+    partial: bool = False
+    always: float | None = None
+    at: dict[Side, float] = field(default_factory=dict)
+
+    def value(self, side: Side) -> float | None:
+        return self.at.get(side, self.always)
+
+
+def awake(
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], held: Mapping[int, Sequence[float]]
+) -> list[ca.SX]:
+    """Return expressions in which terms that a mode leaves out are zero whatever their functions
+    are."""
+    if not held:
+        return list(outputs)
+    nodes, rows = instructions(inputs, outputs)
+    if all(node.op in _SAFE or node.op in ("const", "input") for node in nodes):
+        return list(outputs)
+    algebra = _Sides(inputs, held)
+    terms = evaluate(nodes, algebra)
+    if not algebra.found:
+        return list(outputs)
+    results = []
+    for output, row in zip(outputs, rows, strict=True):
+        result = ca.SX.zeros(*output.shape)
+        for k, j in enumerate(row):
+            result[k] = terms[j].e
+        results.append(result)
+    return results
+
+
+class _Sides:
+    """Expressions with what they are where a multiplier is held."""
+
+    def __init__(self, inputs: Sequence[ca.SX], held: Mapping[int, Sequence[float]]):
+        self._inputs, self._held = inputs, held
+        self.found = False
+
+    def constant(self, value: float) -> _Term:
+        return _Term(ca.SX(value), always=value)
+
+    def symbol(self, vector: int, position: int) -> _Term:
+        e = self._inputs[vector][position]
+        values = () if vector else self._held.get(position, ())
+        return _Term(e, at={(position, value): value for value in values})
+
+    def apply(self, op: str, args: Sequence[_Term]) -> _Term:
+        e = operation(op, [a.e for a in args])
+        safe = op in _SAFE or (op == "div" and bool(args[1].always))
+        partial = not safe or any(a.partial for a in args)
+        at = self._values(op, args)
+        if partial and op in ("mul", "div"):
+            e = self._guarded(op, e, args)
+        return _Term(e, partial, at=at)
+
+    def _values(self, op: str, args: Sequence[_Term]) -> dict[Side, float]:
+        found: dict[Side, float] = {}
+        for side in {side: None for a in args for side in a.at}:
+            values = [a.value(side) for a in args]
+            if (op == "mul" and 0.0 in values) or (op == "div" and values[0] == 0.0):
+                found[side] = 0.0
+            elif op == "div" and None not in values and values[1]:
+                found[side] = values[0] / values[1]  # type: ignore[operator]
+            elif op in _VALUES and None not in values:
+                found[side] = _VALUES[op](*values)
+        return found
+
+    def _guarded(self, op: str, e: ca.SX, args: Sequence[_Term]) -> ca.SX:
+        """A product or quotient that is zero where one of its factors is and the other may have no value."""
+        pairs = [(args[0], args[1]), (args[1], args[0])]
+        for weight, other in pairs[: 2 if op == "mul" else 1]:
+            unsafe = other.partial or (op == "div" and not other.always)
+            if unsafe and 0.0 in weight.at.values():
+                self.found = True
+                e = operation("if_else_zero", [weight.e, e])
+        return e

@@ -1,0 +1,158 @@
+"""The smooth motion of one mode: its field, its guards, and their jets as fast functions.
+
+A guard is a function that is positive inside the mode; the mode ends where it falls through zero:
+
+- ``surface``: s_i h_i for a surface that does not slide (s_i = +1 or -1);
+- ``exit``: what its kind of sliding says (``switches``).
+
+Stops and resets follow the guards as they were given; their direction is the driver's business.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Hashable, Sequence
+from functools import cached_property
+
+import casadi as ca
+
+from ..cache import Content
+from ..definition.parse_definition import read_function
+from ..definition.system import FilippovSystem, require_system
+from ..errors import DefinitionError
+from ..expressions.jets import taylor
+from ..expressions.linearity import bent
+from .switches import Guard, Guarded, Implicit, Sliding, guards_of, sliding
+
+
+class Motion:
+    """Field, guards and jets of one mode of a system; made by ``motion`` and ``followed``."""
+
+    def __init__(
+        self,
+        system: FilippovSystem,
+        mode: str,
+        law: Sliding,
+        guarded: Guarded,
+        key: Hashable = (),
+    ):
+        self.system, self.mode, self.law, self._key = system, mode, law, key
+        self.states, self.field = law.states, law.field
+        self.guards = tuple(guard for guard, _ in guarded)
+        functions = [function for _, function in guarded]
+        self.functions = ca.densify(ca.vertcat(*functions)) if functions else ca.SX(0, 1)
+
+    @property
+    def implicit(self) -> Implicit | None:
+        """The kind of sliding where multipliers are further states, None elsewhere."""
+        return self.law if isinstance(self.law, Implicit) else None
+
+    @property
+    def regular(self) -> bool:
+        """Whether the sliding field has no 0/0 where both fields are tangent to the surface."""
+        return self.law.regular
+
+    @cached_property
+    def affine(self) -> bool:
+        """Whether field and guards are affine in the states, with sines of the time added, so that
+        the first coefficients of their series tell all the others."""
+        both = ca.vertcat(self.field, self.functions)
+        return not any(bent(both, self.states, self.system.definition.time))
+
+    def value_function(self) -> ca.Function:
+        """Return (x, p) -> the field (N, 1) and the guard functions (m, 1)."""
+        values = [self.field, self.functions]
+        return self.system.function(("values", self.mode, self._key), lambda: values, self.states)
+
+    def jet_function(self, order: int) -> ca.Function:
+        """Return (x, p) -> jets of states (N, order+1) and of guard functions (m, order+1)."""
+        p = self.system.parameter_symbols
+
+        def build() -> Sequence[ca.SX]:
+            return taylor(self.field, self.functions, self.states, p, order)
+
+        return self.system.function(("jet", self.mode, order, self._key), build, self.states)
+
+    def gradient_function(self) -> ca.Function:
+        """Return (x, p) -> gradients of the guard functions (m, N), the yardstick of rounding."""
+
+        def build() -> Sequence[ca.SX]:
+            return [ca.jacobian(self.functions, self.states)]
+
+        return self.system.function(("gradient", self.mode, self._key), build, self.states)
+
+
+def motion(system: FilippovSystem, mode: str) -> Motion:
+    """Return the motion of a mode, built once per system."""
+
+    def build() -> Motion:
+        law = sliding(system, mode)
+        return Motion(system, mode, law, guards_of(system, mode, law))
+
+    return system.cached(("motion", mode), build)
+
+
+def watched_functions(system: FilippovSystem, watched: Sequence[ca.SX]) -> list[ca.SX]:
+    """Check functions that a user wants to watch."""
+    return [
+        read_function(system.definition, w, f"watched function {k}") for k, w in enumerate(watched)
+    ]
+
+
+def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -> Motion:
+    """Return a mode whose functions are only watched."""
+    expressions = watched_functions(system, watched)
+    symbols = [system.extended_states, system.parameter_symbols]
+    key = Content(symbols, ca.vertcat(*expressions)) if expressions else ()
+
+    def build() -> Motion:
+        of_mode = motion(system, mode)
+        functions = [of_mode.functions[k] for k in range(len(of_mode.guards))]
+        names = [guard.name for guard in of_mode.guards] + [f"f{k}" for k in range(len(watched))]
+        guarded = [
+            (Guard("zero", k, 0, name), function)
+            for k, (name, function) in enumerate(
+                zip(names, [*functions, *expressions], strict=True)
+            )
+        ]
+        return Motion(system, mode, of_mode.law, guarded, ("followed", key) if expressions else ())
+
+    return system.cached(("followed", mode, key), build)
+
+
+def mode_field(system: FilippovSystem, mode: str) -> ca.SX:
+    """Right-hand side of any mode, sliding included, time row included (SX, extended dimension).
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    mode : str
+        One letter for each surface; at most one ``s``, of a surface whose multiplier is linear.
+
+    Returns
+    -------
+    SX
+        While sliding Filippov's field, with the factor cancelled that makes it 0/0 where both
+        fields coincide.
+
+    Raises
+    ------
+    DefinitionError
+        A mode whose multipliers are only known implicitly.
+
+    Examples
+    --------
+    >>> import casadi as ca
+    >>> import nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> system = ns.FilippovSystem([x, y], surface=y, above=[1, -1], below=[3, 1])
+    >>> ns.local.mode_field(system, "s")
+    SX([2, 0])
+    """
+    require_system(system)
+    found = motion(system, mode)
+    if found.states.numel() != system.extended_dimension:
+        raise DefinitionError(
+            f"mode {mode!r} has no explicit field: on several surfaces, or with a nonlinear multiplier, "
+            "there is only an equation. Use sliding_branches."
+        )
+    return found.field

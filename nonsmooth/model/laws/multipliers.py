@@ -1,0 +1,85 @@
+"""The multipliers that keep the sliding surfaces of a mode, at one point."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..values import Array
+from .coupled import Coupled
+
+
+def sliding_multipliers(
+    of: Coupled,
+    mode: str,
+    x: Array,
+    p: Array,
+    stable_only: bool = True,
+    kept: Array | None = None,
+) -> list[Array]:
+    """Multipliers (surfaces,) that keep the sliding surfaces of a mode."""
+    # Linear equations have one set; for others Newton's method starts from a grid (bilinear
+    # equations of two multipliers have at most two sets).
+    sliding = of.sliding(mode)
+    unknowns = np.zeros(of.count) if kept is None else kept.copy()
+    if not sliding:
+        return [unknowns]
+    k = len(sliding)
+    starts = [np.zeros(k)]
+    if not of.affine:
+        grid = np.linspace(-0.95, 0.95, 21 if k == 1 else 5 if k < 4 else 1)
+        starts = list(np.stack(np.meshgrid(*[grid] * k), axis=-1).reshape(-1, k))
+    found: list[Array] = []
+    for start in starts:
+        unknowns[sliding] = start
+        lam = newton_multipliers(of, mode, x, unknowns, p, 1 if of.affine else 30)
+        if lam is None or not _is_solution(of, mode, x, lam, p, stable_only):
+            continue
+        if all(np.abs(lam - other).max() > 1e-7 for other in found):
+            found.append(lam)
+    return found
+
+
+def _is_solution(
+    of: Coupled, mode: str, x: Array, unknowns: Array, p: Array, stable_only: bool
+) -> bool:
+    sliding = of.sliding(mode)
+    held = of.known_multipliers(mode, x, unknowns, p)
+    marks = of.yardsticks(x, held, of.acting(mode, unknowns), p)
+    slope = marks.slope[np.ix_(sliding, sliding)]
+    g = marks.layer[sliding]
+    small = np.abs(g).max() <= 1e-10 * (1.0 + np.abs(slope).max())
+    largest = np.abs(marks.factors[sliding]) * (1.0 + 1e-9)
+    if not of.affine and not (small and np.all(np.abs(unknowns[sliding]) <= largest)):
+        return False
+    if not np.all(np.isfinite(slope)):
+        return False
+    return not stable_only or is_stable(of, sliding, slope, marks.factors)
+
+
+def is_stable(of: Coupled, sliding: Sequence[int], slope: Array, factors: Array) -> bool:
+    """Whether sliding is stable across the layer, from the slope dG/d(unknowns) of what slides."""
+    own = [k for k, i in enumerate(sliding) if i < of.system.surface_count]
+    stable = slope[np.ix_(own, own)] * np.sign(factors)[np.array(sliding, int)[own]]
+    return not own or bool(np.linalg.eigvals(stable).real.max() < 0.0)
+
+
+def newton_multipliers(
+    of: Coupled, mode: str, x: Array, unknowns: Array, p: Array, iterations: int
+) -> Array | None:
+    """Newton's method for the multipliers of a mode, from those given."""
+    held, sliding = of.known_multipliers(mode, x, unknowns, p), of.sliding(mode)
+    result = unknowns.copy()
+    for _ in range(iterations):
+        marks = of.yardsticks(x, held, of.acting(mode, result), p)
+        try:
+            step = np.linalg.solve(marks.slope[np.ix_(sliding, sliding)], marks.layer[sliding])
+        except np.linalg.LinAlgError:
+            return None
+        result[sliding] -= step
+        if not np.all(np.isfinite(step)):
+            return None
+        if np.abs(step).max(initial=0.0) <= 1e-16 * (1.0 + np.abs(result).max()):
+            break
+    return result

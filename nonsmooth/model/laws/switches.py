@@ -1,0 +1,213 @@
+"""How a mode moves on its surfaces: the kinds of sliding, each with its field, exits and letters.
+
+``Free`` has no sliding surface. ``Affine`` slides on one surface whose multiplier enters linearly:
+the multiplier is eliminated symbolically. ``Implicit`` slides on several surfaces, or on one whose
+multiplier enters nonlinearly: the multipliers are further states.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+import casadi as ca
+
+from ..definition.system import FilippovSystem, require_system
+from ..expressions.cancel import cancel_common_factor, normal_forms
+from ..expressions.identity import vanish_on
+
+
+@dataclass(frozen=True)
+class Guard:
+    """What the zero of one event function means.
+
+    Attributes
+    ----------
+    kind : {"surface", "exit", "stop", "reset", "branch", "zero"}
+    index : int
+        Of the surface, stop or reset.
+    side : int
+        For an exit the side, +1 or -1, to which the motion leaves; for a surface the side on which
+        the motion is; for stops and resets the direction.
+    name : str
+    """
+
+    kind: str
+    index: int
+    side: int
+    name: str
+
+
+Guarded = list[tuple[Guard, ca.SX]]
+
+
+class Sliding(Protocol):
+    """What a kind of sliding gives to the motion of a mode."""
+
+    @property
+    def surfaces(self) -> tuple[int, ...]: ...
+    @property
+    def states(self) -> ca.SX: ...
+    @property
+    def field(self) -> ca.SX: ...
+    @property
+    def regular(self) -> bool: ...
+
+    def exits(self, surface: int) -> Guarded:
+        """Functions that are positive while a surface slides."""
+        ...
+
+    def stability(self) -> Guarded:
+        """Functions that are positive while the sliding is stable across its layer."""
+        ...
+
+
+def sliding(system: FilippovSystem, mode: str) -> Sliding:
+    """Return the kind of sliding that a mode has."""
+    require_system(system)
+    surfaces = [i for i, s in enumerate(system.parse_mode(mode)) if s == 0]
+    if not surfaces:
+        return Free(system, mode)
+    if len(surfaces) == 1 and not system.nonlinear[surfaces[0]]:
+        return Affine(system, mode, surfaces[0])
+    return Implicit(system, mode)
+
+
+class Free:
+    """No surface slides."""
+
+    surfaces: tuple[int, ...] = ()
+    regular = False
+
+    def __init__(self, system: FilippovSystem, mode: str):
+        self.states = system.extended_states
+        self.field = system.field(mode)
+
+    def exits(self, surface: int) -> Guarded:
+        """Return none."""
+        return []
+
+    def stability(self) -> Guarded:
+        """Return none."""
+        return []
+
+
+class Affine:
+    """One surface slides and its multiplier enters linearly."""
+
+    def __init__(self, system: FilippovSystem, mode: str, surface: int):
+        self.system, self.mode, self.surfaces = system, mode, (surface,)
+        self.states = system.extended_states
+        multipliers, lam = ca.SX([float(s) for s in system.parse_mode(mode)]), ca.SX.sym("lambda")
+        multipliers[surface] = lam
+        field = system.field_with(multipliers)
+        middle = ca.substitute(field, lam, 0)
+        entries = ca.vertsplit(ca.densify(ca.jacobian(field, lam)))
+        self.regular = self._continuous(entries)
+        if self.regular:
+            self.field = middle
+            return
+        gradient = ca.jacobian(system.surface_function(surface), self.states)
+        a = ca.simplify(ca.mtimes(gradient, middle))
+        # A factor of G is one of b = grad h . G too, and there it may no longer be in sight.
+        reduced, factor = cancel_common_factor(entries, self.states, system.parameter_symbols)
+        b = ca.simplify(ca.mtimes(gradient, ca.vertcat(*reduced)))
+        self.regular = bool(ca.depends_on(factor, self.states)) and not b.is_zero()
+        self.field = middle - (a / b) * ca.vertcat(*reduced)
+
+    def exits(self, surface: int) -> Guarded:
+        """Return -L_F+ h and L_F- h, which vanish where sliding stops being attracting."""
+        sides = {
+            1: _with_letter(self.mode, surface, "+"),
+            -1: _with_letter(self.mode, surface, "-"),
+        }
+        return [
+            (
+                Guard("exit", surface, side, "L_F1 h" if side > 0 else "L_F2 h"),
+                -side * self.system.lie_derivative([sides[side]], surface),
+            )
+            for side in (1, -1)
+        ]
+
+    def stability(self) -> Guarded:
+        """Return none: attracting sliding is stable."""
+        return []
+
+    def _continuous(self, difference: list[ca.SX]) -> bool:
+        """Whether the two fields are one field on the surface."""
+        h, p = self.system.surface_function(self.surfaces[0]), self.system.parameter_symbols
+        forms = normal_forms([self.states, p], difference)[1]  # to rounding of the coefficients
+        pieces = [e for e, form in zip(difference, forms, strict=True) if form[0]]
+        if not pieces:
+            return True
+        reduced, _ = cancel_common_factor([*pieces, h], self.states, p)
+        return not ca.depends_on(reduced[-1], self.states) or vanish_on(pieces, h, self.states, p)
+
+
+def _with_letter(mode: str, surface: int, letter: str) -> str:
+    return mode[:surface] + letter + mode[surface + 1 :]
+
+
+class Implicit:
+    """Sliding whose multipliers solve grad h_i . f(x, lambda) = 0 implicitly."""
+
+    regular = True
+
+    def __init__(self, system: FilippovSystem, mode: str):
+        self.system, self.mode = system, mode
+        signs = system.parse_mode(mode)
+        self.surfaces = tuple(i for i, s in enumerate(signs) if s == 0)
+        self.multipliers = ca.vertcat(*[ca.SX.sym(f"lambda{i}") for i in self.surfaces])
+        values = ca.SX([float(s) for s in signs])
+        for k, i in enumerate(self.surfaces):
+            values[i] = self.multipliers[k]
+        field = system.field_with(values)
+        x = system.extended_states
+        h = ca.vertcat(*[system.surface_function(i) for i in self.surfaces])
+        self.layer = ca.densify(ca.mtimes(ca.jacobian(h, x), field))
+        self.slope = ca.densify(ca.jacobian(self.layer, self.multipliers))
+        self.states = ca.vertcat(x, self.multipliers)
+        self._plain = field
+
+    @property
+    def field(self) -> ca.SX:
+        """The states' rates, and those of the multipliers."""
+        drift = ca.mtimes(ca.jacobian(self.layer, self.system.extended_states), self._plain)
+        return ca.vertcat(self._plain, -ca.solve(self.slope, drift))
+
+    def exits(self, surface: int) -> Guarded:
+        """Return 1 - lambda and 1 + lambda."""
+        lam = self.multipliers[self.surfaces.index(surface)]
+        return [
+            (Guard("exit", surface, side, f"lambda{surface}"), 1 - side * lam) for side in (1, -1)
+        ]
+
+    def stability(self) -> Guarded:
+        """Return the signed determinant and the trace of the layer problem's slope."""
+        k = len(self.surfaces)
+        # At a simple fold of one multiplier the field is singular before its guard is zero.
+        functions = [(-1.0) ** k * ca.det(self.slope)]
+        if k > 1:
+            functions.append(-ca.trace(self.slope))
+        return [
+            (Guard("branch", self.surfaces[0], 0, "stability of sliding"), f) for f in functions
+        ]
+
+
+def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
+    """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
+    result: Guarded = []
+    for i, sign in enumerate(system.parse_mode(mode)):
+        if sign:
+            result.append((Guard("surface", i, sign, f"h{i}"), sign * system.surface_function(i)))
+        else:
+            result += law.exits(i)
+    functions = system.definition.guards
+    items: Sequence[tuple[str, int, str, int]] = [
+        *(("stop", j, *stop) for j, stop in enumerate(system.stops)),
+        *(("reset", j, *reset) for j, reset in enumerate(system.resets)),
+    ]
+    for row, (kind, j, name, direction) in enumerate(items):
+        result.append((Guard(kind, j, direction, name), functions[row]))
+    return [*result, *law.stability()]

@@ -1,0 +1,1 @@
+"""Branches of equilibria and periodic orbits, their bifurcations, and curves of bifurcations."""

@@ -1,0 +1,243 @@
+"""What is watched along a branch of periodic orbits: its itinerary, and smooth bifurcations.
+
+Some functions are positive while the itinerary holds; others vanish at smooth bifurcations.
+
+An itinerary ceases to hold where a leg's duration ends, where a guard is grazed inside a leg, where a
+guard fails at the start of the next leg or at the end of one, or where an event is no longer crossed
+(the table of sliding bifurcations: di Bernardo, Kowalczyk & Nordmark 2002; with resets Nordmark 1991).
+Each test is a smooth function along the branch, which goes on, virtual, beyond its zero.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, Evaluator, FilippovSystem, Guard
+from ...model.derivatives.variational import guarded_field, variational_field
+from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
+from ..periodic.multipliers import finite_return_map
+from ..runs.guards import LegGuards, watch
+from ..runs.legs import Leg, surface_of
+
+_SMOOTH = ("fold", "branch point", "period doubling", "pitchfork", "Neimark-Sacker", "Hopf")
+
+#: Entries of a return map beyond this say nothing of its multipliers.
+_NO_DIGITS = 1e10
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What a test of an itinerary is about.
+
+    Attributes
+    ----------
+    what : {"duration", "interior", "start", "end", "transversality"}
+    leg : int
+    guard : Guard or None
+        Of the leg's mode.
+    """
+
+    what: str
+    leg: int
+    guard: Guard | None = None
+
+    @cached_property
+    def name(self) -> str:
+        """A name that is the same along the branch."""
+        of = f" {self.guard.name} {self.guard.side}" if self.guard is not None else ""
+        return f"{self.what} {self.leg}{of}"
+
+
+def is_smooth(name: str) -> bool:
+    """Whether a test is that of a smooth bifurcation, which does not end an itinerary."""
+    return name in _SMOOTH
+
+
+def conditions_of(
+    problem: BoundaryProblem, at: Evaluation, p: Array, known: dict[str, Condition]
+) -> dict[str, float]:
+    """All tests of an orbit; what they are about is added to ``known``."""
+    system, legs = problem.system, problem.legs
+    tests: _Tests = system.cached(("tests of legs", legs), lambda: _Tests(system, legs))
+    found: dict[str, float] = {}
+    for condition, value in tests(at, p):
+        name = condition.name
+        known.setdefault(name, condition)
+        if np.isfinite(value):
+            found[name] = value
+    found.update((name, v) for name, v in smooth_tests(problem, at).items() if np.isfinite(v))
+    return found
+
+
+def condition_row(
+    problem: BoundaryProblem, u: Array, p: Array, free: tuple[int, ...], condition: Condition
+) -> tuple[float, Array] | None:
+    """Value of a condition on one leg, and its derivatives by the unknowns and free parameters."""
+    # Only the start of its leg and the parameters matter, by which differences are taken; they steer
+    # Newton's method, whose accuracy is that of the value. None for conditions on the end of a leg.
+    if condition.what not in ("interior", "start"):
+        return None
+    i, n = condition.leg, problem.dimension
+    starts, durations = problem.split(u)
+    duration, count = float(durations[i]), problem.size
+
+    def value(x: Array, q: Array) -> float:
+        if condition.what == "start":
+            leg, before = problem.legs[i], problem.legs[i - 1]
+            y = variational_field(problem.system, leg.mode).states_at(x, q)
+            first = guarded_field(problem.system, leg.mode).starts.copied(y, q)[1]
+            rows = _starting(problem.system, i, leg, before)
+            found = {test.name: float(first[k, order]) for k, order, test in rows}
+            return found.get(condition.name, np.nan)
+        values = minima(problem.system, problem.legs[i], condition, x, duration, q)
+        return min(values, key=abs, default=np.nan)  # the one that touches, not the least
+
+    row, x = np.zeros(count + len(free)), starts[i]
+    sizes = 1e-6 * np.maximum(np.abs(starts).max(axis=0), 1e-3)
+    for k in range(n):
+        step = sizes[k] * np.eye(n)[k]
+        row[i * n + k] = (value(x + step, p) - value(x - step, p)) / (2 * sizes[k])
+    for j, k in enumerate(free):
+        size = 1e-6 * max(abs(float(p[k])), 1e-3)
+        step = size * np.eye(p.size)[k]
+        row[count + j] = (value(x, p + step) - value(x, p - step)) / (2 * size)
+    return value(x, p), row
+
+
+def smooth_tests(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
+    """Tests by the multipliers of the legs' map."""
+    # An eigenvalue -1 of the half map of a symmetric orbit breaks its symmetry: a pitchfork.
+    reduced = finite_return_map(problem, at)
+    if reduced is None or not float(np.abs(reduced).max()) < _NO_DIGITS:  # an event is grazed
+        return {}
+    with np.errstate(all="ignore"):
+        values = np.linalg.eigvals(reduced)
+        k, l = _pairs(values.size)
+        torus = float(np.multiply.reduce(values[k] * values[l] - 1.0).real)
+        flip = float(np.multiply.reduce(values + 1.0).real)
+    name = "period doubling" if problem.symmetry is None else "pitchfork"
+    return {name: flip, "Neimark-Sacker": torus}
+
+
+@lru_cache(maxsize=64)
+def _pairs(count: int) -> tuple[NDArray[Any], NDArray[Any]]:
+    return np.triu_indices(count, 1)
+
+
+class _Tests:
+    """What is watched of the legs of an orbit, and by which guards."""
+
+    def __init__(self, system: FilippovSystem, legs: tuple[Leg, ...]):
+        self.system, self.legs, self.guards = system, legs, LegGuards(system, legs)
+        own = [field.motion.guards for field in self.guards.fields]
+        self.durations = [Condition("duration", i) for i in range(len(legs))]
+        self.starts = [_starting(system, i, leg, legs[i - 1]) for i, leg in enumerate(legs)]
+        self.ends = [_ending(i, leg, own[i]) for i, leg in enumerate(legs)]
+        self.inside = [[(Condition("interior", i, g), g) for g in own[i]] for i in range(len(legs))]
+
+    def __call__(self, at: Evaluation, p: Array) -> list[tuple[Condition, float]]:
+        durations, found = at.durations.tolist(), list[tuple[Condition, float]]()
+        speeds = (at.flight.gradient * at.flight.rate).sum(axis=1).tolist()
+        watched = zip(*self.guards(at.starts, p, at.durations), strict=True)
+        for i, (rows, begin, values) in enumerate(watched):
+            first = begin[len(begin) - len(self.inside[i]) :].tolist()
+            found.append((self.durations[i], durations[i]))
+            found += [(condition, first[k][order]) for k, order, condition in self.starts[i]]
+            met, sign, others = self.ends[i]
+            if met is not None:
+                found.append((met, sign * speeds[i]))
+            if others:
+                if not durations[i] > 0.0:
+                    state = at.flown[i].end
+                    values = guard_values(self.system, self.legs[i].mode)(state, p)[1][:, 0]
+                found += [(condition, float(values[k])) for k, condition in others]
+            found += _interior(self.inside[i], rows)
+        return found
+
+
+def _starting(
+    system: FilippovSystem, i: int, leg: Leg, before: Leg
+) -> list[tuple[int, int, Condition]]:
+    """Guards that are not zero by construction at the start of a leg, of those to order 3."""
+    guards = guarded_field(system, leg.mode).motion.guards
+    orders = [(k, guard, _order(system, guard, before)) for k, guard in enumerate(guards)]
+    return [(k, order, Condition("start", i, g)) for k, g, order in orders if order is not None]
+
+
+def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
+    """Order at which a guard is positive after the event of the leg before; None if not watched."""
+    # A crossing leaves the guard zero and its rate positive. After an exit or release the rate is zero
+    # too, and its positive second derivative is the transversality of that event.
+    if guard.kind not in ("surface", "exit", "impact", "release"):
+        return None
+    if before.kind in ("reset", "impact") and guard.kind != "surface":
+        return None  # the rate after it is that before it, the transversality of the event
+    if guard.kind == "surface" and surface_of(system, before) == guard.index:
+        return 1 if before.kind == "crossing" else None
+    if guard.kind == "impact" and before.name == guard.name:
+        return None
+    return 0
+
+
+def _ending(
+    i: int, leg: Leg, guards: Sequence[Guard]
+) -> tuple[Condition | None, int, list[tuple[int, Condition]]]:
+    """How fast a leg's event is met, with the sign of that; guards of sliding that end together with it."""
+    own = [g for g in guards if g.name == leg.name and leg.side in (0, g.side)]
+    if not own:
+        return None, 0, []
+    sign = own[0].side if own[0].kind in ("stop", "reset") and own[0].side else -1
+    others = [(k, g) for k, g in enumerate(guards) if g.kind == "exit" and g is not own[0]]
+    rows = [(k, Condition("end", i, g)) for k, g in others]
+    return Condition("transversality", i, own[0]), sign, rows
+
+
+def guard_values(system: FilippovSystem, mode: str) -> Evaluator:
+    """(y, p) -> field and guards of a mode; built once."""
+    motion = guarded_field(system, mode).motion
+    return system.cached(("guard values", mode), lambda: Evaluator(motion.value_function()))
+
+
+def _interior(
+    guards: Sequence[tuple[Condition, Guard]], rows: Array
+) -> list[tuple[Condition, float]]:
+    """Smallest minimum of each guard inside a leg."""
+    least: dict[int, float] = {}
+    for number, _, value, bend in rows[:, :4].tolist():
+        k = int(number)
+        guard = guards[k][1]
+        if bend > 0.0 or (bend and guard.kind in ("stop", "reset")):
+            value = _signed(guard, value)
+            least[k] = min(value, least.get(k, np.inf))
+    return [(guards[k][0], value) for k, value in least.items()]
+
+
+def _signed(guard: Guard, value: float) -> float:
+    """A guard's extremum, positive as long as it is not passed."""
+    sign = -guard.side if guard.kind in ("stop", "reset") else 1
+    return (sign or 1) * value
+
+
+def minima(
+    system: FilippovSystem, leg: Leg, condition: Condition, x: Array, duration: float, p: Array
+) -> list[float]:
+    """Values of the guard of an interior condition at all its minima inside a leg."""
+    if duration <= 0.0:
+        return []
+    seen = watch(system, leg.mode, x, duration, p).approaches
+    return [_signed(near.guard, near.value) for near in seen if near.guard == condition.guard]
+
+
+def touching(
+    system: FilippovSystem, leg: Leg, guard: Guard, x: Array, duration: float, p: Array
+) -> float:
+    """Time since its start at which a leg comes nearest to a guard."""
+    seen = watch(system, leg.mode, x, duration, p).approaches
+    own = [near for near in seen if near.guard == guard]
+    return min(own, key=lambda near: abs(near.value)).t if own else 0.5 * duration

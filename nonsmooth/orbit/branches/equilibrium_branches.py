@@ -1,0 +1,328 @@
+"""Equilibria and pseudo-equilibria as a parameter varies, through the bifurcations that join them.
+
+An equilibrium of F_k solves F_k(x, p) = 0; where h = 0 on the branch it is a boundary equilibrium,
+beyond which a branch of pseudo-equilibria continues it: (1 - alpha) F1 + alpha F2 = 0 with h = 0,
+which begins with alpha = 0 (of F1) or 1 (of F2). On the other side of the parameter this is
+persistence, on the same side a nonsmooth fold (di Bernardo, Budd, Champneys & Kowalczyk 2008,
+ch. 5; Kuznetsov, Rinaldi & Gragnani 2003).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from copy import copy
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...local.point.sides import SIDES, Side, side_index
+from ...local.point.surface_point import Place
+from ...local.read_only import ReadOnly
+from ...local.searches.boundary_equilibria import boundary_equilibrium_of
+from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at
+from ...local.searches.pseudo_equilibria import pseudo_equilibrium_at, sliding_matrix
+from ...local.searches.search import Found
+from ...model import Array, NonsmoothError
+from ...solvers.continuation import Departure, Point, Zero, depart
+from .branch import BranchEvent, FarSide
+from .branch_curves import BranchCurve
+from .normal_forms import hopf_coefficient
+
+#: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.
+_START = 1e-4
+
+#: A state is known to this part of its size.
+_BESIDE = 1e-13
+
+
+class Equilibria(BranchCurve):
+    """What curves of equilibria and pseudo-equilibria share."""
+
+    def __init__(self, where: Place, free: tuple[int, ...], scale: Array):
+        self.where, self.free, self.scale = where, free, scale
+        self.system, self.n = where.system, where.system.dimension
+
+    def place_at(self, u: Array) -> Place:
+        """The place with the parameters of a point."""
+        return replace(self.where, parameters=self.parameters_at(u))
+
+    def parameters_at(self, u: Array) -> Array:
+        p = self.where.parameters.copy()
+        p[list(self.free)] = u[-len(self.free) :]
+        return p
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        here, k = self.place_at(u), u.size - len(self.free)
+        curve = copy(self)
+        curve.where, curve.free = here, free
+        curve.scale = np.append(self.scale[:k], widths)
+        return curve, np.append(u[:k], here.parameters[list(free)])
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        raise NotImplementedError
+
+    def mode_at(self, u: Array) -> str:
+        """The mode whose field vanishes."""
+        raise NotImplementedError
+
+    def lyapunov(self, u: Array, frequency: float) -> float:
+        """The first Lyapunov coefficient; NaN where the field is not explicit."""
+        x, p = u[: self.n], self.parameters_at(u)
+        try:
+            return hopf_coefficient(self.system, self.mode_at(u), x, p, frequency)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return float("nan")
+
+    def _vague(self, u: Array, frequency: float, value: float) -> float:
+        """By how much the first Lyapunov coefficient differs where the state does by its rounding."""
+        beside = u.copy()
+        beside[: self.n] += _BESIDE * self.scale[: self.n] * np.cos(np.arange(self.n))
+        return abs(self.lyapunov(beside, frequency) - value)
+
+    def bautin(self, u: Array) -> Mapping[str, float]:
+        """The first Lyapunov coefficient, which vanishes at a Bautin point on a curve of Hopf points."""
+        values = self.eigenvalues(u)
+        k, l = np.triu_indices(values.size, 1)
+        near = int(np.argmin(np.abs(values[k] + values[l])))
+        frequency = float(abs(values[k[near]].imag))
+        value = self.lyapunov(u, frequency) if frequency else np.nan
+        return {"Bautin": value} if np.isfinite(value) else {}
+
+    def double_zero(self, u: Array) -> bool:
+        sizes = np.sort(np.abs(self.eigenvalues(u)))
+        # a double zero is known to the square root of rounding
+        return bool(sizes[1] < 1e-4 * max(1.0, sizes[-1]))
+
+    def hopf(self, u: Array) -> float:
+        """Product of the sums of pairs of eigenvalues: zero at a Hopf point or neutral saddle."""
+        values = self.eigenvalues(u)
+        k, l = np.triu_indices(values.size, 1)
+        return float(np.prod(values[k] + values[l]).real)
+
+    def described(self, zero: Zero, kind: str, **more: Any) -> BranchEvent:
+        u = zero.point.u
+        return BranchEvent(
+            kind,
+            self.value(u),
+            self.describe(u),
+            curve=self,
+            point=zero.point,
+            test=zero.name,
+            **more,
+        )
+
+    def smooth_event(self, zero: Zero, fold: str) -> BranchEvent | None:
+        """Fold, branch point or Hopf point."""
+        u = zero.point.u
+        if zero.name == "fold":
+            return self.described(zero, fold, far_side=FarSide("", "two branches meet and end"))
+        if zero.name == "branch point":
+            return self.described(zero, "branch point", far_side=FarSide("", "branches cross"))
+        values = self.eigenvalues(u)
+        k, l = np.triu_indices(values.size, 1)
+        nearest = int(np.argmin(np.abs(values[k] + values[l])))
+        frequency = float(abs(values[k[nearest]].imag))
+        if frequency == 0.0:
+            return None  # a neutral saddle
+        numbers = {"frequency": frequency}
+        value = self.lyapunov(u, frequency)
+        words = "a pair of eigenvalues crosses the imaginary axis"
+        if np.isfinite(value):
+            numbers["first Lyapunov coefficient"] = value
+            rest = np.delete(values, [k[nearest], l[nearest]])
+            stable = value < 0.0 and bool(np.all(rest.real < 0.0))
+            kind = "supercritical" if value < 0.0 else "subcritical"
+            if abs(value) <= 10.0 * self._vague(u, frequency, value):
+                words += ": degenerate to rounding"
+            else:
+                words += f": orbits branch off ({kind}{', stable' if stable else ''})"
+        side = FarSide("", words, ReadOnly(numbers))
+        return self.described(zero, "Hopf", far_side=side, coefficients=ReadOnly(numbers))
+
+    def boundary(self, zero: Zero, k: int) -> BranchEvent:
+        """The boundary equilibrium of F1 (k = 0) or F2 (k = 1) on this curve."""
+        x, here = zero.point.u[: self.n], self.place_at(zero.point.u)
+        numbers = here.finite_at(x)
+        found = boundary_equilibrium_of(
+            x, k, numbers.gradient, numbers.fields[1 - k], here.jacobians(x)[k]
+        )
+        verdict = {
+            "persistence": "persistence: one continues the other",
+            "nonsmooth fold": "nonsmooth fold: equilibrium and pseudo-equilibrium annihilate",
+        }.get(found.unfolding, "degenerate")
+        onward = "equilibrium" if isinstance(self, PseudoEquilibriumCurve) else "pseudo-equilibrium"
+        side = FarSide(onward, verdict, found.numbers)
+        event = self.described(zero, "boundary equilibrium", far_side=side)
+        return replace(event, solution=found)
+
+    def boundary_numbers(self, u: Array, k: int) -> Mapping[str, float]:
+        """What changes the class of a boundary equilibrium of F1 (k = 0) or F2 (k = 1)."""
+        x, here = u[: self.n], self.place_at(u)
+        numbers, a = here.finite_at(x), here.jacobians(x)[k]
+        other, sign = numbers.fields[1 - k], 1.0 - 2.0 * k
+        bordered = np.block([[a, other[:, None]], [numbers.gradient[None, :], np.zeros((1, 1))]])
+        values = by_real_part(a)
+        i, j = np.triu_indices(self.n, 1)
+        found = {
+            "the other field is tangent": sign * float(numbers.gradient @ other),
+            "persistence turns into nonsmooth fold": -sign * float(np.linalg.det(bordered)),
+            "fold": float(np.linalg.det(a)),
+        }
+        if self.n > 1:
+            found["Hopf"] = float(np.prod(values[i] + values[j]).real)
+        return found
+
+
+class EquilibriumCurve(Equilibria):
+    """F_k(x, p) = 0 in the unknowns (x, p), for continuation."""
+
+    def __init__(self, where: Place, free: tuple[int, ...], scale: Array, side: Side):
+        super().__init__(where, free, scale)
+        self.side, self.k = side, side_index(side)
+
+    def mode_at(self, u: Array) -> str:
+        return self.where.side(self.side)
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        here, x = self.place_at(u), u[: self.n]
+        by_parameter = here.parameter_derivatives(x)[1][self.k][:, list(self.free)]
+        return here.at(x).fields[self.k], np.column_stack([here.jacobians(x)[self.k], by_parameter])
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        return by_real_part(self.place_at(u).jacobians(u[: self.n])[self.k])
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        found = dict[str, float]()
+        if self.where.mode:
+            switches = self.place_at(point.u).switches(point.u[: self.n])
+            found = {self._boundary_of(j): float(h) for j, h in enumerate(switches)}
+        if self.n > 1:
+            found["Hopf"] = self.hopf(point.u)
+        return found
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        if name == "Hopf":
+            return self.bautin(u)
+        return self.boundary_numbers(u, self.k) if name == "boundary equilibrium" else {}
+
+    def _boundary_of(self, surface: int) -> str:
+        own = "boundary equilibrium"
+        return own if surface == self.where.surface else f"{own} of surface {surface}"
+
+    def _on(self, name: str) -> EquilibriumCurve:
+        """The same curve seen from the surface that a test is about."""
+        j = next((j for j in self.where.others if self._boundary_of(j) == name), None)
+        if j is None:
+            return self
+        mode = self.where.side(self.side)
+        curve, side = copy(self), SIDES["+-".index(mode[j])]
+        curve.where = replace(self.where, surface=j, mode=mode[:j] + "s" + mode[j + 1 :])
+        curve.side, curve.k = side, side_index(side)
+        return curve
+
+    def ends(self, name: str) -> bool:
+        return name.startswith("boundary equilibrium")
+
+    def describe(self, u: Array) -> Equilibrium:
+        return equilibrium_at(self.place_at(u), Found(u[: self.n]), self.side)
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        if self.ends(zero.name):
+            curve = self._on(zero.name)
+            event = curve.boundary(zero, curve.k)
+            return replace(event, curve=curve, test="boundary equilibrium")
+        return self.smooth_event(zero, "fold")
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """Pseudo-equilibria with 0 < alpha < 1."""
+        x, value, near = zero.point.u[: self.n], zero.point.u[-1], self._on(zero.name)
+        scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
+        curve = PseudoEquilibriumCurve(near.where, self.free, scale)
+        return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
+
+
+class PseudoEquilibriumCurve(Equilibria):
+    """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
+
+    def mode_at(self, u: Array) -> str:
+        return self.where.mode
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        n, here, x, a = self.n, self.place_at(u), u[: self.n], u[self.n]
+        at, (d1, d2) = here.at(x), here.jacobians(x)
+        dh, df = here.parameter_derivatives(x)
+        f1, f2 = at.fields
+        matrix, free = np.zeros((n + 1, u.size)), list(self.free)
+        matrix[:n, :n] = (1 - a) * d1 + a * d2
+        matrix[:n, n] = f2 - f1
+        matrix[:n, n + 1 :] = ((1 - a) * df[0] + a * df[1])[:, free]
+        matrix[n, :n], matrix[n, n + 1 :] = at.gradient, dh[free]
+        return np.append((1 - a) * f1 + a * f2, at.h), matrix
+
+    def eigenvalues(self, u: Array) -> NDArray[Any]:
+        here, x = self.place_at(u), u[: self.n]
+        return by_real_part(sliding_matrix(here.at(x), here.jacobians(x))[0])
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        u = point.u
+        numbers = self.place_at(u).at(u[: self.n])
+        found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
+        switches = self.place_at(u).switches(u[: self.n])
+        found.update({f"intersection {j}": float(switches[j]) for j in self.where.others})
+        found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
+        if self.n > 2 and found["two-fold"] != 0:
+            found["Hopf"] = self.hopf(u)
+        return found
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        if name == "Hopf":
+            return self.bautin(u)
+        return self.boundary_numbers(u, int(name[-1])) if name.startswith("alpha") else {}
+
+    def ends(self, name: str) -> bool:
+        return name.startswith(("alpha", "intersection"))
+
+    def describe(self, u: Array) -> Any:
+        return pseudo_equilibrium_at(self.place_at(u), Found(u[: self.n]))
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        if zero.name.startswith("alpha"):
+            return self.boundary(zero, int(zero.name[-1]))
+        if zero.name.startswith("intersection"):
+            words = (
+                f"it reaches surface {zero.name.split()[-1]}: not followed onto the intersection"
+            )
+            return self.described(zero, "intersection", far_side=FarSide("", words))
+        if zero.name == "two-fold":
+            numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
+            side = FarSide("", "sliding changes between attracting and repelling")
+            event = BranchEvent("two-fold", self.value(zero.point.u), numbers.x, side)
+            return replace(event, curve=self, point=zero.point, test=zero.name)
+        return self.smooth_event(zero, "pseudo-saddle-node")
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """Equilibria of the field whose weight is one, on that field's own side."""
+        if not zero.name.startswith("alpha"):
+            return None
+        k, u = int(zero.name[-1]), zero.point.u
+        scale = np.append(self.scale[: self.n], self.scale[-1])
+        curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
+        start = np.append(u[: self.n], u[-1])
+        gradient = curve.place_at(start).at(start[: self.n]).gradient
+        dh = curve.place_at(start).parameter_derivatives(start[: self.n])[0][list(self.free)]
+        return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
+
+
+def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | None:
+    """Leave a boundary equilibrium into the region where the new solutions are real."""
+    # ``inward`` is a gradient that must grow, or the sign with which alpha must.
+    _, jacobian = curve.scaled(u / curve.scale)
+    tangent = np.linalg.svd(jacobian)[2][-1]
+    if isinstance(inward, float):
+        growth = inward * tangent[curve.n]
+    else:
+        growth = float((inward * curve.scale) @ tangent)
+    direction = tangent if growth > 0 else -tangent
+    return depart(curve, u, direction, _START, direction)

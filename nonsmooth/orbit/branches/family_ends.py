@@ -1,0 +1,179 @@
+"""Where a family of periodic orbits shrinks to a point of a surface: a boundary equilibrium or a two-fold.
+
+Its size is proportional to the distance of the parameter from that of a boundary equilibrium, or to its
+root at a two-fold. All tests of its itinerary vanish with it, so none of them names the end; the
+equations of the point are regular there, and give its parameter to rounding.
+
+Source: Kuznetsov, Rinaldi & Gragnani 2003 (Int. J. Bifurcation Chaos 13, 2157), boundary focus and
+fused focus; di Bernardo et al. 2008, ch. 5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from ...local.point.sides import SIDES, Side
+from ...local.point.surface_point import Place, place
+from ...local.searches.boundary_equilibria import find_boundary_equilibrium
+from ...model import Array, FilippovSystem, NonsmoothError
+from ...model.derivatives.variational import variational_field
+from ...solvers.continuation import Point, Zero
+from ...solvers.newton import Secant, converge
+from ..periodic.boundary_value_problem import BoundaryProblem
+from ..periodic.orbit import PeriodicOrbit
+from ..runs.legs import fly, surface_of
+from .branch import BranchEvent, FarSide
+from .equilibrium_branches import EquilibriumCurve
+
+# Where a family of periodic orbits shrinks to an equilibrium: the Hopf point, from an orbit close to it.
+
+#: The equilibrium is looked for within so many sizes of the small orbit, or of the step to it.
+_NEAR = 0.1
+
+
+def hopf_point(
+    system: FilippovSystem, mode: str, x: Array, p: Array, index: int
+) -> tuple[Array, float, float] | None:
+    """The Hopf point near a small orbit of one mode."""
+    field, n = variational_field(system, mode).linear, system.dimension
+    size = np.append(np.full(n, max(1.0, float(np.abs(x).max()))), max(abs(float(p[index])), 1e-3))
+
+    def parameters(u: Array) -> Array:
+        q = p.copy()
+        q[index] = u[-1]
+        return q
+
+    def pair(u: Array) -> complex:
+        """The complex eigenvalue next to the imaginary axis."""
+        values = np.linalg.eigvals(np.asarray(field.copied(u[:n], parameters(u))[1], float)[:n, :n])
+        turning = values[values.imag > 0.0]
+        return (
+            complex(turning[np.argmin(np.abs(turning.real))]) if turning.size else complex(np.nan)
+        )
+
+    def equations(v: Array) -> Array:
+        u = v * size
+        rate = np.asarray(field.copied(u[:n], parameters(u))[0], float).ravel()[:n]
+        return np.append(rate, pair(u).real)
+
+    start = np.append(x, p[index])
+    try:
+        root = converge(Secant(equations, 1.0), start / size)
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return None
+    if root is None or not np.abs(root - start / size).max() < _NEAR:
+        return None
+    u = root * size
+    return u[:n], float(u[-1]), pair(u).imag
+
+
+#: The point is looked for within so many sizes of the small orbit, and within this part of the first
+#: one: the last orbit may have shrunk to a point beside it.
+_NEAR, _BESIDE = 30.0, 1e-6
+
+
+def extent(problem: BoundaryProblem, u: Array, p: Array) -> float:
+    """Size of an orbit: the range of its states, at the starts and in the middle of its legs."""
+    starts, durations = problem.split(u)
+    n, seen = problem.system.dimension, list[Array]()
+    for leg, x, duration in zip(problem.legs, starts, durations, strict=True):
+        seen += [x[:n], fly(problem.system, leg, x, 0.5 * float(duration), p).end[:n]]
+    states = np.array(seen)
+    if problem.symmetry is not None:
+        states = np.vstack([states, states @ problem.symmetry.T])
+    return float(np.ptp(states, axis=0).max())
+
+
+def surface_end(
+    orbit: PeriodicOrbit, parameter: str, size: float, first: float
+) -> BranchEvent | None:
+    """The point of a surface that a small orbit is about to shrink to; None if there is none."""
+    reach = max(_NEAR * size, _BESIDE * first)
+    problem, system = orbit.problem, orbit.system
+    x = problem.split(orbit.unknowns)[0][:, : system.dimension].mean(axis=0)
+    for surface, mode in _met(problem):
+        for side in SIDES:
+            found = _equilibrium(orbit, x, parameter, (surface, mode), side, reach)
+            if found is not None:
+                return found
+        if system.dimension == 2:
+            found = _two_fold(orbit, x, parameter, (surface, mode), reach)
+            if found is not None:
+                return found
+    return None
+
+
+def _met(problem: BoundaryProblem) -> Iterator[tuple[int, str | None]]:
+    """Surfaces on which legs end, with a mode that says where the other ones are."""
+    seen = set[int]()
+    for leg in problem.legs:
+        surface = surface_of(problem.system, leg)
+        if surface < 0 or surface in seen:
+            continue
+        seen.add(surface)
+        one = problem.system.surface_count == 1
+        yield surface, None if one else leg.mode[:surface] + "s" + leg.mode[surface + 1 :]
+
+
+def _equilibrium(
+    orbit: PeriodicOrbit,
+    x: Array,
+    parameter: str,
+    at: tuple[int, str | None],
+    side: Side,
+    reach: float,
+) -> BranchEvent | None:
+    system, (surface, mode) = orbit.system, at
+    try:
+        found = find_boundary_equilibrium(
+            system,
+            x,
+            vary=parameter,
+            side=side,
+            parameters=orbit.parameters,
+            surface=surface,
+            mode=mode,
+        )
+        if not found.distance < reach:
+            return None
+        values = dict(found.parameters)
+        where, point = place(system, found.point, values, 0.0, surface, mode)
+        free, scale = (system.parameter_names.index(parameter),), np.ones(system.dimension + 1)
+        curve, u = EquilibriumCurve(where, free, scale, side), np.append(point, found.value)
+        zero = Zero("boundary equilibrium", Point(u, np.zeros(u.size)), 0.0)
+        event = curve.boundary(zero, curve.k)
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return None
+    label, verdict = event.solution.label, event.far_side.verdict
+    words = f"the orbit shrinks to a boundary equilibrium of F{curve.k + 1} ({label}; {verdict})"
+    side_of = FarSide("", words, event.far_side.numbers)
+    return replace(event, solution=orbit, far_side=side_of, coefficients=side_of.numbers)
+
+
+def _two_fold(
+    orbit: PeriodicOrbit, x: Array, parameter: str, at: tuple[int, str | None], reach: float
+) -> BranchEvent | None:
+    """A two-fold of a planar system, which is one at a value of the parameter."""
+    system, (surface, mode) = orbit.system, at
+    index = system.parameter_names.index(parameter)
+
+    def place_at(value: float) -> Place:
+        values = {**orbit.parameters, parameter: value}
+        return place(system, x, values, 0.0, surface, mode)[0]
+
+    def equations(u: Array) -> Array:
+        numbers = place_at(float(u[-1])).at(u[:-1])
+        return np.array([numbers.h, *numbers.lie])
+
+    start = np.append(x, orbit.parameter_vector[index])
+    try:
+        root = converge(Secant(equations, 1.0), start)
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return None
+    if root is None or not np.abs(root[:-1] - x).max() < reach:
+        return None
+    words = "the orbit shrinks to a two-fold, at which sliding changes its stability"
+    return BranchEvent("two-fold", float(root[-1]), orbit, FarSide("", words))

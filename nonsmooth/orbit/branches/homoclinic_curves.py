@@ -1,0 +1,120 @@
+"""Homoclinic orbits as two parameters vary, and those in which branches of periodic orbits end."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+
+from ...local.searches.equilibria import find_equilibrium
+from ...local.searches.pseudo_equilibria import find_pseudo_equilibrium
+from ...model import Array, NonsmoothError
+from ...solvers.continuation import Point
+from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoclinic
+from ..homoclinic.loops import Loop
+from ..periodic.orbit import PeriodicOrbit
+from ..runs.legs import fly
+from .branch import BranchEvent, FarSide
+from .branch_curves import BranchCurve
+
+#: A connection is that of an orbit if their parameters differ by no more than this part of the bounds.
+_SAME = 0.05
+
+
+class ConnectionCurve(BranchCurve):
+    """A homoclinic orbit with one free parameter, or a curve of them with two.
+
+    Parameters
+    ----------
+    loop : Loop
+    u : ndarray
+        A solution.
+    """
+
+    parameter = None
+    branching = False
+    name = "homoclinic"
+
+    def __init__(self, loop: Loop, u: Array):
+        self.loop, self.system, self.free = loop, loop.system, loop.free
+        self.scale = loop.scales(u)
+        self.scale[: loop.chained] *= len(loop.legs)  # many parts of one orbit move as one
+
+    @property
+    def base(self) -> ConnectionCurve:
+        """Itself: no further test is added to its equations."""
+        return self
+
+    def parameters_at(self, u: Array) -> Array:
+        return self.loop.parameters_at(u)
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        p, k = self.parameters_at(u), u.size - len(self.free)
+        start = np.append(u[:k], p[list(free)])
+        curve = ConnectionCurve(self.loop.with_free(free, p), start)
+        curve.scale = np.append(curve.scale[:k], widths)
+        return curve, start
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        with np.errstate(all="ignore"):  # a trial may fly too far
+            return self.loop.equations(u)
+
+    def tests(self, point: Point) -> Mapping[str, float]:
+        return {k: v for k, v in self.loop.tests(point.u).items() if np.isfinite(v)}
+
+    def describe(self, u: Array) -> Connection:
+        return connection_of(self.loop, u, self.system.parameter_names[self.free[-1]])
+
+
+def event_of(connection: Connection) -> BranchEvent:
+    """A connection as an event that two parameters unfold."""
+    u = connection.unknowns
+    curve = ConnectionCurve(connection.loop, u)
+    quantity = connection.saddle_quantity
+    words = "the period diverges"
+    if np.isfinite(quantity):
+        words += f"; saddle quantity {quantity:.4g}"
+    point = Point(u, np.zeros(u.size))
+    return BranchEvent(
+        "homoclinic",
+        connection.value,
+        connection,
+        FarSide("", words),
+        curve=curve,
+        point=point,
+        test="homoclinic",
+    )
+
+
+def homoclinic_end(orbit: PeriodicOrbit, parameter: str, width: float) -> BranchEvent | None:
+    """The homoclinic orbit that a long periodic orbit is close to; None if none is found."""
+    system, value = orbit.system, orbit.parameters[parameter]
+    if system.time_dependent or system.coupled or system.surface_count > 1:
+        return None
+    mode, x = _slowest(orbit)
+    given: dict[str, Any] = {"parameters": orbit.parameters}
+    try:
+        saddle: Any = x
+        if mode == "s":
+            saddle = find_pseudo_equilibrium(system, x, **given)
+        elif mode:
+            saddle = find_equilibrium(system, x, side=mode, **given)  # type: ignore[arg-type]
+        found = find_homoclinic(system, saddle, parameter, parameters=orbit.parameters)
+    except NonsmoothError:
+        return None
+    return event_of(found) if abs(found.value - value) < _SAME * width else None
+
+
+def _slowest(orbit: PeriodicOrbit) -> tuple[str, Array]:
+    """Mode and state where an orbit moves slowest."""
+    p, n, best = orbit.parameter_vector, orbit.system.dimension, (np.inf, "", orbit.start)
+    for leg, x, duration in zip(
+        orbit.problem.legs, orbit.evaluation.starts, orbit.evaluation.durations, strict=True
+    ):
+        for part in np.linspace(0.0, 1.0, 41):
+            flown = fly(orbit.system, leg, x, float(part * duration), p)
+            speed = float(np.linalg.norm(flown.rate[:n]))
+            if speed < best[0]:
+                best = (speed, leg.mode, flown.end[:n])
+    return best[1], best[2]

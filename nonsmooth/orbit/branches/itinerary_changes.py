@@ -1,0 +1,435 @@
+"""Editing an itinerary where a bifurcation changes it: the legs on the far side, and a start there.
+
+| bifurcation | fewer legs | more legs |
+|---|---|---|
+| grazing-sliding | a | a s a |
+| crossing-sliding | a b | a s b |
+| switching-sliding | a s | a b s |
+| adding-sliding | s | s b s |
+| impact grazing | a | a impact a |
+| corner | two events at one time, in the other order | |
+| corner that adds legs | a b | a c d b, past a second surface and back |
+
+A new leg begins with the duration 0, which the smooth flow of its mode accepts.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from ...model import Array, Guard
+from ...model.derivatives.variational import guarded_field
+from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
+from ..periodic.symmetry import TURNED, mirrored, neighbours
+from ..runs.itinerary import leg_between
+from ..runs.legs import Leg, fly, surface_of
+from .conditions import Condition, touching
+
+# Guesses for an orbit whose new legs have begun to grow.
+
+
+def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by: float) -> Array:
+    """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
+    # A flight that is added inside a slide begins before the point where the slide touched its boundary
+    # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a flight of the duration t.
+    starts, durations = (np.array(part) for part in problem.split(u))
+    legs = problem.legs
+    for i in fresh:
+        durations[i] = by
+        added = 0 < i < len(legs) - 1 and legs[i].kind == "entry" and legs[i - 1].kind == "exit"
+        if not added or durations[i - 1] < by or durations[i + 1] < by:
+            continue
+        durations[i - 1] -= by / 3
+        durations[i + 1] -= 2 * by / 3
+        for k in (i - 1, i):
+            flown = fly(problem.system, legs[k], starts[k], float(durations[k]), p)
+            starts[k + 1] = flown.end[: problem.dimension]
+    return problem.pack(starts, durations)
+
+
+# Itineraries beside a corner, where two events happen at one time.
+
+#: Legs that are shorter than this part of the orbit vanish.
+_SHORT = 1e-7
+
+
+def swapped(chain: Chain, i: int) -> Edited | None:
+    """Two events at one time in the other order."""
+    system, (first, second) = chain.problem.system, chain.legs[i - 1 : i + 1]
+    a, b = surface_of(system, first), surface_of(system, second)
+    if a < 0 or b < 0 or a == b:
+        return None
+    between = with_letter(first.mode, b, mode_after(second)[b])
+    chain.legs[i - 1] = leg_between(system, first.mode, between)
+    chain.legs[i] = leg_between(system, between, with_letter(between, a, second.mode[a]))
+    return chain.done(i)
+
+
+def round_corner(chain: Chain, i: int, guard: Guard, p: Array) -> Edited | None:
+    """A second surface is crossed before the crossing that leads to leg ``i``, and back after it."""
+    system, k = chain.problem.system, (i - 1) % len(chain.legs)
+    before, far = chain.legs[k], guard.index
+    if guard.kind != "surface" or before.kind != "crossing":
+        return None
+    flown = fly(system, before, chain.starts[k], chain.durations[k], p)
+    start = before.at_end(system, flown.end, p).after
+    turned = before.mode[far].translate(TURNED)
+    modes = [before.mode, with_letter(before.mode, far, turned)]
+    modes += [with_letter(mode_after(before), far, turned), mode_after(before)]
+    legs = [leg_between(system, a, b) for a, b in pairwise(modes)]
+    chain.legs[k] = legs[0]
+    chain.insert(k + 1, legs[1], start)
+    chain.insert(k + 2, legs[2], start)
+    return chain.done(k + 1, k + 2)
+
+
+def cut_corner(before: Edited, i: int, p: Array) -> Edited | None:
+    """Two short legs beyond a second surface, left out; None where there are no such two."""
+    system, count = before.problem.system, len(before.problem.legs)
+    durations = before.problem.split(before.u)[1]
+    short = [
+        j for j in ((i + 1) % count, (i - 1) % count) if durations[j] < _SHORT * sum(durations)
+    ]
+    if count < 4 or not short:
+        return None
+    turned = rotated(before, ((i if short[0] == (i + 1) % count else short[0]) - 1) % count, p)
+    chain = Chain(turned.problem, turned.u, turned.origin)
+    first, between, last = chain.legs[:3]
+    far, own = surface_of(system, first), surface_of(system, between)
+    crossed = all(leg.kind == "crossing" for leg in (first, between, last))
+    if not crossed or surface_of(system, last) != far or own == far:
+        return None
+    chain.legs[0] = leg_between(system, first.mode, mode_after(last))
+    chain.remove(2)
+    chain.remove(1)
+    guards = guarded_field(system, mode_after(last)).motion.guards
+    guard = next(g for g in guards if g.kind == "surface" and g.index == far)
+    return chain.done(test=Condition("start", 1, guard))
+
+
+# The legs of a periodic orbit while its itinerary is edited.
+
+
+@dataclass(frozen=True, eq=False)
+class Edited:
+    """An itinerary on the other side of a bifurcation."""
+
+    problem: BoundaryProblem
+    u: Array
+    origin: tuple[int, ...]
+    test: str = ""
+
+    @property
+    def fresh(self) -> tuple[int, ...]:
+        """The legs that grow from zero; several in an orbit that is symmetric."""
+        return tuple(i for i, before in enumerate(self.origin) if before == -2)
+
+
+class Chain:
+    """The legs of a problem while they are edited."""
+
+    def __init__(self, problem: BoundaryProblem, u: Array, origin: Sequence[int]):
+        self.problem, self.legs, self.origin = problem, list(problem.legs), list(origin)
+        starts, durations = problem.split(u)
+        self.starts, self.durations = [np.array(x) for x in starts], durations.tolist()
+
+    def insert(self, k: int, leg: Leg, start: Array) -> None:
+        """A new leg of no duration."""
+        self.legs.insert(k, leg)
+        self.starts.insert(k, start)
+        self.durations.insert(k, 0.0)
+        self.origin.insert(k, -1)
+
+    def remove(self, k: int) -> None:
+        for rows in (self.legs, self.starts, self.durations, self.origin):
+            del rows[k]
+
+    def done(self, *fresh: int, test: Condition | None = None) -> Edited:
+        whole = replace(self.problem, legs=tuple(self.legs))
+        u = whole.pack(np.array(self.starts), np.array(self.durations))
+        for k in fresh:
+            self.origin[k] = -2
+        return Edited(whole, u, tuple(self.origin), "" if test is None else test.name)
+
+
+def mode_after(leg: Leg) -> str:
+    """The mode that follows the event of a leg, where its letters tell it; else empty."""
+    if leg.kind not in ("crossing", "entry", "exit"):
+        return ""
+    if leg.name.startswith("L_"):
+        k = leg.mode.index("s")
+        letter = "+" if leg.name == "L_F1 h" else "-"
+    else:
+        k = int(leg.name.removeprefix("lambda").removeprefix("h"))
+        turned = leg.mode[k].translate(TURNED)
+        letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
+    return leg.mode[:k] + letter + leg.mode[k + 1 :]
+
+
+def with_letter(mode: str, surface: int, letter: str) -> str:
+    return mode[:surface] + letter + mode[surface + 1 :]
+
+
+def rotated(before: Edited, k: int, p: Array) -> Edited:
+    """The same orbit from leg ``k``; legs moved to the end are those of the next round."""
+    problem, (starts, durations) = before.problem, before.problem.split(before.u)
+    legs = (*problem.legs[k:], *(mirrored(problem, leg) for leg in problem.legs[:k]))
+    shift = np.zeros(problem.dimension)
+    if problem.forcing is not None:
+        shift[-1] = problem.advance(p)[0]
+    back = np.linalg.inv(problem.wrap)
+    moved = [*starts[k:], *(back @ (x + shift) for x in starts[:k])]
+    whole = replace(problem, legs=legs)
+    u = whole.pack(np.array(moved), np.concatenate([durations[k:], durations[:k]]))
+    return Edited(whole, u, (*before.origin[k:], *before.origin[:k]))
+
+
+#: Sine of the angle at which a field is tangent to a surface.
+_TANGENT = 1e-7
+
+
+def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> str:
+    """The bifurcation that the zero of a test is."""
+    legs, i = problem.legs, test.leg
+    leg, guard = legs[i], test.guard
+    before, after = neighbours(problem, i)
+    if test.what == "interior":
+        assert guard is not None
+        return _grazed(problem, leg, guard, test, at, p)
+    if test.what == "start":
+        assert guard is not None
+        if before.kind == "crossing" and surface_of(problem.system, before) == guard.index:
+            return "crossing-sliding"
+        return "switching-sliding" if guard.kind == "exit" and before.kind == "entry" else "corner"
+    if test.what == "end":
+        return "two-fold"
+    if test.what == "transversality":
+        return {
+            "impact": "impact grazing",
+            "reset": "grazing of a reset",
+            "exit": "adding-sliding",
+        }.get(leg.kind, "grazing, escaping")
+    if before.kind == "entry" and leg.kind == "exit":
+        came, left = before.mode, mode_after(leg)
+        return "grazing-sliding" if came == left else "crossing-sliding"
+    if leg.kind == "entry" and before.kind == "exit":
+        return "adding-sliding" if after.mode == before.mode or len(legs) == 2 else "corner"
+    if leg.kind == "entry" and before.kind == "crossing":
+        same = surface_of(problem.system, leg) == surface_of(problem.system, before)
+        return "switching-sliding" if same else "corner"
+    return "corner"
+
+
+def _grazed(
+    problem: BoundaryProblem, leg: Leg, guard: Guard, test: Condition, at: Evaluation, p: Array
+) -> str:
+    if guard.kind == "impact":
+        return "impact grazing"
+    if guard.kind in ("reset", "stop"):
+        return f"grazing of a {guard.kind}"
+    if guard.kind == "exit":
+        return "adding-sliding"
+    if guard.kind == "release":
+        return "release"
+    t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
+    y = fly(problem.system, leg, at.starts[test.leg], t, p).end[: problem.dimension]
+    other = leg.mode[: guard.index] + ("-" if guard.side > 0 else "+") + leg.mode[guard.index + 1 :]
+    field = leg_between(problem.system, leg.mode, other).map(problem.system)
+    assert field is not None
+    gradient = field(y, p).gradient[: problem.dimension]
+    rate = Leg(other).field(problem.system).rate.copied(y, p)[0][: problem.dimension, 0]
+    across = float(gradient @ rate)
+    if abs(across) <= _TANGENT * float(np.linalg.norm(gradient) * np.linalg.norm(rate)):
+        return "two-fold"  # both fields touch there: always so where a force jumps with a position
+    return "grazing-sliding" if across > 0.0 else "grazing, escaping"
+
+
+def edited(
+    problem: BoundaryProblem, kind: str, conditions: Sequence[Condition], u: Array, p: Array
+) -> Edited | None:
+    """The itinerary beyond a bifurcation; None where nothing continues it."""
+    found: Edited | None = Edited(problem, u, tuple(range(len(problem.legs))))
+    for condition in conditions:
+        assert found is not None
+        if condition.leg not in found.origin:
+            continue
+        at = replace(condition, leg=found.origin.index(condition.leg))
+        longer = condition.what in ("interior", "start")
+        found = (_longer if longer else _shorter)(found, kind, at, p)
+        if found is None:
+            return None
+    return found
+
+
+# more legs ---------------------------------------------------------------------------------------
+
+
+def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
+    chain, i = Chain(before.problem, before.u, before.origin), at.leg
+    if kind in ("crossing-sliding", "switching-sliding"):
+        return _inserted(chain, kind, i, p)
+    if kind == "corner" and at.what == "start" and at.guard is not None:
+        return round_corner(chain, i, at.guard, p)
+    if at.guard is None or at.what != "interior" or kind == "grazing, escaping":
+        return None
+    problem = before.problem
+    leg, x, duration = chain.legs[i], chain.starts[i], chain.durations[i]
+    t = touching(problem.system, leg, at.guard, x, duration, p)
+    y = fly(problem.system, leg, x, t, p).end[: problem.dimension]
+    added = _added(problem, leg, at.guard, kind, y, p)
+    if added is None:
+        return None
+    between, states = added
+    if not leg.name and problem.phase is not None:  # a smooth orbit: it now begins where it touches
+        legs = [replace(leg, name=between[0].name, kind=between[0].kind), *between[1:]]
+        whole = replace(problem, legs=tuple(legs), phase=None, reference=None)
+        times = [duration, *[0.0] * (len(legs) - 1)]
+        shift = np.zeros(problem.dimension)
+        shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
+        later = [state + shift for state in states[: len(legs) - 1]]
+        v = whole.pack(np.array([states[-1], *later]), np.array(times))
+        return Edited(whole, v, (*[0, *[-1] * len(legs)][: len(legs) - 1], -2))
+    for k, (new, start) in enumerate(zip([*between[1:], leg], states, strict=True)):
+        chain.insert(i + 1 + k, new, start)
+    chain.legs[i], chain.durations[i] = between[0], t
+    chain.durations[i + len(states)] = duration - t
+    return chain.done(*([i + 1] if len(states) > 1 else []))
+
+
+def _inserted(chain: Chain, kind: str, i: int, p: Array) -> Edited:
+    """A short leg between a crossing or entry and leg ``i``."""
+    system, k = chain.problem.system, (i - 1) % len(chain.legs)
+    before = chain.legs[k]
+    surface = surface_of(system, before)
+    flown = fly(system, before, chain.starts[k], chain.durations[k], p)
+    start = before.at_end(system, flown.end, p).after
+    if kind == "crossing-sliding":
+        chain.legs[k] = replace(before, kind="entry")
+        slide = with_letter(before.mode, surface, "s")
+        new = leg_between(system, slide, mode_after(before))
+    else:
+        chain.legs[k] = replace(before, kind="crossing")
+        far = with_letter(before.mode, surface, before.mode[surface].translate(TURNED))
+        new = leg_between(system, far, with_letter(far, surface, "s"))
+    chain.insert(k + 1, new, start)
+    return chain.done(k + 1)
+
+
+def _added(
+    problem: BoundaryProblem, leg: Leg, guard: Guard, kind: str, y: Array, p: Array
+) -> tuple[list[Leg], list[Array]] | None:
+    """Legs that come before the rest of a leg that is touched, and the starts after the first."""
+    system = problem.system
+    if kind == "grazing-sliding":
+        slide = with_letter(leg.mode, guard.index, "s")
+        return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
+    if kind == "adding-sliding":
+        free = with_letter(leg.mode, guard.index, "+" if guard.side > 0 else "-")
+        return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
+    if guard.kind in ("impact", "reset"):
+        hit = Leg(leg.mode, guard.name, guard.kind)
+        return [hit], [hit.at_end(system, y, p).after]
+    return None
+
+
+# fewer legs --------------------------------------------------------------------------------------
+
+
+def _shorter(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None:
+    if kind in ("impact grazing", "grazing of a reset"):
+        return _missed(before, at.leg, p)
+    if kind == "corner" and at.what == "duration":
+        cut = cut_corner(before, at.leg, p)
+        if cut is not None:
+            return cut
+    turned = _turned(before, at.leg, p)
+    i = turned.origin.index(before.origin[at.leg])
+    chain = Chain(turned.problem, turned.u, turned.origin)
+    legs = chain.legs
+    if i == 0:
+        return None
+    if kind in ("crossing-sliding", "switching-sliding"):
+        became = "crossing" if kind == "crossing-sliding" else "entry"
+        guard = _start_guard(turned.problem, legs, i)
+        legs[i - 1] = replace(legs[i - 1], kind=became)
+        chain.remove(i)
+        return chain.done(test=Condition("start", i % len(legs), guard))
+    if kind in ("grazing-sliding", "adding-sliding") and at.what == "duration":
+        if len(legs) == 2:
+            return _smooth(chain, p)
+        if i + 1 == len(legs):
+            return None
+        guard = _guard(turned.problem, legs[i - 1])
+        legs[i - 1] = replace(legs[i + 1], mode=legs[i - 1].mode)
+        chain.durations[i - 1] += chain.durations[i] + chain.durations[i + 1]
+        chain.remove(i + 1)
+        chain.remove(i)
+        return chain.done(test=Condition("interior", i - 1, guard))
+    return swapped(chain, i) if kind == "corner" and at.what == "duration" else None
+
+
+def _missed(before: Edited, i: int, p: Array) -> Edited:
+    """An impact or reset that is only touched, left out."""
+    count = len(before.problem.legs)
+    turned = rotated(before, i, p) if i + 1 == count > 1 else before
+    i = 0 if turned is not before else i
+    chain = Chain(turned.problem, turned.u, turned.origin)
+    if count == 1:
+        return _smooth(chain, p)
+    guard = _guard(turned.problem, chain.legs[i])
+    chain.legs[i] = replace(chain.legs[i + 1], mode=chain.legs[i].mode)
+    chain.durations[i] += chain.durations[i + 1]
+    chain.remove(i + 1)
+    return chain.done(test=Condition("interior", i, guard))
+
+
+def _smooth(chain: Chain, p: Array) -> Edited:
+    """An orbit that no event is left of: its one leg gets a phase condition."""
+    problem, leg, period = chain.problem, chain.legs[0], sum(chain.durations)
+    guard, n = _guard(problem, leg), problem.dimension
+    # away from where it touches, which is to be inside the leg
+    start = fly(problem.system, leg, chain.starts[0], 0.4 * period, p).end[:n]
+    phase = np.zeros(n)
+    if problem.system.time_dependent:
+        phase[-1] = 1.0
+    else:
+        rate = leg.field(problem.system).rate.copied(start, p)[0][:n, 0]
+        phase = rate / np.linalg.norm(rate)
+    whole = replace(problem, legs=(Leg(leg.mode),), phase=phase, reference=start.copy())
+    u = whole.pack(np.array([start]), np.array([period]))
+    return Edited(whole, u, (chain.origin[0],), Condition("interior", 0, guard).name)
+
+
+def _guard(problem: BoundaryProblem, leg: Leg) -> Guard:
+    own = leg.map(problem.system)
+    assert own is not None
+    return own.guard
+
+
+def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard:
+    """The guard that fails where leg ``i`` vanishes: of the leg after it."""
+    removed, after = legs[i], legs[(i + 1) % len(legs)]
+    mode = after.mode if i + 1 < len(legs) else mode_after(removed)
+    surface = surface_of(problem.system, removed)
+    for guard in guarded_field(problem.system, mode).motion.guards:
+        if guard.kind == "surface" and guard.index == surface and removed.kind == "exit":
+            return guard
+        if guard.kind == "exit" and removed.kind == "entry" and guard.index == surface:
+            if guard.side == (1 if removed.mode[surface] == "+" else -1):
+                return guard
+    return _guard(problem, legs[i - 1])
+
+
+# shared ------------------------------------------------------------------------------------------
+
+
+def _turned(before: Edited, i: int, p: Array) -> Edited:
+    """The same orbit from another leg, so that leg ``i`` has neighbours on both sides."""
+    count = len(before.problem.legs)
+    if 0 < i < count - 1 or (count == 2 and i == 1) or count == 1:
+        return before
+    return rotated(before, 1 if count == 2 else (i - 1) % count, p)

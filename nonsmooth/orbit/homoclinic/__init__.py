@@ -1,0 +1,1 @@
+"""Homoclinic orbits to saddles and pseudo-saddles."""

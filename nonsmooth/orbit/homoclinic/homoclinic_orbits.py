@@ -1,0 +1,359 @@
+"""Homoclinic orbits: the verb that finds them, and what it returns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...flow.ensembles.progress import progress_bar
+from ...flow.trajectory import Trajectory
+from ...local import Equilibrium, PseudoEquilibrium
+from ...model import (
+    Array,
+    ConvergenceError,
+    FilippovSystem,
+    NonsmoothError,
+    OptionError,
+    ParameterError,
+    Parameters,
+    explain,
+    require_system,
+)
+from ...solvers.newton import Equations, converge, solve
+from ..periodic.orbit import OrbitLeg, named
+from ..periodic.orbit_run import orbit_run
+from .guesses import Departure, departures, saddle_at
+from .loops import Loop
+from .pseudo_saddle_loops import PseudoSaddleLoop, flight_to
+from .saddle_loops import SaddleLoop
+
+#: By so much the end of an orbit comes closer to the saddle at a time, and at least.
+_CLOSER, _SLOWLY = 4.0, 1.2
+
+#: An orbit that ends within this part of its size from the saddle will do where it comes no closer.
+_ENOUGH = 1e-3
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Connection:
+    """A homoclinic orbit to a saddle, a pseudo-saddle or a saddle-focus.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+        Whose orbit it is.
+    parameter : str
+        Name of the parameter that was varied.
+    value : float
+        Of that parameter at the connection.
+    parameters : dict of str to float
+        All of them there.
+    saddle : Equilibrium or PseudoEquilibrium
+        The saddle at that value.
+    legs : tuple of OrbitLeg
+        Those of the orbit. One that approaches the saddle for ever begins and ends close to it.
+    iterations : int
+        Evaluations of the equations.
+    residual : float
+        Largest entry of the equations.
+    faults : tuple of str
+        What its guards contradict; empty unless it is virtual.
+    loop : Loop
+        Its equations.
+    unknowns : ndarray
+        What solves them; from these ``continue_bifurcation`` starts.
+    complete : bool
+        False if the search was interrupted: the orbit ends farther from the saddle than it could.
+    """
+
+    system: FilippovSystem
+    parameter: str
+    value: float
+    parameters: dict[str, float]
+    saddle: Equilibrium | PseudoEquilibrium
+    legs: tuple[OrbitLeg, ...]
+    iterations: int
+    residual: float
+    faults: tuple[str, ...]
+    loop: Loop
+    unknowns: Array
+    complete: bool = True
+
+    @property
+    def itinerary(self) -> str:
+        """Modes of the legs in order, separated by blanks."""
+        return " ".join(leg.mode or "o" for leg in self.legs)
+
+    @property
+    def fold(self) -> Array | None:
+        """Where the orbit first leaves the surface; None if it does not slide before."""
+        first = next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
+        finite = isinstance(self.loop, PseudoSaddleLoop)
+        return self.legs[first].start if first or finite else None
+
+    @property
+    def side(self) -> str:
+        """Mode of the first leg that does not slide."""
+        return next((leg.mode for leg in self.legs if "s" not in leg.mode), self.legs[0].mode)
+
+    @property
+    def flight(self) -> float:
+        """Time from where it leaves the surface, or the neighbourhood of the saddle, to its end."""
+        first = next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
+        return float(sum(leg.duration for leg in self.legs[first:]))
+
+    @property
+    def eigenvalue(self) -> float:
+        """The leading unstable one: periods of nearby orbits diverge as $-ln|mu - mu_0|$ over it."""
+        real = np.real(self.saddle.eigenvalues)
+        return float(real[real > 0].min())
+
+    @property
+    def saddle_quantity(self) -> float:
+        """Sum of the leading stable and unstable eigenvalues; where negative the orbit that is born is
+        stable. Minus infinity where the orbit comes to the saddle in finite time."""
+        real = np.real(self.saddle.eigenvalues)
+        stable = real[real < 0]
+        return self.eigenvalue + float(stable.max()) if stable.size else -np.inf
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """The legs as a run."""
+        return orbit_run(self.system, self.parameters, self.loop.pieces(self.unknowns))
+
+    def __str__(self) -> str:
+        virtual = f" (virtual: {self.faults[0]})" if self.faults else ""
+        kind = "pseudo-saddle" if isinstance(self.saddle, PseudoEquilibrium) else self.saddle.kind
+        at = f"at {self.parameter} = {self.value:.13g}{virtual}"
+        lines = [f"Homoclinic orbit to a {kind} {at}, itinerary {self.itinerary!r}"]
+        values = ", ".join(f"{v:.6g}" for v in self.saddle.eigenvalues)
+        lines.append(f"  {kind} {self.saddle.point.tolist()}, eigenvalues {values}")
+        if self.fold is not None:
+            lines.append(f"  leaves the surface at {self.fold.tolist()} to {self.side!r}")
+        if isinstance(self.loop, SaddleLoop) and not self.complete:
+            lines.append(f"  interrupted: the orbit ends {self.loop.far:.2g} from the saddle")
+        return "\n".join(lines)
+
+    def __repr__(self) -> str:
+        return f"Connection({self.parameter} = {self.value:.10g}, {self.itinerary!r})"
+
+
+def find_homoclinic(
+    system: FilippovSystem,
+    saddle: Equilibrium | PseudoEquilibrium | ArrayLike,
+    parameter: str,
+    *,
+    guess: float | None = None,
+    parameters: Parameters | None = None,
+    max_iterations: int = 30,
+    progress: bool = False,
+) -> Connection:
+    """Find the parameter at which an orbit is homoclinic to a saddle or pseudo-saddle.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        Without explicit time. The orbit may cross, slide and be reset on its way.
+    saddle : Equilibrium, PseudoEquilibrium or array_like (n,)
+        At the guess, or a point near it. A saddle of one mode, on the surface or off it; of a planar
+        pseudo-saddle the surface is the unstable manifold.
+    parameter : str
+        Name of the parameter that is varied.
+    guess : float, optional
+        Its value to start from; by default that of ``parameters``. There an orbit of the unstable
+        manifold should come back to within half of its size.
+    parameters : mapping, optional
+        Values that replace defaults.
+    max_iterations : int, optional
+        Newton's method gives up after this many steps.
+    progress : bool, optional
+        Show on a terminal how close to the saddle the orbit comes.
+
+    Returns
+    -------
+    Connection
+        Of codimension one. ``continue_bifurcation`` follows it as two parameters vary. Ctrl-C ends the
+        search with the orbit that there is, which ends farther from the saddle: ``complete`` is false.
+
+    Raises
+    ------
+    ConvergenceError
+        No orbit that comes back, or Newton's method fails.
+    DegenerateError
+        The point is no saddle.
+    OptionError
+        A system with explicit time or hidden dynamics.
+    DefinitionError
+        ``system`` is none, or has vector multipliers.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A saddle of a wrong shape.
+
+    Notes
+    -----
+    An orbit that lands on a planar pseudo-saddle does so in finite time, with regular equations. Others
+    begin and end close to the saddle in its eigenspaces; how close is chosen so that the error of the
+    parameter is that of rounding.
+
+    Examples
+    --------
+    A spiral above the surface that lands where it slides to:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, c = ca.SX.sym("x"), ca.SX.sym("y"), ca.SX.sym("c")
+    >>> above = [0.1 * x - (y - 1), x + 0.1 * (y - 1)]
+    >>> system = ns.FilippovSystem(
+    ...     [x, y], surface=y, above=above, below=[c, 1], parameters={c: -0.6})
+    >>> found = ns.find_homoclinic(system, [-1.4, 0.0], "c")
+    >>> f"{found.value:.13f}", f"{found.flight:.13f}"
+    ('-0.5862126010325', '5.2426089986980')
+
+    The saddle of a pendulum-like oscillator whose friction is balanced:
+
+    >>> mu = ca.SX.sym("mu")
+    >>> smooth = ns.FilippovSystem([x, y], field=[y, x - x**3 + mu * y], parameters={mu: 0.01})
+    >>> bool(abs(ns.find_homoclinic(smooth, [0.0, 0.0], "mu").value) < 1e-12)
+    True
+    """
+    require_system(system)
+    if system.coupled or system.time_dependent:
+        raise OptionError(
+            explain(
+                "system",
+                expected="an autonomous one with linear multipliers",
+                received=repr(system),
+                advice="The saddle of a system that depends on time is a periodic orbit.",
+            )
+        )
+    names = system.parameter_names
+    if parameter not in names:
+        raise ParameterError(
+            f"parameter: expected a name among {list(names)}, received {parameter!r}."
+        )
+    given = {str(k): v for k, v in (parameters or {}).items()}
+    if guess is not None:
+        given[parameter] = guess
+    p, index = system.parameter_vector(given), names.index(parameter)
+    mode, at = saddle_at(system, saddle, p)
+    if isinstance(at, PseudoEquilibrium) and system.dimension == 2:
+        side, legs, starts, durations = flight_to(system, at, p)
+        loop = PseudoSaddleLoop(system, legs, (index,), p, side)
+        u = _solved(loop, loop.pack(starts, durations, at), parameter, max_iterations)
+        return connection_of(loop, u, parameter)
+    reasons = list[str]()
+    for start in departures(system, mode, at.point, p):
+        try:
+            return _by_projections(system, mode, start, p, index, max_iterations, progress)
+        except ConvergenceError as error:
+            reasons.append(str(error))
+    raise ConvergenceError(
+        f"homoclinic orbit: expected an orbit of the unstable manifold of {at.point.tolist()} that "
+        f"comes back to it, received none ({reasons[0] if reasons else 'none comes near'}). Give a "
+        "better guess of the parameter.",
+        point=at.point,
+    )
+
+
+def _by_projections(
+    system: FilippovSystem,
+    mode: str,
+    start: Departure,
+    p: Array,
+    index: int,
+    max_iterations: int,
+    progress: bool,
+) -> Connection:
+    """The orbit that ends where the guess comes nearest, then closer and closer to the saddle."""
+    far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
+    parameter = system.parameter_names[index]
+    loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)
+    u = np.concatenate([np.ravel(start.starts), start.durations, [p[index]]])
+    u = _solved(loop, u, parameter, max_iterations, damped=True)
+    target, factor, complete = loop.target() * start.size, _CLOSER, True
+    bar, whole = progress_bar(100, progress, "%"), math.log(max(far / target, _SLOWLY))
+    try:
+        while far > target:
+            closer = max(target, far / factor)
+            wait = np.log(far / closer) / -loop.reference.leading(True)
+            longer, guess = loop.prolonged(u, wait, closer)
+            try:
+                found = _solved(longer, guess, parameter, max_iterations)
+                bar.update(100.0 * math.log(far / closer) / whole)
+                u, loop, far, factor = found, longer, closer, _CLOSER
+            except ConvergenceError:
+                factor **= 0.5
+                if factor < _SLOWLY:
+                    if far > _ENOUGH * start.size:
+                        raise
+                    break
+    except KeyboardInterrupt:
+        complete = False
+    finally:
+        bar.close()
+    return replace(connection_of(loop, u, parameter), complete=complete)
+
+
+def _guarded(equations: Equations) -> Equations:
+    """Equations that are not finite where an orbit cannot be flown."""
+
+    def guarded(v: Array) -> tuple[Array, Array]:
+        try:
+            return equations(v)
+        except NonsmoothError:
+            return np.full(v.size, np.nan), np.full((v.size, v.size), np.nan)
+
+    return guarded
+
+
+def _solved(
+    loop: Loop, u: Array, parameter: str, max_iterations: int, damped: bool = False
+) -> Array:
+    scales = loop.scales(u)
+
+    def equations(v: Array) -> tuple[Array, Array]:
+        with np.errstate(all="ignore"):  # a trial may fly too far
+            values, jacobian = loop.equations(v * scales)
+        return values, jacobian * scales
+
+    reason, root = "", None
+    try:
+        root = converge(equations, u / scales, tol=1e-13, max_iterations=max_iterations)
+    except ConvergenceError as error:
+        reason = f" {error}"
+    if root is None and damped:
+        try:
+            what = "homoclinic orbit"
+            root = solve(_guarded(equations), u / scales, tol=1e-10, max_iterations=60, what=what).x
+        except NonsmoothError as error:
+            reason = f" {error}"
+    if root is None or not np.abs(root - u / scales).max() < 10.0:
+        raise ConvergenceError(
+            f"homoclinic orbit: expected Newton's method to converge in {parameter!r}, received none "
+            f"after {loop.iterations} steps.{reason} Give a better guess.",
+            point=u,
+        )
+    return np.asarray(root * scales)
+
+
+def connection_of(loop: Loop, u: Array, parameter: str) -> Connection:
+    """What a solution of the equations is."""
+    legs, faults = loop.described(u)
+    p = loop.parameters_at(u)
+    return Connection(
+        system=loop.system,
+        parameter=parameter,
+        value=float(p[loop.free[-1]]),
+        parameters=named(loop.system, p),
+        saddle=loop.saddle(u),
+        legs=legs,
+        iterations=loop.iterations,
+        residual=float(np.abs(loop.equations(u)[0]).max()),
+        faults=faults,
+        loop=loop,
+        unknowns=u,
+    )

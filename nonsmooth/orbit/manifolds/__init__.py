@@ -1,0 +1,1 @@
+"""Invariant manifolds, dividing surfaces, canards and forward-reachable sets."""

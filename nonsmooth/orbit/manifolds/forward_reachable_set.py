@@ -1,0 +1,433 @@
+"""The set of futures from a point where there is more than one.
+
+In repelling sliding a motion can leave to either side at once, or slide on and leave later; at a
+two-fold it can do the same along the canards that go on into repelling sliding. Each choice is one
+solution in Filippov's sense. A funnel samples them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...flow.concatenation import join, until
+from ...flow.simulate import simulate
+from ...flow.status import Status
+from ...flow.trajectory import Trajectory
+from ...local import TwoFold, find_two_fold
+from ...local.point.lie_derivatives import Numbers
+from ...local.point.surface_point import Place, place
+from ...model import (
+    Array,
+    FilippovSystem,
+    OptionError,
+    Parameters,
+    PointError,
+    Surfaces,
+    explain,
+    real,
+    real_array,
+    require_system,
+)
+from .canards import Path, Slider, paths_from
+
+# Sampled futures of one point: what a funnel is, once its members are known.
+
+
+@dataclass(frozen=True)
+class Departure:
+    """How one member of a funnel goes.
+
+    Attributes
+    ----------
+    side : {"+", "-", "s"}
+        Where it leaves to; ``s`` slides as long as the sliding region lasts.
+    t : float
+        When it leaves.
+    path : int
+        Which sliding orbit it was on until then; -1 for none.
+    """
+
+    side: str
+    t: float
+    path: int
+
+    def __str__(self) -> str:
+        along = f" from path {self.path}" if self.path >= 0 else ""
+        if self.side == "s":
+            return f"slides along path {self.path} until t = {self.t:.6g}"
+        return f"leaves to {self.side}{along} at t = {self.t:.6g}"
+
+
+@dataclass(frozen=True, repr=False)
+class Funnel:
+    """Futures of one point: call it with a time to get the set of states there.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+        The system whose future is not unique.
+    t : float
+        When the future stops being unique.
+    point : ndarray (n,)
+        The state at which it stops being unique.
+    cause : str
+        Why it stops being unique, such as ``"repelling sliding of h0"``.
+    two_fold : TwoFold or None
+        The two-fold that the set begins at, if it does at one.
+    trajectories : tuple of Trajectory
+        From ``point`` on. One that meets another point without a unique future ends there, with
+        status NON_UNIQUE.
+    departures : tuple of Departure
+        How each of them goes.
+    past : Trajectory or None
+        The motion up to ``point``.
+    """
+
+    system: FilippovSystem
+    t: float
+    point: Array
+    cause: str
+    trajectories: tuple[Trajectory, ...]
+    departures: tuple[Departure, ...]
+    two_fold: TwoFold | None = None
+    past: Trajectory | None = field(default=None)
+
+    def __len__(self) -> int:
+        return len(self.trajectories)
+
+    def __call__(self, t: ArrayLike) -> Array:
+        """Evaluate all members."""
+        times = real_array(t, "time")
+        result = np.full((len(self), *times.shape, self.point.size), np.nan)
+        before = times < self.t
+        if before.any():
+            if self.past is None:
+                raise PointError(
+                    f"time: expected values from {self.t:g} on, received {times.min():g}. The "
+                    "funnel starts there."
+                )
+            result[:, before] = self.past(np.minimum(times[before], self.past.t[-1]))
+        for row, run in zip(result, self.trajectories, strict=True):
+            alive = ~before & (times <= run.t[-1])
+            row[alive] = run(times[alive])
+        return result
+
+    @property
+    def first_up(self) -> Trajectory | None:
+        """The first member that leaves to +, a bounding curve; None if none does."""
+        return self._first("+")
+
+    @property
+    def first_down(self) -> Trajectory | None:
+        """The first member that leaves to -, a bounding curve; None if none does."""
+        return self._first("-")
+
+    @property
+    def longest(self) -> Trajectory | None:
+        """The member that slides longest; None if none slides."""
+        sliding = [(d.t, k) for k, d in enumerate(self.departures) if d.side == "s"]
+        return self.trajectories[max(sliding)[1]] if sliding else None
+
+    def _first(self, side: str) -> Trajectory | None:
+        leaving = [(d.t, k) for k, d in enumerate(self.departures) if d.side == side]
+        return self.trajectories[min(leaving)[1]] if leaving else None
+
+    def __repr__(self) -> str:
+        sides = [d.side for d in self.departures]
+        counts = ", ".join(f"{sides.count(c)} {c}" for c in "+-s" if c in sides)
+        return f"Funnel({self.cause} at t = {self.t:g}, {len(self)} members: {counts})"
+
+
+_ANGLE = 1e-8  # of a field that counts as tangent to the surface
+
+
+def funnel(
+    start: FilippovSystem | Trajectory,
+    point: ArrayLike | None = None,
+    t_end: float | None = None,
+    *,
+    samples: int = 33,
+    t_start: float = 0.0,
+    parameters: Parameters | None = None,
+    tol: float = 1e-10,
+) -> Funnel:
+    """Sample the futures of a point where forward uniqueness fails.
+
+    Parameters
+    ----------
+    start : FilippovSystem or Trajectory
+        A system, or a run that ended with NON_UNIQUE, which is continued.
+    point : array_like (n,)
+        With a system: a start in repelling sliding or at a two-fold, or one from which the motion
+        gets there. Not with a trajectory.
+    t_end : float
+        Final time of all members.
+    samples : int, optional
+        About how many members, at least 3. Times of leaving are spread evenly over each sliding
+        orbit; where a sector of sliding orbits leaves a two-fold, directions within it too.
+    t_start, parameters, tol : optional
+        As in :func:`simulate`. A trajectory brings its own time and parameters.
+
+    Returns
+    -------
+    Funnel
+        Sampled futures, and how each of them departs.
+
+    Raises
+    ------
+    PointError
+        The future is unique until ``t_end``, or the point is not one of those above: on several
+        surfaces, or with hidden dynamics.
+    DegenerateError
+        A two-fold that is not generic.
+    OptionError
+        Fewer than three samples, or a time out of its range.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    DefinitionError
+        ``start`` is neither a system nor a run, or has vector multipliers.
+
+    Notes
+    -----
+    Members leave repelling sliding up or down at a sampled time, or slide on until their region
+    ends. At a two-fold they leave at once along a field whose fold is visible there, or slide out
+    along canards and faux canards (``nonsmooth/orbit/manifolds/canards.py``); from a Teixeira singularity
+    (II-C) also flights along the diabolo lines start, which are not sampled.
+
+    Source: Filippov 1988, sec. 10 (uniqueness) and 19 (two-folds); Colombo & Jeffrey 2011.
+
+    Examples
+    --------
+    An orbit of $x' = sgn x$ from 0 can be anywhere in $abs(x) <= t$:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x = ca.SX.sym("x")
+    >>> system = ns.FilippovSystem([x], surface=x, above=[1], below=[-1])
+    >>> futures = ns.orbit.funnel(system, [0.0], 2.0, samples=5)
+    >>> futures
+    Funnel(repelling sliding of h0 at t = 0, 5 members: 2 +, 2 -, 1 s)
+    >>> futures(1.5)[:, 0]
+    array([ 1.5,  0.5, -1.5, -0.5,  0. ])
+    >>> print(futures.departures[1])
+    leaves to + from path 0 at t = 1
+    """
+    if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 3:
+        raise OptionError(
+            f"samples: expected an integer of at least 3, received {samples!r}. One leaves up, one "
+            "down, one slides."
+        )
+    past = _past(start, point, t_end, t_start, parameters, tol)
+    assert t_end is not None
+    return _Sampler(past, float(t_end), int(samples), tol).run()
+
+
+def _past(
+    start: FilippovSystem | Trajectory,
+    point: ArrayLike | None,
+    t_end: float | None,
+    t_start: float,
+    parameters: Parameters | None,
+    tol: float,
+) -> Trajectory:
+    """Return the run up to the point where the future is not unique."""
+    if t_end is None:
+        raise OptionError("t_end: expected the final time of the funnel, received none.")
+    t_end = real(t_end, "t_end")
+    if isinstance(start, Trajectory):
+        if point is not None or parameters is not None:
+            raise OptionError(
+                "point, parameters: expected none with a trajectory, received some. The funnel "
+                "starts where the trajectory ends, with its parameters."
+            )
+        if not t_end > start.t[-1]:
+            raise OptionError(
+                f"t_end: expected a time after {start.t[-1]:g}, received {t_end!r}. The funnel "
+                "starts where the trajectory ends."
+            )
+        past = start
+        require_system(past.system)
+    else:
+        require_system(start)
+        if point is None:
+            raise OptionError("point: expected a start, received none.")
+        past = simulate(start, point, t_end, t_start=t_start, parameters=parameters, tol=tol)
+    if past.status is not Status.NON_UNIQUE:
+        raise PointError(
+            explain(
+                "funnel",
+                expected="a motion that meets a point where its future is not unique",
+                received=f"a unique one until t = {past.t[-1]:g}, {past.status}, itinerary "
+                f"{past.itinerary!r}",
+                advice="Start in repelling sliding or at a two-fold, or raise t_end if the motion "
+                "gets there later.",
+            )
+        )
+    return past
+
+
+class _Sampler:
+    """Builds one funnel."""
+
+    def __init__(self, past: Trajectory, t_end: float, samples: int, tol: float):
+        self.system, self.past = past.system, past
+        self.t, self.t_end, self.samples, self.tol = float(past.t[-1]), t_end, samples, tol
+        self.x = self.system.extended_point(past.x[-1], self.t)
+        self.surfaces = Surfaces(self.system)
+        self.where = self._place()
+        self.slider = Slider(self.where, self.surfaces, t_end, tol)
+        self.members: list[Trajectory] = []
+        self.departures: list[Departure] = []
+
+    def run(self) -> Funnel:
+        numbers = self.where.finite_at(self.x)
+        fold: TwoFold | None = None
+        if np.all(np.abs(numbers.angles) <= _ANGLE):
+            cause = f"two-fold of h{self.where.surface}"
+            if self.system.dimension > 2:
+                fold = self._two_fold()
+                cause = f"two-fold {fold.label} of h{self.where.surface}"
+                self.x = self.system.extended_point(fold.point, self.t)
+            self._leave_two_fold(self.where.at(self.x).second)
+        else:
+            self._require_repelling(numbers)
+            cause = f"repelling sliding of h{self.where.surface}"
+            path = Path(self.slider.path(self.x, self.t), True)
+            self._leave_paths([path], self.samples, at_once=True)
+        if not self.members:
+            raise PointError(
+                explain(
+                    "funnel",
+                    expected="a continuation from the point",
+                    received=f"none that can be sampled from the {cause} at {self.x.tolist()}",
+                    advice="From an invisible two-fold without canards the motion goes on by "
+                    "flights from side to side.",
+                )
+            )
+        return Funnel(
+            system=self.system,
+            t=self.t,
+            point=self.x[: self.system.dimension].copy(),
+            cause=cause,
+            trajectories=tuple(self.members),
+            departures=tuple(self.departures),
+            two_fold=fold,
+            past=self.past if len(self.past.t) > 1 else None,
+        )
+
+    # where -------------------------------------------------------------------------------------
+
+    def _place(self) -> Place:
+        """Return the one surface through the point."""
+        parameters = self.past.parameters
+        p = self.system.parameter_vector(parameters)
+        h, gradient = self.surfaces.values(self.x, p)
+        scale = np.abs(gradient) @ (1.0 + np.abs(self.x))
+        active = np.flatnonzero(np.abs(h) <= 1e-12 * scale)
+        if len(active) != 1 or self.system.nonlinear[active[0]]:
+            kind = (
+                "hidden dynamics there"
+                if len(active) == 1
+                else f"{len(active)} surfaces through it ({', '.join(f'h{i}' for i in active)})"
+            )
+            raise PointError(
+                explain(
+                    f"point {self.x.tolist()}",
+                    expected="a point of one surface, with a field linear in its multiplier",
+                    received=kind,
+                    advice="Continuations there are chosen by hand: simulate(start_mode=...).",
+                )
+            )
+        n = self.system.dimension
+        where, _ = place(self.system, self.x[:n], parameters, self.t, int(active[0]))
+        return where
+
+    def _two_fold(self) -> TwoFold:
+        n = self.system.dimension
+        return find_two_fold(
+            self.system,
+            self.x[:n],
+            parameters=self.past.parameters,
+            t=self.t,
+            surface=self.where.surface,
+            mode=self.where.mode,
+        )
+
+    def _require_repelling(self, numbers: Numbers) -> None:
+        above, below = numbers.angles
+        if not (above >= -_ANGLE and below <= _ANGLE):
+            raise PointError(
+                explain(
+                    f"point {self.x.tolist()}",
+                    expected="repelling sliding or a generic two-fold",
+                    received=f"L1 = {numbers.lie[0]:.6g}, L2 = {numbers.lie[1]:.6g}; the run said: "
+                    f"{self.past.message}",
+                    advice="Continue with simulate(start_mode=...) in the mode that is meant.",
+                )
+            )
+
+    # members -----------------------------------------------------------------------------------
+
+    def _leave_two_fold(self, second: dict[str, float]) -> None:
+        """At once on visible sides, and from every sliding orbit that goes out."""
+        for side, visible in (("+", second["L11"] > 0.0), ("-", second["L22"] < 0.0)):
+            if visible:
+                self._add([], self.x, self.t, side, -1)
+        left = max(self.samples - len(self.members), 1)
+        paths = paths_from(self.x, self.t, self.slider, left)
+        self._leave_paths(paths, left, at_once=False)
+
+    def _leave_paths(self, paths: list[Path], samples: int, at_once: bool) -> None:
+        open_ones = sum(p.repelling for p in paths)
+        each = max(1, (samples - len(paths)) // (2 * open_ones)) if open_ones else 0
+        for number, path in enumerate(paths):
+            if path.repelling:
+                self._leave_path(path, number, each, at_once)
+            self._slide_on(path, number)
+
+    def _leave_path(self, path: Path, number: int, count: int, at_once: bool) -> None:
+        for side in "+-":
+            for t in _times(path.run, count, at_once):
+                pieces = [until(path.run, t)] if t > path.run.t[0] else []
+                x = self.system.extended_point(path.run(t), t)
+                self._add(pieces, x, t, side, number)
+
+    def _slide_on(self, path: Path, number: int) -> None:
+        end = float(path.run.t[-1])
+        pieces = [path.run]
+        if end < self.t_end and self._may_go_on(path.run):
+            pieces.append(self._simulate(self.system.extended_point(path.run.x[-1], end), end))
+        self.members.append(join(pieces))
+        self.departures.append(Departure("s", end, number))
+
+    def _may_go_on(self, run: Trajectory) -> bool:
+        """Whether the path ended at a fold or another surface, not at a stop, reset or failure."""
+        name = run.events[-1].name if run.events else ""
+        return run.status is Status.STOPPED and (name.startswith(("L_F", "h")) or name == "f0")
+
+    def _add(self, before: list[Trajectory], x: Array, t: float, side: str, number: int) -> None:
+        run = self._simulate(x, t, self.where.side(side))
+        self.members.append(join([*before, run]))
+        self.departures.append(Departure(side, t, number))
+
+    def _simulate(self, x: Array, t: float, mode: str | None = None) -> Trajectory:
+        return simulate(
+            self.system,
+            self.slider.on(x)[: self.system.dimension],
+            self.t_end,
+            t_start=t,
+            parameters=self.past.parameters,
+            tol=self.tol,
+            start_mode=mode,
+        )
+
+
+def _times(run: Trajectory, count: int, at_once: bool) -> Iterator[float]:
+    """Times of leaving, the end of the path excluded and its start only if it may be left there."""
+    start, end = float(run.t[0]), float(run.t[-1])
+    for k in range(count):
+        part = k / count if at_once else (k + 1) / (count + 1)
+        yield start + part * (end - start)

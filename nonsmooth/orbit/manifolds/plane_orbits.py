@@ -1,0 +1,157 @@
+"""Orbits of a planar system in a box: evenly spaced ones, and those that separate the others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from functools import cached_property, partial
+
+import numpy as np
+
+from ...flow import Status, Trajectory, simulate
+from ...local.point.regions import Region
+from ...local.point.sides import SIDES
+from ...local.scans.plane_scan import PlaneScan
+from ...model import Array, FilippovSystem, Stop
+from .evenly_spaced_orbits import Cut, SpacedOrbit, evenly_spaced, polyline, until_rest
+
+_TOLERANCE = 1e-8  # far below what a picture resolves
+_CHUNK, _LONGEST = 12, 600  # steps between looks at an orbit, and of all of it
+_EVENTS = 200
+_PASSES = 40.0  # of the box by a typical orbit, in the longest time
+_NEAR = 1e-4  # in units of the box: of a saddle's manifolds at their start, of an orbit that closed
+
+
+class PlaneOrbits:
+    """Orbits through crossing and sliding, forward and backward, to a little outside the box."""
+
+    # Stops and resets of the system are ignored.
+
+    def __init__(self, scan: PlaneScan, t_end: float | None = None):
+        self.scan = scan
+        self.t_end = _duration(scan) if t_end is None else t_end
+
+    @cached_property
+    def rests(self) -> list[Array]:
+        """Where orbits rest."""
+        found = [at.point for at in [*self.scan.equilibria, *self.scan.boundary_equilibria]]
+        return found + [at.point for at in self.scan.pseudo_equilibria]
+
+    @cached_property
+    def _systems(self) -> dict[bool, FilippovSystem]:
+        """The system and its time reversal."""
+        return {ahead: _bounded(self.scan, 1 if ahead else -1) for ahead in (True, False)}
+
+    def follow(
+        self,
+        start: Array,
+        ahead: bool = True,
+        cut: Cut | None = None,
+        mode: str | None = None,
+        landing: bool = False,
+    ) -> Array:
+        """Follow one orbit, a few steps at a time, until ``cut`` shortens it."""
+        if not np.all(np.isfinite(start)):
+            return np.empty((0, 2))
+        curve, x, t, events = start[None, :], start, 0.0, list[Array]()
+        for _ in range(_LONGEST // _CHUNK):
+            part = simulate(
+                self._systems[ahead],
+                x,
+                t_end=self.t_end,
+                t_start=t,
+                tol=_TOLERANCE,
+                start_mode=mode,
+                max_events=_EVENTS,
+                max_steps=_CHUNK,
+                engine="reference",
+            )
+            entry = next((e for e in part.events if landing and e.kind == "entry"), None)
+            until = None if entry is None else (entry.t, entry.x)
+            curve = np.vstack([curve, polyline(part, self.scan.box.size, until=until)[1:]])
+            kept = curve if cut is None else cut(curve)
+            events += [event.x for event in part.events[:-1]]
+            done = part.status is not Status.TOO_MANY_STEPS or len(events) > _EVENTS
+            done |= entry is not None
+            if done or len(kept) < len(curve) or self._closed(events):
+                return kept
+            x, t, mode = part.x[-1], float(part.t[-1]), _mode_at_end(part)
+        return curve
+
+    def _closed(self, events: list[Array]) -> bool:
+        """Whether the last event is where an earlier one was: a cycle, drawn once."""
+        if len(events) < 3:
+            return False
+        gaps = (np.array(events[:-2]) - events[-1]) / self.scan.box.size
+        return bool(np.min(np.linalg.norm(gaps, axis=1)) < _NEAR)
+
+    def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[SpacedOrbit]:
+        """Orbits in the direction of time, about evenly spaced; none starts beside ``avoid``."""
+        # They go from where they begin to where they end, if that is in the box: sliding or rest.
+        follow = partial(self.follow, landing=True)
+        return evenly_spaced(self.scan.box, count, follow, avoid=avoid, rests=self.rests)
+
+    def separatrices(self) -> Iterator[tuple[str, Array]]:
+        """Names and curves (m, 2), in the direction of time."""
+        # ``"fold orbit"`` through visible folds, ``"separatrix"`` for the invariant manifolds of
+        # saddles and for the orbits that end in, or leave, pseudo-saddles.
+        for fold in self.scan.folds:
+            if fold.kind == "visible":
+                for ahead in (False, True):
+                    yield "fold orbit", self._from(fold.point, ahead, fold.side)
+        for found in self.scan.equilibria:
+            if found.kind == "saddle":
+                directions = self.scan.eigenvectors(found)
+                for direction, ahead in zip(directions, (False, True), strict=True):
+                    step = _NEAR * float(self.scan.box.size.min()) * direction
+                    for start in (found.point + step, found.point - step):
+                        yield "separatrix", self._from(start, ahead)
+        for rest in self.scan.pseudo_equilibria:
+            if rest.kind == "pseudo-saddle":
+                ahead = rest.region is not Region.ATTRACTING
+                for side in SIDES:
+                    yield "separatrix", self._from(rest.point, ahead, side)
+
+    def _from(self, start: Array, ahead: bool, mode: str | None = None) -> Array:
+        """An orbit to where it ends, a focus that it winds into too, in the direction of time."""
+        curve = self.follow(start, ahead, self._to_rest, mode=mode)
+        return curve[:: 1 if ahead else -1]
+
+    def _to_rest(self, curve: Array) -> Array:
+        rested = until_rest(curve, self.rests, self.scan.box.size)
+        return curve if rested is None else rested
+
+
+def _mode_at_end(run: Trajectory) -> str | None:
+    """Mode in which a run goes on, where its last state does not say it: on the surface."""
+    mode, on_event = run.events[-1].mode_after, False
+    if len(run.events) > 1:
+        on_event = run.events[-2].t == run.t[-1]
+    return mode if "s" in mode or on_event else None
+
+
+def _bounded(scan: PlaneScan, direction: int) -> FilippovSystem:
+    """Return the system, or its time reversal, with stops a little outside the box."""
+    system, box = scan.where.system, scan.box
+    x, y = system.extended_states[0], system.extended_states[1]
+    dx, dy = 0.03 * box.size
+    walls = [x - (box.x0 - dx), (box.x1 + dx) - x, y - (box.y0 - dy), (box.y1 + dy) - y]
+    symbols = [system.parameter_symbols[k] for k in range(len(scan.where.parameters))]
+    above, below = ([direction * system.field(side)[k] for k in (0, 1)] for side in SIDES)
+    return FilippovSystem(
+        [x, y],
+        surface=system.surface_function(0),
+        above=above,
+        below=below,
+        parameters=dict(zip(symbols, scan.where.parameters.tolist(), strict=True)),
+        stops=[Stop(wall, -1, f"wall {k}") for k, wall in enumerate(walls)],
+    )
+
+
+def _duration(scan: PlaneScan) -> float:
+    """Time in which a typical orbit passes the box several times."""
+    points = scan.box.corner + np.random.default_rng(0).uniform(size=(400, 2)) * scan.box.size
+    values = scan.at(points)
+    fields = np.where(values.h[:, None] > 0, values.fields[:, 0], values.fields[:, 1])
+    speed = np.linalg.norm(fields / scan.box.size, axis=1)
+    speed = speed[np.isfinite(speed) & (speed > 0)]
+    return _PASSES / float(np.quantile(speed, 0.25)) if speed.size else 1.0

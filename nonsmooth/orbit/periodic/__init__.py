@@ -1,0 +1,1 @@
+"""Periodic orbits: guesses, boundary value problem, Newton's method, multipliers, symmetry."""

@@ -1,0 +1,453 @@
+"""The boundary value problem of a periodic orbit with a fixed itinerary.
+
+Unknowns are the start x_i (extended by the time where the system depends on it) and the duration T_i of
+every leg. With the flow phi of the leg's mode, its event e_i and reset g_i,
+
+    g_i(phi_i(x_i, T_i; p)) - x_(i+1) = 0,     e_i(phi_i(x_i, T_i; p)) = 0,     i = 1 .. N,
+
+and the last leg leads back to the first: R g_N - d - x_1 = 0, where R is a symmetry (half orbits) and
+d advances the time of a forced system. The Jacobian holds plain variational matrices; saltation appears
+by itself when the durations are eliminated.
+
+Nothing here asks whether the guards agree: a solution may be virtual, and branches pass through such
+points smoothly. Source: Dercole & Kuznetsov 2005 (SlideCont), Thota & Dankowicz 2008 (TC-HAT), with Taylor
+legs in place of collocation.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
+from typing import Any, NamedTuple
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...flow.compiled.shooting import Demands, SolvedOrbit
+from ...flow.fixed import MOST_STEPS, TOLERANCE, values_program
+from ...model import Array, FilippovSystem
+from ...model.derivatives.event_maps import AtEvent, surface_map
+from ...model.derivatives.forcing import Forcing
+from ..runs.flight import EXTENDED, Flight, Flights, flights_of
+from ..runs.legs import Flown, Leg, fly
+
+# Where the parts of the equations of an orbit are in their Jacobian.
+
+
+class Places(NamedTuple):
+    """Where entries of the Jacobian are in it, row after row."""
+
+    blocks: NDArray[Any]
+    following: NDArray[Any]
+    by_duration: NDArray[Any]
+    event_rows: NDArray[Any]
+    event_durations: NDArray[Any]
+    next_leg: NDArray[Any]
+
+
+@lru_cache(maxsize=256)
+def places_of(count: int, n: int) -> Places:
+    """The places for so many legs of n states."""
+    size = count * (n + 1)
+    places = np.arange(size * size).reshape(size, size)
+    rows = np.arange(count * n).reshape(count, n)
+    times = np.arange(count * n, size)
+    return Places(
+        places[rows[:, :, None], rows[:, None, :]].ravel(),
+        places[rows, np.roll(rows, -1, axis=0)].ravel(),
+        places[rows, times[:, None]].ravel(),
+        places[times[:, None], rows].ravel(),
+        places[times, times].ravel(),
+        np.roll(np.arange(count), -1),
+    )
+
+
+# What is asked of Newton's method where the equations of a whole orbit are solved in one call.
+
+#: Newton's method ends when the next step would be below this, relative to the orbit.
+CLOSE = 1e-10
+
+#: Steps below this, relative to the orbit, are rounding.
+ROUNDING = 1e-14
+
+#: Legs far from the orbit are flown with local errors up to this.
+COARSE = 1e-8
+
+#: Steps below this, relative to the orbit, change its derivatives by rounding.
+FINAL = 1e-13
+
+#: Steps below this that do not shrink are rounding of the equations.
+NOISE = 1e-11
+
+
+def demands_of(
+    forcing: Forcing | None,
+    periods: float,
+    *,
+    tol: float = CLOSE,
+    noise: float = NOISE,
+    longest: float = 0.0,
+    most: int = 1,
+    most_steps: int = MOST_STEPS,
+) -> Demands:
+    """Demands on an orbit."""
+    period = None if forcing is None else values_program(forcing).pointer
+    local = (TOLERANCE, COARSE, EXTENDED, FINAL, ROUNDING)
+    return Demands(tol, noise, *local, longest, periods, period, most, most_steps)
+
+
+#: Up to so many unknowns a dense solution is faster than elimination in Python.
+_DENSE = 60
+
+#: Up to so many legs the states where they start do not tell the size of the orbit.
+_FEW = 4
+
+
+@dataclass(frozen=True, eq=False)
+class Evaluation:
+    """The equations at some unknowns.
+
+    Attributes
+    ----------
+    residual : ndarray (m,)
+    whole : ndarray (m, m + q)
+        Derivatives by the unknowns, then by the chosen parameters.
+    flight : Flight
+        The legs, with the events at their ends; for a leg without an event the identity and the phase
+        condition.
+    starts : ndarray (N, n)
+    durations : ndarray (N,)
+    """
+
+    residual: Array
+    whole: Array
+    flight: Flight
+    starts: Array
+    durations: Array
+
+    @property
+    def jacobian(self) -> Array:
+        """By the unknowns, (m, m)."""
+        return self.whole[:, : len(self.whole)]
+
+    @property
+    def by_parameters(self) -> Array:
+        """By the chosen parameters, (m, q)."""
+        return self.whole[:, len(self.whole) :]
+
+    @property
+    def flown(self) -> tuple[Flown, ...]:
+        """Leg by leg."""
+        return self.flight.flown
+
+    @property
+    def events(self) -> tuple[AtEvent, ...]:
+        """Event by event."""
+        return self.flight.events
+
+
+@dataclass(frozen=True, eq=False)
+class BoundaryProblem:
+    """A periodic orbit's equations: legs, symmetry, forcing, phase.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+    legs : tuple of Leg
+    symmetry : ndarray (n, n) or None
+        R, on the states without the time.
+    periods : float
+        Forcing periods by which the legs advance the time; a whole number, or a half of one with a
+        symmetry.
+    forcing : Forcing or None
+        The forcing period as a function of the parameters.
+    phase : ndarray (N,) or None
+        For a leg without an event: the row of the phase condition ``phase . (x_1 - reference)``.
+    reference : ndarray (N,) or None
+    kept : tuple of int
+        Surfaces on which every leg slides.
+    """
+
+    system: FilippovSystem
+    legs: tuple[Leg, ...]
+    symmetry: Array | None = None
+    periods: float = 0.0
+    forcing: Forcing | None = None
+    phase: Array | None = None
+    reference: Array | None = None
+    kept: tuple[int, ...] = field(init=False)
+
+    def __post_init__(self) -> None:
+        sliding = [
+            i
+            for i in range(self.system.surface_count)
+            if all(leg.mode[i] == "s" for leg in self.legs)
+        ]
+        object.__setattr__(self, "kept", tuple(sliding))
+
+    @property
+    def dimension(self) -> int:
+        """States of a leg's start, the time included."""
+        return self.system.extended_dimension
+
+    @property
+    def size(self) -> int:
+        """Number of unknowns."""
+        return len(self.legs) * (self.dimension + 1)
+
+    def pack(self, starts: Array, durations: Array) -> Array:
+        """Unknowns from starts (N, n) and durations (N,)."""
+        return np.concatenate([np.ravel(starts), np.ravel(durations)])
+
+    def split(self, u: Array) -> tuple[Array, Array]:
+        """Starts (N, n) and durations (N,) of unknowns."""
+        count = len(self.legs) * self.dimension
+        return u[:count].reshape(len(self.legs), self.dimension), u[count : self.size]
+
+    @cached_property
+    def wrap(self) -> Array:
+        """R on the extended states."""
+        whole = np.eye(self.dimension)
+        if self.symmetry is not None:
+            n = self.system.dimension
+            whole[:n, :n] = self.symmetry
+        return whole
+
+    def advance(self, p: Array) -> tuple[float, Array]:
+        """Time by which the legs advance, and its derivatives by all parameters."""
+        if self.forcing is None:
+            return 0.0, np.zeros(p.size)
+        value, slope = self.forcing(p)
+        return self.periods * value, self.periods * slope
+
+    def evaluate(
+        self, u: Array, p: Array, chosen: tuple[int, ...] = (), tol: float = TOLERANCE
+    ) -> Evaluation:
+        """Residual, Jacobian by the unknowns, and derivatives by chosen parameters.
+
+        Parameters
+        ----------
+        u : ndarray (m,)
+        p : ndarray
+            All parameters.
+        chosen : tuple of int
+            Parameters by which one differentiates.
+        tol : float, optional
+            Local errors of the steps.
+
+        Raises
+        ------
+        ConvergenceError, DegenerateError
+            A leg cannot be flown.
+        """
+        columns = list(chosen)
+        if self.is_direct:
+            free = np.concatenate([u[: self.size], p[columns]])
+            wrap = None if self.symmetry is None else self.wrap
+            demands = demands_of(self.forcing, self.periods)
+            found = self.flights(chosen).evaluated(free, p, wrap, tol, demands)
+            if found is not None:
+                return self.evaluation(*found)
+        starts, durations = self.split(u)
+        with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
+            return self._assembled(self.flights(chosen)(starts, durations, p, tol), u, p, columns)
+
+    def _assembled(self, flight: Flight, u: Array, p: Array, columns: list[int]) -> Evaluation:
+        starts, durations = self.split(u)
+        count, n, size = len(self.legs), self.dimension, self.size
+        after, by_end = flight.after, flight.after_state
+        by_p = by_end @ flight.by_parameters + flight.after_parameters[:, :, columns]
+        if self.symmetry is not None:
+            after, by_end, by_p = after.copy(), by_end.copy(), by_p
+            after[-1], by_end[-1] = self.wrap @ after[-1], self.wrap @ by_end[-1]
+            by_p[-1] = self.wrap @ by_p[-1]
+        at, flat = places_of(count, n), np.zeros(size * size)
+        residual, by_parameters = np.empty(size), np.empty((size, len(columns)))
+        residual[: count * n] = (after - starts[at.next_leg]).ravel()
+        residual[count * n :] = flight.value
+        flat[at.blocks] = (by_end @ flight.by_start).ravel()
+        flat[at.following] -= 1.0
+        rate = flight.rate[:, :, None]
+        flat[at.by_duration] = (by_end @ rate).ravel()
+        gradient = flight.gradient[:, None, :]
+        flat[at.event_rows] = (gradient @ flight.by_start).ravel()
+        flat[at.event_durations] = (gradient @ rate).ravel()
+        by_parameters[: count * n] = by_p.reshape(count * n, -1)
+        by_parameters[count * n :] = (gradient @ flight.by_parameters)[:, 0]
+        by_parameters[count * n :] += flight.value_parameters[:, columns]
+        jacobian = flat.reshape(size, size)
+        self._advance(residual, by_parameters, slice((count - 1) * n, count * n), p, columns)
+        if self.phase is not None:
+            self._phased(residual, jacobian, by_parameters, flight, starts[0])
+        if self.kept:
+            self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
+        whole = np.hstack([jacobian, by_parameters])
+        return Evaluation(residual, whole, flight, starts, durations)
+
+    @cached_property
+    def is_direct(self) -> bool:
+        """Whether the equations can be had in one call."""
+        return self.phase is None and not self.kept and self.flights().is_direct
+
+    def evaluation(self, solved: SolvedOrbit, flight: Flight) -> Evaluation:
+        """The equations as one call gives them."""
+        starts, durations = self.split(solved.unknowns)
+        return Evaluation(solved.residual, solved.jacobian, flight, starts, durations)
+
+    def exact_residual(self, u: Array, p: Array) -> Array | None:
+        """Residual with errors far below those of doubles; None where there is no such one.
+
+        Parameters
+        ----------
+        u : ndarray (m,)
+        p : ndarray
+        """
+        starts, durations = self.split(u)
+        if self.phase is not None or self.kept:
+            return None
+        found = self.flights(()).exact(starts, durations, p)
+        if found is None:
+            return None
+        after, rest, value = found
+        if self.symmetry is not None:
+            after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
+        gap = after - starts[places_of(*starts.shape).next_leg]
+        gap[-1, -1] -= self.advance(p)[0]
+        gap += rest
+        return np.concatenate([gap.ravel(), value])
+
+    def flights(self, chosen: tuple[int, ...] = ()) -> Flights:
+        """The legs, ready to be flown with derivatives by chosen parameters."""
+        made = _FLIGHTS.setdefault(self, {})
+        found = made.get(chosen)
+        if found is None:
+            found = made[chosen] = flights_of(self.system, self.legs, chosen)
+        return found
+
+    def _phased(
+        self, residual: Array, jacobian: Array, by_parameters: Array, flight: Flight, start: Array
+    ) -> None:
+        """The phase condition in place of the event that the one leg does not have."""
+        assert self.phase is not None and self.reference is not None
+        n = self.dimension
+        residual[n] = self.phase @ (start - self.reference)
+        jacobian[n] = 0.0
+        jacobian[n, :n] = self.phase
+        by_parameters[n] = 0.0
+        flight.gradient[0, :n] = self.phase @ self.wrap
+
+    def _advance(
+        self, residual: Array, by_parameters: Array, own: slice, p: Array, columns: Sequence[int]
+    ) -> None:
+        if self.forcing is None:
+            return
+        value, slope = self.advance(p)
+        residual[own.stop - 1] -= value
+        by_parameters[own.stop - 1] -= slope[list(columns)]
+
+    def _keep(
+        self,
+        residual: Array,
+        jacobian: Array,
+        by_parameters: Array,
+        start: Array,
+        p: Array,
+        columns: Sequence[int],
+    ) -> None:
+        """An orbit that slides all the time keeps h whatever it is."""
+        n = self.dimension
+        first = (len(self.legs) - 1) * n
+        taken: list[int] = []
+        for surface in self.kept:
+            at = surface_map(self.system, surface)(start, p)
+            free = [k for k in range(self.system.dimension) if k not in taken]
+            k = max(free, key=lambda k: abs(float(at.gradient[k])))
+            taken.append(k)
+            residual[first + k] = at.value
+            jacobian[first + k] = 0.0
+            jacobian[first + k, :n] = at.gradient
+            by_parameters[first + k] = at.by_parameters[list(columns)]
+
+    def rephased(self, u: Array, p: Array) -> BoundaryProblem:
+        """The problem with the plane through an orbit's start across the flow there.
+
+        An autonomous orbit without events starts on a plane, which may miss the orbits that it
+        becomes as a parameter varies. Problems with events, or with forcing, are as they were.
+        """
+        if self.phase is None or self.system.time_dependent:
+            return self
+        start, leg = self.split(u)[0][0], self.legs[0]
+        field = leg.field(self.system)
+        rate = field.rate.copied(field.states_at(start, p), p)[0][: self.dimension, 0]
+        speed = float(np.linalg.norm(rate))
+        if not speed > 0.0:
+            return self
+        return replace(self, phase=rate / speed, reference=start.copy())
+
+    def solve(self, jacobian: Array, right: Array) -> Array:
+        """Solve equations with the Jacobian of this problem, by elimination from leg to leg.
+
+        Durations are eliminated first, then the starts of all legs but the first: n^3 operations for
+        each leg (few legs are solved as a dense system). The columns may be scaled.
+
+        Raises
+        ------
+        numpy.linalg.LinAlgError
+        """
+        count, n = len(self.legs), self.dimension
+        if self.size <= _DENSE or self.kept or not all(leg.name for leg in self.legs):
+            return np.asarray(np.linalg.solve(jacobian, right), float)
+        steps, shifts, slopes, times = [], [], [], []
+        for i in range(count):
+            own, time = slice(i * n, (i + 1) * n), count * n + i
+            following = slice(0, n) if i + 1 == count else slice((i + 1) * n, (i + 2) * n)
+            if jacobian[time, time] == 0.0:
+                raise np.linalg.LinAlgError(f"leg {i + 1}: its event is grazed")
+            slope = jacobian[time, own] / jacobian[time, time]
+            level = right[time] / jacobian[time, time]
+            ahead = -np.diag(jacobian[own, following])  # a diagonal block, but for one leg
+            steps.append(
+                (jacobian[own, own] - np.outer(jacobian[own, time], slope)) / ahead[:, None]
+            )
+            shifts.append((jacobian[own, time] * level - right[own]) / ahead)
+            slopes.append(slope)
+            times.append(level)
+        whole, shift = np.eye(n), np.zeros(n)
+        for step, more in zip(steps, shifts, strict=True):
+            whole, shift = step @ whole, step @ shift + more
+        x = np.linalg.solve(np.eye(n) - whole, shift)
+        result = np.zeros(self.size)
+        for i in range(count):
+            result[i * n : (i + 1) * n] = x
+            result[count * n + i] = times[i] - slopes[i] @ x
+            x = steps[i] @ x + shifts[i]
+        return result
+
+    def scales(self, u: Array, p: Array | None = None) -> Array:
+        """Sizes of the unknowns: states by their range over the legs, times by the duration.
+
+        With parameters ``p`` the states inside of few legs count, not only where they start.
+        """
+        starts, durations = self.split(u)
+        span = float(np.abs(durations).sum()) or 1.0
+        seen = starts
+        if p is not None and len(self.legs) <= _FEW:
+            inside = [
+                fly(self.system, leg, x, part * float(duration), p).end[: self.dimension]
+                for leg, x, duration in zip(self.legs, starts, durations, strict=True)
+                for part in (0.2, 0.4, 0.6, 0.8)
+            ]
+            seen = np.vstack([starts, *inside])
+        size, n = np.abs(seen).max(axis=0).tolist(), self.system.dimension
+        largest = max(*size[:n], 1e-300)  # the time has units of its own
+        if self.system.time_dependent and largest < 1e-9 * span:  # all legs begin at zero
+            largest = span
+        size = [part if part > 1e-6 * largest else largest for part in size[:n]]
+        count, more = len(self.legs), [span] * (self.dimension - n)
+        return np.array((size + more) * count + [span] * count)
+
+
+#: Legs of a problem ready to be flown, by the chosen parameters.
+_FLIGHTS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], Flights]] = WeakKeyDictionary()

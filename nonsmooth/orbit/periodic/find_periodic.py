@@ -1,0 +1,484 @@
+"""The verb ``periodic_orbit``: from a guess to a periodic orbit, or to the reason why there is none."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...flow.fixed import TOLERANCE
+from ...flow.trajectory import Trajectory
+from ...model import (
+    Array,
+    ConvergenceError,
+    DegenerateError,
+    FilippovSystem,
+    NonsmoothError,
+    OptionError,
+    Parameters,
+    require_system,
+    whole,
+)
+from ...solvers.newton import Equations, converge, solve
+from ..runs.itinerary import Itinerary
+from ..runs.legs import Leg, leg_name
+from .boundary_value_problem import CLOSE, COARSE, FINAL, ROUNDING, BoundaryProblem, Evaluation
+from .forcing import about_of
+from .guess import Start, start_of
+from .orbit import PeriodicOrbit, faults_of, named
+from .recurrence import is_about
+from .shooting import shot
+from .symmetry import mirror_of, once_round, require_symmetric
+
+# What a solution of the equations of an orbit must be to count as one.
+
+#: A period below this part of the guess is that of a point.
+_POINT = 1e-9
+
+#: One below this part of it is too, where the equations are singular to ``_SINGULAR``: as an orbit
+#: shrinks to a point, its duration is determined ever less.
+_SHRUNK, _SINGULAR = 1e-2, 1e-9
+
+#: Motion by fewer spacings of numbers of the size of a state is lost in rounding.
+_SPACINGS = 8.0
+
+#: What moves by no more than this part of its size rests.
+_STILL = 1e-6
+
+
+def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> None:
+    """Refuse a point: every equilibrium solves the equations of an orbit, of no or any duration."""
+    # So does, with any duration, every point so far away that motion is lost in its rounding.
+    n = problem.system.dimension
+    guess = float(np.abs(start.problem.split(start.unknowns)[1]).sum())
+    period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
+    _require_resolved(problem, at)
+    way = float(np.abs(at.flight.rate[0]).max()) * period
+    rests = not problem.legs[-1].name and not problem.system.time_dependent
+    shrunk = period <= _SHRUNK * guess and _singular(problem, at)
+    if period > _POINT * guess and not shrunk:
+        guessed = float(np.abs(start.problem.split(start.unknowns)[0][:, :n]).max())
+        size = max(min(1.0, guessed), float(np.abs(x).max()))
+        if not (rests and way <= _STILL * size):
+            return
+    raise ConvergenceError(
+        f"periodic orbit: expected a period near {guess:.6g}, received {period:.2g}: Newton's method "
+        f"shrank the orbit to a point, {x.tolist()}. It is an equilibrium, or a point "
+        "where legs vanish: start closer to the orbit.",
+        point=x,
+    )
+
+
+def _require_resolved(problem: BoundaryProblem, at: Evaluation) -> None:
+    """Refuse an orbit whose states are so large that they do not change by what its legs move."""
+    n, count = problem.system.dimension, len(problem.legs)
+    ways = np.abs(at.flight.rate[:count, :n]) * np.abs(at.durations[:, None])
+    spacings = np.spacing(np.abs(at.starts[:, :n]).max(axis=0))
+    if (ways > _SPACINGS * spacings).any() or not ways.any() or not _singular(problem, at):
+        return  # or at rest where the equations say so
+    raise ConvergenceError(
+        f"periodic orbit: expected an orbit that moves, received the state {at.starts[0, :n].tolist()}, "
+        f"which moves by {ways.max():.2g} at most: less than {_SPACINGS:g} spacings of numbers of that "
+        f"size, of {spacings.max():.2g}, so it closes by rounding. Start closer to the orbit.",
+        point=at.starts[0, :n],
+    )
+
+
+def _singular(problem: BoundaryProblem, at: Evaluation) -> bool:
+    """Whether the equations, in units of the orbit, say next to nothing of it in some direction."""
+    jacobian = at.jacobian * problem.scales(problem.pack(at.starts, at.durations))
+    rows = np.linalg.norm(jacobian, axis=1)
+    values = np.linalg.svd(jacobian / np.where(rows > 0.0, rows, 1.0)[:, None], compute_uv=False)
+    return bool(values[-1] <= _SINGULAR * values[0])
+
+
+def require_duration(problem: BoundaryProblem, at: Evaluation, about: float | None) -> None:
+    """Refuse an orbit that takes another time than was said."""
+    period = float(at.durations.sum()) * (1 if problem.symmetry is None else 2)
+    if about is None or is_about(period, about):
+        return
+    raise ConvergenceError(
+        f"periodic orbit: expected one that takes about period = {about:.6g}, received one of period "
+        f"{period:.10g}, at {at.starts[0, : problem.system.dimension].tolist()}. Start closer to the "
+        "orbit, or leave period= out.",
+        point=at.starts[0, : problem.system.dimension],
+    )
+
+
+def require_simple(orbit: PeriodicOrbit) -> None:
+    """Refuse orbits through two-folds; grazing is refused by the multipliers."""
+    system, p = orbit.system, orbit.parameter_vector
+    for i, leg in enumerate(orbit.problem.legs):
+        if leg.kind != "exit" or system.coupled:
+            continue
+        other = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}[leg.name]
+        flight = orbit.evaluation.flight
+        end = flight.end[i, : flight.sizes[i]]
+        at = Leg(leg.mode, other, "exit").at_end(system, end, p)
+        size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
+        if abs(at.value) <= 1e-9 * size:
+            raise DegenerateError(
+                f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
+                f"{leg_name(leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
+                f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
+            )
+    orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
+
+
+#: No leg may grow to so many times the guess of the whole orbit.
+_LONGEST = 10.0
+
+
+def periodic_orbit(
+    system: FilippovSystem,
+    guess: Trajectory | PeriodicOrbit | ArrayLike,
+    *,
+    itinerary: Itinerary | None = None,
+    period: Any = None,
+    symmetry: ArrayLike | str | None = None,
+    parameters: Parameters | None = None,
+    t_start: float = 0.0,
+    virtual: bool = False,
+    max_iterations: int = 20,
+) -> PeriodicOrbit:
+    """Find a periodic orbit, stable or not, with all digits, its multipliers and its margins.
+
+    The itinerary is read off the guess and kept; the boundary value problem of its legs is solved by
+    Newton's method with exact derivatives; then the guards are asked whether the orbit is real.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        With scalar multipliers; it may slide, jump, hit, and depend periodically on time.
+    guess : Trajectory, state (n,) or PeriodicOrbit
+        A run whose end is near the orbit; a state near it, from which the system is simulated; an
+        orbit at other parameters, whose itinerary is kept.
+    itinerary : str or sequence, optional
+        Modes of the legs in order, e.g. ``"- s"``, or pairs of a mode and the name of the event that
+        ends it; with a state as the guess. One mode alone means an orbit of a forced system without
+        events, over as many periods of the forcing (up to 16) as close best.
+    period : expression in parameters or float, optional
+        The period of the forcing, if the system depends on time. Found by itself where the time only
+        enters sines and cosines of one frequency. The orbit may take several. Of a system without
+        time about how long the whole orbit takes: shorter and longer ones, by more than a factor of
+        1.5, are passed over in the guess and refused as the result.
+    symmetry : "odd" or array_like (n, n), optional
+        R, if R x solves the equations when x does (half a forcing period later, if there is one): the
+        orbit is looked for as a half, which R maps to the other half. ``"odd"`` is $R = -1$.
+    parameters : mapping, optional
+        Values that replace those of the guess, or defaults.
+    t_start : float, optional
+        Time of a state.
+    virtual : bool, optional
+        Accept an orbit that no motion takes because guards disagree.
+    max_iterations : int, optional
+        Newton's method gives up after this many.
+
+    Returns
+    -------
+    PeriodicOrbit
+        The closed orbit: period, itinerary and multipliers.
+
+    Raises
+    ------
+    ConvergenceError
+        The guess does not close, or Newton's method fails.
+    VirtualOrbitError
+        The equations have a solution that is no motion; it is the error's attribute ``orbit``.
+    DegenerateError
+        The orbit grazes, or passes a two-fold or a corner.
+    DefinitionError
+        ``system`` is none, or has vector multipliers; a mode of the itinerary that it does not have.
+    OptionError
+        No period, though the system depends on time and none is found, or one that is no positive
+        time; a symmetry that is none; with a run or an orbit as the guess an itinerary, a ``t_start``,
+        or what contradicts it.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A state of a wrong shape or not finite.
+
+    Notes
+    -----
+    Unknowns are starts and durations of the legs (multiple shooting by Taylor series; no mesh).
+    Multipliers: products of variational and saltation matrices, Leine & Nijmeijer 2004, ch. 7.
+
+    Examples
+    --------
+    A relay that is forced to cross, at a phase $phi$ with $sin phi = -pi/5$. With $c = 2.5 cos phi$ its
+    multiplier is $((c - 1)/(c + 1))^2$.
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, t = ca.SX.sym("x"), ca.SX.sym("t")
+    >>> drive = 2.5 * ca.cos(t)
+    >>> relay = ns.FilippovSystem([x], surface=x, above=[drive - 1], below=[drive + 1], time=t)
+    >>> orbit = ns.periodic_orbit(relay, ns.simulate(relay, [0.5], t_end=40.0))
+    >>> c = 2.5 * np.sqrt(1 - (np.pi / 5)**2)
+    >>> bool(abs(orbit.multipliers[0] - ((c - 1) / (c + 1))**2) < 1e-14)
+    True
+    >>> orbit.stability
+    'asymptotically stable'
+    """
+    require_system(system)
+    max_iterations = whole(max_iterations, "max_iterations")
+    if not isinstance(virtual, (bool, np.bool_)):
+        raise OptionError(f"virtual: expected True or False, received {virtual!r}.")
+    mirror = mirror_of(system, symmetry)
+    start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
+    begun, guessed = start.problem, start.unknowns
+    if begun.legs[-1].name:
+        begun, guessed = once_round(begun, guessed, start.p)
+    solver = _Solver(begun, start.p)
+    u, at = solver.solve(guessed, max_iterations)
+    problem, once = once_round(begun, u, start.p)
+    if problem is not begun:
+        u, at = _Solver(problem, start.p).solve(once, max_iterations)
+    require_motion(problem, at, start)
+    require_duration(problem, at, about_of(system, period, start.p))
+    faults = tuple(faults_of(problem, at, start.p))
+    orbit = PeriodicOrbit(system, named(system, start.p), problem, u, at, solver.iterations, faults)
+    require_simple(orbit)
+    require_symmetric(orbit)
+    if faults and not virtual:
+        raise _virtual(orbit)
+    return orbit
+
+
+#: Larger steps from an orbit of a family, relative to the orbit, are rounding that is magnified along it.
+_POLISH = 1e-3
+
+#: A guess that closes to a part e of its size is as near as this times sqrt(e) to its orbit.
+_FAR = 10.0
+
+#: Directions that equations say less of than the others, by these factors.
+_WEAK = (1e-15, 1e-8, 1e-6, 1e-4, 1e-2)
+
+#: Equations of which singular values would take minutes, and residuals that cannot be smaller.
+_LARGE, _CLOSED = 1000, 1e-9
+
+
+class _Solver:
+    """Newton's method on the equations of an orbit, with what it knows where it fails."""
+
+    def __init__(self, problem: BoundaryProblem, p: Array):
+        self.problem, self.p, self.iterations = problem, p, 0
+        self.last: tuple[Array, Evaluation | None] = (np.zeros(0), None)
+
+    def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
+        """The orbit, to rounding."""
+        longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
+        found = shot(self.problem, u, self.p, longest, max_iterations)
+        if found is not None:
+            self.iterations += found[2]
+            return found[:2]
+        scales = self.problem.scales(u)
+        last: list[Array] = []
+
+        def equations(v: Array) -> tuple[Array, Array]:
+            u = v * scales
+            self.last = u, None
+            durations = self.problem.split(u)[1]
+            if not max(-float(durations.min()), float(durations.max())) <= longest:
+                i = int(np.argmax(np.abs(durations)))
+                raise ConvergenceError(
+                    f"Leg {i + 1} {leg_name(self.problem.legs[i])} grew to the duration "
+                    f"{durations[i]:.3g}."
+                )
+            size = float(np.abs(v - last[-1]).max()) if last else 1e-2
+            # after a step of this size the next one is its square, and what it leaves its fourth power
+            tol = min(max(1e-3 * size**4, TOLERANCE), COARSE)
+            at = self.problem.evaluate(u, self.p, tol=tol)
+            last.append(v)
+            self.last = u, at
+            self.iterations += 1
+            return at.residual, at.jacobian * scales
+
+        reason = ""
+        root: Array | None
+        try:
+            root = converge(
+                equations,
+                u / scales,
+                tol=CLOSE,
+                max_iterations=max_iterations,
+                linear=self.problem.solve,
+            )
+        except (ConvergenceError, DegenerateError) as error:
+            root, reason = None, str(error)
+            if not last:  # not even the guess can be followed: no shorter step helps
+                raise self._failure(reason) from error
+        before = list(last)
+        nearest = self._of_family(equations, u / scales, root, max_iterations)
+        last[:] = before
+        if nearest is not root and nearest is not None:
+            return self._polished(nearest * scales, _POLISH)
+        if root is None and u.size <= _LARGE:
+            root = self._damped(equations, u / scales, 2 * max_iterations)
+        if root is None:
+            raise self._failure(reason)
+        return self._polished(root * scales)
+
+    def _of_family(
+        self, equations: Equations, v: Array, root: Array | None, most: int
+    ) -> Array | None:
+        """The orbit near a guess that closes so well that Newton's method should not leave it."""
+        if v.size > _LARGE:
+            return root
+        try:
+            values, jacobian = equations(v)
+            closes = float(np.abs(values / self._sizes(jacobian)).max())
+            far = _FAR * math.sqrt(closes)
+            if far > 1.0 or (root is not None and np.abs(root - v).max() <= far):
+                return root
+            found = self._nearest(equations, v, most, far)
+        except (NonsmoothError, np.linalg.LinAlgError):
+            return root
+        return root if found is None else found
+
+    def _nearest(self, equations: Equations, v: Array, most: int, far: float) -> Array | None:
+        """Newton's method that does not run along a family of orbits."""
+        # Where a step makes the residual larger, it is one along a direction that the residual does not
+        # decide: less and less weak directions are left as they are.
+        start, (values, jacobian) = v, equations(v)
+        for _ in range(most):
+            sizes = self._sizes(jacobian)
+            now = float(np.abs(values / sizes).max())
+            less = math.inf
+            for weak in _WEAK:
+                step = np.linalg.lstsq(jacobian / sizes[:, None], values / sizes, rcond=weak)[0]
+                if not np.abs(v - step - start).max() <= far:
+                    continue
+                there = equations(v - step)
+                less = float(np.abs(there[0] / sizes).max())
+                if less < 0.5 * now:
+                    break
+            if not less < 0.5 * now:
+                return v if now <= _CLOSED else None
+            v, (values, jacobian) = v - step, there
+        return None
+
+    def _sizes(self, jacobian: Array) -> Array:
+        """Sizes of the equations: of the states that are to meet, and of the events by their derivatives."""
+        rows, n = np.linalg.norm(jacobian, axis=1), len(self.problem.legs) * self.problem.dimension
+        rows[:n] = np.maximum(rows[:n], self.problem.scales(self.last[0])[:n])
+        return np.where(rows > 0.0, rows, 1.0)
+
+    def _damped(self, equations: Equations, v: Array, max_iterations: int) -> Array | None:
+        """Newton's method with halved steps, from farther away."""
+
+        def guarded(w: Array) -> tuple[Array, Array]:
+            try:
+                return equations(w)
+            except (ConvergenceError, DegenerateError):
+                return np.full(w.size, np.nan), np.full((w.size, w.size), np.nan)
+
+        try:
+            found = solve(
+                guarded, v, tol=1e-7, max_iterations=max_iterations, what="periodic orbit"
+            )
+        except NonsmoothError:
+            return None
+        return found.x
+
+    def _polished(self, u: Array, largest: float = math.inf) -> tuple[Array, Evaluation]:
+        """Two more steps at most, as long as they shrink and are not too large: to rounding."""
+        at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
+        for _ in range(2):
+            exact = self.problem.exact_residual(u, self.p)
+            step = self._step(at.jacobian, at.residual if exact is None else exact)
+            size = float(np.abs(step / scales).max())
+            if exact is not None and size <= FINAL:  # the derivatives are those of the orbit
+                return self._moved(u, step, at, exact)
+            if size <= ROUNDING or size > largest:
+                break
+            try:
+                there = self.problem.evaluate(u + step, self.p)
+            except (ConvergenceError, DegenerateError):
+                break
+            self.iterations += 1
+            if not np.abs(there.residual).max() < np.abs(at.residual).max():
+                break
+            u, at = u + step, there
+        return u, at
+
+    def _step(self, jacobian: Array, residual: Array) -> Array:
+        try:
+            return -self.problem.solve(jacobian, residual)
+        except np.linalg.LinAlgError:  # one of a family of orbits: the nearest
+            return -np.asarray(np.linalg.lstsq(jacobian, residual, rcond=1e-12)[0], float)
+
+    def _moved(
+        self, u: Array, step: Array, at: Evaluation, exact: Array
+    ) -> tuple[Array, Evaluation]:
+        """The last step, by which derivatives change less than rounding."""
+        there = u + step
+        starts, durations = self.problem.split(there)
+        residual = exact + at.jacobian @ (there - u)  # rounding of the unknowns is what remains
+        return there, replace(at, residual=residual, starts=starts, durations=durations)
+
+    def _largest(self, at: Evaluation) -> str:
+        """The leg whose equations are least satisfied, in words."""
+        count, n = len(self.problem.legs), self.problem.dimension
+        sizes = np.abs(at.residual[: count * n]).reshape(count, n).max(axis=1)
+        ends = np.abs(at.residual[count * n :])
+        i = int(np.argmax(np.maximum(sizes, ends)))
+        what = "does not end on its event" if ends[i] > sizes[i] else "does not meet the next one"
+        return (
+            f"leg {i + 1} {leg_name(self.problem.legs[i])} {what} (by {max(sizes[i], ends[i]):.2g})"
+        )
+
+    def _failure(self, reason: str) -> ConvergenceError:
+        u, at = self.last
+        _, durations = self.problem.split(u)
+        legs = self.problem.legs
+        size = float(np.abs(at.residual).max()) if at is not None else math.nan
+        backward = [
+            f"leg {i + 1} {leg_name(leg)} has the duration {d:.3g}"
+            for i, (leg, d) in enumerate(zip(legs, durations, strict=True))
+            if not d > 0.0
+        ]
+        if not backward and at is not None:
+            try:
+                backward = faults_of(self.problem, at, self.p)
+            except NonsmoothError:
+                backward = []
+        told = f" {reason}" if reason else ""
+        if at is not None and not backward:
+            backward = [self._largest(at)]
+        where = f" At the last iterate {backward[0]}." if backward else ""
+        words = " ".join(leg.mode or "o" for leg in legs[:40])
+        words += f" ... ({len(legs)} legs)" * (len(legs) > 40)
+        return ConvergenceError(
+            f"periodic orbit: expected Newton's method to converge with the itinerary {words!r}, "
+            f"received none after {self.iterations} steps, residual {size:.2g}.{told}{where} Simulate "
+            "longer, start closer to the orbit, or try the itinerary of a run from there.",
+            residual=size,
+            point=u,
+        )
+
+
+class VirtualOrbitError(ConvergenceError):
+    """An orbit of the equations that no motion takes.
+
+    Attributes
+    ----------
+    orbit : PeriodicOrbit
+        The orbit that solves the equations and is no motion of the system.
+    """
+
+    def __init__(self, message: str, orbit: PeriodicOrbit):
+        super().__init__(message, residual=orbit.residual, point=orbit.unknowns)
+        self.orbit = orbit
+
+
+def _virtual(orbit: PeriodicOrbit) -> VirtualOrbitError:
+    more = f" (and {len(orbit.faults) - 1} more)" if len(orbit.faults) > 1 else ""
+    return VirtualOrbitError(
+        f"periodic orbit: expected one that a motion takes, received a virtual one: "
+        f"{orbit.faults[0]}{more}. Try the itinerary of a simulation from there, or say virtual=True "
+        "if it is meant; it is the attribute `orbit` of this error.",
+        orbit,
+    )

@@ -1,0 +1,218 @@
+"""Floquet multipliers of a periodic orbit from the derivatives of its legs.
+
+The return map is condensed: perturbations are kept on the surfaces of the events, where the direction
+of the flow is left out, and in the subspaces that entries to sliding leave. What remains are the
+multipliers that are not structural; a multiplier 1 of the flow (or of the time) and a 0 for each
+dimension lost are exact. The full matrix gives them with rounding, which estimates the error.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...flow.compiled.shooting import reduced_map, whole_map
+from ...flow.fixed import has_interpreter
+from ...model import Array
+from ...model.derivatives.event_maps import surface_map
+from ..runs.legs import leg_name
+from ..runs.saltation import GRAZING, saltations
+from .boundary_value_problem import BoundaryProblem, Evaluation
+
+#: A direction of which a leg leaves no more than this part is lost.
+_LOST = 1e-12
+
+
+#: States below this part of the way of a leg are zero.
+_AT_ZERO = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Multipliers:
+    """Multipliers of the map of the legs, and how they follow.
+
+    Attributes
+    ----------
+    values : ndarray (N - 1 or N,)
+        The nontrivial ones and the structural zeros, largest first; of the whole period.
+    of_map : ndarray
+        Those of the legs' map alone, the half map of a symmetric orbit.
+    zeros : int
+        How many are structurally zero.
+    reduced : ndarray (r, r)
+        The condensed map, whose eigenvalues are the nontrivial ones of ``of_map``.
+    problem : BoundaryProblem
+    at : Evaluation
+        The orbit.
+    """
+
+    values: NDArray[np.complex128]
+    of_map: NDArray[np.complex128]
+    zeros: int
+    reduced: Array
+    problem: BoundaryProblem
+    at: Evaluation
+
+    @cached_property
+    def matrix(self) -> Array:
+        """The full derivative of the legs' map, (N, N)."""
+        return monodromy(self.problem, self.at)
+
+    @cached_property
+    def error(self) -> float:
+        """Distance of the structural multipliers of ``matrix`` from 1 and 0."""
+        whole, held = np.linalg.eigvals(self.matrix), len(self.problem.kept)
+        # the sliding field keeps h whatever it is: off a surface that is never left its matrix has a 1
+        ones = np.argsort(np.abs(whole - 1.0))[: 1 + held]
+        rest = np.sort(np.abs(np.delete(whole, ones)))
+        structural = rest[: self.zeros - held].tolist()
+        return max(float(np.abs(whole[ones] - 1.0).max()), *structural, 0.0)
+
+
+def multipliers_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> Multipliers:
+    """Multipliers of a periodic orbit."""
+    n = problem.dimension
+    reduced = _condensed(problem, at, p)
+    nontrivial = np.linalg.eigvals(reduced) if len(reduced) > 1 else reduced.ravel()
+    zeros = n - 1 - nontrivial.size
+    of_map = values = _sorted(np.concatenate([nontrivial, np.zeros(zeros)]))
+    if problem.symmetry is not None:
+        values = _sorted(of_map**2)
+    return Multipliers(values, of_map, zeros, reduced, problem, at)
+
+
+def _sorted(values: NDArray[Any]) -> NDArray[np.complex128]:
+    if len(values) < 2:
+        return values.astype(complex)
+    order = np.lexsort((values.imag, -np.abs(values).round(14)))
+    return np.asarray(values[order], complex)
+
+
+def leg_maps(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Derivatives (L, N, N) of the maps from the start of each leg to that of the next, across the flow."""
+    flight = at.flight
+    row = flight.gradient[:, None, :] @ flight.by_start
+    speed = (flight.gradient * flight.rate).sum(axis=1)
+    across = flight.by_start - flight.rate[:, :, None] * (row / speed[:, None, None])
+    maps = flight.after_state @ across
+    if problem.symmetry is not None:
+        maps[-1] = problem.wrap @ maps[-1]
+    return np.asarray(maps)
+
+
+def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Derivative of the legs' map across the flow, (N, N); 0 in place of the 1 of the flow."""
+    product = np.eye(problem.dimension)
+    for step in leg_maps(problem, at):
+        product = step @ product
+    return product
+
+
+def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
+    """As ``return_map``; None where it is not finite, as an event is grazed."""
+    if has_interpreter():
+        flight, wrap = at.flight, None if problem.symmetry is None else problem.wrap
+        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
+        return whole_map(legs, wrap, np.ones(problem.dimension))
+    with np.errstate(all="ignore"):
+        found = return_map(problem, at)
+    return found if np.isfinite(found).all() else None
+
+
+def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
+    """The return map on perturbations across the flow, in the smallest subspace that they pass."""
+    flight = at.flight
+    # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
+    units = _units(problem, at)
+    basis = _kept(problem, at, p, units)
+    if has_interpreter():
+        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
+        wrap = None if problem.symmetry is None else problem.wrap
+        found = reduced_map(legs, wrap, units, basis, GRAZING, _LOST)
+        if found is not None:
+            return found
+    monodromy(problem, at)  # DegenerateError where an event is grazed
+    return _passed(problem, at, units, basis)
+
+
+def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Sizes of states and time; of states that are zero where all legs begin by how far these lead."""
+    n, own = problem.dimension, problem.system.dimension
+    units = problem.scales(problem.pack(at.starts, at.durations))[:n]
+    if problem.system.time_dependent:
+        ways = np.abs(at.flight.rate[: len(at.durations), :own] * at.durations[:, None]).max(
+            initial=0.0
+        )
+        if np.abs(at.starts[:, :own]).max() < _AT_ZERO * ways:
+            units[:own] = np.maximum(units[:own], ways)
+    return units
+
+
+def _passed(problem: BoundaryProblem, at: Evaluation, units: Array, basis: Array) -> Array:
+    """The return map on what the legs leave of some directions."""
+    count, n = len(problem.legs), problem.dimension
+    maps = leg_maps(problem, at) * (units / units[:, None])
+    flown = at.flight.by_start[:, :n] * (units / units[:, None])
+    bases: list[Array] = [np.eye(n)] * count
+    for _ in range(2):
+        for i in range(count):
+            size = float(np.linalg.norm(flown[i] @ basis)) if basis.size else 0.0
+            basis = _range(maps[i] @ basis, size)
+            bases[(i + 1) % count] = basis
+    first = min(range(count), key=lambda i: bases[i].shape[1])
+    product: Array = np.eye(bases[first].shape[1])
+    for k in range(count):
+        i = (first + k) % count
+        product = np.asarray(bases[(i + 1) % count].T @ maps[i] @ bases[i] @ product, float)
+    return product
+
+
+def _kept(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> Array:
+    """Directions that remain on the surfaces on which the orbit slides all the time, in given units."""
+    if not problem.kept:
+        return np.eye(problem.dimension)
+    rows = [surface_map(problem.system, i)(at.starts[0], p).gradient for i in problem.kept]
+    return np.asarray(np.linalg.svd(np.array(rows) * units)[2][len(rows) :].T)
+
+
+def _range(matrix: Array, size: float) -> Array:
+    """Orthonormal basis of the range of a matrix, without what is lost beside ``size``."""
+    if not matrix.shape[1]:
+        return matrix
+    u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
+    return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
+
+
+def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
+    """Product of state-transition and saltation matrices over the legs, (N, N)."""
+    n, flight = problem.dimension, at.flight
+    after = np.roll(flight.before[:, :n], -1, axis=0)
+    if problem.symmetry is not None:
+        after[-1] = np.linalg.solve(problem.wrap, after[-1])
+    jumps = saltations(
+        flight, after, lambda i: f"leg {i + 1} {leg_name(problem.legs[i])}", _events(problem)
+    ).matrix
+    product: Array = np.eye(n)
+    for step in jumps @ flight.by_start:
+        product = step @ product
+    return np.asarray(problem.wrap @ product, float)
+
+
+def stability(values: NDArray[np.complex128], error: float) -> str:
+    """Stability in words, from the multipliers that are not the 1 of the flow."""
+    sizes, margin = np.abs(values), max(1e-9, 10.0 * error)
+    outside = int(np.sum(sizes > 1.0 + margin))
+    if outside:
+        return f"unstable, {outside} multiplier{'s' * (outside > 1)} outside the unit circle"
+    if np.any(sizes > 1.0 - margin):
+        on = int(np.sum(sizes > 1.0 - margin))
+        return f"neutral to first order, {on} multiplier{'s' * (on > 1)} on the unit circle"
+    return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"
+
+
+def _events(problem: BoundaryProblem) -> NDArray[np.bool_]:
+    return np.array([bool(leg.name) for leg in problem.legs])

@@ -1,0 +1,363 @@
+"""Periodic orbits: what is returned, with multipliers, stability, margins, and the orbit as a run."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...flow.fixed import flow_for
+from ...flow.trajectory import Trajectory
+from ...model import Array, FilippovSystem, ParameterError, Surfaces
+from ...model.derivatives.variational import variational_field
+from ...notebook import card, circle
+from ..runs.guards import described, faults_along, watch
+from .boundary_value_problem import BoundaryProblem, Evaluation
+from .multipliers import Multipliers, multipliers_of, stability
+from .orbit_run import orbit_run
+
+
+@dataclass(frozen=True, eq=False)
+class OrbitLeg:
+    """A leg of a periodic orbit.
+
+    Attributes
+    ----------
+    mode : str
+        One letter for each surface.
+    start : ndarray (n,)
+        States at its start.
+    t : float
+        Of the start: of the forcing, or since the start of the orbit.
+    duration : float
+        Time that it takes.
+    event, kind : str
+        Name of the guard that ends it and kind of the event; empty where a time ends it.
+    """
+
+    mode: str
+    start: Array
+    t: float
+    duration: float
+    event: str
+    kind: str
+
+
+@dataclass(frozen=True)
+class Margin:
+    """Distance of an orbit from a change of its itinerary.
+
+    Attributes
+    ----------
+    leg : int
+        Its number, from 0.
+    what : str
+        In words.
+    value : float
+        In the units of what it measures; zero at the change.
+    relative : float
+        Relative to the period, to the size of the orbit, or to a right angle.
+    t : float
+        Of the event or of the nearest approach: of the forcing, or since the start of the orbit.
+    """
+
+    leg: int
+    what: str
+    value: float
+    relative: float
+    t: float
+
+
+class OrbitDerivative(NamedTuple):
+    """How a periodic orbit changes with a parameter.
+
+    Attributes
+    ----------
+    period : float
+        Derivative of the period.
+    start : ndarray (n,)
+        Derivative of the start of the first leg.
+    starts : ndarray (N, n)
+        Of all legs.
+    durations : ndarray (N,)
+        Derivatives of the durations of all legs.
+    """
+
+    period: float
+    start: Array
+    starts: Array
+    durations: Array
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PeriodicOrbit:
+    """A periodic orbit with a fixed itinerary.
+
+    Attributes
+    ----------
+    system : FilippovSystem
+        The system that has the orbit.
+    parameters : dict of str to float
+        Values of all parameters.
+    problem : BoundaryProblem
+        Its equations; with ``unknowns`` what continuation needs.
+    unknowns : ndarray (m,)
+        Starts and durations of the legs; with a symmetry, of the first half.
+    evaluation : Evaluation
+        Residual, Jacobian and the legs with their derivatives.
+    iterations : int
+        Newton steps that it took.
+    faults : tuple of str
+        What its guards contradict; empty unless it is virtual.
+    """
+
+    system: FilippovSystem
+    parameters: dict[str, float]
+    problem: BoundaryProblem
+    unknowns: Array
+    evaluation: Evaluation
+    iterations: int
+    faults: tuple[str, ...] = ()
+
+    # what it is ---------------------------------------------------------------------------------
+
+    @cached_property
+    def parameter_vector(self) -> Array:
+        """Values of all parameters."""
+        return np.array([self.parameters[name] for name in self.system.parameter_names])
+
+    @property
+    def is_virtual(self) -> bool:
+        """Whether no motion takes it, because guards disagree."""
+        return bool(self.faults)
+
+    @property
+    def symmetric(self) -> bool:
+        """Whether it was solved for as a half, which a symmetry maps to the other one."""
+        return self.problem.symmetry is not None
+
+    @property
+    def period(self) -> float:
+        """Duration of the whole orbit, in the system's unit of time."""
+        return float(self.evaluation.durations.sum()) * (2 if self.symmetric else 1)
+
+    @property
+    def start(self) -> Array:
+        """State (n,) where its first leg begins."""
+        return np.asarray(self.evaluation.starts[0, : self.system.dimension])
+
+    @cached_property
+    def legs(self) -> tuple[OrbitLeg, ...]:
+        """Legs of the whole orbit, in order."""
+        n, result = self.system.dimension, list[OrbitLeg]()
+        forced = self.system.time_dependent
+        t = float(self.evaluation.starts[0, n]) if forced else 0.0
+        flips = (None, self.problem.symmetry) if self.symmetric else (None,)
+        for flip in flips:
+            for leg, x, duration in zip(
+                self.problem.legs, self.evaluation.starts, self.evaluation.durations, strict=True
+            ):
+                start, mode, name = x[:n], leg.mode, leg.name
+                if flip is not None:
+                    start = flip @ start
+                    mode = mirrored_mode(self, leg.mode, x, float(duration))
+                    name = _MIRRORED.get(name, name)
+                result.append(OrbitLeg(mode, start, t, float(duration), name, leg.kind))
+                t += float(duration)
+        return tuple(result)
+
+    @property
+    def itinerary(self) -> str:
+        """Modes of the whole orbit in order, separated by blanks."""
+        return " ".join(leg.mode or "o" for leg in self.legs)
+
+    @cached_property
+    def trajectory(self) -> Trajectory:
+        """One period as a run, with dense output."""
+        return orbit_run(self.system, self.parameters, self.legs)
+
+    # stability ----------------------------------------------------------------------------------
+
+    @cached_property
+    def floquet(self) -> Multipliers:
+        """Multipliers with their structure, and the matrices that they are of."""
+        return multipliers_of(self.problem, self.evaluation, self.parameter_vector)
+
+    @property
+    def multipliers(self) -> NDArray[np.complex128]:
+        """Floquet multipliers, (n,), the structural ones exact.
+
+        Of an autonomous system with the 1 of the flow, first; then by size. Of a forced one those of
+        the stroboscopic map: the 1 of the time is left out.
+        """
+        rest = self.floquet.values
+        return rest if self.system.time_dependent else np.concatenate([[1.0 + 0.0j], rest])
+
+    @property
+    def half_multipliers(self) -> NDArray[np.complex128]:
+        """Multipliers of the map of the legs that were solved for.
+
+        Of an orbit with a symmetry these are those of half the orbit, mirrored back; otherwise
+        ``multipliers``.
+        """
+        return self.floquet.of_map
+
+    @property
+    def monodromy(self) -> Array:
+        """Derivative of the flow over one period by the start, (n, n); with the time if there is forcing."""
+        matrix = self.floquet.matrix
+        return matrix @ matrix if self.symmetric else matrix
+
+    @property
+    def structural(self) -> tuple[str, ...]:
+        """Which multipliers are known exactly, and why, in words."""
+        of = "the time" if self.system.time_dependent else "the flow"
+        result = [f"1: along {of}"]
+        if self.floquet.zeros:
+            result.append(f"0 ({self.floquet.zeros} times): directions lost by sliding or resets")
+        return tuple(result)
+
+    @property
+    def error_estimate(self) -> float:
+        """Distance of the structural multipliers from 1 and 0, as computed with rounding."""
+        return self.floquet.error
+
+    @property
+    def stability(self) -> str:
+        """Stability in words, such as ``"asymptotically stable"``."""
+        return stability(self.floquet.values, self.error_estimate)
+
+    @property
+    def residual(self) -> float:
+        """Largest entry that is left of the equations that were solved."""
+        return float(np.abs(self.evaluation.residual).max())
+
+    # neighbours ---------------------------------------------------------------------------------
+
+    def derivative(self, parameter: str) -> OrbitDerivative:
+        """Derivatives of the orbit by a parameter.
+
+        Parameters
+        ----------
+        parameter : str
+            Its name.
+
+        Raises
+        ------
+        ParameterError
+            Unknown name.
+        """
+        names = self.system.parameter_names
+        if parameter not in names:
+            raise ParameterError(
+                f"parameter: expected a name among {list(names)}, received {parameter!r}."
+            )
+        at = self.problem.evaluate(self.unknowns, self.parameter_vector, (names.index(parameter),))
+        change = -self.problem.solve(at.jacobian, at.by_parameters[:, 0])
+        starts, durations = self.problem.split(change)
+        n = self.system.dimension
+        period = float(durations.sum()) * (2 if self.symmetric else 1)
+        return OrbitDerivative(period, starts[0, :n], starts[:, :n], durations)
+
+    @cached_property
+    def margins(self) -> tuple[Margin, ...]:
+        """Distances from changes of the itinerary, the nearest first."""
+        return tuple(sorted(_margins(self), key=lambda m: abs(m.relative)))
+
+    def __str__(self) -> str:
+        kind = "Virtual periodic orbit" if self.is_virtual else "Periodic orbit"
+        modes = self.itinerary
+        shown = modes if len(modes) <= 40 else modes[:36] + " ..."
+        odd = ", found as a half by its symmetry" if self.symmetric else ""
+        lines = [
+            f"{kind} of period {self.period:.13g}, itinerary {shown!r} "
+            f"({len(self.legs)} leg{'s' * (len(self.legs) != 1)}{odd}), {self.stability}",
+            f"  multipliers {', '.join(_number(m) for m in self.multipliers)}"
+            f" (structural ones are exact; their computed distance is {self.error_estimate:.1e})",
+        ]
+        if self.margins:
+            near = self.margins[0]
+            lines.append(f"  nearest change: leg {near.leg + 1} {near.what} {near.value:.6g}")
+        lines += [f"  virtual: {fault}" for fault in self.faults]
+        return "\n".join(lines)
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the orbit: its period, its legs, its multipliers."""
+        rows = (
+            ("period", f"{self.period:.12g}"),
+            ("itinerary", self.itinerary),
+            ("stability", self.stability),
+            ("multipliers", ", ".join(_number(m) for m in self.multipliers)),
+            ("virtual", "; ".join(self.faults)),
+        )
+        return card("PeriodicOrbit", rows, circle(self.multipliers))
+
+    def __repr__(self) -> str:
+        return f"PeriodicOrbit(period {self.period:.10g}, {len(self.legs)} legs, {self.stability})"
+
+
+_MIRRORED = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}
+
+
+def _number(m: complex) -> str:
+    if not m.imag:
+        return f"{m.real:.12g}"
+    return f"{m.real:.12g}{m.imag:+.12g}i"
+
+
+def mirrored_mode(orbit: PeriodicOrbit, mode: str, x: Array, duration: float) -> str:
+    """The mode of a leg's mirror image."""
+    system, p = orbit.system, orbit.parameter_vector
+    field = variational_field(system, mode)
+    middle = flow_for(field, field.start(x, p), p, 0.5 * duration)[: system.extended_dimension]
+    surfaces = Surfaces(system)
+    image = orbit.problem.wrap @ middle
+    if system.time_dependent:
+        image[-1] += orbit.problem.advance(p)[0]
+    h, gradient = surfaces.values(image, p)
+    letters = ""
+    for i in range(system.surface_count):
+        near = abs(h[i]) <= 1e-10 * float(np.abs(gradient[i]) @ (1e-3 + np.abs(image)))
+        letters += "s" if near else "+" if h[i] > 0 else "-"
+    return letters + mode[system.surface_count :]
+
+
+def faults_of(problem: BoundaryProblem, at: Evaluation, p: Array) -> list[str]:
+    """What the guards of a solution contradict, leg by leg."""
+    speeds = (at.flight.gradient * at.flight.rate).sum(axis=1)
+    closes = problem.symmetry is None
+    return faults_along(problem.system, problem.legs, at.starts, at.durations, speeds, p, closes)
+
+
+def _margins(orbit: PeriodicOrbit) -> list[Margin]:
+    problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
+    size = problem.scales(orbit.unknowns)[: problem.dimension]  # units of the states do not matter
+    result: list[Margin] = []
+    for i, leg in enumerate(problem.legs):
+        duration, begins = float(at.durations[i]), orbit.legs[i].t
+        ends = begins + duration
+        verb = "slides" if "s" in leg.mode else "lasts"
+        if leg.name:
+            result.append(Margin(i, f"{verb} for", duration, duration / orbit.period, ends))
+            gradient, rate = at.events[i].gradient[: size.size], at.flown[i].rate[: size.size]
+            length = float(np.linalg.norm(gradient * size) * np.linalg.norm(rate / size)) or 1.0
+            angle = float(at.events[i].gradient @ at.flown[i].rate) / length
+            result.append(Margin(i, f"meets {leg.name} at the angle", angle, angle, ends))
+        if duration <= 0.0:
+            continue
+        for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
+            what = f"keeps {described(near.guard)} at its nearest by"
+            relative = near.distance / float(np.abs(size[: orbit.system.dimension]).max())
+            result.append(Margin(i, what, near.distance, relative, begins + near.t))
+    return result
+
+
+def named(system: FilippovSystem, values: Array) -> dict[str, float]:
+    """Parameters by name."""
+    return dict(zip(system.parameter_names, np.asarray(values).tolist(), strict=True))
+
+
+__all__ = ["Margin", "OrbitDerivative", "OrbitLeg", "PeriodicOrbit", "faults_of", "named"]

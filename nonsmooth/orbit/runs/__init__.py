@@ -1,0 +1,1 @@
+"""Derivatives along runs: legs, saltation, sensitivities, Poincare maps, Lyapunov exponents."""

@@ -1,0 +1,381 @@
+"""All legs of an orbit or a run flown in one call, with their derivatives and those of their events.
+
+What :func:`~nonsmooth.orbit.runs.legs.fly` and :meth:`~nonsmooth.orbit.runs.legs.Leg.at_end` say of one leg is
+stacked here, legs on the first axis.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from itertools import accumulate, pairwise
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...flow.compiled.shooting import Demands, FollowedProgram, OrbitProgram, SolvedOrbit
+from ...flow.compiled.smooth import LegsProgram
+from ...flow.fixed import (
+    MOST_STEPS,
+    TOLERANCE,
+    followed_program,
+    has_interpreter,
+    legs_program,
+    stuck,
+)
+from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
+from ...model.derivatives.event_maps import AtEvent
+from ...model.derivatives.variational import guarded_field, plain_field
+from .guards import ending
+from .legs import Flown, Leg, fly, leg_name
+
+#: Local errors of the steps in extended precision.
+EXTENDED = 2.0**-64
+
+
+@dataclass(frozen=True, eq=False)
+class Flight:
+    """Legs with numbers; rows of legs with fewer states than S end in zeros.
+
+    Attributes
+    ----------
+    sizes : tuple of int
+        States of each leg.
+    end, before, rate : ndarray (L, S)
+        States at the ends, fields at the starts and at the ends.
+    by_start, by_parameters : ndarray (L, S, N), (L, S, q)
+        Derivatives of ``end``.
+    after, after_state, after_parameters : ndarray (L, N), (L, N, S), (L, N, np)
+        States after the events, and their derivatives.
+    value, gradient, value_parameters : ndarray (L,), (L, S), (L, np)
+        The events' functions, and their derivatives.
+    """
+
+    sizes: tuple[int, ...]
+    end: Array
+    before: Array
+    rate: Array
+    by_start: Array
+    by_parameters: Array
+    after: Array
+    after_state: Array
+    after_parameters: Array
+    value: Array
+    gradient: Array
+    value_parameters: Array
+
+    @cached_property
+    def flown(self) -> tuple[Flown, ...]:
+        """Leg by leg."""
+        rows = zip(self.sizes, self.end, self.by_start, self.by_parameters, self.rate, strict=True)
+        return tuple(Flown(end[:k], x[:k], by_p[:k], rate[:k]) for k, end, x, by_p, rate in rows)
+
+    @cached_property
+    def events(self) -> tuple[AtEvent, ...]:
+        """Event by event."""
+        return tuple(
+            AtEvent(
+                self.after[i],
+                self.after_state[i, :, :k],
+                self.after_parameters[i],
+                float(self.value[i]),
+                self.gradient[i, :k],
+                self.value_parameters[i],
+            )
+            for i, k in enumerate(self.sizes)
+        )
+
+
+class Flights:
+    """Legs to be flown again and again.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+    legs : sequence of Leg
+    chosen : tuple of int
+        Parameters by which one differentiates.
+    """
+
+    def __init__(self, system: FilippovSystem, legs: Sequence[Leg], chosen: tuple[int, ...] = ()):
+        self.system, self.legs, self.chosen = system, tuple(legs), chosen
+        distinct = {leg: leg.field(system, chosen) for leg in set(self.legs)}
+        self.fields = [distinct[leg] for leg in self.legs]
+        self.sizes = tuple(field.blocks.states for field in self.fields)
+        self._most = max(self.sizes)
+        # events at one instant follow from each other: composed in Python
+        self._composed = [i for i, leg in enumerate(self.legs) if leg.name and leg.further]
+        self._plain = [i for i, leg in enumerate(self.legs) if not leg.name]
+
+    @cached_property
+    def _program(self) -> LegsProgram:
+        maps = {leg: None if leg.further else leg.map(self.system) for leg in set(self.legs)}
+        events = [maps[leg] for leg in self.legs]
+        return legs_program(self.fields, events, len(self.system.parameter_names))
+
+    @cached_property
+    def _plain_program(self) -> LegsProgram | None:
+        """Legs without derivatives, where each is a flow of the states to one event."""
+        if self._plain or self._composed:
+            return None
+        maps = {leg: leg.map(self.system) for leg in set(self.legs)}
+        if any(field.blocks.states > field.blocks.starts for field in self.fields):
+            return None
+        fields = {leg.mode: plain_field(self.system, leg.mode) for leg in set(self.legs)}
+        events = [at.plain for leg in self.legs if (at := maps[leg]) is not None]
+        of_legs = [fields[leg.mode] for leg in self.legs]
+        return legs_program(of_legs, events, len(self.system.parameter_names))
+
+    def exact(self, starts: Array, durations: Array, p: Array) -> tuple[Array, Array, Array] | None:
+        """States after the events and the events' functions with more digits than a double has.
+
+        Returns
+        -------
+        after, rest, value : ndarray (L, N), (L, N), (L,)
+            States rounded, and what that leaves. None where there are no more digits to be had.
+        """
+        program = self._plain_program if has_interpreter() else None
+        if program is None:
+            return None
+        found = program.extended(starts, p, durations, EXTENDED, MOST_STEPS)
+        if found is None:
+            return None
+        n, (results, rest) = starts.shape[1], found
+        return results[:, :n], rest[:, :n], results[:, n]
+
+    @cached_property
+    def _orbit_program(self) -> OrbitProgram | None:
+        """Newton's method on an orbit of these legs, where each ends by one event."""
+        if len(set(self.sizes)) > 1 or not has_interpreter():
+            return None
+        if self._plain_program is None:
+            return None
+        n, q = self._most, len(self.system.parameter_names)
+        start, fixed, ours, theirs = self._template
+        legs, plain = self._program, self._plain_program
+        return OrbitProgram(legs, plain, n, q, self.chosen, ours, theirs, start, fixed)
+
+    @cached_property
+    def _followed_program(self) -> FollowedProgram | None:
+        if self._orbit_program is None:
+            return None
+        system, maps = self.system, [leg.map(self.system) for leg in self.legs]
+        events = [at for at in maps if at is not None]
+        names = len(system.parameter_names)
+        return followed_program(
+            [guarded_field(system, leg.mode) for leg in self.legs],
+            [ending(system, leg) for leg in self.legs],
+            events,
+            [event.plain for event in events],
+            (system.extended_dimension, system.dimension, names),
+        )
+
+    def followed(self, x: Array, p: Array, times: float) -> tuple[Array, Array] | None:
+        """Follow the legs from a state, each to its event, whatever other guards say.
+
+        Parameters
+        ----------
+        x : ndarray (N,)
+        p : ndarray
+        times : float
+            A leg is followed for so many of the times in which the state changes by its size.
+
+        Returns
+        -------
+        starts, durations : ndarray (L + 1, N), (L,)
+            The last start is the end. None where a leg does not come to its event, and for legs that
+            do not end by one event each.
+        """
+        program = self._followed_program
+        return None if program is None else program(x, p, times, TOLERANCE, MOST_STEPS)
+
+    def newton(
+        self, u: Array, p: Array, scales: Array, wrap: Array | None, demands: Demands
+    ) -> tuple[SolvedOrbit, Flight] | None:
+        """Solve the equations of an orbit of these legs; None where that is not to be had.
+
+        Parameters
+        ----------
+        u : ndarray (m,)
+            Starts of the legs, then durations.
+        p : ndarray
+            All parameters.
+        scales : ndarray (m,)
+            Sizes of the unknowns.
+        wrap : ndarray (N, N) or None
+            Symmetry that maps the end of the last leg.
+        demands : Demands
+        """
+        program = self._orbit_program
+        found = program.newton(u, p, scales, wrap, demands) if program is not None else None
+        return None if found is None else (found, self._flight_of(found, p.size))
+
+    def evaluated(
+        self, u: Array, p: Array, wrap: Array | None, tol: float, demands: Demands
+    ) -> tuple[SolvedOrbit, Flight] | None:
+        """Their equations at starts, durations and chosen parameters (m + k,); as ``newton``."""
+        program = self._orbit_program
+        found = program.evaluate(u, p, wrap, tol, demands) if program is not None else None
+        return None if found is None else (found, self._flight_of(found, p.size))
+
+    def corrected(
+        self,
+        u: Array,
+        p: Array,
+        scales: Array,
+        wrap: Array | None,
+        across: Array,
+        demands: Demands,
+    ) -> tuple[SolvedOrbit, Flight] | None:
+        """Their solution with one chosen parameter across a direction in units ``scales``; as ``newton``."""
+        program = self._orbit_program
+        if program is None:
+            return None
+        found = program.correct(u, p, scales, wrap, across, demands)
+        return None if found is None else (found, self._flight_of(found, p.size))
+
+    @property
+    def is_direct(self) -> bool:
+        """Whether ``newton``, ``evaluated`` and ``corrected`` are to be had."""
+        return self._orbit_program is not None
+
+    def _flight_of(self, found: SolvedOrbit, parameters: int) -> Flight:
+        n, whole = self._most, found.whole
+        return Flight(
+            self.sizes,
+            whole[:, :, 0],
+            found.before[:, :n],
+            found.after[:, :n],
+            whole[:, :, 1 : 1 + n],
+            whole[:, :, 1 + n :],
+            *self._events(found.results, n, parameters),
+        )
+
+    @cached_property
+    def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
+        """Matrices (x, X, P) at the starts, transposed, and those of entries that do not move."""
+        width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
+        count, most = len(self.legs), self._most
+        start, fixed = np.zeros((2, count, columns, most))
+        ours, theirs = list[NDArray[Any]](), list[NDArray[Any]]()
+        for i, field in enumerate(self.fields):
+            b = field.blocks
+            start[i, 1 : 1 + b.starts, : b.starts] = np.eye(b.starts)
+            fixed[i, :, : b.states] = b.fixed.T
+            moving = np.zeros((columns, most), bool)
+            moving[:, : b.states] = b.moving.T
+            ours.append(np.flatnonzero(moving) + i * columns * most)
+            theirs.append(i * width + np.arange(len(ours[-1])))
+        return start, fixed, np.concatenate(ours), np.concatenate(theirs)
+
+    def __call__(self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE) -> Flight:
+        """Fly all legs."""
+        if len(set(self.sizes)) > 1 or not has_interpreter():
+            return self._one_by_one(starts, durations, p)
+        n, most = starts.shape[1], self._most
+        template, fixed, ours, theirs = self._template
+        whole = template.copy()
+        whole[:, 0, :n] = starts
+        if most > n:
+            for i, field in enumerate(self.fields):
+                whole[i] = field.initial(starts[i], p).T
+        z = np.zeros((len(self.legs), self._program.width))
+        z.ravel()[theirs] = whole.ravel()[ours]
+        flown = self._program(z, p, durations, tol, MOST_STEPS)
+        if flown.failed >= 0:
+            i = flown.failed
+            error = stuck(float(durations[i]), flown.left, flown.ends[i, : self.sizes[i]])
+            raise ConvergenceError(f"{self._named(i)}: {error}", point=error.point)
+        whole = fixed.copy()
+        whole.ravel()[ours] = flown.ends.ravel()[theirs]
+        whole = whole.swapaxes(1, 2)
+        end, x, by_p = whole[:, :, 0], whole[:, :, 1 : 1 + n], whole[:, :, 1 + n :]
+        result = Flight(
+            self.sizes,
+            end,
+            flown.before[:, :most],
+            flown.after[:, :most],
+            x,
+            by_p,
+            *self._events(flown.results, n, p.size),
+        )
+        return self._completed(result, p)
+
+    def _events(self, results: Array, n: int, q: int) -> tuple[Array, ...]:
+        """What the events' programs give: g, g_x, g_p, e, e_x, e_p."""
+        count, most = len(self.legs), self._most
+        sizes = (n, n * most, n * q, 1, most, q)
+        at = (0, *accumulate(sizes))
+        if not results.shape[1]:
+            results = np.zeros((count, at[-1]))
+        g, gx, gp, e, ex, ep = [results[:, a:b] for a, b in pairwise(at)]
+        return (
+            g,
+            gx.reshape(count, most, n).swapaxes(1, 2),
+            gp.reshape(count, q, n).swapaxes(1, 2),
+            e[:, 0],
+            ex,
+            ep,
+        )
+
+    def _completed(self, flight: Flight, p: Array) -> Flight:
+        """Fill in legs that end at a time, and events at which several things happen."""
+        if not self._plain and not self._composed:
+            return flight
+        for i in self._composed:
+            k = self.sizes[i]
+            self._fill(flight, i, self.legs[i].at_end(self.system, flight.end[i, :k], p))
+        n = flight.after.shape[1]
+        for i in self._plain:
+            flight.after[i] = flight.end[i, :n]
+            flight.after_state[i] = np.eye(n, self._most)
+            for rows in (flight.after_parameters, flight.gradient, flight.value_parameters):
+                rows[i] = 0.0
+            flight.value[i] = 0.0
+        return flight
+
+    def _fill(self, flight: Flight, i: int, at: AtEvent) -> None:
+        k = self.sizes[i]
+        flight.after[i], flight.after_state[i, :, :k] = at.after, at.after_state
+        flight.after_parameters[i], flight.value[i] = at.after_parameters, at.value
+        flight.gradient[i, :k], flight.value_parameters[i] = at.gradient, at.by_parameters
+
+    def _one_by_one(self, starts: Array, durations: Array, p: Array) -> Flight:
+        count, n, most, q = len(self.legs), starts.shape[1], self._most, len(self.chosen)
+        flight = Flight(
+            self.sizes,
+            np.zeros((count, most)),
+            np.zeros((count, most)),
+            np.zeros((count, most)),
+            np.zeros((count, most, n)),
+            np.zeros((count, most, q)),
+            *self._events(np.zeros((count, 0)), n, p.size),
+        )
+        for i, leg in enumerate(self.legs):
+            k, field = self.sizes[i], self.fields[i]
+            try:
+                part = fly(self.system, leg, starts[i], float(durations[i]), p, self.chosen)
+            except ConvergenceError as error:
+                message = f"{self._named(i)}: {error}"
+                raise ConvergenceError(message, point=error.point) from None
+            except DegenerateError as error:
+                raise DegenerateError(f"{self._named(i)}: {error}") from None
+            flight.end[i, :k], flight.rate[i, :k] = part.end, part.rate
+            flight.by_start[i, :k], flight.by_parameters[i, :k] = part.by_start, part.by_parameters
+            at = field.states_at(starts[i], p)
+            flight.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
+            if leg.name:
+                self._fill(flight, i, leg.at_end(self.system, part.end, p))
+        return self._completed(flight, p)
+
+    def _named(self, i: int) -> str:
+        return f"leg {i + 1} {leg_name(self.legs[i])}"
+
+
+def flights_of(
+    system: FilippovSystem, legs: tuple[Leg, ...], chosen: tuple[int, ...] = ()
+) -> Flights:
+    """Return the flights of some legs, made once per system."""
+    return system.cached(("flights", legs, chosen), lambda: Flights(system, legs, chosen))

@@ -1,0 +1,235 @@
+"""Guards along a leg: where they come near to zero, and whether the leg can be left as it says.
+
+Along a step a guard is a polynomial, so its least values inside a leg are roots of a polynomial's
+derivative: an itinerary is judged by them, not by samples.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from ...flow.watched import LegsWatch, passing, watched
+from ...model import Array, FilippovSystem, Guard
+from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
+from .legs import Leg, leg_name
+
+#: Part of a leg's duration beside its ends that belongs to the ends, where guards are zero.
+_ENDS = 1e-6
+
+#: A guard is negative below this part of its scale.
+_NEGATIVE = 1e-9
+
+
+@dataclass(frozen=True)
+class Approach:
+    """A guard's extremum inside a leg that comes nearest to zero."""
+
+    guard: Guard
+    t: float
+    value: float
+    distance: float
+
+
+@dataclass(frozen=True)
+class Watch:
+    """What the guards of a leg do inside it."""
+
+    approaches: list[Approach]
+    faults: list[str]
+
+
+def watch(system: FilippovSystem, mode: str, x: Array, duration: float, p: Array) -> Watch:
+    """Look at all guards inside a leg."""
+    field = guarded_field(system, mode)
+    y = variational_field(system, mode).states_at(x, p)
+    rows = watched(field, y, p, duration, _ENDS * duration)
+    return Watch(_approaches(field, rows, p), _faults_seen(field, rows, p))
+
+
+def _approaches(field: GuardedField, rows: Array, p: Array) -> list[Approach]:
+    """Extrema at which guards come near to zero."""
+    guards, found = field.motion.guards, list[Approach]()
+    for row in rows:
+        guard, (t, value, bend) = guards[int(row[0])], row[1:4].tolist()
+        if bend and (bend > 0.0 or guard.kind in ("stop", "reset")):
+            slope = field.gradients.copied(row[4:], p)[0][int(row[0])]
+            size = math.sqrt(float(slope @ slope))
+            if size > 0.0:
+                found.append(Approach(guard, t, value, value / size))
+    return found
+
+
+class LegGuards:
+    """The guards of legs that follow each other, to be watched again and again."""
+
+    def __init__(self, system: FilippovSystem, legs: Sequence[Leg]):
+        self.fields = [guarded_field(system, leg.mode) for leg in legs]
+        self._plain = [variational_field(system, leg.mode) for leg in legs]
+        self._watch = LegsWatch(self.fields)
+
+    def __call__(
+        self, starts: Array, p: Array, durations: Array
+    ) -> tuple[list[Array], list[Array], list[Array]]:
+        """As of LegsWatch; legs of no positive duration have no inside."""
+        states = [field.states_at(x, p) for field, x in zip(self._plain, starts, strict=True)]
+        return self._watch(states, p, durations, _ENDS)
+
+
+def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
+    """What guards contradict, from their extrema and values at the ends of steps."""
+    if not len(rows) or float(rows[:, 2].min()) >= 0.0:
+        return []
+    guards = field.motion.guards
+    seen: list[list[tuple[float, float, float]]] = [[] for _ in guards]  # time, value, scale
+    positive = {k for k, _, value in rows[:, :3].tolist() if value > 0.0}
+    for row in rows:
+        k, (t, value), scale = int(row[0]), row[1:3].tolist(), 0.0
+        if k not in positive and guards[k].kind in ("stop", "reset", "zero"):
+            continue  # no change of sign
+        if value < 0.0 and guards[k].kind not in ("stop", "reset"):
+            slope = np.abs(field.gradients.copied(row[4:], p)[0][k])
+            scale = float(slope @ np.abs(row[4:])) + math.sqrt(float(slope @ slope)) * 1e-3
+        seen[k].append((t, value, scale))
+    return [f for g, values in zip(guards, seen, strict=True) for f in _faults(g, values)]
+
+
+def _faults(guard: Guard, values: Sequence[tuple[float, float, float]]) -> list[str]:
+    """What a guard's values inside a leg contradict, earliest first."""
+    ordered = sorted(values)
+    if guard.kind in ("stop", "reset", "zero"):
+        for (_, a, _), (t, b, _) in pairwise(ordered):
+            if a * b < 0.0 and guard.side in (0, 1 if b > a else -1) and guard.kind != "zero":
+                return [f"{guard.kind} {guard.name!r} is met {t:.6g} after its start"]
+        return []
+    low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * scale]
+    if not low:
+        return []
+    t, v = min(low, key=lambda entry: entry[1])
+    return [f"{described(guard)} is violated {t:.6g} after its start (by {abs(v):.3g})"]
+
+
+def described(guard: Guard) -> str:
+    """A guard's condition in words."""
+    if guard.kind == "surface":
+        return f"h{guard.index} {'>' if guard.side > 0 else '<'} 0"
+    if guard.kind == "exit":
+        condition = "<= 0" if guard.side > 0 else ">= 0"
+        if guard.name.startswith("lambda"):
+            return f"{guard.name} {'<= 1' if guard.side > 0 else '>= -1'}"
+        return f"the condition {guard.name} {condition} of sliding"
+    if guard.kind == "impact":
+        return f"the gap of {guard.name!r} >= 0"
+    return f"the reaction of {guard.name!r} >= 0" if guard.kind == "release" else guard.name
+
+
+def change_fault(
+    system: FilippovSystem, leg: Leg, following: str, end: Array, after: Array, p: Array
+) -> str:
+    """Why a leg cannot be followed by a mode as its event says; empty if it can."""
+    if not leg.name:
+        return ""
+    own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
+    y = variational_field(system, following).states_at(after, p)
+    field = guarded_field(system, following)
+    begin = np.vstack([part[:, :4] for part in field.starts.copied(y, p)])
+    return _change_fault(system, leg, float(own.gradient @ rate), field, begin, p)
+
+
+def begin_fault(system: FilippovSystem, leg: Leg, end: Array, p: Array) -> str:
+    """A guard of a leg's mode that is negative where the leg ends; empty if there is none."""
+    field = guarded_field(system, leg.mode)
+    values = np.vstack([part[:, :1] for part in field.starts.copied(end, p)])
+    return _negative(field, values, p)
+
+
+def _change_fault(
+    system: FilippovSystem, leg: Leg, speed: float, field: GuardedField, begin: Array, p: Array
+) -> str:
+    """The same from the rate of the event's function, and from the first coefficients of the next leg."""
+    own = leg.map(system)
+    assert own is not None
+    guard = own.guard
+    if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
+        return f"at its end {described(guard)} is about to hold, not to fail ({leg.name})"
+    if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
+        return f"{guard.kind} {guard.name!r} is met from the wrong side at its end"
+    return _following_fault(field, begin, p)
+
+
+def _following_fault(field: GuardedField, begin: Array, p: Array) -> str:
+    """A guard of the next mode that is negative, or zero and falling, where the mode begins."""
+    fault = _negative(field, begin, p)
+    return fault and f"where mode {field.motion.mode!r} begins after it, {fault}"
+
+
+def _negative(field: GuardedField, begin: Array, p: Array) -> str:
+    """The first guard whose first coefficient that is not zero is negative, in words."""
+    guards = field.motion.guards
+    states, rows = begin[: len(begin) - len(guards)], begin[len(begin) - len(guards) :]
+    if not len(rows) or float(rows.min()) >= 0.0:
+        return ""
+    slopes, sizes = field.gradients.copied(states[:, 0], p)[0], np.abs(states).max(axis=0)
+    for k, guard in enumerate(guards):
+        if guard.kind in ("stop", "reset", "zero", "branch"):
+            continue
+        length = math.sqrt(float(slopes[k] @ slopes[k]))
+        scale = length * sizes
+        scale[0] += 1e-3 * length
+        for value, size in zip(rows[k].tolist(), scale.tolist(), strict=False):
+            if abs(value) > _NEGATIVE * size:
+                if value < 0.0:
+                    return f"{described(guard)} fails"
+                break
+    return ""
+
+
+def faults_along(
+    system: FilippovSystem,
+    legs: Sequence[Leg],
+    starts: Array,
+    durations: Array,
+    speeds: Array,
+    p: Array,
+    closes: bool,
+) -> list[str]:
+    """What the guards contradict along legs that follow each other, leg by leg."""
+    guards = LegGuards(system, legs)
+    fields, (rows, begins, _) = guards.fields, guards(starts, p, durations)
+    result, count = list[str](), len(legs)
+    for i, leg in enumerate(legs):
+        if durations[i] <= 0.0:
+            result.append(f"leg {i + 1} {leg_name(leg)} has the duration {durations[i]:.6g}")
+            continue
+        found, following = _faults_seen(fields[i], rows[i], p), (i + 1) % count
+        if leg.name and (closes or following):
+            field, begin = fields[following], begins[following]
+            fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)
+            found += [fault] if fault else []
+        result += [f"leg {i + 1} {leg_name(leg)}: {fault}" for fault in found]
+    return result
+
+
+def ending(system: FilippovSystem, leg: Leg) -> tuple[int, int]:
+    """Number of the guard that ends a leg among those of its mode, and its direction."""
+    guards = guarded_field(system, leg.mode).motion.guards
+    row = next(
+        k
+        for k, g in enumerate(guards)
+        if g.name == leg.name and (g.kind != "exit" or leg.side in (0, g.side))
+    )
+    return row, guards[row].side if guards[row].kind in ("stop", "reset") else -1
+
+
+def march(system: FilippovSystem, leg: Leg, x: Array, p: Array, t_max: float) -> float | None:
+    """Time until the event of a leg, whatever other guards say; None if it does not come."""
+    # A zero where the leg starts is not counted.
+    field = guarded_field(system, leg.mode)
+    row, direction = ending(system, leg)
+    y = variational_field(system, leg.mode).states_at(x, p)
+    size = float(np.linalg.norm(field.gradients.copied(y, p)[0][row])) * float(np.abs(y).max())
+    return passing(field, row, y, p, t_max, direction=direction, still=1e-9 * size)

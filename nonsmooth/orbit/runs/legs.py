@@ -1,0 +1,298 @@
+"""Legs: stretches of one mode, each with the event that ends it; as words and with numbers.
+
+A run is a chain of legs. What happens at one instant is one event: a reset and the change of mode
+that it causes, an impact and the sliding that follows. Two guards that vanish at the same instant
+without one causing the other are a corner, where a derivative depends on which comes first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from itertools import product
+
+import numpy as np
+
+from ...flow.constants import TIE
+from ...flow.fixed import flow_for
+from ...flow.trajectory import Event, Trajectory
+from ...model import Array, DegenerateError, FilippovSystem, coupled_of
+from ...model.derivatives.event_maps import AtEvent, EventMap, event_map
+from ...model.derivatives.variational import VariationalField, variational_field
+
+#: Directions that differ by less than this are one: the gradients of events at one instant.
+_PARALLEL = 1e-7
+
+
+@dataclass(frozen=True)
+class Leg:
+    """One mode and the event that ends it.
+
+    Attributes
+    ----------
+    mode : str
+    name : str
+        Of the guard that ends the leg; empty for a leg that ends at a time.
+    kind : str
+        Of the event: crossing, entry, exit, reset, impact, release, stop, end.
+    side : int
+        Of an exit.
+    letters : str
+        Sides of the friction at an impact.
+    further : tuple of Leg
+        Resets and impacts caused by the event, at the same instant.
+    """
+
+    mode: str
+    name: str = ""
+    kind: str = "end"
+    side: int = 0
+    letters: str = ""
+    further: tuple[Leg, ...] = ()
+
+    def field(self, system: FilippovSystem, chosen: tuple[int, ...] = ()) -> VariationalField:
+        """The variational field of the mode."""
+        return variational_field(system, self.mode, chosen)
+
+    def map(self, system: FilippovSystem) -> EventMap | None:
+        """The event's function and what it does to the state; None where a time ends the leg."""
+        if not self.name:
+            return None
+        return event_map(system, self.mode, self.name, self.side, self.letters)
+
+    def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
+        """Event function and state after the event, with derivatives; further resets included."""
+        own = self.map(system)
+        assert own is not None
+        at = own(y, p)
+        for leg in self.further:
+            then = leg.map(system)
+            assert then is not None
+            at = _composed(at, then(at.after, p))
+        return at
+
+
+def leg_name(leg: Leg) -> str:
+    """A leg in words: its mode, and what ends it."""
+    end = f", ended by {leg.name}" if leg.name else ""
+    return f"({leg.mode or 'o'}{end})"
+
+
+def _composed(first: AtEvent, then: AtEvent) -> AtEvent:
+    """The map ``then`` after ``first``, at the event of ``first``."""
+    n = len(first.after)
+    slope = then.after_state[:, :n]
+    return replace(
+        first,
+        after=then.after,
+        after_state=slope @ first.after_state,
+        after_parameters=slope @ first.after_parameters + then.after_parameters,
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class Flown:
+    """A leg with numbers: the flow of its mode from its start over its duration.
+
+    Attributes
+    ----------
+    end : ndarray (N + k,)
+        State at the end, before the event, with multipliers that are states.
+    by_start, by_parameters : ndarray (N + k, N), (N + k, q)
+        Derivatives of ``end``.
+    rate : ndarray (N + k,)
+        The field there.
+    """
+
+    end: Array
+    by_start: Array
+    by_parameters: Array
+    rate: Array
+
+
+def fly(
+    system: FilippovSystem,
+    leg: Leg,
+    x: Array,
+    duration: float,
+    p: Array,
+    chosen: tuple[int, ...] = (),
+) -> Flown:
+    """The flow of a leg's mode from ``x`` (N,) over a duration, with derivatives."""
+    field = leg.field(system, chosen)
+    start = field.start(x, p)
+    whole = field.blocks.unpack(flow_for(field, start, p, duration))
+    n, end = field.blocks.starts, whole[:, 0]
+    rate = field.rate.copied(end, p)[0][:, 0]
+    return Flown(end, whole[:, 1 : 1 + n], whole[:, 1 + n :], rate)
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """A leg of a run: where it starts and ends.
+
+    Attributes
+    ----------
+    leg : Leg
+    t, duration : float
+    start, end, after : ndarray (N,)
+        Extended states: at the start, before and after the event that ends it.
+    """
+
+    leg: Leg
+    t: float
+    duration: float
+    start: Array
+    end: Array
+    after: Array
+
+
+def stretches(run: Trajectory) -> list[Stretch]:
+    """Split a run into legs, one for each instant at which something happens."""
+    system, p = run.system, run.system.parameter_vector(run.parameters)
+    t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
+    result: list[Stretch] = []
+    known: dict[tuple[str, ...], Leg] = {}
+    for group in _instants(run.events):
+        first, last = group[0], group[-1]
+        _require_countable(group)
+        x_end = _extended(system, first.x, first.t)
+        if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):  # told by its words
+            key = (first.mode_before, first.name, first.kind, first.mode_after)
+            leg = known.get(key) or known.setdefault(key, leg_of(system, first, p))
+        else:
+            leg = leg_of(system, first, p)
+            further = [leg_of(system, e, p) for e in group[1:] if e.kind not in ("end", "stop")]
+            if further:
+                leg = replace(leg, further=_caused(system, leg, further, x_end, p, first.t))
+        after = _extended(system, last.x_after, last.t)
+        result.append(Stretch(leg, t, first.t - t, x, x_end, after))
+        t, x = last.t, after
+    return result
+
+
+def _extended(system: FilippovSystem, x: Array, t: float) -> Array:
+    if not system.time_dependent:
+        return np.array(x)
+    extended = np.empty(len(x) + 1)
+    extended[:-1], extended[-1] = x, t
+    return extended
+
+
+def _instants(events: Sequence[Event]) -> list[list[Event]]:
+    """Events that happen at one time together."""
+    groups: list[list[Event]] = []
+    for event in events:
+        if groups and abs(event.t - groups[-1][0].t) <= TIE * max(1.0, abs(event.t)):
+            if event.kind == "end":
+                continue  # the run ends at an event
+            groups[-1].append(event)
+        else:
+            groups.append([event])
+    return groups
+
+
+def _require_countable(group: Sequence[Event]) -> None:
+    for event in group:
+        if event.kind == "contact":
+            raise DegenerateError(
+                f"event at t = {event.t:.10g}: expected finitely many impacts before a contact "
+                f"closes, received impacts on {event.name!r} that accumulate. Infinitely many legs "
+                "have no fixed itinerary: end the run before, or give a restitution of 0."
+            )
+
+
+def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
+    """The leg that an event of a run ends."""
+    if event.kind == "end":
+        return Leg(event.mode_before)
+    _require_one_surface(system, event)
+    side, letters = 0, ""
+    if event.name.startswith("lambda"):
+        i = int(event.name.removeprefix("lambda"))
+        side = {"+": 1, "-": -1}.get(event.mode_after[i], 0)
+    if event.kind == "impact":
+        letters = _letters(system, event, p)
+    return Leg(event.mode_before, event.name, event.kind, side, letters)
+
+
+def _require_one_surface(system: FilippovSystem, event: Event) -> None:
+    """Refuse an event at which the motion comes to two surfaces at once."""
+    if event.kind not in ("crossing", "entry", "exit"):
+        return
+    letters = zip(event.mode_before, event.mode_after, strict=False)
+    met = [f"h{i}" for i, (a, b) in enumerate(letters) if a != b and a in "+-"]
+    others = [name for name in met if name != event.name]
+    if others:
+        raise DegenerateError(corner(event.t, event.name, others[0]))
+
+
+def corner(t: float, one: str, other: str) -> str:
+    """Message for two guards that vanish at one instant."""
+    return (
+        f"event at t = {t:.10g}: expected one event, or events that follow from it, received {one!r} "
+        f"and {other!r} at the same instant (a corner). Its derivative depends on which of them comes "
+        "first: move the start or a parameter."
+    )
+
+
+def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
+    """The sides with which friction acted at an impact: those that give the state after it."""
+    x = _extended(system, event.x, event.t)
+    mode = event.mode_before
+    y = variational_field(system, mode).states_at(x, p)
+    after = _extended(system, event.x_after, event.t)
+    choice = lambda letters: event_map(system, mode, event.name, 0, letters)(y, p)
+    return struck_letters(system, mode, event.name, choice, after)
+
+
+def struck_letters(
+    system: FilippovSystem, mode: str, name: str, struck: Callable[[str], AtEvent], after: Array
+) -> str:
+    """The sides with which friction acted at an impact, of those that are possible."""
+    m, coupled = system.surface_count, coupled_of(system)
+    signs, mode = system.parse_letters(mode), system.widened(mode)
+    contact = system.impacts.index(name)
+    taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
+    carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
+    choices = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in carried]
+    misses: list[tuple[float, str]] = []
+    for choice in product(*choices):
+        letters = "".join(choice)
+        misses.append((float(np.abs(struck(letters).after - after).max()), letters))
+    return min(misses)[1]
+
+
+def _caused(
+    system: FilippovSystem, leg: Leg, further: Sequence[Leg], x: Array, p: Array, t: float
+) -> tuple[Leg, ...]:
+    """The resets among events that follow at once, each of which the ones before must cause."""
+    y = leg.field(system).states_at(x, p)
+    kept: tuple[Leg, ...] = ()
+    for then in further:
+        at = replace(leg, further=kept).at_end(system, y, p)
+        start = then.field(system).initial(at.after, p)
+        other = then.at_end(system, start[:, 0], p)
+        n = len(at.after)
+        pulled = (other.gradient @ start[:, 1 : 1 + n]) @ at.after_state
+        if not parallel(pulled, at.gradient):
+            raise DegenerateError(corner(t, leg.name, then.name))
+        if then.kind in ("reset", "impact"):
+            kept = (*kept, then)
+    return kept
+
+
+def parallel(a: Array, b: Array) -> bool:
+    size = float(np.linalg.norm(b))
+    along = b * (a @ b) / size**2 if size else b
+    return bool(np.linalg.norm(a - along) <= _PARALLEL * max(float(np.linalg.norm(a)), 1e-300))
+
+
+def surface_of(system: FilippovSystem, leg: Leg) -> int:
+    """The switching surface of a leg's event; -1 if it has none."""
+    if leg.kind == "exit" and leg.name.startswith("L_"):
+        return leg.mode.index("s")
+    if leg.kind in ("crossing", "entry", "exit"):
+        digits = leg.name.removeprefix("lambda").removeprefix("h")
+        return int(digits) if digits.isdigit() else -1
+    return -1

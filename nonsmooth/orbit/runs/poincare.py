@@ -1,0 +1,242 @@
+"""Orbits of a Poincare map, with the exact derivative of each return."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...flow.saving import Savable
+from ...flow.section import Section
+from ...flow.simulate import simulate
+from ...flow.trajectory import Trajectory
+from ...flow.view import sectioned
+from ...model import (
+    Array,
+    FilippovSystem,
+    OptionError,
+    Parameters,
+    is_real,
+    periods,
+    read_period,
+    real,
+    require_system,
+    whole,
+)
+from .legs import Flown, Stretch, fly, stretches
+from .saltation import Saltation
+from .sensitivity import sensitivity
+from .variation import saltation_after
+
+#: A run without an end of its own: it ends with the last hit, or by its limits of steps or events.
+_ENDLESS = 1e12
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class PoincareOrbit(Savable):
+    """Successive hits of a section.
+
+    Attributes
+    ----------
+    points : ndarray (m, n)
+        States at the hits; fewer than asked for if the run ended before.
+    t : ndarray (m,)
+        Times of the hits, the start first.
+    run : Trajectory
+        Its status says how it ended; STOPPED after the last hit.
+    section : Section
+        The section that was asked for.
+    """
+
+    points: Array
+    t: Array
+    run: Trajectory
+    section: Section
+
+    def jacobian(self, k: int, since: int | None = None) -> Array:
+        """Derivative of a hit by an earlier one.
+
+        Parameters
+        ----------
+        k : int
+            Number of the hit, from 0.
+        since : int, optional
+            Number of the earlier one, -1 for the start of the run; the one before unless given.
+
+        Returns
+        -------
+        ndarray (n, n)
+            Of the return map, extended to neighbours of the section along the flow: it has an
+            eigenvalue 0 with the flow's direction unless the section is at fixed times.
+
+        Raises
+        ------
+        OptionError
+            Numbers of hits that the run does not have.
+        DegenerateError
+            The run grazes a surface, or meets two at one instant.
+        """
+        k = whole(k, "k", least=0)
+        since = k - 1 if since is None else whole(since, "since", least=-1)
+        if not -1 <= since < k < len(self.t):
+            raise OptionError(
+                f"k: expected hits from 0 to {len(self.t) - 1}, the earlier one from -1, received "
+                f"{k!r} and {since!r}."
+            )
+        if is_real(self.section.at):
+            return self._between_times(k, since)
+        return self._between_events(k, since)
+
+    def _between_times(self, k: int, since: int) -> Array:
+        run = self.run
+        t = float(run.t[0] if since < 0 else self.t[since])
+        x = run.x[0] if since < 0 else self.points[since]
+        part = simulate(
+            run.system, x, float(self.t[k]), t_start=t, parameters=run.parameters, tol=1e-12
+        )
+        return sensitivity(part, wrt="x0").dx_dx0
+
+    def _between_events(self, k: int, since: int) -> Array:
+        run, system, n = self.run, self.run.system, self.run.system.dimension
+        p = system.parameter_vector(run.parameters)
+        parts = stretches(run)
+        ends = np.array([part.t + part.duration for part in parts])
+        last = int(np.argmin(np.abs(ends - self.t[k])))
+        first = 0 if since < 0 else int(np.argmin(np.abs(ends - self.t[since])))
+        dx = np.eye(system.extended_dimension)
+        for j in range(first, last):
+            flown, event = self._passage(parts, j, p)
+            if j == first and since >= 0:  # from the hit itself
+                dx = dx if self.section.after else event.matrix[:, : len(dx)]
+            else:
+                dx = event.matrix @ (flown.by_start @ dx)
+        flown, event = self._passage(parts, last, p)
+        dx = flown.by_start @ dx
+        moved = event.time_by_state @ dx
+        if not self.section.after:
+            return (dx + np.outer(flown.rate, moved))[:n, :n]
+        following = parts[last + 1] if last + 1 < len(parts) else None
+        if following is None:
+            raise OptionError(
+                f"k: expected a hit before the last one, received {k}. The field after the last event "
+                "of the run is not known: ask for a hit more."
+            )
+        rate = fly(system, following.leg, following.start, 0.0, p).rate
+        return (event.matrix @ dx + np.outer(rate, moved))[:n, :n]
+
+    def _passage(self, parts: list[Stretch], j: int, p: Array) -> tuple[Flown, Saltation]:
+        """A leg and the event that ends it, with derivatives."""
+        run, part = self.run, parts[j]
+        flown = fly(run.system, part.leg, part.start, part.duration, p)
+        event = saltation_after(run, part, flown, parts[j + 1] if parts[j + 1 :] else None, p)
+        assert event is not None  # all legs up to a hit end with an event
+        return flown, event
+
+    def __repr__(self) -> str:
+        return (
+            f"PoincareOrbit({len(self.t)} hits of {self.section.at} in t = {self.run.t[0]:g} .. "
+            f"{self.run.t[-1]:g}, {self.run.status})"
+        )
+
+
+def poincare(
+    system: FilippovSystem,
+    section: Any,
+    x0: ArrayLike,
+    *,
+    count: int,
+    direction: int = 1,
+    skip: int = 0,
+    t_start: float = 0.0,
+    parameters: Parameters | None = None,
+    tol: float = 1e-10,
+    max_steps: int = 1_000_000,
+    max_events: int = 1_000_000,
+) -> PoincareOrbit:
+    """Follow a run from section to section.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        With scalar multipliers.
+    section : expression, str, number or Section
+        A function of states, parameters and time; a name of a surface, reset or impact, or a kind of
+        event; a period. See :class:`Section`.
+    x0 : array_like (n,)
+        A start on the section is no hit.
+    count : int
+        Hits to follow the run for.
+    direction : {-1, 0, 1}, optional
+        Of an expression or a surface: where it falls, either way, where it rises.
+    skip : int, optional
+        Hits that are passed over before.
+    t_start, parameters, tol, max_steps, max_events : optional
+        As in :func:`simulate`.
+
+    Returns
+    -------
+    PoincareOrbit
+        The returns to the section, in order.
+
+    Raises
+    ------
+    DefinitionError
+        ``system`` is none, or has vector multipliers.
+    PointError
+        A start of a wrong shape or not finite.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        An unknown name of a section; a direction or a number of hits out of its range.
+    NotSmoothError
+        A section with a kink or a jump.
+
+    Examples
+    --------
+    Returns of a spiral whose radius shrinks by $exp(-2 pi/10)$ each turn:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> spiral = ns.FilippovSystem([x, y], field=[-x / 10 - y, x - y / 10])
+    >>> returns = ns.orbit.poincare(spiral, y, [1.0, 0.0], count=3)
+    >>> (returns.points[:, 0] * ca.exp(2 * ca.pi / 10 * ca.DM([1, 2, 3]))).T
+    DM([[1, 1, 1]])
+    >>> returns.jacobian(2)[0, 0].round(9), returns.points[2, 0] / returns.points[1, 0].round(9)
+    (np.float64(0.533488091), np.float64(0.53348809...))
+    """
+    require_system(system)
+    count, t_start = whole(count, "count"), real(t_start, "t_start")
+    if isinstance(section, Section):
+        wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))
+    else:
+        wanted = _section(section, direction, skip, count)
+    t_end = t_start + _ENDLESS
+    period = None if isinstance(wanted.at, str) else read_period(system, wanted.at)
+    if period is not None:
+        length = float(periods(period, system.parameter_vector(parameters)))
+        wanted = replace(wanted, at=length, direction=0)
+        t_end = t_start + length * (wanted.skip + wanted.every * count + 0.5)
+    system, wanted = sectioned(system, wanted)
+    run = simulate(
+        system,
+        x0,
+        t_end,
+        t_start=t_start,
+        parameters=parameters,
+        tol=tol,
+        max_steps=max_steps,
+        max_events=max_events,
+        at=wanted,
+    )
+    assert run.sample_t is not None and run.sample_x is not None
+    met = np.isfinite(run.sample_t)
+    return PoincareOrbit(run.sample_x[met], run.sample_t[met], run, wanted)
+
+
+def _section(section: Any, direction: int, skip: int, count: int) -> Section:
+    undirected = is_real(section) or (
+        isinstance(section, str) and not section.removeprefix("h").isdigit()
+    )
+    return Section(section, 0 if undirected else direction, skip=skip, count=count)

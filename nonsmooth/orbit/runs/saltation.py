@@ -1,0 +1,176 @@
+"""What an event does to neighbours of an orbit: one formula for every kind of event.
+
+At an event e(x, p) = 0 the field changes from f- to f+, the field of the mode after everything that
+happens at that instant, and the state jumps by a reset g (the identity if there is none). A neighbour
+x + dx meets the event at another time, so
+
+    dt = -(e_x dx + e_p dp)/(e_x f-),    dx+ = g_x dx + g_p dp + (g_x f- - f+) dt,
+
+    S = g_x + (f+ - g_x f-) e_x/(e_x f-),    S_p = g_p + (f+ - g_x f-) e_p/(e_x f-).
+
+It holds for crossings, entries to sliding (S loses one rank), exits (f+ = f-, so S = 1), resets,
+impacts, stops, clocks that are states, and surfaces that move with the time, which is a state then.
+
+Source: Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, "Dynamics and bifurcations of non-smooth
+mechanical systems", ch. 7; di Bernardo et al. 2008, "Piecewise-smooth dynamical systems", sec. 2.5.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...model import Array, DegenerateError
+from ...model.derivatives.event_maps import AtEvent
+
+#: An orbit that meets a surface at an angle below this grazes it.
+GRAZING = 1e-8
+
+#: Fields that differ by less than this part of them are one field.
+_CONTINUOUS = 1e-10
+
+
+@dataclass(frozen=True)
+class Saltation:
+    """Derivatives through an event, or stacked through many.
+
+    Attributes
+    ----------
+    matrix : ndarray (N, N + k)
+        S.
+    by_parameters : ndarray (N, np)
+        S_p.
+    time_by_state, time_by_parameters : ndarray (N + k,), (np,)
+        Derivatives of the time of the event.
+    angle : float or ndarray
+        ``|e_x f-|/(|e_x| |f-|)``, zero at a grazing.
+    """
+
+    matrix: Array
+    by_parameters: Array
+    time_by_state: Array
+    time_by_parameters: Array
+    angle: Any
+
+
+def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
+    """Saltation matrix of an event."""
+    found = saltations(_One.of(at, before), after[None], lambda _: what)
+    return Saltation(
+        found.matrix[0],
+        found.by_parameters[0],
+        found.time_by_state[0],
+        found.time_by_parameters[0],
+        float(found.angle[0]),
+    )
+
+
+class Ended(Protocol):
+    """Ends of legs with their events, stacked; as :class:`~nonsmooth.orbit.runs.flight.Flight`."""
+
+    @property
+    def rate(self) -> Array: ...
+    @property
+    def after(self) -> Array: ...
+    @property
+    def after_state(self) -> Array: ...
+    @property
+    def after_parameters(self) -> Array: ...
+    @property
+    def value(self) -> Array: ...
+    @property
+    def gradient(self) -> Array: ...
+    @property
+    def value_parameters(self) -> Array: ...
+
+
+class _One(NamedTuple):
+    """One event, stacked."""
+
+    rate: Array
+    after: Array
+    after_state: Array
+    after_parameters: Array
+    value: Array
+    gradient: Array
+    value_parameters: Array
+
+    @classmethod
+    def of(cls, at: AtEvent, rate: Array) -> _One:
+        rows = (rate, at.after, at.after_state, at.after_parameters, np.array(at.value))
+        return cls(*[row[None] for row in (*rows, at.gradient, at.by_parameters)])
+
+
+def saltations(
+    ends: Ended,
+    after: Array,
+    named: Callable[[int], str],
+    events: NDArray[np.bool_] | None = None,
+) -> Saltation:
+    """Saltation matrices of the events of many legs, stacked."""
+    e, rate, g = ends.gradient, ends.rate, ends.after_state
+    speed = (e * rate).sum(axis=1)
+    size = _norms(e) * _norms(rate)
+    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
+    carried = (g @ rate[:, :, None])[:, :, 0]
+    jump = after - carried
+    kept = _norms(jump) <= _CONTINUOUS * np.maximum(_norms(after), _norms(carried))
+    if events is not None:
+        kept |= ~events
+    grazed = np.flatnonzero((angle < GRAZING) & ~kept)
+    if grazed.size:  # not where a clock ends the leg, whose phase knows no angle: its rate is 1
+        ticks = ((e != 0.0).sum(axis=1) == 1) & (np.abs(speed) == np.abs(e).max(axis=1))
+        grazed = grazed[~ticks[grazed]]
+    if grazed.size:
+        i = int(grazed[0])
+        raise DegenerateError(grazing(named(i), float(angle[i]), ends, i, jump[i]))
+    with np.errstate(divide="ignore", invalid="ignore"):
+        time_x = -e / speed[:, None]
+        time_p = -ends.value_parameters / speed[:, None]
+    matrix, by_parameters = g, ends.after_parameters
+    if not kept.all():
+        jump[kept] = 0.0
+        x, p = np.where(kept[:, None], 0.0, time_x), np.where(kept[:, None], 0.0, time_p)
+        matrix = matrix - jump[:, :, None] * x[:, None, :]
+        by_parameters = by_parameters - jump[:, :, None] * p[:, None, :]
+    return Saltation(matrix, by_parameters, time_x, time_p, angle)
+
+
+def _norms(rows: Array) -> Array:
+    """Lengths of rows, also of those whose squares overflow."""
+    with np.errstate(over="ignore"):
+        found: Array = np.sqrt((rows * rows).sum(axis=1))
+    if not np.isinf(found).any():
+        return found
+    largest = np.abs(rows).max(axis=1)
+    scaled = rows / np.where(largest > 0.0, largest, 1.0)[:, None]
+    return np.asarray(largest * np.sqrt((scaled * scaled).sum(axis=1)))
+
+
+def grazing(what: str, angle: float, ends: Ended, i: int, jump: Array) -> str:
+    """Message for an event that the orbit only touches, of leg i."""
+    n = jump.size
+    moved = not np.array_equal(ends.after_state[i, :, :n], np.eye(n))
+    if moved:
+        kind = (
+            "a grazing of a reset or impact: neighbours that miss it and those that meet it differ "
+            "by a square root, whose derivative is infinite"
+        )
+    elif float(ends.gradient[i, :n] @ jump) > 0.0:
+        kind = (
+            "a grazing of a sliding surface: the derivative is one matrix on the side that misses "
+            "it and another one on the side that slides"
+        )
+    else:
+        kind = (
+            "a grazing of a surface beyond which the field leads away: the map is discontinuous "
+            "there"
+        )
+    return (
+        f"{what}: expected a transversal event, received the angle {angle:.1e} between orbit and "
+        f"surface. It is {kind}. Move the start or a parameter away from the grazing."
+    )

@@ -1,0 +1,321 @@
+"""The verbs ``sensitivity``, ``gradient`` and ``vjp``: derivatives of a run."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...flow.status import Status
+from ...flow.trajectory import Trajectory
+from ...model import (
+    Array,
+    DegenerateError,
+    FilippovSystem,
+    OptionError,
+    ParameterError,
+    PointError,
+    explain,
+    read_function,
+    real_array,
+)
+from ...model.derivatives.event_maps import EventMap, function_map
+from .set_variation import set_sensitivity
+from .variation import Passage, Sensitivity, along, passages
+
+
+def sensitivity(run: Trajectory, *, wrt: str | Sequence[str] = ("x0", "parameters")) -> Sensitivity:
+    """Derivatives of the end of a run, and of its event times, by start and parameters.
+
+    They are exact: state-transition matrices of the legs, integrated beside them to rounding, and
+    saltation matrices at the events. They hold for the run's own itinerary; ``clearance`` says how
+    far it is from another one.
+
+    Parameters
+    ----------
+    run : Trajectory
+        Of ``simulate``. The derivatives are as accurate as the run; take ``tol`` accordingly.
+    wrt : str or sequence of str, optional
+        Names of parameters; ``"parameters"`` stands for all of them, ``"x0"`` for the start, which
+        is always included.
+
+    Returns
+    -------
+    Sensitivity
+        Derivatives of the end of the run by its start and its parameters.
+
+    Raises
+    ------
+    DegenerateError
+        An event that is grazed, two independent events at one instant, impacts that accumulate, a
+        status without an end.
+    ParameterError
+        An unknown name in ``wrt``.
+    OptionError
+        No run of :func:`simulate`, or one without a step.
+
+    Notes
+    -----
+    Aizerman & Gantmakher 1958; Leine & Nijmeijer 2004, ch. 7.
+
+    Examples
+    --------
+    A mass dropped from the height y meets the floor at $t = sqrt(y)$ with $v = -2 sqrt(y)$:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> y, v, r = (ca.SX.sym(s) for s in "yvr")
+    >>> mass = ns.FilippovSystem(
+    ...     [y, v], field=[v, -2.0], resets=ns.Reset(y, [y, -r * v], -1), parameters={r: 0.5})
+    >>> run = ns.simulate(mass, [0.25, 0.0], t_end=0.75)
+    >>> s = ns.sensitivity(run)
+    >>> s.dx_dx0.round(12), s.dx_dp.round(12), s.event_times.round(12), s.dt_dx0.round(12)
+    (array([[0.25, 0.  ],
+           [3.  , 1.  ]]), array([[0.25],
+           [1.  ]]), array([0.5]), array([[1. , 0.5]]))
+    """
+    if _require_run(run).system.sets:
+        return set_sensitivity(run, _names(run, wrt))
+    _, result = along(run, _names(run, wrt))
+    return result
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Gradient:
+    """Gradient of a cost at the end of a run.
+
+    Attributes
+    ----------
+    value : float
+        Of the cost.
+    x0 : ndarray (n,)
+        Derivatives by the start.
+    parameters : dict of str to float
+        Derivatives by the parameters.
+    """
+
+    value: float
+    x0: Array
+    parameters: dict[str, float]
+
+    def __repr__(self) -> str:
+        of = ", ".join(f"{k}: {v:.6g}" for k, v in self.parameters.items())
+        return f"Gradient(value {self.value:.6g}, x0 {self.x0.tolist()}, parameters {{{of}}})"
+
+
+def gradient(
+    run: Trajectory, cost: Any, *, wrt: str | Sequence[str] = ("x0", "parameters")
+) -> Gradient:
+    """Gradient of a cost at the end of a run, by the exact discrete adjoint.
+
+    Parameters
+    ----------
+    run : Trajectory
+        The run, from :func:`nonsmooth.simulate`.
+    cost : expression
+        Of the states at the end, parameters and time. An integral is a further state.
+    wrt : str or sequence of str, optional
+        As in :func:`sensitivity`.
+
+    Returns
+    -------
+    Gradient
+        Derivatives by directions that an entry to sliding loses are zero: that is correct.
+
+    Raises
+    ------
+    DegenerateError
+        As :func:`sensitivity`; a cost that is not finite at the end, or has no finite derivatives.
+    DefinitionError, NotSmoothError
+        A cost with foreign symbols, or with a kink or a jump.
+    OptionError
+        As :func:`sensitivity`.
+    ParameterError
+        An unknown name in ``wrt``.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> y, v, r = (ca.SX.sym(s) for s in "yvr")
+    >>> mass = ns.FilippovSystem(
+    ...     [y, v], field=[v, -2.0], resets=ns.Reset(y, [y, -r * v], -1), parameters={r: 0.5})
+    >>> run = ns.simulate(mass, [0.25, 0.0], t_end=0.75)
+    >>> ns.gradient(run, y**2 + v)
+    Gradient(value 0.00390625, x0 [3.03125, 1.0], parameters {r: 1.03125})
+    """
+    system, n = _require_run(run).system, run.system.dimension
+    names = _names(run, wrt)
+    if system.sets:
+        return _gradient_of_sets(run, read_function(system.definition, cost, "cost"), names)
+    chosen = tuple(system.parameter_names.index(name) for name in names)
+    parts = passages(run, chosen)
+    p = system.parameter_vector(run.parameters)
+    last = parts[-1]
+    at = _cost(system, last.stretch.leg.mode, cost)(last.flown.end, p)
+    row, by_parameters = _pulled(parts, at.gradient, chosen, stopped=_stopped(last))
+    by_parameters = by_parameters + at.by_parameters[list(chosen)]
+    numbers = dict(zip(names, by_parameters.tolist(), strict=True))
+    return _finite(Gradient(at.value, row[:n] + 0.0, numbers), run)
+
+
+def _gradient_of_sets(run: Trajectory, cost: Any, names: Sequence[str]) -> Gradient:
+    """Gradient of a cost by the derivatives of a run through sets."""
+    system, found, t = run.system, set_sensitivity(run, names), float(run.t[-1])
+    here = lambda e: system.evaluate(e, run.x[-1], run.parameters, t).ravel()
+    slope, own = here(system.gradient(cost)), here(system.parameter_gradient(cost))
+    n = system.dimension
+    by_time = float(slope[n]) if system.time_dependent else 0.0
+    x0 = slope[:n] @ found.dx_dx0 + by_time * found.dt_end_dx0
+    by_p = slope[:n] @ found.dx_dp + by_time * found.dt_end_dp
+    by_p = by_p + own[[system.parameter_names.index(name) for name in names]]
+    value = float(here(cost)[0])
+    return _finite(Gradient(value, x0, dict(zip(names, by_p.tolist(), strict=True))), run)
+
+
+def _finite(found: Gradient, run: Trajectory) -> Gradient:
+    """Refuse a cost that is no finite number at the end of a run, or has no finite derivatives."""
+    if np.isfinite([found.value, *found.x0, *found.parameters.values()]).all():
+        return found
+    raise DegenerateError(
+        f"cost: expected a finite number with finite derivatives at the end of the run, "
+        f"{run.x[-1].tolist()}, received {found!r}. Check logarithms, roots and divisions there."
+    )
+
+
+def _cost(system: FilippovSystem, mode: str, cost: Any) -> EventMap:
+    """A cost as a function of the last leg's states, read once for the same expression object."""
+    known = getattr(cost, "element_hash", None)
+    if known is None or cost.numel() != 1:
+        return function_map(system, mode, read_function(system.definition, cost, "cost"))
+
+    def build() -> tuple[Any, EventMap]:
+        # the expression is kept, so that its hash stands for nothing else
+        return cost, function_map(system, mode, read_function(system.definition, cost, "cost"))
+
+    return system.cached(("cost", mode, known()), build)[1]
+
+
+def vjp(
+    run: Trajectory, cotangent: ArrayLike, *, wrt: str | Sequence[str] = ("x0", "parameters")
+) -> tuple[Array, Array]:
+    """Product of a row with the derivatives of the end of a run, by the discrete adjoint.
+
+    Parameters
+    ----------
+    run : Trajectory
+        The run, from :func:`nonsmooth.simulate`.
+    cotangent : array_like (n,)
+        Derivatives of something by the final state.
+    wrt : str or sequence of str, optional
+        As in :func:`sensitivity`.
+
+    Returns
+    -------
+    by_start, by_parameters : ndarray (n,), (q,)
+        In the order of ``wrt``.
+
+    Raises
+    ------
+    PointError
+        Cotangents of a wrong shape; otherwise as :func:`sensitivity`.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, a = ca.SX.sym("x"), ca.SX.sym("a")
+    >>> run = ns.simulate(ns.FilippovSystem([x], field=[a], parameters={a: 2.0}), [0.0], t_end=3.0)
+    >>> ns.vjp(run, [1.0])
+    (array([1.]), array([3.]))
+    """
+    system, n = _require_run(run).system, run.system.dimension
+    row = real_array(cotangent, "cotangent")
+    if row.shape != (n,) or not np.all(np.isfinite(row)):
+        received = f"shape {row.shape}" if row.shape != (n,) else str(row.tolist())
+        raise PointError(
+            explain(
+                "cotangent",
+                expected=f"{n} numbers, finite ones",
+                received=received,
+                advice="It is the derivative of something by the final state.",
+            )
+        )
+    if system.sets:
+        found = set_sensitivity(run, _names(run, wrt))
+        return row @ found.dx_dx0, row @ found.dx_dp
+    chosen = tuple(system.parameter_names.index(name) for name in _names(run, wrt))
+    parts = passages(run, chosen)
+    whole = np.zeros(len(parts[-1].flown.end))
+    whole[:n] = row
+    back, by_parameters = _pulled(parts, whole, chosen, stopped=_stopped(parts[-1]))
+    return back[:n], by_parameters
+
+
+def _stopped(last: Passage) -> bool:
+    return last.stretch.leg.kind == "stop"
+
+
+def _pulled(
+    parts: Sequence[Passage], row: Array, chosen: Sequence[int], stopped: bool
+) -> tuple[Array, Array]:
+    """Pull a row at the end of the flow of the last leg back to the start."""
+    by_parameters = np.zeros(len(chosen))
+    last, event = parts[-1].flown, parts[-1].event
+    if stopped and event is not None:
+        along_flow = float(row @ last.rate)
+        by_parameters = by_parameters + along_flow * event.time_by_parameters[list(chosen)]
+        row = row + along_flow * event.time_by_state
+    elif event is not None:
+        by_parameters = (
+            by_parameters + row[: len(event.matrix)] @ event.by_parameters[:, list(chosen)]
+        )
+        row = row[: len(event.matrix)] @ event.matrix
+    by_parameters = by_parameters + row @ last.by_parameters
+    row = row @ last.by_start
+    for part in reversed(parts[:-1]):
+        row, more = part.backward(row, chosen)
+        by_parameters = by_parameters + more
+    return row, by_parameters
+
+
+def _require_run(run: Trajectory) -> Trajectory:
+    if not isinstance(run, Trajectory):
+        raise OptionError(
+            explain(
+                "run",
+                expected="a Trajectory",
+                received=f"{run!r}",
+                advice="Give what ns.simulate returns.",
+            )
+        )
+    if not len(run.steps):
+        raise OptionError(
+            f"run: expected a motion, received one without a step ({run.message}) "
+            "Give a start from which the run moves."
+        )
+    if run.status not in (Status.REACHED_END, Status.STOPPED):
+        raise DegenerateError(
+            f"run: expected one that came to its end or to a stop, received {run.status} at "
+            f"t = {run.t[-1]:.6g}: {run.message} Its end is not a smooth function of its start: end the "
+            "run before."
+        )
+    return run
+
+
+def _names(run: Trajectory, wrt: str | Sequence[str]) -> tuple[str, ...]:
+    known, names = run.system.parameter_names, list[str]()
+    if not isinstance(wrt, Iterable):
+        raise ParameterError(
+            f"wrt: expected 'x0', 'parameters' or names among {list(known)}, received {wrt!r}."
+        )
+    for name in [wrt] if isinstance(wrt, str) else list(wrt):
+        if name == "parameters":
+            names += [n for n in known if n not in names]
+        elif name in known:
+            names.append(name)
+        elif name != "x0":
+            raise ParameterError(
+                f"wrt: expected 'x0', 'parameters' or names among {list(known)}, received {name!r}."
+            )
+    return tuple(dict.fromkeys(names))

@@ -1,0 +1,403 @@
+"""Derivatives along a run: state-transition matrices of its legs and saltation at its events.
+
+A run with a fixed itinerary is a chain of smooth maps. Each leg gives its state-transition matrix X
+and its derivatives P by parameters, each event its saltation matrices (``saltation``); derivatives of
+the end are their product, and gradients of a cost are the same product from the other end (the exact
+discrete adjoint: nothing is integrated backward, which no method could do through an entry to sliding).
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property, lru_cache
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...flow.trajectory import Trajectory
+from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
+from ...model.derivatives.event_maps import AtEvent
+from .flight import Flight, Flights
+from .guards import described, watch
+from .legs import Flown, Leg, Stretch, fly, leg_name, stretches
+from .saltation import Saltation, saltation, saltations
+
+# Events that a run has only within its own error: grazes, of which it does not know that they happen.
+
+#: Events that an orbit meets at larger angles are met deeper than runs are wrong.
+_STEEP = 1e-3
+
+#: A graze is known to happen where it is so many times as deep as the run is wrong.
+_KNOWN = 4.0
+
+#: Roundings in an event's function, where the run is not wrong otherwise.
+_ROUNDING = 16.0 * float(np.finfo(float).eps)
+
+#: Part of a leg, or of the time in which the state changes, over which a speed's rate is taken.
+_INSTANT = 1e-5
+
+
+def require_known(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
+    """Refuse a run with a graze that is within the run's own error."""
+    flat = [k for k, part in enumerate(parts) if part.event and part.event.angle < _STEEP]
+    if not flat:
+        return
+    n = system.extended_dimension
+    error = np.zeros(n)  # of the run, against the orbit from its start
+    for k, part in enumerate(parts[: flat[-1] + 1]):
+        error = part.flown.by_start @ error
+        error[:n] += part.stretch.end - part.flown.end[:n]
+        if part.event is None:
+            error = error[:n]
+            continue
+        if k in flat:
+            _require_deep(system, part, error, p)
+        error = part.event.matrix @ error
+
+
+def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array) -> None:
+    """Refuse an event that the orbit meets no deeper than the run is wrong by ``error`` (N + k,)."""
+    leg, flown = part.stretch.leg, part.flown
+    at = leg.at_end(system, flown.end, p)
+    if part.event is None or np.array_equal(part.event.matrix, at.after_state):
+        return  # neighbours pass it as if it were not there
+    speed = _speed(at, flown.rate)
+    size, length = math.hypot(*flown.end), math.hypot(*flown.rate)
+    step = _INSTANT * min(part.stretch.duration, size / length if size and length else math.inf)
+    before = flown.end - step * flown.rate
+    rate = leg.field(system).rate.copied(before, p)[0][:, 0]
+    turning = (speed - _speed(leg.at_end(system, before, p), rate)) / step if step else 0.0
+    if not turning * speed < 0.0:
+        return  # it does not turn back
+    depth = 0.5 * speed**2 / abs(turning)
+    wrong = abs(float(at.gradient @ error))
+    wrong += _ROUNDING * float(np.abs(at.gradient) @ np.abs(flown.end))
+    if depth > _KNOWN * wrong:
+        return
+    raise DegenerateError(
+        f"{leg_name(leg)} at t = {part.stretch.t + part.stretch.duration:.10g}: expected an event that "
+        f"the run is sure of, received a grazing: the orbit would turn back {depth:.1e} beyond it, and "
+        f"the run's error is {wrong:.1e} there. A derivative through it means nothing. Simulate with "
+        "a smaller tol, or move the start or a parameter away from the grazing."
+    )
+
+
+def _speed(at: AtEvent, rate: Array) -> float:
+    return float(at.gradient @ rate)
+
+
+# Variational equations along a known run by Gauss collocation, where they have no Taylor series.
+
+_STAGES = 12
+
+
+def collocated(
+    run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
+) -> Flown:
+    """Derivatives of a run's leg between two times, as ``legs.fly`` gives them."""
+    field = leg.field(run.system, chosen)
+    n, starts = field.blocks.starts, run.steps.starts
+    first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
+    last = max(int(np.searchsorted(starts, t_end, side="left")), first + 1)
+    start = _polynomial(run, first, t_start, n)[0]
+    initial = field.initial(start, p)
+    derivatives = initial[:, 1:]
+    nodes, weights, inner = gauss(_STAGES)
+    for k in range(first, last):
+        low = max(float(starts[k]), t_start)
+        high = min(float(starts[k + 1]) if k + 1 < len(starts) else t_end, t_end)
+        if high <= low:
+            continue
+        h = high - low
+        values = [field.linear.copied(_polynomial(run, k, low + h * c, n)[0], p)[1:] for c in nodes]
+        a = np.array([v[0] for v in values])
+        b = np.zeros((_STAGES, *derivatives.shape))
+        b[:, :, n:] = np.array([v[1][:, list(chosen)] for v in values])
+        derivatives = derivatives + h * _increment(a, b, derivatives, h * inner, weights)
+    end, rate = _polynomial(run, last - 1, t_end, n)
+    return Flown(end, derivatives[:, :n], derivatives[:, n:], rate)
+
+
+def _polynomial(run: Trajectory, step: int, t: float, n: int) -> tuple[Array, Array]:
+    """State and its rate at a time of a step."""
+    c = run.steps.coefficients[step][:n]
+    degrees = np.arange(c.shape[1])
+    powered = (t - float(run.steps.starts[step])) ** degrees
+    return c @ powered, c[:, 1:] @ (degrees[1:] * powered[:-1])
+
+
+def _increment(a: Array, b: Array, s: Array, inner: Array, weights: Array) -> Array:
+    """Increment over h of S' = A S + B by collocation: sum_i w_i K_i, K = A (S + h a K) + B."""
+    m, n = a.shape[:2]
+    system = np.eye(m * n) - (a[:, :, None, :] * inner[:, None, :, None]).reshape(m * n, m * n)
+    rates = np.linalg.solve(system, (a @ s + b).reshape(m * n, -1)).reshape(m, n, -1)
+    return np.asarray(np.einsum("i,ijk->jk", weights, rates))
+
+
+@lru_cache(maxsize=1)
+def gauss(stages: int) -> tuple[Array, Array, Array]:
+    """Nodes and weights of Gauss on [0, 1] and the integrals a_ij of the Lagrange basis to node i."""
+    legendre = np.polynomial.legendre
+    x, w = legendre.leggauss(stages)
+    values = legendre.legvander(x, stages - 1)
+    integrals = np.column_stack(
+        [legendre.legval(x, legendre.legint(row, lbnd=-1)) for row in np.eye(stages)]
+    )
+    return (x + 1) / 2, w / 2, np.linalg.solve(values.T, integrals.T).T / 2
+
+
+@dataclass(frozen=True, eq=False)
+class Passage:
+    """A leg of a run and the event that ends it, with derivatives.
+
+    Attributes
+    ----------
+    stretch : Stretch
+    flown : Flown
+    event : Saltation or None
+        None where a time ends the leg.
+    """
+
+    stretch: Stretch
+    flown: Flown
+    event: Saltation | None
+
+    def forward(self, dx: Array, dp: Array) -> tuple[Array, Array]:
+        """Carry derivatives by start (N, m) and parameters (N, q) to the end of the leg's flow."""
+        by_start = self.flown.by_start
+        return by_start @ dx, by_start @ dp + self.flown.by_parameters
+
+    def through(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
+        """Carry derivatives at the end of the flow through the event."""
+        if self.event is None:
+            return dx, dp
+        s = self.event
+        return s.matrix @ dx, s.matrix @ dp + s.by_parameters[:, list(chosen)]
+
+    def times(self, dx: Array, dp: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
+        """Derivatives of the time of the event, from those at the end of the flow."""
+        assert self.event is not None
+        s = self.event
+        return s.time_by_state @ dx, s.time_by_state @ dp + s.time_by_parameters[list(chosen)]
+
+    def backward(self, cotangent: Array, chosen: Sequence[int]) -> tuple[Array, Array]:
+        """Pull a row (N,) back through event and flow: the row at the start, and by parameters."""
+        by_parameters = np.zeros(len(chosen))
+        if self.event is not None:
+            by_parameters += cotangent @ self.event.by_parameters[:, list(chosen)]
+            cotangent = cotangent @ self.event.matrix
+        by_parameters += cotangent @ self.flown.by_parameters
+        return cotangent @ self.flown.by_start, by_parameters
+
+
+def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
+    """Legs and events of a run, with derivatives by the start of each and by chosen parameters."""
+    system = run.system
+    p = system.parameter_vector(run.parameters)
+    parts = stretches(run)
+    try:
+        flight = Flights(system, [part.leg for part in parts], chosen)(
+            np.array([part.start for part in parts]),
+            np.array([part.duration for part in parts]),
+            p,
+        )
+    except ConvergenceError:
+        found = _one_by_one(run, parts, p, chosen)
+        require_known(system, found, p)
+        return found
+    found = _together(parts, flight)
+    if parts[-1].leg.name and run.events[-1].kind == "end":  # the run ends at the very event
+        last = found[-1]
+        jump = saltation_after(run, last.stretch, last.flown, None, p)
+        found[-1] = replace(last, event=jump)
+    require_known(system, found, p)
+    return found
+
+
+def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
+    """Legs that were flown together, with the saltation of their events."""
+    n = flight.after.shape[1]
+    after = np.roll(flight.before[:, :n], -1, axis=0)
+    carried = (flight.after_state @ flight.rate[:, :, None])[:, :, 0]
+    ends: NDArray[Any] = ~np.all(np.isfinite(after), axis=1)
+    ends[-1] = True
+    after[ends] = carried[ends]
+    events = np.array([bool(part.leg.name) for part in parts])
+    found = saltations(flight, after, lambda k: _at(parts[k]), events)
+    rows = zip(
+        parts,
+        flight.flown,
+        events.tolist(),
+        found.matrix,
+        found.by_parameters,
+        found.time_by_state,
+        found.time_by_parameters,
+        found.angle.tolist(),
+        flight.sizes,
+        strict=True,
+    )
+    return [
+        Passage(part, flown, Saltation(s[:, :k], sp, t[:k], tp, angle) if event else None)
+        for part, flown, event, s, sp, t, tp, angle, k in rows
+    ]
+
+
+def _at(part: Stretch) -> str:
+    return f"{part.leg.name!r} at t = {part.t + part.duration:.10g}"
+
+
+def _one_by_one(
+    run: Trajectory, parts: Sequence[Stretch], p: Array, chosen: tuple[int, ...]
+) -> list[Passage]:
+    """Legs of which some have no Taylor series at an end."""
+    result: list[Passage] = []
+    for k, part in enumerate(parts):
+        flown = _flown(run, part, p, chosen)
+        following = parts[k + 1] if k + 1 < len(parts) else None
+        result.append(Passage(part, flown, saltation_after(run, part, flown, following, p)))
+    return result
+
+
+def _flown(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) -> Flown:
+    try:
+        return fly(run.system, part.leg, part.start, part.duration, p, chosen)
+    except ConvergenceError:
+        # The field has no Taylor series at an end of the leg (a power law at zero), but a derivative.
+        return collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
+
+
+def saltation_after(
+    run: Trajectory, part: Stretch, flown: Flown, following: Stretch | None, p: Array
+) -> Saltation | None:
+    """What the event that ends a leg does to neighbours; None where a time ends it."""
+    # At the end of a run that goes no further the field after it is that of the mode reached.
+    if not part.leg.name:
+        return None
+    system, n = run.system, len(part.start)
+    at = part.leg.at_end(system, flown.end, p)
+    ends = run.events[-1]
+    leg = following.leg if following else Leg(ends.mode_before) if ends.kind == "end" else None
+    if part.leg.kind == "stop" or leg is None:
+        after = at.after_state @ flown.rate
+    else:
+        field = leg.field(system)
+        start = field.states_at(at.after, p)
+        after = field.rate.copied(start, p)[0][:n, 0]
+        if not np.all(np.isfinite(after)):
+            after = at.after_state @ flown.rate
+    return saltation(at, flown.rate, after, _at(part))
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Sensitivity:
+    """Derivatives of the end of a run and of the times of its events.
+
+    Attributes
+    ----------
+    dx_dx0 : ndarray (n, n)
+        Of the final state by the start.
+    dx_dp : ndarray (n, q)
+        Of the final state by the parameters ``names``.
+    event_times : ndarray (m,)
+        Times of the events that the derivatives pass.
+    dt_dx0, dt_dp : ndarray (m, n), (m, q)
+        Of the event times.
+    dt_end_dx0, dt_end_dp : ndarray (n,), (q,)
+        Of the final time: zero unless a stop ended the run.
+    names : tuple of str
+        Of the parameters.
+    run : Trajectory
+        The run that was differentiated.
+    """
+
+    dx_dx0: Array
+    dx_dp: Array
+    event_times: Array
+    dt_dx0: Array
+    dt_dp: Array
+    dt_end_dx0: Array
+    dt_end_dp: Array
+    names: tuple[str, ...]
+    run: Trajectory
+
+    @cached_property
+    def clearance(self) -> float:
+        """Smallest distance ``h/|grad h|`` at which the run passed a guard without reaching it.
+
+        Perturbations of that size may change the itinerary, and with it the derivative. Infinite
+        where the run passes none.
+        """
+        return self._nearest[0]
+
+    @cached_property
+    def nearest(self) -> str:
+        """The guard of ``clearance``, and when it was nearest; empty where there is none."""
+        return self._nearest[1]
+
+    @cached_property
+    def _nearest(self) -> tuple[float, str]:
+        if self.run.system.sets:  # not looked for
+            return math.inf, ""
+        return clearance(self.run)
+
+    def __repr__(self) -> str:
+        near = f"; clearance {self.clearance:.3g} ({self.nearest})" if self.nearest else ""
+        return (
+            f"Sensitivity({self.dx_dx0.shape[0]} states, parameters {', '.join(self.names) or '-'}, "
+            f"{len(self.event_times)} events{near})"
+        )
+
+
+def clearance(run: Trajectory) -> tuple[float, str]:
+    """Smallest distance from a guard that a run passed without reaching it, and which and when."""
+    p, best = run.system.parameter_vector(run.parameters), (math.inf, "")
+    for part in stretches(run):
+        if part.duration <= 0.0:
+            continue
+        try:
+            seen = watch(run.system, part.leg.mode, part.start, part.duration, p).approaches
+        except ConvergenceError:
+            continue  # no Taylor series at an end: nothing is said of this leg
+        for near in seen:
+            if abs(near.distance) < best[0]:
+                when = f"{described(near.guard)} at t = {part.t + near.t:.6g}"
+                best = (abs(near.distance), when)
+    return best
+
+
+def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensitivity]:
+    """Passages of a run, and the derivatives that follow from them (without the clearance)."""
+    system, n = run.system, run.system.dimension
+    chosen = tuple(system.parameter_names.index(name) for name in names)
+    parts = passages(run, chosen)
+    dx, dp = np.eye(system.extended_dimension), np.zeros((system.extended_dimension, len(chosen)))
+    times, by_start, by_parameters = list[float](), list[Array](), list[Array]()
+    end_x, end_p = np.zeros(system.extended_dimension), np.zeros(len(chosen))
+    for part in parts:
+        dx, dp = part.forward(dx, dp)
+        if part.event is not None:
+            t_x, t_p = part.times(dx, dp, chosen)
+            times.append(part.stretch.t + part.stretch.duration)
+            by_start.append(t_x[:n])
+            by_parameters.append(t_p)
+            if part.stretch.leg.kind == "stop":
+                end_x, end_p = t_x, t_p
+                rate = part.flown.rate
+                dx, dp = dx + np.outer(rate, t_x), dp + np.outer(rate, t_p)
+                continue
+        dx, dp = part.through(dx, dp, chosen)
+    m, q = len(times), len(chosen)
+    return parts, Sensitivity(
+        dx_dx0=dx[:n, :n],
+        dx_dp=dp[:n],
+        event_times=np.array(times),
+        dt_dx0=np.array(by_start).reshape(m, n),
+        dt_dp=np.array(by_parameters).reshape(m, q),
+        dt_end_dx0=end_x[:n],
+        dt_end_dp=end_p,
+        names=tuple(names),
+        run=run,
+    )

@@ -1,0 +1,1 @@
+"""Portraits: trajectories, phase planes, switching surfaces, manifolds and dividing curves."""

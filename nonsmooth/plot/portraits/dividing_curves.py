@@ -1,0 +1,132 @@
+"""Dividing surfaces of two-folds where a plane of starts cuts them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+
+from ...model import Array, OptionError
+from ...orbit import DividingCurves
+from .. import style
+from ..labels import Labels
+
+#: By the kind of an arc: what its orbits do, and dashes.
+_KINDS: dict[str, tuple[str, Any]] = {
+    "two-fold": ("into a two-fold", "-"),
+    "grazing": ("just touches", style.DASHED),
+}
+
+#: A name is beside the middle of an arc: in this share of its length.
+_MIDDLE = np.linspace(0.3, 0.7, 9)
+
+
+def dividing_curves(
+    found: DividingCurves | Sequence[DividingCurves],
+    *,
+    names: Sequence[str] = (),
+    ax: Axes | None = None,
+    size: tuple[float, float] = (5.0, 3.9),
+    labels: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw the curves in which a plane of starts is cut by what divides orbits beside two-folds.
+
+    Starts that slide into a two-fold are full lines, those that just touch the surface are dashed, and dots
+    are where they meet; circles are where arcs of two itineraries do that are of one kind. Beside every arc
+    is its itinerary. What comes to the two-folds is blue, what leaves them red.
+
+    Parameters
+    ----------
+    found : DividingCurves or sequence of DividingCurves
+        From :func:`nonsmooth.manifold` with ``starts``; several in one plane.
+    names : sequence of str, optional
+        Of the two coordinates of the plane, for the axes.
+    ax : matplotlib Axes, optional
+        Axes to draw into, for example those of a map of outcomes; a new figure is made without it.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    labels : bool, optional
+        Whether arcs have their names beside them.
+    title : str, optional
+        Title of the picture; none by default.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
+
+    Raises
+    ------
+    OptionError
+        Not such curves, or no axes of a plane.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, z = (ca.SX.sym(name) for name in "xyz")
+    >>> system = ns.FilippovSystem([x, y, z], surface=x, above=[y, 1, 0.5], below=[z, 0.3, -1])
+    >>> fold = ns.find_two_fold(system, near=[0.0, 0.0, 0.0])
+    >>> found = ns.manifold(system, fold, starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)],
+    ...                     duration=6.0)
+    >>> figure = ns.plot.dividing_curves(found, names=["y at the start", "z at the start"])
+    >>> figure.axes[0].get_xlabel()
+    'y at the start'
+    """
+    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
+    if not several or not all(isinstance(one, DividingCurves) for one in several):
+        raise OptionError(
+            "found: expected DividingCurves or several, received "
+            f"{repr(found)[:60]}. ns.manifold returns them with starts=."
+        )
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        if hasattr(axes, "get_zlim"):
+            raise OptionError(
+                f"ax: expected axes of a plane, received {type(axes).__name__}. Leave projection out."
+            )
+        named = Labels(axes) if labels else None
+        for one in several:
+            _draw(axes, named, one)
+        for axis, name in zip("xy", names, strict=False):
+            getattr(axes, f"set_{axis}label")(name)
+        axes.margins(0.06)
+        if title:
+            axes.set_title(title)
+    return figure
+
+
+def _draw(axes: Any, named: Labels | None, one: DividingCurves) -> None:
+    color = style.BLUE if one.stable else style.VERMILLION
+    for arc in one.arcs:
+        words, dashes = _KINDS[arc.kind]
+        axes.plot(*arc.points.T, color=color, linewidth=1.8, linestyle=dashes)
+        if named is not None:
+            back = "" if one.stable else ", backward"
+            modes = arc.itinerary.replace("-", "\N{MINUS SIGN}")
+            named.name(f"{modes} {words}{back}", _middle(arc.points), color)
+    changes = _changes(one)
+    if len(changes):
+        look: Any = {"markersize": 4.5, "zorder": 5}
+        axes.plot(*changes.T, "o", markerfacecolor="white", markeredgecolor=color, **look)
+    if len(one.junctions):
+        axes.plot(*one.junctions.T, "o", color=style.BLACK, markersize=4.5, zorder=5)
+
+
+def _changes(one: DividingCurves) -> Array:
+    """Points (k, 2) at which arcs of two itineraries of one kind follow each other."""
+    pairs = [pair for curve in one.curves for pair in pairwise(curve)]
+    found = [a.points[-1] for a, b in pairs if a.kind == b.kind and a.itinerary != b.itinerary]
+    return np.array(found).reshape(-1, 2)
+
+
+def _middle(points: Array) -> Array:
+    """Points (k, 2) about the middle of a polyline, by its length."""
+    steps = np.diff(points, axis=0) / (np.ptp(points, axis=0) + np.finfo(float).tiny)
+    length = np.concatenate([[0.0], np.cumsum(np.linalg.norm(steps, axis=1))])
+    at = _MIDDLE * length[-1]
+    return np.column_stack([np.interp(at, length, column) for column in points.T])

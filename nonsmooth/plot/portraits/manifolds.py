@@ -1,0 +1,141 @@
+"""Manifolds: separatrices in a plane, curves and surfaces in space."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from mpl_toolkits.mplot3d.art3d import Poly3DCollection
+
+from ...model import OptionError
+from ...orbit import Manifold
+from .. import style
+
+_STABLE, _UNSTABLE = style.BLUE, style.VERMILLION
+
+
+def manifold(
+    found: Manifold | Sequence[Manifold],
+    *,
+    names: Sequence[str] = (),
+    ax: Axes | None = None,
+    size: tuple[float, float] = (6.0, 4.6),
+    legend: bool = True,
+    title: str | None = None,
+) -> Figure:
+    """Draw manifolds, stable ones in blue and unstable ones in red.
+
+    Parameters
+    ----------
+    found : Manifold or sequence of Manifold
+        Of points of one system in the plane or in space.
+    names : sequence of str, optional
+        Of the states, for the axes.
+    ax : matplotlib Axes, optional
+        For example that of a phase portrait; with the projection ``"3d"`` for manifolds in space. A
+        new figure is made without it.
+    size : (width, height), optional
+        Of a new figure, in inches.
+    legend : bool, optional
+        Whether a legend is drawn.
+    title : str, optional
+        Title of the picture; the default says what is shown.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        The figure, with ``savefig``; notebooks show it.
+
+    Raises
+    ------
+    OptionError
+        Not manifolds, of other dimensions, or axes that do not fit them.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> system = ns.FilippovSystem([x, y], surface=y, above=[x + y, -1], below=[x, 1])
+    >>> saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.0])
+    >>> both = [ns.manifold(system, saddle, stable=s, length=1.0) for s in (True, False)]
+    >>> figure = ns.plot.manifold(both, names=["x", "y"])
+    """
+    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
+    spatial = _dimension(several) == 3
+    with style.settings():
+        if ax is None and spatial:
+            figure = style.new_figure(size)
+            axes: Any = figure.add_subplot(projection="3d")
+            ax = axes
+        figure, axes = style.axes_for(ax, size)
+        if spatial != hasattr(axes, "get_zlim"):
+            raise OptionError(
+                "ax: expected axes of as many dimensions as the manifolds, received "
+                f"{type(axes).__name__}. Make them with projection='3d' for three states."
+            )
+        for one in several:
+            _draw(axes, one)
+        for axis, name in zip("xyz", names, strict=False):
+            getattr(axes, f"set_{axis}label")(name)
+        if spatial:
+            _fit(axes, several)
+        if title:
+            axes.set_title(title)
+        if legend:
+            _legend(axes, several)
+    return figure
+
+
+def _dimension(several: list[Manifold]) -> int:
+    sizes = {len(m.point) for m in several if isinstance(m, Manifold)}
+    if (
+        len(sizes) != 1
+        or sizes & {2, 3} == set()
+        or not all(isinstance(m, Manifold) for m in several)
+    ):
+        raise OptionError(
+            f"found: expected manifolds of a system with two or three states, received {several!r}. "
+            "Curves in a plane of starts are drawn by dividing_curves."
+        )
+    return sizes.pop()
+
+
+def _draw(axes: Any, one: Manifold) -> None:
+    color = _STABLE if one.stable else _UNSTABLE
+    if one.dimension == 2 and len(one.triangles):
+        faces = one.points[one.triangles]
+        axes.add_collection3d(
+            Poly3DCollection(
+                faces, facecolors=color, alpha=0.35, linewidths=0.0, shade=True, rasterized=True
+            )
+        )
+        for arc in one.arcs[:: max(1, len(one.arcs) // 24)]:
+            axes.plot(*arc.points.T, color=color, linewidth=0.5)
+    else:
+        for arc in one.arcs:
+            axes.plot(*arc.points.T, color=color, linewidth=1.4)
+    axes.plot(*one.point[:, None], marker="X", color=style.BLACK, markersize=5.0, linestyle="")
+
+
+def _fit(axes: Any, several: list[Manifold]) -> None:
+    """Limits around all points, in one scale."""
+    points = np.vstack([arc.points for m in several for arc in m.arcs])
+    for axis, low, high in zip("xyz", points.min(axis=0), points.max(axis=0), strict=True):
+        pad = 0.03 * (high - low) or 0.5
+        getattr(axes, f"set_{axis}lim")(low - pad, high + pad)
+
+
+def _legend(axes: Any, several: list[Manifold]) -> None:
+    words = {True: "stable manifold", False: "unstable manifold"}
+    handles = [
+        style.Line2D([], [], color=_STABLE if s else _UNSTABLE, label=words[s])
+        for s in (True, False)
+        if any(m.stable == s for m in several)
+    ]
+    handles.append(
+        style.marker("X", "its point" if len(several) == 1 else "their points", size=5.0)
+    )
+    axes.legend(handles=handles, loc="upper left" if axes.name == "3d" else "best")

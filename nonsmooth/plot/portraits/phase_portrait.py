@@ -1,0 +1,376 @@
+"""Phase portraits of planar Filippov systems."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from numpy.typing import ArrayLike
+
+from ...local import Equilibrium, Fold, PseudoEquilibrium
+from ...local.scans.box import Box
+from ...local.scans.plane_scan import Piece, PlaneScan
+from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
+from ...orbit.manifolds.plane_orbits import PlaneOrbits
+from .. import style
+from ..labels import Labels
+from ..legends import beside
+from .tapered_ends import draw_orbit
+
+_ORBIT, _SEPARATRIX, _FOLD_ORBIT = "#444444", style.CANARD, style.GREEN
+_PIECES: dict[str, tuple[str, float, Any, str]] = {
+    "attracting": (style.BLACK, 3.4, "-", "sliding, attracting"),
+    "repelling": (style.ORANGE, 3.4, (0, (2.2, 1.0)), "sliding, repelling"),
+    "crossing": (style.GREY, 1.2, "-", "crossing"),
+}
+#: Markers by the last word of a kind.
+_MARKERS = {
+    "fold": "D",
+    "cusp": "^",
+    "pseudo-node": "s",
+    "pseudo-saddle": "X",
+    "pseudo-saddle-node": "P",
+    "node": "o",
+    "focus": "o",
+    "centre": "o",
+    "degenerate": "P",
+    "saddle": "X",
+}
+_ONE_MARK = 0.012  # points so close together, in units of the box, have one name
+Special = Fold | PseudoEquilibrium | Equilibrium
+
+
+def phase_portrait(
+    system: FilippovSystem,
+    box: Sequence[float] | Sequence[Sequence[float]],
+    *,
+    parameters: Parameters | None = None,
+    starts: ArrayLike | None = None,
+    t_end: float | None = None,
+    separatrices: bool = True,
+    ax: Axes | None = None,
+    size: tuple[float, float] = (7.0, 4.8),
+    legend: bool = True,
+    labels: bool | None = None,
+    title: str | None = None,
+) -> Figure:
+    """Draw the phase portrait of a planar system with one surface.
+
+    The directions of both fields, orbits through crossing and sliding, the surface in its
+    attracting, repelling and crossing pieces, folds, equilibria, pseudo-equilibria and
+    separatrices: invariant manifolds of saddles and pseudo-saddles and the orbits through visible
+    folds. Stops and resets of the system are ignored.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        Two states, one surface, no explicit time.
+    box : (xmin, xmax, ymin, ymax) or ((xmin, xmax), (ymin, ymax))
+        The window that is drawn, in the two states.
+    parameters : mapping, optional
+        Values that replace defaults.
+    starts : array_like (k, 2), optional
+        Where orbits start, followed forward only; by default orbits fill the box evenly.
+    t_end : float, optional
+        Duration of each orbit each way; by default long enough to pass the box several times.
+    separatrices : bool, optional
+        Whether to draw them.
+    ax : matplotlib Axes, optional
+        Axes to draw into; default a new figure.
+    size : (float, float), optional
+        Inches, of a new figure.
+    legend : bool, optional
+        Whether a legend of the lines is drawn.
+    labels : bool, optional
+        Whether special points are named beside them; by default where there is a legend.
+    title : str, optional
+        Title of the picture; the default says what is shown.
+
+    Returns
+    -------
+    matplotlib Figure
+        The figure, with ``savefig``; notebooks show it.
+
+    Raises
+    ------
+    DefinitionError
+        The system is not planar, depends on time, or has not exactly one surface.
+    OptionError
+        A box without an inside; a time or a size that is not positive; axes that are none.
+    PointError
+        Starts that are no rows of two finite numbers.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> relay = ns.FilippovSystem(
+    ...     [x, y], surface=x + y, above=[y - x, 3 * y - 10], below=[y - x, 3 * y + 10])
+    >>> figure = ns.plot.phase_portrait(relay, (-4, 4, -4, 4))
+    >>> figure.axes[0].get_xlabel()
+    'x'
+    """
+    _check(system)
+    values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
+    scan = PlaneScan.of(system, values, Box.read(box))
+    with style.settings():
+        figure, axes = style.axes_for(ax, size)
+        portrait = _Portrait(axes, scan, t_end)
+        portrait.draw(None if starts is None else _points(system, starts), separatrices)
+        names, limits = system.state_names, scan.box.limits
+        axes.set(xlim=limits[:2], ylim=limits[2:], xlabel=names[0], ylabel=names[1])
+        if title is not None:
+            axes.set_title(title)
+        if legend:
+            portrait.legend()
+        if legend if labels is None else labels:
+            portrait.names()
+    return figure
+
+
+def _check(system: object) -> None:
+    if not isinstance(system, FilippovSystem):
+        received, advice = type(system).__name__, "Give the system first, then the box."
+    elif system.dimension != 2:
+        received = f"{system.dimension} states: {', '.join(system.state_names)}"
+        advice = "For a two-fold in three states use two_fold; for runs use trajectory."
+    elif system.sets:
+        received, advice = "a set of codimension two or three", "Draw runs with trajectory."
+    elif system.surface_count != 1:
+        received = f"{system.surface_count} surfaces"
+        advice = "Its surfaces meet and cut each other; draw runs with trajectory."
+    elif system.time_dependent:
+        received, advice = "explicit time", "Its orbits cross in the plane of the states."
+    elif system.nonlinear[0]:
+        received, advice = "hidden dynamics", "Its sliding field is not a convex combination."
+    else:
+        return
+    raise DefinitionError(
+        explain(
+            "phase_portrait",
+            expected="an autonomous FilippovSystem of 2 states and 1 surface",
+            received=received,
+            advice=advice,
+        )
+    )
+
+
+def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
+    try:
+        points = np.asarray(starts, dtype=float)
+    except (TypeError, ValueError):
+        points = np.empty(0)
+    if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
+        raise PointError(
+            explain(
+                "starts",
+                expected="finite numbers of shape (k, 2)",
+                received=f"shape {points.shape}" if points.size else repr(starts),
+                advice=f"One row ({', '.join(system.state_names)}) for each orbit.",
+            )
+        )
+    return points
+
+
+class _Portrait:
+    """Draws one portrait: what a scan found, and orbits."""
+
+    def __init__(self, ax: Axes, scan: PlaneScan, t_end: float | None):
+        self.ax, self.scan = ax, scan
+        self.flow = PlaneOrbits(scan, t_end)
+        self.special: list[Special] = [*scan.equilibria, *scan.folds, *scan.pseudo_equilibria]
+        self.special += scan.boundary_equilibria
+        self.drawn: set[str] = set()
+
+    def draw(self, starts: Array | None, separatrices: bool) -> None:
+        """Draw every part, from the back."""
+        self.directions()
+        special = list(self.flow.separatrices()) if separatrices else []
+        self.orbits(starts, [curve for _, curve in special])
+        for name, curve in special:
+            color, width = (_SEPARATRIX, 1.8) if name == "separatrix" else (_FOLD_ORBIT, 1.5)
+            self._draw(curve, color, width, name)
+        self.surface()
+        self.marks()
+
+    def directions(self) -> None:
+        """Faint arrows of the field on each side."""
+        mesh, size = self.scan.box.middles(19), self.scan.box.size
+        numbers = self.scan.at(mesh)
+        for k, (side, color) in enumerate(style.FIELDS.items()):
+            chosen = numbers.h > 0 if side == "+" else numbers.h < 0
+            arrows = numbers.fields[chosen, k] / size
+            length = np.linalg.norm(arrows, axis=1, keepdims=True)
+            arrows = np.divide(arrows, length, out=np.zeros_like(arrows), where=length > 0)
+            arrows = arrows * size * 0.028
+            self.ax.quiver(
+                *mesh[chosen].T,
+                *arrows.T,
+                color=color,
+                alpha=0.33,
+                pivot="mid",
+                angles="xy",
+                scale_units="xy",
+                scale=1.0,
+                width=0.0022,
+                headwidth=4.5,
+                headlength=5,
+                zorder=1,
+            )
+
+    def orbits(self, starts: Array | None, avoid: list[Array]) -> None:
+        """Orbits from given starts, or evenly spaced ones through the box."""
+        if starts is None:
+            for orbit in self.flow.spaced(avoid=avoid):
+                self._draw(orbit.curve, _ORBIT, 0.9, "orbit", orbit.thins)
+            return
+        for start in starts:
+            self._draw(self.flow.follow(start), style.BLACK, 1.0, "orbit")
+            self.ax.plot(*start, ".", color=style.BLACK, markersize=5, zorder=2.2, gid="start")
+            self.drawn.add("start")
+
+    def surface(self) -> None:
+        """The surface in its pieces, with the direction of sliding."""
+        for piece in self.scan.pieces:
+            color, width, dashes, _ = _PIECES[piece.kind]
+            self.ax.plot(
+                *piece.points.T,
+                color=color,
+                linewidth=width,
+                linestyle=dashes,
+                zorder=4,
+                solid_capstyle="butt",
+                gid=piece.kind,
+            )
+            if piece.kind != "crossing":
+                self._sliding_arrows(piece)
+
+    def _sliding_arrows(self, piece: Piece) -> None:
+        """One arrow between neighbouring pseudo-equilibria and ends."""
+        points = piece.points
+        velocity = self.scan.at((points[1:] + points[:-1]) / 2).sliding
+        ahead = np.sum(velocity * np.diff(points, axis=0), axis=1) > 0
+        cuts = [0, *(np.flatnonzero(ahead[1:] != ahead[:-1]) + 1), len(ahead)]
+        for a, b in pairwise(cuts):
+            part = points[a : b + 1]
+            if self.scan.box.length(part) < 0.04:
+                continue
+            part = part if ahead[(a + b) // 2] else part[::-1]
+            color = _PIECES[piece.kind][0]
+            style.arrowhead(self.ax, part, 0.55, color, mutation_scale=17, zorder=5)
+
+    def marks(self) -> None:
+        """Folds, equilibria and pseudo-equilibria."""
+        for found in self.special:
+            name = _name(found)
+            shape, fill = _look(found)
+            edge = style.BLACK
+            if not isinstance(found, PseudoEquilibrium):
+                edge = style.FIELDS[found.side]
+                fill = edge if fill != "white" else fill
+            self.ax.plot(
+                *found.point,
+                marker=shape,
+                markersize=5.5 if isinstance(found, Fold) else 12 if shape == "*" else 8,
+                linestyle="none",
+                markeredgecolor=edge,
+                markerfacecolor=fill,
+                markeredgewidth=1.3,
+                zorder=6,
+                gid=name,
+            )
+
+    def legend(self) -> None:
+        """Explain lines and marks beside the axes."""
+        handles = [
+            style.line(_PIECES[kind][0], text, width, dashes)
+            for kind, (_, width, dashes, text) in _PIECES.items()
+            if any(piece.kind == kind for piece in self.scan.pieces)
+        ]
+        handles.append(style.line(_ORBIT, "orbits", 0.9))
+        if "start" in self.drawn:
+            handles.append(style.marker(".", "where they start", size=5))
+        if "separatrix" in self.drawn:
+            handles.append(style.line(_SEPARATRIX, "separatrices", 1.8))
+        if "fold orbit" in self.drawn:
+            handles.append(style.line(_FOLD_ORBIT, "orbits through visible folds", 1.5))
+        beside(self.ax, handles)
+
+    def names(self) -> None:
+        """Name the sides of the surface and the special points, beside them."""
+        labels = Labels(self.ax)
+        mesh = self.scan.box.middles(9)
+        h = self.scan.at(mesh).h
+        for side, color in style.FIELDS.items():
+            chosen = mesh[h > 0 if side == "+" else h < 0]
+            if len(chosen):
+                text = f"$h {'>' if side == '+' else '<'} 0$"
+                labels.name(text, chosen, color, inside=True, fontsize=10)
+        for name, points in _together(self.special, self.scan.box.size).items():
+            for point in points:
+                labels.name(name, point)
+
+    def _draw(
+        self,
+        curve: Array,
+        color: str,
+        width: float,
+        name: str,
+        thins: tuple[bool, bool] = (False, False),
+    ) -> None:
+        if len(curve) < 2:
+            return
+        self.drawn.add(name)
+        order = 2.0 if name == "orbit" else 3.0
+        look: Any = {"color": color, "zorder": order, "gid": name}
+        draw_orbit(self.ax, curve, thins, self.scan.box, width, **look)
+        for piece in style.inside(curve, self.scan.box.limits):
+            if self.scan.box.length(piece) > 0.1:
+                style.arrowhead(
+                    self.ax, piece, 0.5, color, mutation_scale=9 + 2 * width, zorder=order + 0.1
+                )
+                return
+
+
+def _together(special: list[Special], size: Array) -> dict[str, list[Array]]:
+    """Names and places of points; those that lie on one another are named together."""
+    groups = list[tuple[Array, list[str]]]()
+    for found in special:
+        point = np.asarray(found.point, dtype=float)
+        near = [names for at, names in groups if np.linalg.norm((at - point) / size) < _ONE_MARK]
+        names = near[0] if near else list[str]()
+        if not near:
+            groups.append((point, names))
+        names.append(_name(found))
+    together: dict[str, list[Array]] = {}
+    for point, names in groups:
+        seen = [name if names.count(name) == 1 else f"two {name}s" for name in dict.fromkeys(names)]
+        together.setdefault(",\n".join(seen), []).append(point)
+    return together
+
+
+def _name(found: Special) -> str:
+    """What a special point is called in the legend."""
+    if isinstance(found, Fold):
+        return f"{found.kind} fold" if found.order == 2 else found.kind
+    name = found.kind
+    if isinstance(found, Equilibrium) and name == "degenerate" and np.any(found.eigenvalues.imag):
+        name = "centre"
+    if isinstance(found, Equilibrium) and found.status == "boundary":
+        name = f"boundary {name.rpartition(' ')[2]}"
+    return name
+
+
+def _look(found: Special) -> tuple[str, str]:
+    """Marker and fill of a special point."""
+    name = _name(found)
+    if name.startswith("boundary") and isinstance(found, Equilibrium):
+        return "*", style.BLACK if np.all(found.eigenvalues.real < 0) else "white"
+    full = name.startswith(("visible", "stable")) or name == "saddle"
+    return _MARKERS[name.rpartition(" ")[2]], style.BLACK if full else "white"

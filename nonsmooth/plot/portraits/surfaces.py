@@ -1,0 +1,35 @@
+"""The switching surfaces of a planar system, under what else a picture shows."""
+
+from __future__ import annotations
+
+import numpy as np
+from matplotlib.axes import Axes
+
+from ...model import Array, FilippovSystem, call
+from .. import style
+
+
+def draw_surfaces(
+    ax: Axes, system: FilippovSystem, parameters: Array, box: tuple[float, float, float, float]
+) -> None:
+    """Draw the switching surfaces of a planar system in a box as grey lines."""
+    x, y = np.meshgrid(np.linspace(*box[:2], 161), np.linspace(*box[2:], 161))
+    points = np.vstack([x.ravel(), y.ravel()])
+    count = system.surface_count
+    function = system.function(
+        ("plot surfaces",), lambda: [system.surface_function(i) for i in range(count)]
+    )
+    values = call(function, points, parameters) if count else []
+    for value in values:
+        h = value.reshape(x.shape)
+        if np.nanmin(h) < 0 < np.nanmax(h):
+            ax.contour(
+                x,
+                y,
+                h,
+                levels=[0.0],
+                colors=[style.GREY],
+                linewidths=2.2,
+                alpha=0.7,
+                zorder=1,
+            )

@@ -1,0 +1,1 @@
+"""Interval arithmetic: values, series, polynomials and expressions in enclosures."""

@@ -1,0 +1,109 @@
+"""Expressions as polynomials with rational coefficients: what is equal here is equal.
+
+Instructions that are not polynomial (a sine, an inverse) stand for themselves as atoms. Common
+factors are found by the exact greatest common divisor over the rationals.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from fractions import Fraction
+from typing import Any
+
+from .flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx
+from .instructions import Tape
+from .intervals import Numbers, exact
+
+_POLYNOMIAL = {"const", "add", "sub", "mul", "div", "neg", "sq", "twice", "power"}
+
+
+class Algebra:
+    """Nodes of a tape as polynomials in atoms."""
+
+    def __init__(self, tape: Tape, roots: Sequence[int], numbers: Numbers):
+        self.tape = tape
+        chosen = tape.ancestors(roots)
+        self.atoms = [k for k in chosen if not self._is_polynomial(k)]
+        # A quotient is a product with the inverse of its denominator, which is an atom.
+        below = {k: tape.nodes[k].args[1] for k in chosen if tape.nodes[k].op == "div"}
+        self._inverse = {k: tape.node("inv", b) for k, b in below.items()}
+        self.atoms += sorted(set(self._inverse.values()) - set(self.atoms))
+        names = [f"a{k}" for k in self.atoms] or ["a"]
+        self.ring = fmpq_mpoly_ctx.get(names, "lex")
+        self._value: dict[int, Any] = dict(zip(self.atoms, self.ring.gens(), strict=False))
+        for k in chosen:
+            if k not in self._value:
+                node = tape.nodes[k]
+                args = [self._value[a] for a in node.args]
+                if node.op == "div":
+                    self._value[k] = args[0] * self._value[self._inverse[k]]
+                elif node.op == "const":
+                    self._value[k] = self.constant(exact(node.payload, numbers))
+                else:
+                    self._value[k] = self._combine(node.op, args, node.payload)
+
+    def _is_polynomial(self, k: int) -> bool:
+        return self.tape.nodes[k].op in _POLYNOMIAL
+
+    def constant(self, value: Fraction) -> fmpq_mpoly:
+        """A constant polynomial."""
+        return self.ring.constant(fmpq(value.numerator, value.denominator))
+
+    def _combine(self, op: str, a: Sequence[Any], payload: Any) -> Any:
+        if op == "add":
+            return a[0] + a[1]
+        if op == "sub":
+            return a[0] - a[1]
+        if op == "mul":
+            return a[0] * a[1]
+        if op == "neg":
+            return -a[0]
+        if op == "twice":
+            return a[0] + a[0]
+        return a[0] ** (2 if op == "sq" else payload)
+
+    def __getitem__(self, k: int) -> fmpq_mpoly:
+        """The polynomial of a node."""
+        return self._value[k]
+
+    def node(self, p: fmpq_mpoly) -> int:
+        """Write a polynomial back onto the tape."""
+        tape, terms = self.tape, []
+        for powers, c in p.to_dict().items():
+            term = tape.constant(Fraction(int(c.p), int(c.q)))
+            for atom, n in zip(self.atoms, powers, strict=False):
+                if n:
+                    term = tape.apply("mul", [term, tape.power(atom, int(n))])
+            terms.append(term)
+        return tape.add(*terms)
+
+
+def common_divisor(polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly | None:
+    """Greatest common divisor of those that are not zero; None if all are."""
+    found = None
+    for p in polynomials:
+        if not p.is_zero():
+            found = p if found is None else found.gcd(p)
+    return found
+
+
+class Difference:
+    """F1 - F2 = g G with the greatest common divisor g, and b = grad h . G."""
+
+    # L1 - L2 = g b, so where b has no zero, L1 = L2 implies F1 = F2; while sliding the field is
+    # F1 - (L1/b) G, smooth where g vanishes (Filippov 1988, sec. 4).
+
+    def __init__(
+        self, tape: Tape, fields: Sequence[Sequence[int]], gradient: Sequence[int], numbers: Numbers
+    ):
+        self.differences = [tape.apply("sub", [a, b]) for a, b in zip(*fields, strict=True)]
+        algebra = Algebra(tape, self.differences, numbers)
+        polynomials = [algebra[k] for k in self.differences]
+        divisor = common_divisor(polynomials)
+        self.identical = divisor is None
+        if divisor is None or divisor.is_constant():
+            self.factor, self.direction = tape.constant(1.0), self.differences
+        else:  # written out only where something is cancelled
+            self.factor = algebra.node(divisor)
+            self.direction = [algebra.node(p / divisor) for p in polynomials]
+        self.transverse = tape.dot(gradient, self.direction)

@@ -1,0 +1,181 @@
+"""Numbers that enclose: midpoint-radius intervals of any precision, by Arb through python-flint.
+
+Every operation returns an enclosure of its exact results for all arguments enclosed, or something
+that is not finite. Where a function jumps, or has no value, nothing finite is returned.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from decimal import Decimal
+from fractions import Fraction
+from typing import Any, Literal
+
+from ...model import OptionError, explain
+from .flint import arb, ctx, fmpq
+
+Numbers = Literal["stored", "written"]
+
+
+def exact(value: Any, numbers: Numbers = "stored", what: str = "number") -> Fraction:
+    """The rational number that is meant: a float as stored or as written, others exactly."""
+    if isinstance(value, (str, Decimal, Fraction)) or (
+        isinstance(value, int) and not isinstance(value, bool)
+    ):
+        try:
+            return Fraction(value)
+        except (ValueError, OverflowError, ZeroDivisionError) as error:
+            raise OptionError(_no_number(what, value)) from error
+    try:
+        number = float(value)
+    except (TypeError, ValueError) as error:
+        raise OptionError(_no_number(what, value)) from error
+    if not math.isfinite(number) or isinstance(value, bool):
+        raise OptionError(_no_number(what, value))
+    return Fraction(repr(number)) if numbers == "written" else Fraction(number)
+
+
+def _no_number(what: str, value: Any) -> str:
+    return explain(
+        what,
+        expected="a finite number, or one written as a string",
+        received=repr(value),
+        advice="For example 0.3 or '0.3'.",
+    )
+
+
+def enclose(value: Fraction) -> arb:
+    """Enclose a rational number."""
+    return arb(fmpq(value.numerator, value.denominator))
+
+
+def hull(low: arb, high: arb) -> arb:
+    """Enclose everything from one to the other."""
+    return low.union(high)
+
+
+def fraction(a: arb) -> Fraction:
+    """The value of an exact number."""
+    mantissa, exponent = a.mid().man_exp()
+    m, e = int(mantissa), int(exponent)
+    return Fraction(m * 2**e) if e >= 0 else Fraction(m, 2**-e)
+
+
+def ends(a: arb) -> tuple[Fraction, Fraction]:
+    """Both ends of a finite enclosure, exactly."""
+    m, r = fraction(a), fraction(a.rad())
+    return m - r, m + r
+
+
+def between(low: Fraction, high: Fraction) -> arb:
+    """Enclose an interval."""
+    return hull(enclose(low), enclose(high))
+
+
+def radius(a: arb) -> float:
+    """Radius as a double, rounded upward; infinite where the enclosure is not finite."""
+    return math.nextafter(float(a.rad()), math.inf) if a.is_finite() else math.inf
+
+
+def sign(a: arb) -> int:
+    """The sign that all numbers enclosed have; 0 where they have not one."""
+    return 1 if a > 0 else -1 if a < 0 else 0
+
+
+def inside(a: arb, b: arb) -> bool:
+    """Whether a is finite and lies in the interior of b."""
+    return bool(a.is_finite() and b.is_finite() and b.contains_interior(a))
+
+
+@contextmanager
+def precision(bits: int) -> Iterator[None]:
+    """Compute with so many bits inside."""
+    old = ctx.prec
+    ctx.prec = bits
+    try:
+        yield
+    finally:
+        ctx.prec = old
+
+
+# Operations --------------------------------------------------------------------------------------
+
+
+def square(a: arb) -> arb:
+    """a^2, not negative."""
+    if not a.contains(0):
+        return a * a
+    top = a.abs_upper()
+    return arb(0).union(top * top)
+
+
+def power(a: arb, n: int) -> arb:
+    """A natural power by squaring."""
+    result: arb | None = None
+    while True:
+        if n & 1:
+            result = a if result is None else result * a
+        n >>= 1
+        if not n:
+            return arb(1) if result is None else result
+        a = square(a)
+
+
+def _atan2(y: arb, x: arb) -> arb:
+    """Away from its cut, the negative x axis and 0, where it jumps."""
+    if y.contains(0) and not x > 0:
+        return arb.nan()
+    return arb.atan2(y, x)
+
+
+OPERATIONS: dict[str, Callable[..., arb]] = {
+    **{
+        op: getattr(arb, op)
+        for op in (
+            *("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh"),
+            *("tanh", "asinh", "acosh", "atanh", "erf", "erfinv", "expm1", "log1p"),
+        )
+    },
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "twice": lambda a: a + a,
+    "inv": lambda a: 1 / a,
+    "sq": square,
+    "pow": lambda a, b: (b * a.log()).exp(),
+    "hypot": lambda a, b: (square(a) + square(b)).sqrt(),
+    "atan2": _atan2,
+    "fabs": abs,
+    "fmin": lambda a, b: a.min(b),
+    "fmax": lambda a, b: a.max(b),
+    "pi": arb.pi,
+}
+
+
+class Enclosures:
+    """The arithmetic in which a program's values are enclosed."""
+
+    power = staticmethod(power)
+
+    def __init__(self, inputs: Sequence[Sequence[arb]], numbers: Numbers = "stored"):
+        self.inputs, self.numbers = inputs, numbers
+
+    def constant(self, value: float | Fraction) -> arb:
+        """Enclose a constant."""
+        if isinstance(value, float) and (
+            self.numbers == "stored" or (value.is_integer() and abs(value) < 2**53)
+        ):
+            return arb(value)
+        return enclose(exact(value, self.numbers))
+
+    def symbol(self, vector: int, position: int) -> arb:
+        """Return an input."""
+        return self.inputs[vector][position]
+
+    def apply(self, op: str, args: Sequence[arb]) -> arb:
+        """Enclose an operation."""
+        return OPERATIONS[op](*args)

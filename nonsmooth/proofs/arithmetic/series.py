@@ -1,0 +1,175 @@
+"""Power series with enclosed coefficients: what an expression becomes along a motion.
+
+Coefficients come from the field itself (Picard's iteration gains one order a pass), never from the
+jets of ``nonsmooth.model``, which hold reciprocals as doubles.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from fractions import Fraction
+from typing import Any
+
+from .flint import arb, arb_series, ctx, fmpq
+from .instructions import Program
+from .intervals import OPERATIONS, Numbers, exact
+
+
+@contextmanager
+def length(count: int) -> Iterator[None]:
+    """Compute with so many coefficients inside."""
+    old = ctx.cap
+    ctx.cap = count
+    try:
+        yield
+    finally:
+        ctx.cap = old
+
+
+def _unknown() -> arb_series:
+    """A series of which nothing is known, not even that it is one."""
+    return arb_series([arb.nan()] * ctx.cap)
+
+
+def _one() -> arb_series:
+    return arb_series([1])
+
+
+def _power(a: arb_series, n: int) -> arb_series:
+    result: arb_series | None = None
+    while True:
+        if n & 1:
+            result = a if result is None else result * a
+        n >>= 1
+        if not n:
+            return _one() if result is None else result
+        a = a * a
+
+
+def _atan2(y: arb_series, x: arb_series) -> arb_series:
+    right, up = x[0], y[0]
+    if right > 0:
+        return (y / x).atan()
+    half = arb_series([arb.pi() / 2])
+    if up > 0:
+        return half - (x / y).atan()
+    return -half - (x / y).atan() if up < 0 else arb_series([arb.nan()])
+
+
+def _still(op: str) -> Callable[..., arb_series]:
+    """An operation that is only known of constants."""
+
+    def apply(*args: arb_series) -> arb_series:
+        if any(len(a) > 1 for a in args):
+            return arb_series([arb.nan()])
+        return arb_series([OPERATIONS[op](*(a[0] for a in args))])
+
+    return apply
+
+
+_APPLY: dict[str, Callable[..., arb_series]] = {
+    **{
+        op: getattr(arb_series, op)
+        for op in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "erf")
+    },
+    **{op: _still(op) for op in ("fabs", "fmin", "fmax", "erfinv")},
+    "add": lambda a, b: a + b,
+    "sub": lambda a, b: a - b,
+    "mul": lambda a, b: a * b,
+    "div": lambda a, b: a / b,
+    "neg": lambda a: -a,
+    "twice": lambda a: a + a,
+    "sq": lambda a: a * a,
+    "inv": lambda a: _one() / a,
+    "sinh": lambda a: (a.exp() - (-a).exp()) / 2,
+    "cosh": lambda a: (a.exp() + (-a).exp()) / 2,
+    "tanh": lambda a: _one() - 2 / ((2 * a).exp() + 1),
+    "asinh": lambda a: (a + (a * a + 1).sqrt()).log(),
+    "acosh": lambda a: (a + (a * a - 1).sqrt()).log(),
+    "atanh": lambda a: ((1 + a) / (1 - a)).log() / 2,
+    "expm1": lambda a: a.exp() - 1,
+    "log1p": lambda a: (1 + a).log(),
+    "pow": lambda a, b: (b * a.log()).exp(),
+    "hypot": lambda a, b: (a * a + b * b).sqrt(),
+    "atan2": _atan2,
+    "pi": lambda: arb_series([arb.pi()]),
+}
+
+
+class Series:
+    """The arithmetic of power series.
+
+    Parameters
+    ----------
+    inputs : sequence of sequence of arb_series
+    numbers : {"stored", "written"}
+    """
+
+    power = staticmethod(_power)
+
+    def __init__(self, inputs: Sequence[Sequence[arb_series]], numbers: Numbers):
+        self.inputs, self.numbers = inputs, numbers
+
+    def constant(self, value: float | Fraction) -> arb_series:
+        """A constant, exactly or enclosed."""
+        if isinstance(value, float) and self.numbers == "stored":
+            return arb_series([arb(value)])
+        q = exact(value, self.numbers)
+        return arb_series([arb(fmpq(q.numerator, q.denominator))])
+
+    def symbol(self, vector: int, position: int) -> arb_series:
+        """Return an input."""
+        return self.inputs[vector][position]
+
+    def apply(self, op: str, args: Sequence[arb_series]) -> arb_series:
+        """Enclose an operation's series; no coefficient is known where the value is not."""
+        if all(a[0].is_finite() for a in args):
+            try:
+                found = _APPLY[op](*args)
+            except (ValueError, ZeroDivisionError):  # a denominator or radicand that may be zero
+                return _unknown()
+            if found[0].is_finite():
+                return found
+        return _unknown()
+
+
+def coefficients(
+    field: Program, x: Sequence[arb], p: Sequence[arb], count: int, numbers: Numbers
+) -> list[list[arb]]:
+    """The first ``count`` Taylor coefficients of x' = field(x, p) from points x."""
+    with length(count):
+        start = [arb_series([v]) for v in x]
+        still = [arb_series([v]) for v in p]
+    now = start
+    for k in range(1, count):
+        with length(k):
+            (rates,) = field(Series([now, still], numbers))
+        with length(k + 1):
+            now = [v + f.integral() for v, f in zip(start, rates, strict=True)]
+    return [listed(v, count) for v in now]
+
+
+def along(
+    program: Program, x: Sequence[Sequence[arb]], p: Sequence[arb], numbers: Numbers
+) -> list[list[list[arb]]]:
+    """Coefficients of a program's rows along a motion whose coefficients are known."""
+    count = len(x[0])
+    with length(count):
+        moving = [arb_series(list(c)) for c in x]
+        still = [arb_series([v]) for v in p]
+        rows = program(Series([moving, still], numbers))
+        return [[listed(v, count) for v in row] for row in rows]
+
+
+def listed(series: arb_series, count: int) -> list[arb]:
+    """The first coefficients of a series."""
+    return [series[k] for k in range(count)]
+
+
+def horner(c: Sequence[Any], t: arb) -> Any:
+    """Value of a polynomial at a time or over an interval of times."""
+    result = c[-1]
+    for a in reversed(c[:-1]):
+        result = result * t + a
+    return result

@@ -1,0 +1,1 @@
+"""Proofs about orbits: validated steps, events, itineraries."""

@@ -1,0 +1,329 @@
+"""Validated steps along one orbit, or along all orbits from a box.
+
+A step: an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
+remainder, and the set of states as middle + frame r with an orthogonal frame (Lohner 1987). Guards
+are proven positive, or to have one simple zero; there the time is eliminated by the derivative of the
+return map, (1 - f grad g/(grad g . f)) D. What follows an event is told by ``journey``.
+"""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..arithmetic.flint import arb, arb_mat, ctx
+from ..arithmetic.intervals import hull, radius
+from ..arithmetic.series import horner
+from ..points.equations import column, entries
+from ..points.krawczyk import identity
+from ..proof import DigitsError, UnprovenError
+from .first_zero import Polynomial, UnsureError, first_zero, narrowed
+from .modes import Modes
+from .motion import Mode
+
+# What a validated step is made of.
+
+
+@dataclass
+class Step:
+    """What one step is made of."""
+
+    h: float
+    natural: float  # the step without limits
+    tube: list[arb]
+    hull: list[arb]
+    c: list[list[arb]]  # of the hull
+    top: list[list[arb]]  # of the tube
+    guards: list[list[arb]]
+    guard_tops: list[list[arb]]
+
+
+def at(c: Sequence[Sequence[arb]], top: Sequence[Sequence[arb]], time: arb) -> list[arb]:
+    """States at a time from coefficients 0..K and the remainder."""
+    return [horner([*a[:-1], b[-1]], time) for a, b in zip(c, top, strict=True)]
+
+
+def growth(bound: float, h: float) -> float:
+    """exp(bound h) - 1, rounded upward."""
+    return float(((arb(bound) * arb(h)).expm1()).upper()) * (1 + 1e-12)
+
+
+def orthogonal(matrix: arb_mat) -> arb_mat:
+    """An orthogonal factor of the midpoints as exact doubles, longest column first."""
+    a = np.array([[float(v.mid()) for v in row] for row in matrix.tolist()])
+    order = np.argsort(-np.linalg.norm(a, axis=0))
+    q = np.linalg.qr(a[:, order])[0]
+    return arb_mat([[arb(float(v)) for v in row] for row in q.tolist()])
+
+
+#: How often a step is shortened for the sake of watched functions.
+_SHORTER = 5
+
+
+class Follower:
+    """A set of states that moves in one mode."""
+
+    def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
+        self.modes, self.p, self.order, self.n = modes, list(p), order, len(x)
+        self.adopt(list(x))
+        self.t, self.steps, self.smallest, self.mode = arb(0), 0, 0.0, ""
+        self.zeros: dict[int, int] = {}
+        self.signs: dict[int, int] = {}
+
+    # the set -------------------------------------------------------------------------------------
+
+    def adopt(self, x: list[arb]) -> None:
+        self.middle, self.frame = [v.mid() for v in x], identity(self.n)
+        self.r = column([v - m for v, m in zip(x, self.middle, strict=True)])
+
+    def hull(self) -> list[arb]:
+        """A box around the set."""
+        move = entries(self.frame * self.r)
+        return [m + v for m, v in zip(self.middle, move, strict=True)]
+
+    def moved(self, image: list[arb], derivative: arb_mat) -> None:
+        """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
+        product = derivative * self.frame
+        wide = any(radius(v) > 0 for v in entries(self.r))
+        frame = orthogonal(product) if wide else identity(self.n)
+        inverse = frame.inv()
+        self.middle = [v.mid() for v in image]
+        miss = column([v - m for v, m in zip(image, self.middle, strict=True)])
+        self.r = inverse * miss + (inverse * product) * self.r
+        self.frame = frame
+
+    @property
+    def now(self) -> Mode:
+        """The mode that it is in."""
+        return self.modes[self.mode]
+
+    # steps ---------------------------------------------------------------------------------------
+
+    def step(self, t_end: arb) -> int | None:
+        """One step, to an event if one comes first: the number of the function that is met."""
+        left = math.nextafter(float((t_end - self.t).upper()), math.inf)
+        limit = left
+        for _ in range(40):
+            made = self._prepare(limit, t_end)
+            try:
+                hit = self._first_event(made)
+            except UnsureError as unsure:
+                if unsure.since < 0.02 * min(made.natural, left):
+                    raise UnprovenError(
+                        f"the sign of a guard is undecided at t = {float(self.t.mid()) + unsure.since:.9g} "
+                        "(a tangency, or the set is too wide)"
+                    ) from None
+                limit = unsure.since
+                continue
+            return self._advance(made, hit, t_end)
+        raise UnprovenError(f"no step at t = {float(self.t.mid()):.9g}")
+
+    def _prepare(self, limit: float, t_end: arb) -> Step:
+        """A step size with an a-priori enclosure and a small remainder."""
+        mode, x, count = self.now, self.hull(), self.order + 2
+        c = mode.series(x, self.p, count)
+        size = max(max(abs(float(v[self.order].mid())) for v in c), 1e-300)
+        wide = max(radius(v) for v in x)
+        tolerance = max(2.0 ** (2 - ctx.prec), 1e-3 * wide)
+        natural = min((tolerance / size) ** (1 / self.order), 1e6)
+        h, shorter, guards = min(natural, limit), 0, mode.watched_series(c, self.p)
+        for _ in range(60):
+            tube = self._tube(x, h)
+            if tube is not None:
+                top = mode.series(tube, self.p, count)
+                rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (self.order + 1)
+                if rest <= 8 * tolerance:
+                    tops = mode.watched_series(top, self.p)
+                    if not all(v[-1].is_finite() for v in tops):
+                        h /= 2
+                        continue
+                    if shorter == _SHORTER or not _coarse(guards, tops, h, tolerance):
+                        break
+                    shorter += 1
+                    h *= 0.6
+                    continue
+                ratio = (8 * tolerance / rest) ** (1 / (self.order + 1)) if rest < 1e300 else 0.0
+                h *= min(0.9, max(0.3, 0.9 * ratio))
+            else:
+                h /= 2
+        else:
+            raise UnprovenError(
+                f"no enclosure of the motion from t = {float(self.t.mid()):.9g} (the field is not "
+                "defined there, or the set is too wide)"
+            )
+        if min(h, natural) < self.smallest:
+            raise DigitsError(
+                f"steps become too small at t = {float(self.t.mid()):.9g} (a singularity is near)"
+            )
+        if wide > 0:
+            guards = mode.narrowed(guards, self.middle, (self.frame, self.r), self.p)
+        return Step(h, natural, tube, x, c, top, guards, tops)
+
+    def _tube(self, x: list[arb], h: float) -> list[arb] | None:
+        """B with x + [0, h] F(B) inside B: every orbit from x exists on [0, h] and stays in B."""
+        t, b = hull(arb(0), arb(h)), x
+        for _ in range(12):
+            f = self.now.field(b, self.p)
+            new = [v + t * w for v, w in zip(x, f, strict=True)]
+            if not all(v.is_finite() for v in new):
+                return None
+            if all(u.contains(v) for u, v in zip(b, new, strict=True)):
+                return b
+            b = [v + arb(0, 0.1 * radius(v) + 1e-300) for v in new]
+        return None
+
+    def _first_event(self, made: Step) -> tuple[int, arb] | None:
+        """The guard that comes first, proven, and its time."""
+        hits, unsure = [], float("inf")
+        for k in range(len(self.now.watches)):
+            f = self._polynomial(made, k)
+            try:
+                t = first_zero(f, made.h)
+            except UnsureError as error:
+                unsure = min(unsure, error.since)
+                continue
+            if t is not None:
+                hits.append((t, k))
+        hits.sort(key=lambda hit: float(hit[0].upper()))
+        if hits and float(hits[0][0].upper()) < unsure:
+            return self._earliest(made, hits)
+        if unsure < float("inf"):
+            raise UnsureError(unsure)
+        return None
+
+    def _earliest(self, made: Step, hits: list[tuple[arb, int]]) -> tuple[int, arb]:
+        """The first of the zeros; of zeros that may be at once only one may mean anything."""
+        time, k = hits[0]
+        together = [hits[0], *((t, j) for t, j in hits[1:] if not time < t)]
+        if len(together) == 1:
+            return k, time
+        counting = [(t, j) for t, j in together if self.counts(j)]
+        passed = [hit for hit in together if not self.counts(hit[1])]
+        if any(not self._stays_past(made, hit, together) for hit in passed):
+            counting = []  # one that is passed the other way may come back in its own direction
+        if len(counting) == 1 and self.now.watches[counting[0][1]].kind == "stop":
+            return counting[0][1], counting[0][0]
+        for t, j in counting:
+            others = [hit for hit in together if hit[1] != j]
+            if all(self._comes_before(made, (j, t), other) for other in others):
+                return j, t
+        names = ", ".join(self.now.watches[j].name for _, j in together)
+        when = float((self.t + time).mid())
+        raise UnprovenError(f"which comes first is undecided: {names} at t = {when:.9g}")
+
+    def _stays_past(
+        self, made: Step, hit: tuple[arb, int], together: list[tuple[arb, int]]
+    ) -> bool:
+        """Whether a guard that is passed has no second zero while others are met."""
+        f = self._polynomial(made, hit[1])
+        until = hit[0]
+        for t, _ in together:
+            until = hull(until, t)
+        return bool(f.slope(until) < 0)
+
+    def _comes_before(self, made: Step, hit: tuple[int, arb], other: tuple[arb, int]) -> bool:
+        """Whether every orbit meets one event while another guard, which only falls, is positive."""
+        t, j = other
+        f = self._polynomial(made, j)
+        if not f.slope(hull(hit[1], t)) < 0:
+            return False
+        image, derivative = self._at_event(made, hit)
+        move = (derivative * self.frame) * self.r
+        around = [v + w for v, w in zip(image, entries(move), strict=True)]
+        row = self.now.slope(j, around, self.p)
+        value = self.now.watched(image, self.p)[j] + (arb_mat([row]) * move)[0, 0]
+        tied = ((arb_mat([row]) * (derivative * self.frame)) * self.r)[0, 0]
+        value = value.intersection(self.now.watched(image, self.p)[j] + tied)
+        return bool(self._turned(j) * value > 0)
+
+    def _turned(self, k: int) -> int:
+        """The sign by which a watched function is positive in the mode now."""
+        watch = self.now.watches[k]
+        return self.signs[watch.index] if watch.passes else 1
+
+    def counts(self, k: int) -> bool:
+        """Whether a zero of a guard is an event: stops and resets have a direction."""
+        watch = self.now.watches[k]
+        return not watch.passes or watch.direction * -self.signs[watch.index] >= 0
+
+    def _polynomial(self, made: Step, k: int) -> Polynomial:
+        c, top = made.guards[k][:-1], made.guard_tops[k][-1]
+        if self._turned(k) < 0:
+            c, top = [-v for v in c], -top
+        return Polynomial(c, top, self.zeros.get(k, 0))
+
+    def _advance(self, made: Step, hit: tuple[int, arb] | None, t_end: arb) -> int | None:
+        mode = self.now
+        time = arb(made.h) if hit is None else hit[1]
+        if hit is not None and not self.t + time <= t_end:
+            name = mode.watches[hit[0]].name
+            raise UnprovenError(
+                f"whether {name} is met before the end is undecided: at t in {(self.t + time).str(8)}"
+            )
+        if hit is None and (t_end - self.t) <= made.h:
+            time = t_end - self.t  # the end itself, also where it is no double
+        if hit is None:
+            c = mode.series(self.middle, self.p, self.order + 2)
+            image, derivative = at(c, made.top, time), self._derivative(made, time)
+        else:
+            image, derivative = self._at_event(made, hit)
+        self.moved(image, derivative)
+        self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
+        return None if hit is None else hit[0]
+
+    def _at_event(self, made: Step, hit: tuple[int, arb]) -> tuple[list[arb], arb_mat]:
+        """Where the middle meets an event, and the derivative of the return map there."""
+        c = self.now.series(self.middle, self.p, self.order + 2)
+        image = at(c, made.top, self._own_time(c, made, hit))
+        derivative = self._derivative(made, hit[1])
+        return image, self._return_map(made, hit[0], hit[1], derivative)
+
+    def _derivative(self, made: Step, time: arb) -> arb_mat:
+        """Derivatives of the flow to times in ``time``, for all states of the set."""
+        mode = self.now
+        if mode.affine:
+            return (mode.jacobian(made.hull, self.p) * time).exp()
+        jacobian = mode.jacobian(made.tube, self.p)
+        if not all(v.is_finite() for v in jacobian.entries()):
+            raise UnprovenError(f"the field has no derivative near t = {float(self.t.mid()):.9g}")
+        bound = max(
+            sum(float(abs(v).upper()) for v in row) * (1 + 1e-12) for row in jacobian.tolist()
+        )
+        grow = growth(bound, made.h)
+        around = arb_mat([[arb(int(i == j), grow) for j in range(self.n)] for i in range(self.n)])
+        low = mode.variation(made.c, self.p, identity(self.n))
+        top = mode.variation(made.top, self.p, around)
+        return horner([*low[:-1], top[-1]], time)
+
+    def _own_time(self, c: list[list[arb]], made: Step, hit: tuple[int, arb]) -> arb:
+        """The event's time of the middle alone, narrower than that of the whole set."""
+        k, time = hit
+        g = self.now.watched_series(c, self.p)[k]
+        return narrowed(Polynomial(g[:-1], made.guard_tops[k][-1]), time)
+
+    def _return_map(self, made: Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
+        """(1 - f grad g/(grad g . f)) D where the event is met."""
+        x = at(made.c, made.top, time)
+        f, g = self.now.field(x, self.p), self.now.slope(k, x, self.p)
+        rate = sum((a * b for a, b in zip(f, g, strict=True)), arb(0))
+        if rate.contains(0) or not rate.is_finite():
+            return derivative if radius(time) == 0 else _not_transversal(self)
+        n = self.n
+        across = arb_mat([[int(i == j) - f[i] * g[j] / rate for j in range(n)] for i in range(n)])
+        return across * derivative
+
+
+def _coarse(guards: list[list[arb]], tops: list[list[arb]], h: float, tolerance: float) -> bool:
+    """Whether the remainder of a watched function is far larger than that of the motion."""
+    for c, top in zip(guards, tops, strict=True):
+        size = max(float(abs(v.mid())) * h**k for k, v in enumerate(c[:-1]))
+        if not float(abs(top[-1]).upper()) * h ** (len(c) - 1) <= 64 * tolerance * size:
+            return True
+    return False
+
+
+def _not_transversal(follower: Follower) -> arb_mat:
+    raise UnprovenError(f"an event at t = {follower.t.str(8)} is not proven to be transversal")

@@ -1,0 +1,329 @@
+"""Theorems about one special point: existence, uniqueness, class; over boxes of parameters too."""
+
+from __future__ import annotations
+
+from collections import deque
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from fractions import Fraction
+from typing import Any
+
+from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
+from ...model import FilippovSystem, OptionError, explain, real, whole
+from ..arithmetic.decimals import enclosure, given, inner
+from ..arithmetic.flint import arb
+from ..arithmetic.intervals import Numbers, between, precision, radius
+from ..proof import Proof, hulls, intervals, listed, paragraph
+from ..record import record_of
+from .equations import Equations
+from .krawczyk import Zero, prove_zero
+from .special_points import Verdict
+from .subject import Subject, subject_of
+
+#: What a constant means, in words.
+READ = {
+    "stored": "Constants are the doubles stored in the expressions.",
+    "written": "Constants are the decimals that the stored doubles are written as.",
+}
+
+
+def check_numbers(numbers: Any) -> None:
+    """Raise OptionError unless it is said how the constants of the system are read."""
+    if numbers not in READ:
+        raise OptionError(
+            explain(
+                "numbers",
+                expected="'stored' or 'written'",
+                received=repr(numbers),
+                advice="See certify.",
+            )
+        )
+
+
+def certify(
+    found: TwoFold | Fold | Equilibrium | PseudoEquilibrium,
+    *,
+    system: FilippovSystem | None = None,
+    width: float = 1e-12,
+    parameters: Mapping[Any, Any] | None = None,
+    hold: Sequence[str] | Mapping[str, Any] = (),
+    numbers: Numbers = "stored",
+    max_bits: int = 2048,
+    max_pieces: int = 64,
+) -> Proof:
+    """Prove that a special point exists, is the only one in a named box, and what it is.
+
+    Krawczyk's operator in interval arithmetic of any precision; derivatives are those of the
+    expressions as they are stored. Nothing rests on rounding.
+
+    Parameters
+    ----------
+    found : TwoFold, Fold, Equilibrium or PseudoEquilibrium
+        As a search returns it. In systems with more states than equations the theorem is about the
+        point on the plane through it, across the set of such points (or of held states).
+    system : FilippovSystem, optional
+        Needed for points that do not know theirs: all but two-folds.
+    width : float, optional
+        Largest radius of the enclosures, where the parameters are points.
+    parameters : mapping, optional
+        Values, as numbers or strings, or pairs (low, high): the theorem is then for all of them.
+        The others have the value they had in the search, or their default.
+    hold : sequence of str, or mapping, optional
+        States that keep their value, or have that given, or any of an interval (low, high).
+    numbers : {"stored", "written"}
+        Whether the constant 0.1 is the double nearest to one tenth, or one tenth.
+    max_bits : int, optional
+        Where to give up raising the precision.
+    max_pieces : int, optional
+        How many pieces the intervals of parameters and held states may be divided into.
+
+    Returns
+    -------
+    Proof
+        ``proven`` is False where something stayed undecided; the statement says what.
+
+    Raises
+    ------
+    MissingError
+        python-flint is not installed.
+    NotSmoothError
+        An operation that jumps or has a kink.
+    OptionError
+        ``found`` is none of these points, or needs its system; a width or a limit that is not positive.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is no finite number or interval.
+    DefinitionError
+        A state to ``hold`` that the system does not have.
+
+    Notes
+    -----
+    Krawczyk 1969; Neumaier, Interval Methods for Systems of Equations, 1990, ch. 5; the classes are
+    those of ``nonsmooth.two_folds``. Arithmetic: Arb (Johansson 2017).
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, z = (ca.SX.sym(s) for s in "xyz")
+    >>> s = ns.FilippovSystem([x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1 + 0.1 * y])
+    >>> proof = ns.certify(ns.find_two_fold(s, near=[0.0, 0.1, -0.1]), width=1e-30)
+    >>> proof.proven, proof.label, str(proof.point["y"]), str(proof.values["eigenvalue_low"])
+    (True, 'II-C', '0', '-2.618033988749894848204586834365... +- ...')
+    """
+    subject = subject_of(found, system, hold, numbers, parameters)
+    limit = real(width, "width", low=5e-324, expected="a positive number")
+    whole(max_bits, "max_bits", least=64)
+    whole(max_pieces, "max_pieces")
+    check_numbers(numbers)
+    pieces = _divided(subject, limit, max_bits, max_pieces)
+    return pieces[0] if len(pieces) == 1 else _together(subject, pieces)
+
+
+# Pieces of the parameters --------------------------------------------------------------------------
+
+
+def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> list[Proof]:
+    """Proofs over pieces of the parameters' intervals, halved where one proof does not do."""
+    todo, done, failed = deque([subject]), list[Proof](), 0
+    while todo:
+        one = (
+            todo.popleft()
+        )  # the largest: what is undecided does not use up the pieces of the rest
+        proof, start = _one(one, width, max_bits)
+        if (
+            proof.proven
+            or not _wide(one)
+            or len(todo) + len(done) + 2 > max_pieces
+            or failed > max_pieces
+        ):
+            done.append(proof)
+            continue
+        failed += 1
+        todo += one.halves(start, proof.exists)
+    return done
+
+
+def _one(subject: Subject, width: float, max_bits: int) -> tuple[Proof, list[float]]:
+    """A proof for one piece, with as many bits as its width and class need."""
+    bits = 64
+    while 2.0 ** (16 - bits) > width and bits < max_bits:
+        bits *= 2
+    start: list[arb] = [arb(v) for v in subject.start]
+    best: tuple[Zero, Verdict, Equations] | None = None
+    last = float("inf")
+    while True:
+        with precision(bits):
+            equations = subject.equations()
+            zero = prove_zero(equations, start)
+            if zero is not None:
+                verdict = subject.question.verdict(equations.inputs(zero.point))
+                best, start = (zero, verdict, equations), [v.mid() for v in zero.point]
+                size = max(map(radius, zero.point))
+                stuck = size > 0 and size > 0.5 * last  # wide parameters: more digits do not help
+                last = size
+                if (verdict.label and size <= width) or stuck:
+                    break
+            if 2 * bits > max_bits or (zero is None and _wide(subject) and bits > 64):
+                break
+        bits *= 2
+    with precision(bits):
+        proof = _proof(subject, best, bits)
+    return proof, [float(v) for v in start]
+
+
+def prove_subject(subject: Subject, zero: Zero, width: float, max_bits: int = 1024) -> Proof | None:
+    """A proof for a zero that is known to exist; None where it cannot be told to be that one."""
+    start = [float(v.mid()) for v in zero.point]
+    proof, _ = _one(replace(subject, start=start), width, max_bits)
+    if not proof.exists:
+        return None
+    with precision(2 * max_bits):
+        point, box = (
+            [between(Fraction(a), Fraction(b)) for a, b in proof.record[key]]
+            for key in ("point", "box")
+        )
+        # Where one is in the other's box of uniqueness, they are one zero.
+        same = _all_in(point, zero.box) or _all_in(zero.point, box)
+    return proof if same else None
+
+
+def _all_in(point: Sequence[arb], box: Sequence[arb]) -> bool:
+    return all(b.contains(v) for b, v in zip(box, point, strict=True))
+
+
+def _wide(subject: Subject) -> bool:
+    return any(a < b for a, b in (*subject.parameters, *subject.values))
+
+
+def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits: int) -> Proof:
+    kind, names = subject.question.kind, subject.parameter_names
+    ranges = [given(*pair) for pair in subject.parameters]
+    parameters = dict(zip(names, ranges, strict=True)) | subject.wide_held
+    condition = f"For {intervals(parameters)}: " if parameters else ""
+    if best is None or not best[1].here:
+        why = (
+            "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
+            "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
+            "parameters are too wide."
+            if best is None
+            else f"The fields were those of other sides: {best[1].why}."
+        )
+        statement = paragraph(
+            f"{condition}No proof of a {kind} near "
+            + ", ".join(f"{k} = {v:.8g}" for k, v in zip(subject.names, subject.start, strict=True))
+            + f" with up to {bits} bits.",
+            why,
+        )
+        return Proof(kind, False, False, "", statement, {}, {}, {}, parameters, bits)
+    zero, verdict, equations = best
+    point = dict(zip(subject.names, map(enclosure, zero.point), strict=True))
+    box = {
+        name: inner(b, k) for name, b, k in zip(subject.names, zero.box, zero.image, strict=True)
+    }
+    values = {k: enclosure(v) for k, v in verdict.values.items() if v.is_finite()}
+    statement = _statement(subject, verdict, condition, point, box, values)
+    record = record_of(subject, equations, zero, verdict, bits)
+    return Proof(
+        kind,
+        bool(verdict.label),
+        True,
+        verdict.label,
+        statement,
+        point,
+        box,
+        values,
+        parameters,
+        bits,
+        record,
+    )
+
+
+def _statement(
+    subject: Subject,
+    verdict: Verdict,
+    condition: str,
+    point: Mapping[str, Any],
+    box: Mapping[str, Any],
+    values: Mapping[str, Any],
+) -> str:
+    kind = subject.question.kind
+    place = where(subject)
+    article = "an" if verdict.title[0] in "aeiou" else "a"
+    shown = {k: v for k, v in values.items() if not (k[0] == "L" and k[1:].isdigit())}
+    classed = f", class {verdict.label}" if kind == "two-fold" and verdict.label else ""
+    if verdict.label.startswith("boundary Delta") or verdict.label.startswith("boundary disc"):
+        classed = f", exactly on the {verdict.label}"
+    head = "Theorem" if verdict.label else "Theorem on existence, with the class undecided"
+    return paragraph(
+        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{place}.",
+        f"It is {article} {verdict.title}{classed}, at {listed(point)}.",
+        f"{listed(shown)}." if shown else "",
+        *verdict.lines,
+        f"Not decided: {verdict.why}." if verdict.why and not verdict.label else "",
+        READ[subject.numbers],
+    )
+
+
+def where(subject: Subject) -> str:
+    """What is held, the plane, and the sides of other surfaces."""
+    described = subject.question.described
+    free = {i for vector, i in subject.unknowns if vector == 0}
+    names = [*described.system.state_names, "t"]
+    held = [
+        intervals({names[i]: given(*v)})
+        for i, v in enumerate(subject.values)
+        if i not in free and v[0] == v[1]
+    ]
+    text = f" with {', '.join(held)}" if held else ""
+    if described.system.surface_count > 1:
+        text += f" in mode {described.mode!r}"
+    if subject.normals:
+        text += (
+            f" on the plane through the given point across the set of such points (of codimension "
+            f"{len(subject.normals)})"
+        )
+    return text
+
+
+def _together(subject: Subject, pieces: list[Proof]) -> Proof:
+    """One statement of all pieces."""
+    kind, names = subject.question.kind, subject.parameter_names
+    whole_range = [given(*pair) for pair in subject.parameters]
+    parameters = dict(zip(names, whole_range, strict=True)) | subject.wide_held
+    proven = all(p.proven for p in pieces)
+    exists = all(p.exists for p in pieces)
+    labels = list(dict.fromkeys(p.label for p in pieces if p.proven))
+    head = "Theorem" if proven else "Theorem in part"
+    groups = []
+    for label in labels:
+        count = sum(p.label == label and p.proven for p in pieces)
+        groups.append(f"{label} on {count} of {len(pieces)} pieces")
+    missing = [p for p in pieces if not p.proven]
+    lines = [f"On {intervals(p.parameters)}: {p.statement.splitlines()[0]}" for p in missing[:3]]
+    each = "each" if exists else "each that is named"
+    size = f"on {each} the box of its piece contains exactly one"
+    statement = paragraph(
+        f"{head}. For {intervals(parameters)}, divided into {len(pieces)} pieces, {size} {kind}: "
+        f"{'; '.join(groups) or 'none proven'}.",
+        f"Over all pieces {intervals(hulls([p.point for p in pieces if p.exists]))}.",
+        f"Undecided on {len(missing)} pieces." if missing else "",
+        *lines,
+        READ[subject.numbers],
+    )
+    points = [p.point for p in pieces if p.exists]
+    values = [p.values for p in pieces if p.exists]
+    label = labels[0] if proven and len(labels) == 1 else ""
+    bits = max(p.bits for p in pieces)
+    return Proof(
+        kind,
+        proven,
+        exists,
+        label,
+        statement,
+        hulls(points),
+        {},
+        hulls(values),
+        parameters,
+        bits,
+        {"ranges": [[str(v) for v in pair] for pair in subject.ranges]},
+        tuple(pieces),
+    )

@@ -1,0 +1,298 @@
+"""Every special point in a box: a complete list, or the places that stay undecided."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from fractions import Fraction
+from typing import Any, Literal
+
+import numpy as np
+
+from ...local.point.sides import FIELDS, Side
+from ...model import FilippovSystem, OptionError, explain, real, require_system, whole
+from ..arithmetic.decimals import given
+from ..arithmetic.enclosure import Enclosure
+from ..arithmetic.flint import arb
+from ..arithmetic.interval_arrays import Floats, of_fractions
+from ..arithmetic.intervals import Numbers, enclose, exact, precision
+from ..proof import Proof, intervals, paragraph
+from ..record import asked, record_of
+from ..surface_functions import Described, parameter_ranges
+from .census import Census, Undecided
+from .certify import READ, check_numbers, prove_subject, where
+from .krawczyk import Zero
+from .special_points import QUESTIONS, Question, Verdict
+from .subdivide import Search, clusters
+from .subject import Subject
+
+Kind = Literal["two-fold", "fold", "equilibrium", "pseudo-equilibrium"]
+
+
+#: Wider boxes overflow.
+_WIDEST = Fraction(10) ** 300
+
+
+def prove_all(
+    system: FilippovSystem,
+    box: Sequence[Any],
+    kind: Kind = "two-fold",
+    *,
+    side: Side = "+",
+    surface: int = 0,
+    mode: str | None = None,
+    parameters: Mapping[Any, Any] | None = None,
+    t: float = 0.0,
+    numbers: Numbers = "stored",
+    width: float = 1e-12,
+    max_boxes: int = 200_000,
+) -> Census:
+    """Find every special point in a box, with proof that there are no others.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        With scalar multipliers, and with operations that interval arithmetic knows.
+    box : sequence of n pairs (low, high)
+        For each state its range; a number holds a state at that value. As many states must be left
+        free as there are equations: 3 for two-folds, 2 for folds, all for points of rest.
+    kind : {"two-fold", "fold", "equilibrium", "pseudo-equilibrium"}, optional
+        Equilibria are those of one field on its own side, pseudo-equilibria those that slide.
+    side : {"+", "-"}, optional
+        For folds and equilibria the field $F1$ or $F2$.
+    surface, mode
+        As in :func:`nonsmooth.region`.
+    parameters : mapping, optional
+        Values, or pairs (low, high): the list is then complete for each of them.
+    t : float, optional
+        Time of two-folds and folds, where the system depends on it.
+    numbers, width
+        As in :func:`certify`.
+    max_boxes : int, optional
+        How many pieces of the box may be looked at.
+
+    Returns
+    -------
+    Census
+        Ctrl-C ends the search and returns what was proven so far.
+
+    Raises
+    ------
+    MissingError
+        python-flint is not installed.
+    OptionError
+        A box with too many or too few free states, or without an inside; an unknown ``kind``; a width
+        or a limit that is not positive.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is no finite number or interval.
+    DefinitionError
+        Vector multipliers; a ``mode``, ``surface`` or ``side`` that the system does not have.
+    NotSmoothError
+        An operation that jumps or has a kink.
+
+    Notes
+    -----
+    Subdivision with interval extensions and Krawczyk's operator; see Kearfott 1996, Rigorous Global
+    Search. Zeros that are not simple (double ones, curves) stay undecided, and are named.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, z = (ca.SX.sym(s) for s in "xyz")
+    >>> s = ns.FilippovSystem([x, y, z], surface=x, above=[y**2 - z, 1, 1], below=[y + z, 1, -1])
+    >>> everything = ns.prove_all(s, [(-1, 1), (-2, 2), (-2, 2)])
+    >>> everything.complete, [p.label for p in everything.zeros]
+    (True, [...])
+    """
+    require_system(system)
+    if kind not in QUESTIONS:
+        raise OptionError(
+            explain("kind", expected=f"one of {list(QUESTIONS)}", received=repr(kind), advice="")
+        )
+    limit = real(width, "width", low=5e-324, expected="a positive number")
+    most = whole(max_boxes, "max_boxes")
+    check_numbers(numbers)
+    question = QUESTIONS[kind](Described(system, surface, mode), numbers, side)
+    ranges = _read_box(system, box, numbers)
+    ranges += [exact(t, numbers, "t")] if system.time_dependent else []
+    subject = _subject(question, ranges, parameters, numbers)
+    bounds = [v for v in ranges if isinstance(v, tuple)]
+    bounds += [(low, high) for _, low, high in question.further]
+    with precision(128):
+        around = [of_fractions(*pair) for pair in bounds]
+        low = np.array([float(v.low) for v in around])
+        high = np.array([float(v.high) for v in around])
+        search = Search(subject.equations(), low, high, max_boxes=most)
+        search.run()
+    return _census(subject, search, bounds, limit)
+
+
+def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> list[Any]:
+    """Ranges of the states, or values of those that are held, as fractions."""
+    names = system.state_names
+    expected = f"{len(names)} ranges (low, high) or numbers, for {', '.join(names)}"
+    try:
+        given = list(box)
+    except TypeError:
+        given = []
+    if len(given) != len(names):
+        raise OptionError(
+            explain("box", expected=expected, received=repr(box), advice="In the states' order.")
+        )
+    result: list[Any] = []
+    for name, value in zip(names, given, strict=True):
+        what = f"box of {name!r}"
+        if isinstance(value, (tuple, list, np.ndarray)):
+            ends = [exact(v, numbers, what) for v in value]
+            if len(ends) != 2 or not 0 < ends[1] - ends[0] < _WIDEST:
+                raise OptionError(
+                    explain(
+                        what,
+                        expected="(low, high) with low < high, both finite, less than 1e300 apart",
+                        received=repr(value),
+                        advice="A number instead of a pair holds the state.",
+                    )
+                )
+            result.append((ends[0], ends[1]))
+        else:
+            result.append(exact(value, numbers, what))
+    return result
+
+
+def _subject(
+    question: Question, ranges: list[Any], parameters: Mapping[Any, Any] | None, numbers: Numbers
+) -> Subject:
+    system = question.described.system
+    free = [i for i, v in enumerate(ranges) if isinstance(v, tuple)]
+    unknown = len(free) + len(question.further)
+    if unknown != len(question.nodes):
+        raise OptionError(
+            explain(
+                "box",
+                expected=f"{len(question.nodes) - len(question.further)} free states for a "
+                f"{question.kind}, which has so many equations",
+                received=f"{len(free)}",
+                advice="Otherwise they are no isolated points but a set of dimension "
+                f"{unknown - len(question.nodes)}: hold states by giving a number for their range."
+                if unknown > len(question.nodes)
+                else "Give more states a range.",
+            )
+        )
+    values = [(v[0], v[0]) if isinstance(v, tuple) else (v, v) for v in ranges]
+    return Subject(
+        question,
+        [0.0] * unknown,
+        [(0, i) for i in free] + [(2, k) for k in range(len(question.further))],
+        [system.state_names[i] for i in free] + [name for name, *_ in question.further],
+        values,
+        [],
+        [Fraction(0)] * len(free),
+        parameter_ranges(system, parameters, numbers),
+        numbers,
+    )
+
+
+def _census(
+    subject: Subject, search: Search, bounds: list[tuple[Fraction, Fraction]], width: float
+) -> Census:
+    zeros, edge, left, others = [], [], [], []
+    for found in search.zeros:
+        place = _place(found.point, bounds)
+        counts = subject.question.counts(search.equations.inputs(found.point))
+        if place == "outside" or counts is False:
+            others.append(_of_another(subject, search, found))
+            continue
+        proof = prove_subject(subject, found, width)
+        if proof is None or counts is None:
+            why = "a zero on the surface or at the end of sliding: its status is undecided"
+            left.append(Undecided(proof.point if proof else {}, why))
+        elif place == "edge":
+            edge.append(proof)
+        else:
+            zeros.append(proof)
+    for low, high in clusters(search.undecided, search.size):
+        box = {
+            name: Enclosure(repr(float(a)), repr(float(b)))
+            for name, a, b in zip(subject.names, low, high, strict=True)
+        }
+        left.append(Undecided(box, _reason(low, high, search)))
+    complete = not left and not edge
+    statement = _words(subject, search, bounds, zeros, edge, left, complete)
+    kind = subject.question.kind
+    record = {
+        "complete": complete,
+        "question": asked(subject),
+        "bounds": [[str(v) for v in pair] for pair in bounds],
+        "zeros": [p.record for p in zeros],
+        "others": others,
+    }
+    found_all = tuple(zeros), tuple(edge), tuple(left)
+    return Census(kind, complete, *found_all, search.boxes, statement, record)
+
+
+def _of_another(subject: Subject, search: Search, found: Zero) -> dict[str, Any]:
+    """The record of a zero that is outside the box, or of another status than was asked for."""
+    nothing = Verdict("", subject.question.kind, facts={"label": "", "coincident": False})
+    return record_of(subject, search.equations, found, nothing, 128)
+
+
+def _place(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) -> str:
+    """Whether a point is in the closed box: "inside", "outside" or "edge"."""
+    result = "inside"
+    with precision(256):
+        for v, (a, b) in zip(point, bounds, strict=True):
+            low, high = enclose(a), enclose(b)
+            if v < low or v > high:
+                return "outside"
+            if not (v >= low and v <= high):
+                result = "edge"
+    return result
+
+
+def _reason(low: Floats, high: Floats, search: Search) -> str:
+    share = float(np.max((high - low) / search.size))
+    if search.stopped in ("interrupted",) or search.stopped.endswith("pieces"):
+        return f"not looked at any closer ({search.stopped})"
+    if share > 0.02:
+        return (
+            "zeros that are not isolated (a curve or a surface of them), or expressions that are "
+            "not defined there"
+        )
+    return (
+        "a zero that is not simple (a double one, or several closer than can be told apart), or a "
+        "branch point of an expression"
+    )
+
+
+def _words(
+    subject: Subject,
+    search: Search,
+    bounds: Sequence[tuple[Fraction, Fraction]],
+    zeros: list[Proof],
+    edge: list[Proof],
+    left: list[Undecided],
+    complete: bool,
+) -> str:
+    kind = subject.question.kind
+    ranges = intervals({n: given(*pair) for n, pair in zip(subject.names, bounds, strict=True)})
+    parameters = zip(subject.parameter_names, subject.parameters, strict=True)
+    condition = intervals({name: given(*pair) for name, pair in parameters})
+    side = getattr(subject.question, "side", None)
+    what = f"{kind} of {FIELDS[side]}" if side else kind
+    count = {0: f"no {what}", 1: f"exactly one {what}"}.get(
+        len(zeros), f"exactly {len(zeros)} points of kind {what}"
+    )
+    if not complete:
+        count = f"at least {len(zeros)} of kind {what}; the list is not proven complete"
+    lines = [
+        f"{p.label or 'class undecided'}: {', '.join(f'{k} = {v}' for k, v in p.point.items())}."
+        for p in zeros[:20]
+    ]
+    lines += [f"On the edge: {', '.join(f'{k} = {v}' for k, v in p.point.items())}." for p in edge]
+    lines += [f"Undecided: {u}." for u in left[:10]]
+    head = "Theorem" if complete else "Theorem in part"
+    return paragraph(
+        f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{where(subject)} "
+        f"holds {count}.",
+        *lines,
+        f"Pieces of the box that were looked at: {search.boxes}. {READ[subject.numbers]}",
+    )

@@ -1,0 +1,354 @@
+"""What can be asked about a system: for each special point its equations, and what a zero means."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field
+from fractions import Fraction
+from functools import cached_property
+from typing import Any
+
+from ...local.point.sides import FIELDS, Side, side_index
+from ...local.two_folds.classification import TABLE
+from ...model import DefinitionError, explain
+from ..arithmetic.algebra import Difference
+from ..arithmetic.flint import arb
+from ..arithmetic.instructions import Program
+from ..arithmetic.intervals import Enclosures, Numbers, sign
+from ..surface_functions import Described
+from .classes import FOLDS, proven_class
+from .eigenvalues import eigenvalue_kind
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """What a proven zero is."""
+
+    label: str
+    title: str
+    why: str = ""
+    lines: list[str] = field(default_factory=list)
+    values: dict[str, arb] = field(default_factory=dict)
+    facts: dict[str, Any] = field(default_factory=dict)
+    here: bool = True
+
+
+class Question:
+    """One kind of special point of a described system."""
+
+    kind: str
+    further: Sequence[tuple[str, Fraction, Fraction]] = ()
+    dimension = 1
+
+    def __init__(self, described: Described, numbers: Numbers):
+        self.described, self.numbers = described, numbers
+
+    @property
+    def nodes(self) -> list[int]:
+        raise NotImplementedError
+
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Say what the zero is, if both fields are those of the mode there."""
+        raise NotImplementedError
+
+    def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+        """Whether a zero is a point of this kind, if both fields are those of the mode there."""
+        return True
+
+    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Say what the zero enclosed in the inputs is."""
+        _, why = self._place(inputs)
+        return Verdict("", self.kind, why, here=False) if why else self.judged(inputs)
+
+    def counts(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+        """Whether a zero is one of the points asked for; None where that is undecided."""
+        answers = (self._place(inputs)[0], self.own(inputs))
+        return False if False in answers else None if None in answers else True
+
+    @cached_property
+    def _conditions(self) -> Program:
+        return Program(self.described.tape, [[node for _, node in self.described.elsewhere]])
+
+    def _place(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool | None, str]:
+        """Whether the zero is where the mode's fields apply; if not surely, what is not proven."""
+        if not self.described.elsewhere:
+            return True, ""
+        (values,) = self.values(self._conditions, inputs)
+        open_ = [
+            (v, f"that it is on {name} is not proven, its distance is in {v.str(5)}")
+            for (name, _), v in zip(self.described.elsewhere, values, strict=True)
+            if not v > 0
+        ]
+        if not open_:
+            return True, ""
+        return (False if any(v < 0 for v, _ in open_) else None), open_[0][1]
+
+    def values(self, program: Program, inputs: Sequence[Sequence[arb]]) -> list[list[arb]]:
+        """Enclose a program's values."""
+        return program(Enclosures(inputs, self.numbers))
+
+
+class TwoFolds(Question):
+    """h = L1 = L2 = 0."""
+
+    kind = "two-fold"
+
+    @cached_property
+    def nodes(self) -> list[int]:
+        """h, L1, L2."""
+        return [self.described.h, *self.described.lie]
+
+    @cached_property
+    def _second(self) -> Program:
+        return Program(self.described.tape, [self.described.second])
+
+    @cached_property
+    def difference(self) -> Difference:
+        """F1 - F2 with its common factor."""
+        d = self.described
+        return Difference(d.tape, d.fields, d.gradient(d.h), self.numbers)
+
+    @cached_property
+    def _transverse(self) -> Program:
+        return Program(self.described.tape, [[self.difference.transverse]])
+
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Class, by enclosures of the second derivatives; exact algebra for coincident fields."""
+        (second,) = self.values(self._second, inputs)
+        found, coincident, reason = proven_class(second), False, ""
+        if found.numbers and found.numbers["Delta"].contains(0):
+            coincident, reason = self._coincident(inputs)
+            if coincident:
+                found = proven_class(second, coincident=True)
+        values = dict(zip(("L11", "L12", "L21", "L22"), second, strict=True)) | found.numbers
+        if self.described.nonlinear:
+            why = (
+                "the multiplier enters nonlinearly, and the classes are those of Filippov's sliding"
+            )
+            return Verdict("", "two-fold", why, values=values)
+        facts = {"sigma": list(found.sigma), "label": found.label, "coincident": coincident}
+        if 0 in found.sigma:
+            return Verdict("", "two-fold", found.why, values=values)
+        folds = FOLDS[found.sigma]
+        title = {"VV": "visible two-fold", "II": "invisible two-fold"}.get(
+            folds, "visible-invisible two-fold"
+        )
+        lines = [reason] if reason else []
+        return Verdict(found.label, title, found.why, lines + _meaning(found.label), values, facts)
+
+    def _coincident(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool, str]:
+        difference, program = self.difference, self._transverse
+        if difference.identical:
+            return True, "F1 = F2 everywhere, so Delta = 0 exactly."
+        ((transverse,),) = self.values(program, inputs)
+        if not transverse.is_finite() or transverse.contains(0):
+            return False, ""
+        return True, (
+            "F1 = F2 there, so Delta = 0 and nu1 nu2 = -sigma1 sigma2 exactly: F1 - F2 = g G with an "
+            f"exact common factor g, and grad h . G in {transverse.str(6)} is not zero, so g is. The "
+            "sliding field is smooth through the two-fold."
+        )
+
+
+def _meaning(label: str) -> list[str]:
+    row = next((r for r in TABLE if r.label == label), None)
+    if row is None:
+        return []
+    words = {"none": "none", "one": "one", "all": "infinitely many", "sector": "infinitely many"}
+    return [
+        f"Canards (Da -> s -> Dr): {words[row.into]}; faux canards: {words[row.out_of]}.",
+        row.determinism,
+    ]
+
+
+class Folds(Question):
+    """h = L_i = 0."""
+
+    kind = "fold"
+
+    def __init__(self, described: Described, numbers: Numbers, side: Side):
+        super().__init__(described, numbers)
+        self.side, self._k = side, side_index(side)
+
+    @cached_property
+    def nodes(self) -> list[int]:
+        """h and L_i."""
+        return [self.described.h, self.described.lie[self._k]]
+
+    @cached_property
+    def _looked_at(self) -> Program:
+        d, k = self.described, self._k
+        second = d.lie_derivative(k, d.lie[k])
+        return Program(d.tape, [[second, d.lie_derivative(k, second), d.lie[1 - k]]])
+
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Visible, invisible, or a cusp where L_ii is zero exactly."""
+        ((second, third, other),) = self.values(self._looked_at, inputs)
+        i, d = self._k + 1, self.described
+        values = {f"L{i}{i}": second, f"L{2 - self._k}": other}
+        facts: dict[str, Any] = {"side": self.side}
+        s = sign(second)
+        if s:
+            visible = (s > 0) == (self._k == 0)
+            label = "visible" if visible else "invisible"
+            title = f"{label} fold of {FIELDS[self.side]}"
+            lines = [] if d.nonlinear else [_beside(other, self._k)]
+            return Verdict(label, title, "", lines, values, facts | {"label": label})
+        values |= {f"L{i}{i}{i}": third}
+        if second.is_zero() and sign(third):
+            facts |= {"label": "cusp"}
+            return Verdict("cusp", f"cusp of {FIELDS[self.side]}", values=values, facts=facts)
+        why = f"L{i}{i} in {second.str(5)}: its sign is undecided (a cusp?)"
+        return Verdict("", f"tangency of {FIELDS[self.side]}", why, values=values, facts=facts)
+
+
+def _beside(other: arb, k: int) -> str:
+    """What begins at a fold: L of the other field decides."""
+    s = sign(other)
+    if s == 0:
+        return "The other field's Lie derivative has no proven sign: it may be tangent too."
+    sliding = "attracting" if (s > 0) == (k == 0) else "repelling"
+    return f"The other field crosses the surface there; {sliding} sliding begins at the fold."
+
+
+class Equilibria(Question):
+    """F_i = 0."""
+
+    kind = "equilibrium"
+
+    def __init__(self, described: Described, numbers: Numbers, side: Side):
+        super().__init__(described, numbers)
+        self.side, self._k = side, side_index(side)
+        _autonomous(described, self.kind)
+
+    @property
+    def nodes(self) -> list[int]:
+        """The field."""
+        return list(self.described.fields[self._k])
+
+    @cached_property
+    def _looked_at(self) -> Program:
+        d = self.described
+        return Program(d.tape, [[d.h], *(d.gradient(f) for f in d.fields[self._k])])
+
+    def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+        """Whether it is on its field's own side."""
+        h = self.values(self._looked_at, inputs)[0][0]
+        s = sign(h)
+        return None if s == 0 and not h.is_zero() else s == (1, -1)[self._k]
+
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Real or virtual, and its kind by the signs of the eigenvalues."""
+        (h,), *jacobian = self.values(self._looked_at, inputs)
+        kind, why, values = eigenvalue_kind(jacobian)
+        own = (1, -1)[self._k]
+        status = "boundary" if h.is_zero() else {own: "real", -own: "virtual"}.get(sign(h), "")
+        why = why or ("" if status else f"h in {h.str(5)}: the side is undecided")
+        label = f"{status} {kind}" if status and kind else ""
+        title = f"{label or 'equilibrium'} of {FIELDS[self.side]}"
+        facts = {"side": self.side, "label": label}
+        return Verdict(label, title, why, values={"h": h} | values, facts=facts)
+
+
+class PseudoEquilibria(Question):
+    """h = 0 and (1 + lambda)/2 F1 + (1 - lambda)/2 F2 = 0; lambda is a further unknown."""
+
+    kind = "pseudo-equilibrium"
+    further = (("lambda", Fraction(-1), Fraction(1)),)
+
+    def __init__(self, described: Described, numbers: Numbers):
+        super().__init__(described, numbers)
+        _autonomous(described, self.kind)
+        if described.nonlinear:
+            raise DefinitionError(
+                explain(
+                    "pseudo-equilibrium",
+                    expected="a multiplier that enters linearly",
+                    received="hidden dynamics",
+                    advice="Proofs follow Filippov's convex combination only.",
+                )
+            )
+
+    @cached_property
+    def nodes(self) -> list[int]:
+        """h and the convex combination, as mean plus lambda times half the difference."""
+        d, tape = self.described, self.described.tape
+        lam = tape.symbol(2, 0)
+        rows = []
+        for a, b in zip(*d.fields, strict=True):
+            mean = tape.apply("div", [tape.add(a, b), tape.constant(2)])
+            half = tape.apply("div", [tape.apply("sub", [a, b]), tape.constant(2)])
+            rows.append(tape.add(mean, tape.apply("mul", [lam, half])))
+        return [d.h, *rows]
+
+    @cached_property
+    def _looked_at(self) -> Program:
+        d, tape = self.described, self.described.tape
+        ratio = tape.apply("div", [d.lie[0], tape.apply("sub", list(d.lie))])
+        field = [
+            tape.apply("sub", [a, tape.apply("mul", [ratio, tape.apply("sub", [a, b])])])
+            for a, b in zip(*d.fields, strict=True)
+        ]
+        gradient = d.gradient(d.h)
+        return Program(tape, [list(d.lie), gradient, *(d.gradient(f) for f in field)])
+
+    def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+        """Whether it slides: -1 < lambda < 1."""
+        lam = inputs[2][0]
+        if lam > -1 and lam < 1:
+            return True
+        return False if lam < -1 or lam > 1 or lam == 1 or lam == -1 else None
+
+    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+        """Region, and kind along the surface."""
+        lie, gradient, *jacobian = self.values(self._looked_at, inputs)
+        l1, l2 = map(sign, lie)
+        kind, why, values = _along_surface(gradient, jacobian)
+        real = self.own(inputs)
+        status = {True: "real", False: "virtual", None: ""}[real]
+        region = {(-1, 1): "attracting sliding", (1, -1): "repelling sliding"}.get((l1, l2), "")
+        if l1 * l2 > 0:
+            region = "crossing"
+        if not status or not region:
+            why = f"lambda in {inputs[2][0].str(5)}, L1 in {lie[0].str(5)}, L2 in {lie[1].str(5)}"
+        name = kind.replace("node", "pseudo-node").replace("focus", "pseudo-focus")
+        name = name.replace("saddle", "pseudo-saddle")
+        label = f"{status} {name}" if status and region and kind else ""
+        title = f"{label or 'pseudo-equilibrium'}"
+        lines = [f"It lies in {region}."] if region else []
+        return Verdict(label, title, why, lines, values, {"label": label})
+
+
+def _along_surface(
+    gradient: Sequence[arb], jacobian: Sequence[Sequence[arb]]
+) -> tuple[str, str, dict[str, arb]]:
+    """Eigenvalues on the tangent space, eliminating one coordinate."""
+    n = len(gradient)
+    k = max(range(n), key=lambda i: float(gradient[i].abs_lower()))
+    if gradient[k].contains(0):
+        return "", "grad h is not proven to be nonzero", {}
+    rest = [i for i in range(n) if i != k]
+    reduced = [
+        [jacobian[i][j] - jacobian[i][k] * gradient[j] / gradient[k] for j in rest] for i in rest
+    ]
+    return eigenvalue_kind(reduced)
+
+
+def _autonomous(described: Described, what: str) -> None:
+    if described.system.time_dependent:
+        raise DefinitionError(
+            explain(
+                what,
+                expected="a system that does not depend on time",
+                received=f"one that depends on {described.system.definition.time}",
+                advice="Points of rest do not stay where fields change with time.",
+            )
+        )
+
+
+QUESTIONS: Mapping[str, Callable[[Described, Numbers, Side], Question]] = {
+    "two-fold": lambda d, numbers, side: TwoFolds(d, numbers),
+    "fold": Folds,
+    "equilibrium": Equilibria,
+    "pseudo-equilibrium": lambda d, numbers, side: PseudoEquilibria(d, numbers),
+}

@@ -1,0 +1,200 @@
+"""Bifurcations in two parameters, of equilibria and of orbits, lie on curves known in closed form, and so do
+their points of codimension two."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from tests.orbit.periodic_cases import impact_oscillator, table
+
+x, y, z, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b"))
+BOX = [(-1, 1), (-1.5, 1)]
+
+
+def system(above, below=(1, 1), start=(0.0, 0.0), surface=y + 100, states=(x, y)):
+    return ns.FilippovSystem(
+        list(states),
+        surface=surface,
+        above=list(above),
+        below=list(below),
+        parameters={a: start[0], b: start[1]},
+    )
+
+
+@pytest.fixture(scope="module")
+def takens():
+    """Bogdanov-Takens' normal form: folds on b^2 = 4 a, Hopf points on a = 0 > b."""
+    s = system([y, a + b * x + x**2 - x * y], start=(0.1, -1.0))
+    return ns.continue_equilibrium(s, [0.11, 0], "a", bounds=(-0.5, 0.5))
+
+
+def test_folds_and_hopf_points_meet_in_a_bogdanov_takens_point(takens):
+    hopf, fold = (next(e for e in takens.events if e.kind == k) for k in ("Hopf", "fold"))
+    folds = ns.continue_bifurcation(fold, ("a", "b"), bounds=BOX)
+    assert np.abs(folds.values[:, 1] ** 2 - 4 * folds.values[:, 0]).max() < 1e-12
+    assert [point.kind for point in folds.special] == ["Bogdanov-Takens"]
+    assert np.abs(folds.special[0].values).max() < 1e-10
+    hopfs = ns.continue_bifurcation(hopf, ("a", "b"), bounds=BOX)
+    assert np.abs(hopfs.values[:, 0]).max() < 1e-12
+    assert np.ptp(hopfs.values[:, 1]) > 2
+    assert "Bogdanov-Takens" in str(folds) and "fold" in repr(folds)
+    assert abs(folds.solution(3).point[0] + folds.values[3, 1] / 2) < 1e-10
+
+
+def test_boundary_equilibria_with_their_degenerate_points():
+    """A focus at (0, a) with trace 2 b: on the surface at a = 0, a boundary Hopf point at b = 0, and
+    where the pseudo-equilibria change sides: s = C A^-1 E = 0."""
+    u, v = x, y - a
+    s = system([b * u - v, u + b * v], [1, 0.5], (0.5, -0.5), surface=y)
+    branch = ns.continue_equilibrium(s, [0, 0.5], "a", bounds=(-1, 1))
+    (event,) = branch.events
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=BOX)
+    assert np.abs(curve.values[:, 0]).max() < 1e-13
+    found = {point.kind: point.values[1] for point in curve.special}
+    # C adj(A) E with A = [[b, -1], [1, b]]: -E1 + b E2 = 0
+    assert set(found) == {"boundary Hopf"}
+    assert abs(found["boundary Hopf"]) < 1e-12
+    other = system([b * u - v, u + b * v], [0.5, 1], (0.5, -0.5), surface=y)
+    (event,) = ns.continue_equilibrium(other, [0, 0.5], "a", bounds=(-1, 1)).events
+    found = {
+        point.kind: point.values[1]
+        for point in ns.continue_bifurcation(event, ("a", "b"), bounds=BOX).special
+    }
+    assert abs(found["persistence turns into nonsmooth fold"] - 0.5) < 1e-12
+
+
+def test_boundary_equilibria_from_either_side_are_one_curve():
+    """At h = y = 0 with A = -1: (0, a + b^2) is on the surface where a = -b^2."""
+    s = system([-x, -(y - a - b**2)], [0, 1], (0.5, 0.3), surface=y)
+    (event,) = ns.continue_equilibrium(s, [0, 0.5], "a", bounds=(-1, 1)).events
+    real = ns.continue_bifurcation(event, ("a", "b"), bounds=BOX)
+    assert np.abs(real.values[:, 0] + real.values[:, 1] ** 2).max() < 1e-12
+    below = ns.find_pseudo_equilibrium(s, [0, 0], parameters={"a": -0.5, "b": 0.3}).point
+    branch = ns.continue_equilibrium(
+        s, below, "a", bounds=(-1, 1), side=None, parameters={"a": -0.5, "b": 0.3}
+    )
+    (event,) = branch.events
+    pseudo = ns.continue_bifurcation(event, ("a", "b"), bounds=BOX)
+    assert np.abs(pseudo.values[:, 0] + pseudo.values[:, 1] ** 2).max() < 1e-12
+
+
+def test_pseudo_saddle_nodes_and_two_folds():
+    """Sliding flow a - x^2 + b x on y = 0: folds on b^2 = -4 a; two-folds where L1 = L2 = 0."""
+    flow = a + b * x - x**2
+    s = system([flow, -1], [flow, 1], (0.5, 0.3), surface=y)
+    branch = ns.continue_equilibrium(s, [0.9, 0], "a", bounds=(-1, 1), side=None)
+    curve = ns.continue_bifurcation(branch.events[0], ("a", "b"), bounds=BOX)
+    assert curve.kind == "pseudo-saddle-node"
+    assert np.abs(curve.values[:, 1] ** 2 + 4 * curve.values[:, 0]).max() < 1e-12
+    s = system([1, x], [-1, x + a - b**2], (-0.5, 0.3), surface=y)
+    branch = ns.continue_equilibrium(s, [0.2, 0], "a", bounds=(-1, 1), side=None)
+    curve = ns.continue_bifurcation(branch.events[0], ("a", "b"), bounds=BOX)
+    assert curve.kind == "two-fold"
+    assert np.abs(curve.values[:, 0] - curve.values[:, 1] ** 2).max() < 1e-12
+
+
+def test_a_closed_curve_of_folds():
+    """x'= a^2 + b^2 - 1/4 + x^2: folds on a circle."""
+    s = system([a**2 + b**2 - 0.25 + x**2, -y], start=(0.1, 0.1))
+    branch = ns.continue_equilibrium(s, [0.48, 0], "a", bounds=(-1, 1))
+    event = branch.events[-1]
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=[(-1, 1), (-1, 1)])
+    assert np.abs(np.hypot(*curve.values.T) - 0.5).max() < 1e-12
+    assert curve.ends == (ns.orbit.BranchEnd.CLOSED, ns.orbit.BranchEnd.CLOSED)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (dict(parameters=("a", "a")), ns.DefinitionError, "two names"),
+        (dict(parameters=("a", "kappa")), ns.DefinitionError, "kappa"),
+        (dict(parameters="a"), ns.DefinitionError, "two names"),
+        (dict(bounds=[(-1, 1)]), ns.OptionError, "two pairs"),
+        (dict(bounds=[(-1, 1), (0, 1)]), ns.OptionError, "around b"),
+        (dict(event="fold"), ns.DefinitionError, "Branch.events"),
+    ],
+)
+def test_bad_input(takens, change, error, words):
+    given = {"event": takens.events[0], "parameters": ("a", "b"), "bounds": BOX} | change
+    with pytest.raises(error, match=words):
+        ns.continue_bifurcation(given.pop("event"), given.pop("parameters"), **given)
+
+
+# periodic orbits ------------------------------------------------------------------------------------
+
+
+def test_a_ball_on_a_table_folds_and_doubles_on_closed_forms():
+    """Holmes 1982: A = pi k and A^2 = (pi k)^2 + (2 (1 + r^2)/(1 + r)^2)^2 with k = (1 - r)/(1 + r)."""
+    orbit = ns.periodic_orbit(table(), [0.26, 3.1], t_start=0.64, itinerary=[("", "reset")])
+    for event in ns.continue_orbit(orbit, "A", bounds=(0.3, 1.2)).events:
+        curve = ns.continue_bifurcation(event, ("A", "r"), bounds=[(0.1, 2), (0.5, 0.9)])
+        A, r = curve.values.T
+        fold = np.pi * (1 - r) / (1 + r)
+        wanted = fold if event.kind == "fold" else np.hypot(fold, 2 * (1 + r * r) / (1 + r) ** 2)
+        assert np.abs(A - wanted).max() < 1e-11 and len(curve) > 10
+        assert curve.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
+
+
+def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(monkeypatch):
+    w, z = 0.8, 0.05
+    system = impact_oscillator()
+    at = {"F": 0.35}
+    rest = ns.simulate(system, [0, 0], 300, parameters=at).x[-1]
+    run = ns.simulate(system, rest, 360, t_start=300, parameters=at)
+    orbit = ns.periodic_orbit(system, run, parameters=at)
+    (event,) = ns.continue_orbit(orbit, "F", bounds=(0.33, 0.4)).events
+    curve = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)])
+    F, z = curve.values.T
+    evaluate, calls = type(orbit.problem).evaluate, [0]
+
+    def interrupted(*args, **more):
+        calls[0] += 1
+        if calls[0] == 40:
+            raise KeyboardInterrupt
+        return evaluate(*args, **more)
+
+    monkeypatch.setattr(type(orbit.problem), "evaluate", interrupted)
+    cut = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)], progress=True)
+    assert ns.orbit.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
+    assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
+
+
+def test_strong_resonances_on_a_curve_of_neimark_sacker_points():
+    """x' = (a + i b) x at the origin of a forced plane: the angle is 2 pi b."""
+    t, b = ca.SX.sym("t"), ca.SX.sym("b")
+    pull = (x * x + y * y) * (1 + 0.5 * ca.cos(t))
+    system = ns.FilippovSystem(
+        [x, y],
+        field=[a * x - b * y - x * pull, b * x + a * y - y * pull],
+        time=t,
+        parameters={a: -0.1, b: 0.2},
+    )
+    orbit = ns.periodic_orbit(system, [0.001, 0.001], period=2 * np.pi)
+    (event,) = ns.continue_orbit(orbit, "a", bounds=(-0.2, 0.2)).events
+    curve = ns.continue_bifurcation(event, ("a", "b"), bounds=[(-0.2, 0.2), (0.12, 0.45)])
+    assert np.abs(curve.values[:, 0]).max() < 1e-12
+    found = {point.kind: point.values[1] for point in curve.special}
+    assert set(found) == {"1:4 resonance", "1:3 resonance"}
+    assert abs(found["1:4 resonance"] - 1 / 4) < 1e-11
+    assert abs(found["1:3 resonance"] - 1 / 3) < 1e-11
+
+
+def test_a_grazing_meets_a_two_fold():
+    """A circle touches the surface x = -d, on which the other field pulls with u - y: up to u = 0."""
+    d, u = ca.SX.sym("d"), ca.SX.sym("u")
+    r = ca.sqrt(x * x + y * y)
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=x + d,
+        above=[x * (1 - r) - y, y * (1 - r) + x],
+        below=[u - y, 1],
+        parameters={d: 1.2, u: 0.4},
+    )
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.9, 0.0], 40.0))
+    (event,) = ns.continue_orbit(orbit, "d", bounds=(0.99, 1.3)).events
+    curve = ns.continue_bifurcation(event, ("d", "u"), bounds=[(0.5, 1.5), (-0.4, 0.6)])
+    assert np.abs(curve.values[:, 0] - 1).max() < 1e-12
+    (special,) = curve.special
+    assert special.kind == "grazing-sliding with two-fold"
+    assert np.abs(special.values - [1, 0]).max() < 1e-11

@@ -1,0 +1,239 @@
+"""Equilibria and pseudo-equilibria on branches: every event at its closed-form value, both sides of it
+as solutions found afresh."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+
+x, y, z, mu, nu = (ca.SX.sym(s) for s in ("x", "y", "z", "mu", "nu"))
+
+
+def planar(above, below, value=0.0, surface=y):
+    return ns.FilippovSystem(
+        [x, y], surface=surface, above=above, below=below, parameters={mu: value}
+    )
+
+
+def test_fold_of_equilibria():
+    system = planar([mu - x**2, 1 - y], [1, 1], 0.5)
+    branch = ns.continue_equilibrium(system, [0.7, 1.0], "mu", bounds=(-1, 1))
+    (event,) = branch.events
+    assert event.kind == "fold" and abs(event.parameter) < 1e-13
+    assert [e.kind for e in branch.at(0.25)] == ["saddle", "stable node"]
+    assert [round(e.point[0], 12) for e in branch.at(0.25)] == [-0.5, 0.5]
+    assert branch.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
+
+
+def test_hopf_point_and_not_a_neutral_saddle():
+    """u = x - 1, v = y - 2: a focus whose trace is 2 mu; and a saddle whose trace vanishes."""
+    u, v = x - 1, y - 2
+    focus = planar([mu * u - 3 * v, 3 * u + mu * v], [1, 1], -0.4)
+    (event,) = ns.continue_equilibrium(focus, [1, 2], "mu", bounds=(-1, 1)).events
+    assert event.kind == "Hopf" and abs(event.parameter) < 1e-13
+    assert abs(event.coefficients["frequency"] - 3) < 1e-12
+    saddle = planar([(1 + mu) * u, -v], [1, 1], -0.4)
+    assert ns.continue_equilibrium(saddle, [1, 2], "mu", bounds=(-0.9, 1)).events == ()
+
+
+# Equilibrium (mu - 1) above the surface: eigenvalues of A; the other field is E.
+FOCUS = ([[-1, -1], [1, -1]], 1.0)
+SADDLE = ([[1, 0], [1, -2]], 2.0)
+
+
+@pytest.mark.parametrize(("matrix", "pull"), [FOCUS, SADDLE])
+def test_boundary_equilibrium_is_the_one_that_is_found_and_classified(matrix, pull):
+    a = np.array(matrix, dtype=float)
+    offset = ca.vertcat(x, y - (mu - 1))
+    system = planar(ca.vertsplit(ca.DM(a) @ offset), [1, pull], 1.5)
+    found = ns.find_boundary_equilibrium(system, [0, 0], vary="mu")
+    local = ns.local.boundary_equilibrium(system, found.point, parameters=found.parameters)
+    branch = ns.continue_equilibrium(system, [0, 0.5], "mu", bounds=(0.5, 2))
+    (event,) = branch.events
+    assert event.kind == "boundary equilibrium"
+    assert abs(event.parameter - found.value) < 1e-13
+    assert event.solution.label == local.label
+    assert event.far_side.verdict.startswith(local.unfolding)
+    # beyond it the pseudo-equilibria are those that a search finds
+    pseudo = [s for s in branch.solutions if isinstance(s, ns.local.PseudoEquilibrium)]
+    assert len(pseudo) > 3 and all(s.status == "real" for s in pseudo)
+    persists = local.unfolding == "persistence"
+    values = branch.values[[isinstance(s, ns.local.PseudoEquilibrium) for s in branch.solutions]]
+    assert np.all(values < 1 + 1e-12) if persists else np.all(values > 1 - 1e-12)
+    there = {"mu": 0.7 if persists else 1.3}
+    again = ns.find_pseudo_equilibrium(system, pseudo[-1].point, parameters=there)
+    (on_branch,) = [s for s in branch.at(there["mu"]) if isinstance(s, ns.local.PseudoEquilibrium)]
+    assert np.abs(on_branch.point - again.point).max() < 1e-12
+
+
+def test_from_a_pseudo_equilibrium_through_the_boundary_to_the_equilibrium():
+    a = ca.DM(FOCUS[0])
+    system = planar(ca.vertsplit(a @ ca.vertcat(x, y - (mu - 1))), [1, 1], 0.7)
+    near = ns.find_pseudo_equilibrium(system, [0, 0]).point
+    branch = ns.continue_equilibrium(system, near, "mu", bounds=(0.5, 2), side=None)
+    assert [e.kind for e in branch.events] == ["boundary equilibrium"]
+    assert isinstance(branch.solutions[-1], ns.local.Equilibrium)
+    assert np.abs(branch[1.8].point - [0, 0.8]).max() < 1e-12
+    halted = ns.continue_equilibrium(system, near, "mu", bounds=(0.5, 2), side=None, through=False)
+    assert halted.ends == (ns.orbit.BranchEnd.REACHED_BOUND, ns.orbit.BranchEnd.EVENT)
+
+
+def test_pseudo_saddle_node_in_three_dimensions_and_hopf_of_the_sliding_flow():
+    """The sliding flow on z = 0 is given: (mu - x^2, -y), and a focus of trace 2 mu."""
+    flow = [mu - x**2, -y]
+    system = ns.FilippovSystem(
+        [x, y, z], surface=z, above=[*flow, -1], below=[*flow, 1], parameters={mu: 0.5}
+    )
+    branch = ns.continue_equilibrium(system, [0.7, 0, 0], "mu", bounds=(-1, 1), side=None)
+    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
+        ("pseudo-saddle-node", 0.0)
+    ]
+    flow = [mu * x - 2 * y, 2 * x + mu * y]
+    system = ns.FilippovSystem(
+        [x, y, z], surface=z, above=[*flow, -1], below=[*flow, 1], parameters={mu: 0.5}
+    )
+    (event,) = ns.continue_equilibrium(system, [0, 0, 0], "mu", bounds=(-1, 1), side=None).events
+    assert event.kind == "Hopf" and abs(event.coefficients["frequency"] - 2) < 1e-12
+
+
+def test_a_pitchfork_is_a_branch_point():
+    system = planar([x * (mu - x**2), 1 - y], [1, 1], -0.5)
+    branch = ns.continue_equilibrium(system, [0, 1], "mu", bounds=(-1, 1))
+    assert [(e.kind, round(e.parameter, 10) + 0.0) for e in branch.events] == [
+        ("branch point", 0.0)
+    ]
+
+
+def test_pseudo_equilibrium_through_a_two_fold_changes_from_repelling_to_attracting():
+    """det(F1, F2) = 2 x + mu on y = 0, so x = -mu/2, L1 = -mu/2 = -L2 and alpha = 1/2."""
+    system = planar([1, x], [-1, x + mu], -0.5)
+    branch = ns.continue_equilibrium(system, [0.2, 0], "mu", bounds=(-1, 1), side=None)
+    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [("two-fold", 0.0)]
+    assert np.abs(branch[0.6].point - [-0.3, 0]).max() < 1e-13
+    assert (branch[-0.6].region, branch[0.6].region) == (ns.Region.REPELLING, ns.Region.ATTRACTING)
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "words"),
+    [
+        (dict(bounds=(0.6, 1)), ns.OptionError, "around mu"),
+        (dict(bounds=3), ns.OptionError, "two numbers"),
+        (dict(parameter="kappa"), ns.DefinitionError, "kappa"),
+        (dict(step=-1), ns.OptionError, "step"),
+        (dict(max_points=1), ns.OptionError, "max_points"),
+        (dict(near=[1.0]), ns.PointError, "2"),
+    ],
+)
+def test_bad_input(change, error, words):
+    system = planar([mu - x**2, 1 - y], [1, 1], 0.5)
+    given = {"near": [0.7, 1.0], "parameter": "mu", "bounds": (-1, 1)} | change
+    with pytest.raises(error, match=words):
+        ns.continue_equilibrium(system, **given)
+
+
+def test_a_value_that_the_branch_does_not_reach():
+    system = planar([mu - x**2, 1 - y], [1, 1], 0.5)
+    branch = ns.continue_equilibrium(system, [0.7, 1.0], "mu", bounds=(-1, 1))
+    with pytest.raises(ns.PointError, match="reaches"):
+        branch.at(-0.5)
+    assert "fold" in str(branch) and "fold" in repr(branch) and "fold" in repr(branch.events)
+
+
+def test_a_smooth_system_has_equilibria_without_a_side():
+    u, v = x - 1, y - 2
+    smooth = ns.FilippovSystem(
+        [x, y],
+        field=[mu * u - 3 * v - u * (u**2 + v**2), 3 * u + mu * v - v * (u**2 + v**2)],
+        parameters={mu: -0.4},
+    )
+    found = ns.find_equilibrium(smooth, [0.9, 2.1])
+    assert np.abs(found.point - [1, 2]).max() < 1e-12
+    assert (found.status, found.kind, found.mode) == ("real", "stable focus", "")
+    assert str(found).startswith("stable focus at")
+    branch = ns.continue_equilibrium(smooth, [0.9, 2.1], "mu", bounds=(-1, 1))
+    (event,) = branch.events
+    assert event.kind == "Hopf" and abs(event.parameter) < 1e-13
+    cycle = ns.continue_orbit(event, "mu", bounds=(-1, 1))[0.25]
+    assert cycle.period == pytest.approx(2 * np.pi / 3, rel=1e-12)  # r^2 = mu
+    radius = np.hypot(*(cycle.start - [1, 2]))
+    assert radius == pytest.approx(0.5, rel=1e-10)
+    curve = ns.continue_equilibrium(smooth, [0.9, 2.1], "mu", bounds=(-1, 1), side="+")
+    assert len(curve.events) == 1
+    for options, words in (
+        (dict(side="-"), "one field"),
+        (dict(mode="+"), "no surface"),
+        (dict(surface=1), "no surface"),
+        (dict(side=None), "at least one switching surface"),
+    ):
+        with pytest.raises((ns.OptionError, ns.DefinitionError), match=words):
+            ns.continue_equilibrium(smooth, [0.9, 2.1], "mu", bounds=(-1, 1), **options)
+
+
+def test_the_manifolds_of_a_smooth_saddle_are_followed():
+    saddle = ns.FilippovSystem([x, y], field=[x, -y + x**2])
+    found = ns.manifold(saddle, ns.find_equilibrium(saddle, [0.1, 0.1]), stable=False, length=1.0)
+    for arc in found.arcs:
+        assert np.abs(arc.points[:, 1] - arc.points[:, 0] ** 2 / 3).max() < 1e-9
+
+
+def two_relays(value=1.5):
+    """The equilibrium of ++ is at (mu, 2 - mu): on y = 0 at mu = 2, on x = 0 at mu = 0."""
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    return ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[a, b],
+        field=[mu + 1 - a - x, 3 - mu - b - y],
+        parameters={mu: value},
+    )
+
+
+def test_of_several_surfaces_each_may_be_met():
+    branch = ns.continue_equilibrium(two_relays(), [1.5, 0.5], "mu", bounds=(-0.5, 2.5))
+    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
+        ("boundary equilibrium", 0.0),
+        ("boundary equilibrium", 2.0),
+    ]
+    modes = [s.mode for s in branch.solutions]
+    assert modes[0] == "s+" and modes[-1] == "+s" and "++" in modes
+    assert np.abs(branch[-0.25].point - [0, 2.25]).max() < 1e-12
+    assert np.abs(branch[2.25].point - [2.25, 0]).max() < 1e-12
+    other = ns.find_equilibrium(two_relays(2.25), [2.25, 0.5])
+    assert other.status == "virtual" and other.h > 0  # beyond the second surface
+
+
+def test_a_cycle_around_an_equilibrium_between_two_surfaces_has_its_mode():
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    u, v = x - 1, y - 1
+    system = ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[a, b],
+        field=[
+            mu * u - 3 * v - u * (u**2 + v**2) + (1 - a),
+            3 * u + mu * v - v * (u**2 + v**2) + (1 - b),
+        ],
+        parameters={mu: -0.1},
+    )
+    (event,) = ns.continue_equilibrium(system, [1, 1], "mu", bounds=(-0.2, 0.5)).events
+    cycle = ns.continue_orbit(event, "mu", bounds=(-0.2, 0.5))[0.25]
+    assert cycle.itinerary == "++" and cycle.period == pytest.approx(2 * np.pi / 3, rel=1e-12)
+
+
+def test_a_pseudo_equilibrium_that_meets_another_surface_ends_there():
+    """On x = 0 the sliding flow rests at y = mu while y > 0."""
+    with_mode = dict(side=None, surface=0, mode="s+")
+    a, b = ca.SX.sym("a"), ca.SX.sym("b")
+    system = ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[a, b],
+        field=[-a, mu - y - b + 1],
+        parameters={mu: 1.0},
+    )
+    branch = ns.continue_equilibrium(system, [0.0, 1.0], "mu", bounds=(-0.5, 2), **with_mode)
+    assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
+        ("intersection", 0.0)
+    ]
+    assert branch.ends[0] is ns.orbit.BranchEnd.EVENT

@@ -1,0 +1,100 @@
+"""Branches of orbits that shrink to a point of a surface end at the boundary equilibrium or two-fold of the
+closed form, by that name."""
+
+import casadi as ca
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.local.searches.boundary_equilibria import fold_orbit_landing
+
+X, Y, MU, NU = (ca.SX.sym(name) for name in ("x", "y", "mu", "nu"))
+GROWTH = 0.1
+
+
+def boundary_focus(slope: float, away: float = 0.0) -> ns.FilippovSystem:
+    """An unstable focus at the height mu over the surface y = nu, on which its orbits land and slide.
+
+    The sliding flow has its zero at x = mu (1 + r c)/(c - r): a stable pseudo-node below mu = nu if
+    c > r (BF1, persistence), and a pseudo-saddle above it if c < r (BF2, a nonsmooth fold).
+    """
+    x, y = X - away, Y - MU
+    return ns.FilippovSystem(
+        [X, Y],
+        surface=Y - NU,
+        above=[GROWTH * x - y, x + GROWTH * y],
+        below=[slope, 1.0],
+        parameters={MU: 0.5, NU: 0.0},
+    )
+
+
+@pytest.mark.parametrize("step", [0.01, 0.05, 0.3])
+@pytest.mark.parametrize(
+    ("slope", "label", "unfolding"), [(1.0, "BF1", "persistence"), (0.0, "BF2", "nonsmooth fold")]
+)
+def test_sliding_cycles_end_at_a_boundary_focus_of_either_kind(slope, label, unfolding, step):
+    system = boundary_focus(slope)
+    orbit = ns.periodic_orbit(system, [0.05, 0.001])
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.2, 0.6), step=step)
+    (event,) = branch.events
+    assert event.kind == "boundary equilibrium" and abs(event.parameter) < 1e-15
+    assert label in event.far_side.verdict and unfolding in event.far_side.verdict
+    assert event.far_side.itinerary == ""
+    assert branch.ends == (ns.orbit.BranchEnd.EVENT, ns.orbit.BranchEnd.REACHED_BOUND)
+    for mu in (0.5, 0.05, 1e-4):  # the flight from the fold is that of a linear system
+        slide = next(leg for leg in branch[mu].legs if leg.mode == "s")
+        landing = mu * (GROWTH + fold_orbit_landing(GROWTH, 1.0))  # from the fold at x = r mu
+        assert slide.start[0] == pytest.approx(landing, rel=1e-9)
+
+
+def test_far_from_the_origin_and_in_two_parameters_too():
+    system = boundary_focus(1.0, away=1000.0)
+    orbit = ns.periodic_orbit(system, [1000.05, 0.001])
+    (event,) = ns.continue_orbit(orbit, "mu", bounds=(-0.2, 0.6)).events
+    assert event.kind == "boundary equilibrium" and abs(event.parameter) < 1e-12
+    curve = ns.continue_bifurcation(event, ("mu", "nu"), bounds=[(-0.2, 0.6), (-0.5, 0.5)])
+    assert len(curve.values) > 2 and abs(curve.values[:, 0] - curve.values[:, 1]).max() < 1e-12
+
+
+def test_crossing_cycles_end_where_both_foci_are_on_the_surface():
+    """Two foci in one place, one that repels and one that attracts: cycles as large as it is high."""
+    focus = lambda r: [r * X - (Y - MU), X + r * (Y - MU)]
+    system = ns.FilippovSystem(
+        [X, Y], surface=Y, above=focus(0.1), below=focus(-0.3), parameters={MU: 0.3}
+    )
+    orbit = ns.periodic_orbit(system, [1.0, 0.01])
+    (event,) = ns.continue_orbit(orbit, "mu", bounds=(-0.5, 0.5)).events
+    assert event.kind == "boundary equilibrium" and abs(event.parameter) < 1e-15
+
+
+@pytest.mark.parametrize("bend", [0.3, -0.3])
+def test_crossing_cycles_end_at_a_two_fold(bend):
+    """Folds at x = 0 and at x = mu, both invisible: one two-fold at mu = 0, around which cycles of the size
+    sqrt(mu/bend) are born as sliding between the folds changes its stability (pseudo-Hopf)."""
+    system = ns.FilippovSystem(
+        [X, Y],
+        surface=Y,
+        above=[1, -X + bend * X**2],
+        below=[-1, MU - X],
+        parameters={MU: 0.05},
+    )
+    mu = 0.05 if bend > 0 else -0.05
+    orbit = ns.periodic_orbit(system, [0.3, 0.001], parameters={"mu": mu})
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.2, 0.2))
+    (event,) = branch.events
+    assert event.kind == "two-fold" and abs(event.parameter) < 1e-15
+    assert "shrinks to a two-fold" in event.far_side.verdict
+    # starts s < e have the mean mu, as below h is a parabola; above e = -s + (2/3) bend s^2 + O(s^3)
+    for size in (0.01, 1e-3):
+        small = branch[mu / 0.05 * size]
+        starts = sorted(float(leg.start[0]) for leg in small.legs)
+        assert sum(starts) == pytest.approx(2 * mu / 0.05 * size, rel=1e-6)
+        assert starts[1] == pytest.approx((3 * size / abs(bend)) ** 0.5, rel=2 * size**0.5)
+
+
+def test_such_branches_are_drawn():
+    orbit = ns.periodic_orbit(boundary_focus(1.0), [0.05, 0.001])
+    branch = ns.continue_orbit(orbit, "mu", bounds=(-0.2, 0.6))
+    figure = ns.plot.branch(branch)
+    assert any(
+        "boundary equilibrium" in str(t.get_text()) for t in figure.axes[0].get_legend().texts
+    )

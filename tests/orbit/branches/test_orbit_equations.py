@@ -1,0 +1,207 @@
+"""Equations of orbits with a free parameter are the same in one call and from leg to leg, their derivatives are
+those of differences, and what is corrected in one call is what Newton's method finds step by step."""
+
+from __future__ import annotations
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.flow import watched
+from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.flow.compiled.shooting import bordered_direction
+from nonsmooth.model.derivatives.variational import guarded_field
+from nonsmooth.orbit.branches import conditions, orbit_equations
+from nonsmooth.orbit.branches.conditions import conditions_of
+from nonsmooth.orbit.branches.orbit_branches import OrbitCurve
+from nonsmooth.orbit.periodic import multipliers
+from nonsmooth.orbit.periodic.boundary_value_problem import BoundaryProblem
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+
+def walker():
+    """One leg in R^4, whose reset and guard have parameters."""
+    start = [0.20, -0.20, 0.40, (1 - np.cos(0.40)) * -0.20]
+    system = ns.textbook.simplest_walker().system
+    return ns.periodic_orbit(system, start, itinerary=[("", "heelstrike")]), system.parameter_names
+
+
+def friction():
+    """Half an orbit; the period of the forcing has a parameter."""
+    system = ns.textbook.forced_dry_friction().system
+    given = {"symmetry": "odd", "parameters": {"f": 0.6}, "t_start": 0.64}
+    return ns.periodic_orbit(system, [1.44, 0.0], itinerary="s -", **given), ("f",)
+
+
+def whole_friction():
+    """Both halves."""
+    system = ns.textbook.forced_dry_friction().system
+    run = ns.simulate(system, [1.5, 0.0], 100.0, parameters={"f": 0.6})
+    return ns.periodic_orbit(system, run), ("f",)
+
+
+def relay():
+    """Half an orbit of fourteen legs."""
+    system = ns.textbook.multi_sliding_relay().system
+    start, modes = [0.0, 1.0, 2.57], ["+", "s"] * 7
+    return ns.periodic_orbit(system, start, itinerary=modes, symmetry="odd"), ("w",)
+
+
+def bounces():
+    """A ball on a table that vibrates; its restitution is a parameter of the reset.
+
+    It rises with the speed pi/2 once in a period pi where the table has 2 a cos(2 t) = pi/2 (1 - r)/(1 + r).
+    """
+    y, v, t, r, a = (ca.SX.sym(name) for name in ("y", "v", "t", "r", "a"))
+    gap, speed = y - a * ca.sin(2 * t), 2 * a * ca.cos(2 * t)
+    hit = ns.Reset(gap, [y, speed - r * (v - speed)], direction=-1, name="hit")
+    given = {"field": [v, -1.0], "time": t, "resets": hit, "parameters": {r: 0.6, a: 0.25}}
+    system, phase = ns.FilippovSystem([y, v], **given), np.arccos(np.pi / 4)
+    start = [0.25 * np.sin(phase), np.pi / 2]
+    itinerary = [("", "hit")]
+    orbit = ns.periodic_orbit(system, start, itinerary=itinerary, t_start=phase / 2)
+    return orbit, ("a", "r")
+
+
+CASES = {
+    "walker": walker,
+    "bounces": bounces,
+    "friction": friction,
+    "whole": whole_friction,
+    "relay": relay,
+}
+
+
+def curve_of(orbit, name):
+    p, free = orbit.parameter_vector, (orbit.system.parameter_names.index(name),)
+    curve = OrbitCurve(orbit.problem, p, free, np.ones(1), orbit.unknowns, 1e3)
+    return curve, np.append(orbit.unknowns, p[free[0]])
+
+
+@pytest.fixture(params=CASES)
+def orbit_and_names(request):
+    orbit, names = CASES[request.param]()
+    return orbit, names
+
+
+def test_equations_in_one_call_are_those_of_the_legs_and_of_differences(orbit_and_names):
+    orbit, names = orbit_and_names
+    for name in names:
+        curve, u = curve_of(orbit, name)
+        problem, p = orbit.problem, curve.parameters_at(u)
+        values, matrix = curve.equations(u)
+        assert problem.is_direct
+        flight = problem.flights(curve.free)(*problem.split(u), p)
+        apart = problem._assembled(flight, u, p, list(curve.free))
+        size = np.abs(matrix).max()
+        assert np.abs(apart.residual - values).max() < 1e-13 * size
+        assert np.abs(apart.whole - matrix).max() < 1e-13 * size
+        for k in (0, problem.size - 1, problem.size):
+            step = 1e-5 * max(abs(u[k]), 0.1) * np.eye(u.size)[k]
+            ahead, back = (curve.equations(u + s * step)[0] for s in (1, -1))
+            slope = (ahead - back) / (2 * step[k])
+            assert np.abs(slope - matrix[:, k]).max() < 1e-6 * max(1.0, np.abs(matrix[:, k]).max())
+
+
+def test_points_corrected_in_one_call_are_those_found_step_by_step(monkeypatch, orbit_and_names):
+    orbit, names = orbit_and_names
+    curve, u = curve_of(orbit, names[-1])
+    jacobian = curve.equations(u)[1] * curve.scale
+    tangent = np.linalg.svd(jacobian)[2][-1]
+    guess = u + 1e-3 * tangent * curve.scale + 1e-5 * curve.scale * np.cos(np.arange(u.size))
+    found = curve.correct(guess, tangent)
+    assert curve._last == found.tobytes()  # the equations at the point are there
+    at_once = curve.evaluation(found)
+    monkeypatch.setattr(BoundaryProblem, "is_direct", False)
+    other, _ = curve_of(orbit, names[-1])
+    stepwise = other.correct(guess, tangent)
+    assert np.abs((found - stepwise) / curve.scale).max() < 1e-13
+    assert abs(tangent @ ((found - guess) / curve.scale)) < 1e-14
+    again = other.evaluation(found)
+    assert np.abs(again.residual).max() < 1e-12 * np.abs(again.whole).max()
+    assert np.abs(again.whole - at_once.whole).max() < 1e-12 * np.abs(again.whole).max()
+
+
+def test_a_branch_by_a_parameter_of_a_reset_ends_at_its_fold():
+    """Where the table is not faster than (1 - r)/(1 + r) pi/2."""
+    branch = ns.continue_orbit(bounces()[0], "r", bounds=(0.5, 0.7), step=0.1)
+    ratio = 1 / np.pi
+    assert [event.kind for event in branch.events] == ["fold"]
+    assert branch.events[0].parameter == pytest.approx((1 - ratio) / (1 + ratio), rel=1e-12)
+
+
+def test_a_corrector_that_fails_in_one_call_is_tried_step_by_step(monkeypatch):
+    orbit, _ = walker()
+    curve, u = curve_of(orbit, orbit.system.parameter_names[0])
+    monkeypatch.setattr(orbit_equations, "_MOST_STEPS", 1)
+    axis = np.eye(u.size)[-1]
+    guess = u.copy()
+    guess[-1] *= 1.001
+    found = curve.correct(guess, axis)
+    assert found is not None and found[-1] == guess[-1]
+
+
+def test_a_guess_without_a_solution_has_none():
+    """The walker's gait ends in a fold below the slope 0."""
+    orbit, _ = walker()
+    curve, u = curve_of(orbit, orbit.system.parameter_names[0])
+    guess, axis = u.copy(), np.eye(u.size)[-1]
+    guess[-1] = -0.5
+    assert curve.correct(guess, axis) is None
+
+
+@pytest.mark.parametrize("size", [2, 3, 7, 20])
+def test_directions_and_determinants_are_those_of_linear_algebra(size):
+    random = np.random.default_rng(size)
+    jacobian, before = random.normal(size=(size - 1, size)), random.normal(size=size)
+    jacobian[0, : size // 2] = 0.0
+    found = bordered_direction(jacobian, before)
+    assert found is not None
+    direction, determinant = found
+    assert np.abs(jacobian @ direction).max() < 1e-12 and direction @ before > 0
+    assert abs(np.linalg.norm(direction) - 1) < 1e-14
+    bordered = np.vstack([jacobian, before])
+    length = 1 / (direction @ before)
+    assert determinant == pytest.approx(np.linalg.det(bordered) * length, rel=1e-9)
+    assert bordered_direction(np.zeros((size - 1, size)), before) is None
+
+
+def test_a_direction_is_not_found_where_numbers_are_not():
+    assert bordered_direction(np.full((1, 2), np.nan), np.ones(2)) is None
+
+
+def test_tests_of_an_orbit_are_the_same_without_the_interpreter(monkeypatch, orbit_and_names):
+    orbit, _ = orbit_and_names
+    p, known = orbit.parameter_vector, {}
+    found = conditions_of(orbit.problem, orbit.evaluation, p, known)
+    for module in (watched, multipliers):
+        monkeypatch.setattr(module, "has_interpreter", lambda: False)
+    again = conditions_of(orbit.problem, orbit.evaluation, p, {})
+    assert list(found) == list(again) and set(known) <= set(found)
+    size = max(1.0, *map(abs, again.values()))
+    for name, value in found.items():
+        assert value == pytest.approx(again[name], rel=1e-9, abs=1e-11 * size), name
+
+
+def test_tests_by_multipliers_are_products_of_them(orbit_and_names):
+    """prod (1 + m) and prod (m_i m_j - 1) over all multipliers of the legs' map, a 0 across the flow."""
+    orbit, _ = orbit_and_names
+    m = np.append(orbit.half_multipliers, 0.0)
+    found = conditions.smooth_tests(orbit.problem, orbit.evaluation)
+    flip = np.prod(1 + m).real
+    torus = np.prod([m[i] * m[j] - 1 for i in range(m.size) for j in range(i)]).real
+    name = "pitchfork" if orbit.symmetric else "period doubling"
+    assert found[name] == pytest.approx(flip, rel=1e-9, abs=1e-10)
+    assert found["Neimark-Sacker"] == pytest.approx(torus, rel=1e-9, abs=1e-10)
+
+
+def test_guards_at_the_ends_of_legs_are_those_of_the_states_there():
+    orbit, _ = whole_friction()
+    problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
+    fields = [guarded_field(orbit.system, leg.mode) for leg in problem.legs]
+    _, _, values = watched.LegsWatch(fields)(list(at.starts), p, at.durations, 1e-6)
+    for field, value, flown in zip(fields, values, at.flown, strict=True):
+        expected = field.starts.copied(flown.end, p)[1][:, 0]
+        np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-13)

@@ -1,0 +1,370 @@
+"""What cannot be a periodic orbit is refused with the leg, what happened and what to try."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from tests.orbit.periodic_cases import (
+    forced_friction,
+    scalar_relay,
+    stick_slip,
+    walker,
+    welander,
+)
+
+X, Y = ca.SX.sym("x"), ca.SX.sym("y")
+
+
+@pytest.mark.parametrize(
+    ("solve", "error", "message"),
+    [
+        (
+            lambda: (forced_friction(), [1.5, 0.0], {"period": -2.0}),
+            ns.OptionError,
+            "positive time",
+        ),
+        (
+            lambda: (forced_friction(), [1.5, 0.0], {"period": 3.3}),
+            ns.OptionError,
+            "the same again, received 3.3, after which it differs by",
+        ),
+        (
+            lambda: (forced_friction(), [1.5, 0.0], {"period": "x"}),
+            ns.OptionError,
+            r"a number, or an expression in the parameters \['f', 'W'\], received 'x'",
+        ),
+        (
+            lambda: (walker(), [0.2, -0.2, 0.4, -0.0158], {"itinerary": [("", "toe")]}),
+            ns.OptionError,
+            r"an event among \['heelstrike'\] .* received 'toe'",
+        ),
+        (
+            lambda: (welander(), [0.4, 0.3], {"max_iterations": 0}),
+            ns.OptionError,
+            "max_iterations: expected a positive whole number",
+        ),
+        (
+            lambda: (ns.FilippovSystem([X, Y], field=[Y, -X - Y / 2]), [1.0, 0.0], {}),
+            ns.ConvergenceError,
+            "shrank the orbit to a point, .* an equilibrium",
+        ),
+        (
+            lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s +"}),
+            ns.ConvergenceError,
+            r"leg 2 \(s, ended by L_F1 h\) to come to its event",
+        ),
+        (
+            lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s", "parameters": {"f": 0.0}}),
+            ns.DegenerateError,
+            "leg 2 .* a two-fold, at",
+        ),
+    ],
+)
+def test_what_cannot_be_an_orbit_is_refused_by_leg_and_cause(solve, error, message) -> None:
+    system, guess, options = solve()
+    with pytest.raises(error, match=message):
+        ns.periodic_orbit(system, guess, **options)
+
+
+def test_a_guess_from_which_trial_steps_overflow_is_no_reason_to_give_up() -> None:
+    near = ns.periodic_orbit(stick_slip(), [1.0, 0.5], itinerary="- s")
+    far = ns.periodic_orbit(stick_slip(), [1e9, 0.5], itinerary="- s")
+    assert far.period == pytest.approx(near.period, rel=1e-12)
+
+
+def test_a_section_that_is_unknown_is_named_with_those_that_are_known() -> None:
+    with pytest.raises(ns.OptionError, match=r"a name of \['h0'\] .* received 'h7'"):
+        ns.orbit.poincare(forced_friction(), "h7", [1.0, 0.0], count=3)
+
+
+@pytest.mark.parametrize("word", [3, [("-", "h0", "entry")], [3], [("-", 2)], [[]], [None]])
+def test_an_itinerary_that_is_none_is_refused(word) -> None:
+    with pytest.raises(ns.OptionError, match=r"itinerary: expected modes, .* or pairs of a mode"):
+        ns.periodic_orbit(stick_slip(), [1.0, 0.5], itinerary=word)
+
+
+@pytest.mark.parametrize(
+    ("names", "bounds", "error", "message"),
+    [
+        (None, [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters: expected two names"),
+        (3, [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters: expected two names"),
+        (("A", "k", "A"), [(1, 3), (0.5, 2)], ns.DefinitionError, "expected two names"),
+        (("A", "k"), None, ns.OptionError, "bounds: expected two pairs of numbers"),
+        (("A", "k"), 3.0, ns.OptionError, "bounds: expected two pairs of numbers"),
+    ],
+)
+def test_what_is_no_pair_of_parameters_or_bounds_is_refused(names, bounds, error, message) -> None:
+    branch = ns.continue_orbit(ns.periodic_orbit(scalar_relay(), [0.5]), "A", bounds=(1.5, 3.0))
+    with pytest.raises(error, match=message):
+        ns.continue_bifurcation(branch.events[0], names, bounds=bounds)
+
+
+@pytest.mark.parametrize("points", [3, [[0.0]], [[float("nan"), 0.0]], [[[0.0, 1.0, 2.0]]]])
+def test_attractors_that_are_no_points_are_refused(points) -> None:
+    grid = {"x": [0.0, 1.0], "v": 0.0}
+    with pytest.raises(
+        ns.PointError, match=r"attractors: expected points \(m, 2\) that are finite"
+    ):
+        ns.basins(stick_slip(), grid, t_end=10.0, attractors=points)
+
+
+@pytest.mark.parametrize("start", [1e300, -1e17])
+def test_a_state_whose_motion_is_lost_in_rounding_is_no_orbit(start) -> None:
+    t = ca.SX.sym("t")
+    drive = 2.5 * ca.cos(t)
+    relay = ns.FilippovSystem([X], surface=X, above=[drive - 1], below=[drive + 1], time=t)
+    with pytest.raises(ns.ConvergenceError, match=r"an orbit that moves, .* closes by rounding"):
+        ns.periodic_orbit(relay, [start])
+
+
+@pytest.mark.parametrize("offset", [1e6, 1e9])
+def test_an_orbit_far_from_the_origin_is_one_as_long_as_it_moves(offset) -> None:
+    """The relay of the docstring about x = offset: its multiplier is that of offset 0."""
+    t = ca.SX.sym("t")
+    drive = 2.5 * ca.cos(t)
+    relay = ns.FilippovSystem([X], surface=X - offset, above=[drive - 1], below=[drive + 1], time=t)
+    orbit = ns.periodic_orbit(relay, [offset + 0.5])
+    c = 2.5 * (1 - (ca.pi / 5) ** 2) ** 0.5
+    assert abs(orbit.multipliers[0] - ((c - 1) / (c + 1)) ** 2) < 1e-15 * offset
+
+
+def test_an_equilibrium_of_a_forced_system_is_an_orbit_though_it_does_not_move() -> None:
+    """x' = (0.1 - x)(2 + cos t): the multiplier of x = 0.1 is exp(-4 pi)."""
+    t = ca.SX.sym("t")
+    system = ns.FilippovSystem([X], field=[(0.1 - X) * (2 + ca.cos(t))], time=t)
+    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3], t_end=40.0))
+    assert orbit.start == pytest.approx([0.1], rel=1e-15)
+    assert abs(orbit.multipliers[0].real / ca.exp(-4 * ca.pi) - 1) < 1e-8
+
+
+def integrators(b3: float, a: float) -> ns.FilippovSystem:
+    """Three integrators with a relay that its output lags by two: fast switches (Johansson et al. 1999)."""
+    z = ca.SX.sym("z")
+    field = lambda u: [Y - a * X, z - u - a * X, -b3 * u - a * X]
+    return ns.FilippovSystem([X, Y, z], surface=X, above=field(1), below=field(-1))
+
+
+def test_a_run_that_chatters_is_refused_soon_and_by_its_name() -> None:
+    system = integrators(0.1, 1.0)
+    run = ns.simulate(system, [1.0, 0.0, 0.0], 200.0, max_events=20_000)
+    assert run.status is ns.Status.TOO_MANY_EVENTS
+    with pytest.raises(
+        ns.ConvergenceError, match="one that chatters: it ended with TOO_MANY_EVENTS"
+    ):
+        ns.periodic_orbit(system, run)
+    with pytest.raises(ns.ConvergenceError, match="one that chatters"):  # 2,000 events of its own
+        ns.periodic_orbit(integrators(0.0, 1.0), [1.0, 0.0, 0.0])
+
+
+@pytest.mark.parametrize("start", [[1.0, 0.0, 0.0], [0.3, -0.2, 0.5]])
+def test_an_orbit_that_shrinks_to_a_two_fold_is_none(start) -> None:
+    """Near x = y = 0 small orbits nearly close, by their size squared: Newton's method halves them."""
+    with pytest.raises(ns.ConvergenceError, match="shrank the orbit to a point"):
+        ns.periodic_orbit(integrators(1.0, 0.0), start)
+
+
+def harmonic() -> ns.FilippovSystem:
+    """Orbits of period 2 pi around a circle that attracts."""
+    pull = 1 - X**2 - Y**2
+    return ns.FilippovSystem([X, Y], field=[-Y + X * pull, X + Y * pull])
+
+
+def test_the_period_of_a_system_without_time_is_about_what_the_orbit_takes() -> None:
+    system = harmonic()
+    run = ns.simulate(system, [0.5, 0.0], t_end=60.0)
+    for guess in (run, [0.5, 0.0], ns.periodic_orbit(system, run)):
+        assert ns.periodic_orbit(system, guess, period=7.0).period == pytest.approx(2 * ca.pi)
+        with pytest.raises(
+            ns.ConvergenceError, match=r"about period = 12.5664, received .* 6.2831"
+        ):
+            ns.periodic_orbit(system, guess, period=4 * ca.pi)
+    odd = ns.periodic_orbit(system, run, period=6.0, symmetry="odd")
+    assert odd.symmetric and odd.period == pytest.approx(2 * ca.pi)
+
+
+@pytest.mark.parametrize("period", [-1.0, 0.0, float("nan"), "x", X])
+def test_a_period_that_is_no_time_is_refused_in_a_system_without_time(period) -> None:
+    with pytest.raises(ns.OptionError, match="period: expected a"):
+        ns.periodic_orbit(harmonic(), [0.5, 0.0], period=period)
+
+
+def test_what_an_orbit_or_a_run_says_itself_is_not_said_again() -> None:
+    system = scalar_relay()
+    orbit = ns.periodic_orbit(system, [0.5])
+    for options, message in [
+        ({"itinerary": "+ -"}, "itinerary: expected none, as it belongs to a state"),
+        ({"t_start": 1.0}, "t_start: expected none, as it belongs to a state"),
+        ({"period": 3.0}, "period: expected that of the orbit that is the guess, 6.28318"),
+        ({"symmetry": "odd"}, "symmetry: expected none, or that by which the guess was found"),
+    ]:
+        with pytest.raises(ns.OptionError, match=message):
+            ns.periodic_orbit(system, orbit, **options)
+    with pytest.raises(ns.OptionError, match=r"itinerary: .* with a Trajectory"):
+        ns.periodic_orbit(system, ns.simulate(system, [0.5], 40.0), itinerary="+ -")
+
+
+@pytest.mark.parametrize("rounds", [2, 3, 10])
+def test_several_periods_of_the_forcing_given_as_one_are_the_same_orbit_once(rounds) -> None:
+    once = ns.periodic_orbit(scalar_relay(), [0.5])
+    several = ns.periodic_orbit(scalar_relay(), [0.5], period=2 * ca.pi * rounds)
+    assert several.period == pytest.approx(once.period) and len(several.legs) == 2
+    assert abs(several.multipliers[0] - once.multipliers[0]) < 1e-12
+
+
+def test_a_leg_that_begins_near_zero_may_take_as_long_as_the_one_before() -> None:
+    """At its events the only state of a relay is zero, which says nothing of how long a leg takes."""
+    found = ns.periodic_orbit(scalar_relay(), [0.5], itinerary="+ -")
+    assert (
+        abs(found.multipliers[0] - ns.periodic_orbit(scalar_relay(), [0.5]).multipliers[0]) < 1e-13
+    )
+
+
+def test_an_orbit_of_another_system_is_no_guess_and_one_of_a_like_system_is() -> None:
+    orbit = ns.periodic_orbit(scalar_relay(), [0.5])
+    for guess in (orbit, ns.simulate(scalar_relay(), [0.5], 40.0)):
+        with pytest.raises(ns.DefinitionError, match="guess: expected a run or an orbit of"):
+            ns.periodic_orbit(harmonic(), guess)
+    t, a, k = (ca.SX.sym(name) for name in ("t", "A", "k"))
+    drive = a * ca.cos(t) - X / 10  # a friction more
+    names = {a: 2.5, k: 1.0}
+    like = ns.FilippovSystem(
+        [X], surface=X, above=[drive - k], below=[drive + k], time=t, parameters=names
+    )
+    known = ns.periodic_orbit(like, [0.5])
+    found = ns.periodic_orbit(like, orbit)
+    assert found.system is like
+    assert found.multipliers[0] == pytest.approx(known.multipliers[0], rel=1e-12)
+
+
+@pytest.mark.parametrize("cost", [ca.log(X - 100), ca.sqrt(X)])
+def test_a_cost_that_is_no_number_has_no_gradient(cost) -> None:
+    """The logarithm of a negative number; a root of zero, whose slope is infinite."""
+    run = ns.simulate(ns.FilippovSystem([X], field=[-X]), [0.0], 1.0)
+    with pytest.raises(
+        ns.DegenerateError, match="cost: expected a finite number with finite deriv"
+    ):
+        ns.gradient(run, cost)
+
+
+def test_hits_of_a_section_are_asked_for_by_whole_numbers_and_times_by_numbers() -> None:
+    system = scalar_relay()
+    hits = ns.orbit.poincare(system, "h0", [0.5], count=3, direction=0)
+    for options in ({"k": 1.5}, {"k": "a"}, {"k": 1, "since": "a"}, {"k": 1, "since": -2}):
+        with pytest.raises(ns.OptionError, match="expected a whole number"):
+            hits.jacobian(**options)
+    with pytest.raises(ns.OptionError, match="t_start: expected a finite number"):
+        ns.orbit.poincare(system, 1.0, [0.5], count=3, t_start="a")
+
+
+@pytest.mark.parametrize("step", [2.0, 1e9])
+def test_steps_are_no_longer_than_the_bounds_are_wide(step) -> None:
+    orbit = ns.periodic_orbit(scalar_relay(), [0.5])
+    branch = ns.continue_orbit(orbit, "A", bounds=(1.5, 3.0), step=step)
+    assert [event.kind for event in branch.events] == ["crossing-sliding"]
+    assert branch.events[0].parameter == pytest.approx((1 + ca.pi**2 / 4) ** 0.5, rel=1e-12)
+
+
+class Circle(ns.continuation.Curve):
+    """The unit circle."""
+
+    def equations(self, u):
+        return np.array([u @ u - 1.0]), 2 * u[None, :]
+
+
+def curve(**given):
+    return type("Mine", (Circle,), given)()
+
+
+@pytest.mark.parametrize(
+    ("change", "error", "message"),
+    [
+        ({"curve": None}, ns.DefinitionError, "curve: expected an instance of a subclass"),
+        ({"curve": Circle}, ns.DefinitionError, "curve: expected an instance of a subclass"),
+        ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "one with equations"),
+        ({"curve": curve(equations=lambda self, u: None)}, ns.DefinitionError, "expected arrays"),
+        ({"curve": curve(equations=lambda self, u: u @ u)}, ns.DefinitionError, "expected arrays"),
+        (
+            {"curve": curve(equations=lambda self, u: (u, np.eye(2)))},
+            ns.DefinitionError,
+            r"expected arrays \(1,\) and \(1, 2\) for 2 unknowns",
+        ),
+        ({"curve": curve(parameter=7)}, ns.DefinitionError, "curve.parameter: expected the index"),
+        ({"curve": curve(scale=np.array([1.0, 0.0]))}, ns.DefinitionError, "curve.scale: expected"),
+        (
+            {"curve": curve(tests=lambda self, point: [0.5])},
+            ns.DefinitionError,
+            r"curve.tests: expected a mapping of names to numbers, received \[0.5\]",
+        ),
+        (
+            {"curve": curve(tests=lambda self, point: {"half": "a"})},
+            ns.DefinitionError,
+            "received 'a' under the name 'half'",
+        ),
+        (
+            {"curve": curve(tests=lambda self, point: {3: 0.5}, exact=False)},
+            ns.DefinitionError,
+            "received 0.5 under the name 3",
+        ),
+        ({"curve": curve(tests=lambda self, point: {"x": point.u})}, ns.DefinitionError, "under"),
+        ({"rows": []}, ns.PointError, "rows: expected a list of points"),
+        ({"rows": None}, ns.PointError, "rows: expected a list of points"),
+        ({"rows": ["ab"]}, ns.PointError, "rows"),
+        ({"rows": [[1.0, 0.0], [1.0]]}, ns.PointError, r"rows\[0\]: expected a vector \(1,\)"),
+        ({"rows": [[float("nan"), 0.0]]}, ns.PointError, "of finite numbers"),
+        ({"tangent": [1.0]}, ns.PointError, r"tangent: expected a vector \(2,\)"),
+        ({"tangent": [0.0, 0.0]}, ns.PointError, "tangent: expected a direction, received zero"),
+        ({"step": 0.0}, ns.OptionError, "step: expected a positive"),
+        ({"step": float("nan")}, ns.OptionError, "step: expected a positive"),
+        ({"step": "a"}, ns.OptionError, "step: expected a positive"),
+        ({"first": -1.0}, ns.OptionError, "first: expected a positive"),
+        ({"most": 0}, ns.OptionError, "most: expected a positive whole number"),
+        ({"bounds": 3}, ns.OptionError, "bounds: expected entries"),
+        ({"bounds": [(5, 0, 1)]}, ns.OptionError, "bounds: expected entries"),
+        ({"bounds": [(0, 2, 1)]}, ns.OptionError, "bounds: expected entries"),
+        ({"bounds": [(0, float("nan"), 1)]}, ns.OptionError, "bounds: expected entries"),
+        ({"report": 3}, ns.OptionError, "report: expected a function"),
+    ],
+)
+def test_a_curve_of_ones_own_that_is_none_is_refused(change, error, message) -> None:
+    given = {"curve": Circle(), "rows": [[1.0, 0.0]], "tangent": [0.0, 1.0], "step": 0.2} | change
+    with pytest.raises(error, match=message):
+        ns.continuation.trace(given.pop("curve"), given.pop("rows"), given.pop("tangent"), **given)
+
+
+def test_parts_of_curves_that_are_none_are_refused() -> None:
+    c, u = ns.continuation, np.array([1.0, 0.0])
+    for call, error in [
+        (lambda: c.directions(None, u), ns.DefinitionError),
+        (lambda: c.directions(Circle(), None), ns.PointError),
+        (lambda: c.depart(None, u, u, 0.1, u), ns.DefinitionError),
+        (lambda: c.other_direction(None), ns.DefinitionError),
+        (lambda: c.ahead([], 0.1, u), ns.PointError),
+        (lambda: list(c.pieces(None, None, None, last=None)), ns.DefinitionError),
+        (lambda: c.converge(None, u), ns.DefinitionError),
+        (lambda: c.converge(lambda v: (v, np.eye(2)), "a"), ns.PointError),
+    ]:
+        with pytest.raises(error, match="expected"):
+            call()
+
+
+def test_a_guess_of_many_rounds_is_solved_for_once(monkeypatch) -> None:
+    space, solved = ns.periodic_orbit.__globals__, []
+    plain = space["shot"]
+
+    def shot(problem, *rest):
+        solved.append(len(problem.legs))
+        return plain(problem, *rest)
+
+    monkeypatch.setitem(space, "shot", shot)
+    orbit = ns.periodic_orbit(scalar_relay(), [0.5], period=200 * 2 * np.pi)
+    assert max(solved) == len(orbit.legs) == 2
+    assert orbit.period == pytest.approx(2 * np.pi, rel=1e-14)
+
+
+@pytest.mark.slow
+def test_a_guess_of_two_thousand_legs_is_refused_without_their_singular_values() -> None:
+    """They took more than four minutes in one call, which no Ctrl-C ended."""
+    with pytest.raises(ns.ConvergenceError, match=r"\.\.\. \(\d+ legs\)', received none") as caught:
+        ns.periodic_orbit(scalar_relay(), [0.5], period=1000 * 2 * np.pi)
+    assert len(str(caught.value)) < 600

@@ -1,0 +1,127 @@
+"""Legs flown together are those flown one by one, and in extended precision they have more digits."""
+
+import casadi as ca
+import mpmath as mp
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.flow import fixed, watched
+from nonsmooth.flow.compiled import find_compiler
+from nonsmooth.model.derivatives.variational import guarded_field
+from nonsmooth.orbit.runs import flight
+from nonsmooth.orbit.runs.flight import Flights
+from nonsmooth.orbit.runs.guards import watch
+from nonsmooth.orbit.runs.legs import Leg
+
+pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+
+x, y, z, t, a, b, lam, other = (ca.SX.sym(s) for s in "x y z t a b lam other".split())
+
+BELT = ns.FilippovSystem(
+    [x, y],
+    surface=y - a,
+    above=[y, b * ca.cos(2 * t) - x - 1 + 0.1 * y**3],
+    below=[y, b * ca.cos(2 * t) - x + 1 + 0.1 * y**3],
+    time=t,
+    parameters={a: 0.3, b: 0.5},
+    resets=ns.Reset(x - 3, [x - 4, -y * b], 1, "wall"),
+)
+HIDDEN = ns.FilippovSystem(
+    [x, y],
+    surface=y,
+    multipliers=lam,
+    field=[1 + lam, a * x - 2 * lam + 0.3 * lam**2 * x],
+    parameters={a: 0.5},
+    hidden=True,
+)
+MIXED = [
+    Leg("-", "h0", "entry"),
+    Leg("s", "L_F1 h", "exit", 1),
+    Leg("+", "wall", "reset"),
+    Leg("-"),
+]
+
+
+def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
+    p = system.parameter_vector()
+    flights = Flights(system, legs, chosen)
+    together = flights(np.array(starts), np.array(durations), p)
+    monkeypatch.setattr(flight, "has_interpreter", lambda: False)
+    return together, flights(np.array(starts), np.array(durations), p)
+
+
+@pytest.mark.parametrize(
+    ("system", "legs", "starts", "durations"),
+    [
+        (
+            BELT,
+            MIXED,
+            [[0.2, 0.1, 0.4], [0.4, 0.3, 0.5], [1, 0.4, 2], [0, -0.5, 1]],
+            [1, 0, -0.5, 2],
+        ),
+        (HIDDEN, [Leg("s"), Leg("s", "lambda0", "exit", 1)], [[0.1, 0.0], [0.2, 0.0]], [0.3, 0.2]),
+        (HIDDEN, [Leg("s"), Leg("+", "h0", "entry")], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
+    ],
+)
+def test_legs_flown_together_are_those_flown_one_by_one(
+    monkeypatch, system, legs, starts, durations
+):
+    both = together_and_apart(monkeypatch, system, legs, starts, durations, (0,))
+    for name in flight.Flight.__dataclass_fields__:
+        one, two = (np.asarray(getattr(found, name)) for found in both)
+        np.testing.assert_allclose(one, two, rtol=1e-12, atol=1e-13, err_msg=name)
+
+
+def test_a_leg_that_fails_is_named():
+    system = ns.FilippovSystem([x], surface=x - 9, above=[1], below=[x**2])
+    legs = [Leg("-"), Leg("-", "h0", "crossing")]
+    with pytest.raises(ns.ConvergenceError, match=r"leg 2 \(-, ended by h0\): .* before the end"):
+        Flights(system, legs)(np.array([[0.1], [1.0]]), np.array([1.0, 2.0]), np.zeros(0))
+
+
+def test_residuals_have_more_digits_than_doubles():
+    """x'' = -4 x, y' = x y from binary numbers, against the closed form with 40 digits."""
+    system = ns.FilippovSystem([x, y, z], surface=x, above=[y, -4 * x, x * z], below=[1, 0, 0])
+    start, duration = np.array([[0.75, 1.5, 1.25]]), np.array([0.875])
+    found = Flights(system, [Leg("+", "h0", "crossing")]).exact(start, duration, np.zeros(0))
+    if found is None or np.finfo(np.longdouble).eps > 1e-18:
+        pytest.skip("no extended precision on this machine")
+    after, rest, value = found
+    with mp.workdps(40):
+        angle = 2 * mp.mpf(0.875)
+        s, c = mp.sin(angle), mp.cos(angle)
+        u = mp.mpf(0.75)
+        area = (u * s + u * (1 - c)) / 2  # of x = u (cos 2t + sin 2t)
+        end = [u * (c + s), 2 * u * (c - s), mp.mpf(1.25) * mp.exp(area)]
+        errors = [
+            abs(mp.mpf(float(after[0, i])) + mp.mpf(float(rest[0, i])) - end[i]) for i in range(3)
+        ]
+    assert max(errors) < 2e-18 and value[0] == float(end[0])
+
+
+def test_guards_are_watched_alike_in_c_and_in_python(monkeypatch):
+    field, p = guarded_field(BELT, "-"), BELT.parameter_vector()
+    start = np.array([0.2, -0.4, 0.1])
+    found = watched.watched(field, start, p, 6.0, 1e-6)
+    passed = watched.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9)
+    monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+    again = watched.watched(field, start, p, 6.0, 1e-6)
+    extrema = [rows[rows[:, 3] != 0.0] for rows in (found, again)]
+    assert len(extrema[0]) >= 3
+    np.testing.assert_allclose(
+        *(rows[np.lexsort(rows.T[:2])] for rows in extrema), rtol=1e-10, atol=1e-11
+    )
+    assert passed == pytest.approx(
+        watched.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9), rel=1e-13
+    )
+
+
+def test_extrema_of_a_guard_are_those_of_its_closed_form():
+    """h = sin(3 t) + 1.1 along x = t: minima at t = pi/2, 7 pi/6, ... with h = 0.1."""
+    system = ns.FilippovSystem([x, y], surface=ca.sin(3 * x) + 1.1, above=[1, 0], below=[1, 0])
+    seen = watch(system, "+", np.array([0.0, 0.0]), 5.0, np.zeros(0))
+    times = [near.t for near in seen.approaches]
+    np.testing.assert_allclose(times, np.pi / 2 + 2 * np.pi / 3 * np.arange(2), rtol=1e-13)
+    np.testing.assert_allclose([near.value for near in seen.approaches], 0.1, rtol=1e-13)
+    assert not seen.faults and fixed.has_interpreter()

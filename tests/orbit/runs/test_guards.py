@@ -1,0 +1,95 @@
+"""Every kind of guard has its condition in words, by its side; many legs are judged as each of them is."""
+
+import casadi as ca
+import numpy as np
+import pytest
+
+import nonsmooth as ns
+from nonsmooth.flow import watched
+from nonsmooth.model import Guard
+from nonsmooth.orbit.runs.guards import change_fault, described, faults_along, watch
+from nonsmooth.orbit.runs.legs import Leg, fly, leg_name
+
+
+@pytest.mark.parametrize(
+    ("guard", "words"),
+    [
+        (Guard("surface", 0, 1, "h0"), "h0 > 0"),
+        (Guard("surface", 2, -1, "h2"), "h2 < 0"),
+        (Guard("exit", 0, 1, "L_F1 h"), "the condition L_F1 h <= 0 of sliding"),
+        (Guard("exit", 0, -1, "L_F2 h"), "the condition L_F2 h >= 0 of sliding"),
+        (Guard("exit", 1, 1, "lambda1"), "lambda1 <= 1"),
+        (Guard("exit", 1, -1, "lambda1"), "lambda1 >= -1"),
+        (Guard("impact", 0, 1, "floor"), "the gap of 'floor' >= 0"),
+        (Guard("release", 0, 1, "floor"), "the reaction of 'floor' >= 0"),
+        (Guard("stop", 0, 1, "end"), "end"),
+    ],
+)
+def test_a_guard_is_told_as_the_condition_that_holds(guard, words):
+    assert described(guard) == words
+
+
+def test_legs_are_judged_together_as_one_by_one(monkeypatch):
+    """A swing above and below y = 0, of which some legs pass it, begin beyond it, or have no duration."""
+    x, y, v = (ca.SX.sym(name) for name in ("x", "y", "v"))
+    system = ns.FilippovSystem(
+        [x, y, v],
+        surface=y,
+        above=[1, v, -y - 0.2],
+        below=[1, v, 0.2 - y],
+        stops=ns.Stop(x - 7.5, 1, "out"),
+    )
+    legs = [
+        Leg("+", "h0", "crossing"),
+        Leg("-", "h0", "crossing"),
+        Leg("+", "h0", "crossing"),
+        Leg("-", "h0", "crossing"),
+        Leg("+"),
+    ]
+    starts = np.array([[0, 0.2, 0.7], [7, -0.3, 0], [0, 0.0, 1], [0, 0.1, -1], [0, 1, 0.0]])
+    durations, p = np.array([5.0, 1.0, 2.6, 0.0, 9.0]), np.zeros(0)
+    ends = [fly(system, leg, s, d, p) for leg, s, d in zip(legs, starts, durations, strict=True)]
+    speeds = np.array([end.rate[1] * (-1) ** i for i, end in enumerate(ends)])
+    expected = []
+    for i, leg in enumerate(legs):
+        if durations[i] <= 0.0:
+            expected.append(f"leg {i + 1} {leg_name(leg)} has the duration 0")
+            continue
+        found = watch(system, leg.mode, starts[i], durations[i], p).faults
+        j = (i + 1) % len(legs)
+        fault = change_fault(system, leg, legs[j].mode, ends[i].end, starts[j], p)
+        found += [fault] if fault else []
+        expected += [f"leg {i + 1} {leg_name(leg)}: {fault}" for fault in found]
+    together = faults_along(system, legs, starts, durations, speeds, p, True)
+    assert together == expected and len(together) >= 5
+    assert sum("is violated" in fault for fault in together) >= 1
+    assert sum("begins after it" in fault for fault in together) >= 1
+    assert sum("'out' is met" in fault for fault in together) == 2  # from 7 to 8, and from 0 to 9
+    monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+    assert faults_along(system, legs, starts, durations, speeds, p, True) == together
+
+
+@pytest.mark.parametrize("interpreted", [True, False])
+@pytest.mark.parametrize("kind", ["stop", "reset"])
+@pytest.mark.parametrize("duration", [1.0, 3.0, 40.0])
+def test_what_is_passed_inside_a_step_is_seen(monkeypatch, interpreted, kind, duration):
+    """x - 0.9 rises all along a leg of one step, x = t or of many: it has no extremum and one zero."""
+    if not interpreted:
+        monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+    x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    given = (
+        {"stops": ns.Stop(x - 0.9, 1, "out")}
+        if kind == "stop"
+        else {"resets": ns.Reset(x - 0.9, [0, y], 1, "out")}
+    )
+    turn = ca.sin(y) if duration > 3 else 0  # many steps
+    system = ns.FilippovSystem(
+        [x, y], surface=y + 99, above=[1, 1 + 0.1 * turn], below=[1, 1 + 0 * y], **given
+    )
+    p = np.zeros(0)
+    (fault,) = watch(system, "+", np.array([0.0, 0.0]), duration, p).faults
+    assert fault.startswith(f"{kind} 'out' is met ")
+    assert watch(system, "+", np.array([0.91, 0.0]), duration, p).faults == []
+    late = np.array([0.9 - duration, 0.0])  # met at the very end, as by what ends the leg
+    assert watch(system, "+", late, duration, p).faults == []
+    assert watch(system, "+", np.array([0.9, 0.0]), duration, p).faults == []

@@ -1,0 +1,425 @@
+"""Derivatives of a run are exact through every kind of event, whichever way one computes them."""
+
+from __future__ import annotations
+
+import json
+import pickle
+from pathlib import Path
+
+import casadi as ca
+import numpy as np
+import pytest
+from hypothesis import assume, given, settings
+from hypothesis import strategies as st
+
+import nonsmooth as ns
+
+CASES = {
+    case["id"]: case
+    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
+}
+
+
+def throw() -> ns.FilippovSystem:
+    """Case G1: friction that changes at x = 1, a wall at x = 2, a belt at v = -b."""
+    x, v, lam, place = (ca.SX.sym(s) for s in ("x", "v", "lam", "place"))
+    mu1, mu2, r, b = (ca.SX.sym(s) for s in ("mu1", "mu2", "r", "b"))
+    mu = (mu1 + mu2) / 2 + (mu2 - mu1) / 2 * place
+    return ns.FilippovSystem(
+        [x, v],
+        field=[v, -mu * lam],
+        multipliers=[lam, place],
+        surfaces=[v + b, x - 1],
+        parameters={mu1: 1.0, mu2: 1.5, r: 0.8, b: 0.3},
+        resets=ns.Reset(x - 2, [x, -r * v], 1),
+    )
+
+
+def test_gradients_through_crossing_impact_and_entry_are_the_closed_forms() -> None:
+    values = CASES["G1"]["values"]
+    run = ns.simulate(throw(), [0.0, 3.0], t_end=2.0, tol=1e-14)
+    s = ns.sensitivity(run)
+    expected = {k: float(v) for k, v in values["dx_T"].items()}
+    assert s.dx_dx0[0, 1] == pytest.approx(expected.pop("v0"), rel=1e-13)
+    for name, value in expected.items():
+        assert s.dx_dp[0, s.names.index(name)] == pytest.approx(value, rel=1e-13)
+    assert np.abs(s.dx_dx0[1]).max() < 1e-15
+    assert s.dx_dp[1].round(14).tolist() == [0, 0, 0, -1]
+    assert s.event_times == pytest.approx([float(t) for t in values["event_times"]], rel=1e-13)
+
+
+def differences(system, x0, t_end, names, **options):
+    """Central differences of order four of the end of a run."""
+    values = system.parameter_vector(None)
+    rows, weights = [], {1: 8 / 12, -1: -8 / 12, 2: -1 / 12, -2: 1 / 12}
+
+    def end(x, p):
+        given = dict(zip(system.parameter_names, p, strict=True))
+        return ns.simulate(system, x, t_end, parameters=given, tol=1e-14, **options).x[-1]
+
+    h = 2e-4
+    for k in range(len(x0)):
+        e = h * np.eye(len(x0))[k]
+        rows.append(sum(w * end(x0 + j * e, values) for j, w in weights.items()) / h)
+    for name in names:
+        e = h * np.eye(len(values))[system.parameter_names.index(name)]
+        rows.append(sum(w * end(x0, values + j * e) for j, w in weights.items()) / h)
+    return np.array(rows).T
+
+
+def check(system, x0, t_end, itinerary=None) -> ns.orbit.Sensitivity:
+    x0 = np.array(x0)
+    run = ns.simulate(system, x0, t_end, tol=1e-14)
+    if itinerary is not None:
+        assert run.itinerary == itinerary
+    s = ns.sensitivity(run)
+    found = np.hstack([s.dx_dx0, s.dx_dp])
+    expected = differences(system, x0, t_end, s.names)
+    assert np.abs(found - expected).max() < 2e-9 * (1 + np.abs(expected).max())
+    for row in np.eye(system.dimension):
+        by_start, by_parameters = ns.vjp(run, row)
+        pulled = np.concatenate([by_start, by_parameters])
+        assert np.abs(pulled - row @ found).max() <= 1e-12 * np.abs(found).max()
+    return s
+
+
+x, y, v, w, t, a, b, lam, other = (ca.SX.sym(s) for s in "x y v w t a b lam other".split())
+
+
+def test_a_surface_that_moves_with_the_time() -> None:
+    ramp = ns.FilippovSystem(
+        [x, y],
+        surface=y - 1 + a * t,
+        above=[1, x],
+        below=[y, -b],
+        time=t,
+        parameters={a: 0.5, b: 0.3},
+    )
+    check(ramp, [0.2, 0.1], 1.5)
+
+
+def test_a_reset_that_carries_the_state_through_a_surface() -> None:
+    # The jump and the change of mode that it causes are one event.
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y,
+        above=[1 + y, -1 - x],
+        below=[2 * y, 0.5 + a * x],
+        parameters={a: 0.4},
+        resets=ns.Reset(x - 1, [x - 1.5, -y - a], 1),
+    )
+    check(system, [0.1, 2.0], 2.4)
+
+
+def test_an_impact_and_friction_at_the_contact() -> None:
+    r = ca.SX.sym("r")
+    block = ns.FilippovSystem(
+        [x, y, v, w],
+        field=[v, w, -a * lam * r, r - 2.0],
+        surface=v,
+        multipliers=lam,
+        impacts=ns.Impact(y - 0.1 * x, restitution=b, reaction=r),
+        parameters={a: 0.2, b: 0.6},
+    )
+    s = check(block, [0.0, 0.5, 1.0, 0.0], 1.3)
+    assert len(s.event_times) >= 1
+
+
+def test_sliding_on_two_surfaces_one_after_the_other() -> None:
+    z = ca.SX.sym("z")
+    system = ns.FilippovSystem(
+        [x, y, z],
+        surfaces=[x, y],
+        multipliers=[lam, other],
+        field=[a - lam + 0.1 * y, 0.2 * z - other, 0.5 + lam * other - b * z],
+        parameters={a: 0.3, b: 0.4},
+    )
+    run = ns.simulate(system, [0.5, 0.9, 0.2], 2.0, tol=1e-14)
+    assert run.segments[-1].mode == "ss"
+    s = check(system, [0.5, 0.9, 0.2], 2.0)
+    assert np.linalg.matrix_rank(s.dx_dx0, tol=1e-10) == 1
+
+
+def test_sliding_of_hidden_dynamics() -> None:
+    system = ns.FilippovSystem(
+        [x, y],
+        surface=y,
+        multipliers=lam,
+        field=[1 + lam, a * x - 2 * lam + 0.3 * lam**2 * x],
+        parameters={a: 0.5},
+        hidden=True,
+    )
+    check(system, [0.1, 0.6], 1.5)
+
+
+def test_a_stop_moves_the_end() -> None:
+    system = ns.FilippovSystem([x, y], field=[y, -a], stops=ns.Stop(x, -1), parameters={a: 2.0})
+    run = ns.simulate(system, [1.0, 0.0], 9.0, tol=1e-14)  # x = x0 - t^2: v = -2 sqrt(a x0/2)
+    s = ns.sensitivity(run)
+    assert s.dx_dx0[1, 0] == pytest.approx(-1.0, rel=1e-13)
+    assert s.dx_dp[1, 0] == pytest.approx(-0.5, rel=1e-13)
+    assert np.abs(s.dx_dx0[0]).max() < 1e-15
+    assert s.dt_end_dx0[0] == pytest.approx(0.5, rel=1e-13)
+    assert ns.gradient(run, y).x0 == pytest.approx(s.dx_dx0[1], rel=1e-13)
+
+
+@settings(deadline=None, max_examples=4)
+@given(st.integers(0, 10**6))
+def test_adjoint_and_forward_agree_on_random_systems(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    states = [ca.SX.sym(f"x{i}") for i in range(2)]
+    fields = [
+        [ca.dot(ca.DM(row), ca.vertcat(*states)) + a * c for row, c in zip(m, u, strict=True)]
+        for m, u in ((rng.normal(size=(2, 2)), rng.normal(size=2)) for _ in range(2))
+    ]
+    system = ns.FilippovSystem(
+        states, surface=states[0], above=fields[0], below=fields[1], parameters={a: 1.0}
+    )
+    run = ns.simulate(system, rng.normal(size=2), 1.5)
+    assume(run.status is ns.Status.REACHED_END)
+    s = ns.sensitivity(run)
+    found = np.hstack([s.dx_dx0, s.dx_dp])
+    row = rng.normal(size=2)
+    pulled = np.concatenate(ns.vjp(run, row))
+    assert np.abs(pulled - row @ found).max() <= 1e-12 * (1 + np.abs(found).max())
+    # A switching function times a number is the same system, and so are its derivatives.
+    scaled = ns.FilippovSystem(
+        states, surface=-1e3 * states[0], above=fields[1], below=fields[0], parameters={a: 1.0}
+    )
+    again = ns.sensitivity(ns.simulate(scaled, run.x[0], 1.5))
+    assert np.abs(again.dx_dx0 - s.dx_dx0).max() <= 1e-8 * (1 + np.abs(found).max())
+
+
+def test_a_run_back_in_time_has_the_inverse_derivative() -> None:
+    forward = ns.FilippovSystem([x, y], surface=y, above=[1 + y, -1], below=[y - 1, -2 - x])
+    back = ns.FilippovSystem([x, y], surface=y, above=[-1 - y, 1], below=[1 - y, 2 + x])
+    run = ns.simulate(forward, [0.2, 0.5], 1.0, tol=1e-14)
+    there = ns.sensitivity(run).dx_dx0
+    home = ns.sensitivity(ns.simulate(back, run.x[-1], 1.0, tol=1e-14)).dx_dx0
+    assert np.abs(home @ there - np.eye(2)).max() < 1e-12
+
+
+def test_the_clearance_is_the_distance_from_a_guard_that_is_missed() -> None:
+    system = ns.FilippovSystem([x, y], surface=2 * y, above=[1, 2 * x], below=[1, 1])
+    run = ns.simulate(system, [-1.0, 1.01], 2.0)  # y = x^2 + 0.01
+    s = ns.sensitivity(run)
+    assert s.clearance == pytest.approx(0.01, rel=1e-9)
+    assert "h0 > 0 at t = 1" in s.nearest
+
+
+def test_a_grazing_is_refused_by_name() -> None:
+    fall = ns.FilippovSystem([x, y], surface=y, above=[1, -3 * x**2], below=[1, -1])
+    run = ns.simulate(fall, [-1.0, 1.0], 1.5, tol=1e-12)  # y = -x^3: tangent at the surface
+    with pytest.raises(ns.DegenerateError, match="transversal"):
+        ns.sensitivity(run)
+
+
+def test_a_run_that_ended_for_another_reason_is_refused() -> None:
+    focus = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[-1, -x])
+    run = ns.simulate(focus, [-1.0, 0.5], 90.0, max_events=3)
+    with pytest.raises(ns.DegenerateError, match="TOO_MANY_EVENTS"):
+        ns.sensitivity(run)
+
+
+def test_a_body_that_rests_on_a_shaken_table() -> None:
+    rest = ns.FilippovSystem(
+        [y, v],
+        field=[v, -1],
+        impacts=ns.Impact(y - a * ca.sin(b * t), restitution=0.0),
+        time=t,
+        parameters={a: 1.5, b: 1.0},
+    )
+    s = check(rest, [2.0, 0.0], 6.0)
+    assert np.abs(s.dx_dx0).max() < 1e-12  # all starts rest, and take off together
+
+
+def test_impacts_that_accumulate_are_refused() -> None:
+    bouncing = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
+    with pytest.raises(ns.DegenerateError, match="accumulate"):
+        ns.sensitivity(ns.simulate(bouncing, [1.0, 0.0], 9.0))
+
+
+def test_a_corner_is_refused() -> None:
+    both = ns.FilippovSystem(
+        [x, y],
+        surfaces=[x, y],
+        multipliers=[lam, other],
+        field=[1 + 0.1 * lam, 1 + 0.2 * other],
+    )
+    run = ns.simulate(both, [-0.9, -0.8], 3.0)
+    assert run.itinerary == "-- ++"
+    with pytest.raises(ns.DegenerateError, match="corner"):
+        ns.sensitivity(run)
+
+
+def test_saltation_matrices_are_those_of_exact_fractions() -> None:
+    def exact(rows) -> np.ndarray:
+        return np.array([[eval(v) for v in row] for row in rows])  # fractions such as "-1/2"
+
+    values, at = CASES["S1"]["values"], [0.0, 0.0]
+    crossing = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
+    assert np.array_equal(
+        ns.orbit.saltation_matrix(crossing, "+", "-", at), exact(values["crossing"])
+    )
+    entry = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, 2])
+    assert np.array_equal(ns.orbit.saltation_matrix(entry, "+", "s", at), exact(values["entry"]))
+    moving = ns.FilippovSystem([x, y], surface=y + 3 * t, above=[1, -5], below=[3, -4], time=t)
+    found = ns.orbit.saltation_matrix(moving, "+", "-", at)
+    assert np.array_equal(found, exact(values["time_dependent"]))
+    after = [x + y / 4, -y / 2]
+    for surface in (x, x - y):
+        jump = ns.FilippovSystem(
+            [x, y],
+            surface=surface,
+            above=[1, 2],
+            below=[1, -2],
+            resets=ns.Reset(y, after, -1, "jump"),
+        )
+        found = ns.orbit.saltation_matrix(jump, "-", "+", at, event="jump")
+        assert np.array_equal(found, exact(values["reset"]))
+
+
+def swing(a0: float, tol: float, r: float = 0.5) -> tuple[ns.Trajectory, float]:
+    """x'' = -x from -a0 against a wall at 1, and the derivative of x at t = 4 by the start."""
+    wall = ns.FilippovSystem([x, v], field=[v, -x], resets=ns.Reset(x - 1, [x, -r * v], 1))
+    run = ns.simulate(wall, [-a0, 0.0], t_end=4.0, tol=tol)
+    speed = max(a0**2 - 1, 1e-300) ** 0.5  # at the wall, after the time arccos(-1/a0)
+    later, sooner = 4.0 - np.arccos(-1 / a0), 1 / (a0 * speed)
+    by_later = -np.sin(later) - r * speed * np.cos(later)
+    return run, -float(by_later * sooner - r * a0 / speed * np.sin(later))
+
+
+@pytest.mark.parametrize("tol", [1e-8, 1e-10])
+@pytest.mark.parametrize("ask", [ns.sensitivity, lambda run: ns.vjp(run, [1.0, 0.0])])
+def test_an_impact_that_a_run_has_by_its_error_alone_is_a_graze(tol, ask) -> None:
+    run, _ = swing(1.0, tol)
+    assert run.events[0].name == "reset"  # by rounding; the exact orbit touches the wall
+    with pytest.raises(ns.DegenerateError, match="that the run is sure of, received a grazing"):
+        ask(run)
+
+
+@pytest.mark.parametrize(
+    ("beyond", "tol", "rel"), [(1e-6, 1e-8, 1e-4), (1e-8, 1e-12, 1e-4), (1e-10, 1e-14, 1e-4)]
+)
+def test_impacts_that_nearly_graze_have_their_derivative(beyond, tol, rel) -> None:
+    run, expected = swing(1.0 + beyond, tol)
+    assert abs(expected) > 400.0
+    assert ns.sensitivity(run).dx_dx0[0, 0] == pytest.approx(expected, rel=rel)
+
+
+def test_a_flat_impact_of_an_orbit_that_does_not_turn_back_is_no_graze() -> None:
+    flat = ns.FilippovSystem(
+        [x, y], field=[1, -1e-6 * b], resets=ns.Reset(y, [x, y + 1], -1), parameters={b: 1.0}
+    )
+    s = ns.sensitivity(ns.simulate(flat, [0.0, 1e-6], t_end=3.0))
+    assert s.event_times == pytest.approx([1.0]) and s.dt_dx0[0, 1] == pytest.approx(1e6)
+
+
+TURN = ns.FilippovSystem([x, y], surface=y, above=[1, x], below=[1, 1])
+HALF = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
+FLOOR = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitution=0.5))
+
+
+@pytest.mark.parametrize(
+    ("system", "before", "after", "point", "message"),
+    [
+        (HALF, "+", "-", [0.0, 1.0], r"h0 = 0, received \[0.0, 1.0\], where it is 1"),
+        (HALF, "+", "-", [0.0, 1e-8], "where it is 1e-08"),
+        (HALF, "-", "+", [0.0, 0.0], "h0 < 0 is about to hold, not to fail"),
+        (HALF, "+", "s", [0.0, 0.0], "the condition L_F2 h >= 0 of sliding fails"),
+        (TURN, "s", "+", [0.0, 1.0], r"'L_F1 h' happens in mode 's': h0 = 0"),
+        (TURN, "s", "+", [1.0, 0.0], "L_F1 h = 0, received"),
+        (TURN, "+", "s", [1.0, 0.0], "h0 > 0 is about to hold"),
+        (FLOOR, "o", "o", [1e-3, -1.0], "where it is 0.001"),
+        (FLOOR, "o", "o", [0.0, 1.0], "the gap of 'impact' >= 0 is about to hold"),
+    ],
+)
+def test_a_point_at_which_no_such_event_happens_has_no_saltation_matrix(
+    system, before, after, point, message
+) -> None:
+    with pytest.raises(ns.PointError, match=message):
+        ns.orbit.saltation_matrix(system, before, after, point)
+
+
+@pytest.mark.parametrize("size", [1e-3, 1.0, 1e6])
+def test_points_that_are_on_the_event_to_rounding_are_taken(size) -> None:
+    """The tolerance is relative: the units of the states do not matter."""
+    system = ns.FilippovSystem([x, y], surface=3 * x - y, above=[1, -1], below=[2, -1])
+    line = np.array([1.0, 3.0]) * size / 3.0
+    found = ns.orbit.saltation_matrix(system, "-", "+", line)  # S = 1 + (f+ - f-) e_x/(e_x f-)
+    assert np.abs(found - np.eye(2) - np.outer([-1, 0], [3, -1]) / 7).max() < 1e-15
+    with pytest.raises(ns.PointError, match="happens in mode"):
+        ns.orbit.saltation_matrix(system, "-", "+", line * [1.0, 1.0 + 1e-6])
+
+
+def test_bad_input_is_refused_in_words() -> None:
+    run = ns.simulate(throw(), [0.0, 3.0], t_end=2.0)
+    with pytest.raises(ns.ParameterError, match="mu3"):
+        ns.sensitivity(run, wrt="mu3")
+    with pytest.raises(ns.OptionError, match="Trajectory"):
+        ns.sensitivity("run")  # type: ignore[arg-type]
+    with pytest.raises(ns.PointError, match="2 numbers"):
+        ns.vjp(run, [1.0, 2.0, 3.0])
+    with pytest.raises(ns.PointError, match=r"2 numbers, finite ones, received \[nan"):
+        ns.vjp(run, [np.nan, 2.0])
+    with pytest.raises(ns.ParameterError, match="received 3"):
+        ns.sensitivity(run, wrt=3)  # type: ignore[arg-type]
+    with pytest.raises(ns.DefinitionError):
+        ns.gradient(run, ca.SX.sym("stranger"))
+    assert ns.sensitivity(run, wrt="r").dx_dp.shape == (2, 1)
+
+
+def test_events_without_names_of_their_own_have_their_own_derivatives() -> None:
+    """A free particle between two walls: x(4) = .1 + .45 (dx) ..., each bounce by its own restitution."""
+    walls = [ns.Impact(1 - x, restitution=0.5), ns.Impact(x + 1, restitution=0.9)]
+    system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls)
+    run = ns.simulate(system, [0.1, 1.3], 4.0, tol=1e-13)
+    assert [e.name for e in run.events[:2]] == ["impact", "impact 2"]
+    t1 = 0.9 / 1.3  # of the first bounce; the second is 2/(.5 v) later
+    t2 = t1 + 2 / 0.65
+    by_v = 0.45 * (4 - t2) - 0.585 * (
+        -0.9 / 1.3**2 - 2 / (0.5 * 1.3**2)
+    )  # d/dv of -1 + .45 v (4 - t2)
+    by_x = -0.585 * (-1 / 1.3)
+    found = ns.sensitivity(run).dx_dx0
+    assert np.abs(found - [[by_x, by_v], [0.0, 0.45]]).max() < 1e-12
+
+
+def test_numbers_of_names_avoid_names_that_are_given() -> None:
+    stops = [ns.Stop(x - k, name=name) for k, name in enumerate(["a", "a", "a 2", "a", "b"])]
+    system = ns.FilippovSystem([x, v], field=[v, -x], stops=stops)
+    assert [name for name, _ in system.stops] == ["a", "a 3", "a 2", "a 4", "b"]
+
+
+@pytest.mark.parametrize("kind", [ns.Stop, ns.Reset])
+def test_events_of_one_name_across_kinds_have_their_own_derivatives(kind) -> None:
+    """Each wall doubles as another event: v is .5 v behind the first and .45 v behind the second."""
+    back = dict(direction=-1, name="w")
+    other = ns.Stop(v + 9, **back) if kind is ns.Stop else ns.Reset(x + 1, [x, -0.9 * v], **back)
+    walls = [ns.Impact(1 - x, restitution=0.5, name="w")]
+    if kind is ns.Stop:
+        walls.append(ns.Impact(x + 1, restitution=0.9, name="h0"))
+    more = dict(stops=[other]) if kind is ns.Stop else dict(resets=[other])
+    system = ns.FilippovSystem([x, v], field=[v, 0 * v], impacts=walls, **more)
+    found = ns.sensitivity(ns.simulate(system, [0.1, 1.3], 4.0, tol=1e-13)).dx_dx0
+    late = 4 - 0.9 / 1.3 - 2 / 0.65
+    expected = [[0.45, 0.45 * late + 0.585 * (0.9 + 4) / 1.3**2], [0.0, 0.45]]
+    assert np.abs(found - expected).max() < 1e-12
+    again = pickle.loads(pickle.dumps(system))
+    assert again == system and again.impacts == system.impacts
+
+
+def test_an_event_with_the_name_of_a_surface_has_its_own_derivative() -> None:
+    """A reset called h0 beside a surface h0 through which the speed falls from v to v - 1."""
+    system = ns.FilippovSystem(
+        [x, v],
+        surface=x,
+        above=[v - 1, 0],
+        below=[v, 0],
+        resets=[ns.Reset(x - 1, [x / 2, 2 * v], direction=1, name="h0")],
+    )
+    assert system.resets == (("h0 2", 1),)
+    run = ns.simulate(system, [-1.0, 2.0], 1.6, tol=1e-13)
+    # x = 0 at 1/2, 1 at 3/2; then x = 1/2 + (2 v - 1) (1.6 - t2), t2 = -x0/v + 1/(v - 1)
+    expected = [[3 / 2, 2 * 0.1 + 3 * (1 / 4 + 1)], [0.0, 2.0]]
+    assert np.abs(ns.sensitivity(run).dx_dx0 - expected).max() < 1e-12

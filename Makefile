@@ -8,7 +8,7 @@ PYTEST_ARGS ?=
 
 BIN := .venv/bin
 PIP := $(BIN)/python -m pip --disable-pip-version-check install -qq
-PYTEST := $(BIN)/python -m tests.halves --quiet
+PYTEST := $(BIN)/python -m pytest --quiet -n 2 --dist worksteal
 
 .DEFAULT_GOAL := help
 .DELETE_ON_ERROR:
@@ -34,7 +34,7 @@ docs: .venv/.docs .venv/.test ## the documentation, into build/docs/, with the r
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs --quiet build --strict
 	@echo "docs: build/docs/index.html"
 
-lint: .venv/.dev ## formatting, lint, types and the floors
+lint: .venv/.dev ## formatting, lint, types and layers
 	@$(BIN)/ruff format --quiet --check . || { echo "format: run '$(BIN)/ruff format .'"; exit 1; }
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/mypy

@@ -1,9 +1,9 @@
-"""What every test and every example of a docstring runs under: no display, and few compilations.
+"""What tests and the examples of docstrings have in common: no display, and little to compile.
 
-What the fast suite compiles is the driver in C, once, and lanes and kernels without optimisation. A program
-of one system has the same bits as that driver and takes seconds to compile: fast tests of
-``test_special.py`` and the slow ones have it. Lanes as they are shipped have the tests in ``SHIPPED``, the
-slow ones, and where hypothesis draws all its examples those of ``tests/flow/compiled``.
+The fast tests compile the driver in C, once, and lanes and kernels without optimisation. A program
+of one system has the same bits as that driver and takes seconds to compile: only the fast tests of
+``test_special.py`` and the slow tests use it. Optimised lanes run in the tests named in ``SHIPPED``, in the
+slow tests, and in all of ``tests/flow/compiled`` where hypothesis draws all its examples.
 """
 
 import contextlib
@@ -17,24 +17,14 @@ import pytest
 
 from nonsmooth.flow.compiled import tape
 from nonsmooth.flow.compiled.building.build import CompilerError
-from nonsmooth.flow.compiled.device import shim
 from nonsmooth.flow.compiled.lanes import engine
-from tests.halves import NAME, elsewhere
 
 os.environ["MPLBACKEND"] = "Agg"
 
 HERE = Path(__file__).parent
 
-#: Tests that are marked slow beside those that say so themselves.
-DEAR = {
-    line
-    for line in (HERE / "tests" / "dear.txt").read_text(encoding="utf-8").splitlines()
-    if not line.startswith("#")
-}
-
-
-#: Tests and files of the fast suite with lanes as they are shipped, whatever the profile: what looks at every
-#: rule of the printer, and where worker processes, which know nothing of this file, have the same bits.
+#: Fast tests and files with optimised lanes: one runs every operation of the printer, one compares all of lanes, and
+#: the worker processes of ensembles, which do not load this file, must give the same bits.
 SHIPPED = {
     "test_every_operation",
     "test_random_landings_agree_with_the_interpreter",
@@ -48,19 +38,14 @@ gc.set_threshold(50_000, 20, 100)
 
 
 def pytest_sessionstart() -> None:
-    """Where two processes begin, one compiles the driver in C while the other waits to load it."""
-    if not os.environ.get(NAME):
+    """Of several workers of pytest-xdist one compiles the driver in C while the others wait to load it."""
+    if "PYTEST_XDIST_WORKER" not in os.environ or os.name == "nt":
         return
     import fcntl
 
-    with open(HERE / "tests" / "halves.py", "rb") as file, contextlib.suppress(CompilerError):
+    with open(__file__, "rb") as file, contextlib.suppress(CompilerError):
         fcntl.flock(file, fcntl.LOCK_EX)
         tape.library()
-
-
-def pytest_ignore_collect(collection_path: Path) -> bool | None:
-    """Leave the files of the other half to the other process."""
-    return True if collection_path.is_file() and elsewhere(collection_path) else None
 
 
 def pytest_collectstart(collector: pytest.Collector) -> None:
@@ -73,15 +58,15 @@ def pytest_collectstart(collector: pytest.Collector) -> None:
 
 @pytest.hookimpl(tryfirst=True)
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """Mark what is dear; leave out what was asked for by name and is of the other half."""
-    items[:] = [item for item in items if not elsewhere(item.path)]
+    """Mark the slow cases of tests, before ``-m`` selects."""
     for item in items:
-        if item.nodeid in DEAR:
+        cases = {case for marker in item.iter_markers("slow_cases") for case in marker.args}
+        if cases and item.callspec.id in cases:
             item.add_marker(pytest.mark.slow)
 
 
 def pytest_collection_finish() -> None:
-    """What is there now stays: the collector need not look at it again."""
+    """Exclude what has been collected from garbage collection: it stays."""
     gc.freeze()
 
 
@@ -89,7 +74,7 @@ def pytest_collection_finish() -> None:
 def few_compilations(
     request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[None]:
-    """The driver in C for what asks for ``engine="compiled"`` and for all but very long runs; lanes compiled at once."""
+    """Replace programs of one system by the driver in C, and compile lanes without optimisation."""
     slow = request.node.get_closest_marker("slow") is not None
     if not slow and request.path.name != "test_special.py":
         monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
@@ -98,5 +83,4 @@ def few_compilations(
     shipped = COMPILED in request.path.parents and (WHOLE or bool(names & SHIPPED))
     if not (slow or shipped):
         monkeypatch.setattr(engine, "FLAGS", (*engine.FLAGS, "-O0"))
-        monkeypatch.setattr(shim, "_FLAGS", (*shim._FLAGS, "-O0"))
     yield

@@ -1,4 +1,4 @@
-"""Bounces on an NVIDIA card, where there is one: their bits beside the shim's, and how many a second.
+"""Bounces on an NVIDIA card, where there is one: their bits beside those of the same text as C++, and how many a second.
 
     python -m benchmarks --only gpu
 
@@ -16,10 +16,10 @@ import nonsmooth as ns
 from nonsmooth.flow.compiled.device.card import card
 from nonsmooth.flow.compiled.device.kernel import Kernel, Source
 from nonsmooth.flow.compiled.device.machine import DeviceError, Machine
-from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
+from tests.flow.compiled.device.shim import Shim
 
 from .peers import diffrax_modes
 from .problems import T_MAX, Array, bounce_system, random_starts

@@ -24,11 +24,11 @@ PICTURES = [(name, picture) for name, paper in PAPERS.items() for picture in pap
 
 
 #: Claims and figures that take over a second: with the slow tests, and by `make reproduce`.
-DEAR_CLAIMS = {
+SLOW_CLAIMS = {
     "jeffrey_colombo_2009": ["single_quantity", "repelling_before"],
     "colombo_jeffrey_2011": ["portraits", "open_sets"],
 }
-DEAR_FIGURES = {
+SLOW_FIGURES = {
     "welander_1982-portraits",
     "welander_1982-diagram",
     "kuznetsov_2003-diagram",
@@ -44,18 +44,18 @@ compute_once = cache(lambda compute: compute())
 
 @pytest.fixture(
     params=[
-        *[(name, name not in DEAR_CLAIMS) for name in NAMES],
-        *[pytest.param((name, True), marks=pytest.mark.slow) for name in DEAR_CLAIMS],
+        *[(name, name not in SLOW_CLAIMS) for name in NAMES],
+        *[pytest.param((name, True), marks=pytest.mark.slow) for name in SLOW_CLAIMS],
     ],
-    ids=lambda case: case[0] + ("" if case[1] else ", without the dear"),
+    ids=lambda case: case[0] + ("" if case[1] else ", without the slow"),
 )
 def computed(request):
     """A paper, its claims, and whether these are all of them."""
     name, whole = request.param
-    dear = [] if whole else DEAR_CLAIMS[name]
+    slow = [] if whole else SLOW_CLAIMS[name]
     (table,) = PAPERS[name].tables
-    claims = [compute_once(c) for c in table.rows if c.__name__ not in dear]
-    assert len(claims) == len(table.rows) - len(dear)
+    claims = [compute_once(c) for c in table.rows if c.__name__ not in slow]
+    assert len(claims) == len(table.rows) - len(slow)
     return PAPERS[name], claims, whole
 
 
@@ -90,10 +90,22 @@ def test_only_what_was_read_is_called_reproduced():
         assert "reproduced" not in paper.title and "no reproduction" in text
 
 
+@pytest.mark.slow_cases(
+    "jeffrey_colombo_2009-space",
+    "jeffrey_colombo_2009-sliding",
+    "jeffrey_colombo_2009-diabolo",
+    "jeffrey_colombo_2009-crossings",
+    "colombo_jeffrey_2011-visible",
+    "colombo_jeffrey_2011-invisible",
+    "colombo_jeffrey_2011-mixed",
+    "colombo_jeffrey_2011-space",
+    "colombo_jeffrey_2011-maps",
+    "colombo_jeffrey_2011-series",
+)
 @pytest.mark.parametrize(
     ("name", "picture"),
     [
-        pytest.param(n, p, marks=pytest.mark.slow) if f"{n}-{p.name}" in DEAR_FIGURES else (n, p)
+        pytest.param(n, p, marks=pytest.mark.slow) if f"{n}-{p.name}" in SLOW_FIGURES else (n, p)
         for n, p in PICTURES
     ],
     ids=[f"{n}-{p.name}" for n, p in PICTURES],

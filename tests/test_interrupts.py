@@ -67,6 +67,7 @@ class Profile:
             sys.setprofile(None)
 
 
+@pytest.mark.slow_cases("an intersection")
 @pytest.mark.parametrize("name", WORKS)
 def test_an_interrupt_is_heard_at_every_place(name):
     work = WORKS[name]

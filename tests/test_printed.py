@@ -52,6 +52,7 @@ def test_a_result_prints_what_it_is(make, printed):
     assert repr(make()).startswith(printed)
 
 
+@pytest.mark.slow
 def test_a_dividing_curve_prints_its_arcs_and_where_they_join():
     curve = bounce.dividing_curve(TURF, ydot=-1.0)
     first, second = curve.arcs[:2]

@@ -13,24 +13,6 @@ SPACE = ns.FilippovSystem(
 SMOOTH = ns.FilippovSystem([X, Y], field=[Y, -X])
 
 
-@pytest.mark.parametrize(
-    "ask",
-    [
-        lambda s: ns.simulate(s, [0.0], t_end=1.0),
-        lambda s: ns.region(s, [0.0]),
-        lambda s: ns.local.fold_fold(s, [0.0, 0.0]),
-        lambda s: ns.find_equilibrium(s, [0.0]),
-        lambda s: ns.find_boundary_equilibrium(s, [0.0], vary="a"),
-        lambda s: ns.continue_equilibrium(s, [0.0], "a", bounds=(0, 1)),
-        lambda s: ns.orbit.trace_two_folds(s, [0.0], over="a", values=[0.0]),
-        lambda s: ns.certify_orbit(s, [0], t_end=1),
-    ],
-)
-def test_what_is_no_system(ask):
-    with pytest.raises(ns.DefinitionError, match="expected a FilippovSystem, received 'system'"):
-        ask("system")
-
-
 def test_a_smooth_system_has_no_sliding():
     with pytest.raises(ns.DefinitionError, match="at least one switching surface"):
         ns.local.sliding_branches(SMOOTH, [0.0, 0.0])

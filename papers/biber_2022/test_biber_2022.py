@@ -59,6 +59,7 @@ def claims():
     return [compute() for compute in (*results.ALL, *theorems.ALL)]
 
 
+@pytest.mark.slow_cases("8")
 @pytest.mark.parametrize("number", range(1, len(errata.ALL) + 1))
 def test_erratum_is_confirmed_by_computation(number):
     found = errata.erratum(number)
@@ -167,6 +168,7 @@ def test_exact_evaluation_refuses_roots():
 # Figures --------------------------------------------------------------------------------------
 
 
+@pytest.mark.slow_cases("trajectories", "two_fold_b", "two_fold_c", "visible_fp1", "visible_fp2")
 @pytest.mark.parametrize("picture", figures.PICTURES, ids=lambda p: p.name)
 def test_figures_are_fit_for_print(picture):
     figure = picture.draw()

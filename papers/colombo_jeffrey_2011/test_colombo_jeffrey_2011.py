@@ -11,6 +11,7 @@ import nonsmooth as ns
 from papers.colombo_jeffrey_2011 import figures, model, results
 
 
+@pytest.mark.slow_cases("VV-C1", "VV-F", "II-F", "mix-0", "mix-S", "mix-C", "mix-F")
 @pytest.mark.parametrize("name", model.CLASSES)
 def test_classes_have_their_label_and_their_ring_counts(name):
     numbers = model.CLASSES[name]

@@ -11,6 +11,7 @@ import nonsmooth as ns
 from papers.jeffrey_colombo_2009 import model, results
 
 
+@pytest.mark.slow_cases("v4-31")
 @pytest.mark.parametrize(("v", "expected"), results.COUNTS)
 def test_flights_are_counted_as_in_the_theory(v, expected):
     assert model.most_flights(v) == expected == model.formula_for_flights(v[0] * v[1])
@@ -24,6 +25,7 @@ def test_simulated_return_matrix_is_the_product_of_both_flights(v):
     assert model.simulated_return_matrix(v) == pytest.approx(below @ above, rel=0, abs=1e-9)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("v", "count"), [((-2.0, -1.0), 120), ((-0.5, -0.5), 0), ((2.0, 1.0), 0)])
 def test_ring_of_120_sliding_orbits(v, count):
     assert results.reached(v) == count

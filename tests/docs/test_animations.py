@@ -17,6 +17,7 @@ sys.modules[_spec.name] = animations  # dataclasses look their module up
 _spec.loader.exec_module(animations)
 
 
+@pytest.mark.slow_cases("funnel")
 @pytest.mark.parametrize("animation", animations.ANIMATIONS, ids=lambda a: a.name)
 def test_it_moves_and_ends_with_a_still(animation, tmp_path):
     moving, still = animations.write(animation, tmp_path, count=3)
@@ -38,10 +39,3 @@ def test_each_moment_of_the_bounce_has_its_dot_and_the_ground_is_below_the_ball(
         assert sum(line.get_marker() == "o" for line in cone.lines) == 1
         (circle,) = ball.patches
         assert circle.get_xy()[:, 1].min() > ball.get_ylim()[0] + 0.1
-
-
-def test_the_page_asks_for_files_that_are_written():
-    text = animations.animations()
-    for animation in animations.ANIMATIONS:
-        assert f'src="gallery/{animation.name}.webp"' in text
-        assert f'srcset="gallery/{animation.name}.png"' in text

@@ -1,13 +1,10 @@
 """Every public name is on one page of the API, and all it takes, has, returns and raises is described."""
 
 import dataclasses
-import html
 import importlib
 import importlib.util
 import inspect
 import re
-import textwrap
-import xml.etree.ElementTree as ElementTree
 from collections import Counter
 from pathlib import Path
 
@@ -23,8 +20,6 @@ _spec.loader.exec_module(api)
 
 OBJECTS = dict(api.objects())
 MODULES = sorted({path.rpartition(".")[0] for path in OBJECTS})
-PACKAGES = {task.package for task in api.listed().values()} | {"nonsmooth.local"}
-PACKAGES |= {module.__name__ for _, module, _ in api.MODULES}
 SECTION = re.compile(
     r"^(?:Other Parameters|Parameters|Attributes|Returns|Yields|Raises|Warns)\n-+\n(.*?)(?=^[A-Z][A-Za-z ]*\n-+$|\Z)",
     re.MULTILINE | re.DOTALL,
@@ -112,35 +107,6 @@ def test_no_parameter_and_no_field_is_left_out(module):
     assert {where: names for where, names in missing.items() if names} == {}
 
 
-def test_what_is_undescribed_is_seen():
-    doc = """Say something.
-
-    Parameters
-    ----------
-    a : int
-    b, c : float
-        Two numbers.
-
-    Attributes
-    ----------
-    d : str
-
-    Returns
-    -------
-    float
-
-    Raises
-    ------
-    ValueError
-        No number.
-    OSError, KeyError
-
-    Examples
-    --------
-    """
-    assert undescribed(doc) == ["a : int", "d : str", "float", "OSError, KeyError"]
-
-
 @pytest.mark.parametrize("module", [ns, bounce, bounce.golf, bounce.laws], ids=lambda m: m.__name__)
 def test_every_public_name_is_on_a_page(module):
     names = [n for n in module.__all__ if api.documented(getattr(module, n))]
@@ -153,54 +119,6 @@ def test_rooms_of_the_ball_are_there():
     for room in ("contact", "shot", "maps"):
         for name in getattr(bounce, room).__all__:
             assert f"bounce.{room}.{name}" in OBJECTS
-
-
-#: What is no prose for the reader of a page: code, links to names, what is typeset.
-MARKED = re.compile(r":\w+:`[^`]*`|``.*?``|`[^`]*`|\"[^\"\n]*\"|\$\$.*?\$\$|\$[^$]+\$", re.DOTALL)
-PLAIN_FORMULA = re.compile(
-    r"\^|\bsqrt\b|[<>]=|->|!=|[A-Za-z0-9)]'+ *[=+]|\w+ = \S|\s[<>+*/] |\babs\(|\|\w+\||-\+|\+-"
-    r"|\b(lambda|sigma|theta|phi|kappa|Delta|nu|eta|mu|omega|pi|alpha|eps)\d?(_\w+)?\b"
-    r"|\b[FLMXYhxyz]\d\d?\b|\b(exp|sin|cos|log|grad|sgn|Sgn)\b"
-)
-
-
-def prose(doc):
-    """The text of a docstring, without heads of entries, code and formulas that are marked."""
-    text, _, examples = inspect.cleandoc(doc).partition("\nExamples\n")
-    paragraphs = re.split(r"\n\s*\n", examples.lstrip("-\n"))
-    text = "\n\n".join([text, *(p for p in paragraphs if not p.lstrip().startswith(">>>"))])
-    return MARKED.sub("", re.sub(r"^[\w*, ]+ : .*$|^-+$", "", text, flags=re.MULTILINE))
-
-
-@pytest.mark.parametrize("module", MODULES)
-def test_formulas_are_marked_so_that_a_page_typesets_them(module):
-    plain = [
-        (where, line)
-        for path, thing in of(module)
-        for where, doc in docstrings(path, thing)
-        for line in prose(doc).splitlines()
-        if PLAIN_FORMULA.search(line)
-    ]
-    assert plain == [], "write them between dollars: $x' = -mu load$"
-
-
-def test_marked_formulas_are_typeset_whole(monkeypatch):
-    pytest.importorskip("latex2mathml", reason="formulas are typeset with the docs extra")
-    monkeypatch.syspath_prepend(DOCS)
-    formula = importlib.import_module("formulas").formula
-    made = []
-    for path, thing in OBJECTS.items():
-        for _, doc in docstrings(path, thing):
-            text = inspect.cleandoc(doc).partition("\nExamples\n---")[0]
-            made += re.findall(
-                r"\$\$(.+?)\$\$|\$([^$]+?)\$", re.sub(r"``.*?``", "", text), re.DOTALL
-            )
-    assert len(made) > 300
-    for block, line in made:
-        typeset = formula(block or line, "block" if block else "inline").replace("<wbr>", "")
-        ElementTree.fromstring(f"<p>{typeset}</p>")
-        shown = re.sub(r"<[^>]+>", "", typeset)
-        assert not re.search(r"[\^$\\_*]|sqrt|abs\(|[<>]=|->", html.unescape(shown)), (block, line)
 
 
 def test_no_name_is_on_two_pages():
@@ -220,48 +138,3 @@ def test_pages_ask_for_each_name_and_are_in_the_navigation():
     assert len([shown for shown, _ in asked if shown]) > 20
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert [uri for uri in pages if f": {uri}\n" not in navigation] == []
-
-
-def test_overview_says_what_each_name_is():
-    overview = api.overview()
-    for path, thing in OBJECTS.items():
-        package = next(
-            p for p in sorted(PACKAGES, key=len, reverse=True) if path.startswith(p + ".")
-        )
-        assert f"[{api.place(package, path.removeprefix(package + '.'))}] | " in overview
-        first = (thing.__doc__ or "").partition("\n")[0]
-        assert textwrap.shorten(first, 400), path
-
-
-# What the pages make of docstrings ------------------------------------------------------------------
-
-
-def neighbour(name):
-    """A module of docs, which is no package."""
-    spec = importlib.util.spec_from_file_location(f"docs_{name}", DOCS / f"{name}.py")
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
-
-
-def test_parameters_described_together_show_their_own_types():
-    griffe = pytest.importorskip("griffe", reason="comes with the extra docs")
-    found = griffe.load(
-        "nonsmooth.local.point.regions",
-        search_paths=[DOCS.parent],
-        docstring_parser="numpy",
-        extensions=griffe.load_extensions(str(DOCS / "shared_entries.py")),
-    )["alpha"]
-    (section,) = [s for s in found.docstring.parsed if s.kind.value == "parameters"]
-    shown = {p.name: str(p.annotation) for p in section.value}
-    signature = {p.name: str(p.annotation) for p in found.parameters}
-    assert shown == signature
-    assert shown["system"] == "FilippovSystem" and shown["tol"] == "float"
-
-
-def test_errors_listed_together_are_shown_one_by_one():
-    pytest.importorskip("mkdocs", reason="comes with the extra docs")
-    listed = neighbour("hooks")._LISTED
-    link = '<autoref identifier="nonsmooth.A" optional hover>A</autoref>'
-    assert listed.search(f"<code>({link}, {link})</code>")
-    assert not listed.search(f"<code>({link} or {link})</code>")

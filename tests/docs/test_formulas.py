@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ast
 import html
 import re
 import sys
@@ -72,6 +73,22 @@ def test_it_is_well_formed_and_keeps_its_order():
     assert made.count("<math>") > 2  # a long formula may be broken
     assert made.index("ν") < made.index("<mfrac>") < made.index("υ") < made.index("Λ")
     assert made.endswith("& more")
+
+
+def test_formulas_of_docstrings_are_typeset_whole():
+    root = Path(__file__).parents[2]
+    paths = [path for name in ("nonsmooth", "bounce") for path in (root / name).rglob("*.py")]
+    nodes = (node for path in paths for node in ast.walk(ast.parse(path.read_text("utf-8"))))
+    kinds = (ast.Module, ast.ClassDef, ast.FunctionDef)
+    docs = [ast.get_docstring(node) or "" for node in nodes if isinstance(node, kinds)]
+    found = {text for doc in docs for text in re.findall(r"\$([^$`\n\\{]+)\$", doc)}
+    assert len(found) > 300
+    for text in found:
+        made = formula(text).replace("<wbr>", "")
+        ElementTree.fromstring(f"<p>{made}</p>")
+        assert not re.search(
+            r"[\^$\\_*]|sqrt|abs\(|[<>]=|->", re.sub(r"<[^>]+>", "", bare(made))
+        ), text
 
 
 def test_unbalanced_brackets_lose_nothing():

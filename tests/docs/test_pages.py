@@ -1,4 +1,4 @@
-"""The Python blocks of every page run, in order, as one program, and print what the page says."""
+"""The Python blocks of every page and of README.md run, in order, as one program, and print what the page says."""
 
 import contextlib
 import doctest
@@ -32,11 +32,12 @@ def check_block(name, line, source, wanted, namespace):
         assert agrees, f"{name}:{line}: expected\n{wanted}\nprinted\n{printed.getvalue()}"
 
 
+@pytest.mark.slow_cases("branches", "coming_from", "golf", "recipes", "start")
 @pytest.mark.parametrize(
     "page",
     [
         pytest.param(page, marks=pytest.mark.slow) if page.stem.startswith("tutorial_") else page
-        for page in PAGES
+        for page in [*PAGES, DOCS.parent / "README.md"]
     ],
     ids=lambda page: page.stem,
 )
@@ -64,10 +65,3 @@ def test_every_page_is_in_the_navigation():
     navigation = (DOCS.parent / "mkdocs.yml").read_text(encoding="utf-8")
     assert PAGES
     assert [p.name for p in PAGES if f": {p.name}\n" not in navigation] == []
-
-
-def test_blocks_are_found_with_their_output():
-    text = "```python\nprint(1)\n```\n\n```text\n1\n```\n\n<!-- needs: a -->\n```python\nb\n```\n"
-    first, second = BLOCK.finditer(text)
-    assert (first["source"], first["output"], first["note"]) == ("print(1)\n", "1\n", None)
-    assert (second["source"], second["output"], second["what"]) == ("b\n", None, "a")

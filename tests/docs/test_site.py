@@ -1,4 +1,4 @@
-"""The site is complete, says what the code says, and needs no network."""
+"""The built site is complete, its links resolve, and it needs no network."""
 
 import html.parser
 import importlib.util
@@ -11,10 +11,6 @@ from pathlib import Path
 
 import pytest
 
-import bounce
-import nonsmooth as ns
-from nonsmooth.flow.status import ADVICE
-from nonsmooth.local.two_folds.classification import TABLE
 from tests.browser import WIDTHS
 
 ROOT = Path(__file__).parents[2]
@@ -54,85 +50,6 @@ def loads(text):
     parser = _Loads()
     parser.feed(text)
     return parser.foreign, parser.local
-
-
-# The sources ---------------------------------------------------------------------------------------
-
-
-def test_decision_table_is_the_code_s():
-    text = generate.fill((DOCS / "two_folds.md").read_text(encoding="utf-8"))
-    assert len(TABLE) == 8
-    for row in TABLE:
-        lines = [x for x in text.splitlines() if x.startswith(f"| **{row.label}** |")]
-        line = lines[0]  # the second is the example of the class
-        assert f"${generate.latex(row.condition)}$" in line
-        assert f"| {row.into} | {row.out_of} |" in line
-        assert f"**{row.label}**\n:   {row.determinism}" in text
-
-
-def test_conditions_become_latex():
-    assert generate.latex("kappa_- > 0 (nu1, nu2 > 0 and nu1 nu2 > 1)") == (
-        r"\kappa_{-} > 0 \quad (\nu_1,\; \nu_2 > 0 \text{ and } \nu_1 \nu_2 > 1)"
-    )
-    written = " ".join(generate.latex(row.condition) for row in TABLE)
-    assert not re.search(r"(?<![\\{])\b(?:kappa|nu\d|gap|Delta)", written)
-
-
-def test_every_region_is_listed():
-    text = generate.regions()
-    assert all(f"`Region.{region.name}`" in text for region in ns.Region)
-
-
-def test_every_status_is_listed_with_its_advice():
-    text = generate.fill((DOCS / "statuses.md").read_text(encoding="utf-8"))
-    for status in ns.Status:
-        assert f"| `{status.name}` | {int(status)} |" in text
-        assert ADVICE[status] in text
-
-
-def test_every_exception_is_listed():
-    text = generate.error_table()
-    classes = [getattr(m, n) for m in (ns, bounce, bounce.golf) for n in m.__all__]
-    errors = [c for c in classes if isinstance(c, type) and issubclass(c, ns.NonsmoothError)]
-    assert len(errors) > 8
-    assert [c.__name__ for c in errors if f"{c.__name__}`" not in text] == []
-
-
-def test_obligations_of_a_contact_model_are_numbered_from_one():
-    text = generate.obligations()
-    numbers = [int(n) for n in re.findall(r"^(\d+)\. ", text, re.MULTILINE)]
-    assert numbers == list(range(1, len(numbers) + 1)) and len(numbers) >= 9
-
-
-def test_every_marker_has_its_part_and_every_part_its_marker():
-    asked = {
-        name
-        for page in DOCS.glob("*.md")
-        for name in generate.MARKER.findall(page.read_text(encoding="utf-8"))
-    }
-    assert asked == set(generate.PARTS)
-
-
-def test_sources_load_nothing_from_elsewhere():
-    config = (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
-    assert "font: false" in config
-    assert "extra_javascript" not in config
-    assert "http" not in config and "//" not in config
-    for style in re.findall(r"^  - (.*\.css)$", config, re.MULTILINE):
-        text = (DOCS / style).read_text(encoding="utf-8")  # a file of the site
-        assert "url(" not in text and "@import" not in text
-    for page in DOCS.glob("*.md"):
-        text = page.read_text(encoding="utf-8")
-        assert loads(text)[0] == [], page.name
-        assert not re.search(r"!\[[^\]]*\]\((?:https?:)?//", text), page.name
-        assert "```mermaid" not in text, f"{page.name}: mermaid is loaded from a network"
-
-
-def test_loads_are_found():
-    foreign, local = loads(
-        '<script src="//a/b.js"></script><img src=c.png><a href="http://d">d</a>'
-    )
-    assert (foreign, local) == (["//a/b.js"], ["c.png"])
 
 
 # The README's picture ------------------------------------------------------------------------------

@@ -77,6 +77,7 @@ def test_what_the_series_at_the_start_does_not_see_is_integrated(name, engine):
     assert abs(state[1] - truth) <= 100 * tol * max(1.0, t_end, abs(truth))
 
 
+@pytest.mark.slow_cases("ensemble")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_block_that_sticks_is_moved_by_a_load_that_comes_late(engine):
     """Friction .4 under the load 3 exp(-(t - 30)^2): it breaks away, overshoots and sticks again."""
@@ -98,6 +99,7 @@ def test_a_stop_inside_a_pulse_is_met(engine):
     assert abs(state[0] - (50 - (2 * np.log(2)) ** 0.5)) < 1e-9
 
 
+@pytest.mark.slow_cases("ensemble")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_surface_inside_a_pulse_is_crossed(engine):
     """Twice, upward and downward; between, y falls at the rate 2."""
@@ -135,6 +137,7 @@ def test_a_late_end_loses_no_event(engine, tol, t_end):
     assert abs(state[1] + (2 * 9.81) ** 0.5) < 1e-12
 
 
+@pytest.mark.slow_cases("ensemble")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_late_end_loses_no_reset_and_no_surface(engine):
     hop = ns.Reset(y, [y, 0.0 * v, ca.SX(0)], direction=-1)
@@ -157,6 +160,7 @@ def test_a_field_that_ends_is_not_called_complete(f, engine):
     assert np.all(np.isfinite(state)) and -1e-9 < state[0] < 1e-6
 
 
+@pytest.mark.slow_cases("ensemble")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_states_that_are_not_finite_end_the_run(engine):
     """Sliding along a surface to which both fields are parallel; and a blow-up at infinity."""
@@ -178,6 +182,7 @@ def test_a_run_ends_where_derivatives_of_large_states_are_no_numbers(engine):
     assert run.status is ns.Status.NOT_FINITE and least < run.t[-1] < np.log(1e310) / 3
 
 
+@pytest.mark.slow_cases("100000000.0-ensemble", "-1000000000.0-ensemble")
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("far", [1e8, -1e9])
 def test_far_from_zero_rounding_is_no_defect(far, engine):
@@ -190,6 +195,7 @@ def test_far_from_zero_rounding_is_no_defect(far, engine):
     assert status is ns.Status.REACHED_END and abs(state[1] - np.sin(5.0)) < 1e-15 * abs(far)
 
 
+@pytest.mark.slow_cases("ensemble")
 @pytest.mark.parametrize("engine", ENGINES)
 def test_a_field_whose_first_steps_are_all_too_long_has_no_branch_point(engine):
     """x^40 grows by more than its series shows at every step; in units of 1e9 its coefficients are below

@@ -279,6 +279,7 @@ def pile(count, e, mu=0.4):
     )
 
 
+@pytest.mark.slow_cases("0.0-reference", "0.4-reference")
 @pytest.mark.parametrize("engine", ["reference", "auto"])
 @pytest.mark.parametrize("e", [0.0, 0.4])
 def test_a_pile_of_three_falls_and_comes_to_rest(engine, e):
@@ -292,7 +293,7 @@ def test_a_pile_of_three_falls_and_comes_to_rest(engine, e):
     np.testing.assert_allclose(run.x[-1, 3:], 0.0, rtol=0, atol=1e-12)
 
 
-@pytest.mark.parametrize("engine", ["reference", "auto"])
+@pytest.mark.parametrize("engine", [pytest.param("reference", marks=pytest.mark.slow), "auto"])
 def test_a_neighbour_is_not_behind_by_the_error_of_a_root(engine):
     """While one gap chatters the others are met within the tolerance, from all sides."""
     system = pile(2, 0.5)

@@ -34,7 +34,15 @@ def chain(k):
     )
 
 
-@pytest.mark.parametrize("k", [1, 2, pytest.param(3, marks=pytest.mark.slow), 4])
+@pytest.mark.parametrize(
+    "k",
+    [
+        1,
+        pytest.param(2, marks=pytest.mark.slow),
+        pytest.param(3, marks=pytest.mark.slow),
+        pytest.param(4, marks=pytest.mark.slow),
+    ],
+)
 def test_blocks_agree_with_an_independent_integrator(k):
     rng, t_end = np.random.default_rng(k), 15.0
     starts = np.hstack([rng.normal(size=(2, k)), rng.uniform(-0.5, 0.2, (2, k))])

@@ -14,6 +14,7 @@ from . import plane_friction as plane
 ENGINES = ["reference", "auto"]
 
 
+@pytest.mark.slow_cases("three-rolls-reference")
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("name", plane.CASES)
 def test_reference_cases_to_rounding(name, engine):
@@ -301,6 +302,7 @@ def test_what_knows_surfaces_only_says_so(question):
 _LANDINGS = st.tuples(*[st.floats(-1.5, 1.5) for _ in range(4)])
 
 
+@pytest.mark.slow
 @given(_LANDINGS, _LANDINGS, st.sampled_from([0.1, 0.6]), st.sampled_from([0.5, 1.5]))
 @settings(max_examples=12, deadline=None)
 def test_friction_brings_two_motions_closer(one, two, mu, eta):

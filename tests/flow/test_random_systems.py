@@ -90,11 +90,13 @@ def compare(found: Sample, engine: str) -> None:
     assert decided >= 0.9 * len(results)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [Size(2, 1), Size(3, 3)], ids=str)
 def test_a_few_random_systems_agree_with_an_independent_integrator(size):
     compare(sample(size, FEW), "reference")
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("engine", ["tape", "lanes"])
 def test_compiled_engines_follow_a_few_random_systems(engine):
     compare(sample(Size(3, 1), FEW), engine)

@@ -132,6 +132,7 @@ def test_a_period_may_depend_on_parameters(engine):
     assert np.allclose(run.sample_x, 0.5, rtol=0, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_engines_and_chunks_agree_on_hits_of_random_runs():
     dry = ns.FilippovSystem(
         [x, v],

@@ -91,6 +91,7 @@ def test_reversing_time(definition):
     np.testing.assert_allclose(other.coordinates(x), fold.coordinates(x) * [1, -1, -1])
 
 
+@pytest.mark.slow
 @given(definitions(), matrix, matrix, vector, st.booleans())
 @at_most(60)
 def test_changing_coordinates(definition, linear, quadratic, shift, curved):

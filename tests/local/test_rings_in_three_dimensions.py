@@ -107,6 +107,7 @@ def survey(fold, sigma, nu, direction):
     return end == "s", isolated, time
 
 
+@pytest.mark.slow_cases("sigma3-nu3-II-C", "sigma7-nu7-mix-S", "sigma11-nu11-mix-S")
 @pytest.mark.parametrize(("sigma", "nu", "label"), CASES)
 def test_desingularised_sliding_flow(sigma, nu, label):
     fold = find_two_fold(system(sigma, nu), [0.01, -0.02, 0.015])

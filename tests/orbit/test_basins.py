@@ -20,6 +20,7 @@ WELL = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x -
 QUIET = ns.Work(threads=1, progress=False)
 
 
+@pytest.mark.slow
 def test_thresholds_of_the_double_well_to_rounding_by_narrowing_the_grid():
     """B2: released at rest from x0; each threshold is bracketed by labels and narrowed."""
     for threshold, low, high in zip(
@@ -38,6 +39,7 @@ def test_thresholds_of_the_double_well_to_rounding_by_narrowing_the_grid():
         assert low - 1e-10 < threshold < high + 1e-10
 
 
+@pytest.mark.slow
 def test_a_repelling_circle_divides_rest_from_a_cycle():
     r2 = x**2 + y**2
     system = ns.FilippovSystem(

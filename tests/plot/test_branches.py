@@ -88,6 +88,7 @@ def test_orbits_are_drawn_by_their_largest_state_or_as_one_asks(relay):
     assert set(np.concatenate([line.get_ydata() for line in lengths.lines])) == {2, 4}
 
 
+@pytest.mark.slow
 def test_a_branch_from_hopf_to_homoclinic_is_drawn_to_its_ends():
     d, u = ca.SX.sym("d"), ca.SX.sym("u")
     r = ca.sqrt(x * x + y * y)
@@ -122,6 +123,7 @@ def test_curves_in_two_parameters_with_their_special_points(takens):
     assert {text.get_text() for text in ax.get_legend().get_texts()} == {"Hopf", "fold"}
 
 
+@pytest.mark.slow
 def test_an_orbit_has_its_modes_and_lies_over_a_portrait():
     block = ns.FilippovSystem(
         [x, y],

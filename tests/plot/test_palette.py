@@ -111,6 +111,7 @@ DRAWN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("name", "kind"), [*((name, "pdf") for name in DRAWN), ("friction_cone", "ps")]
 )

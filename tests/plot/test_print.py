@@ -189,6 +189,22 @@ def test_every_function_that_draws_is_here():
     assert set(BALLS) == drawing(bounce.plot)
 
 
+@pytest.mark.slow_cases(
+    "bifurcation_curves",
+    "branch1",
+    "dividing_curves",
+    "phase_portrait",
+    "sliding_portrait",
+    "two_fold0",
+    "two_fold1",
+    "two_fold2",
+    "two_fold_3d0",
+    "two_fold_3d1",
+    "two_fold_atlas",
+    "two_fold_atlas_pages",
+    "outcome_map",
+    "proven_map",
+)
 @pytest.mark.parametrize(
     "draw",
     [pytest.param(d, id=name) for name, cases in {**DRAWN, **BALLS}.items() for d in cases],
@@ -205,13 +221,26 @@ COLUMN = (3.4, 4.4)
 @pytest.mark.parametrize(
     "draw",
     [
-        lambda: ns.plot.phase_portrait(harvest(), (0.0, 1.1, 0.5, 1.5), size=COLUMN),
-        lambda: ns.plot.two_fold(ns.textbook.TWO_FOLDS["VV-C1"], size=COLUMN),
-        lambda: ns.plot.two_fold_3d(ns.textbook.TWO_FOLDS["mix-C"], size=COLUMN),
+        pytest.param(
+            lambda: ns.plot.phase_portrait(harvest(), (0.0, 1.1, 0.5, 1.5), size=COLUMN),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            lambda: ns.plot.two_fold(ns.textbook.TWO_FOLDS["VV-C1"], size=COLUMN),
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(
+            lambda: ns.plot.two_fold_3d(ns.textbook.TWO_FOLDS["mix-C"], size=COLUMN),
+            marks=pytest.mark.slow,
+        ),
         lambda: ns.plot.trajectory(run(), size=COLUMN),
         lambda: ns.plot.basins(basins(2), size=COLUMN),
-        lambda: ns.plot.dividing_curves(cut(), size=(3.4, 2.9)),
-        lambda: ns.plot.dividing_curves(cut(), size=(7.0, 4.4)),
+        pytest.param(
+            lambda: ns.plot.dividing_curves(cut(), size=(3.4, 2.9)), marks=pytest.mark.slow
+        ),
+        pytest.param(
+            lambda: ns.plot.dividing_curves(cut(), size=(7.0, 4.4)), marks=pytest.mark.slow
+        ),
     ],
     ids=[
         "phase_portrait",
@@ -230,6 +259,7 @@ def test_picture_as_wide_as_a_column_is_fit_for_print_too(draw):
     assert max(ax.bbox.width for ax in figure.axes) > 0.3 * figure.bbox.width  # two side by side
 
 
+@pytest.mark.slow
 def test_no_title_is_cut_in_a_file():
     """Square axes of a narrow figure need more than one layout."""
     stream = io.BytesIO()
@@ -238,7 +268,9 @@ def test_no_title_is_cut_in_a_file():
     assert imread(stream)[0].min() == 1.0  # the uppermost row of pixels is white
 
 
-@pytest.mark.parametrize(("count", "size"), [(2, COLUMN), (3, None), (6, COLUMN)])
+@pytest.mark.parametrize(
+    ("count", "size"), [(2, COLUMN), (3, None), pytest.param(6, COLUMN, marks=pytest.mark.slow)]
+)
 def test_names_of_24_letters_do_not_meet(count, size):
     names = ["displacement_of_the_block", "tip_velocity_of_the_bow_", "temperature_of_the_spring"]
     names = [f"{names[k % 3]}{k // 3 or ''}" for k in range(count)]

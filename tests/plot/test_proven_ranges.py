@@ -59,6 +59,7 @@ def test_what_has_no_range_is_refused(what):
         ns.plot.proof_map(what)
 
 
+@pytest.mark.slow
 def test_pieces_are_divided_along_what_the_class_depends_on():
     """Neither parameter moves the two-fold; pieces that stay undecided lie at m q = 1."""
     fold = ns.find_two_fold(SYSTEM, near=[0, 0.1, -0.1])

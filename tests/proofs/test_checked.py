@@ -108,6 +108,7 @@ def test_kinds_in_space_are_checked_by_counting_eigenvalues(sign, tmp_path):
         assert altered(path, lambda t, label=label: t["proofs"][0]["claims"].update(label=label))
 
 
+@pytest.mark.slow
 def test_planar_points_of_rest_and_cusps_are_checked(tmp_path):
     node = plane([y - x, 1 - 2 * y], [1, 1])
     slides = plane([1 - x, -1], [-1 - x, 1])
@@ -126,6 +127,7 @@ def test_planar_points_of_rest_and_cusps_are_checked(tmp_path):
         assert altered(path, lambda t, other=other: t["proofs"][0]["claims"].update(label=other))
 
 
+@pytest.mark.slow
 def test_pieces_must_cover_the_ranges_of_parameters(tmp_path):
     system = ns.FilippovSystem(
         [x, y, z, q],
@@ -180,6 +182,7 @@ def orbits():
     yield drop, [1, 0], "1.25", "-"
 
 
+@pytest.mark.slow_cases("0", "2")
 @pytest.mark.parametrize("k", range(3))
 def test_orbits_are_followed_again_and_others_are_not(k, tmp_path):
     system, start, end, itinerary = list(orbits())[k]

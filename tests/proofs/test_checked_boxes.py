@@ -240,6 +240,7 @@ def tampered(names, count, folder):
         assert ": checked:" not in line or holds(record), (line, record)
 
 
+@pytest.mark.slow
 def test_what_is_altered_is_refused_or_true(tmp_path):
     tampered(["drop", "fold", "two surfaces"], 8, tmp_path)
 

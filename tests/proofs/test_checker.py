@@ -104,6 +104,7 @@ def test_false_statements_are_not_checked(k, tmp_path):
     assert code == 1 and "NOT CHECKED" in words, (what, words)
 
 
+@pytest.mark.slow
 def test_every_two_fold_of_random_systems_is_checked(tmp_path):
     """Boxes of uniqueness are a little inside the limit: the checker's intervals are wider."""
     rng = np.random.default_rng(77)

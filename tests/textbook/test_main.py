@@ -35,6 +35,7 @@ def test_show_prints_values_and_status(name, capsys):
     assert "run: Trajectory(" in out
 
 
+@pytest.mark.slow
 def test_show_draws(tmp_path, capsys):
     plot = pytest.importorskip("nonsmooth.plot", reason="pictures are another floor")
     if "trajectory" not in dir(plot):

@@ -22,6 +22,7 @@ def measured(tmp_path):
     return path
 
 
+@pytest.mark.slow
 def test_fit(command, tmp_path, measured):
     picture = tmp_path / "residuals.png"
     argv = ["fit", measured, "--turf", "natural", "--parameters", "mu,restitution,tilt"]
@@ -33,6 +34,7 @@ def test_fit(command, tmp_path, measured):
     assert "95 %" in command(*argv)[1]
 
 
+@pytest.mark.slow
 def test_parameters_that_are_not_determined(command, tmp_path):
     rng = np.random.default_rng(15)
     u, v, w = rng.uniform(15, 25, 4), -rng.uniform(10, 18, 4), rng.uniform(100, 300, 4)
@@ -47,6 +49,7 @@ def test_parameters_that_are_not_determined(command, tmp_path):
     assert code == 3 and json.loads(out)["undetermined"] == ["mu"]
 
 
+@pytest.mark.slow
 def test_an_interval_that_is_too_narrow_is_shown_beside_its_profile(command, tmp_path):
     turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
     rng = np.random.default_rng(36)

@@ -13,7 +13,16 @@ import nonsmooth as ns
 KV = "--model KelvinVoigt --set mu=0.3 --set d1=0.1 --set d2=0.15 --set eta=0.5".split()
 
 
-@pytest.mark.parametrize("show", ["region", "slip", "omega", "angle", "reversal"])
+@pytest.mark.parametrize(
+    "show",
+    [
+        pytest.param("region", marks=pytest.mark.slow),
+        pytest.param("slip", marks=pytest.mark.slow),
+        pytest.param("omega", marks=pytest.mark.slow),
+        pytest.param("angle", marks=pytest.mark.slow),
+        "reversal",
+    ],
+)
 def test_map_pictures(command, tmp_path, show):
     path = tmp_path / "map.png"
     over = ["--over", "xdot=-2:2:20", "--over", "omega=-4:4:20"]
@@ -89,6 +98,7 @@ def test_a_contact_model_in_physical_units(command, tmp_path):
     assert command("map", *KV, "--stiffness", "2e4", "--output", tmp_path / "m.png")[0] == 0
 
 
+@pytest.mark.slow
 def test_regions_have_colours_that_differ_and_the_dividing_curve_is_drawn(
     command, tmp_path, monkeypatch
 ):
@@ -128,6 +138,7 @@ def test_the_default_landings_show_several_kinds_of_bounce(command, tmp_path, tu
     assert max(shares.values()) < 0.85
 
 
+@pytest.mark.slow
 def test_a_kind_of_bounce_has_one_colour_on_every_map(command, tmp_path, monkeypatch):
     drawn = []
 

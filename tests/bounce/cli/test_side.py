@@ -72,6 +72,7 @@ def test_a_run_until_rest_with_side_spin(command, tmp_path):
     assert code == 0 and "run_run_side [m]" in out.splitlines()[0]
 
 
+@pytest.mark.slow
 def test_a_flight_curves_with_the_axis(command, tmp_path):
     argv = "flight --speed 70 --angle 11 --spin 2700 --axis-tilt".split()
     report = json.loads(command(*argv, 10, "--turf", "natural", "--json")[1])

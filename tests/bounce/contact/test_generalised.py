@@ -73,6 +73,7 @@ def model_of(case, **more):
     )
 
 
+@pytest.mark.slow_cases("D01-1e-13", "D16-1e-13")
 @pytest.mark.parametrize("tol", [1e-13, 1e-10, 1e-8, 1e-6])
 @pytest.mark.parametrize("case", CASES, ids=[c["id"] for c in CASES])
 def test_reference(case, tol):

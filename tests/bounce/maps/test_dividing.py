@@ -64,6 +64,7 @@ def test_junction_and_lift_off(curve):
     assert np.abs(first.lift_off[:, 1] + first.lift_off[:, 4]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_speeds_within_rounding_of_the_junction_have_its_spin(curve):
     """There an orbit of one arc may be of the other by rounding."""
     for model in (curve.model, NO_GRAVITY):
@@ -77,6 +78,7 @@ def test_slope_at_rest_is_five_halves(curve):
     assert curve.omega(1e-6) / 1e-6 == pytest.approx(2.5, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_once_warm_nothing_is_built_again(curve, monkeypatch):
     """What takes long is to build functions; how long the rest takes is in benchmarks/."""
 
@@ -163,6 +165,7 @@ MODELS = [
 DEAR = (bounce.KuwabaraKono, Coupled, bounce.Maxwell)
 
 
+@pytest.mark.slow_cases("DepthDampedKelvinVoigt", "KelvinVoigt1", "Hertz", "KelvinVoigt2")
 @pytest.mark.parametrize(
     "model",
     [pytest.param(m, marks=pytest.mark.slow) if type(m) in DEAR else m for m in MODELS],
@@ -175,6 +178,7 @@ def test_other_contact_models_have_it_too(model):
     assert all(pair == ["+", "-"] for pair in letters)
 
 
+@pytest.mark.slow
 def test_landings_given_by_expressions_lead_to_the_same_curve(curve):
     """The general verb looks for it in a box, with exact derivatives instead of differences."""
     model = NO_GRAVITY  # its contact begins at touch-down
@@ -198,6 +202,7 @@ def test_landings_given_by_expressions_lead_to_the_same_curve(curve):
         assert np.abs(reference.omega(xdot) - omega).max() < 1e-11
 
 
+@pytest.mark.slow
 def test_on_a_slope_both_halves_are_traced():
     curve = bounce.dividing_curve(MODELS[-2], reach=1.0)
     assert not curve.mirrored
@@ -211,6 +216,7 @@ def test_on_a_slope_both_halves_are_traced():
 COARSE = dict(step=0.4, reach=2.6)
 
 
+@pytest.mark.slow
 @settings(max_examples=3, deadline=None)
 @given(st.floats(0.1, 8.0), st.floats(0.05, 2.5))
 def test_without_gravity_the_surface_is_a_cone(factor, xdot):
@@ -219,6 +225,7 @@ def test_without_gravity_the_surface_is_a_cone(factor, xdot):
     assert other == pytest.approx(factor * one, rel=1e-10)
 
 
+@pytest.mark.slow
 @settings(max_examples=3, deadline=None)
 @given(st.floats(0.1, 8.0), st.floats(0.05, 2.5))
 def test_with_gravity_scaling_it_too_is_a_symmetry(factor, xdot):
@@ -228,6 +235,7 @@ def test_with_gravity_scaling_it_too_is_a_symmetry(factor, xdot):
     assert other.omega(factor * xdot) == pytest.approx(factor * one, rel=1e-9)
 
 
+@pytest.mark.slow
 def test_surface_is_curves_at_several_normal_speeds():
     surface = bounce.dividing_surface(NO_GRAVITY, [-2.0, -0.5])
     assert surface.two_fold[0].shape[1] == surface.slipping[1].shape[1] == 3

@@ -26,6 +26,7 @@ FAST = (MODELS[0], MODELS[1], MODELS[4])
 CASES = [m if m in FAST else pytest.param(m, marks=pytest.mark.slow) for m in MODELS]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("model", CASES, ids=lambda m: type(m).__name__)
 def test_agrees_with_single_bounces(model):
     """Also where friction begins only when the load has risen, or at a power law's zero."""
@@ -43,6 +44,7 @@ def test_agrees_with_single_bounces(model):
         assert many.itinerary[k] == shot.itinerary
 
 
+@pytest.mark.slow_cases("KelvinVoigt1", "Hertz1")
 @pytest.mark.parametrize("model", CASES, ids=lambda m: type(m).__name__)
 def test_no_bounce_is_left_to_the_slow_driver(model, monkeypatch):
     def refuse(*_):

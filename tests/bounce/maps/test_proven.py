@@ -8,6 +8,7 @@ import bounce
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 
 
+@pytest.mark.slow
 def test_decided_pieces_are_what_the_simulation_gives():
     found = bounce.proven_map(TURF, xdot=(0.2, 0.26), omega=(0.6, 0.7), depth=3)
     sizes = (found.boxes[:, 1] - found.boxes[:, 0]) * (found.boxes[:, 3] - found.boxes[:, 2])

@@ -49,7 +49,9 @@ def distances(off, eta, k):
     return sum(weight * np.sum((a[0] - a[1]) ** 2, axis=-1) for weight, a in parts)
 
 
-@pytest.mark.parametrize("eta, mu, load", [(0.5, 0.3, "contact"), (1.5, 0.6, "net")])
+@pytest.mark.parametrize(
+    "eta, mu, load", [(0.5, 0.3, "contact"), pytest.param(1.5, 0.6, "net", marks=pytest.mark.slow)]
+)
 def test_in_the_plane_bounces_come_closer(eta, mu, load):
     """|dV|^2 + k |dW|^2 + eta^2 |dX|^2 does not grow while the load is nonnegative."""
     model = TURF.replace(eta=eta, mu=mu, load=load)
@@ -168,6 +170,7 @@ def test_the_turn_with_eta_is_the_formula_to_first_order():
     assert mirrored.turn[0] == pytest.approx(-found.turn[1], abs=1e-9)
 
 
+@pytest.mark.slow
 def test_refusals():
     with pytest.raises(ns.OptionError, match="radius, points"):
         bounce.winding_number(TURF, [0.2, 0.0], [0.5, 0.0], 0.0)

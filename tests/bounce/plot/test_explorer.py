@@ -89,6 +89,7 @@ def compare(browser, page, count, seed):
     return seen
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_bounces_are_python_s(browser, page):
     seen = compare(browser, page, 150, seed=0)
@@ -163,8 +164,9 @@ return {...map, code: [...map.code], curve: Maps.curve(map), rooms: Maps.rooms(m
 """
 
 
+@pytest.mark.slow
 @pytest.mark.browser
-@pytest.mark.parametrize("load", ["contact", pytest.param("net", marks=pytest.mark.slow)])
+@pytest.mark.parametrize("load", ["contact", "net"])
 def test_map_is_that_of_python(browser, page, load):
     model = TURF.replace(eta=0.8, G=0.15, load=load)
     browser.open(page)
@@ -225,6 +227,7 @@ while (document.documentElement.dataset.map !== "fine") await new Promise((go) =
 """
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, width):
@@ -254,6 +257,7 @@ return [...document.querySelectorAll("#map .region-name")].filter((e) => {
 """
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_names_of_regions_are_not_cut_by_the_frame(browser, page, width):
@@ -291,6 +295,7 @@ def test_the_enlarged_end_lies_on_no_curve(browser, page, width, sign):
     assert count >= 2 and met == []
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_keys_and_fields_move_everything(browser, page):
     from selenium.webdriver.common.by import By
@@ -322,6 +327,7 @@ def test_keys_and_fields_move_everything(browser, page):
     assert browser.faults() == {}
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     for words in ("mu=abc&eta=&xdot=NaN", "load=toString&inertia=7", "%E0%A4%A&=&"):

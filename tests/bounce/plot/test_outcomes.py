@@ -122,6 +122,7 @@ def test_quantities_are_drawn(outcomes, quantity):
     assert len(bounce.plot.outcome_map(outcomes, quantity).axes) == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("width", [7.0, 3.4])
 @pytest.mark.parametrize("quantity", ["itinerary", "slip", "spin_reversal"])
 def test_keys_and_titles_are_within_the_sheet_and_off_the_map(outcomes, quantity, width):

@@ -12,6 +12,7 @@ import nonsmooth as ns
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.0, eta=0.5, G=0.05, load="net")
 
 
+@pytest.mark.slow
 def test_friction_cone(tmp_path):
     shot = bounce.simulate(TURF, 0.3, -1.0, 0.2)
     assert shot.itinerary == "F + s -"

@@ -56,6 +56,7 @@ def test_random_linear_bounces():
     compare(TURF.replace(G=1e-4), seed=1, count=8)
 
 
+@pytest.mark.slow
 def test_random_nonlinear_bounces():
     soft = bounce.DepthDampedKelvinVoigt(mu=0.3, d1=0.4, d2=0.1, eta=0.5)
     compare(soft, seed=2, count=4)
@@ -114,6 +115,7 @@ def run_checker(path):
     )
 
 
+@pytest.mark.slow_cases("True-None", "True-earlier")
 @pytest.mark.parametrize("change", [None, "earlier", "other"])
 @pytest.mark.parametrize("box", [False, True])
 def test_the_checker_follows_a_bounce_again(change, box, tmp_path):

@@ -54,6 +54,11 @@ def test_adhesion_that_is_let_go_where_it_ends():
     assert shot.lift_off.ydot == pytest.approx(np.sqrt(1 - 0.05**2 - 2 * 0.05 * 0.05), abs=1e-9)
 
 
+@pytest.mark.slow_cases(
+    "KelvinVoigt(mu=0.3, d1=0, d2=0, eta=1.5, G=0.01, slope=-0.3, load='net')-1e-06",
+    "Hertz(mu=0.3, stiffness=1)-1e-06",
+    "Maxwell(mu=0.3, branch_stiffness=1, relaxation=1e+06)-1e-06",
+)
 @pytest.mark.parametrize("tol", [1e-6, pytest.param(1e-10, marks=pytest.mark.slow)])
 @pytest.mark.parametrize(
     "model",

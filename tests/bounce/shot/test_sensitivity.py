@@ -51,6 +51,7 @@ def differences(model, landing, name, h=1e-4):
     return (8 * (at(h) - at(-h)) - (at(2 * h) - at(-2 * h))) / (12 * h)
 
 
+@pytest.mark.slow_cases("Hunt-Crossley")
 @pytest.mark.parametrize("case", CASES)
 def test_against_fourth_order_differences(case):
     model, landing, names, itinerary = CASES[case]
@@ -88,6 +89,7 @@ def test_unknown_name():
         bounce.sensitivity(bounce.simulate(KV, 0.2, -1.0, 1.0), ["nu"])
 
 
+@pytest.mark.slow_cases("None-landing0", "0.1-landing0")
 @pytest.mark.parametrize("landing", [([1.0, 0.2], [0.1, 1.0, 0.0]), ([2.0, 0.2], [1.5, 0.4, 0.3])])
 @pytest.mark.parametrize("drilling", [None, 0.1])
 def test_derivatives_of_a_bounce_in_3d_are_those_of_differences(landing, drilling):

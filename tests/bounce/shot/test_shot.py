@@ -183,6 +183,7 @@ POWER_LAWS = [
 SLOWLY = [(m, tol) for m in POWER_LAWS[1:] for tol in (1e-6, 1e-13)]
 
 
+@pytest.mark.slow_cases("Hertz(mu=0.3, stiffness=1, d1=0.1, eta=0.5, G=0.01, load='net')-1e-10")
 @pytest.mark.parametrize(
     ("model", "tol"),
     [

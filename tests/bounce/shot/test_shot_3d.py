@@ -136,6 +136,7 @@ def test_every_model_has_a_form_in_3d(model):
     assert space.time == pytest.approx(plane.time, abs=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(v=st.tuples(SPEED, SPEED), w=st.tuples(SPEED, SPEED))
 def test_a_mirrored_landing_gives_mirrored_bits(v, w):
@@ -153,6 +154,7 @@ def test_a_mirrored_landing_gives_mirrored_bits(v, w):
             assert np.array_equal(a * mirror, b)
 
 
+@pytest.mark.slow
 @settings(max_examples=6)
 @given(
     angle=st.floats(-3, 3),

@@ -86,6 +86,26 @@ def lanes_agree(system, x, p, options, expected, tolerance):
 ENDS = {"belt_oscillator": 13.0, "buck_converter": 0.0199}
 
 
+@pytest.mark.slow_cases(
+    "belt_oscillator",
+    "block_on_disc",
+    "block_on_incline",
+    "dry_friction",
+    "forced_dry_friction",
+    "harvested_prey_predator",
+    "kelvin_voigt_bounce",
+    "leine_stick_slip",
+    "multi_sliding_relay",
+    "piecewise_cycle",
+    "planar_relay",
+    "pseudo_hopf",
+    "scalar_sliding",
+    "shaken_block",
+    "stick_slip_exponential",
+    "turntable",
+    "two_fold",
+    "welander_box",
+)
 @pytest.mark.parametrize("name", sorted(textbook.PROBLEMS))
 def test_textbook_problems(name):
     problem = textbook.by_name(name)
@@ -133,6 +153,7 @@ def agree_on_polynomials(made):
     agree(system, start, options, tolerance=1e-9)
 
 
+@pytest.mark.slow
 @settings(max_examples=3, suppress_health_check=list(HealthCheck))
 @given(polynomial_systems(most=3))
 def test_polynomial_systems(made):
@@ -196,6 +217,7 @@ def test_every_operation():
     assert agree(system, [0.4, 0.9], options, {"p": 1.5}, 1e-9) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [25])
 def test_functions_in_parts(size, monkeypatch):
     monkeypatch.setattr(ccode, "_WHOLE", 2 * size)
@@ -234,6 +256,7 @@ def test_two_surfaces_with_sliding_on_each():
     assert any(status is not None for status in found)
 
 
+@pytest.mark.slow
 def test_curved_surface_keeps_the_slider_on_it():
     x, y, lam = (ca.SX.sym(s) for s in "xyl")
     h = x * x + y * y - 1
@@ -251,7 +274,7 @@ def test_curved_surface_keeps_the_slider_on_it():
     np.testing.assert_allclose(chunk.x[:, 0], np.cos(1000.0), atol=1e-9)
 
 
-@pytest.mark.parametrize("t_end", [60.0, 400.0])
+@pytest.mark.parametrize("t_end", [pytest.param(60.0, marks=pytest.mark.slow), 400.0])
 def test_itineraries_of_any_length_in_lanes(t_end):
     """A square wave switches 40 or 250 times; lanes keep the last 31 modes in one number."""
     x, t, lam = (ca.SX.sym(s) for s in "xtl")
@@ -267,6 +290,7 @@ def test_itineraries_of_any_length_in_lanes(t_end):
     assert len(set(map(tuple, words))) > 1 and lanes.totals[2] == 0
 
 
+@pytest.mark.slow
 def test_limits_become_the_same_status():
     problem = textbook.by_name("pseudo_hopf")
     for limits in ({"max_events": 5}, {"max_steps": 7}, {"max_step": 0.01}):
@@ -280,11 +304,13 @@ def test_start_mode_on_repelling_surface():
         agree(system, [0.0], Options(t_end=1.0, start_mode=mode))
 
 
+@pytest.mark.slow
 def test_dense_output_survives_full_buffers():
     problem = textbook.by_name("leine_stick_slip")
     assert agree(problem.system, problem.start, Options(t_end=600.0), tolerance=1e-9) is not None
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("width", "flags"),
     [(8, ""), (4, ""), (4, "-mno-avx512f"), (4, "-mno-avx"), (8, "-mno-avx512f")],
@@ -307,6 +333,7 @@ def test_lanes_of_any_width_and_instruction_set(width, flags, monkeypatch):
     ]
 
 
+@pytest.mark.slow_cases("0.0--1.0-stop-1.0", "0.0--1.0-surface-1.0")
 @pytest.mark.parametrize("t_end", [1.0, 10.0, 100.0, 1000.0])
 @pytest.mark.parametrize("kind", ["stop", "surface"])
 @pytest.mark.parametrize(("v0", "a0"), [(0.0, -1.0), (-1e-9, -1.0), (-1e-9, 0.0), (-1e-4, 0.0)])
@@ -346,7 +373,7 @@ def cubics(draw_outside, seed=0):
 @pytest.mark.parametrize(
     "outside",
     [
-        lambda rng: 1 + 10.0 ** rng.uniform(-10, -5, 2000),
+        pytest.param(lambda rng: 1 + 10.0 ** rng.uniform(-10, -5, 2000), marks=pytest.mark.slow),
         lambda rng: -(10.0 ** rng.uniform(-8, -5, 2000)),
     ],
     ids=["after the end", "before the start"],
@@ -362,7 +389,11 @@ def test_roots_just_outside_the_step_are_not_taken(outside):
 
 
 @pytest.mark.parametrize(
-    ("start", "t_end", "expected"), [([2e-4, -0.03, 2.0], 1e6, 0.01), ([2.0, -3.0, 2.0], 1e8, 1.0)]
+    ("start", "t_end", "expected"),
+    [
+        pytest.param([2e-4, -0.03, 2.0], 1e6, 0.01, marks=pytest.mark.slow),
+        ([2.0, -3.0, 2.0], 1e8, 1.0),
+    ],
 )
 def test_pairs_early_in_a_long_step_are_seen(start, t_end, expected):
     """Rounding at an early root is not that at the end of the step: (t - .01)(t - .02) to 1e6."""

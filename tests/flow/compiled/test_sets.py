@@ -54,6 +54,7 @@ def compare(count, seed, tol):
     return worst
 
 
+@pytest.mark.slow
 def test_random_landings_agree_with_the_reference():
     assert compare(16, 3, 1e-12) < 1e-12
 

@@ -101,6 +101,7 @@ def draws_of_operations(count, seed):
     return x, np.column_stack([own, rng.uniform(-1.0, 1.0, count)])
 
 
+@pytest.mark.slow
 def test_all_operations_in_random_systems():
     made, options = every_operation(), Options(t_end=5.0, max_steps=500, **LOOSE)
     x, p = draws_of_operations(60, 1)
@@ -175,6 +176,7 @@ def bouncing():
     )
 
 
+@pytest.mark.slow
 def test_impacts_and_contacts():
     made = bouncing()
     options = Options(t_end=6.0, **LOOSE)
@@ -204,6 +206,7 @@ def oscillator(friction=0.4):
     return ns.FilippovSystem([x, v], surface=v - 0.3, above=slow, below=fast)
 
 
+@pytest.mark.slow
 def test_the_run_goes_on_in_the_program_from_any_step(monkeypatch):
     options = Options(t_end=60.0, **LOOSE)
     engine = tape_for(oscillator(), options)
@@ -255,6 +258,7 @@ def compiler(tmp_path, monkeypatch):
     go.set()
 
 
+@pytest.mark.slow
 def test_a_long_run_does_not_wait_and_nobody_can_tell(compiler):
     go, began = compiler
     made = oscillator()
@@ -304,6 +308,7 @@ def test_a_compiler_that_fails_meanwhile_is_told_once_and_the_run_goes_on(compil
         ns.simulate(made, [1.0, 0.2], 5.0, tol=1e-3, engine="compiled")
 
 
+@pytest.mark.slow
 def test_an_interrupt_leaves_the_compilation_alone(compiler, monkeypatch):
     made, library = oscillator(), tape_module.library()
     original, engine = library.run_continue, tape_for(made, Options(t_end=1.0, **LOOSE))

@@ -71,9 +71,8 @@ def random_system(rng):
     )
 
 
-@pytest.mark.parametrize(
-    "count", [8, pytest.param(400, marks=pytest.mark.slow)], ids=["few", "many"]
-)
+@pytest.mark.slow
+@pytest.mark.parametrize("count", [8, 400], ids=["few", "many"])
 def test_random_systems(count):
     rng, handed = np.random.default_rng(count), 0
     for _ in range(count):
@@ -108,6 +107,7 @@ def test_blocks_with_friction(count):
     assert len(agree(blocks(count), start, 15.0).events) > count
 
 
+@pytest.mark.slow
 def test_a_hundred_blocks_keep_their_energy_balance():
     """Energy changes by the work of friction, which is -mu_i lambda_i w_i: quadrature of the run."""
     count = 100
@@ -247,6 +247,7 @@ OPERATIONS = {
 P = ca.SX.sym("p")
 
 
+@pytest.mark.slow_cases("error")
 @pytest.mark.parametrize("name", OPERATIONS)
 def test_every_operation(name):
     """As a field, as a curved surface with sliding, and as a stop."""

@@ -7,8 +7,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device import kernel
-from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.ensembles import on_device
+from tests.flow.compiled.device.shim import Shim
 
 needs_compiler = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 RANGES = {"x": (-1.0, 1.0), "t": (0.0, 4.0)}
@@ -54,7 +54,7 @@ def test_on_the_processor(system):
 
 
 @needs_compiler
-@pytest.mark.parametrize("places", [kernel.PLACES, 2])
+@pytest.mark.parametrize("places", [pytest.param(kernel.PLACES, marks=pytest.mark.slow), 2])
 def test_on_a_card(system, monkeypatch, places):
     """With room for two itineraries in the card's table the other runs are counted here."""
     monkeypatch.setattr(kernel, "PLACES", places)

@@ -276,6 +276,7 @@ def and_slowly(fast, *slow):
     return [*fast, *(pytest.param(case, marks=pytest.mark.slow) for case in slow)]
 
 
+@pytest.mark.slow_cases("3e-14-compiled", "-3e-14-compiled")
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize("gap", [3e-14, -3e-14])
 def test_events_keep_their_order_until_rounding(engine, gap):
@@ -301,6 +302,7 @@ def test_a_start_is_on_a_surface_only_to_rounding(engine, offset):
         assert set(many.itinerary) == {word}
 
 
+@pytest.mark.slow_cases("1e-13-compiled")
 @pytest.mark.parametrize("engine", ENGINES)
 @pytest.mark.parametrize(
     "tol", and_slowly([1e-4, 1e-8, 1e-13], 1e-5, 1e-6, 1e-7, 1e-9, 1e-10, 1e-11, 1e-12)

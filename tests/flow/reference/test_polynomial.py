@@ -78,6 +78,7 @@ def test_not_positive_at_the_start_is_a_root_at_once():
     assert first_root([-1.0, 2.0], 1.0) == 0.0
 
 
+@pytest.mark.slow
 def test_high_degree_against_all_roots_at_40_digits():
     import mpmath as mp
 

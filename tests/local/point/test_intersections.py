@@ -106,6 +106,7 @@ def curved(angle=0.4):
     )
 
 
+@pytest.mark.slow
 def test_eigenvalues_along_an_intersection_are_those_of_the_sliding_flow():
     system = curved()
     found = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.1], mode="ss")

@@ -46,6 +46,7 @@ def hidden(sigma, nu, seed, extra=0):
     return system, s, rotation
 
 
+@pytest.mark.slow
 @at_most(40)
 @given(signs, numbers, numbers, seeds)
 def test_found_from_starts_around_it(sigma, n1, n2, seed):
@@ -64,6 +65,7 @@ def test_found_from_starts_around_it(sigma, n1, n2, seed):
         assert fold.iterations <= 8
 
 
+@pytest.mark.slow
 @at_most(20)
 @given(signs, numbers, numbers, seeds)
 def test_least_norm_in_five_dimensions(sigma, n1, n2, seed):
@@ -91,6 +93,7 @@ def test_convergence_is_quadratic():
     assert len(exponents) >= 2 and min(exponents) > 1.6
 
 
+@pytest.mark.slow
 @at_most(25)
 @given(signs, numbers, numbers, seeds)
 def test_coordinates_and_point_at_are_inverse(sigma, n1, n2, seed):

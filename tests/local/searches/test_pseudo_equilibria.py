@@ -58,7 +58,9 @@ def random_system(n, rng):
     )
 
 
-@pytest.mark.parametrize("n", [1, 2, 3, 4, 6])
+@pytest.mark.parametrize(
+    "n", [1, 2, 3, pytest.param(4, marks=pytest.mark.slow), pytest.param(6, marks=pytest.mark.slow)]
+)
 def test_pseudo_equilibria_in_any_dimension(n):
     for seed in range(5):
         rng = np.random.default_rng([n, seed])

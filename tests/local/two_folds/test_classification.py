@@ -92,6 +92,11 @@ def check(found, expected):
         assert (count, isolated) == (expected, [])
 
 
+@pytest.mark.slow_cases(
+    "sigma5-nu5-II-C-120-0",
+    "sigma11-nu11-mix-S-into11-out_of11",
+    "sigma16-nu16-mix-S-into16-out_of16",
+)
 @pytest.mark.parametrize(("sigma", "nu", "label", "into", "out_of"), EXAMPLES)
 def test_rings(sigma, nu, label, into, out_of):
     c = classify_two_fold(sigma, nu)
@@ -113,6 +118,7 @@ numbers = st.floats(-4, 4).filter(lambda v: abs(v) > 1e-6)
 signs = st.sampled_from([VV, II, VI, IV])
 
 
+@pytest.mark.slow
 @settings(max_examples=8)
 @given(signs, numbers, numbers)
 def test_rings_at_random(sigma, n1, n2):

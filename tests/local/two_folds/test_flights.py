@@ -71,6 +71,7 @@ def test_flights_of_other_two_folds():
 numbers = st.floats(-3, 3)
 
 
+@pytest.mark.slow
 @given(numbers, numbers, st.floats(-2, -0.01), st.floats(-2, 2))
 def test_flights_are_orbits_of_the_normal_form(n1, n2, down, other):
     nu, s = (n1, n2), system((-1, 1), (n1, n2))

@@ -86,6 +86,7 @@ def prepared(name):
     )
 
 
+@pytest.mark.slow_cases("sign")
 @pytest.mark.parametrize("name", EXPRESSIONS)
 @at_most(30)
 @given(a=st.floats(-3, 3), b=st.floats(-3, 3), m=st.floats(-1, 1))

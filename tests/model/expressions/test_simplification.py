@@ -103,6 +103,7 @@ def test_shapes_are_kept():
     assert a.shape == (2, 2) and b.shape == (0, 1)
 
 
+@pytest.mark.slow
 def test_deep_graphs():
     """A thousand nested products and functions: no recursion over them."""
     deep = x

@@ -160,6 +160,7 @@ def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(
     assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_strong_resonances_on_a_curve_of_neimark_sacker_points():
     """x' = (a + i b) x at the origin of a forced plane: the angle is 2 pi b."""
     t, b = ca.SX.sym("t"), ca.SX.sym("b")

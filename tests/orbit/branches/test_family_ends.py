@@ -66,7 +66,7 @@ def test_crossing_cycles_end_where_both_foci_are_on_the_surface():
     assert event.kind == "boundary equilibrium" and abs(event.parameter) < 1e-15
 
 
-@pytest.mark.parametrize("bend", [0.3, -0.3])
+@pytest.mark.parametrize("bend", [pytest.param(0.3, marks=pytest.mark.slow), -0.3])
 def test_crossing_cycles_end_at_a_two_fold(bend):
     """Folds at x = 0 and at x = mu, both invisible: one two-fold at mu = 0, around which cycles of the size
     sqrt(mu/bend) are born as sliding between the folds changes its stability (pseudo-Hopf)."""

@@ -48,6 +48,7 @@ def test_doubled_orbits_meet_the_doubling_of_the_single_one():
     assert single[2.8].legs[0].start[0] == pytest.approx(1 - 1 / 2.8, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_the_third_doubling_of_the_walker_has_its_coefficient_too():
     """The orbits beside it hold in a small neighbourhood only."""
     problem = ns.textbook.simplest_walker()
@@ -111,7 +112,9 @@ def split(event, name, bounds, value):
     return float(apart @ apart) / 4
 
 
-@pytest.mark.parametrize("case", ["ball on a table", "buck converter", "walker"])
+@pytest.mark.parametrize(
+    "case", ["ball on a table", pytest.param("buck converter", marks=pytest.mark.slow), "walker"]
+)
 def test_doubled_orbits_part_as_the_coefficient_foretells(case):
     """The half distance e of the two rounds obeys c e^2 = -1 - (multiplier of the single orbit)."""
     if case == "ball on a table":
@@ -251,6 +254,7 @@ def test_a_curve_of_doublings_has_the_point_where_it_becomes_subcritical():
     assert kind == "degenerate period doubling" and np.abs(values).max() < 1e-8
 
 
+@pytest.mark.slow
 def test_orbits_without_the_symmetry_part_as_the_coefficient_of_the_pitchfork_foretells():
     """Duffing's oscillator: half the distance e of a state from the mirror image of that half a period later
     obeys c e^2 = -1 - (multiplier of the half map of the symmetric orbit)."""

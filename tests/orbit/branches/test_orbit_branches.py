@@ -324,6 +324,7 @@ def test_a_corner_of_two_surfaces_is_passed_and_a_touch_of_one_is_named():
     assert abs(top - event.parameter) < 1e-5 and event.far_side.verdict == "persistence"
 
 
+@pytest.mark.slow
 def test_an_event_at_the_first_leg_of_a_half_orbit_is_that_of_its_own_mode():
     """The slide that ends at w = 31.63 begins the half; before it is the mirror image of the last leg."""
     problem = ns.textbook.multi_sliding_relay()

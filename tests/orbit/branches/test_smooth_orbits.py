@@ -72,6 +72,7 @@ def flipping():
     return ns.FilippovSystem([u, w], field=[f[0], f[1]], time=t, parameters={m: -0.3, q: 1.0})
 
 
+@pytest.mark.slow
 def test_a_moebius_band_doubles_the_period_and_the_doubled_orbit_is_found():
     system = flipping()
     orbit = ns.periodic_orbit(system, [0.01, 0.01])

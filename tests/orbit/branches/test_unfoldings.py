@@ -109,6 +109,7 @@ def test_a_branch_gives_the_orbit_of_each_side_up_to_the_event(branch):
             assert orbit.itinerary == word and not orbit.is_virtual
 
 
+@pytest.mark.slow
 def test_doubled_orbits_between_two_doublings_are_followed_once():
     """A block on a belt, forced: the orbits of two periods begin and end at doublings of the single one."""
     b, A = symbols("b A")
@@ -142,6 +143,7 @@ def test_doubled_orbits_between_two_doublings_are_followed_once():
     assert sorted(again) == pytest.approx(sorted(e.parameter for e in ends), abs=1e-8)
 
 
+@pytest.mark.slow
 def test_a_symmetric_orbit_that_grazes_two_walls_at_once_is_not_classified():
     """A mass between two walls: where it touches one it touches the other half a period later."""
     F = ca.SX.sym("F")

@@ -103,7 +103,7 @@ def solid_spiral(shear: float) -> ns.FilippovSystem:
     )
 
 
-@pytest.mark.parametrize("shear", [0.0, 0.4])
+@pytest.mark.parametrize("shear", [0.0, pytest.param(0.4, marks=pytest.mark.slow)])
 def test_a_pseudo_saddle_in_space_is_reached_by_sliding(shear: float) -> None:
     found = ns.find_homoclinic(solid_spiral(shear), [-1.4 + 0.2 * shear, 0.0, 0.2], "c")
     assert abs(found.value - float(CASES["H1"]["c_homoclinic"])) < 1e-12
@@ -129,6 +129,7 @@ def test_curves_of_pseudo_homoclinics_and_their_neutral_saddle() -> None:
     assert abs(special.values[1] - neutral) < 1e-9
 
 
+@pytest.mark.slow
 def test_planar_and_solid_curves_agree(spiral: ns.FilippovSystem) -> None:
     box = [(-1.0, 0.0), (0.08, 0.12)]
     planar = ns.continue_bifurcation(
@@ -157,7 +158,7 @@ def sandstede(a: float) -> ns.FilippovSystem:
     )
 
 
-@pytest.mark.parametrize("a", [-0.2, 0.2])
+@pytest.mark.parametrize("a", [pytest.param(-0.2, marks=pytest.mark.slow), 0.2])
 def test_a_loop_with_a_closed_form(a: float) -> None:
     found = ns.find_homoclinic(sandstede(a), [0.0, 0.0, 0.0], "mu")
     assert abs(found.value) < 1e-12 and found.complete

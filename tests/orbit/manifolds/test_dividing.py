@@ -58,6 +58,7 @@ def require_closed_form(found, old, tol=1e-12):
     assert kinds == {"grazing", "two-fold"}
 
 
+@pytest.mark.slow
 def test_three_states_cut_at_a_height():
     above, below = base()
     system = ns.FilippovSystem([X, Y, Z], surface=X, above=above, below=below)
@@ -87,7 +88,8 @@ def test_three_states_cut_at_a_height():
     assert slides.points[-1, 1] == 1.0  # the box is met exactly
 
 
-@pytest.mark.parametrize("seed", [3, pytest.param(4, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [3, 4])
 def test_four_states_mixed_by_a_linear_map(seed):
     """Two-folds are a line; the surface does not feel the fourth direction, but all states do."""
     v = [ca.SX.sym(f"v{k}") for k in range(4)]
@@ -235,6 +237,7 @@ def opening():
     return system, ns.find_two_fold(system, near=[0.0, 0.0, 1.0])
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("computed", [False, True])
 def test_orbits_that_end_where_both_fields_agree(computed):
     system, fold = opening()

@@ -64,6 +64,7 @@ def test_times_broadcast():
     assert futures(np.ones((2, 3))).shape == (5, 2, 3, 1)
 
 
+@pytest.mark.slow
 @given(st.floats(0.1, 3.0), st.floats(0.1, 3.0), st.floats(0.5, 3.0))
 @at_most(20)
 def test_leaving_speeds_are_those_of_the_two_fields(up, down, t_end):
@@ -171,6 +172,7 @@ def test_the_canard_goes_on_where_it_arrived():
     np.testing.assert_allclose(futures([0.5, 3.5])[:, 0, 1:], 0.375, atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_sector_of_canards_of_the_teixeira_singularity():
     """II-C, nu = (-2, -1): every orbit of Dr comes from s, after the time of the formula."""
     system = two_fold((-1, 1), (-2.0, -1.0))
@@ -196,6 +198,7 @@ def test_a_sector_of_canards_of_the_teixeira_singularity():
     assert {d.side for d in futures.departures if d.path < 0} == set()  # invisible: none at once
 
 
+@pytest.mark.slow
 def test_faux_canards_leave_into_attracting_sliding():
     """VV-F, nu = (2, 1): from s up, down, or anywhere into Da, where sliding lasts to a fold."""
     futures = ns.orbit.funnel(two_fold((1, -1), (2.0, 1.0)), [0.0, 0.0, 0.0], 1.0, samples=12)
@@ -213,8 +216,10 @@ def test_faux_canards_leave_into_attracting_sliding():
     [
         ((1, 1), (-1.5, 1.5), {"+", "-", "s"}),  # mix-S: a canard and a faux canard
         ((1, 1), (-3.0, -0.5), {"+", "-", "s"}),  # mix-C
-        ((1, 1), (0.5, 3.0), {"+", "s"}),  # mix-F
-        ((-1, -1), (3.0, 0.5), {"-", "s"}),  # mix-0 ... or F, with the sides exchanged
+        pytest.param((1, 1), (0.5, 3.0), {"+", "s"}, marks=pytest.mark.slow),  # mix-F
+        pytest.param(
+            (-1, -1), (3.0, 0.5), {"-", "s"}, marks=pytest.mark.slow
+        ),  # mix-0 ... or F, with the sides exchanged
         ((1, 1), (0.0, 0.5), {"+"}),  # mix-0
         ((-1, 1), (-0.5, -0.5), {"s"}),  # II-F: one faux canard
     ],
@@ -248,6 +253,7 @@ def test_four_states_start_at_the_two_fold_given():
         assert continuous(run)
 
 
+@pytest.mark.slow
 def test_explicit_time():
     """A two-fold at t = 0.3 of a system that depends on time: members leave it then."""
     system = ns.FilippovSystem(

@@ -75,6 +75,7 @@ def test_the_homoclinic_orbit_leaves_by_the_fold_and_ends_at_the_pseudo_saddle()
     assert np.abs(slide.arcs[0].points[:20, 1]).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_a_surface_of_a_saddle_in_space():
     """x' = -x, y' = -3 y, z' = z + x**2: the stable manifold is z = -x**2/3."""
     switched = ns.FilippovSystem(
@@ -256,6 +257,7 @@ X, Y, Z = (ca.SX.sym(s) for s in ("X", "Y", "Z"))
 R = ca.sqrt(X * X + Y * Y)
 
 
+@pytest.mark.slow
 def test_the_surface_of_a_saddle_cycle_is_its_closed_form():
     """rho' = -rho + z^2 and z' = z/5 about the circle of radius 1: rho = z^2/1.4 leaves it."""
     g = 1 - R + Z * Z
@@ -272,6 +274,7 @@ def test_the_surface_of_a_saddle_cycle_is_its_closed_form():
     assert np.hypot(*inside.points[:, :2].T).min() < 0.8
 
 
+@pytest.mark.slow
 def test_a_cycle_through_a_switch_keeps_its_cylinder():
     """What leaves along z grows by exp(0.6 pi) a round, at different rates on the two sides."""
     g = 1 - R
@@ -330,6 +333,7 @@ def test_the_surface_that_divides_orbits_passing_a_two_fold():
     assert len(found.triangles) > 100 and len(found.arcs) > 20
 
 
+@pytest.mark.slow
 def test_what_leaves_a_canard_is_a_surface_too():
     system = passing()
     fold = ns.find_two_fold(system, near=[0.0, 0.01, 0.01])

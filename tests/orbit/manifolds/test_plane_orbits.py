@@ -18,6 +18,7 @@ def orbits(above, below, surface=y, box=(-2.0, 2.0, -2.0, 2.0), t_end=None):
     return PlaneOrbits(PlaneScan.of(system, {}, Box(*box)), t_end)
 
 
+@pytest.mark.slow
 def test_an_orbit_is_that_of_simulate_however_often_it_is_looked_at():
     block = orbits([y, -x - 0.4], [y, -x + 0.4], box=(-4.0, 4.0, -4.0, 4.0), t_end=15.0)
     curve = block.follow(np.array([3.0, 0.0]))
@@ -138,6 +139,7 @@ def ends_in_the_box(flow, curves, rests):
             yield curve[-1], gaps.min() < 1 / 150
 
 
+@pytest.mark.slow
 def test_every_orbit_goes_to_where_it_ends():
     """Predator and prey with a threshold: to sliding, to rest, to another orbit or out of the box."""
     a, d, effort, b = 0.3556, 0.0444, 0.2067, 0.3
@@ -160,6 +162,7 @@ def test_orbits_end_in_a_node_and_spirals_in_a_focus():
         assert sum(bool(np.all(np.abs(end) < 1e-12)) for end, _ in ends) > 2
 
 
+@pytest.mark.slow
 def test_no_orbit_ends_in_mid_air_unless_it_thins_out():
     """A limit cycle through a surface that is crossed: where orbits crowd, and nothing ends on it."""
     smooth = 0.5 * (1 - x**2) * y - x

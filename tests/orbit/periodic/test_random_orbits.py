@@ -6,6 +6,7 @@ from __future__ import annotations
 import casadi as ca
 import mpmath as mp
 import numpy as np
+import pytest
 from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
@@ -61,6 +62,7 @@ def returned(legs, sides, x, t, span):
     return [rest[0], rest[1]]
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=2)
 @given(st.integers(0, 10**6))
 def test_multipliers_are_those_of_the_return_map_with_40_digits(seed: int) -> None:
@@ -87,6 +89,7 @@ def test_multipliers_are_those_of_the_return_map_with_40_digits(seed: int) -> No
     assert abs(np.prod(orbit.multipliers) - size) < 1e-11
 
 
+@pytest.mark.slow
 @settings(deadline=None, max_examples=5)
 @given(
     st.integers(0, 10**6), st.sampled_from([1e-4, 7.0, -1.0, -1e5]), st.sampled_from([1e-6, 1e4])

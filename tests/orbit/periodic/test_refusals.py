@@ -145,6 +145,7 @@ def integrators(b3: float, a: float) -> ns.FilippovSystem:
     return ns.FilippovSystem([X, Y, z], surface=X, above=field(1), below=field(-1))
 
 
+@pytest.mark.slow
 def test_a_run_that_chatters_is_refused_soon_and_by_its_name() -> None:
     system = integrators(0.1, 1.0)
     run = ns.simulate(system, [1.0, 0.0, 0.0], 200.0, max_events=20_000)

@@ -129,6 +129,7 @@ def test_interruption_keeps_what_was_counted(monkeypatch):
     assert np.allclose(np.sort(found.exponents), [-math.log(2), 0.0], atol=1e-9)
 
 
+@pytest.mark.slow
 def test_a_run_that_ends_at_an_event_loses_no_direction():
     """Chebyshev's map at each tick of a clock: ln 2, and 0 of the clock, whose last tick is the end."""
     x, c = ca.SX.sym("x"), ca.SX.sym("c")

@@ -52,7 +52,7 @@ def test_a_block_on_an_incline_in_closed_form():
 @pytest.mark.parametrize(
     ("start", "itinerary"),
     [
-        ((1.0, 0.2, 0.3, 0.5), "* s *"),
+        pytest.param((1.0, 0.2, 0.3, 0.5), "* s *", marks=pytest.mark.slow),
         ((2.0, 0.2, -0.3, 1.5), "*"),
         ((0.4, 0.1, -0.4, -0.1), "s *"),
     ],
@@ -117,6 +117,7 @@ def test_corners_and_other_systems_are_refused():
         ns.orbit.saltation_matrix(block(), "*", "s", [0, 0, 0, 0])
 
 
+@pytest.mark.slow
 def test_gradients_are_products_of_the_derivatives():
     system = block()
     x1, x2 = (system.extended_states[i] for i in (0, 1))

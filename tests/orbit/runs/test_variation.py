@@ -125,6 +125,7 @@ def test_an_impact_and_friction_at_the_contact() -> None:
     assert len(s.event_times) >= 1
 
 
+@pytest.mark.slow
 def test_sliding_on_two_surfaces_one_after_the_other() -> None:
     z = ca.SX.sym("z")
     system = ns.FilippovSystem(
@@ -140,6 +141,7 @@ def test_sliding_on_two_surfaces_one_after_the_other() -> None:
     assert np.linalg.matrix_rank(s.dx_dx0, tol=1e-10) == 1
 
 
+@pytest.mark.slow
 def test_sliding_of_hidden_dynamics() -> None:
     system = ns.FilippovSystem(
         [x, y],

@@ -44,6 +44,7 @@ def test_arcs_of_both_kinds_and_where_they_meet(found):
     assert (axes.get_xlabel(), axes.get_ylabel(), axes.get_title()) == ("y", "z", "starts")
 
 
+@pytest.mark.slow
 def test_what_leaves_two_folds_has_another_colour(found):
     (axes,) = ns.plot.dividing_curves([found, backward()]).axes
     lines = [line for line in axes.lines if line.get_linestyle() != "None"]
@@ -67,6 +68,7 @@ def test_what_does_not_fit_is_refused(found):
         ns.plot.manifold(found)
 
 
+@pytest.mark.slow
 def test_a_circle_is_where_two_itineraries_of_one_kind_meet():
     given = dict(starts=lambda a, b: [a, b, 0.6 - 0.3 * b], box=[(-0.8, 0.83), (-2.1, 1.07)])
     fold = ns.find_two_fold(SYSTEM, near=[0, 0, 0])  # starts on either side of the surface

@@ -28,6 +28,7 @@ def harvest(level):
     )
 
 
+@pytest.mark.slow
 def test_every_object_of_a_portrait_is_drawn_and_explained():
     figure = ns.plot.phase_portrait(harvest(0.95), (0.0, 1.2, 0.3, 1.5))
     ax = figure.axes[0]
@@ -43,6 +44,7 @@ def test_every_object_of_a_portrait_is_drawn_and_explained():
     assert {"visible fold", "stable pseudo-node", "unstable focus", "$h > 0$", "$h < 0$"} <= named
 
 
+@pytest.mark.slow
 def test_drawn_orbits_follow_the_fields():
     system = harvest(0.95)
     scan = PlaneScan.of(system, {}, Box(0.0, 1.2, 0.3, 1.5))
@@ -100,6 +102,7 @@ def test_a_box_without_the_surface_is_drawn():
     assert figure.axes[0].get_title() == "below"
 
 
+@pytest.mark.slow
 def test_global_settings_are_left_alone_and_files_are_written(tmp_path):
     before = dict(matplotlib.rcParams)
     figure = ns.plot.phase_portrait(harvest(0.95), (0.0, 1.2, 0.3, 1.5))
@@ -109,6 +112,7 @@ def test_global_settings_are_left_alone_and_files_are_written(tmp_path):
         assert (tmp_path / f"plane.{suffix}").read_bytes().startswith(start)
 
 
+@pytest.mark.slow
 def test_other_systems_and_boxes_are_refused():
     z, t = ca.SX.sym("z"), ca.SX.sym("t")
     box = (-1, 1, -1, 1)
@@ -136,6 +140,7 @@ def test_other_systems_and_boxes_are_refused():
         ns.plot.phase_portrait(harvest(1.0), box, starts=[1, 2])
 
 
+@pytest.mark.slow
 def test_an_orbit_that_goes_on_beside_another_thins_out():
     pendulum = ns.FilippovSystem(
         [x, y], surface=y, above=[y, -ca.sin(x) - 0.3], below=[y, -ca.sin(x) + 0.3]
@@ -153,6 +158,7 @@ def test_an_orbit_that_goes_on_beside_another_thins_out():
         assert min(np.linalg.norm(parts[-1][-1] - join) for join in joins) < 1e-12
 
 
+@pytest.mark.slow
 def test_an_equilibrium_on_the_surface_has_the_name_that_it_has():
     """Not that of a fold, which is visible or not by rounding."""
     ax = ns.plot.phase_portrait(harvest(0.80135528), (0.0, 1.2, 0.3, 1.5)).axes[0]

@@ -25,7 +25,7 @@ def system(above, below, surface=x):
     ("label", "words"),
     [
         ("VV-C1", ("visible", "visible")),
-        ("II-C", ("invisible", "invisible")),
+        pytest.param("II-C", ("invisible", "invisible"), marks=pytest.mark.slow),
         ("mix-S", ("visible", "invisible")),
     ],
 )
@@ -73,6 +73,7 @@ def test_cusp_parts_the_visible_from_the_invisible_fold():
         assert np.abs(b + a**2 - 0.3).max() < 1e-12
 
 
+@pytest.mark.slow
 def test_curved_surface_is_drawn_over_chosen_coordinates():
     s = system([1, 1, 0], [0, 0, 1], surface=z + x - y**2)  # L1 = 1 - 2 y, fold at y = .5
     for names, column in ((("x", "y"), 1), (("y", "x"), 0), (("y", "z"), 0)):
@@ -120,6 +121,7 @@ def test_bad_input_is_refused_with_advice(call, error, words):
         call(ns.textbook.two_fold("II-C").system)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("box", [(-1, 0.05, -1, 1), (-1, 1, -0.02, 1), (-0.03, 1, -1, 0.04)])
 def test_the_name_of_a_class_is_inside_of_a_narrow_frame(box):
     system = ns.textbook.two_fold("VV-C1").system

@@ -114,6 +114,7 @@ def test_backward_and_empty_runs_are_drawn():
     ns.plot.trajectory(stuck)
 
 
+@pytest.mark.slow
 def test_global_settings_are_left_alone_and_files_are_written(run, tmp_path):
     before = dict(matplotlib.rcParams)
     figure = ns.plot.trajectory(run)
@@ -148,6 +149,7 @@ def test_motion_off_a_set_is_drawn_with_its_own_words(name):
     assert len(figure.axes) >= 2
 
 
+@pytest.mark.slow
 def test_a_run_of_very_many_events_marks_its_end_and_shortens_its_title():
     """A relay oscillator of some 340 crossings: what is drawn is the last event alone."""
     p, q = ca.SX.sym("p"), ca.SX.sym("q")

@@ -83,6 +83,7 @@ def test_each_class_is_named_in_its_area():
             assert classify_two_fold(sigma, name.get_position()).label == name.get_text()
 
 
+@pytest.mark.slow
 def test_the_atlas_draws_what_it_is_asked_for(tmp_path):
     before = dict(matplotlib.rcParams)
     figure = ns.plot.two_fold_atlas(["II-C", "mix-S"])
@@ -95,6 +96,7 @@ def test_the_atlas_draws_what_it_is_asked_for(tmp_path):
     assert_allclose(figure.get_size_inches()[0], 7.0)  # the width of a page
 
 
+@pytest.mark.slow
 def test_pages_have_two_each_and_fit_a_page():
     pages = ns.plot.two_fold_atlas_pages(["II-C", "mix-S", "VV-F"])
     titles = [[ax.get_title().split(" ")[0] for ax in page.axes] for page in pages]

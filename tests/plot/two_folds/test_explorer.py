@@ -96,6 +96,7 @@ def compare(browser, page, folds, count):
     return labels
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("folds", SIGMA)
 def test_classes_and_numbers_are_those_of_the_decision_table(browser, page, folds):
@@ -190,6 +191,7 @@ def test_page_fits_complains_of_nothing_and_names_every_control(browser, page, f
     assert seen["slopes"] == pytest.approx([m for _, m in eigenlines(flow)])
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_keys_move_the_point_and_everything_follows(browser, page):
     from selenium.webdriver.common.by import By
@@ -246,6 +248,7 @@ def test_classes_have_the_colours_of_the_atlas_and_boundaries_of_many_are_listed
     assert fills == {label: color for label, (color, _) in FILLS.items()}
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     for words in ("folds=toString&nu=a,b", "folds=XX&nu=1", "nu=NaN,1", "%E0%A4%A"):
@@ -255,6 +258,7 @@ def test_an_address_that_makes_no_sense_shows_the_start(browser, page):
     assert shown(browser)["say"] == "ν₁ = 3, ν₂ = −3"
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 @pytest.mark.parametrize("width", WIDTHS)
 def test_the_point_is_dragged(browser, page, width):
@@ -282,6 +286,7 @@ return [dot.x + dot.width / 2, dot.y + dot.height / 2, frame.width];
 """
 
 
+@pytest.mark.slow
 @pytest.mark.browser
 def test_a_finger_drags_the_point_and_beside_it_scrolls_the_page(browser, page):
     def touch(kind, *points):

@@ -98,6 +98,7 @@ def test_eigenlines_have_the_slope_of_the_theory(sigma, nu):
         assert_allclose(line.sum(axis=0), 0, atol=1e-12)  # through the two-fold
 
 
+@pytest.mark.slow_cases("mix-S-two_fold_3d")
 @pytest.mark.parametrize("draw", [ns.plot.two_fold, ns.plot.two_fold_3d])
 @pytest.mark.parametrize("sigma, nu", ALL.values(), ids=ALL)
 def test_every_part_is_named(draw, sigma, nu):
@@ -116,6 +117,7 @@ def test_every_part_is_named(draw, sigma, nu):
     assert len(ax.get_legend().get_texts()) <= 6
 
 
+@pytest.mark.slow
 def test_names_of_lines_are_left_out_or_stand_without_a_legend():
     case = CLASSES["II-C"]
     for draw in (ns.plot.two_fold, ns.plot.two_fold_3d):
@@ -164,6 +166,7 @@ def test_global_settings_and_pyplot_are_left_alone(draw):
     assert pyplot.get_fignums() == known
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("draw", [ns.plot.two_fold, ns.plot.two_fold_3d])
 @pytest.mark.parametrize(
     "suffix, start", [("png", b"\x89PNG"), ("pdf", b"%PDF-"), ("svg", b"<?xml")]

@@ -28,6 +28,7 @@ def test_stick_slip_has_the_events_of_the_closed_form():
         assert holds(orbit.events[1].x["x"], mpmath.mpf(1))
 
 
+@pytest.mark.slow
 def test_a_nonlinear_orbit_agrees_with_mpmath_at_30_digits():
     s = ns.FilippovSystem(
         [x, v], surface=x - 5, above=[1, 1], below=[v, (1 - x**2) * v - ca.sin(x)]
@@ -42,6 +43,7 @@ def test_a_nonlinear_orbit_agrees_with_mpmath_at_30_digits():
             assert abs(mpmath.mpf(value.low) - truth) < mpmath.mpf(10) ** -24
 
 
+@pytest.mark.slow_cases("2", "3")
 @pytest.mark.parametrize("seed", range(4))
 def test_itineraries_and_times_are_those_of_simulate(seed):
     rng = np.random.default_rng(seed)
@@ -64,6 +66,7 @@ def test_itineraries_and_times_are_those_of_simulate(seed):
     assert [e.middle for e in orbit.end.values()] == pytest.approx(list(run.x[-1]), abs=1e-7)
 
 
+@pytest.mark.slow
 def test_boxes_hold_the_orbits_from_their_points():
     s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
     box = [(-0.01, 0.01), (-0.005, 0.005)]
@@ -159,6 +162,7 @@ def test_a_start_on_the_surface_is_told_exactly():
     assert not undecided.proven and "undecided" in undecided.why
 
 
+@pytest.mark.slow
 def test_a_guard_is_not_followed_over_its_jump():
     """atan2 jumps where the orbit crosses the negative axis; Taylor series know nothing beyond."""
     angle = ns.FilippovSystem(

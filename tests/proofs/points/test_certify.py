@@ -208,6 +208,7 @@ def test_what_is_given_wrongly_is_refused():
             proven(system, parameters={"p": bad})
 
 
+@pytest.mark.slow
 def test_without_the_package_the_error_says_what_to_install():
     code = (
         "import sys; sys.modules['flint'] = None\n"

@@ -41,6 +41,7 @@ def test_the_count_is_that_of_the_closed_form(first, second, count):
     assert all(p.exists for p in everything.zeros)
 
 
+@pytest.mark.slow
 def test_double_zeros_curves_and_edges_are_named():
     double = ns.prove_all(flat(x**2 + y**2 - 1, x - 1), BOX)
     assert not double.complete and "not simple" in double.undecided[0].why
@@ -56,6 +57,7 @@ def test_double_zeros_curves_and_edges_are_named():
     assert exact.complete and len(exact.zeros) == 1
 
 
+@pytest.mark.slow
 def test_branch_points_are_not_passed_over():
     everything = ns.prove_all(flat(ca.sqrt(x) - 0.5, y), BOX)
     assert not everything.complete
@@ -82,6 +84,7 @@ def test_planar_points():
     ]
 
 
+@pytest.mark.slow
 def test_newton_finds_nothing_that_is_not_proven():
     assert theorems.lists(seed=3, systems=4, starts=15).sound
 
@@ -117,6 +120,7 @@ def test_what_is_given_wrongly_is_refused():
     assert ns.prove_all(s, [(-1, 1), 0.25, (-1, 1)], "fold").complete
 
 
+@pytest.mark.slow
 def test_a_jump_with_a_finite_derivative_is_not_passed_over():
     """atan2 jumps by 2 pi over its cut, where its derivative is finite."""
     for offset in (3.1, -3.1, 0.0, 3.0):

@@ -71,6 +71,7 @@ def test_an_arc_ends_at_a_test_that_ends_it():
     assert abs(arc.points[-1].u[0] - 0.5) < 1e-13
 
 
+@pytest.mark.slow
 @at_most(20)
 @given(st.floats(1e-6, 1e6))
 def test_units_do_not_matter(factor):

@@ -23,7 +23,21 @@ _THREADS, _RESIDENT = 128, 2
 
 
 class Card:
-    """One CUDA device."""
+    """One CUDA device.
+
+    Parameters
+    ----------
+    core : module
+        ``cuda.core``.
+    fused : bool
+        Whether products and sums are fused, as in the lanes on a processor; without, the bits are those of
+        the same text as C++ compiled so.
+
+    Raises
+    ------
+    DeviceError
+        No driver, or no device.
+    """
 
     threads = _THREADS
 

@@ -1,6 +1,6 @@
 /* One lane for each thread: the types and operations of vector.h, for the same text. A mask is all ones or zeros.
  *
- * As CUDA C++ by NVRTC, or as C++ by any compiler: shim.py then goes through blocks and threads one by one.
+ * As CUDA C++ by NVRTC, or as C++ by any compiler: tests then go through blocks and threads one by one.
  * All arithmetic is that of vector.h without AVX-512, operation by operation.
  */
 #define W 1

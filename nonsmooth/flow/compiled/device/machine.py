@@ -1,4 +1,4 @@
-"""What a GPU must do for us: compile, hold arrays, launch. ``card.py`` does it, and ``shim.py`` on this processor."""
+"""What a GPU must do: compile, hold arrays, launch. ``card.py`` does it; tests put a processor in its place."""
 
 from __future__ import annotations
 

@@ -28,6 +28,7 @@ def synthetic(model, n, noise=0.0, seed=0, components=("xdot", "ydot", "omega"))
     return data
 
 
+@pytest.mark.slow
 def test_exact_data_give_the_exact_parameters():
     found = bounce.golf.fit(GUESS, synthetic(TRUE, 15), parameters=["mu", "eta", "d2"], starts=4)
     for name in ("mu", "eta", "d2"):
@@ -47,6 +48,7 @@ def test_gradient_is_that_of_differences():
     assert np.abs(exact - numeric).max() < 1e-7
 
 
+@pytest.mark.slow
 def test_coverage():
     """Of 40 fits, a 90 % interval holds the truth in 36 +- 6 (three standard deviations)."""
     law = bounce.laws.TiltedBounce(mu=0.25, restitution=0.4, tilt=0.2)
@@ -61,6 +63,7 @@ def test_coverage():
     assert np.all(np.abs(counts - 36) <= 6), counts
 
 
+@pytest.mark.slow
 def test_noise_on_a_contact_model():
     found = bounce.golf.fit(
         GUESS, synthetic(TRUE, 40, 0.005), parameters=["mu", "eta", "d2"], starts=3, polish=1

@@ -95,6 +95,7 @@ def _build_and_call(number):
     return build(f"int answer(void) {{ return {number}; }}\n").answer()
 
 
+@pytest.mark.slow
 def test_many_processes_at_once(cache):
     with multiprocessing.get_context("spawn").Pool(4) as pool:
         assert pool.map(_build_and_call, [7] * 8) == [7] * 8

@@ -112,14 +112,9 @@ print(text)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
-    "stub",
-    [
-        "writes no library",
-        pytest.param("developer tools", marks=pytest.mark.slow),
-        pytest.param("no program", marks=pytest.mark.slow),
-    ],
-    indirect=True,
+    "stub", ["writes no library", "developer tools", "no program"], indirect=True
 )
 def test_without_another_compiler_the_reference_driver_runs_with_one_warning(stub):
     path = os.pathsep.join(p for p in sys.path if p)

@@ -280,6 +280,7 @@ print(folder)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() != 0, reason="needs another user")
 def test_a_user_without_an_entry_in_passwd(tmp_path):
     environment = {"PATH": os.environ["PATH"], "TMPDIR": "/tmp"}

@@ -10,8 +10,8 @@ import pytest
 import nonsmooth as ns
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device.card import Card
-from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.ensembles import on_device
+from tests.flow.compiled.device.shim import Shim
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 

@@ -15,7 +15,7 @@ ROOT = Path(__file__).parents[4]
 PROGRAM = """
 import numpy as np
 from nonsmooth.flow.compiled.device.kernel import Bins, Kernel, Source
-from nonsmooth.flow.compiled.device.shim import Shim
+from tests.flow.compiled.device.shim import Shim
 from nonsmooth.flow.options import Options
 from nonsmooth.flow.results import Chunk
 from benchmarks.problems import bounce_system, random_starts

@@ -9,12 +9,12 @@ import nonsmooth.textbook as textbook
 from benchmarks.problems import bounce_system, random_starts
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.device.kernel import word_of
-from nonsmooth.flow.compiled.device.shim import Shim
 from nonsmooth.flow.compiled.lanes import engine
 from nonsmooth.flow.constants import HAND_OVER
 from nonsmooth.flow.ensembles import on_device
 from nonsmooth.flow.options import Options
 from tests.flow.compiled.device.cases import TAKEN, block_on_a_belt, ends
+from tests.flow.compiled.device.shim import Shim
 
 pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
 
@@ -66,6 +66,7 @@ def compared(system, x, options, machine, monkeypatch, at=None, p=None):
     return done
 
 
+@pytest.mark.slow
 def test_same_bits_as_lanes_without_contraction(system, shim, monkeypatch):
     done = compared(system, STARTS, LOOSE, shim, monkeypatch, at=(1, 1))
     assert done.sum() > 150

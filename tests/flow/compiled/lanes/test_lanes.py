@@ -134,6 +134,7 @@ def test_reference_and_compiled_engines_agree(system, starts):
         np.testing.assert_allclose(one.x, two.x, atol=1e-12)
 
 
+@pytest.mark.slow
 @needs_compiler
 def test_process_pool_gives_the_same_bits(system, starts):
     here = ensemble(system, starts, 5.0, work=Work(chunk=50))
@@ -377,6 +378,7 @@ def test_arguments_of_another_kind_are_refused(arguments, message):
         ensemble(x0=[[1.0]], t_end=1.0, **given)
 
 
+@pytest.mark.slow
 def test_what_lanes_hand_over_has_no_itineraries_of_its_own():
     """Starts on the surface at a fold are handed over; their neighbours are not."""
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
@@ -389,7 +391,10 @@ def test_what_lanes_hand_over_has_no_itineraries_of_its_own():
     assert many.itinerary[::40].tolist() == single
 
 
-@pytest.mark.parametrize(("engine", "count"), [("reference", 3), ("auto", 3), ("auto", 100)])
+@pytest.mark.parametrize(
+    ("engine", "count"),
+    [("reference", 3), ("auto", 3), pytest.param("auto", 100, marks=pytest.mark.slow)],
+)
 def test_events_that_cannot_happen_are_none(engine, count):
     """A relay enters sliding once; a saw is set back by 1 whenever it reaches 5."""
     x, starts = ca.SX.sym("x"), np.linspace(-1.0, 4.0, count)[:, None]

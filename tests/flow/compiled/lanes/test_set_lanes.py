@@ -56,6 +56,7 @@ def test_random_landings_agree_with_the_interpreter():
     assert lanes.totals[2] < 80 and alone.totals[2] <= 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("kind", ["linear", "nonlinear"])
 def test_mirror_images_are_mirrored_to_the_bit_and_turned_starts_turn(kind):
     system, x = space.system(kind), space.starts(400)

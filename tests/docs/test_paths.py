@@ -1,4 +1,4 @@
-"""README, CONTRIBUTING and the page on extending name paths that exist."""
+"""Paths and names in README, CONTRIBUTING and the page on extending exist."""
 
 import re
 from pathlib import Path

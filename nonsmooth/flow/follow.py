@@ -29,7 +29,7 @@ from ..model import (
     watched_functions,
 )
 from . import messages
-from .options import Options
+from .options import Options, tolerances
 from .reference.coupled_modes import CoupledModes
 from .reference.modes import Expansion, Modes, SeparateModes, powers
 from .reference.polynomial import first_crossing
@@ -108,11 +108,12 @@ def follow(
     """
     require_system(system)
     t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
+    rtol, atol = tolerances(tol, rtol, atol)
     options = Options(
         t_end=max(t_end, t_start),
         t_start=min(t_end, t_start),
-        rtol=tol if rtol is None else rtol,
-        atol=tol if atol is None else atol,
+        rtol=rtol,
+        atol=atol,
         max_step=max_step,
         max_steps=max_steps,
     )

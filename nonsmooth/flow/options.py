@@ -5,10 +5,23 @@ from __future__ import annotations
 import math
 import sys
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from ..model import OptionError, explain, real, whole
 from .constants import SAFETY
 from .section import Hits
+
+
+class Tolerances(NamedTuple):
+    """Relative and absolute tolerance of a run."""
+
+    rtol: float
+    atol: float
+
+
+def tolerances(tol: float, rtol: float | None = None, atol: float | None = None) -> Tolerances:
+    """Both are ``tol`` unless given apart."""
+    return Tolerances(tol if rtol is None else rtol, tol if atol is None else atol)
 
 
 @dataclass(frozen=True)

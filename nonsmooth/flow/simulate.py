@@ -15,7 +15,7 @@ from .compiled.convert import trajectory
 from .compiled.tape import library, tape_for
 from .constants import HAND_OVER
 from .ensembles.starts import require_start_mode
-from .options import Options
+from .options import Options, tolerances
 from .reference.driver import Driver
 from .section import Section, Times
 from .select import compiled_or_none, use_compiled
@@ -113,11 +113,12 @@ def simulate(
     ('- + - + s', True)
     """
     require_system(system, sets=True)
+    rtol, atol = tolerances(tol, rtol, atol)
     options = Options(
         t_end=t_end,
         t_start=t_start,
-        rtol=tol if rtol is None else rtol,
-        atol=tol if atol is None else atol,
+        rtol=rtol,
+        atol=atol,
         max_step=max_step,
         max_steps=max_steps,
         max_events=max_events,

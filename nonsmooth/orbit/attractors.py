@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..flow.ensembles.ensemble import ensemble
 from ..flow.ensembles.work import Work
+from ..flow.options import Tolerances
 from ..flow.saving import savable
 from ..flow.section import Section
 from ..flow.status import Status
@@ -62,11 +63,12 @@ class Search:
         samples: int,
         rounds: int,
         parameters: Parameters | None,
-        tol: float,
+        tolerances: Tolerances,
         work: Work,
     ):
         self.system, self.x0 = system, starts
-        self.parameters, self.tol, self.work, self.near = parameters, tol, work, near
+        self.parameters, self.tolerances = parameters, tolerances
+        self.work, self.near = work, near
         self.samples, self.t_start, self.begun = samples, t_start, 0
         if not t_end > t_start:
             raise OptionError(f"t_end: expected a time after {t_start}, received {t_end}.")
@@ -234,7 +236,8 @@ class Search:
             end,
             t_start=t,
             parameters=dict(self.parameters or {}),
-            tol=self.tol,
+            rtol=self.tolerances.rtol,
+            atol=self.tolerances.atol,
             work=self._work(what),
             **view,
         )

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..flow.ensembles.work import Work, checked_work
+from ..flow.options import tolerances
 from ..flow.saving import Savable
 from ..model import (
     Array,
@@ -108,8 +109,8 @@ class Basins(Savable):
 def basins(
     system: FilippovSystem,
     grid: Mapping[str, ArrayLike] | ArrayLike,
-    *,
     t_end: float,
+    *,
     section: Any = None,
     attractors: Sequence[ArrayLike] = (),
     near: float = 0.01,
@@ -118,6 +119,8 @@ def basins(
     t_start: float = 0.0,
     parameters: Parameters | None = None,
     tol: float = 1e-9,
+    rtol: float | None = None,
+    atol: float | None = None,
     work: Work | None = None,
 ) -> Basins:
     """Label starts by the attractors that their runs go to.
@@ -142,7 +145,7 @@ def basins(
         Looks in each round, all of which must be near.
     rounds : int, optional
         Rounds in which the time is spent; the time of one should be enough for a few returns.
-    t_start, parameters, tol : optional
+    t_start, parameters, tol, rtol, atol : optional
         As in :func:`simulate`; parameters are numbers.
     work : Work, optional
         Threads or executor, progress bars, and a checkpoint: after an interruption the same call
@@ -192,7 +195,7 @@ def basins(
         samples=whole(samples, "samples"),
         rounds=whole(rounds, "rounds"),
         parameters=parameters,
-        tol=tol,
+        tolerances=tolerances(tol, rtol, atol),
         work=checked_work(work),
     )
     for points in _listed(system, attractors):

@@ -52,11 +52,11 @@ def test_forward_then_backward_is_the_identity(a, b, span, mode):
 
 
 def test_wrong_requests_are_refused():
-    with pytest.raises(ns.OptionError, match=r"until: expected a name among \['h0'\]"):
+    with pytest.raises(ns.OptionError, match="until"):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until="h7")
     with pytest.raises(ns.DefinitionError, match="mode"):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="up")
-    with pytest.raises(ns.DefinitionError, match=r"also \['q'\]"):
+    with pytest.raises(ns.DefinitionError, match="'q'"):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", watch=[ca.SX.sym("q")])
     with pytest.raises(ns.NotSmoothError):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until=[ca.fabs(x)])

@@ -65,7 +65,7 @@ def test_a_parameter_that_is_no_restitution_is_refused(e):
     ball = ns.FilippovSystem(
         [y, v], field=[v, -G], impacts=ns.Impact(y, restitution=1 - q), parameters={q: 0.5}
     )
-    with pytest.raises(ns.ParameterError, match=r"'impact': expected .* from 0 to 1"):
+    with pytest.raises(ns.ParameterError, match="restitution of 'impact'"):
         ns.simulate(ball, [1.0, 0.0], 5.0, parameters={"q": 1 - e})
     run = ns.ensemble(ball, [[1.0, 0.0]] * 2, 5.0, parameters={"q": [0.5, 1 - e]})
     assert [ns.Status(s) for s in run.status] == [ns.Status.REACHED_END, ns.Status.INCONSISTENT]
@@ -222,15 +222,13 @@ def test_painleve_paradox_is_named(engine):
 
 
 def test_wrong_impacts_are_refused():
-    with pytest.raises(
-        ns.DefinitionError, match="restitution of 'impact': expected a number from 0"
-    ):
+    with pytest.raises(ns.DefinitionError, match="restitution of 'impact'"):
         ns.FilippovSystem([y, v], field=[v, -G], impacts=ns.Impact(y, restitution=1.5))
-    with pytest.raises(ns.DefinitionError, match="a function of positions"):
+    with pytest.raises(ns.DefinitionError, match="positions"):
         ns.FilippovSystem([y, v], field=[v, r - G], impacts=ns.Impact(v, reaction=r))
-    with pytest.raises(ns.DefinitionError, match="does not move"):
+    with pytest.raises(ns.DefinitionError, match="reaction of 'impact'"):
         ns.FilippovSystem([y, v, x], field=[v, -G, r], impacts=ns.Impact(y, reaction=r))
-    with pytest.raises(ns.DefinitionError, match=r"impacts\[0\]: expected a Impact"):
+    with pytest.raises(ns.DefinitionError, match="impacts"):
         ns.FilippovSystem([y, v], field=[v, -G], impacts=[ns.Stop(y)])
 
 
@@ -253,7 +251,7 @@ def test_a_curved_wall_pushes_along_its_normal(engine):
 
 def test_a_reaction_whose_direction_cannot_be_seen_is_asked_for():
     """A point that moves at speed v in the direction q before a wall: the gap's rate is v cos q."""
-    with pytest.raises(ns.DefinitionError, match="expected reaction=, a symbol in the field"):
+    with pytest.raises(ns.DefinitionError, match="reaction of 'impact'"):
         ns.FilippovSystem([x, q, v], field=[v * ca.cos(q), 1, 0], impacts=ns.Impact(1 - x))
 
 

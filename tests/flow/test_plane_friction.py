@@ -206,7 +206,7 @@ def test_a_mode_to_start_in():
     # Letters that only runs know, one for each component, none, no letters
     for mode in ("+", "i", "b", "ll", "**", "", 1):
         for run in (ns.simulate, ns.ensemble):
-            with pytest.raises(ns.DefinitionError, match=r"\* s for a set"):
+            with pytest.raises(ns.DefinitionError, match="mode"):
                 run(_puck(), [0, 0, 0, 0], 2.0, start_mode=mode)
 
 
@@ -235,9 +235,9 @@ def test_a_start_off_a_set_goes_on_from_a_surface_that_repels(engine):
     assert held.itinerary == "*s" and held.status == ns.Status.NON_UNIQUE
     assert held.x[-1] == pytest.approx(np.zeros(3), abs=1e-11)
     for mode in ("s+", "ss"):
-        with pytest.raises(ns.OptionError, match=r"where h0 = \[0.6, -0.8\] \('\*'\)"):
+        with pytest.raises(ns.OptionError, match=r"start_mode.*h0"):
             run(start, mode)
-    with pytest.raises(ns.OptionError, match=r"where h1 = 2 \('\+'\)"):
+    with pytest.raises(ns.OptionError, match=r"start_mode.*h1"):
         run([0.6, -0.8, 2.0], "*s")
     assert "start_mode '*+' has 0" in run([0.0, 0.0, 0.0], "*+").message
 
@@ -268,14 +268,14 @@ def test_what_is_no_set_is_refused():
     l1, l2 = plane.columns("l1", "l2")
     pair = ca.vertcat(v[0], v[1])
     for surfaces, multipliers, message in [
-        ([pair], [l1], r"\[2\], received \[1\]"),
-        ([v[0]], [ca.vertcat(l1, l2)], r"\[1\], received \[2\]"),
-        ([ca.vertcat(*v)], [ca.SX.sym("l", 4)], "at most 3 switching functions"),
-        ([ca.SX.zeros(2, 2)], [ca.vertcat(l1, l2)], "received a matrix"),
+        ([pair], [l1], "multipliers"),
+        ([v[0]], [ca.vertcat(l1, l2)], "multipliers"),
+        ([ca.vertcat(*v)], [ca.SX.sym("l", 4)], "surface 0.*at most 3"),
+        ([ca.SX.zeros(2, 2)], [ca.vertcat(l1, l2)], "surface 0.*matrix"),
     ]:
         with pytest.raises(ns.DefinitionError, match=message):
             ns.FilippovSystem(v, field=[0] * 4, surfaces=surfaces, multipliers=multipliers)
-    with pytest.raises(ns.DefinitionError, match="all of its components together"):
+    with pytest.raises(ns.DefinitionError, match=r"multiplier \[l1, l2\].*linear"):
         ns.FilippovSystem(
             v,
             field=[l1 * l2, 0, 0, 0],
@@ -295,7 +295,7 @@ def test_what_is_no_set_is_refused():
     ],
 )
 def test_what_knows_surfaces_only_says_so(question):
-    with pytest.raises(ns.DefinitionError, match="multipliers are scalars"):
+    with pytest.raises(ns.DefinitionError, match="multipliers"):
         question(_puck())
 
 

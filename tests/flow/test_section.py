@@ -54,7 +54,7 @@ def test_an_expression_in_states_is_a_section_and_its_start_is_no_hit(sample, en
     times, states, _ = sample(TWO_SPRINGS, [-0.5, 0.0], 100.0, at=at, engine=engine)
     assert np.allclose(times, 1.5 * math.pi * np.arange(1, 4), rtol=0, atol=1e-8)
     assert np.allclose(states, [[-0.5, 0.0]] * 3, rtol=0, atol=1e-8)
-    with pytest.raises(ns.DefinitionError, match=r"section: expected the states .* received also"):
+    with pytest.raises(ns.DefinitionError, match="section"):
         sample(TWO_SPRINGS, [-0.5, 0.0], 1.0, at=ns.Section(v - w, count=1))
 
 
@@ -161,26 +161,26 @@ def test_samples_survive_a_checkpoint_and_other_requests_are_another_problem(tmp
     again = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
     assert np.array_equal(first.sample_x, again.sample_x)
     assert np.array_equal(pickle.loads(pickle.dumps(again)).sample_t, first.sample_t)
-    with pytest.raises(ns.OptionError, match="another system, start"):
+    with pytest.raises(ns.OptionError, match="another system"):
         ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.5], work=work)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"at": "h1"}, r"at: expected a name of \['h0'\] or a kind"),
-        ({"at": "end"}, "at: expected a name"),
-        ({"at": -1.0}, "period: expected a positive number, received -1.0"),
-        ({"at": [x]}, "a period or an expression"),
-        ({"at": 50.0}, "at least 1 periods"),
-        ({"at": ns.Section("entry", direction=1)}, "Only surfaces are chosen by direction"),
-        ({"at": ns.Section(1.0, after=True)}, "Times have no direction"),
-        ({"at": "h0", "t_eval": [1.0]}, "expected one of them"),
-        ({"t_eval": [[1.0]]}, r"t_eval: expected times in a row .* received shape \(1, 1\)"),
-        ({"t_eval": [2.0, 1.0]}, "received times that go back"),
-        ({"t_eval": [0.0, 11.0]}, r"to t_end = 10.0, received times from 0.0 to 11.0"),
-        ({"t_eval": [math.nan]}, "some that are not finite"),
-        ({"t_eval": "all"}, "t_eval: expected an array of times, received 'all'"),
+        ({"at": "h1"}, r"\bat\b.*'h1'"),
+        ({"at": "end"}, r"\bat\b.*'end'"),
+        ({"at": -1.0}, "period"),
+        ({"at": [x]}, r"\bat\b.*Section"),
+        ({"at": 50.0}, r"\bat\b.*periods"),
+        ({"at": ns.Section("entry", direction=1)}, "direction.*'entry'"),
+        ({"at": ns.Section(1.0, after=True)}, "direction"),
+        ({"at": "h0", "t_eval": [1.0]}, "t_eval.*at"),
+        ({"t_eval": [[1.0]]}, "t_eval"),
+        ({"t_eval": [2.0, 1.0]}, "t_eval.*back"),
+        ({"t_eval": [0.0, 11.0]}, r"t_eval.*11\.0"),
+        ({"t_eval": [math.nan]}, "t_eval.*finite"),
+        ({"t_eval": "all"}, "t_eval"),
     ],
 )
 def test_bad_requests_are_refused_by_name(options, message):
@@ -192,10 +192,10 @@ def test_bad_requests_are_refused_by_name(options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"direction": 2}, "direction: expected -1"),
-        ({"every": 0}, "every: expected a positive whole number"),
-        ({"skip": -1}, "skip: expected a whole number >= 0"),
-        ({"count": 0.5}, "count: expected a positive whole number"),
+        ({"direction": 2}, "direction"),
+        ({"every": 0}, "every"),
+        ({"skip": -1}, "skip"),
+        ({"count": 0.5}, "count"),
     ],
 )
 def test_bad_sections_are_refused(options, message):
@@ -204,7 +204,7 @@ def test_bad_sections_are_refused(options, message):
 
 
 def test_an_ensemble_must_know_how_many_hits_to_keep():
-    with pytest.raises(ns.OptionError, match="expected count= with a section at events"):
+    with pytest.raises(ns.OptionError, match="count"):
         ns.ensemble(TWO_SPRINGS, [0.0, 1.0], 10.0, at="h0")
 
 
@@ -256,9 +256,9 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
             assert run(at).sample_t == pytest.approx(quarters[1:2], abs=1e-9)
     many = ns.ensemble(system, [[1.0, 0.0, 1.0, 0.0]], 9.5, at=ns.Section(z, 1, count=1))
     assert many.sample_t[0] == pytest.approx(quarters[1:2], abs=1e-9)
-    with pytest.raises(ns.OptionError, match=r"expected a name of \['h0', 'h1'\]"):
+    with pytest.raises(ns.OptionError, match=r"\bat\b.*'h2'"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at="h2")
-    with pytest.raises(ns.OptionError, match="It is a set, which is reached from all sides"):
+    with pytest.raises(ns.OptionError, match=r"direction.*'h0'"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))
 
 

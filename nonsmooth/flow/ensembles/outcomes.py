@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, explain, require_system, whole
 from ..compiled.device.kernel import Bins, Reduced
-from ..options import Options
+from ..options import Options, tolerances
 from ..results import Chunk
 from ..status import Status
 from .chunks import Job, run_chunk
@@ -116,6 +116,8 @@ def outcomes(
     t_start: float = 0.0,
     parameters: Mapping[Any, ArrayLike] | None = None,
     tol: float = 1e-10,
+    rtol: float | None = None,
+    atol: float | None = None,
     ranges: Mapping[str, tuple[float, float]] | None = None,
     bins: int = 100,
     work: Work | None = None,
@@ -135,7 +137,7 @@ def outcomes(
         Starts.
     t_end : float
         Time at which every run ends, unless a stop ends it before.
-    t_start, tol : float, optional
+    t_start, tol, rtol, atol : float, optional
         As for :func:`ensemble`.
     parameters : mapping, optional
         Values that replace defaults: numbers, or arrays that broadcast with the starts.
@@ -172,7 +174,8 @@ def outcomes(
     >>> found.status, found.histogram["x"].sum()
     ({<Status.REACHED_END: 0>: 500}, np.int64(500))
     """
-    options = Options(t_end=t_end, t_start=t_start, rtol=tol, atol=tol)
+    rtol, atol = tolerances(tol, rtol, atol)
+    options = Options(t_end=t_end, t_start=t_start, rtol=rtol, atol=atol)
     require_system(system, sets=True)
     work = checked_work(work)
     if work.checkpoint is not None or work.store is not None:

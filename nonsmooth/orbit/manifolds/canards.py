@@ -22,6 +22,7 @@ import numpy as np
 
 from ...flow.concatenation import forward, join, straight
 from ...flow.follow import follow
+from ...flow.options import Tolerances
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local.point.lie_derivatives import Numbers
@@ -61,7 +62,7 @@ class Slider:
     where: Place
     surfaces: Surfaces
     t_end: float
-    tol: float
+    tolerances: Tolerances
 
     def on(self, x: Array) -> Array:
         """Move an extended state onto the surface."""
@@ -88,7 +89,8 @@ class Slider:
             until=[*names, *near],
             t_start=t,
             parameters=self.parameters,
-            tol=self.tol,
+            rtol=self.tolerances.rtol,
+            atol=self.tolerances.atol,
         )
 
     def path(self, x: Array, t: float) -> Trajectory:

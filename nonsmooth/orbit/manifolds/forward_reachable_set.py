@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...flow.concatenation import join, until
+from ...flow.options import Tolerances, tolerances
 from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
@@ -154,6 +155,8 @@ def funnel(
     t_start: float = 0.0,
     parameters: Parameters | None = None,
     tol: float = 1e-10,
+    rtol: float | None = None,
+    atol: float | None = None,
 ) -> Funnel:
     """Sample the futures of a point where forward uniqueness fails.
 
@@ -169,7 +172,7 @@ def funnel(
     samples : int, optional
         About how many members, at least 3. Times of leaving are spread evenly over each sliding
         orbit; where a sector of sliding orbits leaves a two-fold, directions within it too.
-    t_start, parameters, tol : optional
+    t_start, parameters, tol, rtol, atol : optional
         As in :func:`simulate`. A trajectory brings its own time and parameters.
 
     Returns
@@ -220,9 +223,10 @@ def funnel(
             f"samples: expected an integer of at least 3, received {samples!r}. One leaves up, one "
             "down, one slides."
         )
-    past = _past(start, point, t_end, t_start, parameters, tol)
+    chosen = tolerances(tol, rtol, atol)
+    past = _past(start, point, t_end, t_start, parameters, chosen)
     assert t_end is not None
-    return _Sampler(past, float(t_end), int(samples), tol).run()
+    return _Sampler(past, float(t_end), int(samples), chosen).run()
 
 
 def _past(
@@ -231,7 +235,7 @@ def _past(
     t_end: float | None,
     t_start: float,
     parameters: Parameters | None,
-    tol: float,
+    tolerances: Tolerances,
 ) -> Trajectory:
     """Return the run up to the point where the future is not unique."""
     if t_end is None:
@@ -254,7 +258,15 @@ def _past(
         require_system(start)
         if point is None:
             raise OptionError("point: expected a start, received none.")
-        past = simulate(start, point, t_end, t_start=t_start, parameters=parameters, tol=tol)
+        past = simulate(
+            start,
+            point,
+            t_end,
+            t_start=t_start,
+            parameters=parameters,
+            rtol=tolerances.rtol,
+            atol=tolerances.atol,
+        )
     if past.status is not Status.NON_UNIQUE:
         raise PointError(
             explain(
@@ -272,13 +284,14 @@ def _past(
 class _Sampler:
     """Builds one funnel."""
 
-    def __init__(self, past: Trajectory, t_end: float, samples: int, tol: float):
+    def __init__(self, past: Trajectory, t_end: float, samples: int, tolerances: Tolerances):
         self.system, self.past = past.system, past
-        self.t, self.t_end, self.samples, self.tol = float(past.t[-1]), t_end, samples, tol
+        self.t, self.t_end, self.samples = float(past.t[-1]), t_end, samples
+        self.tolerances = tolerances
         self.x = self.system.extended_point(past.x[-1], self.t)
         self.surfaces = Surfaces(self.system)
         self.where = self._place()
-        self.slider = Slider(self.where, self.surfaces, t_end, tol)
+        self.slider = Slider(self.where, self.surfaces, t_end, tolerances)
         self.members: list[Trajectory] = []
         self.departures: list[Departure] = []
 
@@ -420,7 +433,8 @@ class _Sampler:
             self.t_end,
             t_start=t,
             parameters=self.past.parameters,
-            tol=self.tol,
+            rtol=self.tolerances.rtol,
+            atol=self.tolerances.atol,
             start_mode=mode,
         )
 

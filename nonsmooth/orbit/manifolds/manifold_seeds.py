@@ -7,6 +7,7 @@ from collections.abc import Callable
 
 import numpy as np
 
+from ...flow.options import tolerances
 from ...flow.simulate import simulate
 from ...local.point.surface_point import place
 from ...local.searches.two_fold import TwoFold
@@ -96,7 +97,8 @@ def canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[f
     where, s = place(system, fold.point, follower.parameters)
     surfaces = Surfaces(system)
     speed = max(float(np.linalg.norm(f)) for f in where.at(s).fields) or 1.0
-    slider = Slider(where, surfaces, 20.0 * follower.length / speed, min(follower.tol, 1e-10))
+    span = 20.0 * follower.length / speed
+    slider = Slider(where, surfaces, span, tolerances(min(follower.tol, 1e-10)))
     try:
         paths = [path for path in paths_from(s, 0.0, slider, 16) if path.repelling]
     except NonsmoothError:

@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ...flow.constants import AT_END
 from ...flow.ensembles.progress import progress_bar
+from ...flow.options import tolerances
 from ...flow.saving import Savable
 from ...flow.simulate import simulate
 from ...flow.status import Status
@@ -100,13 +101,15 @@ class LyapunovSpectrum(Savable):
 def lyapunov_spectrum(
     system: FilippovSystem,
     x0: ArrayLike,
-    *,
     t_end: float,
+    *,
     transient: float | None = None,
     k: int | None = None,
     t_start: float = 0.0,
     parameters: Parameters | None = None,
     tol: float = 1e-10,
+    rtol: float | None = None,
+    atol: float | None = None,
     progress: bool = True,
 ) -> LyapunovSpectrum:
     """Lyapunov exponents of the run from a start, through crossings, sliding, resets and impacts.
@@ -124,7 +127,7 @@ def lyapunov_spectrum(
         of the run unless given.
     k : int, optional
         How many exponents, the largest; all n unless given.
-    t_start, parameters, tol : optional
+    t_start, parameters, tol, rtol, atol : optional
         As in :func:`simulate`.
     progress : bool, optional
         A bar for runs of some seconds on a terminal.
@@ -180,13 +183,15 @@ def lyapunov_spectrum(
                 advice="The run from there to t_end is counted.",
             )
         )
+    rtol, atol = tolerances(tol, rtol, atol)
     run = simulate(
         system,
         x0,
         t_end,
         t_start=t_start,
         parameters=parameters,
-        tol=tol,
+        rtol=rtol,
+        atol=atol,
         max_events=10_000_000,
         max_steps=100_000_000,
     )

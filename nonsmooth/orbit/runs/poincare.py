@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...flow.options import tolerances
 from ...flow.saving import Savable
 from ...flow.section import Section
 from ...flow.simulate import simulate
@@ -152,6 +153,8 @@ def poincare(
     t_start: float = 0.0,
     parameters: Parameters | None = None,
     tol: float = 1e-10,
+    rtol: float | None = None,
+    atol: float | None = None,
     max_steps: int = 1_000_000,
     max_events: int = 1_000_000,
 ) -> PoincareOrbit:
@@ -172,7 +175,7 @@ def poincare(
         Of an expression or a surface: where it falls, either way, where it rises.
     skip : int, optional
         Hits that are passed over before.
-    t_start, parameters, tol, max_steps, max_events : optional
+    t_start, parameters, tol, rtol, atol, max_steps, max_events : optional
         As in :func:`simulate`.
 
     Returns
@@ -219,13 +222,15 @@ def poincare(
         wanted = replace(wanted, at=length, direction=0)
         t_end = t_start + length * (wanted.skip + wanted.every * count + 0.5)
     system, wanted = sectioned(system, wanted)
+    rtol, atol = tolerances(tol, rtol, atol)
     run = simulate(
         system,
         x0,
         t_end,
         t_start=t_start,
         parameters=parameters,
-        tol=tol,
+        rtol=rtol,
+        atol=atol,
         max_steps=max_steps,
         max_events=max_events,
         at=wanted,

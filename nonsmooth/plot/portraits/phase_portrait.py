@@ -47,10 +47,10 @@ Special = Fold | PseudoEquilibrium | Equilibrium
 def phase_portrait(
     system: FilippovSystem,
     box: Sequence[float] | Sequence[Sequence[float]],
+    t_end: float | None = None,
     *,
     parameters: Parameters | None = None,
     starts: ArrayLike | None = None,
-    t_end: float | None = None,
     separatrices: bool = True,
     ax: Axes | None = None,
     size: tuple[float, float] = (7.0, 4.8),

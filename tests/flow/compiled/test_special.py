@@ -298,7 +298,7 @@ def test_a_compiler_that_fails_meanwhile_is_told_once_and_the_run_goes_on(compil
     monkeypatch.setattr(build.Compilation, "call", lambda self, command: "no room\nat all")
     made = oscillator()
     expected = ns.simulate(oscillator(), [1.0, 0.2], 5.0, tol=1e-3)
-    with pytest.warns(CompilerWarning, match=r"failed \(no room\)\. Long runs stay with") as told:
+    with pytest.warns(CompilerWarning, match="no room") as told:
         ns.simulate(made, [1.0, 0.2], 200.0, tol=1e-3)
         tape_for(made, Options(t_end=1.0, **LOOSE))._special._thread.join()
         for _ in range(3):

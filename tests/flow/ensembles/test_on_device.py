@@ -42,7 +42,7 @@ def test_refusals(system, options, said):
 
 
 def test_other_devices_are_refused():
-    with pytest.raises(ns.OptionError, match=r"expected None or one of .*'cuda'.*received 'tpu'"):
+    with pytest.raises(ns.OptionError, match=r"device.*'tpu'"):
         ns.ensemble(pair(), [[1.0, 1.0]], 1.0, device="tpu")
 
 
@@ -57,5 +57,5 @@ def test_without_a_driver_the_error_says_so():
         def Device(self):
             raise RuntimeError("Ensure the NVIDIA display driver is installed.")
 
-    with pytest.raises(machine.DeviceError, match=r"NVIDIA card and its driver.*display driver"):
+    with pytest.raises(machine.DeviceError, match=r"NVIDIA.*display driver"):
         card.Card(Core())

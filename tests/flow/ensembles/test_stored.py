@@ -149,7 +149,7 @@ def test_a_file_that_is_no_such_array_is_refused(wrong, tmp_path):
         np.save(path, np.array([{}] * 200, object), allow_pickle=True)
     else:
         path.mkdir()
-    with pytest.raises(ns.OptionError, match="store: expected an array of shape"):
+    with pytest.raises(ns.OptionError, match="store"):
         sweep(tmp_path / "sweep")
     if wrong == "link":
         assert not np.load(tmp_path / "elsewhere.npy").any()
@@ -183,7 +183,7 @@ def test_a_disk_without_room_is_told_at_once(code, whole, tmp_path, monkeypatch,
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "posix_fallocate", full)
-        with pytest.raises(ns.OptionError, match=rf"{os.strerror(code)}[^$]*Make room"):
+        with pytest.raises(ns.OptionError, match=f"store.*{os.strerror(code)}"):
             sweep(tmp_path / "sweep")
     left = {f.name for f in (tmp_path / "sweep").iterdir()}
     assert counted == [] and left <= {"problem.json", ".lock"}
@@ -205,7 +205,7 @@ def test_a_folder_that_another_run_writes_to_is_refused(whole, tmp_path, monkeyp
 
     def within(*args):
         monkeypatch.setattr(work_module, "run_chunk", run)
-        with pytest.raises(ns.OptionError, match="another run is writing") as caught:
+        with pytest.raises(ns.OptionError, match="another run") as caught:
             sweep(tmp_path / "sweep")
         said.append(str(caught.value))
         return run(*args)
@@ -229,7 +229,7 @@ def test_so_is_one_of_another_process_until_that_ends(whole, tmp_path):
     run = [sys.executable, "-c", program, tmp_path / "sweep" / ".lock"]
     with subprocess.Popen(run, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout.readline() == b"held\n"
-        with pytest.raises(ns.OptionError, match="another run is writing"):
+        with pytest.raises(ns.OptionError, match="another run"):
             sweep(tmp_path / "sweep")
         other.kill()
     assert_same(sweep(tmp_path / "sweep"), whole)
@@ -241,7 +241,7 @@ def test_a_link_in_the_place_of_the_lock_is_not_followed(tmp_path):
     (tmp_path / "sweep" / ".lock").unlink()
     (tmp_path / "elsewhere").write_text("kept")
     (tmp_path / "sweep" / ".lock").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(ns.OptionError, match="a folder that can be read and written"):
+    with pytest.raises(ns.OptionError, match="checkpoint"):
         sweep(tmp_path / "sweep")
     assert (tmp_path / "elsewhere").read_text() == "kept"
 
@@ -282,11 +282,11 @@ def test_a_disk_that_is_too_small_ends_no_process(tmp_path):
 
 def test_another_problem_and_a_checkpoint_are_refused(tmp_path):
     sweep(tmp_path / "sweep")
-    with pytest.raises(ns.OptionError, match="another system, start"):
+    with pytest.raises(ns.OptionError, match="another system"):
         sweep(tmp_path / "sweep", starts=ns.RandomStarts(200, [0, 0], [1, 1]))
-    with pytest.raises(ns.OptionError, match="another system, start"):
+    with pytest.raises(ns.OptionError, match="another system"):
         ns.ensemble(BLOCK, STARTS, work=ns.Work(checkpoint=tmp_path / "sweep"), **OPTIONS)
-    with pytest.raises(ns.OptionError, match="one of them"):
+    with pytest.raises(ns.OptionError, match=r"checkpoint.*store"):
         ns.Work(store="a", checkpoint="b")
 
 

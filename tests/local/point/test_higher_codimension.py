@@ -141,15 +141,15 @@ def test_beside_a_surface_the_side_is_known_or_asked_for():
     assert ns.region(system, [0, 0, 1.0], surface=1) is ns.Region.CROSSING
     assert ns.region(system, [0, 0, -1.0], surface=1) is ns.Region.SLIDING
     assert ns.region(system, [0, 0, 0.0], surface=1, mode="-s") is ns.Region.SLIDING
-    with pytest.raises(ns.PointError, match=r"a side of h0.*mode="):
+    with pytest.raises(ns.PointError, match=r"point.*h0.*mode="):
         ns.region(system, [0, 0, 0.0], surface=1)
-    with pytest.raises(ns.DefinitionError, match=r"one of \[1\], received 0"):
+    with pytest.raises(ns.DefinitionError, match="surface"):
         ns.local.limit_directions(system, [0, 0, 1.0], surface=0)
 
 
 def test_points_off_the_set_and_other_systems_are_refused():
     system = frozen([0.3, 0.0], 0.5 * np.eye(2))
-    with pytest.raises(ns.PointError, match=r"on the set h0 = 0, received h = \[0.1, 0.0\]"):
+    with pytest.raises(ns.PointError, match=r"point.*h = \[0.1, 0.0\]"):
         ns.local.limit_directions(system, [0.1, 0.0])
     with pytest.raises(ns.PointError):
         ns.region(system, [np.nan, 0.0])

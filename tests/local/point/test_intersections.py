@@ -199,23 +199,23 @@ def test_three_genes_in_a_loop_do_not_stay():
 
 def test_wrong_questions_are_refused():
     system = plane(-a, -b)
-    with pytest.raises(ns.PointError, match="a point where surfaces meet"):
+    with pytest.raises(ns.PointError, match="surfaces meet"):
         ns.local.intersection(system, [1.0, 1.0])
-    with pytest.raises(ns.PointError, match=r"a point of surfaces \[0, 1\]"):
+    with pytest.raises(ns.PointError, match=r"point.*\[0, 1\]"):
         ns.local.intersection(system, [0.0, 1.0], surfaces=[0, 1])
     with pytest.raises(ns.PointError, match="independent gradients"):
         touching = ns.FilippovSystem(
             [x, y], field=[-a, -b], multipliers=[a, b], surfaces=[y, y - x**2]
         )
         ns.local.intersection(touching, [0.0, 0.0])
-    with pytest.raises(ns.DefinitionError, match="at most 2 surfaces"):
+    with pytest.raises(ns.DefinitionError, match="mode 'sss'"):
         three = ns.FilippovSystem(
             [x, y], field=[-a, -b - c], multipliers=[a, b, c], surfaces=[x, y, x + y]
         )
         ns.find_pseudo_equilibrium(three, [0.0, 0.0], mode="sss")
-    with pytest.raises(ns.DefinitionError, match="at least one switching surface"):
+    with pytest.raises(ns.DefinitionError, match="switching surface"):
         ns.local.intersection(ns.FilippovSystem([x], field=[-x]), [0.0])
-    with pytest.raises(ns.PointError, match="multipliers that are determined"):
+    with pytest.raises(ns.PointError, match="multipliers"):
         singular = ns.FilippovSystem(
             [x, y, z], field=[-a - b, -a - b, -z], multipliers=[a, b], surfaces=[x, y]
         )

@@ -84,9 +84,9 @@ def test_sliding_field_is_tangent_and_rescaling_h_changes_nothing(c, a, b):
 def test_two_fold_with_different_fields_has_no_sliding_field():
     system = ns.FilippovSystem([x, y, z], surface=x, above=[-y, 1, -2], below=[z, -1, 1])
     assert region(system, [0, 0, 0]) is Region.TWO_FOLD
-    with pytest.raises(ns.PointError, match="0/0 at a two-fold"):
+    with pytest.raises(ns.PointError, match=r"alpha.*two-fold"):
         alpha(system, [0, 0, 0])
-    with pytest.raises(ns.PointError, match="tangent and different"):
+    with pytest.raises(ns.PointError, match=r"sliding field.*tangent"):
         sliding_field(system, [0, 0, 0])
     # rounding of a search does not turn a two-fold into something else
     assert region(system, [0, 1e-15, -3e-16]) is Region.TWO_FOLD
@@ -125,46 +125,46 @@ def test_several_surfaces():
     assert alpha(system, [0, -1.0]) == pytest.approx(0.75)
     np.testing.assert_allclose(sliding_field(system, [0, 1.0]), [0, -1])
     np.testing.assert_allclose(sliding_field(system, [2.0, 0], surface=1), [-1, 0])
-    with pytest.raises(ns.PointError, match=r"a point on surfaces 0 and 1.*mode="):
+    with pytest.raises(ns.PointError, match=r"point.*mode="):
         region(system, [0, 0])
     assert region(system, [0, 0], mode="s+") is Region.ATTRACTING
-    with pytest.raises(ns.DefinitionError, match=r"2 letter\(s\)"):
+    with pytest.raises(ns.DefinitionError, match="mode"):
         region(system, [0, 0], mode="+")
 
 
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: region(OSCILLATOR, [0.2, 0.31]), ns.PointError, r"h = 0.01 \(about 0.01 away\)"),
-        (lambda: region(OSCILLATOR, [0.2, 0.31]), ns.PointError, r"nearest point .*\[0.2, 0.3\]"),
-        (lambda: region(OSCILLATOR, [0.2]), ns.PointError, r"shape \(2,\)"),
-        (lambda: region(OSCILLATOR, [0.2, math.inf]), ns.PointError, "finite numbers"),
+        (lambda: region(OSCILLATOR, [0.2, 0.31]), ns.PointError, "h = 0.01"),
+        (lambda: region(OSCILLATOR, [0.2, 0.31]), ns.PointError, r"\[0.2, 0.3\]"),
+        (lambda: region(OSCILLATOR, [0.2]), ns.PointError, "point.*shape"),
+        (lambda: region(OSCILLATOR, [0.2, math.inf]), ns.PointError, "point.*finite"),
         (lambda: region(OSCILLATOR, None), ns.PointError, "2"),
         (
             lambda: region(OSCILLATOR, [0.2, 0.3], tol=-1),
             ns.OptionError,
-            "tol: expected a positive",
+            r"\btol\b",
         ),
-        (lambda: region(OSCILLATOR, [0.2, 0.3], tol="x"), ns.OptionError, "received 'x'"),
-        (lambda: region(OSCILLATOR, [0.2, 0.3], surface=-1), ns.DefinitionError, "index below 1"),
+        (lambda: region(OSCILLATOR, [0.2, 0.3], tol="x"), ns.OptionError, "tol.*'x'"),
+        (lambda: region(OSCILLATOR, [0.2, 0.3], surface=-1), ns.DefinitionError, "surface"),
         (
             lambda: region(OSCILLATOR, [0.2, 0.3], parameters={"mu": 1}),
             ns.ParameterError,
-            r"\['belt', 'friction'\], received 'mu'",
+            "parameters.*'mu'",
         ),
-        (lambda: alpha(OSCILLATOR, [0.5, 0.3]), ns.PointError, "crossing down.*L1 = -0.9"),
-        (lambda: sliding_field(OSCILLATOR, [-0.5, 0.3]), ns.PointError, "crossing up.*no convex"),
+        (lambda: alpha(OSCILLATOR, [0.5, 0.3]), ns.PointError, "alpha.*crossing down"),
+        (lambda: sliding_field(OSCILLATOR, [-0.5, 0.3]), ns.PointError, "crossing up"),
         (
             lambda: region(ns.FilippovSystem([X], field=[-X]), [0.0]),
             ns.DefinitionError,
-            "at least one switching surface",
+            "switching surface",
         ),
         (
             lambda: region(
                 ns.FilippovSystem([X, V], surface=V, above=[ca.log(X), 1], below=[0, 1]), [-1.0, 0]
             ),
             ns.PointError,
-            "left its domain",
+            "point.*finite",
         ),
     ],
 )

@@ -87,12 +87,12 @@ def test_the_flattest_coordinates_are_chosen():
 
 @pytest.mark.parametrize("coordinates", [("x",), ("x", "x"), ("x", "q")])
 def test_bad_coordinates_are_refused(coordinates):
-    with pytest.raises(ns.DefinitionError, match="coordinates: expected two of the states"):
+    with pytest.raises(ns.DefinitionError, match="coordinates"):
         scan([1, 0, 0], [0, 1, 0], coordinates=coordinates)
 
 
 def test_no_surface_over_the_box_is_refused():
-    with pytest.raises(ns.DefinitionError, match="surface: expected one over the box"):
+    with pytest.raises(ns.DefinitionError, match="surface"):
         scan([1, 0, 0], [0, 1, 0], surface=x**2 + 1)
 
 

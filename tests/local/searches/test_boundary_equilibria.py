@@ -104,9 +104,9 @@ def test_derivatives_by_parameters_are_those_of_the_expressions():
 
 
 def test_messages():
-    with pytest.raises(ns.PointError, match=r"expected an equilibrium of a field.*nearest zero"):
+    with pytest.raises(ns.PointError, match=r"point.*equilibrium"):
         boundary_equilibrium(PLANE, [0.0, 0.0])
-    with pytest.raises(ns.DefinitionError, match=r"vary: expected a parameter among \[\]"):
+    with pytest.raises(ns.DefinitionError, match="vary"):
         find_boundary_equilibrium(PLANE, [0.0, 0.0], vary="mu")
-    with pytest.raises(ns.DefinitionError, match=r"side: expected '\+' .* received 'below'"):
+    with pytest.raises(ns.DefinitionError, match="side"):
         find_boundary_equilibrium(PLANE, [0.0, 0.0], vary="mu", side="below")

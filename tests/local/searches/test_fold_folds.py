@@ -21,8 +21,8 @@ def test_the_fused_focus_of_the_pseudo_hopf_bifurcation():
 
 
 def test_messages():
-    with pytest.raises(ns.PointError, match=r"expected a fold-fold, L1 = L2 = 0"):
+    with pytest.raises(ns.PointError, match="fold-fold"):
         fold_fold(PLANE, [0.0, 0.0])
     space = ns.FilippovSystem([X, Y, Z], surface=X, above=[Y, 1, 0], below=[1, 0, 0])
-    with pytest.raises(ns.DefinitionError, match=r"expected a planar system.*received 3 states"):
+    with pytest.raises(ns.DefinitionError, match=r"fold-fold.*3 states"):
         fold_fold(space, [0.0, 0.0, 0.0])

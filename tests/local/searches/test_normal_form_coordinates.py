@@ -50,10 +50,10 @@ def test_states_have_the_coordinates_they_were_found_for(case):
 
 def test_wrong_shapes_and_numbers_are_refused():
     fold = CASES["three states"]()
-    with pytest.raises(ns.PointError, match=r"states: expected shape \(..., 3\)"):
+    with pytest.raises(ns.PointError, match="states"):
         fold.coordinates([1.0, 2.0])
-    with pytest.raises(ns.PointError, match="states: expected finite"):
+    with pytest.raises(ns.PointError, match="states"):
         fold.coordinates([1.0, np.nan, 0.0])
     for wrong in (1.0, [1.0], [0.1, np.inf]):
-        with pytest.raises(ns.PointError, match="z: expected finite numbers"):
+        with pytest.raises(ns.PointError, match=r"\bz\b"):
             fold.point_at(wrong)

@@ -30,7 +30,7 @@ def test_where_a_search_fails_the_whole_point_is_told():
     assert caught.value.point.shape == (3,)
     assert_allclose(caught.value.point[:2], start[:2])
     system = ns.FilippovSystem([x, y, z], surface=x, above=[1 + z**2, 0, 0], below=[1, 0, 0])
-    with pytest.raises(ns.ConvergenceError, match=r"fold of F1 \(above\)") as caught:
+    with pytest.raises(ns.ConvergenceError, match="fold of F1") as caught:
         ns.find_fold(system, [0.1, 0.2, 0.3], hold=["y"])
     assert caught.value.point.shape == (3,) and caught.value.point[1] == 0.2
 
@@ -78,5 +78,5 @@ def test_a_trial_whose_jacobian_overflows_is_halved():
 
     root = solve(equations, np.array([-5.5]), tol=1e-12, max_iterations=400, what="root")
     assert abs(root.x[0] - np.log(2.0)) < 1e-12
-    with pytest.raises(ns.PointError, match="where the equations of a root are finite"):
+    with pytest.raises(ns.PointError, match=r"near.*root"):
         solve(equations, np.array([400.0]), tol=1e-12, max_iterations=9, what="root")

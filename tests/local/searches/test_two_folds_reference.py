@@ -120,7 +120,7 @@ def test_found_from_a_distance(case):
 
 def test_normal_force_with_zero_gradient_is_refused():
     case = next(case for case in CASES if case["degenerate"])
-    with pytest.raises(ns.DegenerateError, match="independent grad h, grad L1 and grad L2"):
+    with pytest.raises(ns.DegenerateError, match="dependent"):
         two_fold(ball(case), point(case))
 
 

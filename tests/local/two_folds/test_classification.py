@@ -235,10 +235,10 @@ def test_margin_is_the_distance_to_the_nearest_boundary():
     ("sigma", "nu", "error", "message"),
     [
         ((0, 1), (1, 1), ns.DegenerateError, "cusp-fold"),
-        ((2, 1), (1, 1), ns.OptionError, r"expected two signs, \+1 or -1, received \(2, 1\)"),
-        ((1, 1), (math.nan, 1), ns.OptionError, "expected two finite numbers"),
-        ((1, 1), (1, 1, 1), ns.OptionError, "nu: expected a pair of numbers"),
-        (1, (1, 1), ns.OptionError, "sigma: expected a pair of numbers, received 1"),
+        ((2, 1), (1, 1), ns.OptionError, "sigma"),
+        ((1, 1), (math.nan, 1), ns.OptionError, r"\bnu\b"),
+        ((1, 1), (1, 1, 1), ns.OptionError, r"\bnu\b"),
+        (1, (1, 1), ns.OptionError, "sigma"),
     ],
 )
 def test_bad_input(sigma, nu, error, message):

@@ -126,7 +126,7 @@ def test_accumulation_time():
 
 @pytest.mark.parametrize("nu", [(-0.5, -1), (2, 1), (-1, 1)])
 def test_no_diabolo(nu):
-    with pytest.raises(ns.OptionError, match=r"nu1, nu2 < 0 and nu1 nu2 > 1"):
+    with pytest.raises(ns.OptionError, match="nu1"):
         diabolo_slopes(nu)
     with pytest.raises(ns.OptionError):
         accumulation_time(nu)

@@ -88,35 +88,35 @@ def test_products_of_different_multipliers_are_allowed():
 
 FOREIGN_X = ca.SX.sym("x")
 WRONG = {
-    "a missing field": ({"below": None}, "below: expected 2 expressions"),
-    "a field of the wrong length": ({"above": [v]}, "above: expected 2 expressions"),
-    "an undeclared symbol": ({"above": [v, t]}, r"received also \['t'\].*states=, parameters="),
-    "a second symbol of the same name": ({"above": [FOREIGN_X, v]}, "create each symbol once"),
-    "a constant surface": ({"surface": 1.0}, "surface 0: expected a function of the states"),
-    "a surface of parameters only": ({"surface": belt}, "surface 0: expected a function of the"),
-    "a function of Python's math": ({"above": [v, math.sin(x)]}, "write casadi.sin"),
-    "a function as a field": ({"above": lambda x, v: [v, x]}, "function .* Call it with the symb"),
-    "functions in a field": ({"above": [v, lambda x: x]}, "no truth value: write casadi.if_else"),
-    "NaN in a field": ({"above": [v, np.nan]}, "expected finite constants, received nan"),
-    "inf in a surface": ({"surface": v - ca.inf}, "expected finite constants"),
-    "NaN as a default": ({"parameters": {belt: np.nan, friction: 1}}, "finite number"),
-    "the same name twice": ({"parameters": {ca.SX.sym("x"): 1.0}}, "more than once"),
-    "a state that is no symbol": ({"states": [x, 2 * v]}, r"states\[1\]: expected a scalar symbol"),
-    "states as strings": ({"states": ["x", "v"]}, r"states\[0\]: expected a scalar symbol"),
-    "no states": ({"states": []}, "at least one symbol"),
-    "a vector entry": ({"above": [v, ca.vertcat(x, v)]}, "expected a scalar, received shape"),
-    "text in a field": ({"above": [v, "x"]}, "expected a CasADi SX expression or a number"),
-    "MX": ({"above": [v, ca.MX.sym("m")]}, "received MX"),
-    "both forms": ({"field": [v, x]}, "a mixture of the two forms"),
-    "surface twice": ({"surfaces": [v]}, "received both"),
+    "a missing field": ({"below": None}, "below"),
+    "a field of the wrong length": ({"above": [v]}, "above"),
+    "an undeclared symbol": ({"above": [v, t]}, "field.*'t'"),
+    "a second symbol of the same name": ({"above": [FOREIGN_X, v]}, "field.*'x'"),
+    "a constant surface": ({"surface": 1.0}, "surface 0.*constant"),
+    "a surface of parameters only": ({"surface": belt}, "surface 0.*constant"),
+    "a function of Python's math": ({"above": [v, math.sin(x)]}, "casadi.sin"),
+    "a function as a field": ({"above": lambda x, v: [v, x]}, "above.*function"),
+    "functions in a field": ({"above": [v, lambda x: x]}, "if_else"),
+    "NaN in a field": ({"above": [v, np.nan]}, "field.*nan"),
+    "inf in a surface": ({"surface": v - ca.inf}, "surface 0.*inf"),
+    "NaN as a default": ({"parameters": {belt: np.nan, friction: 1}}, "parameter 'belt'"),
+    "the same name twice": ({"parameters": {ca.SX.sym("x"): 1.0}}, "symbols.*'x'"),
+    "a state that is no symbol": ({"states": [x, 2 * v]}, "states"),
+    "states as strings": ({"states": ["x", "v"]}, "states"),
+    "no states": ({"states": []}, "states"),
+    "a vector entry": ({"above": [v, ca.vertcat(x, v)]}, "above.*shape"),
+    "text in a field": ({"above": [v, "x"]}, "above.*'x'"),
+    "MX": ({"above": [v, ca.MX.sym("m")]}, "above.*MX"),
+    "both forms": ({"field": [v, x]}, "above=.*field="),
+    "surface twice": ({"surfaces": [v]}, "surface=.*surfaces="),
     "a wrong direction": ({"stops": [ns.Stop(x, 2)]}, "direction of 'stop'"),
     "a surface with a multiple zero": (
         {"surface": (v - 1) ** 3},
-        "surface 0: expected a function with simple",
+        "surface 0.*factor",
     ),
     "a stop with a double zero": (
         {"stops": [ns.Stop(x * (v - x) ** 2)]},
-        "stop 'stop': expected a function with simple",
+        "stop 'stop'.*factor",
     ),
     "a reset map of the wrong length": ({"resets": [ns.Reset(x, [x])]}, "map of reset 'reset'"),
 }
@@ -153,25 +153,25 @@ def test_non_smooth_operations_are_refused_with_advice(operation, where):
         "surface": {"surface": operation + v},
         "stops": {"stops": [ns.Stop(operation)]},
     }[where]
-    with pytest.raises(ns.NotSmoothError, match="Declare the switch as a surface"):
+    with pytest.raises(ns.NotSmoothError, match="surface"):
         stick_slip(**changes)
 
 
 def test_multipliers_must_be_linear_and_one_per_surface():
-    with pytest.raises(ns.DefinitionError, match="hidden dynamics"):
+    with pytest.raises(ns.DefinitionError, match="hidden"):
         ns.FilippovSystem([x], field=[lam**2], multipliers=lam, surface=x)
-    with pytest.raises(ns.DefinitionError, match="one for each of the 1 surfaces, received 2"):
+    with pytest.raises(ns.DefinitionError, match="multipliers"):
         ns.FilippovSystem([x], field=[lam], multipliers=[lam, kap], surface=x)
-    with pytest.raises(ns.DefinitionError, match="Only the field may contain multipliers"):
+    with pytest.raises(ns.DefinitionError, match=r"surface 0.*multiplier"):
         ns.FilippovSystem([x], field=[lam], multipliers=lam, surface=x + lam)
 
 
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"speed": 1.0}, "expected names among .*'belt'.* received 'speed'"),
-        ({"belt": np.inf}, "parameter 'belt': expected a finite number"),
-        ({"belt": "fast"}, "parameter 'belt': expected a finite number"),
+        ({"speed": 1.0}, "parameters.*'speed'"),
+        ({"belt": np.inf}, "parameter 'belt'"),
+        ({"belt": "fast"}, "parameter 'belt'"),
     ],
 )
 def test_wrong_parameters_are_refused(parameters, message):
@@ -181,7 +181,7 @@ def test_wrong_parameters_are_refused(parameters, message):
 
 def test_a_missing_parameter_is_named():
     system = stick_slip(parameters=[belt, friction])
-    with pytest.raises(ns.ParameterError, match=r"expected a value for \['belt', 'friction'\]"):
+    with pytest.raises(ns.ParameterError, match=r"parameters.*'belt', 'friction'"):
         system.parameter_vector()
     assert system.parameter_vector({"belt": 1, "friction": 2}).tolist() == [1, 2]
 
@@ -189,11 +189,11 @@ def test_a_missing_parameter_is_named():
 @pytest.mark.parametrize(
     ("point", "message"),
     [
-        ([1.0], r"shape \(2,\).*received shape \(1,\)"),
-        ([[1.0, 2.0]], r"received shape \(1, 2\)"),
-        ([1.0, np.nan], "finite numbers"),
-        ([1.0, np.inf], "finite numbers"),
-        (["a", "b"], "2 numbers"),
+        ([1.0], r"point.*shape \(1,\)"),
+        ([[1.0, 2.0]], r"point.*shape \(1, 2\)"),
+        ([1.0, np.nan], "point.*finite"),
+        ([1.0, np.inf], "point.*finite"),
+        (["a", "b"], "point.*numbers"),
         (None, "shape"),
     ],
 )
@@ -204,7 +204,7 @@ def test_wrong_points_are_refused(point, message):
 
 def test_a_mode_of_the_wrong_form_is_refused():
     for mode in ("", "++", "x", 1):
-        with pytest.raises(ns.DefinitionError, match="mode: expected 1 letter"):
+        with pytest.raises(ns.DefinitionError, match="mode"):
             stick_slip().parse_mode(mode)
 
 
@@ -238,5 +238,5 @@ def test_a_field_that_is_known_implicitly_is_refused():
     lam = ca.SX.sym("lam", 2)
     system = ns.FilippovSystem([x, y], field=[-lam[0], -lam[1]], multipliers=lam, surfaces=[x, y])
     assert ns.local.mode_field(system, "s+").numel() == 2
-    with pytest.raises(ns.DefinitionError, match="'ss'"):
+    with pytest.raises(ns.DefinitionError, match=r"mode.*'ss'"):
         ns.local.mode_field(system, "ss")

@@ -107,11 +107,11 @@ def test_a_closed_curve_of_folds():
 @pytest.mark.parametrize(
     ("change", "error", "words"),
     [
-        (dict(parameters=("a", "a")), ns.DefinitionError, "two names"),
+        (dict(parameters=("a", "a")), ns.DefinitionError, "parameters"),
         (dict(parameters=("a", "kappa")), ns.DefinitionError, "kappa"),
-        (dict(parameters="a"), ns.DefinitionError, "two names"),
-        (dict(bounds=[(-1, 1)]), ns.OptionError, "two pairs"),
-        (dict(bounds=[(-1, 1), (0, 1)]), ns.OptionError, "around b"),
+        (dict(parameters="a"), ns.DefinitionError, "parameters"),
+        (dict(bounds=[(-1, 1)]), ns.OptionError, "bounds"),
+        (dict(bounds=[(-1, 1), (0, 1)]), ns.OptionError, "bounds"),
         (dict(event="fold"), ns.DefinitionError, "Branch.events"),
     ],
 )

@@ -226,7 +226,7 @@ def test_a_period_that_diverges_ends_a_branch():
     ("change", "error", "words"),
     [
         (dict(parameter="kappa"), ns.DefinitionError, "kappa"),
-        (dict(bounds=(3, 4)), ns.OptionError, "around A"),
+        (dict(bounds=(3, 4)), ns.OptionError, "bounds"),
         (dict(step=0), ns.OptionError, "step"),
         (dict(orbit="orbit"), ns.DefinitionError, "PeriodicOrbit"),
     ],
@@ -357,7 +357,7 @@ def test_an_event_at_which_the_equations_are_singular_is_where_the_branch_is_los
 
 def test_through_is_a_truth_value():
     half = ns.periodic_orbit(scalar_relay(), [0.5])
-    with pytest.raises(ns.OptionError, match="through: expected True or False, received 'no'"):
+    with pytest.raises(ns.OptionError, match="through"):
         ns.continue_orbit(half, "A", bounds=(1.0, 4.0), through="no")
 
 

@@ -75,11 +75,11 @@ def test_what_is_no_connection_is_refused(spiral: ns.FilippovSystem) -> None:
     )
     with pytest.raises(ns.OptionError, match="autonomous"):
         ns.find_homoclinic(forced, [0.0], "c")
-    with pytest.raises(ns.PointError, match="2 numbers"):
+    with pytest.raises(ns.PointError, match=r"saddle.*numbers"):
         ns.find_homoclinic(oscillator(), [0.0, 0.0, 0.0], "c")
     with pytest.raises(ns.DegenerateError, match="real saddle"):
         ns.find_homoclinic(oscillator(), [1.0, 0.0], "c")
-    with pytest.raises(ns.ConvergenceError, match="comes back"):
+    with pytest.raises(ns.ConvergenceError, match="homoclinic orbit"):
         ns.find_homoclinic(oscillator(), [0.0, 0.0], "c", guess=5.0)
 
 

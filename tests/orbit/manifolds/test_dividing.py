@@ -284,21 +284,19 @@ def test_a_curve_is_followed_from_points_of_it():
 def test_ends_at_an_event_that_does_not_fit_are_refused():
     system, fold = opening()
     good = dict(starts=lambda a, b: [a, b, 0.0], box=[(-1, 1), (-2, 2)], duration=5.0)
-    with pytest.raises(
-        ns.OptionError, match=r"until: expected the name of a stop .*'open', 'never'"
-    ):
+    with pytest.raises(ns.OptionError, match="until"):
         ns.manifold(system, fold, until="lift-off", **good)
-    with pytest.raises(ns.DegenerateError, match="expected a two-fold at the event 'never'"):
+    with pytest.raises(ns.DegenerateError, match=r"two-fold.*'never'"):
         ns.manifold(system, fold, until="never", **good)
-    with pytest.raises(ns.OptionError, match="Stops are not met backward"):
+    with pytest.raises(ns.OptionError, match=r"stable.*until="):
         ns.manifold(system, fold, until="open", stable=False, **good)
-    with pytest.raises(ns.OptionError, match="starts: expected with until="):
+    with pytest.raises(ns.OptionError, match=r"starts.*until="):
         starts = ns.orbit.ComputedStarts(lambda u: (0.0, [*u, 0.0]))
         ns.manifold(system, fold, **{**good, "starts": starts})
     for begin in (5, [("+ s", (0.1, -0.5))], [("+ s", (0.1,))] * 2, [("+ s", "no")] * 2):
-        with pytest.raises(ns.OptionError, match="begin: expected two points or more"):
+        with pytest.raises(ns.OptionError, match="begin"):
             ns.manifold(system, fold, until="open", begin=begin, **good)
-    with pytest.raises(ns.OptionError, match="until, begin: expected with starts="):
+    with pytest.raises(ns.OptionError, match=r"until.*begin.*starts="):
         ns.manifold(system, fold, until="open", length=1.0)
 
 
@@ -354,26 +352,26 @@ def test_curves_are_saved(tmp_path):
 def test_what_cannot_be_cut_is_refused():
     system, fold = plain()
     good = dict(starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)], duration=6.0)
-    with pytest.raises(ns.OptionError, match="starts: expected three finite rows of 3 states"):
+    with pytest.raises(ns.OptionError, match="starts"):
         ns.manifold(system, fold, **{**good, "starts": [[0.3, 0, 0]]})
-    with pytest.raises(ns.OptionError, match="starts: expected three finite rows"):
+    with pytest.raises(ns.OptionError, match="starts"):
         ns.manifold(system, fold, **{**good, "starts": lambda a, b: [a, b]})
-    with pytest.raises(ns.OptionError, match="of the two coordinates alone"):
+    with pytest.raises(ns.OptionError, match=r"starts.*coordinates"):
         ns.manifold(system, fold, **{**good, "starts": lambda a, b: [a, b, X]})
-    with pytest.raises(ns.OptionError, match="box: expected the range"):
+    with pytest.raises(ns.OptionError, match=r"\bbox\b"):
         ns.manifold(system, fold, **{**good, "box": [(1, -1), (0, 1)]})
-    with pytest.raises(ns.OptionError, match="duration: expected a positive number"):
+    with pytest.raises(ns.OptionError, match="duration"):
         ns.manifold(system, fold, **{**good, "duration": None})
-    with pytest.raises(ns.OptionError, match="length: expected a positive number"):
+    with pytest.raises(ns.OptionError, match="length"):
         ns.manifold(system, fold)
-    with pytest.raises(ns.OptionError, match="expected a TwoFold with starts="):
+    with pytest.raises(ns.OptionError, match="TwoFold"):
         ns.manifold(system, ns.local.fold(system, [0.0, 0.0, -1.0]), **good)
-    with pytest.raises(ns.DegenerateError, match="on both sides of a dividing surface"):
+    with pytest.raises(ns.DegenerateError, match=r"starts.*dividing surface"):
         ns.manifold(system, fold, **{**good, "box": [(1, 2), (1, 2)]})
     teixeira = ns.FilippovSystem(
         [X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1 + 0.1 * Y]
     )
-    with pytest.raises(ns.DegenerateError, match="one canard"):
+    with pytest.raises(ns.DegenerateError, match="canard"):
         ns.manifold(teixeira, ns.find_two_fold(teixeira, near=[0.0, 0.1, -0.1]), **good)
 
 

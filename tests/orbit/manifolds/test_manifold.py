@@ -235,19 +235,19 @@ def test_manifolds_are_saved(tmp_path):
 def test_what_has_no_manifold_is_refused():
     node = ns.FilippovSystem([x, y], surface=x - 2, above=[-x, -y], below=[-x, -2 * y])
     found = ns.find_equilibrium(node, [0.1, 0.1], side="-")
-    with pytest.raises(ns.DegenerateError, match="expected a point with unstable directions"):
+    with pytest.raises(ns.DegenerateError, match="unstable directions"):
         ns.manifold(node, found, stable=False, length=1.0)
     virtual = ns.find_equilibrium(node, [0.1, 0.1], side="+")
-    with pytest.raises(ns.DegenerateError, match="received a virtual one"):
+    with pytest.raises(ns.DegenerateError, match="virtual"):
         ns.manifold(node, virtual, length=1.0)
-    with pytest.raises(ns.OptionError, match="of: expected an Equilibrium"):
+    with pytest.raises(ns.OptionError, match=r"\bof\b.*Equilibrium"):
         ns.manifold(node, [0.0, 0.0], length=1.0)
-    with pytest.raises(ns.OptionError, match="length: expected a positive number"):
+    with pytest.raises(ns.OptionError, match="length"):
         ns.manifold(node, found, length=-1.0)
     kicked = ns.FilippovSystem(
         [x, y], surface=x - 2, above=[x, -y], below=[x, -2 * y], resets=ns.Reset(y - 1, [x, 0], 1)
     )
-    with pytest.raises(ns.DefinitionError, match="system: expected one without resets"):
+    with pytest.raises(ns.DefinitionError, match="system"):
         ns.manifold(kicked, ns.find_equilibrium(kicked, [0.1, 0.1], side="-"), length=1.0)
 
 
@@ -346,11 +346,11 @@ def test_what_leaves_a_canard_is_a_surface_too():
 def test_orbits_and_two_folds_without_a_surface_are_refused():
     relaxing = ns.FilippovSystem([X, Y], field=[Y, (1 - X * X) * Y - X])
     cycle = ns.periodic_orbit(relaxing, ns.simulate(relaxing, [2.0, 0.0], 40.0))
-    with pytest.raises(ns.DegenerateError, match="three dimensions with one stable multiplier"):
+    with pytest.raises(ns.DegenerateError, match="three dimensions"):
         ns.manifold(relaxing, cycle, length=1.0)
     teixeira = ns.FilippovSystem(
         [X, Y, Z], surface=X, above=[-Y, 1, -2], below=[Z, -1, 1 + 0.1 * Y]
     )
     fold = ns.find_two_fold(teixeira, near=[0.0, 0.1, -0.1])
-    with pytest.raises(ns.DegenerateError, match="infinitely many"):
+    with pytest.raises(ns.DegenerateError, match="canard"):
         ns.manifold(teixeira, fold, length=1.0)

@@ -369,7 +369,7 @@ def test_virtual_orbits_are_refused_unless_asked_for() -> None:
     system = grazing_circle()
     at = {"d": 0.9}
     free = ns.periodic_orbit(system, ns.simulate(system, [0.9, 0.0], 40, parameters={"d": 1.1}))
-    with pytest.raises(ns.ConvergenceError, match=r"leg 1 \(\+\): h0 > 0 is violated") as refused:
+    with pytest.raises(ns.ConvergenceError, match=r"leg 1 \(\+\).*h0 > 0") as refused:
         ns.periodic_orbit(system, free, parameters=at)
     assert refused.value.orbit.period == pytest.approx(2 * math.pi, rel=1e-13)
     virtual = ns.periodic_orbit(system, free, parameters=at, virtual=True)
@@ -383,9 +383,9 @@ def test_what_cannot_be_is_said() -> None:
         ns.periodic_orbit(system, run, parameters={"mu": 1.0})
     with pytest.raises(ns.OptionError, match="symmetry"):
         ns.periodic_orbit(system, run, symmetry="even")
-    with pytest.raises(ns.OptionError, match="whose square is 1"):
+    with pytest.raises(ns.OptionError, match="symmetry"):
         ns.periodic_orbit(system, run, symmetry=2 * np.eye(2))
-    with pytest.raises(ns.OptionError, match="no letter changes"):
+    with pytest.raises(ns.OptionError, match="itinerary"):
         ns.periodic_orbit(system, [1.5, 0.0], itinerary="+ + -")
     with pytest.raises(ns.PointError):
         ns.periodic_orbit(system, [1.5, 0.0, 1.0])

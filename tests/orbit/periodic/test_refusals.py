@@ -22,42 +22,42 @@ X, Y = ca.SX.sym("x"), ca.SX.sym("y")
         (
             lambda: (forced_friction(), [1.5, 0.0], {"period": -2.0}),
             ns.OptionError,
-            "positive time",
+            "period",
         ),
         (
             lambda: (forced_friction(), [1.5, 0.0], {"period": 3.3}),
             ns.OptionError,
-            "the same again, received 3.3, after which it differs by",
+            "period.*3.3",
         ),
         (
             lambda: (forced_friction(), [1.5, 0.0], {"period": "x"}),
             ns.OptionError,
-            r"a number, or an expression in the parameters \['f', 'W'\], received 'x'",
+            "period.*'x'",
         ),
         (
             lambda: (walker(), [0.2, -0.2, 0.4, -0.0158], {"itinerary": [("", "toe")]}),
             ns.OptionError,
-            r"an event among \['heelstrike'\] .* received 'toe'",
+            "itinerary.*'toe'",
         ),
         (
             lambda: (welander(), [0.4, 0.3], {"max_iterations": 0}),
             ns.OptionError,
-            "max_iterations: expected a positive whole number",
+            "max_iterations",
         ),
         (
             lambda: (ns.FilippovSystem([X, Y], field=[Y, -X - Y / 2]), [1.0, 0.0], {}),
             ns.ConvergenceError,
-            "shrank the orbit to a point, .* an equilibrium",
+            "shrank.*equilibrium",
         ),
         (
             lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s +"}),
             ns.ConvergenceError,
-            r"leg 2 \(s, ended by L_F1 h\) to come to its event",
+            r"guess.*leg 2 \(s, ended by L_F1 h\)",
         ),
         (
             lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s", "parameters": {"f": 0.0}}),
             ns.DegenerateError,
-            "leg 2 .* a two-fold, at",
+            "leg 2.*two-fold",
         ),
     ],
 )
@@ -74,24 +74,24 @@ def test_a_guess_from_which_trial_steps_overflow_is_no_reason_to_give_up() -> No
 
 
 def test_a_section_that_is_unknown_is_named_with_those_that_are_known() -> None:
-    with pytest.raises(ns.OptionError, match=r"a name of \['h0'\] .* received 'h7'"):
+    with pytest.raises(ns.OptionError, match="'h7'"):
         ns.orbit.poincare(forced_friction(), "h7", [1.0, 0.0], count=3)
 
 
 @pytest.mark.parametrize("word", [3, [("-", "h0", "entry")], [3], [("-", 2)], [[]], [None]])
 def test_an_itinerary_that_is_none_is_refused(word) -> None:
-    with pytest.raises(ns.OptionError, match=r"itinerary: expected modes, .* or pairs of a mode"):
+    with pytest.raises(ns.OptionError, match="itinerary"):
         ns.periodic_orbit(stick_slip(), [1.0, 0.5], itinerary=word)
 
 
 @pytest.mark.parametrize(
     ("names", "bounds", "error", "message"),
     [
-        (None, [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters: expected two names"),
-        (3, [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters: expected two names"),
-        (("A", "k", "A"), [(1, 3), (0.5, 2)], ns.DefinitionError, "expected two names"),
-        (("A", "k"), None, ns.OptionError, "bounds: expected two pairs of numbers"),
-        (("A", "k"), 3.0, ns.OptionError, "bounds: expected two pairs of numbers"),
+        (None, [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters"),
+        (3, [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters"),
+        (("A", "k", "A"), [(1, 3), (0.5, 2)], ns.DefinitionError, "parameters"),
+        (("A", "k"), None, ns.OptionError, "bounds"),
+        (("A", "k"), 3.0, ns.OptionError, "bounds"),
     ],
 )
 def test_what_is_no_pair_of_parameters_or_bounds_is_refused(names, bounds, error, message) -> None:
@@ -103,9 +103,7 @@ def test_what_is_no_pair_of_parameters_or_bounds_is_refused(names, bounds, error
 @pytest.mark.parametrize("points", [3, [[0.0]], [[float("nan"), 0.0]], [[[0.0, 1.0, 2.0]]]])
 def test_attractors_that_are_no_points_are_refused(points) -> None:
     grid = {"x": [0.0, 1.0], "v": 0.0}
-    with pytest.raises(
-        ns.PointError, match=r"attractors: expected points \(m, 2\) that are finite"
-    ):
+    with pytest.raises(ns.PointError, match="attractors"):
         ns.basins(stick_slip(), grid, t_end=10.0, attractors=points)
 
 
@@ -114,7 +112,7 @@ def test_a_state_whose_motion_is_lost_in_rounding_is_no_orbit(start) -> None:
     t = ca.SX.sym("t")
     drive = 2.5 * ca.cos(t)
     relay = ns.FilippovSystem([X], surface=X, above=[drive - 1], below=[drive + 1], time=t)
-    with pytest.raises(ns.ConvergenceError, match=r"an orbit that moves, .* closes by rounding"):
+    with pytest.raises(ns.ConvergenceError, match="rounding"):
         ns.periodic_orbit(relay, [start])
 
 
@@ -150,18 +148,16 @@ def test_a_run_that_chatters_is_refused_soon_and_by_its_name() -> None:
     system = integrators(0.1, 1.0)
     run = ns.simulate(system, [1.0, 0.0, 0.0], 200.0, max_events=20_000)
     assert run.status is ns.Status.TOO_MANY_EVENTS
-    with pytest.raises(
-        ns.ConvergenceError, match="one that chatters: it ended with TOO_MANY_EVENTS"
-    ):
+    with pytest.raises(ns.ConvergenceError, match=r"guess.*TOO_MANY_EVENTS"):
         ns.periodic_orbit(system, run)
-    with pytest.raises(ns.ConvergenceError, match="one that chatters"):  # 2,000 events of its own
+    with pytest.raises(ns.ConvergenceError, match=r"guess.*chatters"):  # 2,000 events of its own
         ns.periodic_orbit(integrators(0.0, 1.0), [1.0, 0.0, 0.0])
 
 
 @pytest.mark.parametrize("start", [[1.0, 0.0, 0.0], [0.3, -0.2, 0.5]])
 def test_an_orbit_that_shrinks_to_a_two_fold_is_none(start) -> None:
     """Near x = y = 0 small orbits nearly close, by their size squared: Newton's method halves them."""
-    with pytest.raises(ns.ConvergenceError, match="shrank the orbit to a point"):
+    with pytest.raises(ns.ConvergenceError, match="shrank"):
         ns.periodic_orbit(integrators(1.0, 0.0), start)
 
 
@@ -176,9 +172,7 @@ def test_the_period_of_a_system_without_time_is_about_what_the_orbit_takes() -> 
     run = ns.simulate(system, [0.5, 0.0], t_end=60.0)
     for guess in (run, [0.5, 0.0], ns.periodic_orbit(system, run)):
         assert ns.periodic_orbit(system, guess, period=7.0).period == pytest.approx(2 * ca.pi)
-        with pytest.raises(
-            ns.ConvergenceError, match=r"about period = 12.5664, received .* 6.2831"
-        ):
+        with pytest.raises(ns.ConvergenceError, match=r"period = 12.5664.*6.2831"):
             ns.periodic_orbit(system, guess, period=4 * ca.pi)
     odd = ns.periodic_orbit(system, run, period=6.0, symmetry="odd")
     assert odd.symmetric and odd.period == pytest.approx(2 * ca.pi)
@@ -186,7 +180,7 @@ def test_the_period_of_a_system_without_time_is_about_what_the_orbit_takes() -> 
 
 @pytest.mark.parametrize("period", [-1.0, 0.0, float("nan"), "x", X])
 def test_a_period_that_is_no_time_is_refused_in_a_system_without_time(period) -> None:
-    with pytest.raises(ns.OptionError, match="period: expected a"):
+    with pytest.raises(ns.OptionError, match="period"):
         ns.periodic_orbit(harmonic(), [0.5, 0.0], period=period)
 
 
@@ -194,14 +188,14 @@ def test_what_an_orbit_or_a_run_says_itself_is_not_said_again() -> None:
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, [0.5])
     for options, message in [
-        ({"itinerary": "+ -"}, "itinerary: expected none, as it belongs to a state"),
-        ({"t_start": 1.0}, "t_start: expected none, as it belongs to a state"),
-        ({"period": 3.0}, "period: expected that of the orbit that is the guess, 6.28318"),
-        ({"symmetry": "odd"}, "symmetry: expected none, or that by which the guess was found"),
+        ({"itinerary": "+ -"}, "itinerary"),
+        ({"t_start": 1.0}, "t_start"),
+        ({"period": 3.0}, "period"),
+        ({"symmetry": "odd"}, "symmetry"),
     ]:
         with pytest.raises(ns.OptionError, match=message):
             ns.periodic_orbit(system, orbit, **options)
-    with pytest.raises(ns.OptionError, match=r"itinerary: .* with a Trajectory"):
+    with pytest.raises(ns.OptionError, match="itinerary"):
         ns.periodic_orbit(system, ns.simulate(system, [0.5], 40.0), itinerary="+ -")
 
 
@@ -224,7 +218,7 @@ def test_a_leg_that_begins_near_zero_may_take_as_long_as_the_one_before() -> Non
 def test_an_orbit_of_another_system_is_no_guess_and_one_of_a_like_system_is() -> None:
     orbit = ns.periodic_orbit(scalar_relay(), [0.5])
     for guess in (orbit, ns.simulate(scalar_relay(), [0.5], 40.0)):
-        with pytest.raises(ns.DefinitionError, match="guess: expected a run or an orbit of"):
+        with pytest.raises(ns.DefinitionError, match="guess"):
             ns.periodic_orbit(harmonic(), guess)
     t, a, k = (ca.SX.sym(name) for name in ("t", "A", "k"))
     drive = a * ca.cos(t) - X / 10  # a friction more
@@ -242,9 +236,7 @@ def test_an_orbit_of_another_system_is_no_guess_and_one_of_a_like_system_is() ->
 def test_a_cost_that_is_no_number_has_no_gradient(cost) -> None:
     """The logarithm of a negative number; a root of zero, whose slope is infinite."""
     run = ns.simulate(ns.FilippovSystem([X], field=[-X]), [0.0], 1.0)
-    with pytest.raises(
-        ns.DegenerateError, match="cost: expected a finite number with finite deriv"
-    ):
+    with pytest.raises(ns.DegenerateError, match="cost"):
         ns.gradient(run, cost)
 
 
@@ -252,9 +244,9 @@ def test_hits_of_a_section_are_asked_for_by_whole_numbers_and_times_by_numbers()
     system = scalar_relay()
     hits = ns.orbit.poincare(system, "h0", [0.5], count=3, direction=0)
     for options in ({"k": 1.5}, {"k": "a"}, {"k": 1, "since": "a"}, {"k": 1, "since": -2}):
-        with pytest.raises(ns.OptionError, match="expected a whole number"):
+        with pytest.raises(ns.OptionError, match=r"\b(k|since)\b"):
             hits.jacobian(**options)
-    with pytest.raises(ns.OptionError, match="t_start: expected a finite number"):
+    with pytest.raises(ns.OptionError, match="t_start"):
         ns.orbit.poincare(system, 1.0, [0.5], count=3, t_start="a")
 
 
@@ -280,51 +272,51 @@ def curve(**given):
 @pytest.mark.parametrize(
     ("change", "error", "message"),
     [
-        ({"curve": None}, ns.DefinitionError, "curve: expected an instance of a subclass"),
-        ({"curve": Circle}, ns.DefinitionError, "curve: expected an instance of a subclass"),
-        ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "one with equations"),
-        ({"curve": curve(equations=lambda self, u: None)}, ns.DefinitionError, "expected arrays"),
-        ({"curve": curve(equations=lambda self, u: u @ u)}, ns.DefinitionError, "expected arrays"),
+        ({"curve": None}, ns.DefinitionError, "curve"),
+        ({"curve": Circle}, ns.DefinitionError, "curve"),
+        ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "curve.*equations"),
+        ({"curve": curve(equations=lambda self, u: None)}, ns.DefinitionError, "curve.equations"),
+        ({"curve": curve(equations=lambda self, u: u @ u)}, ns.DefinitionError, "curve.equations"),
         (
             {"curve": curve(equations=lambda self, u: (u, np.eye(2)))},
             ns.DefinitionError,
-            r"expected arrays \(1,\) and \(1, 2\) for 2 unknowns",
+            r"curve.equations.*\(1, 2\)",
         ),
-        ({"curve": curve(parameter=7)}, ns.DefinitionError, "curve.parameter: expected the index"),
-        ({"curve": curve(scale=np.array([1.0, 0.0]))}, ns.DefinitionError, "curve.scale: expected"),
+        ({"curve": curve(parameter=7)}, ns.DefinitionError, "curve.parameter"),
+        ({"curve": curve(scale=np.array([1.0, 0.0]))}, ns.DefinitionError, "curve.scale"),
         (
             {"curve": curve(tests=lambda self, point: [0.5])},
             ns.DefinitionError,
-            r"curve.tests: expected a mapping of names to numbers, received \[0.5\]",
+            r"curve.tests.*\[0.5\]",
         ),
         (
             {"curve": curve(tests=lambda self, point: {"half": "a"})},
             ns.DefinitionError,
-            "received 'a' under the name 'half'",
+            "curve.tests.*'half'",
         ),
         (
             {"curve": curve(tests=lambda self, point: {3: 0.5}, exact=False)},
             ns.DefinitionError,
-            "received 0.5 under the name 3",
+            "curve.tests.*3",
         ),
         ({"curve": curve(tests=lambda self, point: {"x": point.u})}, ns.DefinitionError, "under"),
-        ({"rows": []}, ns.PointError, "rows: expected a list of points"),
-        ({"rows": None}, ns.PointError, "rows: expected a list of points"),
+        ({"rows": []}, ns.PointError, "rows"),
+        ({"rows": None}, ns.PointError, "rows"),
         ({"rows": ["ab"]}, ns.PointError, "rows"),
-        ({"rows": [[1.0, 0.0], [1.0]]}, ns.PointError, r"rows\[0\]: expected a vector \(1,\)"),
-        ({"rows": [[float("nan"), 0.0]]}, ns.PointError, "of finite numbers"),
-        ({"tangent": [1.0]}, ns.PointError, r"tangent: expected a vector \(2,\)"),
-        ({"tangent": [0.0, 0.0]}, ns.PointError, "tangent: expected a direction, received zero"),
-        ({"step": 0.0}, ns.OptionError, "step: expected a positive"),
-        ({"step": float("nan")}, ns.OptionError, "step: expected a positive"),
-        ({"step": "a"}, ns.OptionError, "step: expected a positive"),
-        ({"first": -1.0}, ns.OptionError, "first: expected a positive"),
-        ({"most": 0}, ns.OptionError, "most: expected a positive whole number"),
-        ({"bounds": 3}, ns.OptionError, "bounds: expected entries"),
-        ({"bounds": [(5, 0, 1)]}, ns.OptionError, "bounds: expected entries"),
-        ({"bounds": [(0, 2, 1)]}, ns.OptionError, "bounds: expected entries"),
-        ({"bounds": [(0, float("nan"), 1)]}, ns.OptionError, "bounds: expected entries"),
-        ({"report": 3}, ns.OptionError, "report: expected a function"),
+        ({"rows": [[1.0, 0.0], [1.0]]}, ns.PointError, "rows"),
+        ({"rows": [[float("nan"), 0.0]]}, ns.PointError, "rows.*finite"),
+        ({"tangent": [1.0]}, ns.PointError, "tangent"),
+        ({"tangent": [0.0, 0.0]}, ns.PointError, "tangent"),
+        ({"step": 0.0}, ns.OptionError, "step"),
+        ({"step": float("nan")}, ns.OptionError, "step"),
+        ({"step": "a"}, ns.OptionError, "step"),
+        ({"first": -1.0}, ns.OptionError, "first"),
+        ({"most": 0}, ns.OptionError, "most"),
+        ({"bounds": 3}, ns.OptionError, "bounds"),
+        ({"bounds": [(5, 0, 1)]}, ns.OptionError, "bounds"),
+        ({"bounds": [(0, 2, 1)]}, ns.OptionError, "bounds"),
+        ({"bounds": [(0, float("nan"), 1)]}, ns.OptionError, "bounds"),
+        ({"report": 3}, ns.OptionError, "report"),
     ],
 )
 def test_a_curve_of_ones_own_that_is_none_is_refused(change, error, message) -> None:
@@ -366,6 +358,6 @@ def test_a_guess_of_many_rounds_is_solved_for_once(monkeypatch) -> None:
 @pytest.mark.slow
 def test_a_guess_of_two_thousand_legs_is_refused_without_their_singular_values() -> None:
     """They took more than four minutes in one call, which no Ctrl-C ended."""
-    with pytest.raises(ns.ConvergenceError, match=r"\.\.\. \(\d+ legs\)', received none") as caught:
+    with pytest.raises(ns.ConvergenceError, match=r"\.\.\. \(\d+ legs\)") as caught:
         ns.periodic_orbit(scalar_relay(), [0.5], period=1000 * 2 * np.pi)
     assert len(str(caught.value)) < 600

@@ -20,13 +20,11 @@ def test_a_forced_orbit_without_the_symmetry_is_refused():
     half = ns.periodic_orbit(relay, [0.5], symmetry="odd")
     whole = ns.periodic_orbit(relay, [0.5])
     assert half.multipliers == pytest.approx(whole.multipliers, abs=1e-13)
-    with pytest.raises(
-        ns.OptionError, match=r"maps motions .* half a forcing period later, received"
-    ):
+    with pytest.raises(ns.OptionError, match=r"symmetry.*half a forcing period"):
         ns.periodic_orbit(relay, [0.5], symmetry="odd", parameters={"b": 0.01})
-    with pytest.raises(ns.OptionError, match="symmetry: expected a matrix that maps motions"):
+    with pytest.raises(ns.OptionError, match="symmetry"):
         ns.periodic_orbit(scalar_relay(), [0.5], symmetry=np.eye(1))
-    with pytest.raises(ns.OptionError, match="Leave symmetry= out"):
+    with pytest.raises(ns.OptionError, match="symmetry"):
         ns.continue_orbit(half, "b", bounds=(-0.1, 0.1))
     event = ns.continue_orbit(ns.periodic_orbit(relay, [0.5]), "b", bounds=(-0.1, 0.1))
     assert not event.events and not any(orbit.symmetric for orbit in event.orbits)
@@ -46,13 +44,13 @@ def test_walls_that_are_no_mirror_images_are_refused_and_others_are_not():
     orbit = ns.periodic_orbit(system, run, symmetry="odd")
     assert [leg.name for leg in orbit.problem.legs] in (["right"], ["left"])
     assert orbit.multipliers == pytest.approx(ns.periodic_orbit(system, run).multipliers, abs=1e-11)
-    with pytest.raises(ns.OptionError, match="the other half of the orbit is off by"):
+    with pytest.raises(ns.OptionError, match=r"symmetry.*half of the orbit"):
         ns.periodic_orbit(system, run, symmetry="odd", parameters={"d": 0.1})
 
 
 @pytest.mark.parametrize("matrix", [[[np.nan]], [[2.0]], np.eye(2)])
 def test_a_matrix_that_is_no_reflection_is_refused(matrix):
-    with pytest.raises(ns.OptionError, match=r"a matrix \(1, 1\) whose square is 1"):
+    with pytest.raises(ns.OptionError, match=r"symmetry.*\(1, 1\)"):
         ns.periodic_orbit(scalar_relay(), [0.5], symmetry=matrix)
 
 
@@ -65,7 +63,5 @@ def test_a_surface_that_is_no_mirror_image_is_refused(level):
     if not level:
         assert half().itinerary == "- +"
         return
-    with pytest.raises(
-        ns.OptionError, match="events of the other half of the orbit are not on h0 = 0"
-    ):
+    with pytest.raises(ns.OptionError, match=r"symmetry.*h0 = 0"):
         half()

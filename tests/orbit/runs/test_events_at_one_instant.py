@@ -39,5 +39,5 @@ def test_two_resets_that_only_meet_are_a_corner():
         ],
     )
     run = ns.simulate(system, [0.0, 0.0], 1.5)
-    with pytest.raises(ns.DegenerateError, match=r"'A' and 'B' at the same instant \(a corner\)"):
+    with pytest.raises(ns.DegenerateError, match=r"'A' and 'B'.*corner"):
         ns.sensitivity(run)

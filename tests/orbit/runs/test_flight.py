@@ -76,7 +76,7 @@ def test_legs_flown_together_are_those_flown_one_by_one(
 def test_a_leg_that_fails_is_named():
     system = ns.FilippovSystem([x], surface=x - 9, above=[1], below=[x**2])
     legs = [Leg("-"), Leg("-", "h0", "crossing")]
-    with pytest.raises(ns.ConvergenceError, match=r"leg 2 \(-, ended by h0\): .* before the end"):
+    with pytest.raises(ns.ConvergenceError, match=r"leg 2 \(-, ended by h0\)"):
         Flights(system, legs)(np.array([[0.1], [1.0]]), np.array([1.0, 2.0]), np.zeros(0))
 
 

@@ -50,7 +50,7 @@ def test_its_derivative_is_that_of_the_map_whatever_the_guards_say(block) -> Non
 def test_words_that_do_not_fit_are_refused(block: ns.FilippovSystem) -> None:
     with pytest.raises(ns.DefinitionError, match="mode"):
         ns.orbit.FixedItinerary(block, "- x", until="h0")
-    with pytest.raises(ns.OptionError, match="no letter changes"):
+    with pytest.raises(ns.OptionError, match="itinerary"):
         ns.orbit.FixedItinerary(block, "- -", until="h0").arrive([-1.0, 0.0])
     with pytest.raises(ns.ConvergenceError, match="leg in mode"):
         ns.orbit.FixedItinerary(block, "s", until="L_F1 h", t_max=1.0).arrive([0.0, 1.0])
@@ -58,7 +58,7 @@ def test_words_that_do_not_fit_are_refused(block: ns.FilippovSystem) -> None:
 
 def test_a_word_without_modes_is_refused(block: ns.FilippovSystem) -> None:
     for word in ("", []):
-        with pytest.raises(ns.OptionError, match="expected at least one mode, received none"):
+        with pytest.raises(ns.OptionError, match="itinerary"):
             ns.orbit.FixedItinerary(block, word, until="h0")
 
 

@@ -98,10 +98,10 @@ def test_lyapunov_spectra_are_saved(tmp_path):
 @pytest.mark.parametrize(
     ("options", "error", "message"),
     [
-        ({"t_end": 1.0, "k": 2}, ns.OptionError, "k: expected at most the 1 states"),
-        ({"t_end": 1.0, "transient": 1.0}, ns.OptionError, "a time after t_start . transient = 1"),
-        ({"t_end": -1.0}, ns.OptionError, "t_end: expected a time after"),
-        ({"t_end": 3.0}, ns.DegenerateError, "ended at t = 2 with status STOPPED"),
+        ({"t_end": 1.0, "k": 2}, ns.OptionError, r"\bk\b"),
+        ({"t_end": 1.0, "transient": 1.0}, ns.OptionError, "t_end.*transient"),
+        ({"t_end": -1.0}, ns.OptionError, "t_end"),
+        ({"t_end": 3.0}, ns.DegenerateError, "STOPPED"),
     ],
 )
 def test_what_cannot_be_counted_is_refused(options, error, message):
@@ -154,9 +154,9 @@ def test_a_map_that_diverges_has_its_exponents_as_long_as_there_are_digits():
     sizes = [math.exp(0.5 + k) * 3.0**k for k in range(4)]  # x at the ticks
     total = sum(math.log(3.0) + math.log(2.0 * size) for size in sizes[1:]) + 2.0 * 3.0
     assert found.exponents.sum() == pytest.approx(total / 3.0, rel=1e-9)
-    with pytest.raises(ns.DegenerateError, match=r"'clock' at t = .* The run diverges, or"):
+    with pytest.raises(ns.DegenerateError, match=r"'clock'.*diverges"):
         ns.lyapunov_spectrum(system, start, t_end=20.0, progress=False)
-    with pytest.raises(ns.DegenerateError, match=r"status NOT_FINITE\. The run diverges: its last"):
+    with pytest.raises(ns.DegenerateError, match=r"NOT_FINITE.*diverges"):
         ns.lyapunov_spectrum(system, start, t_end=60.0, progress=False)
 
 

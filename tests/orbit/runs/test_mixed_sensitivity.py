@@ -235,5 +235,5 @@ def test_what_has_no_derivative_is_refused():
         impacts=ns.Impact(Y, 0.5),
     )
     run = ns.simulate(accumulates, [0.1, 0.0, 3.0, 4.0], 3.0)
-    with pytest.raises(ns.DegenerateError, match="impacts on 'impact' that accumulate"):
+    with pytest.raises(ns.DegenerateError, match=r"'impact'.*accumulate"):
         ns.sensitivity(run)

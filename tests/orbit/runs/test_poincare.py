@@ -100,7 +100,7 @@ def test_a_run_that_ends_before_has_fewer_hits(tmp_path):
     away = ns.FilippovSystem([x, y], field=[-y, x], stops=ns.Stop(x + 0.5, -1))
     found = ns.orbit.poincare(away, x, [1.0, 0.0], count=4, direction=0)
     assert len(found.t) == 1 and found.run.events[-1].name == "stop"
-    with pytest.raises(ns.OptionError, match="k: expected hits from 0 to 0"):
+    with pytest.raises(ns.OptionError, match=r"\bk\b"):
         found.jacobian(1)
     found.save(tmp_path / "orbit")
     again = ns.load(tmp_path / "orbit")

@@ -111,9 +111,9 @@ def test_corners_and_other_systems_are_refused():
     with pytest.raises(ns.DegenerateError, match="corner"):
         ns.sensitivity(line)
     leaving = ns.simulate(block(), [0, 0, 0, 0], 1.0, parameters={"a": 0.8})
-    with pytest.raises(ns.DegenerateError, match="start off the sets"):
+    with pytest.raises(ns.DegenerateError, match=r"start.*sets"):
         ns.sensitivity(leaving)
-    with pytest.raises(ns.DefinitionError, match="multipliers are scalars"):
+    with pytest.raises(ns.DefinitionError, match="multipliers"):
         ns.orbit.saltation_matrix(block(), "*", "s", [0, 0, 0, 0])
 
 

@@ -296,7 +296,7 @@ def swing(a0: float, tol: float, r: float = 0.5) -> tuple[ns.Trajectory, float]:
 def test_an_impact_that_a_run_has_by_its_error_alone_is_a_graze(tol, ask) -> None:
     run, _ = swing(1.0, tol)
     assert run.events[0].name == "reset"  # by rounding; the exact orbit touches the wall
-    with pytest.raises(ns.DegenerateError, match="that the run is sure of, received a grazing"):
+    with pytest.raises(ns.DegenerateError, match="grazing"):
         ask(run)
 
 
@@ -325,15 +325,15 @@ FLOOR = ns.FilippovSystem([y, v], field=[v, -1], impacts=ns.Impact(y, restitutio
 @pytest.mark.parametrize(
     ("system", "before", "after", "point", "message"),
     [
-        (HALF, "+", "-", [0.0, 1.0], r"h0 = 0, received \[0.0, 1.0\], where it is 1"),
-        (HALF, "+", "-", [0.0, 1e-8], "where it is 1e-08"),
-        (HALF, "-", "+", [0.0, 0.0], "h0 < 0 is about to hold, not to fail"),
-        (HALF, "+", "s", [0.0, 0.0], "the condition L_F2 h >= 0 of sliding fails"),
-        (TURN, "s", "+", [0.0, 1.0], r"'L_F1 h' happens in mode 's': h0 = 0"),
-        (TURN, "s", "+", [1.0, 0.0], "L_F1 h = 0, received"),
-        (TURN, "+", "s", [1.0, 0.0], "h0 > 0 is about to hold"),
-        (FLOOR, "o", "o", [1e-3, -1.0], "where it is 0.001"),
-        (FLOOR, "o", "o", [0.0, 1.0], "the gap of 'impact' >= 0 is about to hold"),
+        (HALF, "+", "-", [0.0, 1.0], r"point.*'h0'.*mode '\+'"),
+        (HALF, "+", "-", [0.0, 1e-8], "point.*1e-08"),
+        (HALF, "-", "+", [0.0, 0.0], "point.*h0 < 0"),
+        (HALF, "+", "s", [0.0, 0.0], "point.*L_F2 h >= 0"),
+        (TURN, "s", "+", [0.0, 1.0], "point.*'L_F1 h'.*h0 = 0"),
+        (TURN, "s", "+", [1.0, 0.0], "point.*L_F1 h = 0"),
+        (TURN, "+", "s", [1.0, 0.0], "point.*h0 > 0"),
+        (FLOOR, "o", "o", [1e-3, -1.0], "point.*0.001"),
+        (FLOOR, "o", "o", [0.0, 1.0], "point.*gap of 'impact'"),
     ],
 )
 def test_a_point_at_which_no_such_event_happens_has_no_saltation_matrix(
@@ -350,7 +350,7 @@ def test_points_that_are_on_the_event_to_rounding_are_taken(size) -> None:
     line = np.array([1.0, 3.0]) * size / 3.0
     found = ns.orbit.saltation_matrix(system, "-", "+", line)  # S = 1 + (f+ - f-) e_x/(e_x f-)
     assert np.abs(found - np.eye(2) - np.outer([-1, 0], [3, -1]) / 7).max() < 1e-15
-    with pytest.raises(ns.PointError, match="happens in mode"):
+    with pytest.raises(ns.PointError, match=r"point.*'h0'"):
         ns.orbit.saltation_matrix(system, "-", "+", line * [1.0, 1.0 + 1e-6])
 
 
@@ -360,11 +360,11 @@ def test_bad_input_is_refused_in_words() -> None:
         ns.sensitivity(run, wrt="mu3")
     with pytest.raises(ns.OptionError, match="Trajectory"):
         ns.sensitivity("run")  # type: ignore[arg-type]
-    with pytest.raises(ns.PointError, match="2 numbers"):
+    with pytest.raises(ns.PointError, match="cotangent"):
         ns.vjp(run, [1.0, 2.0, 3.0])
-    with pytest.raises(ns.PointError, match=r"2 numbers, finite ones, received \[nan"):
+    with pytest.raises(ns.PointError, match=r"cotangent.*nan"):
         ns.vjp(run, [np.nan, 2.0])
-    with pytest.raises(ns.ParameterError, match="received 3"):
+    with pytest.raises(ns.ParameterError, match="wrt"):
         ns.sensitivity(run, wrt=3)  # type: ignore[arg-type]
     with pytest.raises(ns.DefinitionError):
         ns.gradient(run, ca.SX.sym("stranger"))

@@ -116,27 +116,27 @@ def test_global_settings_are_left_alone_and_files_are_written(tmp_path):
 def test_other_systems_and_boxes_are_refused():
     z, t = ca.SX.sym("z"), ca.SX.sym("t")
     box = (-1, 1, -1, 1)
-    with pytest.raises(ns.DefinitionError, match="of 2 states and 1 surface, received int"):
+    with pytest.raises(ns.DefinitionError, match=r"phase_portrait.*int"):
         ns.plot.phase_portrait(3, box)
     space = ns.FilippovSystem([x, y, z], surface=x, above=[-1, 0, 0], below=[1, 0, 0])
-    with pytest.raises(ns.DefinitionError, match="received 3 states: x, y, z"):
+    with pytest.raises(ns.DefinitionError, match="3 states"):
         ns.plot.phase_portrait(space, box)
     smooth = ns.FilippovSystem([x, y], field=[y, -x])
-    with pytest.raises(ns.DefinitionError, match="received 0 surfaces"):
+    with pytest.raises(ns.DefinitionError, match="0 surfaces"):
         ns.plot.phase_portrait(smooth, box)
     lam = ca.SX.sym("lam")
     hidden = ns.FilippovSystem(
         [x, y], surface=y, multipliers=lam, field=[1, -(lam**3)], hidden=True
     )
-    with pytest.raises(ns.DefinitionError, match="received hidden dynamics"):
+    with pytest.raises(ns.DefinitionError, match="hidden"):
         ns.plot.phase_portrait(hidden, box)
     driven = ns.FilippovSystem([x, y], surface=x, above=[-1, t], below=[1, 0], time=t)
-    with pytest.raises(ns.DefinitionError, match="received explicit time"):
+    with pytest.raises(ns.DefinitionError, match="time"):
         ns.plot.phase_portrait(driven, box)
     for wrong in (None, (1, -1, 0, 1), (0, 1, 2), "box", (0, 1, 0, np.inf)):
-        with pytest.raises(ns.OptionError, match="box: expected"):
+        with pytest.raises(ns.OptionError, match=r"\bbox\b"):
             ns.plot.phase_portrait(harvest(1.0), wrong)
-    with pytest.raises(ns.PointError, match="starts: expected finite numbers of shape"):
+    with pytest.raises(ns.PointError, match="starts"):
         ns.plot.phase_portrait(harvest(1.0), box, starts=[1, 2])
 
 

@@ -190,7 +190,7 @@ def test_drawing_on_given_axes():
 @pytest.mark.parametrize("draw", [ns.plot.two_fold, ns.plot.two_fold_3d])
 @pytest.mark.parametrize("wrong", [None, 3, "fold", [1, 2], ((1, -1), (1, 2, 3)), object()])
 def test_what_is_not_a_two_fold_is_refused(draw, wrong):
-    with pytest.raises(ns.DefinitionError, match=r"expected a two-fold as find_two_fold returns"):
+    with pytest.raises(ns.DefinitionError, match="two-fold"):
         draw(wrong)
 
 
@@ -198,13 +198,13 @@ def test_other_wrong_input_is_refused():
     good = CLASSES["VV-F"]
     with pytest.raises(ns.DegenerateError, match="cusp"):
         ns.plot.two_fold(((0, 1), (1.0, 1.0)))
-    with pytest.raises(ns.OptionError, match="two finite numbers"):
+    with pytest.raises(ns.OptionError, match=r"\bnu\b"):
         ns.plot.two_fold(((1, 1), (np.nan, 1.0)))
-    with pytest.raises(ns.OptionError, match="size: expected a width and a height"):
+    with pytest.raises(ns.OptionError, match="size"):
         ns.plot.two_fold(good, size=(3, -1))
-    with pytest.raises(ns.OptionError, match="ax: expected matplotlib axes, received str"):
+    with pytest.raises(ns.OptionError, match=r"\bax\b"):
         ns.plot.two_fold(good, ax="here")
-    with pytest.raises(ns.OptionError, match="orbits: expected a whole number"):
+    with pytest.raises(ns.OptionError, match="orbits"):
         ns.plot.two_fold(good, orbits=2.5)
     with pytest.raises(ns.OptionError, match="elevation"):
         ns.plot.two_fold_3d(good, elevation=-10)

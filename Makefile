@@ -29,12 +29,12 @@ check: lint ## everything that must hold before a release: lint, then all tests
 bench: .venv/.bench ## measured speeds, beside the peers
 	@$(BIN)/python -m benchmarks
 
-docs: .venv/.docs .venv/.test ## the documentation, into build/docs/, with the reports of the papers
-	@test -f build/welander_1982/report.html || $(BIN)/python -m papers
+docs: .venv/.docs .venv/.test ## the documentation, into build/docs/, with the records of the papers
+	@test -f build/welander_1982/results.md || $(BIN)/python -m papers
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/python -m mkdocs --quiet build --strict
 	@echo "docs: build/docs/index.html"
 
-lint: .venv/.dev ## formatting, lint, types and the floors
+lint: .venv/.dev ## formatting, lint, types and layers
 	@$(BIN)/ruff format --quiet --check . || { echo "format: run '$(BIN)/ruff format .'"; exit 1; }
 	@$(BIN)/ruff check --quiet .
 	@$(BIN)/mypy

@@ -24,15 +24,7 @@ STYLE = ns.plot.style
 
 @dataclass(frozen=True)
 class Animation:
-    """A moving picture.
-
-    Attributes
-    ----------
-    name, title, text : str
-        Name of the files; what it shows, in a few words and in a few sentences.
-    frames : callable
-        Given how many, yields the figure at each moment; the same figure, drawn anew.
-    """
+    """A moving picture; ``frames`` yields the same figure, drawn anew, at each of so many moments."""
 
     name: str
     title: str
@@ -143,12 +135,7 @@ ANIMATIONS = (
 
 
 def write(animation: Animation, folder: Path, count: int = 40) -> list[Path]:
-    """Write the moving picture as WebP and its last moment as PNG.
-
-    Returns
-    -------
-    list of Path
-    """
+    """Write the moving picture as WebP and its last moment as PNG."""
     images = [_image(figure) for figure in animation.frames(count)]
     folder.mkdir(parents=True, exist_ok=True)
     moving, still = (folder / f"{animation.name}.{kind}" for kind in ("webp", "png"))

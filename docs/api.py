@@ -156,12 +156,12 @@ def members(path: str, names: Iterable[str]) -> str:
 
 
 def _member(path: str, name: str) -> str:
-    """One name; where a module has the same name, it is asked for by the place of its definition."""
-    asked, shown = place(path, name), f"{path}.{name}"
-    if asked == shown:
-        return f"::: {asked}\n{_OPTIONS.get(name, '')}"
+    """The entry of a name; where a module has the same name, by the path of its definition."""
+    defined, shown = place(path, name), f"{path}.{name}"
+    if defined == shown:
+        return f"::: {defined}\n{_OPTIONS.get(name, '')}"
     options = f"    options:\n      heading: {shown}\n      toc_label: {shown}\n"
-    return f"[](){{#{shown}}}\n\n::: {asked}\n{options}"
+    return f"[](){{#{shown}}}\n\n::: {defined}\n{options}"
 
 
 def place(path: str, name: str) -> str:

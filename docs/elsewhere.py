@@ -17,9 +17,6 @@ PAPERS = (
     "welander_1982",
 )
 
-#: The folder of the whole reports, seen from the pages of the papers.
-REPORTS = "../reports"
-
 
 def text_of(path: str) -> str:
     """Text of a file of the repository."""
@@ -39,8 +36,12 @@ def pages() -> dict[str, str]:
 
 
 def pictures() -> dict[str, Path]:
-    """Pictures of those pages, by their address."""
-    return {"work_precision.png": ROOT / "benchmarks" / "work_precision.png"}
+    """Pictures of those pages, by their address; those of papers as `make reproduce` drew them."""
+    found = {"work_precision.png": ROOT / "benchmarks" / "work_precision.png"}
+    for name in PAPERS:
+        for path in sorted((ROOT / "build" / name).glob("*.png")):
+            found[f"papers/{name}/{path.name}"] = path
+    return found
 
 
 def cite() -> str:
@@ -53,19 +54,15 @@ def cite() -> str:
 
 
 def paper(name: str) -> str:
-    """The page of a paper: its README with a link to the whole report."""
+    """The page of a paper: its README, with the record instead of the table of claims where there is one."""
     text = text_of(f"papers/{name}/README.md")
-    title, _, rest = text.partition("\n")
-    if f"reports/{name}.html" not in reports():
+    record = ROOT / "build" / name / "results.md"
+    if not record.is_file():
         return text
-    link = f"[The whole report, with its figures]({REPORTS}/{name}.html){{ .md-button }}"
-    return f"{title}\n\n{link}\n{rest}"
-
-
-def reports() -> dict[str, Path]:
-    """Whole reports by their address, as `make reproduce` wrote them."""
-    found = {name: ROOT / "build" / name / "report.html" for name in PAPERS}
-    return {f"reports/{name}.html": path for name, path in found.items() if path.is_file()}
+    before, after = re.split(r"<!-- claims.*?<!-- end of claims -->\n", text, flags=re.DOTALL)
+    found = record.read_text(encoding="utf-8").partition("\n\n## ")[2]
+    found = re.sub(r"\]\((?=\w+\.png\))", f"]({name}/", found)
+    return f"---\nhide:\n  - toc\n---\n\n{before}{after}\n## {found}"
 
 
 def measured() -> str:

@@ -1,7 +1,7 @@
-"""What the pages take from the code, so that it cannot drift: tables and the gallery.
+"""Generate tables and the gallery from the code, so that the pages agree with it.
 
-A page asks for a part with a line `<!-- generated: name -->`; the name is a function of `PARTS`.
-`hooks.py` puts the text there while the site is built. Nothing here needs mkdocs.
+A line `<!-- generated: name -->` of a page is replaced by the text that the function of this name in
+`PARTS` returns, while the site is built.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""What `make docs` does besides turning pages into HTML (an mkdocs hook).
+"""Hooks of mkdocs: draw the gallery, write the pages of the API, fill in tables, typeset formulas.
 
-It draws the gallery by running the programs of docs/examples, writes the API's pages, puts the
-generated parts into the pages, and typesets mathematics. All of it lands in build/, nothing in docs/.
+Everything that is generated is written to build/.
 """
 
 from __future__ import annotations
@@ -18,12 +17,11 @@ sys.path[:0] = [str(DOCS), str(DOCS.parent)]
 import animations  # noqa: E402
 import api  # noqa: E402  (neighbours; docs is not a package)
 import elsewhere  # noqa: E402
+import formulas  # noqa: E402
 import generate  # noqa: E402
 import notebooks  # noqa: E402
 import typeset  # noqa: E402
 from mkdocs.structure.files import File, Files  # noqa: E402
-
-from papers import mathematics  # noqa: E402
 
 PICTURES = DOCS.parent / "build" / "gallery"
 #: A list of exceptions in brackets, and a dash before a description that is not there.
@@ -57,7 +55,7 @@ def on_files(files: Files, config: Any) -> Files:
         done = notebooks.run(page.read_text(encoding="utf-8"), page.stem)
         for uri, content in notebooks.files(done, page.stem).items():
             files.append(File.generated(config, uri, content=content))
-    for uri, path in {**elsewhere.pictures(), **elsewhere.reports()}.items():
+    for uri, path in elsewhere.pictures().items():
         files.append(File.generated(config, uri, abs_src_path=str(path)))
     for uri, text in {**api.pages(), **elsewhere.pages(), **generate.explorers()}.items():
         files.append(File.generated(config, uri, content=text))
@@ -78,9 +76,9 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
     """Take Sphinx's roles out of docstrings, typeset formulas, label the cells of tables."""
     read = typeset.formula
     if page.file.src_uri.startswith("api/") or page.file.src_uri == "gallery.md":
-        read = mathematics.formula  # docstrings have formulas as plain text
+        read = formulas.formula  # docstrings have formulas as plain text
         html = _LISTED.sub(lambda found: found[1].replace(">, <", "></code>, <code><"), html)
         html = _NOTHING.sub("", html)
     if page.file.src_uri.startswith(("papers/", "benchmarks")):  # plain text, for terminals too
-        html = mathematics.typeset_page(html)
+        html = formulas.page(html)
     return typeset.labelled(typeset.mathematics(_ROLE.sub("", html), read))

@@ -27,21 +27,7 @@ _PART = re.compile(
 
 @dataclass
 class Cell:
-    """A piece of a tutorial.
-
-    Attributes
-    ----------
-    text : str
-        Markdown, or the program of a block.
-    program : bool
-        Whether it is a program.
-    alt : str
-        What its picture shows; empty where it has none.
-    printed : str
-        What running it printed.
-    pictures : dict of str to bytes
-        Its picture by the kind of file, once it has run.
-    """
+    """A piece of a tutorial: Markdown or a program, with what it printed and its pictures by kind of file."""
 
     text: str
     program: bool
@@ -85,7 +71,7 @@ def _drawn(figure: Any, kind: str) -> bytes:
 
 
 def with_pictures(page: str, name: str) -> str:
-    """The page with a picture where it asks for one; they are files `name-1.svg` and so on."""
+    """The page with its pictures, the files `name-1.svg` and so on."""
     numbers = iter(range(1, 1000))
     return re.sub(
         r"^<!-- picture: (.*?) -->$",

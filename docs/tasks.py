@@ -11,19 +11,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Task:
-    """A page of the API.
-
-    Attributes
-    ----------
-    title : str
-        What a reader wants to do.
-    about : str
-        The first paragraph: what is here, and which page explains it.
-    package : str
-        Where the names are imported from.
-    names : tuple of str
-        In the order in which the page describes them.
-    """
+    """A page of the API: its title, first paragraph, package, and names in their order on the page."""
 
     title: str
     about: str

@@ -1,9 +1,7 @@
-"""What a page's HTML gets besides what Markdown makes: mathematics as MathML, labels in tables.
+"""Typeset LaTeX formulas as MathML, and label the cells of tables, in the HTML of a page.
 
-Formulas are written between dollars and become MathML while the site is built, so a page needs neither
-a script nor a network to show them: as LaTeX in the pages, as plain text in docstrings, which `help()`
-shows as they are. Cells of tables carry the heads of their columns, so that
-a narrow screen can show each row as a list.
+MathML is made while the site is built, so a page needs neither a script nor a network. Cells carry the
+heads of their columns, so that a narrow screen can show each row as a list.
 """
 
 from __future__ import annotations
@@ -19,7 +17,7 @@ _FORMULA = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL
 )
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
-_HEAD = re.compile(r"<th[^>]*>(.*?)</th>", re.DOTALL)
+_HEAD = re.compile(r"<th(?:\s[^>]*)?>(.*?)</th>", re.DOTALL)
 _ROW = re.compile(r"<tr>.*?</tr>", re.DOTALL)
 _TAG = re.compile(r"<[^>]+>")
 
@@ -30,18 +28,7 @@ class FormulaError(ValueError):
 
 @cache
 def formula(latex: str, display: str = "inline") -> str:
-    """Typeset LaTeX as MathML.
-
-    Raises
-    ------
-    FormulaError
-        A command or an ampersand is left over in what would be shown.
-
-    Examples
-    --------
-    >>> formula(r"\\nu_1")[:5], formula(r"\\nu_1")[-7:]
-    ('<math', '</math>')
-    """
+    """Typeset LaTeX as MathML; raise FormulaError if a command is left over in what would be shown."""
     made = convert(latex, display=display)
     shown = _TAG.sub("", made)
     if "\\" in shown or "&amp;" in shown or re.search(r"&(?![#\w]+;)", shown):

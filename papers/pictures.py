@@ -1,53 +1,98 @@
-"""A figure of a paper: what it is called, what it shows, and how to draw it."""
+"""Figures of papers: what each shows, the look of print, and a check that it is legible."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.legend import Legend
 from matplotlib.path import Path as MplPath
 from matplotlib.text import Text
 from matplotlib.transforms import Affine2D
 from mpl_toolkits.mplot3d.art3d import Text3D
+from numpy.typing import ArrayLike, NDArray
+
+from nonsmooth.plot import style
+from nonsmooth.plot.labels import Labels as Labels
+
+_PRINT = {
+    "font.size": 8.0,
+    "axes.titlesize": 8.5,
+    "axes.labelsize": 9.0,
+    "legend.fontsize": 8.0,
+    "xtick.labelsize": 8.0,
+    "ytick.labelsize": 8.0,
+    "xtick.direction": "out",
+    "ytick.direction": "out",
+    "pdf.fonttype": 42,
+}
 
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure of the paper.
-
-    Attributes
-    ----------
-    name : str
-        Of the files.
-    label : str
-        The paper's, or a few words.
-    caption : str
-    draw : callable
-    """
+    """A figure: the name of its files, the paper's label or a few words, a caption, and its program."""
 
     name: str
     label: str
     caption: str
     draw: Callable[[], Figure]
 
+    def save(self, folder: Path) -> None:
+        """Draw the figure and write it as PNG and PDF."""
+        figure = self.draw()
+        figure.savefig(folder / f"{self.name}.png", dpi=150)
+        figure.savefig(folder / f"{self.name}.pdf", dpi=150, metadata={"CreationDate": None})
 
-def save(picture: Picture, folder: Path) -> list[Path]:
-    """Draw a figure and write it as PNG and PDF.
 
-    Returns
-    -------
-    list of Path
-    """
-    figure = picture.draw()
-    paths = [folder / f"{picture.name}.{kind}" for kind in ("png", "pdf")]
-    for path in paths:
-        figure.savefig(
-            path, dpi=150, metadata={"CreationDate": None} if path.suffix == ".pdf" else None
-        )
-    return paths
+@contextmanager
+def settings() -> Iterator[None]:
+    """Apply the library's style with the sizes of print inside a ``with`` block."""
+    with style.settings(_PRINT):
+        yield
+
+
+def new_figure(width: float, height: float) -> Figure:
+    """Return an empty figure (inches) that is unknown to pyplot."""
+    return style.new_figure((width, height))
+
+
+def canvas(width: float, height: float) -> tuple[Figure, Axes]:
+    """Return a figure with one axes of equal scales and no frame, for schematic drawings."""
+    figure = new_figure(width, height)
+    axes = figure.add_subplot()
+    axes.set_aspect("equal")
+    axes.set_axis_off()
+    return figure, axes
+
+
+def sampled(
+    function: Callable[[float], ArrayLike], at: ArrayLike, turn: float = 4.0, most: int = 200
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Sample curves more densely where they bend: no angle above ``turn`` degrees, ``most`` points."""
+    values = {float(x): np.atleast_1d(np.asarray(function(float(x)), float)) for x in np.ravel(at)}
+    while len(values) < most:
+        xs = np.array(sorted(values))
+        ys = np.array([values[x] for x in xs])
+        dx = np.diff(xs)[:, None] / np.ptp(xs)
+        dy = np.diff(ys, axis=0) / np.where(np.ptp(ys, axis=0) > 0, np.ptp(ys, axis=0), 1.0)
+        angle = np.degrees(np.arctan2(dy, dx))
+        bends = np.abs(np.diff(angle, axis=0)) > turn
+        long = np.hypot(dx, dy) > 2e-3
+        near = np.zeros(len(dx), dtype=bool)
+        near[:-1] |= np.any(bends & long[:-1], axis=1)
+        near[1:] |= np.any(bends & long[1:], axis=1)
+        new = [(a + b) / 2 for a, b, k in zip(xs[:-1], xs[1:], near, strict=True) if k]
+        if not new:
+            break
+        for x in new[: most - len(values)]:
+            values[float(x)] = np.atleast_1d(np.asarray(function(float(x)), float))
+    xs = np.array(sorted(values))
+    return xs, np.array([values[x] for x in xs])
 
 
 #: The width of a page in inches, the smallest text in points, and the longest legend, of print.
@@ -55,17 +100,7 @@ PAGE, SMALLEST, LISTED = 7.0, 8.0, 6
 
 
 def faults(figure: Figure) -> list[str]:
-    """What would not do in print: the width, texts too small, cut off or on others, long legends.
-
-    Parameters
-    ----------
-    figure : matplotlib Figure
-
-    Returns
-    -------
-    list of str
-        A sentence for each fault.
-    """
+    """Sentences on what is not legible in print: width, small, cut or overlapping texts, long legends."""
     width, found = figure.get_figwidth(), list[str]()
     if width > PAGE:
         found.append(f"it is {width:g} inches wide, more than the {PAGE:g} of a page.")

@@ -75,13 +75,13 @@ def cases() -> Checks:
 
 
 def kv_rescaled() -> Checks:
-    """The scaling that leads from (kv) to (kv_rescaled)."""
+    """The scaling that leads from eq. (11) to eq. (15)."""
     e2 = ca.SX.sym("e2")
     y, yt, g = (ca.SX.sym(n) for n in ("y", "yt", "g"))
     normal = e2**2 * (-2 * d2 / e2 * yt - y / e2**2 - g)
     return (
         Check(
-            "X and Omega equations follow from (kv) with X = x, Omega = eps2 omega",
+            "X and Omega equations follow from eq. (11) with X = x, Omega = eps2 omega",
             all(identical(r) for r in scaling_residuals(ca.SX(1), e2, e2**2)),
         ),
         Check("Y equation follows", identical(normal, -2 * d2 * (e2 * yt) - y - e2**2 * g)),
@@ -117,7 +117,7 @@ def sign_conditions() -> Checks:
         )
     return (
         Check(
-            "largest dLambda_N/dY over Y in {-1, -.1}, Y' in {-1, 0, .5} for the three laws used "
+            "largest dLambda_N/dY over Y in {-1, -0.1}, Y' in {-1, 0, 0.5} for the three laws used "
             "here: " + ", ".join(f"{r:.3g}" for r in rows),
             max(rows) < 0,
         ),
@@ -196,7 +196,7 @@ def signs_and_numbers() -> Checks:
 
 
 def reduced_flow() -> Checks:
-    """(normal_red) from (normal_sliding)."""
+    """Equation (48) from equation (47)."""
     z2, z3, s1, s2, n1, n2 = (ca.SX.sym(n) for n in ("z2", "z3", "s1", "s2", "n1", "n2"))
     weight = z2 / (z2 + z3)
     second = (1 - weight) * -s1 + weight * n2
@@ -258,7 +258,7 @@ def eigenvalue_cases() -> Checks:
 
 
 def second_lie_order() -> Checks:
-    """The second lines of (second_derivativeF1, F2) leave out a term with a factor eps."""
+    """The second lines of eq. (51) leave out a term with a factor eps."""
     model = generic().equations
     drift = along(ca.vertcat(Xp, 0, Yp, 0, 0), model.A)
     slope = 7 * mu * Yp * ca.jacobian(model.Lambda_N, Y) / 2
@@ -280,7 +280,7 @@ def from_erratum(*numbers: int) -> Checks:
 
 
 def alpha_definition() -> Checks:
-    """Equation (alpha) is the solution of F_s.grad H = 0."""
+    """Equation (21) is the solution of F_s.grad H = 0."""
     model, weight = kelvin_voigt(), ca.SX.sym("weight")
     field = (1 - weight) * model.F1 + weight * model.F2
     return (
@@ -293,7 +293,7 @@ def alpha_definition() -> Checks:
 
 
 def switching() -> Checks:
-    """Equations (switching_con) and (switching_con2)."""
+    """Equations (24) and (26)."""
     return results.switching().checks
 
 
@@ -312,62 +312,62 @@ _ENTRIES: tuple[Entry, ...] = (
     ("Sec. 2.2, dv/dt", "dv/dt = diag(7/2, 1) lambda", CORRECTED, (25,), None),
     ("Sec. 2.2, dv/dt rescaled", "dv/dt = m^-1 lambda~ + O(eps)", CORRECTED, (1,), None),
     ("Sec. 2.2, n", "n = integral of lambda_N dt~", DEFINITION, (), None),
-    ("v_divs_gen", "dv/dn = [(7/2) lT/lN, 1]", AGREES, (), per_impulse),
-    ("v_div_slip", "dv_T/dv_N = +-(7/2) mu", AGREES, (), per_impulse),
-    ("v_div_roll", "dv_T/dv_N = 0", AGREES, (), per_impulse),
+    ("eq. (7)", "dv/dn = [(7/2) lT/lN, 1]", AGREES, (), per_impulse),
+    ("eq. (8)", "dv_T/dv_N = +-(7/2) mu", AGREES, (), per_impulse),
+    ("eq. (9)", "dv_T/dv_N = 0", AGREES, (), per_impulse),
     ("case I", "abs(H0/y'0) > (7/2) mu (1+r)", AGREES, (), cases),
     ("case II", "(7/2) mu < abs(H0/y'0) < (7/2) mu (1+r)", AGREES, (), cases),
     ("case III", "abs(H0/y'0) < (7/2) mu", AGREES, (), cases),
     ("Sec. 2.2, r", "r ~ exp(-pi d/2 + d^2/2 + O(d^3))", CORRECTED, (2,), None),
-    ("kv", "linear Kelvin-Voigt model", ASSUMPTION, (), None),
+    ("eq. (11)", "linear Kelvin-Voigt model", ASSUMPTION, (), None),
     ("Sec. 3, lambda_N", "lN = -(2 d2/eps2) y' - y/eps2^2 - g", CORRECTED, (4,), None),
     ("Sec. 3, tau", "tau = t/eps2", DEFINITION, (), None),
     ("Sec. 3, eta", "eta = eps2/eps1 << 1", CORRECTED, (5,), None),
-    ("kv_rescaled", "X'' + 2 d1 eta X' + eta^2 X = Lambda_T, ..", AGREES, (6, 7), kv_rescaled),
-    ("nforce", "Lambda_N = -2 d2 Y' - Y - eps2^2 g", CORRECTED, (4,), None),
+    ("eq. (15)", "X'' + 2 d1 eta X' + eta^2 X = Lambda_T, ..", AGREES, (6, 7), kv_rescaled),
+    ("eq. (16)", "Lambda_N = -2 d2 Y' - Y - eps2^2 g", CORRECTED, (4,), None),
     ("Sec. 3.1, p'", "p' = F1 if H > 0, F2 if H < 0", DEFINITION, (), None),
-    ("vec_p", "p = [X, X', Y, Y', Omega]", DEFINITION, (), None),
+    ("eq. (18)", "p = [X, X', Y, Y', Omega]", DEFINITION, (), None),
     ("Sec. 3.1, H", "H = X' + Omega", DEFINITION, (), contact_point),
-    ("sliding", "F_s = (1 - alpha) F1 + alpha F2", AGREES, (), sliding),
-    ("alpha", "alpha = F1.grad H/((F1 - F2).grad H)", AGREES, (), alpha_definition),
+    ("eq. (20)", "F_s = (1 - alpha) F1 + alpha F2", AGREES, (), sliding),
+    ("eq. (21)", "alpha = F1.grad H/((F1 - F2).grad H)", AGREES, (), alpha_definition),
     ("Sec. 3.2, p'", "p' = F_s if H = 0 (where alpha is in [0, 1])", DEFINITION, (), full_system),
     ("Sec. 3.2, alpha", "alpha made explicit", CORRECTED, (9,), None),
-    ("switching_con", "F1.grad H", AGREES, (), switching),
-    ("lie2_kv", "(F1.grad)^2 H", CORRECTED, (11,), None),
-    ("switching_con2", "F2.grad H", AGREES, (), switching),
-    ("2conds", "4 d1 eta X' + eta^2 X = 0, Lambda_N = 0", CORRECTED, (10,), None),
-    ("generic_eq", "generalised model", ASSUMPTION, (), special_case),
+    ("eq. (24)", "F1.grad H", AGREES, (), switching),
+    ("eq. (25)", "(F1.grad)^2 H", CORRECTED, (11,), None),
+    ("eq. (26)", "F2.grad H", AGREES, (), switching),
+    ("eq. (27)", "4 d1 eta X' + eta^2 X = 0, Lambda_N = 0", CORRECTED, (10,), None),
+    ("eq. (28)", "generalised model", ASSUMPTION, (), special_case),
     ("Sec. 4, slip", "abs(lT) = mu lN", CORRECTED, (4,), None),
     ("Sec. 4, roll", "abs(lT) < mu lN", CORRECTED, (4,), None),
-    ("lift_off_cond", "lN = -d y' - k y - g = 0", CORRECTED, (4,), None),
-    ("functions_constraints", "u_y < 0, d_y < 0", ASSUMPTION, (), None),
-    ("force_constraints", "d lN/dy < 0", ASSUMPTION, (), sign_conditions),
-    ("functions_constraints_horizontal", "sign(u_x' < 0)) = sign x'", CORRECTED, (26,), None),
+    ("eq. (29)", "lN = -d y' - k y - g = 0", CORRECTED, (4,), None),
+    ("eq. (30)", "u_y < 0, d_y < 0", ASSUMPTION, (), None),
+    ("eq. (31)", "d lN/dy < 0", ASSUMPTION, (), sign_conditions),
+    ("eq. (32)", "sign(u_x' < 0)) = sign x'", CORRECTED, (26,), None),
     ("Sec. 4, tau", "tau = t/eps", DEFINITION, (), None),
     (
-        "functions_constraints_horizontal_scaling",
+        "eq. (34)",
         "k = kappa/eps, d = delta/eps^2",
         CORRECTED,
         (15,),
         None,
     ),
     ("Sec. 4, upsilon, zeta", "upsilon = u, zeta = z", AGREES, (), tangential_scale),
-    ("derivatives_constraint", "derivatives of order one", ASSUMPTION, (), None),
+    ("eq. (36)", "derivatives of order one", ASSUMPTION, (), None),
     (
-        "generic_rescaled",
+        "eq. (37)",
         "X'' + eps upsilon X' + eps^2 zeta X = Lambda_T, ..",
         AGREES,
         (7, 15),
         partial(from_erratum, 15),
     ),
     (
-        "functions_constraints_new_scaling",
+        "eq. (38)",
         "upsilon_Y < 0, delta_Y < 0, sign upsilon_X' = sign X'",
         ASSUMPTION,
         (),
         None,
     ),
-    ("force_constraints_new_scaling", "d Lambda_N/dY = d/dy(..) < 0", CORRECTED, (27,), None),
+    ("eq. (39)", "d Lambda_N/dY = d/dy(..) < 0", CORRECTED, (27,), None),
     ("Sec. 4, Lambda_T", "Lambda_T = -sign(H) Lambda_N", CORRECTED, (16,), None),
     (
         "Sec. 4, H, Lambda_N",
@@ -392,16 +392,16 @@ _ENTRIES: tuple[Entry, ...] = (
         (21,),
         None,
     ),
-    ("sigma_def", "sigma_i = sign (F_i.grad)^2 H", DEFINITION, (), signs_and_numbers),
-    ("nus", "nu1, nu2", DEFINITION, (), signs_and_numbers),
-    ("normal_sliding", "sliding normal form", CORRECTED, (21,), None),
-    ("normal_red", "z' = M z/(z2 + z3)", AGREES, (), reduced_flow),
+    ("eq. (45)", "sigma_i = sign (F_i.grad)^2 H", DEFINITION, (), signs_and_numbers),
+    ("eq. (46)", "nu1, nu2", DEFINITION, (), signs_and_numbers),
+    ("eq. (47)", "sliding normal form", CORRECTED, (21,), None),
+    ("eq. (48)", "z' = M z/(z2 + z3)", AGREES, (), reduced_flow),
     ("Sec. 4.1, regions", "D_att, D_rep, D_C1, D_C2", AGREES, (), regions),
-    ("normal_red_visible", "M = [[nu2, -1], [-1, nu1]]", AGREES, (), eigenvalue_cases),
-    ("second_derivativeF1", "(F1.grad)^2 H at s", CORRECTED, (17,), None),
-    ("second_derivativeF2", "(F2.grad)^2 H at s", AGREES, (17,), second_lie_order),
+    ("eq. (50)", "M = [[nu2, -1], [-1, nu1]]", AGREES, (), eigenvalue_cases),
+    ("eq. (51)", "(F1.grad)^2 H at s", CORRECTED, (17,), None),
+    ("eq. (52)", "(F2.grad)^2 H at s", AGREES, (17,), second_lie_order),
     ("Sec. 4.2, sigma", "sigma1 = 1, sigma2 = -1", CORRECTED, (19,), None),
-    ("nus_calc", "nu1 nu2 = 1 + (20/7) (..) g eps^3", CORRECTED, (18, 22), None),
+    ("eq. (54)", "nu1 nu2 = 1 + (20/7) (..) g eps^3", CORRECTED, (18, 22), None),
 )
 
 

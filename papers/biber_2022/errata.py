@@ -6,7 +6,7 @@ Numbers 1 to 24 were known before this reproduction; 25 on were found by it.
 from __future__ import annotations
 
 from collections.abc import Callable
-from functools import cache
+from functools import cache, partial
 
 from . import errata_further as further
 from . import errata_general as general
@@ -77,3 +77,33 @@ def erratum(number: int) -> Erratum:
     if result.number != number:
         raise ValueError(f"erratum {number}: the function in its place derives {result.number}.")
     return result
+
+
+ROWS = tuple(partial(erratum, number) for number in range(1, len(ALL) + 1))
+
+#: What of the paper holds as it is.
+STANDS = (
+    "A ball that rolls during the bounce lifts off slipping, but for a set of landings of codimension "
+    "one: rolling lift-off is a two-fold, and a single rolling orbit reaches it.",
+    "Compliance and damping along the ground let the slip reverse; rigid laws do not.",
+    "A surface of codimension one divides the landings that leave in forward slip from those that "
+    "leave in reverse. It has a second part, which the paper does not mention, where the ball slips "
+    "throughout.",
+    "Not checked: the measurements, which are not public, and the parameters of Fig. 10, which are not "
+    "printed.",
+)
+
+
+def opening() -> list[tuple[str, list[str]]]:
+    """What to read first: what stands, what changes, what is a slip of print."""
+    found = [compute() for compute in ROWS]
+    brief = [
+        f"Erratum {e.number}, {e.place}: printed {e.printed}; correct {e.correct}." for e in found
+    ]
+    changes = [f"{text} (Erratum {number}.)" for number, text in CONCLUSIONS.items()]
+    return [
+        ("What stands", list(STANDS)),
+        ("Errata that change a statement", changes),
+        ("Errata that change a formula or a number", [brief[n - 1] for n in FORMULAS]),
+        ("Slips of print", [brief[n - 1] for n in SLIPS]),
+    ]

@@ -46,7 +46,7 @@ def sign_condition() -> Erratum:
     second = [impose(g.equations.lie(i, i), given) for i in (1, 2)]
     return Erratum(
         26,
-        "(functions_constraints_horizontal) and the text before it",
+        "eq. (32) and the text before it",
         "sign(u_x' < 0)) = sign(x'); the stiffness increases when the ball moves to the right",
         "sign(u_x') = sign(x'), a condition on the damping u; no correct result needs it",
         (
@@ -71,7 +71,7 @@ def force_slope() -> Erratum:
     )
     return Erratum(
         27,
-        "(force_constraints_new_scaling)",
+        "eq. (39)",
         "d/dY Lambda_N = d/dy (-delta Y' - kappa Y - eps^2 g)",
         "d/dY on both sides",
         (
@@ -84,7 +84,7 @@ def force_slope() -> Erratum:
 
 
 def both_positive() -> Erratum:
-    """28: the signs of the terms of (lie2_kv)."""
+    """28: the signs of the terms of eq. (25)."""
     values = {"d1": 1.0, "d2": 0.01, "eta": 0.1}
     bracket = 7 * d2 - 5 * d1 * eta
     number = float(
@@ -92,11 +92,11 @@ def both_positive() -> Erratum:
     )
     return Erratum(
         28,
-        "Sec. 3.2, after (lie2_kv)",
+        "Sec. 3.2, after eq. (25)",
         "both terms on the right-hand side are positive",
         "the second has the sign of 7 d2 - 5 d1 eta (erratum 11); the sum is positive for small "
         "eta because Lambda_N = O(eta)",
-        (Check(f"d1 = 1, d2 = .01, eta = .1: 7 d2 - 5 d1 eta = {number:.2f} < 0", number < 0),),
+        (Check(f"d1 = 1, d2 = 0.01, eta = 0.1: 7 d2 - 5 d1 eta = {number:.2f} < 0", number < 0),),
     )
 
 

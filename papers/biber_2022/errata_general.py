@@ -56,7 +56,7 @@ def fold_of(name: str, xp: float = 0.2, yp: float = 0.7) -> ns.local.TwoFold:
 def normal_scale() -> Erratum:
     """15: k = eps^-2 kappa, d = eps^-1 delta."""
     k, d, y, yt, g = (ca.SX.sym(n) for n in ("k", "d", "y", "yt", "g"))
-    left = eps**2 * (-d * yt - k * y - g)  # Y'' = eps^2 y'' by (generic_eq)
+    left = eps**2 * (-d * yt - k * y - g)  # Y'' = eps^2 y'' by eq. (28)
 
     def right(stiffness_power: int, damping_power: int) -> ca.SX:
         kappa, delta = k / eps**stiffness_power, d / eps**damping_power
@@ -64,12 +64,12 @@ def normal_scale() -> Erratum:
 
     return Erratum(
         15,
-        "(functions_constraints_horizontal_scaling)",
+        "eq. (34)",
         "k = eps^-1 kappa, d = eps^-2 delta",
         "k = eps^-2 kappa, d = eps^-1 delta",
         (
             Check(
-                "the corrected powers turn (generic_eq) into (generic_rescaled) identically",
+                "the corrected powers turn eq. (28) into eq. (37) identically",
                 identical(left, right(-2, -1)),
             ),
             Check("the printed powers do not", not identical(left, right(-1, -2))),
@@ -89,12 +89,11 @@ def friction_coefficient() -> Erratum:
         "Lambda_T = -sign(H) mu Lambda_N",
         (
             Check(
-                "with mu, (F1 - F2).grad H = -7 mu Lambda_N, as (second_derivativeF1) with its "
-                "(7/2) mu needs",
+                "with mu, (F1 - F2).grad H = -7 mu Lambda_N, as eq. (51) with its (7/2) mu needs",
                 identical(model.lie(1) - model.lie(2), -7 * mu * load),
             ),
             Check(
-                "as printed it would be -7 Lambda_N: the mu of (second_derivativeF1) would be gone",
+                "as printed it would be -7 Lambda_N: the mu of eq. (51) would be gone",
                 identical(with_mu, -7 * load / 2)
                 and not identical(model.lie(1) - model.lie(2), -7 * load),
             ),
@@ -103,7 +102,7 @@ def friction_coefficient() -> Erratum:
 
 
 def second_lie_first_line() -> Erratum:
-    """17: the first line of (second_derivativeF1), and the exact second derivatives at s."""
+    """17: the first line of eq. (51), and the exact second derivatives at s."""
     g = generic()
     model = g.equations
     slope = ca.jacobian(model.Lambda_N, Y)
@@ -120,7 +119,7 @@ def second_lie_first_line() -> Erratum:
     exact_n = model_n.value(model_n.lie(1, 1), s)
     return Erratum(
         17,
-        "(second_derivativeF1), (second_derivativeF2)",
+        "eq. (51), eq. (52)",
         "first line with the factor (-delta - kappa - eps^2 g); operator (grad.F1)^2",
         "(-delta Y' - kappa Y - eps^2 g) = Lambda_N = 0 at s; operator (F1.grad)^2",
         (
@@ -176,7 +175,7 @@ def nu_product() -> Erratum:
     theirs = poly.value(printed.nu_product(poly, upsilon, by=Y), s)
     return Erratum(
         18,
-        "(nus_calc)",
+        "eq. (54)",
         "nu1 nu2 = 1 + (20/7) (..) g eps^3 + O(eps^4) < 1",
         "nu1 nu2 = 1 at every visible two-fold",
         (
@@ -254,9 +253,9 @@ def visible_condition() -> Erratum:
                 "(F1.grad)^2 H + (F2.grad)^2 H = 2 (X' A_X + Y' A_Y) at s for every law",
                 identical(both, 2 * drift, given=g.at_two_fold),
             ),
-            row("slow", "linear, eta = 2, X' = .05, Y' = .7", "visible"),
+            row("slow", "linear, eta = 2, X' = 0.05, Y' = 0.7", "visible"),
             row(
-                "stiff", "linear, eta = 2, X' = .5: 2 eta^2 abs(X') > 7 mu Y'", "visible-invisible"
+                "stiff", "linear, eta = 2, X' = 0.5: 2 eta^2 abs(X') > 7 mu Y'", "visible-invisible"
             ),
             row(
                 "hertz",
@@ -269,7 +268,7 @@ def visible_condition() -> Erratum:
 
 @cache
 def reverse_slip_with_backspin() -> tuple[float, float]:
-    """H_F and Omega_F for d=.1, eta=.5, mu=.3, G=1e-4 and start (0,.3,0,-1,.6)."""
+    """H_F and Omega_F for d=0.1, eta=0.5, mu=0.3, G=1e-4 and start (0,0.3,0,-1,0.6)."""
     last = law("linear").bounce([0, 0.3, 0, -1, 0.6]).x[-1]
     return float(last[1] + last[4]), float(last[4])
 
@@ -283,7 +282,9 @@ def topspin() -> Erratum:
         "the surface divides lift-off with backspin from lift-off with topspin",
         "it divides forward from reverse slip, the signs of H_F; the spin Omega_F may differ",
         (
-            close("d=.1, eta=.5, mu=.3, G=1e-4, start (0,.3,0,-1,.6): H_F", slip, -7.33e-4, 5e-7),
+            close(
+                "d=0.1, eta=0.5, mu=0.3, G=1e-4, start (0,0.3,0,-1,0.6): H_F", slip, -7.33e-4, 5e-7
+            ),
             close("Omega_F", spin, 0.0582, 5e-5),
             Check("reverse slip with backspin", slip < 0 < spin),
         ),
@@ -309,7 +310,7 @@ def normal_form_slips() -> Erratum:
         21,
         "Sec. 4.1, normal form",
         "z4..n' = O(|z|); t -> phi t when z2 is on one side (the condition is cut off); an entry of "
-        "(normal_sliding) without its letter, the index 3 alone",
+        "eq. (47) without its letter, the index 3 alone",
         "z4..n drift along the two-fold set at order one; t = phi tau when z1 > 0, tau/phi when "
         "z1 < 0; z3",
         (
@@ -323,7 +324,7 @@ def normal_form_slips() -> Erratum:
                 error < 1e-13,
             ),
             Check(
-                "with z3 the condition z1' = 0 gives alpha = z2/(z2 + z3) and (normal_red)",
+                "with z3 the condition z1' = 0 gives alpha = z2/(z2 + z3) and eq. (48)",
                 identical((1 - weight) * -z2 + weight * z3, 0),
             ),
         ),
@@ -331,19 +332,19 @@ def normal_form_slips() -> Erratum:
 
 
 def slope_variable() -> Erratum:
-    """22: the denominator of (nus_calc) holds d/dY."""
+    """22: the denominator of eq. (54) holds d/dY."""
     model = law("linear")
     s = fold_of("linear").point
     by_yp = model.value(ca.jacobian(model.Lambda_N, Yp), s, d2=0.0)
     by_y = model.value(ca.jacobian(model.Lambda_N, Y), s, d2=0.0)
     return Erratum(
         22,
-        "(nus_calc) and the text after it",
-        "d/dY' (Lambda_N), negative by (force_constraints_new_scaling)",
+        "eq. (54) and the text after it",
+        "d/dY' (Lambda_N), negative by eq. (39)",
         "d/dY",
         (
             Check(
-                "(force_constraints_new_scaling) bounds dLambda_N/dY; without normal damping "
+                "eq. (39) bounds dLambda_N/dY; without normal damping "
                 f"dLambda_N/dY' = {by_yp:g} and the printed fraction is not defined, while "
                 f"dLambda_N/dY = {by_y:g}",
                 by_yp == 0 and by_y == -1,
@@ -353,7 +354,7 @@ def slope_variable() -> Erratum:
 
 
 def table() -> Erratum:
-    """23: table ics."""
+    """23: Table 1."""
     rows = recomputed()
     wrong = [r for r in rows if not r.fits_all]
     low, high = (
@@ -366,7 +367,7 @@ def table() -> Erratum:
     )
     return Erratum(
         23,
-        "table ics",
+        "Table 1",
         "1.53 m/s -> 71.1; 1040 rpm -> 1090; 1090 rpm -> 1140",
         "71.7; 108.9 and 114.1 rad/s (10400 and 10900 rpm would fit the printed values)",
         (

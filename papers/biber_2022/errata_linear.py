@@ -151,7 +151,7 @@ def overdamped() -> Erratum:
     times = {d: lift_off_time(d, 0.0) for d in (0.9, 1.0, 2.0, 5.0)}
     return Erratum(
         3,
-        "Sec. 3, after (kv)",
+        "Sec. 3, after eq. (11)",
         "d2 < 1 will insure lift-off",
         "sufficient, not necessary: with lift-off at zero force the ball leaves for d2 >= 1 too",
         (
@@ -173,7 +173,7 @@ def gravity_twice() -> Erratum:
     touch_down = model.value(model.Lambda_N, [0, 1, 0, -1, 0], mu=0.3, d1=0, d2=0, eta=1, G=1e-4)
     return Erratum(
         4,
-        "(nforce), Sec. 3; (lift_off_cond), Sec. 4",
+        "eq. (16), Sec. 3; eq. (29), Sec. 4",
         "lambda_N includes -g",
         "Sec. 2 has y'' = lambda_N - g, so the contact force is lambda_N without -g",
         (
@@ -182,7 +182,7 @@ def gravity_twice() -> Erratum:
                 identical(model.Lambda_N, 0, given=rest)
                 and identical(model.Lambda_N + G, G, given=rest),
             ),
-            close("lift-off time, d2 = .1, G = .05, printed load", net, 3.0063, 5e-5),
+            close("lift-off time, d2 = 0.1, G = 0.05, printed load", net, 3.0063, 5e-5),
             close("lift-off time with the contact force", contact, 3.0746, 5e-5),
             Check(
                 f"printed load at touch-down with d2 = 0, G = 1e-4: {touch_down:.1e} < 0, which "
@@ -219,10 +219,9 @@ def which_is_soft() -> Erratum:
 
 
 def scaling_residuals(length: ca.SX, spin: ca.SX, force: ca.SX) -> list[ca.SX]:
-    """What is left of (kv_rescaled) and of H for X = length x, Omega = spin omega, Lambda = force
-    lambda and tau = t/eps2: the X and Omega equations and the slope mismatch of H."""
+    """Residuals of eq. (15) and of H for X = length x, Omega = spin omega, Lambda = force lambda."""
     x, xt, e1, lam_T = (ca.SX.sym(n) for n in ("x", "xt", "e1", "lT"))
-    acceleration = lam_T - 2 * d1 / e1 * xt - x / e1**2  # equation (kv)
+    acceleration = lam_T - 2 * d1 / e1 * xt - x / e1**2  # eq. (11)
     ratio = EPS2 / e1
     first = length * (EPS2**2 * acceleration + 2 * d1 * ratio * EPS2 * xt + ratio**2 * x)
     return [first - force * lam_T, 5 * (EPS2 * spin - force) * lam_T / 2, length * EPS2 - spin]
@@ -232,13 +231,13 @@ def force_scale() -> Erratum:
     """6: Lambda = eps2^2 lambda."""
     return Erratum(
         6,
-        "Sec. 3, after (kv_rescaled)",
+        "Sec. 3, after eq. (15)",
         "Lambda = eps2^-2 lambda",
         "Lambda = eps2^2 lambda",
         (
             Check(
-                "X = x, tau = t/eps2, Lambda_T = eps2^2 lambda_T turns the first line of (kv) into "
-                "that of (kv_rescaled) identically",
+                "X = x, tau = t/eps2, Lambda_T = eps2^2 lambda_T turns the first line of eq. (11) into "
+                "that of eq. (15) identically",
                 identical(scaling_residuals(ca.SX(1), EPS2, EPS2**2)[0]),
             ),
             Check(
@@ -258,7 +257,7 @@ def spin_scale() -> Erratum:
     one = ca.SX(1)
     return Erratum(
         7,
-        "Sec. 3, after (kv_rescaled); again in Sec. 4",
+        "Sec. 3, after eq. (15); again in Sec. 4",
         "X = x, Omega = omega",
         "X = x, Omega = eps2 omega, Lambda = eps2^2 lambda, G = eps2^2 g; or X = x/eps2, "
         "Omega = omega, Lambda = eps2 lambda, G = eps2 g",
@@ -322,23 +321,25 @@ def alpha() -> Erratum:
         "(7 mu S - 4 d1 eta X' - eta^2 X)/(7 mu S), S = 2 d2 Y' + Y",
         "1/2 - (2 d1 eta X' + eta^2 X)/(7 mu (S + G))",
         (
-            Check("(alpha) equals the corrected form identically", identical(model.alpha, correct)),
             Check(
-                "the printed form differs from (alpha) even at G = 0",
+                "eq. (21) equals the corrected form identically", identical(model.alpha, correct)
+            ),
+            Check(
+                "the printed form differs from eq. (21) even at G = 0",
                 not identical(model.alpha, printed.alpha(), given=[(G, 0)]),
             ),
             Check(
-                "without tangential force (A = 0, G = 0) the printed form is 1/2, where (alpha) is "
+                "without tangential force (A = 0, G = 0) the printed form is 1/2, where eq. (21) is "
                 "1/2: no",
                 not identical(printed.alpha(), 0.5, given=no_tangential),
             ),
             Check(
-                "in the rigid limit eta = 0 the printed form is 1 and (alpha) is 1/2",
+                "in the rigid limit eta = 0 the printed form is 1 and eq. (21) is 1/2",
                 identical(printed.alpha(), 1, given=[(eta, 0)])
                 and identical(model.alpha, 0.5, given=[(eta, 0)]),
             ),
             Check(
-                f"at X = .2, X' = .3, Y = -.5, Y' = .4 (mu .3, d .1, eta .5): {ours:.6f} against "
+                f"at X = 0.2, X' = 0.3, Y = -0.5, Y' = 0.4 (mu 0.3, d 0.1, eta 0.5): {ours:.6f} against "
                 f"printed {theirs:.6f}",
                 abs(ours - model.value(model.alpha, state, **values)) < 1e-15
                 and abs(ours - theirs) > 0.1,
@@ -355,7 +356,7 @@ def two_conditions() -> Erratum:
     correct = 2 * d1 * eta * Xp + eta**2 * X
     return Erratum(
         10,
-        "(2conds)",
+        "eq. (27)",
         "4 d1 eta X' + eta^2 X = 0",
         "2 d1 eta X' + eta^2 X = 0",
         (
@@ -388,7 +389,7 @@ def second_lie() -> Erratum:
     at_zero = ca.substitute(printed.second_lie_kv() - correct, eta, 0)
     return Erratum(
         11,
-        "(lie2_kv)",
+        "eq. (25)",
         "(7/2) mu Y' + (7 d2 + 2 d1 eta) Lambda_N + O(eta^2)",
         "(7/2) mu Y' + mu (7 d2 - 5 d1 eta) Lambda_N - eta^2 X'",
         (
@@ -412,7 +413,7 @@ def second_lie() -> Erratum:
 
 @cache
 def exit_in_compression() -> ns.flow.Event:
-    """Return the end of rolling for mu=.3, eta=1, d1=0, d2=.1, G=0 and start (0,2,0,-1,-2)."""
+    """Return the end of rolling for mu=0.3, eta=1, d1=0, d2=0.1, G=0 and start (0,2,0,-1,-2)."""
     run = linear(mu=0.3, d1=0.0, d2=0.1, eta=1.0, G=0.0).bounce([0, 2, 0, -1, -2])
     return next(e for e in run.events if e.kind == "exit")
 
@@ -422,12 +423,12 @@ def roll_to_slip_in_compression() -> Erratum:
     leave = exit_in_compression()
     return Erratum(
         12,
-        "Sec. 3.2, after (switching_con)",
+        "Sec. 3.2, after eq. (24)",
         "the transition from roll to slip can only happen in restitution",
         "true as eta -> 0; false when eta^2 abs(X') is of the order of (7/2) mu abs(Y') or more",
         (
             close(
-                "mu=.3, eta=1, d1=0, d2=.1, G=0, start (0,2,0,-1,-2): rolling ends at tau",
+                "mu=0.3, eta=1, d1=0, d2=0.1, G=0, start (0,2,0,-1,-2): rolling ends at tau",
                 leave.t,
                 0.2038,
                 5e-5,
@@ -460,7 +461,7 @@ def which_compliance() -> Erratum:
                 runs[0.0].itinerary.endswith("s"),
             ),
             Check(
-                "eta = .05 and .5: "
+                "eta = 0.05 and 0.5: "
                 + ", ".join(
                     f'"{runs[v].itinerary}" with H_F = {runs[v].x[-1, 1] + runs[v].x[-1, 4]:.3g}'
                     for v in (0.05, 0.5)
@@ -490,11 +491,11 @@ def isotropic() -> Erratum:
         "only without friction",
         (
             Check(
-                f"mu = 0: (X', Y') = (.5, -1) leaves as ({without[0]:.6f}, {without[1]:.6f})",
+                f"mu = 0: (X', Y') = (0.5, -1) leaves as ({without[0]:.6f}, {without[1]:.6f})",
                 abs(without[0] + 0.5) < 1e-9 and abs(without[1] - 1) < 1e-9,
             ),
             Check(
-                f"mu = .3: it leaves as ({with_friction[0]:.6f}, {with_friction[1]:.6f})",
+                f"mu = 0.3: it leaves as ({with_friction[0]:.6f}, {with_friction[1]:.6f})",
                 abs(with_friction[0] + 0.5) > 0.05,
             ),
         ),

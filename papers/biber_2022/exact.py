@@ -47,19 +47,7 @@ def constant(value: float) -> Fraction:
 
 
 def evaluate(expression: Expression, values: Mapping[str, Fraction]) -> Fraction:
-    """Evaluate a rational expression exactly.
-
-    Parameters
-    ----------
-    expression : SX scalar
-        Sums, products, quotients, integer powers and absolute values of named symbols.
-    values : mapping
-        A fraction for each symbol's name.
-
-    Returns
-    -------
-    Fraction
-    """
+    """Evaluate a rational expression exactly, given a fraction for each symbol's name."""
     expression = ca.densify(ca.SX(expression))
     symbols = ca.symvar(expression)
     function = ca.Function("exact", symbols, [expression])
@@ -92,24 +80,7 @@ def impose(expression: Expression, given: Given) -> ca.SX:
 def identical(
     left: Expression, right: Expression = 0.0, *, given: Given = (), samples: int = 12
 ) -> bool:
-    """Whether two rational expressions are equal as functions.
-
-    Parameters
-    ----------
-    left, right : SX scalar or number
-    given : sequence of (symbol, expression), optional
-        Constraints, each solved for one symbol and substituted in this order.
-    samples : int, optional
-        Number of random rational points.
-
-    Examples
-    --------
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> identical((x + y) ** 2, x**2 + 2 * x * y + y**2), identical(x / 3, x / 3 + 1e-20 * y)
-    (True, False)
-    >>> identical(x**2, y**2, given=[(x, -y)])
-    True
-    """
+    """Whether two rational expressions are equal as functions, under constraints solved for a symbol each."""
     difference = impose(ca.SX(left) - right, given)
     names = [s.name() for s in ca.symvar(difference)]
     generator = random.Random(2022)

@@ -1,4 +1,4 @@
-"""Figures of section 3: trajectories in the friction cone and their slip (kv_pert)."""
+"""Figures of section 3: trajectories in the friction cone and their slip."""
 
 from __future__ import annotations
 
@@ -6,7 +6,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from .. import look
+from nonsmooth.plot import style as look
+
+from .. import pictures
 from .results import kv_pert_data, kv_pert_shot
 
 #: Name in the paper, trajectory, colour, line style.
@@ -25,15 +27,11 @@ def _cone(axes: Axes, mu: float, top: float) -> None:
 
 
 def kv_pert_cone() -> Figure:
-    """Figure kv_pert (a): the end of three bounces in the friction cone.
-
-    The perturbations are not given in the paper; with +-.02 in X' the runs leave the inside of the
-    cone so late that the whole of it (inset) shows them as one line.
-    """
+    """Figure 10 (a): the end of three bounces in the friction cone; the paper gives no perturbations."""
     mu = kv_pert_data()["parameters"]["mu"]
     top = 11.0
-    with look.settings():
-        figure = look.new_figure(6.4, 5.2)
+    with pictures.settings():
+        figure = pictures.new_figure(6.4, 5.2)
         axes = figure.add_subplot()
         inset = axes.inset_axes((0.06, 0.09, 0.25, 0.34))
         _cone(axes, mu, top)
@@ -68,9 +66,9 @@ def kv_pert_cone() -> Figure:
 
 
 def kv_pert_slip() -> Figure:
-    """Figure kv_pert (b): slip velocity of the three bounces shortly before lift-off."""
-    with look.settings():
-        figure = look.new_figure(6.0, 5.2)
+    """Figure 10 (b): slip velocity of the three bounces shortly before lift-off."""
+    with pictures.settings():
+        figure = pictures.new_figure(6.0, 5.2)
         panels = figure.subplots(3, 1, sharex=True, sharey=True)
         for axes, (label, name, color, style) in zip(panels, RUNS, strict=True):
             shot = kv_pert_shot(name)

@@ -17,8 +17,9 @@ from scipy.optimize import brentq
 from scipy.stats import qmc
 
 import bounce
+from nonsmooth.plot import style as look
 
-from .. import look
+from .. import pictures
 from .errata_linear import log_restitution_value
 from .model import Array
 from .table import Row, recomputed
@@ -36,12 +37,12 @@ def rigid_slip(h0: Array, normal: Array, mu: float, r: float) -> Array:
 
 
 def trajectories() -> Figure:
-    """Figure trajectories: tangential against normal velocity in a rigid bounce."""
+    """Figure 6: tangential against normal velocity in a rigid bounce."""
     mu, r = 0.3, 0.6
     slope = 3.5 * mu
     edges = (slope, slope * (1 + r))
-    with look.settings():
-        figure = look.new_figure(6.2, 4.6)
+    with pictures.settings():
+        figure = pictures.new_figure(6.2, 4.6)
         axes = figure.add_subplot()
         for side, color, style in ((1, look.ABOVE, "-"), (-1, look.BELOW, look.DASHED)):
             for start in (0.35, 0.7, 1.25, 1.5, 1.95, 2.3):
@@ -96,7 +97,7 @@ def trajectories() -> Figure:
 
 
 def ranges(surface: str) -> dict[str, tuple[float, float]]:
-    """Dimensionless ranges of table ics as printed (rad/s and 1/s)."""
+    """Dimensionless ranges of Table 1 as printed (rad/s and 1/s)."""
     rows = [row for row in recomputed() if row.surface == surface]
     result = {}
     for quantity in ("xdot0", "ydot0", "omega0"):
@@ -110,7 +111,7 @@ def _printed(rows: Sequence[Row], name: str) -> float:
 
 
 def experiment_ranges() -> Figure:
-    """Figure ics: the ranges of the experiments as boxes, with both readings of the spin."""
+    """Figure 3: the ranges of the experiments as boxes, with both readings of the spin."""
     styles = {"astroturf": (look.VERMILLION, "-", "//"), "turf": (look.BLUE, look.DASHED, "")}
     pairs = (("xdot0", "ydot0"), ("xdot0", "omega0"))
     labels = {
@@ -118,8 +119,8 @@ def experiment_ranges() -> Figure:
         "ydot0": r"$\dot y_0/R$ (1/s)",
         "omega0": r"$\omega_0$ (rad/s)",
     }
-    with look.settings():
-        figure = look.new_figure(7.0, 3.6)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 3.6)
         for axes, (a, b) in zip(figure.subplots(1, 2), pairs, strict=True):
             for surface, (color, style, hatch) in styles.items():
                 box = ranges(surface)
@@ -171,13 +172,7 @@ def experiment_ranges() -> Figure:
 
 @cache
 def predictions(surface: str, count: int = 256) -> tuple[Array, Array, Array]:
-    """H_0, H_F of the compliant model and of the rigid law over the published ranges.
-
-    Returns
-    -------
-    tuple of ndarray (count,)
-        In 1/s.
-    """
+    """H_0 and H_F (1/s) of the compliant model and of the rigid law over the published ranges."""
     r, mu = FITS[surface]
     d2 = brentq(lambda d: np.exp(log_restitution_value(2 * d)) - r, 1e-6, 1 - 1e-9)
     ball = bounce.KelvinVoigt(mu=mu, d1=TANGENTIAL_DAMPING, d2=d2, eta=ETA, G=0.0)
@@ -218,9 +213,9 @@ def _scatter(axes: Axes, surface: str) -> None:
 
 
 def tangential_velocity() -> Figure:
-    """Figure tangential_vel_experiments, as predictions over the published ranges."""
-    with look.settings():
-        figure = look.new_figure(7.0, 3.9)
+    """Figure 4, as predictions over the published ranges."""
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 3.9)
         panels = figure.subplots(1, 2)
         for axes, surface in zip(panels, FITS, strict=True):
             _scatter(axes, surface)

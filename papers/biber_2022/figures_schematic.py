@@ -7,7 +7,9 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.patches import Arc, Circle, Polygon, Rectangle
 
-from .. import look
+from nonsmooth.plot import style as look
+
+from .. import pictures
 
 _GROUND = "0.85"
 
@@ -79,9 +81,9 @@ def _dashpot(axes: Axes, start: np.ndarray, end: np.ndarray) -> None:
 
 
 def setting_notation() -> Figure:
-    """Figure setting_notation."""
-    with look.settings():
-        figure, axes = look.canvas(5.0, 4.2)
+    """Figure 2."""
+    with pictures.settings():
+        figure, axes = pictures.canvas(5.0, 4.2)
         axes.set(xlim=(-1.9, 2.3), ylim=(-1.35, 2.0))
         _ground(axes, -1.8, 2.2, -0.9, 0.3, hatch="")
         _ball(axes, (0.0, 0.0), 1.0)
@@ -109,8 +111,8 @@ def setting_notation() -> Figure:
 
 def _mechanism(labels: dict[str, str]) -> Figure:
     """A ball held by springs and dashpots in both directions, with friction below it."""
-    with look.settings():
-        figure, axes = look.canvas(6.4, 4.6)
+    with pictures.settings():
+        figure, axes = pictures.canvas(6.4, 4.6)
         axes.set(xlim=(-2.3, 3.0), ylim=(-1.95, 1.55))
         _ground(axes, -1.9, 1.4, -1.6)
         axes.add_patch(
@@ -138,7 +140,7 @@ def _mechanism(labels: dict[str, str]) -> Figure:
 
 
 def settings_kv() -> Figure:
-    """Figure settings_kv."""
+    """Figure 7."""
     return _mechanism(
         {
             "k": r"$\dfrac{1}{\varepsilon_2^2}$",
@@ -150,7 +152,7 @@ def settings_kv() -> Figure:
 
 
 def setting_generic() -> Figure:
-    """Figure setting_generic."""
+    """Figure 11."""
     return _mechanism(
         {
             "k": r"$k(y,\dot y)$",
@@ -162,7 +164,7 @@ def setting_generic() -> Figure:
 
 
 def filippov_convexity() -> Figure:
-    """Figure filippov_convexity: F_s on the line between the tips of F1 and F2."""
+    """Figure 8: F_s on the line between the tips of F1 and F2."""
 
     def put(x: float, y: float, z: float) -> np.ndarray:
         return np.array([x + 0.45 * y, 0.5 * y + z])
@@ -171,8 +173,8 @@ def filippov_convexity() -> Figure:
     first, second = np.array([1.25, 0.1, -0.75]), np.array([1.6, 0.7, 1.1])  # above, below
     weight = first[2] / (first[2] - second[2])
     slide = (1 - weight) * first + weight * second
-    with look.settings():
-        figure, axes = look.canvas(6.0, 3.9)
+    with pictures.settings():
+        figure, axes = pictures.canvas(6.0, 3.9)
         axes.set(xlim=(-1.35, 3.1), ylim=(-1.2, 1.75))
         corners = [
             put(*c) for c in ((-0.7, -0.9, 0), (2.3, -0.9, 0), (2.3, 1.1, 0), (-0.7, 1.1, 0))

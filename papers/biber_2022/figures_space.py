@@ -16,8 +16,9 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 
 import nonsmooth as ns
+from nonsmooth.plot import style as look
 
-from .. import look
+from .. import pictures
 from .errata_general import fold_of
 from .model import Array
 
@@ -182,9 +183,9 @@ class Scene:
 
 
 def geometries() -> Figure:
-    """Figure geometries: what a bounce can do, in the ball's own normal form."""
-    with look.settings():
-        figure, axes = look.canvas(7.0, 5.4)
+    """Figure 9: what a bounce can do, in the ball's own normal form."""
+    with pictures.settings():
+        figure, axes = pictures.canvas(7.0, 5.4)
         scene = Scene(axes, 1.25)
         axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
         scene.surface()
@@ -246,10 +247,10 @@ def _ball_labels(axes: Axes, scene: Scene) -> None:
 
 
 def two_fold_visible() -> Figure:
-    """Figure 2-fold (a): the ball's visible two-fold with the lift-off surface."""
+    """Figure 12 (a): the ball's visible two-fold with the lift-off surface."""
     flow = fold_of("linear")
-    with look.settings():
-        figure, axes = look.canvas(7.0, 5.3)
+    with pictures.settings():
+        figure, axes = pictures.canvas(7.0, 5.3)
         scene = Scene(axes, 1.25)
         axes.set(xlim=(-1.95, 1.75), ylim=(-1.32, 1.22))
         scene.surface()

@@ -1,4 +1,4 @@
-"""The paper's equations in its own notation, with its labels.
+"""The paper's equations in its own notation, with its equation numbers.
 
 The state is p = [X, X', Y, Y', Omega] (equation vec_p): position and velocity of the centre along
 and normal to the ground, and spin; lengths in ball radii, time in units of the normal contact
@@ -35,18 +35,7 @@ grad_H = ca.jacobian(H, p).T
 
 @dataclass(frozen=True, eq=False)
 class Equations:
-    """One of the paper's models: the two fields of equation (sliding) and what derives from them.
-
-    Attributes
-    ----------
-    A : SX
-        Tangential acceleration besides friction.
-    Lambda_N : SX
-        Normal load, equation (nforce).
-    parameters : dict
-        Symbols and their default values (None where there is none).
-    name : str
-    """
+    """A model of the paper: the two fields of eq. (20); ``A`` is the tangential acceleration but friction."""
 
     A: ca.SX
     Lambda_N: ca.SX
@@ -77,12 +66,12 @@ class Equations:
 
     @property
     def alpha(self) -> ca.SX:
-        """Equation (alpha)."""
+        """Equation (21)."""
         return self.lie(1) / ca.dot(self.F1 - self.F2, grad_H)
 
     @property
     def F_s(self) -> ca.SX:
-        """Rolling, equation (sliding)."""
+        """Rolling, eq. (20)."""
         return (1 - self.alpha) * self.F1 + self.alpha * self.F2
 
     @cached_property
@@ -113,13 +102,7 @@ def along(field_: ca.SX, expression: Expression) -> ca.SX:
 
 
 def linear(**values: float | None) -> Equations:
-    """Equation (kv_rescaled), the linear Kelvin-Voigt model.
-
-    Parameters
-    ----------
-    mu, d1, d2, eta, G : float, optional
-        Defaults of the parameters; any may be given later instead.
-    """
+    """Equation (15), the linear Kelvin-Voigt model."""
     symbols = (mu, d1, d2, eta, G)
     return Equations(
         A=-(2 * d1 * eta * Xp + eta**2 * X),
@@ -137,18 +120,7 @@ def generalised(
     parameters: Mapping[ca.SX, float | None],
     name: str,
 ) -> Equations:
-    """Equation (generic_rescaled).
-
-    Parameters
-    ----------
-    upsilon, zeta : SX
-        Tangential damping and stiffness, functions of all five states.
-    delta, kappa : SX
-        Normal damping and stiffness, functions of Y and Y'.
-    parameters : mapping
-        Every symbol in them, and mu, G and eps.
-    name : str
-    """
+    """Equation (37); ``parameters`` holds every symbol of the four functions, and mu, G and eps."""
     return Equations(
         A=-(eps * upsilon * Xp + eps**2 * zeta * X),
         Lambda_N=-delta * Yp - kappa * Y - G,
@@ -159,19 +131,7 @@ def generalised(
 
 @dataclass(frozen=True, eq=False)
 class Generic:
-    """The generalised model with arbitrary values and gradients of its four functions.
-
-    Second Lie derivatives hold values and first derivatives of upsilon, zeta, delta and kappa only,
-    so an identity for functions with free value and gradient at a point holds for all functions.
-
-    Attributes
-    ----------
-    upsilon, zeta, delta, kappa : SX
-        Affine functions with symbols for coefficients.
-    equations : Equations
-    zeta_value, gravity : SX
-        The constant of ``zeta`` and G: solved for to put the two-fold at the point.
-    """
+    """The generalised model with free values and gradients of its four functions at a point."""
 
     upsilon: ca.SX
     zeta: ca.SX

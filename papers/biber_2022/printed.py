@@ -1,4 +1,4 @@
-"""Formulas as the paper prints them, where they are wrong: what the corrected ones are held against."""
+"""Formulas as the paper prints them, where they are wrong, to compare with the corrected ones."""
 
 from __future__ import annotations
 
@@ -10,22 +10,22 @@ _S = 2 * d2 * Yp + Y
 
 
 def alpha() -> ca.SX:
-    """Equation (alpha) made explicit, Sec. 3.2, without its O(eps2^2)."""
+    """Equation (21) made explicit, Sec. 3.2, without its O(eps2^2)."""
     return (7 * mu * _S - 4 * d1 * eta * Xp - eta**2 * X) / (7 * mu * _S)
 
 
 def two_conditions() -> tuple[ca.SX, ca.SX]:
-    """Equation (2conds): both vanish at a rolling lift-off."""
+    """Equation (27): both vanish at a rolling lift-off."""
     return 4 * d1 * eta * Xp + eta**2 * X, _S + G
 
 
 def second_lie_kv() -> ca.SX:
-    """Equation (lie2_kv) without its O(eta^2)."""
+    """Equation (25) without its O(eta^2)."""
     return 7 * mu * Yp / 2 + (7 * d2 + 2 * d1 * eta) * (-_S - G)
 
 
 def second_lie_general(delta: Expression, kappa: Expression) -> tuple[ca.SX, ca.SX]:
-    """Equation (second_derivativeF1): its first and second line without O(eps)."""
+    """Equation (51): its first and second line without O(eps)."""
     slope = ca.jacobian(delta, Y) * Yp + ca.jacobian(kappa, Y) * Y + kappa
     damping = ca.jacobian(delta, Yp) * Yp + delta + ca.jacobian(kappa, Yp) * Y
     first = 7 * mu * slope * Yp / 2 + 7 * mu * damping * (-delta - kappa - G) / 2
@@ -34,7 +34,7 @@ def second_lie_general(delta: Expression, kappa: Expression) -> tuple[ca.SX, ca.
 
 
 def nu_product(equations: Equations, upsilon: Expression, by: ca.SX = Yp) -> ca.SX:
-    """Equation (nus_calc) without its O(eps^4); ``by`` is the variable of d Lambda_N."""
+    """Equation (54) without its O(eps^4); ``by`` is the variable of d Lambda_N."""
     upper = ca.jacobian(upsilon, Xp) * Xp
     lower = ca.jacobian(equations.Lambda_N, by) * Yp
     return 1 + 20 * upper * G * eps / (7 * lower)  # g eps^3 = G eps

@@ -1,25 +1,15 @@
-"""The rows of the tables besides claims: errata and equations, each with its checks."""
+"""Rows of the tables besides the claims: errata and displayed equations."""
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
-from typing import Any
+from dataclasses import dataclass
 
-from ..claims import Check
+from ..claims import Check, corrects
 
 
 @dataclass(frozen=True)
 class Erratum:
-    """A misprint or error, what is correct, and the computation that shows both.
-
-    Attributes
-    ----------
-    number : int
-    place : str
-    printed, correct : str
-    checks : tuple of Check
-        Facts that show the printed form wrong and the corrected one right.
-    """
+    """A misprint or error, what is correct, and the checks that show both."""
 
     number: int
     place: str
@@ -28,36 +18,24 @@ class Erratum:
     checks: tuple[Check, ...]
 
     @property
-    def confirmed(self) -> bool:
-        """Whether every check holds."""
-        return all(c.holds for c in self.checks)
+    def name(self) -> str:
+        return f"erratum {self.number}"
 
     @property
     def verdict(self) -> str:
-        """``confirmed`` or ``not confirmed``."""
-        return "confirmed" if self.confirmed else "not confirmed"
+        return "confirmed" if all(c.holds for c in self.checks) else "not confirmed"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
-        return {**asdict(self), "verdict": self.verdict}
+    @property
+    def value(self) -> str:
+        return f"{self.place}: {self.correct}"
+
+    def cells(self) -> list[str]:
+        return [str(self.number), self.place, self.printed, self.correct, self.verdict]
 
 
 @dataclass(frozen=True)
 class Equation:
-    """A displayed equation and its check.
-
-    Attributes
-    ----------
-    number : int
-        Order of appearance among the displayed equations, unnumbered ones included.
-    label : str
-        The paper's label, or a few words.
-    content : str
-    verdict : str
-        ``agrees``, ``corrected``, ``definition`` (nothing to compute) or ``assumption``.
-    checks : tuple of Check
-    errata : tuple of int
-    """
+    """A displayed equation; its verdict is agrees, corrected, definition or assumption."""
 
     number: int
     label: str
@@ -67,10 +45,13 @@ class Equation:
     errata: tuple[int, ...] = ()
 
     @property
-    def holds(self) -> bool:
-        """Whether every check holds."""
-        return all(c.holds for c in self.checks)
+    def name(self) -> str:
+        return f"equation {self.number}"
 
-    def as_dict(self) -> dict[str, Any]:
-        """Plain values, for JSON."""
-        return {**asdict(self), "holds": self.holds}
+    @property
+    def value(self) -> str:
+        return f"{self.label}: {self.content}"
+
+    def cells(self) -> list[str]:
+        verdict = corrects(self.verdict, self.errata)
+        return [str(self.number), self.label, self.content, verdict]

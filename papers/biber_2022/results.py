@@ -6,7 +6,7 @@ Numbers that a claim and an erratum share are computed once, in ``errata``.
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
@@ -33,18 +33,18 @@ BASE = dict(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
 
 @cache
 def kv_pert_data() -> dict[str, Any]:
-    """Read the reference trajectories of figure kv_pert (50-digit arithmetic)."""
+    """Read the reference trajectories of Fig. 10 (50-digit arithmetic)."""
     return json.loads((DATA / "kv_pert.json").read_text())
 
 
 def paper_ball(**values: float) -> bounce.KelvinVoigt:
-    """Equation (kv_rescaled) with the paper's normal load."""
+    """Equation (15) with the paper's normal load."""
     return bounce.KelvinVoigt(load="net", **{**BASE, **values})
 
 
 @cache
 def kv_pert_shot(name: str) -> bounce.Shot:
-    """Simulate one trajectory of figure kv_pert: A_printed, A_exact, B or C."""
+    """Simulate one trajectory of Fig. 10: A_printed, A_exact, B or C."""
     data = kv_pert_data()
     x, xdot, y, ydot, omega = (float(v) for v in data["trajectories"][name]["p0"])
     ball = paper_ball(**data["parameters"])
@@ -57,10 +57,10 @@ def last_state(shot: bounce.Shot) -> Array:
     return np.array([end.x, end.xdot, end.y, end.ydot, end.omega])
 
 
-def corrected(id: str, place: str, statement: str, value: str, number: int, how: str) -> Claim:
+def corrected(name: str, place: str, statement: str, value: str, number: int, how: str) -> Claim:
     """Return the claim that an erratum corrects, with the erratum's checks."""
     return Claim(
-        id, place, statement, value, CORRECTED, how, erratum(number).checks, errata=(number,)
+        name, place, statement, value, CORRECTED, how, erratum(number).checks, errata=(number,)
     )
 
 
@@ -95,7 +95,7 @@ def rigid_cases() -> Claim:
         f"{sum(right)} of {len(right)} starts, on both sides of each boundary and of both signs, "
         "behave as stated",
         AGREES,
-        "impact integrated over the normal impulse, a Filippov system; mu = .3, r = .5",
+        "impact integrated over the normal impulse, a Filippov system; mu = 0.3, r = 0.5",
         (Check("every start falls in its case", all(right)),),
     )
 
@@ -130,14 +130,14 @@ def slip_classes() -> Claim:
         checks.append(Check(counts[-1], wrong == 0 and reverse > 0))
     return Claim(
         "slip-classes",
-        "Sec. 2.1, figure tangential_vel_experiments",
+        "Sec. 2.1, Fig. 4",
         "two classes at lift-off: large positive slip, and small negative slip; rarely none; a rigid "
         "bounce has no spin reversal",
         "landings with H0 > 0 over the published ranges: "
         + "; ".join(counts)
         + ". The measurements themselves are not public",
         NOT_CHECKABLE,
-        "256 landings for each surface, r and mu of the companion fits, d1 = .1, eta = .5, G = 0",
+        "256 landings for each surface, r and mu of the companion fits, d1 = 0.1, eta = 0.5, G = 0",
         tuple(checks),
     )
 
@@ -146,7 +146,7 @@ def slip_classes() -> Claim:
 
 
 def ball_equations() -> Claim:
-    """The model of ``bounce`` is equation (kv_rescaled)."""
+    """The model of ``bounce`` is eq. (15)."""
     paper, worst = kelvin_voigt(), 0.0
     for values in (BASE, {**BASE, "d1": 0.4, "eta": 1.5, "G": 0.02}):
         shot = bounce.simulate(paper_ball(**values), xdot=0.7, ydot=-1.0, omega=0.6)
@@ -158,7 +158,7 @@ def ball_equations() -> Claim:
                 worst = max(worst, float(np.abs(ours - theirs).max()))
     return Claim(
         "ball-equations",
-        "(kv_rescaled), (nforce)",
+        "eq. (15), eq. (16)",
         "the linear Kelvin-Voigt model",
         f"bounce.KelvinVoigt(load='net') has these fields, to {worst:.1e}",
         AGREES,
@@ -168,7 +168,7 @@ def ball_equations() -> Claim:
 
 
 def alpha() -> Claim:
-    """Equation (alpha) made explicit."""
+    """Equation (21) made explicit."""
     return corrected(
         "alpha",
         "Sec. 3.2, alpha made explicit",
@@ -180,13 +180,13 @@ def alpha() -> Claim:
 
 
 def switching() -> Claim:
-    """Equations (switching_con) and (switching_con2)."""
+    """Equations (24) and (26)."""
     model = kelvin_voigt()
     tangential = -2 * d1 * eta * Xp - eta**2 * X
     normal = 7 * mu * (2 * d2 * Yp + Y + G) / 2
     return Claim(
         "switching",
-        "(switching_con), (switching_con2)",
+        "eq. (24), eq. (26)",
         "F1.grad H = -2 d1 eta X' - eta^2 X + (7/2) mu [2 d2 Y' + Y + eps2^2 g]; F2.grad H with -",
         "both as printed",
         AGREES,
@@ -199,10 +199,10 @@ def switching() -> Claim:
 
 
 def two_conditions() -> Claim:
-    """Equation (2conds)."""
+    """Equation (27)."""
     return corrected(
         "rolling-lift-off-conditions",
-        "(2conds)",
+        "eq. (27)",
         "rolling lift-off needs 4 d1 eta X' + eta^2 X = 0 and 2 d2 Y' + Y + eps2^2 g = 0",
         "2 d1 eta X' + eta^2 X = 0; the second condition is right",
         10,
@@ -211,10 +211,10 @@ def two_conditions() -> Claim:
 
 
 def second_lie() -> Claim:
-    """Equation (lie2_kv)."""
+    """Equation (25)."""
     return corrected(
         "second-lie-linear",
-        "(lie2_kv)",
+        "eq. (25)",
         "(F1.grad)^2 H = (7/2) mu Y' + (7 d2 + 2 d1 eta) Lambda_N + O(eta^2)",
         "(7/2) mu Y' + mu (7 d2 - 5 d1 eta) Lambda_N - eta^2 X', exactly",
         11,
@@ -239,7 +239,7 @@ def roll_to_slip() -> Claim:
         "simulation",
     )
     extra = Check(
-        f"d = .1, eta = .5, start (0, .7, 0, -1, .6): rolling ends at Y' = {leave.x[3]:.4f} > 0",
+        f"d = 0.1, eta = 0.5, start (0, 0.7, 0, -1, 0.6): rolling ends at Y' = {leave.x[3]:.4f} > 0",
         bool(leave.x[3] > 0),
     )
     return Claim(**{**claim.__dict__, "checks": (*claim.checks, extra)})
@@ -301,7 +301,7 @@ def normal_compliance() -> Claim:
         "compliance in the normal direction makes the ball lift off slipping",
         "tangential compliance does; with normal compliance only (eta = 0) it lifts off rolling",
         13,
-        "simulation with eta = 0, .05, .5",
+        "simulation with eta = 0, 0.05, 0.5",
     )
 
 
@@ -315,7 +315,7 @@ def slip_reversal() -> Claim:
         "tangential stiffness and damping enable slip reversal",
         f"H0 = {landing:+.2f} -> H_F = {shot.slip:+.6f}, itinerary {shot.itinerary!r}",
         AGREES,
-        "simulation, mu = .3, d1 = d2 = .1, eta = .5, G = 1e-4, start (0, .7, 0, -1, .6)",
+        "simulation, mu = 0.3, d1 = d2 = 0.1, eta = 0.5, G = 1e-4, start (0, 0.7, 0, -1, 0.6)",
         (
             Check(
                 "H changes sign through rolling",
@@ -349,7 +349,7 @@ def rolling_lift_off(n: int = 20) -> Claim:
     )
 
 
-# Figure kv_pert --------------------------------------------------------------------------------
+# Figure 10 --------------------------------------------------------------------------------
 
 
 def kv_pert_parameters() -> Claim:
@@ -363,10 +363,10 @@ def kv_pert_parameters() -> Claim:
     printed = float(data["p0_printed"][1])
     return Claim(
         "kv-pert-parameters",
-        "Sec. 3.2, figure kv_pert",
-        "p0 = (.3543, -.1603128, -.1608, 3.4739, .1603128) with mu = .3 lifts off rolling",
+        "Sec. 3.2, Fig. 10",
+        "p0 = (0.3543, -0.1603128, -0.1608, 3.4739, 0.1603128) with mu = 0.3 lifts off rolling",
         "d1, d2, eta, eps2 are not given. p0 reaches the two-fold if 2 d1 X' + eta X = 0 at "
-        f"lift-off; d1 = .098, d2 = .007, eta = .09, G = 0 does, with X'0 = {required:.10f}",
+        f"lift-off; d1 = 0.098, d2 = 0.007, eta = 0.09, G = 0 does, with X'0 = {required:.10f}",
         NOT_CHECKABLE,
         "simulation of the family's roundest member",
         (
@@ -377,7 +377,7 @@ def kv_pert_parameters() -> Claim:
 
 
 def kv_pert() -> Claim:
-    """The three trajectories of figure kv_pert."""
+    """The three trajectories of Fig. 10."""
     data, worst = kv_pert_data()["trajectories"], 0.0
     for name, reference in data.items():
         shot = kv_pert_shot(name)
@@ -391,13 +391,13 @@ def kv_pert() -> Claim:
     names = {name: kv_pert_shot(name).itinerary for name in ("A_exact", "B", "C")}
     return Claim(
         "kv-pert",
-        "figure kv_pert",
+        "Fig. 10",
         "(A) lifts off rolling, inside the friction cone; (B) and (C), perturbed, leave rolling "
         "shortly before lift-off, on either side of the cone",
         f"(A) {names['A_exact']}, H_F = {abs(slips['A_printed']):.0e}; (B) {names['B']}, H_F = "
         f"{slips['B']:.4e}; (C) {names['C']}, H_F = {slips['C']:.4e}",
         AGREES,
-        "bounce.simulate with the parameters above; B and C: X'0 -+ .02, Omega0 = -X'0",
+        "bounce.simulate with the parameters above; B and C: X'0 -+ 0.02, Omega0 = -X'0",
         (
             Check(f"lift-off states and times within {worst:.1e} of the reference", worst < 1e-10),
             Check(
@@ -414,10 +414,10 @@ def kv_pert() -> Claim:
 
 
 def second_lie_general() -> Claim:
-    """Equations (second_derivativeF1) and (second_derivativeF2)."""
+    """Equations (51) and (52)."""
     return corrected(
         "second-lie-general",
-        "(second_derivativeF1), (second_derivativeF2)",
+        "eq. (51), eq. (52)",
         "(F1.grad)^2 H = -(7/2) mu Y' dLambda_N/dY + O(eps) at s; + for F2",
         "X' A_X + Y' A_Y -+ (7/2) mu Y' dLambda_N/dY exactly: the second lines are right to O(eps), "
         "the first line is not",
@@ -435,7 +435,7 @@ def sigma() -> Claim:
         "sigma1 = 1, sigma2 = -1: a visible two-fold",
         "; ".join(f"{n} law: sigma = {f.sigma}, {f.kind}" for n, f in folds.items()),
         AGREES,
-        "ns.find_two_fold near X' = .2, Y' = .7 for three laws",
+        "ns.find_two_fold near X' = 0.2, Y' = 0.7 for three laws",
         tuple(
             Check(f"{n}: {f.sigma}", f.sigma == (1, -1) and f.kind == "visible")
             for n, f in folds.items()
@@ -457,13 +457,13 @@ def visible() -> Claim:
 
 
 def nu_product() -> Claim:
-    """Equation (nus_calc)."""
+    """Equation (54)."""
     products = ", ".join(
         f"{abs(f.nu[0] * f.nu[1] - 1):.1e} ({n})" for n, f in ((n, fold_of(n)) for n in LAWS)
     )
     return corrected(
         "nu-product",
-        "(nus_calc)",
+        "eq. (54)",
         "nu1 nu2 = 1 + (20/7) (d_X' upsilon X')/(d_Y' Lambda_N Y') g eps^3 < 1",
         f"nu1 nu2 = 1 exactly at every visible two-fold: abs(nu1 nu2 - 1) = {products}",
         18,
@@ -499,14 +499,14 @@ def one_canard() -> Claim:
 
 
 def coincident_fields() -> Claim:
-    """The matrix of (normal_red_visible) at the ball's two-fold."""
+    """The matrix of eq. (50) at the ball's two-fold."""
     folds = [fold_of(n) for n in LAWS]
     g = generic()
     product = g.equations.lie(1, 2) * g.equations.lie(2, 1)
     square = g.equations.lie(1, 1) * g.equations.lie(2, 2)
     return Claim(
         "singular-matrix",
-        "(normal_red_visible)",
+        "eq. (50)",
         "s is a saddle of the reduced flow",
         "det M = nu1 nu2 - 1 = 0: both fields coincide at s and rolling passes through it smoothly; "
         "s is a regular point of the rolling flow",
@@ -563,13 +563,13 @@ def spin_and_slip() -> Claim:
 
 
 def table() -> Claim:
-    """Table ics."""
+    """Table 1."""
     rows = recomputed()
     wrong = [r for r in rows if not r.fits_all]
     listed = "; ".join(f"{r.printed} should be {r.computed:.4g}" for r in wrong)
     return corrected(
         "table-ics",
-        "table ics",
+        "Table 1",
         "dimensionless ranges of the experiments",
         f"{len(wrong)} of {len(rows)} entries do not follow from their dimensional ones: {listed}",
         23,
@@ -603,9 +603,3 @@ ALL: tuple[Callable[[], Claim], ...] = (
     rigid_limit,
     spin_and_slip,
 )
-
-
-def claims() -> Iterator[Claim]:
-    """Compute the claims one by one."""
-    for compute in ALL:
-        yield compute()

@@ -1,4 +1,4 @@
-"""Table ics recomputed from its own dimensional entries, with the rounding of both sides."""
+"""Table 1 recomputed from its own dimensional entries, with the rounding of both sides."""
 
 from __future__ import annotations
 
@@ -6,30 +6,18 @@ import json
 import math
 from dataclasses import dataclass
 from decimal import Decimal
+from functools import partial
 from itertools import pairwise
 from pathlib import Path
+
+from ..claims import Check
 
 DATA = Path(__file__).parent / "data" / "table_ics.json"
 
 
 @dataclass(frozen=True)
 class Row:
-    """One entry of the table.
-
-    Attributes
-    ----------
-    surface, quantity, unit : str
-    dimensional, printed : str
-        As in the paper.
-    computed : float
-        In 1/s (velocity over radius) or rad/s.
-    radius : tuple of float or None
-        Ball radii in mm for which both printed roundings are right; None for spins.
-    consistent : bool
-        Whether the two printed numbers agree, within their roundings, for the stated radius.
-    fits_all : bool
-        Whether they agree for the radius that suits most entries (spins: at all).
-    """
+    """An entry in 1/s or rad/s; ``radius``: ball radii (mm) for which both printed numbers are right."""
 
     surface: str
     quantity: str
@@ -38,8 +26,28 @@ class Row:
     printed: str
     computed: float
     radius: tuple[float, float] | None
-    consistent: bool
-    fits_all: bool
+    consistent: bool  # within the roundings, for the stated radius
+    fits_all: bool  # for the radius that suits most entries (spins: at all)
+    checks: tuple[Check, ...] = ()
+
+    @property
+    def name(self) -> str:
+        return f"Table 1, {self.surface}, {self.quantity}"
+
+    @property
+    def verdict(self) -> str:
+        return "agrees" if self.fits_all else "corrected"
+
+    @property
+    def value(self) -> str:
+        return f"{self.dimensional} {self.unit} is {self.computed:.4g}, printed {self.printed}"
+
+    def cells(self) -> list[str]:
+        given = f"{self.dimensional} {self.unit}"
+        return [
+            *(self.surface, self.quantity, given, self.printed, f"{self.computed:.4g}"),
+            self.verdict,
+        ]
 
 
 def rounding_interval(text: str, figures: int = 3) -> tuple[float, float]:
@@ -63,12 +71,7 @@ def _deepest(intervals: list[tuple[float, float]]) -> float:
 
 
 def recomputed() -> list[Row]:
-    """Recompute every entry.
-
-    Returns
-    -------
-    list of Row
-    """
+    """Recompute every entry."""
     data = json.loads(DATA.read_text())
     radius = float(data["radius_mm"])
     speeds = [r for r in data["rows"] if r["unit"] == "m/s"]
@@ -91,3 +94,11 @@ def recomputed() -> list[Row]:
             Row(**r, computed=computed, radius=interval, consistent=consistent, fits_all=fits)
         )
     return rows
+
+
+def entry(number: int) -> Row:
+    """One entry, from 0."""
+    return recomputed()[number]
+
+
+ROWS = tuple(partial(entry, number) for number in range(12))

@@ -40,7 +40,7 @@ def two_fold_proof() -> ns.proofs.Proof:
 
 @cache
 def neighbour(name: str) -> ns.proofs.OrbitProof:
-    """Trajectory B or C of figure kv_pert, with its parameters as decimals."""
+    """Trajectory B or C of Fig. 10, with its parameters as decimals."""
     data = kv_pert_data()
     ball = bounce.KelvinVoigt(load="net", **data["parameters"])
     start = data["trajectories"][name]["p0"]
@@ -60,11 +60,11 @@ def nu_product() -> Claim:
     negative = proof.values["nu1"].ends[1] < 0 and proof.values["nu2"].ends[1] < 0
     claim = corrected(
         "proven-nu-product",
-        "(nus_calc)",
+        "eq. (54)",
         "nu1 nu2 = 1 + O(eps^3) < 1 at the two-fold of the ball",
-        "theorem: for all mu in [.2, .4], d1 in [.08, .12], d2 in [.05, .15], eta in [.4, .6], G in "
-        "[0, .001], inertia in [.38, .42], ground inclined by up to .01, Y' in [.6, 1], Omega in "
-        "[-.6, .6] there is exactly one two-fold (in a named box), F1 = F2 there and nu1 nu2 = 1 "
+        "theorem: for all mu in [0.2, 0.4], d1 in [0.08, 0.12], d2 in [0.05, 0.15], eta in [0.4, 0.6], G in "
+        "[0, 0.001], inertia in [0.38, 0.42], ground inclined by up to 0.01, Y' in [0.6, 1], Omega in "
+        "[-0.6, 0.6] there is exactly one two-fold (in a named box), F1 = F2 there and nu1 nu2 = 1 "
         "exactly, nu1, nu2 < 0",
         18,
         "ns.certify: Krawczyk's operator for existence and uniqueness, exact common factor of F1 - F2",
@@ -82,7 +82,7 @@ def two_fold_class() -> Claim:
     proof = two_fold_proof()
     return Claim(
         "proven-class",
-        "Sec. 4, after (nus_calc)",
+        "Sec. 4, after eq. (54)",
         "the two-fold is visible and one orbit, a canard, lifts off rolling",
         "theorem: class VV-C1, one canard and no faux canard, for all parameters and lift-off speeds "
         "of the same box",
@@ -96,7 +96,7 @@ def two_fold_class() -> Claim:
 
 
 def slip_reversal() -> Claim:
-    """The neighbours of figure kv_pert lift off to both sides."""
+    """The neighbours of Fig. 10 lift off to both sides."""
     data = kv_pert_data()["trajectories"]
     checks = []
     for name, mode in (("B", "+"), ("C", "-")):
@@ -112,10 +112,10 @@ def slip_reversal() -> Claim:
         checks.append(Check(f"{name} ends at the reference", near))
     return Claim(
         "proven-slip-reversal",
-        "figure kv_pert",
+        "Fig. 10",
         "trajectories on both sides of the canard lift off in forward and in reverse slip",
-        "theorem: from the printed p0 with X'(0) lowered by .02 (B) the ball rolls, then lifts off in "
-        "forward slip; raised by .02 (C), in reverse",
+        "theorem: from the printed p0 with X'(0) lowered by 0.02 (B) the ball rolls, then lifts off in "
+        "forward slip; raised by 0.02 (C), in reverse",
         AGREES,
         "ns.certify_orbit: validated Taylor steps, events by interval Newton, decimals as written",
         tuple(checks),
@@ -129,10 +129,7 @@ LAST = Fraction(1, 10**9)
 
 
 def rolling_ball() -> tuple[ns.FilippovSystem, dict[str, str]]:
-    """A system whose points of rest (t, V) are zero load and force of figure kv_pert's rolling ball.
-
-    From p0 with X'(0) = V: X'' = -(5/7)(2 d1 eta X' + eta^2 X), Y'' = -2 d2 Y' - Y - G.
-    """
+    """A system whose points of rest (t, V) are zero load and force of Fig. 10's rolling ball."""
     data = kv_pert_data()
     numbers = {k: str(v) for k, v in data["parameters"].items()}
     x0, _, y0, w0, _ = data["trajectories"]["A_exact"]["p0"]
@@ -212,10 +209,10 @@ def canard() -> Claim:
     followed = orbit.proven and orbit.status == "end" and not orbit.events
     return Claim(
         "proven-canard",
-        "Sec. 4.2, figure kv_pert",
+        "Sec. 4.2, Fig. 10",
         "a single trajectory of the rolling region reaches s",
         "theorem: for X'(0) from B's to C's there is exactly one at which load and tangential force of "
-        f"the rolling ball vanish together before t = .1, X'(0) = {speed}; until 1e-9 before, that ball "
+        f"the rolling ball vanish together before t = 0.1, X'(0) = {speed}; until 1e-9 before, that ball "
         "is inside the friction cone",
         AGREES,
         "ns.prove_all on the closed form of rolling; ns.certify_orbit with the cone's edges as stops",

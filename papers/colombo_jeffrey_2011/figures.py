@@ -14,10 +14,10 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from numpy.typing import NDArray
 
 import nonsmooth as ns
+from nonsmooth.plot import style as look
 from nonsmooth.plot.two_folds.class_map import FILLS
 
-from .. import look
-from ..pictures import Picture
+from .. import pictures
 from .model import BEND, CALM, CLASSES, RECURRENT, excursions, recurrent, slid_from
 
 _HIGH = 0.3  # of the highest arc of an excursion: lower ones have no arrow
@@ -45,9 +45,9 @@ def _legend(names: Sequence[str] = ()) -> list[Line2D | Patch]:
 
 def _portraits(names: tuple[str, ...]) -> Callable[[], Figure]:
     def draw() -> Figure:
-        with look.settings():
+        with pictures.settings():
             rows = (len(names) + 1) // 2
-            figure = look.new_figure(7.0, 3.2 * rows + (1.4 if len(names) == 2 else 0.9))
+            figure = pictures.new_figure(7.0, 3.2 * rows + (1.4 if len(names) == 2 else 0.9))
             axes = figure.subplots(rows, 2).ravel()
             for ax, name in zip(axes, names, strict=False):
                 ns.plot.two_fold(CLASSES[name], ax=ax, legend=False, labels=True)
@@ -65,8 +65,8 @@ def _portraits(names: tuple[str, ...]) -> Callable[[], Figure]:
 def space() -> Figure:
     """One two-fold of each kind, with the flow on both sides."""
     names = ("VV-C1", "II-F", "II-C", "mix-C")
-    with look.settings():
-        figure = look.new_figure(7.0, 5.8)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 5.8)
         for ax, name in zip(figure.subplots(2, 2).ravel(), names, strict=True):
             ns.plot.two_fold_3d(CLASSES[name], ax=ax, legend=False, labels=True)
         shadows = look.line("#B5B5B5", "shadows of orbits above", 1.0)
@@ -76,8 +76,8 @@ def space() -> Figure:
 
 def maps() -> Figure:
     """Classes over the plane of nu1 and nu2, for each kind."""
-    with look.settings():
-        figure = look.new_figure(7.0, 8.6)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 8.6)
         axes = figure.subplots(2, 2).ravel()
         for ax, kind in zip(axes, ("VV", "II", "VI"), strict=False):
             ns.plot.two_fold_map(kind, ax=ax)
@@ -96,8 +96,8 @@ def maps() -> Figure:
 
 def funnel() -> Figure:
     """Excursions from the singularity and back, in space."""
-    with look.settings():
-        figure = look.new_figure(7.0, 4.6)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 4.6)
         # Axes in space are square: taller than the figure, so that they are as wide.
         figure.set_layout_engine("none")
         place = (0, 0.53 - 3.5 / 4.6, 1, 7 / 4.6)
@@ -153,8 +153,8 @@ def _times(ax: Axes3D, orbit: NDArray[np.float64], color: str) -> None:
 
 def series() -> Figure:
     """One solution: excursion after excursion, each drawn by chance at the singularity."""
-    with look.settings():
-        figure = look.new_figure(7.0, 4.0)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 4.0)
         top, bottom = figure.subplots(2, 1, height_ratios=(2, 1))
         now, amplitudes = 0.0, []
         for e in excursions():
@@ -182,8 +182,8 @@ def series() -> Figure:
 
 def surface() -> Figure:
     """Sliding portraits of the recurrent system on both sides of the bifurcation."""
-    with look.settings():
-        figure = look.new_figure(7.0, 4.2)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 4.2)
         left, right = figure.subplots(1, 2)
         for ax, nu in ((left, RECURRENT), (right, CALM)):
             ns.plot.sliding_portrait(
@@ -204,38 +204,38 @@ def surface() -> Figure:
     return figure
 
 
-PICTURES: tuple[Picture, ...] = (
-    Picture(
+PICTURES: tuple[pictures.Picture, ...] = (
+    pictures.Picture(
         "visible",
         "visible two-folds",
         "The two sliding portraits of a visible two-fold.",
         _portraits(("VV-C1", "VV-F")),
     ),
-    Picture(
+    pictures.Picture(
         "invisible",
         "invisible two-folds",
         "The two sliding portraits of an invisible two-fold, on both sides of nu1 nu2 = 1.",
         _portraits(("II-F", "II-C")),
     ),
-    Picture(
+    pictures.Picture(
         "mixed",
         "mixed two-folds",
         "The four sliding portraits of a visible-invisible two-fold.",
         _portraits(("mix-0", "mix-S", "mix-C", "mix-F")),
     ),
-    Picture(
+    pictures.Picture(
         "space",
         "flow in space",
         "Two-folds of the three kinds, with (z1, z2, z3) for (x, y, z).",
         space,
     ),
-    Picture(
+    pictures.Picture(
         "maps",
         "classes",
         "The class of a two-fold by its numbers nu1 and nu2, for each kind.",
         maps,
     ),
-    Picture(
+    pictures.Picture(
         "excursions",
         "excursions",
         f"Two excursions from the two-fold of x > 0: (-y, 1, nu1 + {BEND:g} x), x < 0: (z, nu2, 1), "
@@ -243,13 +243,13 @@ PICTURES: tuple[Picture, ...] = (
         "and ends where it began. Arrows: the direction of time.",
         funnel,
     ),
-    Picture(
+    pictures.Picture(
         "series",
         "nondeterministic chaos",
         "One solution of the same system. At each visit of the two-fold what follows is drawn by chance.",
         series,
     ),
-    Picture(
+    pictures.Picture(
         "surface",
         "recurrent system",
         "Its sliding portrait. Left, nu1 nu2 > 1: every attracting sliding orbit nearby reaches the "

@@ -86,17 +86,7 @@ def recurrent() -> ns.FilippovSystem:
 
 @dataclass(frozen=True)
 class Excursion:
-    """One way out of the two-fold and back.
-
-    Attributes
-    ----------
-    start : ndarray (3,)
-        Where it leaves repelling sliding.
-    mode : str
-        To which side.
-    trajectory : Trajectory
-        From there on.
-    """
+    """An orbit from repelling sliding at ``start`` to the side ``mode`` and back to the two-fold."""
 
     start: Array
     mode: str
@@ -116,10 +106,7 @@ class Excursion:
 
 @cache
 def excursions(count: int = 40, seed: int = 1) -> tuple[Excursion, ...]:
-    """Continue from the two-fold by chance: slide on for a while, then leave up or down.
-
-    Every point of repelling sliding near this two-fold is reached from it by sliding.
-    """
+    """Continue from the two-fold at random: slide on for a while, then leave to a side."""
     chance = np.random.default_rng(seed)
     system = recurrent()
     fold = ns.find_two_fold(system, [0.0, 0.01, 0.01])

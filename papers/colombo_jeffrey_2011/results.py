@@ -92,7 +92,7 @@ def canards() -> Claim:
     for name, (slope, expected) in cases.items():
         reaches, beside = _either_side(name, slope)
         checks.append(Check(f"{name}: the orbit of slope {slope:.6f} reaches it", reaches))
-        checks.append(Check(f"{name}: .001 to either side {beside}", beside == expected))
+        checks.append(Check(f"{name}: 0.001 to either side {beside}", beside == expected))
         label = ns.two_folds.classify_two_fold(*CLASSES[name])
         checks.append(close(f"{name}: slope by formula", label.into.low, slope, 1e-12))
     return Claim(
@@ -102,7 +102,7 @@ def canards() -> Claim:
         f"visible two-fold of class VV-C1: slope {visible:.6f}, neighbours leave to different sides; "
         f"mixed one of class mix-S: {mixed:.6f}",
         HOLDS,
-        "simulation of the orbit on the eigenline and .001 beside it",
+        "simulation of the orbit on the eigenline and 0.001 beside it",
         tuple(checks),
     )
 
@@ -124,7 +124,7 @@ def severed() -> Claim:
         "the causal link between inward and outward dynamics is severed",
         f"class II-C: {past} of {RING} sliding orbits arrive in finite time, {worst:.0e} from the "
         "formula; from there orbits slide on for any while and leave up or down: "
-        f"{gap:.2f} apart at t = .5",
+        f"{gap:.2f} apart at t = 0.5",
         HOLDS,
         "simulation, which stops at the two-fold with NON_UNIQUE; funnel of the continuations",
         (

@@ -13,9 +13,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Polygon
 
 import nonsmooth as ns
+from nonsmooth.plot import style as look
 
-from .. import look
-from ..pictures import Picture
+from .. import pictures
 from .model import (
     AFTER,
     AT,
@@ -41,8 +41,8 @@ def _numbers(v: V) -> str:
 
 def space() -> Figure:
     """Flow on both sides of the surface, before, at and after the bifurcation."""
-    with look.settings():
-        figure = look.new_figure(7.0, 5.4)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 5.4)
         *axes, key = figure.subplots(2, 2).ravel()
         for ax, (letter, v, words) in zip(axes, _CASES, strict=True):
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
@@ -61,8 +61,8 @@ def space() -> Figure:
 
 def sliding() -> Figure:
     """Sliding portraits before, at and after the bifurcation."""
-    with look.settings():
-        figure = look.new_figure(7.0, 6.6)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 6.6)
         *axes, key = figure.subplots(2, 2).ravel()
         for ax, (letter, v, words) in zip(axes, _CASES, strict=True):
             title = f"({letter}) {words}: $V$ = {_numbers(v)}"
@@ -86,8 +86,7 @@ def sliding() -> Figure:
 
 
 def _arcs(start: Array, above: bool) -> tuple[Array, Array, Array]:
-    """Surface of the arcs from the ray through ``start``, scaled so that its edges cross the axis of the
-    diabolo at right angles: along and across that axis, and x."""
+    """Surface of the arcs from the ray through ``start``; its edges cross the diabolo's axis at right angles."""
     share = np.linspace(0.0, 1.0, 81)
     y, z = start
     t = -2 * (y if above else z) * share
@@ -107,8 +106,8 @@ def _turned(x: Array, y: Array, z: Array) -> tuple[Array, Array, Array]:
 def diabolo() -> Figure:
     """The pair of invariant surfaces with an orbit on the one whose orbits fall in."""
     low, high = ns.two_folds.diabolo_slopes(AFTER)
-    with look.settings():
-        figure = look.new_figure(7.0, 3.4)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 3.4)
         # Axes in space are square: taller than the figure, so that they are as wide.
         figure.set_layout_engine("none")
         place = (0, 0.55 - 3.5 / 3.4, 1, 7 / 3.4)
@@ -163,8 +162,8 @@ def _flights_by_slope(v: V, count: int = 90) -> tuple[Array, list[int]]:
 
 def regions() -> Figure:
     """Crossing regions by the number of flights before sliding."""
-    with look.settings():
-        figure = look.new_figure(7.0, 3.4)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 3.4)
         axes = figure.subplots(1, 2)
         for ax, v in zip(axes, (_FINITE, AFTER), strict=True):
             for turn in (1, -1):
@@ -207,8 +206,8 @@ def _dress(ax: Axes, v: V) -> None:
 
 def crossings() -> Figure:
     """Largest number of flights against V+ V-."""
-    with look.settings():
-        figure = look.new_figure(3.4, 2.7)
+    with pictures.settings():
+        figure = pictures.new_figure(3.4, 2.7)
         ax = figure.add_subplot()
         away = np.geomspace(1, 2e-3, 4000)[1:]
         ax.plot(away, [formula_for_flights(1 - a) for a in away], color=look.BLACK, lw=1.2)
@@ -229,8 +228,8 @@ def crossings() -> Figure:
 
 def eigenvalues() -> Figure:
     """Eigenvalues of the return map against V+ V-."""
-    with look.settings():
-        figure = look.new_figure(7.0, 3.2)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 3.2)
         left, right = figure.subplots(1, 2)
         circle = np.linspace(0, 2 * math.pi, 200)
         left.plot(np.cos(circle), np.sin(circle), color=look.GREY, linewidth=0.8)
@@ -266,8 +265,8 @@ def eigenvalues() -> Figure:
     return figure
 
 
-PICTURES: tuple[Picture, ...] = (
-    Picture(
+PICTURES: tuple[pictures.Picture, ...] = (
+    pictures.Picture(
         "space",
         "flow",
         "The flow near the two-fold before, at and after the bifurcation, with (z1, z2, z3) for "
@@ -275,7 +274,7 @@ PICTURES: tuple[Picture, ...] = (
         "fall into the singularity.",
         space,
     ),
-    Picture(
+    pictures.Picture(
         "sliding",
         "sliding",
         "The sliding portraits. Before the bifurcation sliding orbits turn away from the "
@@ -283,14 +282,14 @@ PICTURES: tuple[Picture, ...] = (
         "sliding orbit passes through the singularity (hatched).",
         sliding,
     ),
-    Picture(
+    pictures.Picture(
         "diabolo",
         "nonsmooth diabolo",
         f"The two invariant surfaces for V = {_numbers(AFTER)} and an orbit on the one whose orbits "
         "fall into the singularity, crossing infinitely often until t = 3.828427.",
         diabolo,
     ),
-    Picture(
+    pictures.Picture(
         "regions",
         "regions of attraction",
         "How many flights an orbit makes that starts on the surface, by simulation. Before the "
@@ -299,13 +298,13 @@ PICTURES: tuple[Picture, ...] = (
         "surface on which they come out of it.",
         regions,
     ),
-    Picture(
+    pictures.Picture(
         "crossings",
         "number of crossings",
         "Largest number of flights before sliding, by formula and by simulation.",
         crossings,
     ),
-    Picture(
+    pictures.Picture(
         "eigenvalues",
         "return map",
         "Eigenvalues of the return map move round the unit circle and meet at 1 as V+ V- reaches 1. Of "

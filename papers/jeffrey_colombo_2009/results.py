@@ -114,13 +114,13 @@ def single_quantity() -> Claim:
         "known from memory: abstract",
         "the local dynamics depends on a single quantity, the jump in direction of the field "
         "through the singularity",
-        "the product V+ V- decides, together with the signs: V+ V- = .9 gives "
+        "the product V+ V- decides, together with the signs: V+ V- = 0.9 gives "
         f"{counts[0]} flights for three pairs of negative V; V+ V- = 2 lets all sliding orbits reach "
         f"the two-fold if V < 0 and {positive} of {RING} if V > 0",
         HOLDS,
         "simulation of fans of crossing orbits and rings of sliding orbits",
         (
-            Check(f"most flights {counts} at V+ V- = .9", counts == [9, 9, 9]),
+            Check(f"most flights {counts} at V+ V- = 0.9", counts == [9, 9, 9]),
             Check(f"{reach} of {RING} reach at V+ V- = 2, V < 0", reach == [RING, RING]),
             Check(f"{positive} reach at V+ V- = 2, V > 0", positive == 0),
         ),
@@ -217,7 +217,7 @@ def parabolic() -> Claim:
         "smooth-but-for-an-edge",
         "known from memory: abstract",
         "the surfaces are smooth except where they intersect the discontinuity surface",
-        f"height of the arc over (-r, {high:.4f} r): {heights[0]:.6f} r^2 for r = 1, .1, .01; at the "
+        f"height of the arc over (-r, {high:.4f} r): {heights[0]:.6f} r^2 for r = 1, 0.1, 0.01; at the "
         f"edge x' jumps from {jump[0]:.4f} to {jump[1]:.4f} and (y', z') from (1, {AFTER[0]:g}) to "
         f"({AFTER[1]:g}, 1)",
         HOLDS,
@@ -299,7 +299,7 @@ def determinacy() -> Claim:
         "not determined by the vector field",
         f"{stopped} of {RING} arrive, at times that agree with -(1, 1) M^-1 z to {worst:.0e}; from "
         f"there canards slide into repelling sliding and leave it up or down at any time: a funnel of "
-        f"{len(onward.trajectories)} of them is {spread:.2f} wide at t = .5. The abstract of 2009 "
+        f"{len(onward.trajectories)} of them is {spread:.2f} wide at t = 0.5. The abstract of 2009 "
         "states attraction; the loss of determinacy is the point of the paper of 2011",
         HOLDS,
         "ring of sliding orbits; funnel of the continuations",

@@ -11,9 +11,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 import nonsmooth as ns
+from nonsmooth.plot import style as look
 
-from .. import look
-from ..pictures import Picture
+from .. import pictures
 from .model import (
     BOUNDARY_FOCUS,
     BOUNDARY_NODE,
@@ -53,8 +53,8 @@ def _around(
     levels: tuple[float, float, float], boxes: Callable[[float], Box], x1: float, *missing: str
 ) -> Figure:
     """Portraits before, at and after a bifurcation, which happens at x1; without the missing lines."""
-    with look.settings():
-        figure = look.new_figure(7.0, 6.2)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 6.2)
         *axes, key = figure.subplots(2, 2).ravel()
         for ax, alpha in zip(axes, levels, strict=True):
             ns.plot.phase_portrait(
@@ -106,8 +106,8 @@ def saddle_node() -> Figure:
 
 def whole() -> Figure:
     """The whole plane in four regimes."""
-    with look.settings():
-        figure = look.new_figure(7.0, 6.6)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 6.6)
         for ax, alpha in zip(figure.subplots(2, 2).ravel(), (0.75, 0.88, 1.05, 1.3), strict=True):
             ns.plot.phase_portrait(
                 SYSTEM,
@@ -126,8 +126,8 @@ def whole() -> Figure:
 
 def cycles() -> Figure:
     """Sliding cycles for several thresholds."""
-    with look.settings():
-        figure = look.new_figure(7.0, 4.6)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 4.6)
         ax = figure.add_subplot()
         for alpha in (1.2, 1.5, 2.0, 2.3):
             run = run_from_fold(alpha, period(alpha))
@@ -157,8 +157,8 @@ def cycles() -> Figure:
 def diagram() -> Figure:
     """Everything on the threshold against alpha, and the period of the sliding cycle."""
     top, _ = free_cycle()
-    with look.settings():
-        figure = look.new_figure(7.0, 6.2)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 6.2)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for x, visible in ((FREE_FOLD, BOUNDARY_FOCUS), (HARVESTED_FOLD, BOUNDARY_NODE)):
             # the free fold is visible above its threshold, the harvested one below its own
@@ -175,7 +175,7 @@ def diagram() -> Figure:
         ends = top - np.geomspace(0.1, 1e-6, 12)  # where it ends as a square root does
         begun = [*np.linspace(BOUNDARY_FOCUS + 1e-3, top - 0.11, 24), *ends]
         born = sliding_homoclinic()
-        levels, values = look.sampled(lambda a: landing(a)[1], [*begun, born])
+        levels, values = pictures.sampled(lambda a: landing(a)[1], [*begun, born])
         landings = values[:, 0]
         for part, dashes, width, name in (
             (levels <= born, look.DOTS, 1.4, "landing of the fold's orbit"),
@@ -185,7 +185,7 @@ def diagram() -> Figure:
             upper.plot(*curve, color=look.GREEN, linestyle=dashes, linewidth=width, gid=name)
         _bifurcations(upper, lower, top)
         begun = [*(born + np.geomspace(2e-6, 0.3, 20)), *np.linspace(born + 0.32, top - 1e-3, 12)]
-        later, logs = look.sampled(lambda a: np.log10(period(a, 2500.0)), begun)
+        later, logs = pictures.sampled(lambda a: np.log10(period(a, 2500.0)), begun)
         lower.plot(later, 10 ** logs[:, 0], color=look.GREEN, linewidth=1.8)
         upper.set(ylabel="$x_1$ on $x_2 = \\alpha$", ylim=(0, 0.9))
         lower.set(xlabel="$\\alpha$", ylabel="period", yscale="log", xlim=(0.7, 2.5))
@@ -195,7 +195,7 @@ def diagram() -> Figure:
 
 def _names(ax: Axes) -> None:
     """Name the curves beside them; those that lie to both sides of a bifurcation twice."""
-    labels = look.Labels(ax)
+    labels = pictures.Labels(ax)
     for x, level, color, name in (
         (FREE_FOLD, BOUNDARY_FOCUS, look.BELOW, "fold of the free field"),
         (HARVESTED_FOLD, BOUNDARY_NODE, look.ABOVE, "fold of the harvested field"),
@@ -233,42 +233,42 @@ def _bifurcations(upper: Axes, lower: Axes, top: float) -> None:
         )
 
 
-PICTURES: tuple[Picture, ...] = (
-    Picture(
+PICTURES: tuple[pictures.Picture, ...] = (
+    pictures.Picture(
         "boundary_node",
         "boundary node",
         "Before, at and after the boundary node (BN1): the stable node above the threshold turns into "
         "a stable pseudo-node.",
         node,
     ),
-    Picture(
+    pictures.Picture(
         "boundary_focus",
         "boundary focus",
         "Before, at and after the boundary focus (BF3): an unstable focus and a pseudo-saddle appear "
         "together. The orbit from the visible fold (green) lands beyond the pseudo-saddle.",
         focus,
     ),
-    Picture(
+    pictures.Picture(
         "pseudo_saddle_node",
         "pseudo-saddle-node",
         "Before, at and after the pseudo-saddle-node: the pseudo-equilibria merge and vanish, and "
         "sliding then runs from right to left throughout.",
         saddle_node,
     ),
-    Picture(
+    pictures.Picture(
         "regimes",
         "four regimes",
-        "Stable node (.75), stable pseudo-node (.88), with pseudo-saddle and unstable focus (1.05), "
+        "Stable node (0.75), stable pseudo-node (0.88), with pseudo-saddle and unstable focus (1.05), "
         "stable sliding cycle (1.3).",
         whole,
     ),
-    Picture(
+    pictures.Picture(
         "cycles",
         "sliding cycles",
         "Sliding cycles through the fold of the free field (dotted line), and the cycle of the model without harvest, which touches the threshold from below at alpha = 2.40009.",
         cycles,
     ),
-    Picture(
+    pictures.Picture(
         "diagram",
         "bifurcation diagram",
         "All that lies on the threshold, and the period of the sliding cycle.",

@@ -143,7 +143,7 @@ def no_small_cycle() -> Claim:
         "after-the-boundary-focus",
         "computed here",
         "what the orbit from the fold does above the boundary focus",
-        "it lands beyond the pseudo-saddle and slides to the pseudo-node, for alpha from .93 to 1.18",
+        "it lands beyond the pseudo-saddle and slides to the pseudo-node, for alpha from 0.93 to 1.18",
         ADDED,
         "simulation at seven thresholds",
         (
@@ -171,7 +171,7 @@ def boundary_node() -> Claim:
         f"at alpha = {alpha:.12f} a stable node of the harvested field: class {found.label}, "
         "persistence. It turns into the stable pseudo-node",
         HOLDS,
-        "find_boundary_equilibrium, classify; equilibria .02 to either side",
+        "find_boundary_equilibrium, classify; equilibria 0.02 to either side",
         (
             close("alpha", alpha, _reference("boundary node"), 1e-12),
             close("by formula", BOUNDARY_NODE, _reference("boundary node"), 1e-14),
@@ -205,7 +205,7 @@ def saddle_node() -> Claim:
         f"pseudo-node merge; second derivative of the sliding speed "
         f"{found.evidence['second derivative of g']:.6f}",
         HOLDS,
-        "classify at the point; number of pseudo-equilibria .001 to either side",
+        "classify at the point; number of pseudo-equilibria 0.001 to either side",
         (
             close("alpha", SADDLE_NODE, _reference("pseudo-saddle-node"), 1e-14),
             Check(f"class {found.label}", found.label == "pseudo-saddle-node"),
@@ -288,10 +288,10 @@ def grazing() -> Claim:
         "field; at that alpha the sliding segment of the cycle shrinks to nothing (grazing-sliding), "
         "and above it the cycle does not reach the threshold",
         ADDED,
-        "return map of the free field from its fold; simulation .001 to either side",
+        "return map of the free field from its fold; simulation 0.001 to either side",
         (
-            Check(f"sliding segment {short:.4f} long .001 below", 0 < short < 0.05),
-            Check(f"itinerary .001 above: {above.itinerary}", above.itinerary == "-"),
+            Check(f"sliding segment {short:.4f} long 0.001 below", 0 < short < 0.05),
+            Check(f"itinerary 0.001 above: {above.itinerary}", above.itinerary == "-"),
         ),
     )
 

@@ -9,9 +9,9 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
 import nonsmooth as ns
+from nonsmooth.plot import style as look
 
-from .. import look
-from ..pictures import Picture
+from .. import pictures
 from .model import (
     BOUNDARY_MIXED,
     BOUNDARY_RESTING,
@@ -42,8 +42,8 @@ def _cycle_points(eps: float) -> tuple[Array, Array, Array]:
 
 def portraits() -> Figure:
     """Portraits for six thresholds."""
-    with look.settings():
-        figure = look.new_figure(7.0, 8.4)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 8.4)
         for ax, eps in zip(figure.subplots(3, 2).ravel(), _LEVELS, strict=True):
             ns.plot.phase_portrait(
                 DENSITY,
@@ -76,8 +76,8 @@ def oscillation() -> Figure:
     """Temperature, salinity and density over three periods."""
     eps = -0.01
     t, x, mixing = _cycle_points(eps)
-    with look.settings():
-        figure = look.new_figure(7.0, 4.2)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 4.2)
         top, bottom = figure.subplots(2, 1, sharex=True)
         for k in range(3):
             now = t + k * t[-1]
@@ -101,8 +101,8 @@ def oscillation() -> Figure:
 
 def diagram() -> Figure:
     """Equilibria, pseudo-equilibria and the cycle against the threshold; the period."""
-    with look.settings():
-        figure = look.new_figure(7.0, 5.8)
+    with pictures.settings():
+        figure = pictures.new_figure(7.0, 5.8)
         upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3, 2))
         for low, high, color, dashes in (
             (MIXED[0], MERGING, look.BLACK, look.DASHED),
@@ -114,7 +114,7 @@ def diagram() -> Figure:
         upper.plot([-0.08, BOUNDARY_MIXED], [MIXED[0]] * 2, color=look.ABOVE, linewidth=2.2)
         upper.plot([BOUNDARY_RESTING, 0.25], [RESTING[0]] * 2, color=look.BELOW, linewidth=2.2)
         begun = [*(BOUNDARY_MIXED + np.geomspace(1e-7, 1e-2, 16)), *-np.geomspace(0.032, 1e-5, 16)]
-        levels, extremes = look.sampled(_extremes, begun)
+        levels, extremes = pictures.sampled(_extremes, begun)
         upper.fill_between(levels, *extremes[:, :2].T, color=look.PURPLE, alpha=0.15, linewidth=0)
         for k in (0, 1):
             upper.plot(levels, extremes[:, k], color=look.PURPLE, linewidth=1.8)
@@ -136,7 +136,7 @@ def diagram() -> Figure:
 
 def _names(ax: Axes, levels: Array, warmest: Array) -> None:
     """Name the curves of the diagram beside them."""
-    labels = look.Labels(ax)
+    labels = pictures.Labels(ax)
     for low, high, color, name in (  # names of the unstable ones left of the cycle
         (0.9 * MIXED[0] + 0.1 * MERGING, 0.5 * (MIXED[0] + MERGING), look.BLACK, "pseudo-\nsaddle"),
         (MERGING + 0.05, MERGING + 0.2, look.REPELLING, "unstable\npseudo-\nnode"),
@@ -159,26 +159,26 @@ def _extremes(eps: float) -> tuple[float, float, float]:
     return float(x[:, 0].min()), float(x[:, 0].max()), float(t[-1])
 
 
-PICTURES: tuple[Picture, ...] = (
-    Picture(
+PICTURES: tuple[pictures.Picture, ...] = (
+    pictures.Picture(
         "portraits",
         "portraits",
-        "The box for six thresholds: mixed all the time (-.06), oscillating (-.03, -.01), the stable "
-        "fused focus (0), balanced on the surface (.05), resting (.22).",
+        "The box for six thresholds: mixed all the time (-0.06), oscillating (-0.03, -0.01), the stable "
+        "fused focus (0), balanced on the surface (0.05), resting (0.22).",
         portraits,
     ),
-    Picture(
+    pictures.Picture(
         "oscillation",
         "oscillation",
-        "Three periods of the oscillation at eps = -.01: while the box rests it slowly warms and takes "
+        "Three periods of the oscillation at eps = -0.01: while the box rests it slowly warms and takes "
         "up salt; when its density reaches the threshold it mixes, for a short time.",
         oscillation,
     ),
-    Picture(
+    pictures.Picture(
         "diagram",
         "bifurcation diagram",
         "Equilibria, pseudo-equilibria and the cycle over the threshold. Two pseudo-equilibria in "
-        "repelling sliding merge at eps = -.0702. The cycle begins at the fused "
+        "repelling sliding merge at eps = -0.0702. The cycle begins at the fused "
         "focus and ends in a homoclinic orbit of the boundary equilibrium at eps = -7/165; there its "
         "period has no bound.",
         diagram,

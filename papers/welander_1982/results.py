@@ -48,7 +48,7 @@ def oscillation() -> Claim:
         "oscillation",
         "known from memory: abstract",
         "a simple heat-salt oscillator: for steady forcing the box oscillates by itself",
-        f"at eps = -.01 a stable crossing cycle, period {period:.10f}, multiplier {multiplier:.7f}; "
+        f"at eps = -0.01 a stable crossing cycle, period {period:.10f}, multiplier {multiplier:.7f}; "
         "resting and mixed phase alternate",
         HOLDS,
         "Newton's method on the return map; orbits from three starts",
@@ -73,10 +73,10 @@ def resting_equilibrium() -> Claim:
         "boundary-equilibrium-resting",
         "known from memory: nonsmooth form in the later literature",
         "for a high threshold the box rests",
-        f"the resting equilibrium (1, 1) is real for eps > .2 and reaches the surface at eps = {eps:.12g}: "
-        f"class {found.label}, persistence; for eps < .2 a stable pseudo-node takes its place",
+        f"the resting equilibrium (1, 1) is real for eps > 0.2 and reaches the surface at eps = {eps:.12g}: "
+        f"class {found.label}, persistence; for eps < 0.2 a stable pseudo-node takes its place",
         HOLDS,
-        "find_boundary_equilibrium, classify; equilibria .02 to either side",
+        "find_boundary_equilibrium, classify; equilibria 0.02 to either side",
         (
             close("eps", eps, _reference("boundary equilibrium, k = 0"), 1e-12),
             close("by formula, 1 - a", BOUNDARY_RESTING, 0.2, 1e-15),
@@ -104,7 +104,7 @@ def sliding_equilibrium() -> Claim:
         "pseudo-equilibrium",
         "known from memory: nonsmooth form in the later literature",
         "between threshold 0 and the resting state the box comes to a balance on the surface",
-        f"at eps = .05 a {found.kind} at T = {found.point[0]:.12f} with the mixing on for a share "
+        f"at eps = 0.05 a {found.kind} at T = {found.point[0]:.12f} with the mixing on for a share "
         f"{1 - found.alpha:.4f} of the time; orbits from three starts end there",
         HOLDS,
         "find_pseudo_equilibrium; simulation",
@@ -165,14 +165,14 @@ def pseudo_hopf() -> Claim:
         f"fused focus (pseudo-Hopf); for eps < 0 the cycle spans {sizes[1]:.4f} sqrt(-eps) in T; for "
         "eps > 0 orbits end in sliding",
         HOLDS,
-        "classify; simulation at eps = -1e-4 and -1e-6, and .002",
+        "classify; simulation at eps = -1e-4 and -1e-6, and 0.002",
         (
             Check(f"class {found.label}", found.label == "II2"),
             Check(
                 f"stability {found.evidence['stability']:.4f} > 0", found.evidence["stability"] > 0
             ),
             close("ratio of the two sizes", sizes[0] / sizes[1], 1, 0.005),
-            Check(f"eps = .002 ends sliding: {calm[-5:]}", calm.endswith("s")),
+            Check(f"eps = 0.002 ends sliding: {calm[-5:]}", calm.endswith("s")),
         ),
     )
 
@@ -196,7 +196,7 @@ def mixed_equilibrium() -> Claim:
         "eps the stable node is real, with a pseudo-saddle in repelling sliding; for higher eps both are "
         "gone and the box oscillates",
         HOLDS,
-        "find_boundary_equilibrium, classify; equilibria .001 to either side",
+        "find_boundary_equilibrium, classify; equilibria 0.001 to either side",
         (
             close("eps", eps, -7 / 165, 1e-14),
             close("by formula, b/(b + k) - a/(1 + k)", BOUNDARY_MIXED, -7 / 165, 1e-15),

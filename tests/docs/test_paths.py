@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 ROOT = Path(__file__).parents[2]
-PAGES = ["README.md", "CONTRIBUTING.md", "docs/extend.md"]
+PAGES = ["README.md", "CONTRIBUTING.md", "docs/architecture.md", "docs/extend.md"]
 FOLDERS = "nonsmooth|bounce|tests|papers|docs|benchmarks"
 
 

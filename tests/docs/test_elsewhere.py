@@ -1,0 +1,44 @@
+"""The page of a paper shows its record where there is one; the picture of the architecture is legible."""
+
+import importlib
+
+import pytest
+
+from papers.__main__ import NAMES
+from papers.pictures import faults
+
+
+@pytest.fixture
+def elsewhere(monkeypatch, pytestconfig):
+    monkeypatch.syspath_prepend(pytestconfig.rootpath / "docs")
+    return importlib.import_module("elsewhere")
+
+
+def test_every_paper_has_a_page(elsewhere):
+    assert elsewhere.PAPERS == NAMES
+    pages = elsewhere.pages()
+    assert all(pages[f"papers/{name}.md"].count("\n# ") <= 1 for name in NAMES)
+
+
+def test_the_record_takes_the_place_of_the_table_of_claims(elsewhere, monkeypatch, tmp_path):
+    for folder in ("papers", "build"):
+        (tmp_path / folder / "welander_1982").mkdir(parents=True)
+    (tmp_path / "papers" / "welander_1982" / "README.md").write_text(
+        "# Title\n\nBefore.\n\n<!-- claims: x -->\n| a |\n<!-- end of claims -->\n\nAfter.\n"
+    )
+    monkeypatch.setattr(elsewhere, "ROOT", tmp_path)
+    assert "| a |" in elsewhere.paper("welander_1982")
+    (tmp_path / "build" / "welander_1982" / "results.md").write_text(
+        "# Title\n\nSource.\n\nSummary.\n\n## Figures\n\n### One\n\n![One](one.png)\n\n## Claims\n"
+    )
+    (tmp_path / "build" / "welander_1982" / "one.png").touch()
+    page = elsewhere.paper("welander_1982")
+    assert "| a |" not in page and page.count("# Title") == 1
+    assert "Before." in page and "After." in page and "## Claims" in page
+    assert "![One](welander_1982/one.png)" in page
+    assert "papers/welander_1982/one.png" in elsewhere.pictures()
+
+
+def test_the_picture_of_the_architecture_is_legible(monkeypatch, pytestconfig):
+    monkeypatch.syspath_prepend(pytestconfig.rootpath / "docs")
+    assert faults(importlib.import_module("architecture").figure()) == []

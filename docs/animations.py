@@ -1,7 +1,7 @@
 """Moving pictures of the gallery: each is a figure that is drawn again for each moment.
 
-They are written as WebP while the site is built, with a still of the last moment for readers who asked
-their browser for less motion.
+They are written as WebP while the site is built, with a still picture of the last moment for readers whose
+browser is set to reduced motion.
 """
 
 from __future__ import annotations

@@ -37,6 +37,7 @@ WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
 gc.set_threshold(50_000, 20, 100)
 
 
+@pytest.hookimpl(trylast=True)  # after pytest-cov has begun to measure
 def pytest_sessionstart() -> None:
     """Of several workers of pytest-xdist one compiles the driver in C while the others wait to load it."""
     if "PYTEST_XDIST_WORKER" not in os.environ or os.name == "nt":

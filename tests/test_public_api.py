@@ -1,4 +1,4 @@
-"""The front door holds verbs, nouns and errors; what it does not hold has one place elsewhere."""
+"""The top level has the functions, classes and errors that most programs use; each name has one place."""
 
 import inspect
 import types
@@ -50,13 +50,13 @@ ORBITS = {
 }
 
 
-def test_dir_is_the_front_door_and_nothing_else():
+def test_dir_is_the_public_api_and_nothing_else():
     assert dir(ns) == sorted([*ns.__all__, "__version__"])
     assert list(ns.__all__) == sorted(ns.__all__)
     assert all(getattr(ns, name) is not None for name in ns.__all__)
 
 
-def test_modules_at_the_front_door_are_those_it_speaks_of():
+def test_modules_at_the_top_are_those_of_its_docstring():
     modules = {n for n in ns.__all__ if isinstance(getattr(ns, n), types.ModuleType)}
     assert modules == {
         *("continuation", "flow", "local", "orbit", "plot", "proofs", "textbook", "two_folds"),

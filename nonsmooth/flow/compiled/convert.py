@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import math
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, Guard
 from .. import messages
 from ..constants import KINDS, REASONS
+from ..names import guard_name
 from ..options import Options
 from ..status import ADVICE, Status
 from ..trajectory import Event, Segment, Steps, Trajectory
@@ -39,20 +40,20 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
     modes, found = run.letters, []
     for k, kind in enumerate(run.event_kinds):
         before, after = modes[run.event_before[k]], modes[run.event_after[k]]
-        row = int(run.event_guards[k])
-        name = run.guards(before)[row].name if row >= 0 else _closed(run, before, after)
-        t = float(run.event_t[k])
+        row, t = int(run.event_guards[k]), float(run.event_t[k])
+        own = [run.guards(before)[row]] if row >= 0 else _closed(run, before, after)
+        name = " and ".join(guard_name(system, guard) for guard in own)
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
         before, after = system.spelled(before), system.spelled(after)
-        found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1]))
+        of = own[0].element, own[0].side
+        found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1], *of))
     return found
 
 
-def _closed(run: Run, before: str, after: str) -> str:
-    """Names of the contacts that close together where impacts accumulate."""
-    closed = [g for g in run.guards(after) if g.kind == "release"]
-    opened = {g.name for g in run.guards(before) if g.kind == "release"}
-    return " and ".join(g.name for g in closed if g.name not in opened)
+def _closed(run: Run, before: str, after: str) -> list[Guard]:
+    """Guards of the contacts that close together where impacts accumulate."""
+    opened = [g for g in run.guards(before) if g.kind == "release"]
+    return [g for g in run.guards(after) if g.kind == "release" and g not in opened]
 
 
 def _segments(system: FilippovSystem, run: Run) -> list[Segment]:

@@ -23,8 +23,13 @@ import numpy as np
 
 from ...model import Array, Guard
 from ...model.derivatives.variational import guarded_field
-from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
-from ..periodic.symmetry import TURNED, mirrored, neighbours
+from ..periodic.boundary_value_problem import (
+    TURNED,
+    BoundaryProblem,
+    Evaluation,
+    mirrored,
+    neighbours,
+)
 from ..runs.itinerary import leg_between
 from ..runs.legs import Leg, fly, surface_of
 from .conditions import Condition, touching
@@ -160,14 +165,9 @@ def mode_after(leg: Leg) -> str:
     """The mode that follows the event of a leg, where its letters tell it; else empty."""
     if leg.kind not in ("crossing", "entry", "exit"):
         return ""
-    if leg.name.startswith("L_"):
-        k = leg.mode.index("s")
-        letter = "+" if leg.name == "L_F1 h" else "-"
-    else:
-        k = int(leg.name.removeprefix("lambda").removeprefix("h"))
-        turned = leg.mode[k].translate(TURNED)
-        letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
-    return leg.mode[:k] + letter + leg.mode[k + 1 :]
+    turned = leg.mode[leg.element].translate(TURNED)
+    letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
+    return with_letter(leg.mode, leg.element, letter)
 
 
 def with_letter(mode: str, surface: int, letter: str) -> str:
@@ -284,9 +284,9 @@ def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None
     if added is None:
         return None
     between, states = added
-    if not leg.name and problem.phase is not None:  # a smooth orbit: it now begins where it touches
-        legs = [replace(leg, name=between[0].name, kind=between[0].kind), *between[1:]]
-        whole = replace(problem, legs=tuple(legs), phase=None, reference=None)
+    if leg.timed and problem.phase is not None:  # a smooth orbit: it now begins where it touches
+        legs = tuple(between)
+        whole = replace(problem, legs=legs, phase=None, reference=None)
         times = [duration, *[0.0] * (len(legs) - 1)]
         shift = np.zeros(problem.dimension)
         shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
@@ -331,7 +331,7 @@ def _added(
         free = with_letter(leg.mode, guard.index, "+" if guard.side > 0 else "-")
         return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
     if guard.kind in ("impact", "reset"):
-        hit = Leg(leg.mode, guard.name, guard.kind)
+        hit = Leg(leg.mode, guard.kind, guard.element, guard.side)
         return [hit], [hit.at_end(system, y, p).after]
     return None
 

@@ -26,6 +26,10 @@ class _Leg(Protocol):
     def event(self) -> str: ...
     @property
     def kind(self) -> str: ...
+    @property
+    def element(self) -> int: ...
+    @property
+    def side(self) -> int: ...
 
 
 def orbit_run(
@@ -56,11 +60,9 @@ def orbit_run(
         end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
         segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients)))
         if leg.event:
-            events.append(
-                Event(
-                    leg.kind, end, run.x[-1], leg.mode, following.mode, leg.event, following.start
-                )
-            )
+            modes, of = (leg.mode, following.mode), (leg.element, leg.side)
+            after = following.start
+            events.append(Event(leg.kind, end, run.x[-1], *modes, leg.event, after, *of))
     last = states[-1][-1]
     events.append(Event("end", float(times[-1][-1]), last, legs[-1].mode, legs[-1].mode))
     return Trajectory(

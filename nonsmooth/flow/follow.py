@@ -72,8 +72,8 @@ def follow(
         the point.
     until : str, expression, or sequence of them, optional
         End at a zero of these: names of the mode's own event functions (``"h0"``,
-        ``"lambda0 = 1"``, ``"lambda0 = -1"``, names of stops and resets) or expressions in states, parameters and time. A
-        zero at the start is not counted.
+        ``"lambda0 = 1"``, ``"lambda0 = -1"``, names of stops and resets) or expressions in states,
+        parameters and time. A zero at the start is not counted.
     watch : expression or sequence of them, optional
         Further functions whose zeros are reported (named ``f0``, ``f1``, ...).
     t_start, parameters, tol, rtol, atol, max_step, max_steps : optional

@@ -195,7 +195,8 @@ class Trajectory(Savable):
         ----------
         what : {"points", "events", "samples"}, optional
             ``points`` and ``samples`` have the time as index and a column for each state; ``events``
-            has time, kind, name, modes, and the states before and after (``x_after``, ...).
+            has time, kind, name, element, side, modes, and the states before and after
+            (``x_after``, ...).
 
         Returns
         -------

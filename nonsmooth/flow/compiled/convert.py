@@ -45,7 +45,7 @@ def _events(system: FilippovSystem, run: Run) -> list[Event]:
         name = " and ".join(guard_name(system, guard) for guard in own)
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
         before, after = system.spelled(before), system.spelled(after)
-        of = own[0].element, own[0].side
+        of = (own[0].element, own[0].side) if own else (-1, 0)
         found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1], *of))
     return found
 

@@ -113,8 +113,8 @@ def come_to_rest(driver: Driver, left: float) -> bool:
         closed = [j for j in involved if before[first + j] != driver.mode[first + j]]
         name = " and ".join(driver.system.impacts[j] for j in closed)
         driver.limit = driver.t
-        of = Guard("contact", closed[0], 0, len(driver.system.entries) + closed[0])
-        driver.event(change(before, driver.mode), before, of, name=name)
+        of = [Guard("release", j, 0, len(driver.system.entries) + j) for j in closed]
+        driver.event(change(before, driver.mode), before, of[0] if of else None, name=name)
     return True
 
 

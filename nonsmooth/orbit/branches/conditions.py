@@ -179,7 +179,7 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
         return None
     if before.kind in ("reset", "impact") and guard.kind != "surface":
         return None  # the rate after it is that before it, the transversality of the event
-    if guard.kind == "surface" and surface_of(system, before) == guard.index:
+    if guard.kind == "surface" and surface_of(system, before) == guard.element:
         return 1 if before.kind == "crossing" else None
     if guard.kind == "impact" and guard.ends(before.kind, before.element, before.side):
         return None

@@ -117,10 +117,10 @@ def contact_maps(
     _require_one_touch(at)
     y = touched(problem, test, at, p)
     own, other, second = contact_at(
-        problem, problem.legs[test.leg], test.guard.index, test.guard.side, y, p
+        problem, problem.legs[test.leg], test.guard.element, test.guard.side, y, p
     )
     outside = _around(problem, test, at, p, own, second["gradient of L1"])
-    normal = surface_map(problem.system, test.guard.index)(y, p).gradient
+    normal = surface_map(problem.system, test.guard.element)(y, p).gradient
     ratio = second["L21"] / second["L11"]
     contact = np.eye(problem.dimension)
     contact -= np.outer(other - ratio * own, normal) / float(normal @ other)

@@ -11,7 +11,7 @@ import numpy as np
 from ...flow.names import guard_name
 from ...local import Equilibrium, PseudoEquilibrium
 from ...model import Array, FilippovSystem
-from ..periodic.orbit import OrbitLeg, orbit_leg
+from ..periodic.orbit_run import OrbitLeg, orbit_leg
 from ..runs.guards import watch
 from ..runs.legs import Flown, Leg, fly
 

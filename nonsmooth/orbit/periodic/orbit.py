@@ -16,48 +16,9 @@ from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...model.derivatives.variational import variational_field
 from ...notebook import card, circle
 from ..runs.guards import faults_along, watch
-from ..runs.legs import Leg
 from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
 from .multipliers import Multipliers, multipliers_of, stability
-from .orbit_run import orbit_run
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitLeg:
-    """A leg of a periodic orbit.
-
-    Attributes
-    ----------
-    mode : str
-        One letter for each surface.
-    start : ndarray (n,)
-        States at its start.
-    t : float
-        Of the start: of the forcing, or since the start of the orbit.
-    duration : float
-        Time that it takes.
-    event, kind : str
-        Name of the guard that ends it and kind of the event; empty where a time ends it.
-    element, side : int
-        Of that event, as in ``Event``.
-    """
-
-    mode: str
-    start: Array
-    t: float
-    duration: float
-    event: str
-    kind: str
-    element: int = -1
-    side: int = 0
-
-
-def orbit_leg(
-    system: FilippovSystem, leg: Leg, start: Array, t: float, duration: float, ends: bool = True
-) -> OrbitLeg:
-    """A leg with numbers; without its event where it is a part before its end."""
-    own = (leg.name(system), leg.kind, leg.element, leg.side) if ends else ("", leg.kind)
-    return OrbitLeg(leg.mode, start, t, duration, *own)
+from .orbit_run import OrbitLeg, orbit_leg, orbit_run
 
 
 @dataclass(frozen=True)

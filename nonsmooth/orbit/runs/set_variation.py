@@ -349,6 +349,9 @@ def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
 _NEAR = 1e-2
 
 
+#: Kinds of events of surfaces and sets.
+_CHANGES = ("crossing", "entry", "exit")
+
 #: Switching functions of a set that was held are zero at this part of what they are made of.
 _ON_SET = 1e-14
 
@@ -418,6 +421,11 @@ class _Passage:
                 "restitution of 0."
             )
         met = self._met(event)
+        if event.kind in _CHANGES and not event.side and len(met) < 2:
+            raise DegenerateError(
+                f"run: the {event.kind} at t = {event.t:.10g} is no zero of a function and has no "
+                "derivative. End the run before it."
+            )
         if event.kind == "crossing" and len(met) > 1:
             raise DegenerateError(
                 f"run: expected hits of sets and ends of sliding only, received {event.kind!r} at "
@@ -442,8 +450,8 @@ class _Passage:
         return parallel(other.gradient @ one.after_state, one.gradient)
 
     def _met(self, event: Event) -> tuple[int, ...]:
-        """Switching functions of the surface or set that an event is named after."""
-        own = event.kind in ("crossing", "entry", "exit") and event.element >= 0
+        """Switching functions of the surface or set that an event belongs to."""
+        own = event.kind in _CHANGES and 0 <= event.element < len(self.system.entries)
         return self.system.entries[event.element] if own else ()
 
     def _at(self, mode: str, event: Event) -> AtEvent:
@@ -525,5 +533,5 @@ class _Passage:
 
 def _ends_sliding(event: Event) -> bool:
     """Whether a multiplier or reaction came to its limit, where the field is continuous."""
-    slid = event.kind == "exit" or event.kind == "crossing"
-    return event.kind == "release" or (slid and event.mode_before[event.element] == "s")
+    slid = event.kind in _CHANGES and event.mode_before[event.element] == "s"
+    return event.kind == "release" or slid

@@ -79,8 +79,8 @@ def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array)
     if depth > _KNOWN * wrong:
         return
     raise DegenerateError(
-        f"{leg_name(system, leg)} at t = {part.stretch.t + part.stretch.duration:.10g}: expected an event that "
-        f"the run is sure of, received a grazing: the orbit would turn back {depth:.1e} beyond it, and "
+        f"{leg_name(system, leg)} at t = {part.stretch.t + part.stretch.duration:.10g}: expected an "
+        f"event that the run is sure of, received a grazing: the orbit would turn back {depth:.1e} beyond it, and "
         f"the run's error is {wrong:.1e} there. A derivative through it means nothing. Simulate with "
         "a smaller tol, or move the start or a parameter away from the grazing."
     )

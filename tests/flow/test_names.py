@@ -147,3 +147,23 @@ def test_saved_runs_keep_elements_and_sides(tmp_path):
     kept = ns.load(tmp_path / "run.npz")
     assert [(e.element, e.side) for e in kept.events] == [(e.element, e.side) for e in run.events]
     assert list(run.to_pandas("events")["element"]) == [e.element for e in run.events]
+
+
+@engines
+def test_states_and_parameters_may_be_called_like_multipliers(engine):
+    """The same run and derivative, whatever the symbols are called."""
+    found = []
+    for names in (("x", "v", "f", "u"), ("lambda0", "h0", "lambda1", "L_F1 h")):
+        a, b, f, u = (ca.SX.sym(name) for name in names)
+        system = ns.FilippovSystem(
+            [a, b],
+            surfaces=[b - 1],
+            multipliers=[u],
+            field=[b, -a - f * u],
+            parameters={f: 1.0},
+        )
+        run = ns.simulate(system, [0.0, -0.5], 6.0, engine=engine)
+        derivative = ns.sensitivity(run)
+        kinds = [(e.kind, e.name, e.element, e.side) for e in run.events]
+        found.append((run.x.tobytes(), derivative.dx_dp.tobytes(), kinds))
+    assert found[0] == found[1] and found[0][2][1][:2] == ("exit", "lambda0 = -1")

@@ -77,7 +77,7 @@ def recurrence(
     anchor = starts[0] if first else starts[-1]
     others = [k for k in starts if (k > anchor if first else k < anchor)]
     if symmetry is None:
-        others = [k for k in others if _key(run, parts, k) == _key(run, parts, anchor)]
+        others = [k for k in others if _key(parts, k) == _key(parts, anchor)]
     if about is not None:
         others = [k for k in others if is_about(abs(parts[k].t - parts[anchor].t), about)]
     if not others:
@@ -96,8 +96,11 @@ def _moves(run: Trajectory, part: Stretch) -> bool:
     return bool(np.max(way) > _REST * np.ptp(run.x, axis=0).max())
 
 
-def _key(run: Trajectory, parts: Sequence[Stretch], k: int) -> tuple[str, str]:
-    return parts[k].leg.mode, parts[k - 1].leg.name(run.system)
+def _key(parts: Sequence[Stretch], k: int) -> tuple[object, ...]:
+    """Mode of a leg, and the guard that ended the one before it."""
+    leg = parts[k - 1].leg
+    own = leg.kind if leg.kind in ("stop", "reset") else leg.mode[leg.element :][:1] == "s"
+    return parts[k].leg.mode, own, leg.element, leg.side if own is True else 0
 
 
 def _scales(run: Trajectory) -> Array:

@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Array
-from .constants import change
+from .names import change
 from .reference.polynomial import shift
 from .trajectory import Event, Segment, Steps, Trajectory
 

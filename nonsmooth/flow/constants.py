@@ -149,12 +149,3 @@ REASONS = (
 
 #: Not a status: the run goes on in the next call, after its arrays were emptied, or elsewhere.
 RUNNING, FULL, HAND_OVER = -1, -2, -3
-
-
-def change(before: str, after: str) -> str:
-    """Kind of the event by which one mode follows another."""
-    closed = after.count("c") - before.count("c")
-    if closed:
-        return "contact" if closed > 0 else "release"
-    more = after.count("s") - before.count("s")
-    return "entry" if more > 0 else ("exit" if more < 0 else "crossing")

@@ -41,7 +41,7 @@ def trajectory_table(run: Trajectory, what: str) -> Any:
         index = pandas.Index(run.sample_t, name="t")
         frame = pandas.DataFrame(run.sample_x, columns=names, index=index)
     elif what == "events":
-        columns = ("t", "kind", "name", "mode_before", "mode_after")
+        columns = ("t", "kind", "name", "element", "side", "mode_before", "mode_after")
         frame = pandas.DataFrame({c: [getattr(e, c) for e in run.events] for c in columns})
         for suffix, attribute in (("", "x"), ("_after", "x_after")):
             states = np.array([getattr(e, attribute) for e in run.events]).reshape(-1, len(names))

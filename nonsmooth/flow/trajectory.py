@@ -33,9 +33,17 @@ class Event:
         Equal at a stop, a zero and the end. After a reset the mode that starts there, also where
         the jump went through a surface.
     name : str
-        Of the surface (``h0``, ``h1``, ...), stop, reset or function.
+        Of the surface (``h0``, ``h1``, ...), the limit of a multiplier at which sliding ends
+        (``lambda0 = 1``, ``lambda0 = -1``, ``|lambda0| = 1`` of a set), the stop, reset, impact or
+        function.
     x_after : ndarray (n,)
         State after a reset, ``x`` otherwise.
+    element : int
+        What it belongs to: position of the surface, set or contact among the letters of the modes;
+        number of the stop or reset, clocks counted after the resets; -1 for none.
+    side : int
+        Of a crossing or entry the side, +1 or -1, from which the motion comes; of the end of sliding
+        the one to which it goes; of a stop or reset its direction; of an impact 1; otherwise 0.
     """
 
     kind: str
@@ -45,6 +53,8 @@ class Event:
     mode_after: str
     name: str = ""
     x_after: Array = None  # type: ignore[assignment]  # x unless given
+    element: int = -1
+    side: int = 0
 
     def __post_init__(self) -> None:
         if self.x_after is None:
@@ -185,7 +195,8 @@ class Trajectory(Savable):
         ----------
         what : {"points", "events", "samples"}, optional
             ``points`` and ``samples`` have the time as index and a column for each state; ``events``
-            has time, kind, name, modes, and the states before and after (``x_after``, ...).
+            has time, kind, name, element, side, modes, and the states before and after
+            (``x_after``, ...).
 
         Returns
         -------

@@ -5,14 +5,14 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, Guard, coupled_of
+from ...model import Array, Coupled, FilippovSystem, coupled_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..constants import FULL, RUNNING
 from ..options import Options
@@ -289,7 +289,7 @@ class TapeEngine:
         self.system, self.order = system, order
         self.coupled = coupled_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
-        self.guards = lru_cache(maxsize=4096)(self._guards)
+        self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
         self._steps, self._special, self._rooms = 0, None, rooms_of((0, 0, 0))
@@ -369,14 +369,6 @@ class TapeEngine:
 
     def _entries(self, e: Entries) -> _Entries:
         return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
-
-    def _guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode, with the names that the reference driver gives them."""
-        found = self.coupled.guards(mode)
-        if self.system.coupled:
-            return found
-        names = {1: "L_F1 h", -1: "L_F2 h"}
-        return tuple(replace(g, name=names[g.side]) if g.kind == "exit" else g for g in found)
 
     # one trajectory ----------------------------------------------------------------------------
 

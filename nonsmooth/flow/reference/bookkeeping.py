@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from itertools import pairwise
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, Guard
 from .. import messages
 from ..constants import AT_ONCE, BLOCKS, LAGS, REMAINING, SHRINKS, SPREAD
 from ..options import Options
@@ -65,10 +65,13 @@ class Bookkeeping:
         """Note the state."""
         self.record.point(self.t, self.x)
 
-    def event(self, kind: str, before: str, name: str, x: Array | None = None) -> None:
+    def event(
+        self, kind: str, before: str, guard: Guard | None, x: Array | None = None, name: str = ""
+    ) -> None:
         """Note an event at the state ``x``, the present one unless the event changed it."""
         before, after = self.system.spelled(before), self.system.spelled(self.mode)
-        self.record.event(kind, self.t, x if x is not None else self.x, before, after, name, self.x)
+        state = x if x is not None else self.x
+        name = self.record.event(kind, self.t, state, before, after, guard, name, self.x).name
         self._count_hit(kind, before, name)
         if kind in ("end", "stop"):
             return
@@ -117,5 +120,5 @@ class Bookkeeping:
         if count > first or not self.record.segments:
             self.record.segments.append(self._segment(start, first, count))
         if status is not Status.STOPPED:
-            self.event("end", self.mode, str(status))
+            self.event("end", self.mode, None, name=str(status))
         return self.record.trajectory(status, message, self.limit)

@@ -16,7 +16,8 @@ import numpy as np
 
 from ...model import Array, Coupled, FilippovSystem, Guard, Resets, Surfaces, coupled_of
 from .. import messages
-from ..constants import ON_SURFACE, PRIORITY, VANISHES, change
+from ..constants import ON_SURFACE, PRIORITY, VANISHES
+from ..names import change, guard_name
 from ..options import Options
 from ..status import Status
 from ..trajectory import Trajectory
@@ -152,8 +153,10 @@ class Driver(Bookkeeping):
 
     def _serve(self, guard: Guard) -> None:
         if guard.kind == "stop":
-            self.event("stop", self.mode, guard.name)
-            return self.end(Status.STOPPED, messages.stopped(guard.name, self.t))
+            self.event("stop", self.mode, guard)
+            return self.end(
+                Status.STOPPED, messages.stopped(guard_name(self.system, guard), self.t)
+            )
         if guard.kind == "reset":
             return self._reset(guard)
         if guard.kind == "impact":
@@ -176,7 +179,7 @@ class Driver(Bookkeeping):
         if guard.kind == "slip":
             known = {("slip", i, 0): 1, ("near", i, 0): 2}
         layer = (float(guard.side), -guard.side) if guard.kind == "surface" else None
-        self.go_on(active, known, before, guard.name, layer)
+        self.go_on(active, known, before, guard, layer)
 
     def _is_on(self, surface: int) -> bool:
         """Whether Newton's steps have led onto a surface: not where its zero is a multiple one."""
@@ -189,20 +192,21 @@ class Driver(Bookkeeping):
         surface = self.mode.index("s")
         direction = 1 if e.unknowns[surface, 1] > 0 else -1
         layer = (float(self.unknowns[surface]), direction)
-        self.go_on([surface], {}, self.mode, "stability of sliding", layer)
+        branch = Guard("branch", surface, 0, self.system.entry_of(surface))
+        self.go_on([surface], {}, self.mode, branch, layer)
 
     def go_on(
         self,
         active: Sequence[int],
         known: dict[tuple[str, int, int], int],
         before: str,
-        name: str,
+        guard: Guard,
         layer: tuple[float, int] | None = None,
     ) -> None:
         if self.ended is not None or not self.choose(active, self.mode, known, layer):
             return
         if self.mode != before:
-            self.event(change(before, self.mode), before, name)
+            self.event(change(before, self.mode), before, guard)
 
     def choose(
         self,
@@ -227,8 +231,10 @@ class Driver(Bookkeeping):
             self.settle_in()
         else:
             self.x = x
-            self.end(Status.NOT_FINITE, messages.reset_not_finite(guard.name, self.t))
-        self.event("reset", before, guard.name, x)
+            self.end(
+                Status.NOT_FINITE, messages.reset_not_finite(guard_name(self.system, guard), self.t)
+            )
+        self.event("reset", before, guard, x)
         self._fired.add(guard.index)
         self.arm(guard)
 
@@ -334,7 +340,7 @@ class Driver(Bookkeeping):
         heading = -side or guard.side
         if zeros > 1 and value * heading > 0.0:
             self.limit = self.t
-            self.end(Status.ACCUMULATION, messages.pressed(guard.name, self.t))
+            self.end(Status.ACCUMULATION, messages.pressed(guard_name(self.system, guard), self.t))
 
     def _is_pressed(self, guard: Guard, row: int, value: float) -> bool:
         """Whether a start on the zero of a reset is met at once."""
@@ -344,7 +350,7 @@ class Driver(Bookkeeping):
         e = self.stepper.expand(self.mode, after, self.unknowns)
         zeros, back = self.stepper.leading(e, row, 0)
         if zeros > 0 and (back * value <= 0.0 or min(zeros, self.drops[row]) > 1):
-            self.end(Status.NON_UNIQUE, messages.two_sided(guard.name))
+            self.end(Status.NON_UNIQUE, messages.two_sided(guard_name(self.system, guard)))
         return False
 
     def _adopt(self, continuation: Continuation) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...model import Guard, coupled_of
 from .. import messages
-from ..constants import change
+from ..names import change, guard_name
 from ..status import Status
 from .contacts import Contacts
 
@@ -73,11 +73,13 @@ def impact(driver: Driver, guard: Guard) -> None:
         return driver.end(Status.INCONSISTENT, message)
     after = driver.contacts.strike(x, driver.mode, involved, False)
     if after is None:
-        return driver.end(Status.INCONSISTENT, messages.no_impulse(guard.name, driver.t))
+        return driver.end(
+            Status.INCONSISTENT, messages.no_impulse(guard_name(driver.system, guard), driver.t)
+        )
     driver.x = after
     driver.note()
     driver.settle_in()
-    driver.event("impact", before, guard.name, x)
+    driver.event("impact", before, guard, x)
     driver.arm()
 
 
@@ -86,7 +88,7 @@ def release(driver: Driver, guard: Guard) -> None:
     before, j = driver.mode, guard.index
     active = driver.active({driver.system.surface_count + j}, driver.mode)
     known = {("release", j, 0): 1, ("impact", j, 1): 3}
-    driver.go_on(active, known, before, guard.name)
+    driver.go_on(active, known, before, guard)
 
 
 def come_to_rest(driver: Driver, left: float) -> bool:
@@ -111,7 +113,8 @@ def come_to_rest(driver: Driver, left: float) -> bool:
         closed = [j for j in involved if before[first + j] != driver.mode[first + j]]
         name = " and ".join(driver.system.impacts[j] for j in closed)
         driver.limit = driver.t
-        driver.event(change(before, driver.mode), before, name)
+        of = [Guard("release", j, 0, len(driver.system.entries) + j) for j in closed]
+        driver.event(change(before, driver.mode), before, of[0] if of else None, name=name)
     return True
 
 

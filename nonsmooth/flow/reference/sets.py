@@ -70,7 +70,7 @@ def near(driver: Driver, guard: Guard, fell: bool = True) -> None:
     active = driver.active({*own}, mode)
     driver.x = driver.surfaces.project(driver.x, p, active)
     driver.record.correct(driver.x)
-    driver.go_on(active, {}, before, guard.name)
+    driver.go_on(active, {}, before, guard)
 
 
 def look(driver: Driver) -> None:

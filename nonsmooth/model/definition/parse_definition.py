@@ -166,16 +166,17 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
 
 
 def _own_names(sizes: Sequence[int]) -> set[str]:
-    """Names that guards of a system have by themselves: of surfaces and sets, and of the ends of sliding."""
-    of_each = {f"{what}{k}" for k in range(len(sizes)) for what in ("h", "lambda")}
-    return of_each | ({"L_F1 h", "L_F2 h", "stability of sliding"} if sizes else set())
+    """Names of guards of surfaces, sets and the ends of sliding (``flow/names.py``)."""
+    of_each = ("h{}", "lambda{} = 1", "lambda{} = -1", "|lambda{}| = 1")
+    names = {name.format(k) for k in range(len(sizes)) for name in of_each}
+    return names | ({"stability of sliding"} if sizes else set())
 
 
 def _told_apart(
     kinds: Sequence[list[Any]], own: set[str]
 ) -> tuple[list[list[Any]], tuple[tuple[str, str], ...]]:
     """Events with names of their own."""
-    # Events are found again by their names, so that two of one name would have the derivatives of the first.
+    # ``at=``, ``until=`` and ``itinerary=`` choose events by their names.
     taken, used = {item.name for items in kinds for item in items} | own, set(own)
     found, renamed = list[list[Any]](), list[tuple[str, str]]()
     for items in kinds:

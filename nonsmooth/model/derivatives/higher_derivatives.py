@@ -7,6 +7,7 @@ import casadi as ca
 from ..definition.system import FilippovSystem
 from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import mode_field
+from ..laws.switches import Guard
 from .variational import guarded_field
 
 
@@ -41,15 +42,15 @@ def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int
     return evaluator(system, ("contact", mode, surface, side), build)
 
 
-def guard_rate_gradient(system: FilippovSystem, mode: str, name: str) -> Evaluator:
+def guard_rate_gradient(system: FilippovSystem, mode: str, guard: Guard) -> Evaluator:
     """x, p -> the gradient of the rate of a guard along the field of its mode."""
     motion = guarded_field(system, mode).motion
 
     def build() -> Evaluator:
-        k = next(k for k, g in enumerate(motion.guards) if g.name == name)
+        k = motion.guards.index(guard)
         rate = ca.mtimes(ca.jacobian(motion.functions[k], motion.states), motion.field)
         row = ca.densify(ca.jacobian(rate, motion.states))
         inputs = [motion.states, system.parameter_symbols]
         return Evaluator(ca.Function("rate", inputs, [row], {"cse": True}))
 
-    return system.cached(("rate of a guard", mode, name), build)
+    return system.cached(("rate of a guard", mode, guard), build)

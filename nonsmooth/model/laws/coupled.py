@@ -35,7 +35,7 @@ from ..expressions.unused_terms import awake
 from ..values import Array
 from .evaluators import Evaluator
 from .multiplier_series import MultiplierSeries, unit
-from .switches import Guard
+from .switches import Guard, event_guards
 
 # Numbers of a system at one point: what steps are measured with.
 
@@ -175,36 +175,32 @@ class Coupled:
 
     def guards(self, mode: str) -> tuple[Guard, ...]:
         """Guards of a mode: surfaces and exits, stops and resets, stability of sliding."""
-        result: list[Guard] = []
-        names = self.system.surface_names
+        result, contacts = list[Guard](), len(self.system.entries)
         for i, sign in enumerate(self.system.parse_letters(mode)):
             j = i - self._surfaces
             if j >= 0:
-                kind, name = ("impact" if sign else "release"), self.system.impacts[j]
-                result.append(Guard(kind, j, sign, name))
+                result.append(Guard("impact" if sign else "release", j, sign, contacts + j))
             elif i in self.system.set_of:
                 result += self._guards_of_set(i, mode[i])
             elif sign:
-                result.append(Guard("surface", i, sign, names[i]))
+                result.append(Guard("surface", i, sign, self.system.entry_of(i)))
             else:
-                name = f"lambda{names[i][1:]}"
-                result += [Guard("exit", i, side, name) for side in (1, -1)]
-        items = [("stop", j, *s) for j, s in enumerate(self.system.stops)]
-        items += [("reset", j, *r) for j, r in enumerate(self.system.resets)]
-        result += [Guard(kind, j, direction, name) for kind, j, name, direction in items]
-        result += [Guard("zero", k, 0, f"f{k}") for k in range(self._watched)]
+                result += [Guard("exit", i, side, self.system.entry_of(i)) for side in (1, -1)]
+        result += event_guards(self.system)
+        result += [Guard("zero", k, 0, k) for k in range(self._watched)]
         sliding = self.sliding(mode)
         first = next((i for i in sliding if i < self._surfaces), 0)
         branches = len(self._changing(sliding))
-        return (*result, *[Guard("branch", first, 0, "stability of sliding")] * branches)
+        of_first = self.system.entry_of(first) if self._surfaces else 0
+        return (*result, *[Guard("branch", first, 0, of_first)] * branches)
 
     def _guards_of_set(self, i: int, letter: str) -> list[Guard]:
         """Those of the set that begins with a switching function."""
         if i != self.system.set_of[i][0] or letter == "i":
             return []
-        near = [Guard("near", i, 0, name := self.system.surface_names[i])]
-        slip = Guard("slip", i, 0, f"lambda{name[1:]}")
-        return [slip, *near * self.scaled[i]] if letter == "s" else near
+        k = self.system.entry_of(i)
+        near = [Guard("near", i, 0, k)]
+        return [Guard("slip", i, 0, k), *near * self.scaled[i]] if letter == "s" else near
 
     @cached_property
     def slope_moves(self) -> NDArray[np.bool_]:

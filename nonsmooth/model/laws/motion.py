@@ -107,13 +107,8 @@ def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -
     def build() -> Motion:
         of_mode = motion(system, mode)
         functions = [of_mode.functions[k] for k in range(len(of_mode.guards))]
-        names = [guard.name for guard in of_mode.guards] + [f"f{k}" for k in range(len(watched))]
-        guarded = [
-            (Guard("zero", k, 0, name), function)
-            for k, (name, function) in enumerate(
-                zip(names, [*functions, *expressions], strict=True)
-            )
-        ]
+        functions += expressions
+        guarded = [(Guard("zero", k, 0, k), function) for k, function in enumerate(functions)]
         return Motion(system, mode, of_mode.law, guarded, ("followed", key) if expressions else ())
 
     return system.cached(("followed", mode, key), build)

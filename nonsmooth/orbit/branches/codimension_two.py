@@ -81,10 +81,10 @@ def _touches(
         return found
     y = touched(problem, condition, at, p)
     try:
-        _, other, second = contact_at(problem, leg, guard.index, guard.side, y, p)
+        _, other, second = contact_at(problem, leg, guard.element, guard.side, y, p)
     except NonsmoothError:
         return found  # the leg slides elsewhere
-    normal = guard.side * surface_map(problem.system, guard.index)(y, p).gradient
+    normal = guard.side * surface_map(problem.system, guard.element)(y, p).gradient
     found["two-fold"] = float(normal[: other.size] @ other)
     found["touch of higher order"] = guard.side * float(second["L11"])
     with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole

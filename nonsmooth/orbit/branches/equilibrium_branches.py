@@ -243,6 +243,10 @@ class EquilibriumCurve(Equilibria):
         return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
 
 
+#: Tests at which the weight of one field vanishes, and the weight alpha of F2 there.
+_ALPHA = {"alpha = 0": 0, "alpha = 1": 1}
+
+
 class PseudoEquilibriumCurve(Equilibria):
     """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
 
@@ -270,7 +274,7 @@ class PseudoEquilibriumCurve(Equilibria):
         numbers = self.place_at(u).at(u[: self.n])
         found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
         switches = self.place_at(u).switches(u[: self.n])
-        found.update({f"intersection {j}": float(switches[j]) for j in self.where.others})
+        found.update({name: float(switches[j]) for name, j in self._met.items()})
         found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
         if self.n > 2 and found["two-fold"] != 0:
             found["Hopf"] = self.hopf(u)
@@ -279,21 +283,24 @@ class PseudoEquilibriumCurve(Equilibria):
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
         if name == "Hopf":
             return self.bautin(u)
-        return self.boundary_numbers(u, int(name[-1])) if name.startswith("alpha") else {}
+        return self.boundary_numbers(u, _ALPHA[name]) if name in _ALPHA else {}
+
+    @property
+    def _met(self) -> dict[str, int]:
+        """Other surfaces by the names of their tests."""
+        return {f"intersection {j}": j for j in self.where.others}
 
     def ends(self, name: str) -> bool:
-        return name.startswith(("alpha", "intersection"))
+        return name in _ALPHA or name in self._met
 
     def describe(self, u: Array) -> Any:
         return pseudo_equilibrium_at(self.place_at(u), Found(u[: self.n]))
 
     def event(self, zero: Zero) -> BranchEvent | None:
-        if zero.name.startswith("alpha"):
-            return self.boundary(zero, int(zero.name[-1]))
-        if zero.name.startswith("intersection"):
-            words = (
-                f"it reaches surface {zero.name.split()[-1]}: not followed onto the intersection"
-            )
+        if zero.name in _ALPHA:
+            return self.boundary(zero, _ALPHA[zero.name])
+        if zero.name in self._met:
+            words = f"it reaches surface {self._met[zero.name]}: not followed onto the intersection"
             return self.described(zero, "intersection", far_side=FarSide("", words))
         if zero.name == "two-fold":
             numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
@@ -304,9 +311,9 @@ class PseudoEquilibriumCurve(Equilibria):
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Equilibria of the field whose weight is one, on that field's own side."""
-        if not zero.name.startswith("alpha"):
+        if zero.name not in _ALPHA:
             return None
-        k, u = int(zero.name[-1]), zero.point.u
+        k, u = _ALPHA[zero.name], zero.point.u
         scale = np.append(self.scale[: self.n], self.scale[-1])
         curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
         start = np.append(u[: self.n], u[-1])

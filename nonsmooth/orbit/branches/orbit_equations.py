@@ -41,7 +41,7 @@ class Small:
 
 def applies(problem: BoundaryProblem) -> bool:
     """Whether every leg has an event that determines its duration, and nothing else is demanded."""
-    return not problem.kept and all(leg.name for leg in problem.legs)
+    return not problem.kept and not any(leg.timed for leg in problem.legs)
 
 
 def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:

@@ -10,9 +10,8 @@ from ...local import Equilibrium, PseudoEquilibrium
 from ...model import Array, ConvergenceError, DefinitionError, explain
 from ...model.derivatives.variational import variational_field
 from ...solvers.continuation import other_direction
-from ..periodic.boundary_value_problem import BoundaryProblem
+from ..periodic.boundary_value_problem import BoundaryProblem, mirrored
 from ..periodic.multipliers import leg_maps
-from ..periodic.symmetry import mirrored
 from ..runs.legs import Leg
 from .branch import BranchEvent
 from .orbit_branches import OrbitCurve

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.names import guard_name
 from ...local.read_only import ReadOnly
 from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
@@ -67,8 +68,9 @@ def far_side(
     verdict = _VERDICTS.get(kind, "")
     if kind == "corner":
         i = test.leg
-        other = problem.legs[i].name if test.guard is None else test.guard.name
-        verdict = verdict.format(one=problem.legs[i - 1].name, other=other)
+        of, guard = problem.system, test.guard
+        other = problem.legs[i].name(of) if guard is None else guard_name(of, guard)
+        verdict = verdict.format(one=problem.legs[i - 1].name(of), other=other)
     return FarSide(word, verdict)
 
 
@@ -115,10 +117,10 @@ def contact_maps(
     _require_one_touch(at)
     y = touched(problem, test, at, p)
     own, other, second = contact_at(
-        problem, problem.legs[test.leg], test.guard.index, test.guard.side, y, p
+        problem, problem.legs[test.leg], test.guard.element, test.guard.side, y, p
     )
     outside = _around(problem, test, at, p, own, second["gradient of L1"])
-    normal = surface_map(problem.system, test.guard.index)(y, p).gradient
+    normal = surface_map(problem.system, test.guard.element)(y, p).gradient
     ratio = second["L21"] / second["L11"]
     contact = np.eye(problem.dimension)
     contact -= np.outer(other - ratio * own, normal) / float(normal @ other)
@@ -139,12 +141,12 @@ def impact_numbers(
     numbers = {"leading multiplier": abs(leading), "its angle": float(np.angle(leading))}
     y = touched(problem, test, at, p)
     own = leg.field(system).rate.copied(leg.field(system).states_at(y, p), p)[0][:n, 0]
-    hit = Leg(leg.mode, guard.name, guard.kind).at_end(system, y, p)
+    hit = Leg(leg.mode, guard.kind, guard.element, guard.side).at_end(system, y, p)
     if y.size != hit.gradient.size or np.abs(hit.after - y).max() > 1e-6 * (1 + np.abs(y).max()):
         return numbers
     sign = -guard.side if guard.kind == "reset" else 1
     normal = (sign or 1) * hit.gradient
-    found = guard_rate_gradient(system, leg.mode, guard.name).copied(y, p)[0]
+    found = guard_rate_gradient(system, leg.mode, guard).copied(y, p)[0]
     rate = found.ravel() * (sign or 1)
     bend = float(rate @ own)
     jump = (hit.after_state @ own - own) / bend
@@ -201,7 +203,7 @@ def _around(
     across = np.eye(n) - np.outer(own, section) / float(section @ own)
     maps = leg_maps(problem, at)
     rest = fly(system, leg, first.end[:n], duration - t, p)
-    if leg.name:
+    if not leg.timed:
         event = at.events[i]
         speed = float(event.gradient @ rest.rate)
         closing = event.after_state @ (

@@ -210,7 +210,7 @@ def _in_parts(
             legs.append(part.leg)
             starts.append(part.start[:n] if not k else run(part.t + k * step))
             durations.append(step)
-            inside = 0.0 if part.leg.name else step
+            inside = step if part.leg.timed else 0.0
             held.append(inside if k + 1 < count else None)
     return Departure(
         here.point, tuple(legs), np.array(starts), np.array(durations), tuple(held), miss, size

@@ -8,9 +8,10 @@ from copy import copy
 
 import numpy as np
 
+from ...flow.names import guard_name
 from ...local import Equilibrium, PseudoEquilibrium
 from ...model import Array, FilippovSystem
-from ..periodic.orbit import OrbitLeg
+from ..periodic.orbit_run import OrbitLeg, orbit_leg
 from ..runs.guards import watch
 from ..runs.legs import Flown, Leg, fly
 
@@ -84,7 +85,7 @@ class Loop(ABC):
                 continue
             least: dict[str, float] = {}
             for near in watch(self.system, leg.mode, x, duration, p).approaches:
-                name = f"leg {i + 1} grazes {near.guard.name}"
+                name = f"leg {i + 1} grazes {guard_name(self.system, near.guard)}"
                 least[name] = min(near.value, least.get(name, np.inf))
             found.update(least)
         return found
@@ -159,7 +160,7 @@ class Loop(ABC):
         """The legs with numbers, and what their guards contradict."""
         p, legs, faults = self.parameters_at(u), list[OrbitLeg](), list[str]()
         for k, (leg, x, t, duration) in enumerate(self.joined(u)):
-            legs.append(OrbitLeg(leg.mode, x, t, duration, leg.name, leg.kind))
+            legs.append(orbit_leg(self.system, leg, x, t, duration))
             name = f"leg {k + 1} ({leg.mode or 'o'})"
             if duration <= 0.0:
                 faults.append(f"{name} has the duration {duration:.3g}")
@@ -173,9 +174,7 @@ class Loop(ABC):
         starts, durations = self.split(u)
         times = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
         return tuple(
-            OrbitLeg(
-                leg.mode, x.copy(), float(t), float(d), leg.name if held is None else "", leg.kind
-            )
+            orbit_leg(self.system, leg, x.copy(), float(t), float(d), held is None)
             for leg, x, t, d, held in zip(
                 self.legs, starts, times, durations, self.held, strict=True
             )

@@ -92,8 +92,8 @@ class PseudoSaddleLoop(Loop):
         side: str,
     ):
         super().__init__(system, legs, free, p)
-        name = "L_F1 h" if side == "+" else "L_F2 h"
-        self._fold = (surface_map(system, 0), event_map(system, "s", name))
+        fold = event_map(system, "s", "exit", 0, 1 if side == "+" else -1)
+        self._fold = (surface_map(system, 0), fold)
         self._fields = [variational_field(system, mode).linear for mode in "+-"]
 
     def pack(

@@ -22,13 +22,14 @@ import numpy as np
 
 from ...flow.concatenation import forward, join, straight
 from ...flow.follow import follow
+from ...flow.names import guard_name
 from ...flow.options import Tolerances
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local.point.lie_derivatives import Numbers
 from ...local.point.regions import coincide
 from ...local.point.surface_point import Place
-from ...model import Array, OptionError, Surfaces
+from ...model import Array, OptionError, Surfaces, motion
 
 #: Where a path along an eigenline begins, and where one of a node is taken to be at s: times, and
 #: values of L2 - L1, relative to those of the problem. Errors are of second order in it.
@@ -77,8 +78,7 @@ class Slider:
     def follow(self, x: Array, t: float, t_end: float, delta: float) -> Trajectory:
         """Follow until a fold, another surface, a stop, or abs(L1 - L2) = ``delta`` (if not 0)."""
         system, i = self.where.system, self.where.surface
-        others = [f"h{j}" for j in range(system.surface_count) if j != i]
-        names = ["L_F1 h", "L_F2 h", *others, *(n for n, _ in system.stops + system.resets)]
+        names = [guard_name(system, g) for g in motion(system, self.where.mode).guards]
         l1, l2 = (system.lie_derivative([self.where.side(c)], i) for c in "+-")
         near = [(l1 - l2) ** 2 - delta**2] if delta else []
         return follow(

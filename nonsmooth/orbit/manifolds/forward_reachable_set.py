@@ -419,7 +419,9 @@ class _Sampler:
     def _may_go_on(self, run: Trajectory) -> bool:
         """Whether the path ended at a fold or another surface, not at a stop, reset or failure."""
         name = run.events[-1].name if run.events else ""
-        return run.status is Status.STOPPED and (name.startswith(("L_F", "h")) or name == "f0")
+        return run.status is Status.STOPPED and name not in dict(
+            run.system.stops + run.system.resets
+        )
 
     def _add(self, before: list[Trajectory], x: Array, t: float, side: str, number: int) -> None:
         run = self._simulate(x, t, self.where.side(side))

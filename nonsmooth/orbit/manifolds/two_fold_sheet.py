@@ -21,6 +21,7 @@ from typing import Any
 import numpy as np
 
 from ...flow.follow import follow
+from ...flow.names import event_name
 from ...flow.status import Status
 from ...local.point.surface_point import place
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem, Parameters, evaluator
@@ -212,7 +213,8 @@ class TwoFoldSheet:
         )
         if run.status is not Status.REACHED_END:
             return f"the sliding orbit into the two-fold ends before: {run.message}"
-        names = {"L_F1 h": "L1 <= 0", "L_F2 h": "L2 >= 0"}
+        ends = {1: "L1 <= 0", -1: "L2 >= 0"}
+        names = {event_name(self.system, "s", "exit", 0, side): ends[side] for side in ends}
         near = 1e-5 * duration
         for event in run.events:
             if event.name in names and event.t > near - duration:

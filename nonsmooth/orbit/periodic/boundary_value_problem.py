@@ -31,7 +31,7 @@ from ...model import Array, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from ...model.derivatives.forcing import Forcing
 from ..runs.flight import EXTENDED, Flight, Flights, flights_of
-from ..runs.legs import Flown, Leg, fly
+from ..runs.legs import Flown, Leg, fly, surface_of
 
 # Where the parts of the equations of an orbit are in their Jacobian.
 
@@ -397,7 +397,7 @@ class BoundaryProblem:
         numpy.linalg.LinAlgError
         """
         count, n = len(self.legs), self.dimension
-        if self.size <= _DENSE or self.kept or not all(leg.name for leg in self.legs):
+        if self.size <= _DENSE or self.kept or any(leg.timed for leg in self.legs):
             return np.asarray(np.linalg.solve(jacobian, right), float)
         steps, shifts, slopes, times = [], [], [], []
         for i in range(count):
@@ -451,3 +451,42 @@ class BoundaryProblem:
 
 #: Legs of a problem ready to be flown, by the chosen parameters.
 _FLIGHTS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], Flights]] = WeakKeyDictionary()
+
+
+# Legs as the symmetry of an orbit maps them: the other half of one that is solved for as a half.
+
+TURNED = str.maketrans("+-", "-+")
+
+
+def neighbours(problem: BoundaryProblem, i: int) -> tuple[Leg, Leg]:
+    """The legs before and after leg ``i``; beyond the ends of a half those of the other half."""
+    legs, last = problem.legs, len(problem.legs) - 1
+    before = legs[i - 1] if i else mirrored(problem, legs[last])
+    after = legs[i + 1] if i < last else mirrored(problem, legs[0])
+    return before, after
+
+
+def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
+    """A leg as the symmetry of the problem maps it; surfaces whose function changes its sign turn."""
+    if problem.symmetry is None:
+        return leg
+    turned = _turning(problem)
+    mode = "".join(
+        c.translate(TURNED) if k < len(turned) and turned[k] else c for k, c in enumerate(leg.mode)
+    )
+    surface = surface_of(problem.system, leg)
+    side = -leg.side if surface >= 0 and turned[surface] else leg.side
+    return replace(leg, mode=mode, side=side)
+
+
+def _turning(problem: BoundaryProblem) -> list[bool]:
+    """Which switching functions the symmetry maps to their negatives."""
+    system = problem.system
+    x = np.cos(1.0 + np.arange(system.dimension))
+    back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
+    result = []
+    for k in range(system.surface_count):
+        h = system.surface_function(k)
+        a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
+        result.append(a * b < 0.0)
+    return result

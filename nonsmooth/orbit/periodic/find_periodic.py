@@ -24,7 +24,7 @@ from ...model import (
 )
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import Leg, leg_name
+from ..runs.legs import leg_name
 from .boundary_value_problem import CLOSE, COARSE, FINAL, ROUNDING, BoundaryProblem, Evaluation
 from .forcing import about_of
 from .guess import Start, start_of
@@ -57,7 +57,7 @@ def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> No
     period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
     _require_resolved(problem, at)
     way = float(np.abs(at.flight.rate[0]).max()) * period
-    rests = not problem.legs[-1].name and not problem.system.time_dependent
+    rests = problem.legs[-1].timed and not problem.system.time_dependent
     shrunk = period <= _SHRUNK * guess and _singular(problem, at)
     if period > _POINT * guess and not shrunk:
         guessed = float(np.abs(start.problem.split(start.unknowns)[0][:, :n]).max())
@@ -114,15 +114,14 @@ def require_simple(orbit: PeriodicOrbit) -> None:
     for i, leg in enumerate(orbit.problem.legs):
         if leg.kind != "exit" or system.coupled:
             continue
-        other = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}[leg.name]
         flight = orbit.evaluation.flight
         end = flight.end[i, : flight.sizes[i]]
-        at = Leg(leg.mode, other, "exit").at_end(system, end, p)
+        at = replace(leg, side=-leg.side).at_end(system, end, p)
         size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
         if abs(at.value) <= 1e-9 * size:
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
-                f"{leg_name(leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
+                f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
                 f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
             )
     orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
@@ -229,7 +228,7 @@ def periodic_orbit(
     mirror = mirror_of(system, symmetry)
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     begun, guessed = start.problem, start.unknowns
-    if begun.legs[-1].name:
+    if not begun.legs[-1].timed:
         begun, guessed = once_round(begun, guessed, start.p)
     solver = _Solver(begun, start.p)
     u, at = solver.solve(guessed, max_iterations)
@@ -284,7 +283,7 @@ class _Solver:
             if not max(-float(durations.min()), float(durations.max())) <= longest:
                 i = int(np.argmax(np.abs(durations)))
                 raise ConvergenceError(
-                    f"Leg {i + 1} {leg_name(self.problem.legs[i])} grew to the duration "
+                    f"Leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
             size = float(np.abs(v - last[-1]).max()) if last else 1e-2
@@ -426,9 +425,7 @@ class _Solver:
         ends = np.abs(at.residual[count * n :])
         i = int(np.argmax(np.maximum(sizes, ends)))
         what = "does not end on its event" if ends[i] > sizes[i] else "does not meet the next one"
-        return (
-            f"leg {i + 1} {leg_name(self.problem.legs[i])} {what} (by {max(sizes[i], ends[i]):.2g})"
-        )
+        return f"leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} {what} (by {max(sizes[i], ends[i]):.2g})"
 
     def _failure(self, reason: str) -> ConvergenceError:
         u, at = self.last
@@ -436,7 +433,7 @@ class _Solver:
         legs = self.problem.legs
         size = float(np.abs(at.residual).max()) if at is not None else math.nan
         backward = [
-            f"leg {i + 1} {leg_name(leg)} has the duration {d:.3g}"
+            f"leg {i + 1} {leg_name(self.problem.system, leg)} has the duration {d:.3g}"
             for i, (leg, d) in enumerate(zip(legs, durations, strict=True))
             if not d > 0.0
         ]

@@ -199,7 +199,7 @@ def _half(about: float | None, mirror: Array | None) -> float | None:
 def _nearest(start: Start, x: Array, span: float) -> Start:
     """Of the whole periods at which an orbit without an event may begin, the one nearest to ``x``."""
     problem, p = start.problem, start.p
-    if problem.legs[-1].name or problem.periods < 2:
+    if not problem.legs[-1].timed or problem.periods < 2:
         return start
     (y,), (duration,) = problem.split(start.unknowns)
     n, found = problem.system.dimension, list[Array]()
@@ -259,7 +259,7 @@ def _problem(
     phase = reference = None
     if forcing is not None and not forcing.found:
         require_period(system, legs, starts, durations, forcing(p)[0], p)
-    if not legs[-1].name:
+    if legs[-1].timed:
         phase = np.zeros(system.extended_dimension)
         if system.time_dependent:  # from time 0, which is the same phase of every forcing period
             assert forcing is not None
@@ -321,7 +321,7 @@ def _followed(
         if duration is None:
             n, t = system.dimension, float(x[-1]) if system.time_dependent else sum(durations)
             raise ConvergenceError(
-                f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
+                f"guess: expected leg {k + 1} {leg_name(system, leg)} to come to its event, received none "
                 f"from {x[:n].tolist()} at t = {t:.6g}. Start closer to the orbit, or change the "
                 "itinerary."
             )

@@ -194,7 +194,10 @@ def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     if problem.symmetry is not None:
         after[-1] = np.linalg.solve(problem.wrap, after[-1])
     jumps = saltations(
-        flight, after, lambda i: f"leg {i + 1} {leg_name(problem.legs[i])}", _events(problem)
+        flight,
+        after,
+        lambda i: f"leg {i + 1} {leg_name(problem.system, problem.legs[i])}",
+        _events(problem),
     ).matrix
     product: Array = np.eye(n)
     for step in jumps @ flight.by_start:
@@ -215,4 +218,4 @@ def stability(values: NDArray[np.complex128], error: float) -> str:
 
 
 def _events(problem: BoundaryProblem) -> NDArray[np.bool_]:
-    return np.array([bool(leg.name) for leg in problem.legs])
+    return np.array([not leg.timed for leg in problem.legs])

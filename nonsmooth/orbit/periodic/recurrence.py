@@ -63,12 +63,12 @@ def recurrence(
 ) -> Recurrence | None:
     """The legs of a run that nearly close, None if it has none."""
     parts = [part for part in stretches(run) if part.duration > 0.0]
-    if len(parts) > 1 and not parts[-1].leg.name:
+    if len(parts) > 1 and parts[-1].leg.timed:
         if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
             found = _without_events(run, parts[-1:], symmetry, period, first, about)
             if found is not None and found.distance <= CLOSE and _moves(run, found.parts[0]):
                 return found
-    closed = [k for k, part in enumerate(parts) if part.leg.name and part.leg.kind != "stop"]
+    closed = [k for k, part in enumerate(parts) if part.leg.kind not in ("end", "stop")]
     # legs between two events: start k is after the event that ends part k - 1
     starts = [k + 1 for k in closed if k + 1 < len(parts)]
     if len(starts) < 2:
@@ -96,8 +96,11 @@ def _moves(run: Trajectory, part: Stretch) -> bool:
     return bool(np.max(way) > _REST * np.ptp(run.x, axis=0).max())
 
 
-def _key(parts: Sequence[Stretch], k: int) -> tuple[str, str]:
-    return parts[k].leg.mode, parts[k - 1].leg.name
+def _key(parts: Sequence[Stretch], k: int) -> tuple[object, ...]:
+    """Mode of a leg, and the guard that ended the one before it."""
+    leg = parts[k - 1].leg
+    own = leg.kind if leg.kind in ("stop", "reset") else leg.mode[leg.element :][:1] == "s"
+    return parts[k].leg.mode, own, leg.element, leg.side if own is True else 0
 
 
 def _scales(run: Trajectory) -> Array:

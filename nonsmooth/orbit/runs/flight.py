@@ -106,8 +106,8 @@ class Flights:
         self.sizes = tuple(field.blocks.states for field in self.fields)
         self._most = max(self.sizes)
         # events at one instant follow from each other: composed in Python
-        self._composed = [i for i, leg in enumerate(self.legs) if leg.name and leg.further]
-        self._plain = [i for i, leg in enumerate(self.legs) if not leg.name]
+        self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
+        self._plain = [i for i, leg in enumerate(self.legs) if leg.timed]
 
     @cached_property
     def _program(self) -> LegsProgram:
@@ -366,12 +366,12 @@ class Flights:
             flight.by_start[i, :k], flight.by_parameters[i, :k] = part.by_start, part.by_parameters
             at = field.states_at(starts[i], p)
             flight.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
-            if leg.name:
+            if not leg.timed:
                 self._fill(flight, i, leg.at_end(self.system, part.end, p))
         return self._completed(flight, p)
 
     def _named(self, i: int) -> str:
-        return f"leg {i + 1} {leg_name(self.legs[i])}"
+        return f"leg {i + 1} {leg_name(self.system, self.legs[i])}"
 
 
 def flights_of(

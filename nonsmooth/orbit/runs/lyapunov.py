@@ -295,7 +295,7 @@ class _Frame:
 
     def _diverging(self, matrix: Array, part: Stretch) -> DegenerateError:
         return DegenerateError(
-            f"{part.leg.name!r} at t = {self.t:.10g}: expected an event that carries neighbours on with "
+            f"{part.leg.name(self.system)!r} at t = {self.t:.10g}: expected an event that carries neighbours on with "
             f"digits that are left, received derivatives up to {np.abs(matrix).max():.2g} that lose no "
             "direction. The run diverges, or its states need other units: the last one is "
             f"{part.end[: self.n].tolist()}."

@@ -214,7 +214,7 @@ def poincare(
     if isinstance(section, Section):
         wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))
     else:
-        wanted = _section(section, direction, skip, count)
+        wanted = _section(system, section, direction, skip, count)
     t_end = t_start + _ENDLESS
     period = None if isinstance(wanted.at, str) else read_period(system, wanted.at)
     if period is not None:
@@ -240,8 +240,9 @@ def poincare(
     return PoincareOrbit(run.sample_x[met], run.sample_t[met], run, wanted)
 
 
-def _section(section: Any, direction: int, skip: int, count: int) -> Section:
-    undirected = is_real(section) or (
-        isinstance(section, str) and not section.removeprefix("h").isdigit()
-    )
+def _section(
+    system: FilippovSystem, section: Any, direction: int, skip: int, count: int
+) -> Section:
+    named = isinstance(section, str) and section not in system.surface_names
+    undirected = is_real(section) or named
     return Section(section, 0 if undirected else direction, skip=skip, count=count)

@@ -82,13 +82,14 @@ def saltation_matrix(
     for mode in (before, after):
         system.parse_letters(mode)  # refuses what is no mode
     leg = leg_between(system, before, after, event)
+    name = leg.name(system)
     field, following = leg.field(system), Leg(after).field(system)
     y = field.initial(x, p)
     at, size, n = leg.at_end(system, y[:, 0], p), system.extended_dimension, system.dimension
     _require_near(system, leg, at, x, p)
     start = following.states_at(at.after, p)
     rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
-    matrix = saltation(at, rates[0], rates[1][:size], f"{leg.name!r} at {x[:n].tolist()}").matrix
+    matrix = saltation(at, rates[0], rates[1][:size], f"{name!r} at {x[:n].tolist()}").matrix
     fault = ""
     if leg.kind != "reset":  # of which both modes are said, on a surface too
         fault = begin_fault(system, leg, y[:, 0], p)
@@ -97,7 +98,7 @@ def saltation_matrix(
         raise PointError(
             explain(
                 "point",
-                expected=f"one at which {leg.name!r} leads from mode {before!r} to {after!r}",
+                expected=f"one at which {name!r} leads from mode {before!r} to {after!r}",
                 received=f"{x[:n].tolist()}, where it does not: {fault}",
                 advice="Change the point, or the modes: a run through it says which they are.",
             )
@@ -108,8 +109,9 @@ def saltation_matrix(
 def _require_near(system: FilippovSystem, leg: Leg, at: AtEvent, x: Array, p: Array) -> None:
     """Refuse a point (N,) that is off the event, or off a surface on which the leg slides."""
     signs = system.parse_letters(leg.mode)[: system.surface_count]
-    zeros: list[tuple[str, Any]] = [(leg.name, at)]
-    zeros += [(f"h{i}", surface_map(system, i)(x, p)) for i, s in enumerate(signs) if not s]
+    own = leg.name(system)
+    zeros: list[tuple[str, Any]] = [(own if leg.kind == "exit" else f"{own} = 0", at)]
+    zeros += [(f"h{i} = 0", surface_map(system, i)(x, p)) for i, s in enumerate(signs) if not s]
     for name, zero in zeros:
         size = float(np.abs(x).max()) + 1e-3
         allowed = _NEAR * size * float(np.linalg.norm(zero.gradient))
@@ -117,7 +119,7 @@ def _require_near(system: FilippovSystem, leg: Leg, at: AtEvent, x: Array, p: Ar
             raise PointError(
                 explain(
                     "point",
-                    expected=f"one at which {leg.name!r} happens in mode {leg.mode!r}: {name} = 0",
+                    expected=f"one at which {own!r} happens in mode {leg.mode!r}: {name}",
                     received=f"{x[: system.dimension].tolist()}, where it is {zero.value:.6g}",
                     advice="Take it from a run (event.x; with a smaller tol it is nearer), or solve for it.",
                 )

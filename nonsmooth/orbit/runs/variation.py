@@ -17,11 +17,12 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...flow.names import described
 from ...flow.trajectory import Trajectory
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
 from .flight import Flight, Flights
-from .guards import described, watch
+from .guards import watch
 from .legs import Flown, Leg, Stretch, fly, leg_name, stretches
 from .saltation import Saltation, saltation, saltations
 
@@ -78,8 +79,8 @@ def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array)
     if depth > _KNOWN * wrong:
         return
     raise DegenerateError(
-        f"{leg_name(leg)} at t = {part.stretch.t + part.stretch.duration:.10g}: expected an event that "
-        f"the run is sure of, received a grazing: the orbit would turn back {depth:.1e} beyond it, and "
+        f"{leg_name(system, leg)} at t = {part.stretch.t + part.stretch.duration:.10g}: expected an "
+        f"event that the run is sure of, received a grazing: the orbit would turn back {depth:.1e} beyond it, and "
         f"the run's error is {wrong:.1e} there. A derivative through it means nothing. Simulate with "
         "a smaller tol, or move the start or a parameter away from the grazing."
     )
@@ -208,8 +209,8 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
         found = _one_by_one(run, parts, p, chosen)
         require_known(system, found, p)
         return found
-    found = _together(parts, flight)
-    if parts[-1].leg.name and run.events[-1].kind == "end":  # the run ends at the very event
+    found = _together(system, parts, flight)
+    if not parts[-1].leg.timed and run.events[-1].kind == "end":  # the run ends at the very event
         last = found[-1]
         jump = saltation_after(run, last.stretch, last.flown, None, p)
         found[-1] = replace(last, event=jump)
@@ -217,7 +218,7 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     return found
 
 
-def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
+def _together(system: FilippovSystem, parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
     """Legs that were flown together, with the saltation of their events."""
     n = flight.after.shape[1]
     after = np.roll(flight.before[:, :n], -1, axis=0)
@@ -225,8 +226,8 @@ def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
     ends: NDArray[Any] = ~np.all(np.isfinite(after), axis=1)
     ends[-1] = True
     after[ends] = carried[ends]
-    events = np.array([bool(part.leg.name) for part in parts])
-    found = saltations(flight, after, lambda k: _at(parts[k]), events)
+    events = np.array([not part.leg.timed for part in parts])
+    found = saltations(flight, after, lambda k: _at(system, parts[k]), events)
     rows = zip(
         parts,
         flight.flown,
@@ -245,8 +246,8 @@ def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
     ]
 
 
-def _at(part: Stretch) -> str:
-    return f"{part.leg.name!r} at t = {part.t + part.duration:.10g}"
+def _at(system: FilippovSystem, part: Stretch) -> str:
+    return f"{part.leg.name(system)!r} at t = {part.t + part.duration:.10g}"
 
 
 def _one_by_one(
@@ -274,7 +275,7 @@ def saltation_after(
 ) -> Saltation | None:
     """What the event that ends a leg does to neighbours; None where a time ends it."""
     # At the end of a run that goes no further the field after it is that of the mode reached.
-    if not part.leg.name:
+    if part.leg.timed:
         return None
     system, n = run.system, len(part.start)
     at = part.leg.at_end(system, flown.end, p)
@@ -288,7 +289,7 @@ def saltation_after(
         after = field.rate.copied(start, p)[0][:n, 0]
         if not np.all(np.isfinite(after)):
             after = at.after_state @ flown.rate
-    return saltation(at, flown.rate, after, _at(part))
+    return saltation(at, flown.rate, after, _at(system, part))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -363,7 +364,7 @@ def clearance(run: Trajectory) -> tuple[float, str]:
             continue  # no Taylor series at an end: nothing is said of this leg
         for near in seen:
             if abs(near.distance) < best[0]:
-                when = f"{described(near.guard)} at t = {part.t + near.t:.6g}"
+                when = f"{described(run.system, near.guard)} at t = {part.t + near.t:.6g}"
                 best = (abs(near.distance), when)
     return best
 

@@ -408,3 +408,35 @@ def test_a_guess_that_goes_round_several_times_gives_the_orbit_once() -> None:
     run = ns.simulate(forced, [0.0, 0.0], 40.0)
     orbit = ns.periodic_orbit(forced, run)
     assert orbit.problem.periods == 1 and orbit.period == pytest.approx(math.pi, rel=1e-13)
+
+
+def test_legs_and_events_of_an_orbit_have_elements_and_sides():
+    """The same stick-slip orbit, found whole, with a second surface, and as its own run."""
+    expected = [("entry", 0, -1, "h0"), ("exit", 0, -1, "lambda0 = -1")]
+    one = stick_slip()
+    lam, mu = ca.SX.sym("lam"), ca.SX.sym("mu")
+    x, v, f, k, b = (ca.SX.sym(name) for name in "xvfkb")
+    two = ns.FilippovSystem(
+        [x, v],
+        surfaces=[v - b, x - 50],
+        multipliers=[lam, mu],
+        field=[v, -x - lam * f + k * (v - b)],
+        parameters={f: 1, k: 0.2, b: 0.5},
+    )
+    for system in (one, two):
+        orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.4], 60))
+        legs = [(leg.kind, leg.element, leg.side, leg.event) for leg in orbit.legs]
+        events = [(e.kind, e.element, e.side, e.name) for e in orbit.trajectory.events[:-1]]
+        assert legs == events and sorted(legs) == expected
+
+
+def test_mirrored_legs_have_mirrored_sides():
+    system = forced_friction()
+    half = ns.periodic_orbit(system, ns.simulate(system, [1.5, 0.0], 100.0), symmetry="odd")
+    names = [(leg.kind, leg.element, leg.side, leg.event) for leg in half.legs]
+    count = len(names) // 2
+    assert half.symmetric and names[:count] != names[count:]
+    for (kind, element, side, event), other in zip(names[:count], names[count:], strict=True):
+        assert other[:3] == (kind, element, -side)
+        swapped = {"lambda0 = 1": "lambda0 = -1", "lambda0 = -1": "lambda0 = 1"}
+        assert other[3] == swapped.get(event, event)

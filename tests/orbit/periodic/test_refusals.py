@@ -52,7 +52,7 @@ X, Y = ca.SX.sym("x"), ca.SX.sym("y")
         (
             lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s +"}),
             ns.ConvergenceError,
-            r"guess.*leg 2 \(s, ended by L_F1 h\)",
+            r"guess.*leg 2 \(s, ended by lambda0 = 1\)",
         ),
         (
             lambda: (stick_slip(), [1.0, 0.5], {"itinerary": "- s", "parameters": {"f": 0.0}}),

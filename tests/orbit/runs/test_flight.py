@@ -36,9 +36,9 @@ HIDDEN = ns.FilippovSystem(
     hidden=True,
 )
 MIXED = [
-    Leg("-", "h0", "entry"),
-    Leg("s", "L_F1 h", "exit", 1),
-    Leg("+", "wall", "reset"),
+    Leg("-", "entry", 0, -1),
+    Leg("s", "exit", 0, 1),
+    Leg("+", "reset", 0, -1),
     Leg("-"),
 ]
 
@@ -60,8 +60,8 @@ def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
             [[0.2, 0.1, 0.4], [0.4, 0.3, 0.5], [1, 0.4, 2], [0, -0.5, 1]],
             [1, 0, -0.5, 2],
         ),
-        (HIDDEN, [Leg("s"), Leg("s", "lambda0", "exit", 1)], [[0.1, 0.0], [0.2, 0.0]], [0.3, 0.2]),
-        (HIDDEN, [Leg("s"), Leg("+", "h0", "entry")], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
+        (HIDDEN, [Leg("s"), Leg("s", "exit", 0, 1)], [[0.1, 0.0], [0.2, 0.0]], [0.3, 0.2]),
+        (HIDDEN, [Leg("s"), Leg("+", "entry", 0, 1)], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
     ],
 )
 def test_legs_flown_together_are_those_flown_one_by_one(
@@ -75,7 +75,7 @@ def test_legs_flown_together_are_those_flown_one_by_one(
 
 def test_a_leg_that_fails_is_named():
     system = ns.FilippovSystem([x], surface=x - 9, above=[1], below=[x**2])
-    legs = [Leg("-"), Leg("-", "h0", "crossing")]
+    legs = [Leg("-"), Leg("-", "crossing", 0, -1)]
     with pytest.raises(ns.ConvergenceError, match=r"leg 2 \(-, ended by h0\)"):
         Flights(system, legs)(np.array([[0.1], [1.0]]), np.array([1.0, 2.0]), np.zeros(0))
 
@@ -84,7 +84,7 @@ def test_residuals_have_more_digits_than_doubles():
     """x'' = -4 x, y' = x y from binary numbers, against the closed form with 40 digits."""
     system = ns.FilippovSystem([x, y, z], surface=x, above=[y, -4 * x, x * z], below=[1, 0, 0])
     start, duration = np.array([[0.75, 1.5, 1.25]]), np.array([0.875])
-    found = Flights(system, [Leg("+", "h0", "crossing")]).exact(start, duration, np.zeros(0))
+    found = Flights(system, [Leg("+", "crossing", 0, 1)]).exact(start, duration, np.zeros(0))
     if found is None or np.finfo(np.longdouble).eps > 1e-18:
         pytest.skip("no extended precision on this machine")
     after, rest, value = found

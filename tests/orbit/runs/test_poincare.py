@@ -106,3 +106,10 @@ def test_a_run_that_ends_before_has_fewer_hits(tmp_path):
     again = ns.load(tmp_path / "orbit")
     assert np.array_equal(again.points, found.points)
     assert np.array_equal(again.jacobian(0), found.jacobian(0))
+
+
+@pytest.mark.parametrize("name", ["h7", "7", "lambda0"])
+def test_a_stop_may_have_a_name_like_that_of_a_surface(name):
+    system = ns.FilippovSystem([x, v], field=[v, -x], resets=[ns.Reset(x, [x, 0.5 * v], name=name)])
+    found = ns.orbit.poincare(system, name, [1.0, 0.0], count=2)
+    assert np.allclose(found.points[:, 1], [-1.0, 0.5], atol=1e-9)

@@ -157,8 +157,8 @@ class Batch:
         return going if part.rows is None else going & part.rows
 
     def touch_down(self, t_max: float, work: ns.Work, options: dict[str, Any]) -> None:
-        """Move rows whose load is not positive at once to where it is; this keeps no checkpoint."""
-        options = {**options, "work": replace(work, checkpoint=None)}
+        """Move rows whose load is not positive at once to where it is; this needs no store."""
+        options = {**options, "work": replace(work, store=None)}
         for part in self.parts:
             root, short, later, longest = self._rise(part.blueprint)
             going = self._going(part)
@@ -242,8 +242,8 @@ class Batch:
             later = len(runs.itineraries) * self.free[rows]
             code[rows] = len(words) + runs.itinerary_code + later
             words += [*runs.itineraries, *(f"F {word}" for word in runs.itineraries)]
-            if work.checkpoint is not None:  # the second part, if any, has its own
-                work = replace(work, checkpoint=f"{os.fspath(work.checkpoint)}-weightless")
+            if work.store is not None:  # the second part, if any, has its own
+                work = replace(work, store=f"{os.fspath(work.store)}-weightless")
         start = np.stack([self._rows(self.given[n]) for n in ("x", "xdot", "y", "ydot")], axis=-1)
         stay = (self.status == _LIFTED_OFF) & rests(self.states, start)
         self.status[stay] = int(BounceStatus.NO_LIFT_OFF)

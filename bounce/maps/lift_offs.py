@@ -86,7 +86,7 @@ def lift_off(
     tol, t_max : float, optional
         As in :func:`simulate`.
     work : nonsmooth.Work, optional
-        Threads, executor, chunk, bar and checkpoint of :func:`nonsmooth.ensemble`; by default no bar.
+        Threads, executor, chunk, bar and store of :func:`nonsmooth.ensemble`; by default no bar.
     engine : {"auto", "reference", "compiled"}
         Which driver: ``"auto"`` takes the compiled one where there is a compiler.
     device : {None, "cuda"}, optional

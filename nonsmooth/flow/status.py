@@ -12,7 +12,7 @@ class Status(IntEnum):
     accumulate (ACCUMULATION); several surfaces meet where no motion is stable (INTERSECTION); steps
     became too short (STEP_TOO_SMALL); a value is not finite (NOT_FINITE); a limit on events or steps was
     reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot hold (INCONSISTENT). The message of a
-    run says more. The values are stable: ensembles store them in arrays and checkpoints.
+    run says more. The values are stable: ensembles store them in arrays and files.
     """
 
     REACHED_END = 0

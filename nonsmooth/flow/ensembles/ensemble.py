@@ -5,7 +5,6 @@ from __future__ import annotations
 import hashlib
 import math
 from collections.abc import Mapping
-from contextlib import nullcontext
 from typing import Any
 
 from numpy.typing import ArrayLike
@@ -23,7 +22,7 @@ from .chunks import Job
 from .lazy_starts import Drawn
 from .on_device import CHUNK, require_device, run_there
 from .starts import Starts
-from .stored import Stored
+from .store import Store
 from .work import Work, checked_work, run_all, size_of_chunk
 
 #: Fewer trajectories than this are not worth compiling the engine that runs several in step; nor those of
@@ -76,7 +75,7 @@ def ensemble(
     at : Section, str, number or expression, optional
         Keep the states at a section; one at events needs a ``count``. See :class:`Section`.
     work : Work, optional
-        Threads or an executor, size of a chunk, progress bar, checkpoint; see :class:`Work`.
+        Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
     engine : {"auto", "reference", "compiled"}
         Which driver: ``"auto"`` takes the compiled one where there is a compiler.
     device : {None, "cuda"}, optional
@@ -155,13 +154,15 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     size = lambda: (
         work.chunk or (size_of_chunk(job, starts, work.workers, most) if there is None else CHUNK)
     )
-    saved = work.saved(lambda: _problem(system, starts, job, device), size)
-    with saved.alone() if isinstance(saved, Stored) else nullcontext():
-        arrays, codes = None, None
-        if isinstance(saved, Stored):
-            arrays, codes = saved.arrays(none, count), saved.codes(count)
-        results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
-        run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)
+    collected = lambda arrays: Collected(system, starts.shape, job.at is not None, job.room, arrays)
+    if work.store is None:
+        results = collected(None)
+        run_all(job, starts, results, work, size(), None, there)
+        return results.ensemble()
+    store = Store(work.store, _problem(system, starts, job, device))
+    with store.opened(size):
+        results, codes = collected(store.arrays(none, count)), store.codes(count)
+        run_all(job, starts, results, work, store.chunk, store, there)
         return results.ensemble(codes)
 
 

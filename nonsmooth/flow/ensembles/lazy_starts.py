@@ -113,7 +113,7 @@ class Grid:
         return f"Grid(shape {self.shape}, {self.dimension} states)"
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts are made from, so that a checkpoint knows them again."""
+        """What the starts are made from, for the hash of a store."""
         return "grid", [(a.shape, a.tobytes()) for a in self._axes]
 
 
@@ -215,7 +215,7 @@ class RandomStarts:
         return low + (high - low) * part
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts are made from, so that a checkpoint knows them again."""
+        """What the starts are made from, for the hash of a store."""
         low, high = np.asarray(self.low), np.asarray(self.high)
         return "random", self.count, low.tobytes(), high.tobytes(), self.seed
 

@@ -160,7 +160,7 @@ def outcomes(
     PointError, ParameterError, DefinitionError, CompilerError, DeviceError
         As :func:`ensemble`.
     OptionError
-        An option out of its range; ranges of what is no state, or that are empty; a checkpoint or a store.
+        An option out of its range; ranges of what is no state, or that are empty; a store.
 
     Examples
     --------
@@ -175,10 +175,8 @@ def outcomes(
     options = Options(t_end=t_end, t_start=t_start, rtol=tol, atol=tol)
     require_system(system, sets=True)
     work = checked_work(work)
-    if work.checkpoint is not None or work.store is not None:
-        raise OptionError(
-            "work: expected no checkpoint and no store, received one. Nothing is kept."
-        )
+    if work.store is not None:
+        raise OptionError("work has a store, but outcomes keeps no runs. Leave out store=.")
     made = _Sums(system, _bins(system, ranges or {}, bins))
     starts = Starts(system, x0, parameters, t_start)
     step = t_end > t_start and device is None

@@ -1,4 +1,4 @@
-"""How the work of an ensemble is done: chunks, threads or an executor, progress, checkpoints."""
+"""Running the chunks of an ensemble in threads or on an executor, with progress and a store."""
 
 from __future__ import annotations
 
@@ -18,11 +18,10 @@ import numpy as np
 
 from ...model import Array, OptionError, explain
 from ..results import Chunk
-from .checkpoint import Checkpoint
 from .chunks import Job, run_away, run_chunk, shipped
 from .progress import progress_bar
 from .starts import Starts
-from .stored import Stored
+from .store import Store
 
 #: Chunks under way at once with an executor, and bytes of results of each: so much is on its way at most.
 _IN_FLIGHT, _SHIPPED = 64, 1 << 22
@@ -49,13 +48,11 @@ class Work:
         Trajectories in one piece of work; a few are timed to choose it unless given.
     progress : bool, optional
         A bar for runs of some seconds on a terminal; nothing in logs.
-    checkpoint : path, optional
-        A folder for finished chunks. A later call with the same problem goes on from there, with
-        bit-identical results; a checkpoint of another problem is refused.
     store : path, optional
-        A folder for the results themselves: arrays (``x.npy``, ...) that are mapped into memory,
-        written as chunks are finished. It is a checkpoint too. Results of any size need no memory;
-        starts need none as a :class:`Grid` or :class:`RandomStarts`.
+        A folder for the results: arrays (``x.npy``, ...) that are mapped into memory and filled chunk
+        by chunk, so that results of any size need no memory; starts need none as a :class:`Grid` or
+        :class:`RandomStarts`. After an interruption a call with the same problem computes the chunks
+        that are missing, with bit-identical results; the folder of another problem is refused.
 
     Raises
     ------
@@ -76,18 +73,12 @@ class Work:
     executor: Executor | None = None
     chunk: int | None = None
     progress: bool = True
-    checkpoint: str | os.PathLike[str] | None = None
     store: str | os.PathLike[str] | None = None
 
     def __post_init__(self) -> None:
         _positive("chunk", 1 if self.chunk is None else self.chunk)
         _positive("threads", 1 if self.threads is None else self.threads)
-        _require_path("checkpoint", self.checkpoint)
         _require_path("store", self.store)
-        if self.checkpoint is not None and self.store is not None:
-            raise OptionError(
-                "checkpoint, store: expected one of them, received both. A store is a checkpoint too."
-            )
         if self.executor is not None and not isinstance(self.executor, Executor):
             raise OptionError(
                 explain(
@@ -97,25 +88,6 @@ class Work:
                     advice="ProcessPoolExecutor(), or dask.distributed.Client(...).get_executor().",
                 )
             )
-
-    def saved(self, problem: Callable[[], str], size: Callable[[], int]) -> Checkpoint | None:
-        """Return where chunks are kept, if they are to be.
-
-        Parameters
-        ----------
-        problem : callable
-            Returns the hash of what the results depend on.
-        size : callable
-            Returns the size of a chunk, if nothing kept says it.
-
-        Raises
-        ------
-        OptionError
-            A folder that holds the results of another problem, or of another version.
-        """
-        if self.store is not None:
-            return Stored(self.store, problem(), size)
-        return None if self.checkpoint is None else Checkpoint(self.checkpoint, problem(), size)
 
     @property
     def workers(self) -> int:
@@ -168,7 +140,7 @@ def run_all(
     results: Sink,
     work: Work,
     size: int,
-    saved: Checkpoint | None,
+    store: Store | None,
     there: Callable[[int, Chunk], Chunk] | None = None,
 ) -> None:
     """Run all trajectories, chunk by chunk, except those that are kept."""
@@ -177,7 +149,7 @@ def run_all(
     for number in range(math.ceil(starts.count / size)):
         first = number * size
         like = results.part(first, min(first + size, starts.count))
-        done = saved.load(number, like) if saved is not None else None
+        done = store.load(number, like) if store is not None else None
         if done is None:
             missing.append(number)
         else:
@@ -193,8 +165,8 @@ def run_all(
         with closing(chunks) as finished:
             for number, chunk in finished:
                 results.put(number * size, chunk)
-                if saved is not None:
-                    saved.save(number, chunk)
+                if store is not None:
+                    store.save(number, chunk)
                 bar.update(len(chunk.t))
     finally:
         bar.close()

@@ -18,8 +18,8 @@ from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.constants import KINDS
 from nonsmooth.flow.ensembles import chunks
 from nonsmooth.flow.ensembles import work as work_module
-from nonsmooth.flow.ensembles.checkpoint import Checkpoint
 from nonsmooth.flow.ensembles.ensemble import ensemble
+from nonsmooth.flow.ensembles.store import Store
 from nonsmooth.flow.ensembles.work import Work
 from nonsmooth.model import (
     FilippovSystem,
@@ -189,20 +189,18 @@ def test_interrupted_sweep_goes_on_where_it_was(system, starts, tmp_path, monkey
     whole = ensemble(system, starts, 5.0, at_event=("entry", 1))
     folder = tmp_path / "sweep"
     options = {"at_event": ("entry", 1)}
-    again = Work(checkpoint=folder)
+    again = Work(store=folder)
     with pytest.raises(KeyboardInterrupt):
-        work = Work(chunk=40, executor=_Interrupt(3), checkpoint=folder)
+        work = Work(chunk=40, executor=_Interrupt(3), store=folder)
         ensemble(system, starts, 5.0, **options, work=work)
-    finished = len(list(folder.glob("chunk-*.npz")))
+    finished = len(list(folder.glob("chunk-*.json")))
     assert 0 < finished < 8
     saved = []
-    original = Checkpoint.save
-    monkeypatch.setattr(
-        Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
-    )
+    original = Store.save
+    monkeypatch.setattr(Store, "save", lambda self, k, c: (saved.append(k), original(self, k, c)))
     same(whole, ensemble(system, starts, 5.0, **options, work=again))  # the folder knows its chunk
     assert len(saved) == 8 - finished
-    next(folder.glob("chunk-*.npz")).write_bytes(b"cut off")
+    next(folder.glob("chunk-*.json")).write_bytes(b"cut off")
     copy = pickle.loads(pickle.dumps(system))
     same(whole, ensemble(copy, starts, 5.0, **options, work=again))
     assert len(saved) == 8 - finished + 1
@@ -237,38 +235,34 @@ def test_a_sweep_whose_worker_was_killed_goes_on_where_it_was(
             system,
             starts,
             5.0,
-            work=Work(chunk=40, executor=pool, checkpoint=tmp_path / "sweep"),
+            work=Work(chunk=40, executor=pool, store=tmp_path / "sweep"),
         )
-    assert len(list((tmp_path / "sweep").glob("chunk-*.npz"))) == 3
+    assert len(list((tmp_path / "sweep").glob("chunk-*.json"))) == 3
     saved = []
-    original = Checkpoint.save
-    monkeypatch.setattr(
-        Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
-    )
-    same(whole, ensemble(system, starts, 5.0, work=Work(checkpoint=tmp_path / "sweep")))
+    original = Store.save
+    monkeypatch.setattr(Store, "save", lambda self, k, c: (saved.append(k), original(self, k, c)))
+    same(whole, ensemble(system, starts, 5.0, work=Work(store=tmp_path / "sweep")))
     assert sorted(saved) == [3, 4, 5, 6, 7]
 
 
-def test_checkpoint_of_another_problem_is_refused(system, starts, tmp_path):
+def test_store_of_another_problem_is_refused(system, starts, tmp_path):
     few = starts[:4]
-    ensemble(system, few, 1.0, work=Work(checkpoint=tmp_path / "a"))
+    ensemble(system, few, 1.0, work=Work(store=tmp_path / "a"))
     for other in (
-        lambda path: ensemble(system, few + 1e-16, 2.0, work=Work(checkpoint=path)),
-        lambda path: ensemble(system, few[:3], 1.0, work=Work(checkpoint=path)),
-        lambda path: ensemble(system, few, 1.0, tol=1e-9, work=Work(checkpoint=path)),
+        lambda path: ensemble(system, few + 1e-16, 2.0, work=Work(store=path)),
+        lambda path: ensemble(system, few[:3], 1.0, work=Work(store=path)),
+        lambda path: ensemble(system, few, 1.0, tol=1e-9, work=Work(store=path)),
+        lambda path: ensemble(system, few, 1.0, parameters={"belt": 0.2}, work=Work(store=path)),
         lambda path: ensemble(
-            system, few, 1.0, parameters={"belt": 0.2}, work=Work(checkpoint=path)
-        ),
-        lambda path: ensemble(
-            system, few, 1.0, parameters={"belt": np.ones(4)}, work=Work(checkpoint=path)
+            system, few, 1.0, parameters={"belt": np.ones(4)}, work=Work(store=path)
         ),
     ):
         with pytest.raises(OptionError, match="another"):
             other(tmp_path / "a")
     (tmp_path / "b").mkdir()
     (tmp_path / "b" / "thesis.tex").write_text("precious")
-    with pytest.raises(OptionError, match="something else"):
-        ensemble(system, few, 1.0, work=Work(checkpoint=tmp_path / "b"))
+    with pytest.raises(OptionError, match="store"):
+        ensemble(system, few, 1.0, work=Work(store=tmp_path / "b"))
 
 
 def test_bad_input(system):

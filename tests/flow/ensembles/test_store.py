@@ -1,4 +1,4 @@
-"""Results in a folder are those in memory, to the bit, also after an interruption, a loss or damage."""
+"""Results in a store are those in memory, to the bit, also after an interruption, a loss or damage."""
 
 import errno
 import json
@@ -52,6 +52,19 @@ def assert_same(a, b):
     assert all(np.array_equal(a.events[kind], b.events[kind]) for kind in a.events)
 
 
+@pytest.fixture(scope="module")
+def kept(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("kept") / "sweep"
+    sweep(folder)
+    return folder
+
+
+@pytest.fixture
+def folder(kept, tmp_path):
+    """A store of all results."""
+    return shutil.copytree(kept, tmp_path / "sweep")
+
+
 def test_a_store_has_the_results(whole, tmp_path):
     found = sweep(tmp_path / "sweep")
     assert_same(found, whole)
@@ -79,10 +92,8 @@ def counted(monkeypatch):
     return sizes
 
 
-def test_what_is_there_is_not_computed_again(whole, tmp_path, counted):
-    sweep(tmp_path / "sweep")
-    counted.clear()
-    assert_same(sweep(tmp_path / "sweep", chunk=7), whole)
+def test_what_is_there_is_not_computed_again(whole, folder, counted):
+    assert_same(sweep(folder, chunk=7), whole)  # the folder has its own size of a chunk
     assert counted == []
 
 
@@ -104,55 +115,179 @@ def test_an_interruption_costs_what_was_under_way(whole, tmp_path, counted, monk
 
 
 @pytest.mark.parametrize("name", ["x", "t", "status", "itinerary", "kinds", "at_x", "sample_x"])
-def test_rows_that_were_changed_are_computed_again(name, whole, tmp_path, counted):
-    sweep(tmp_path / "sweep")
-    array = np.load(tmp_path / "sweep" / f"{name}.npy", mmap_mode="r+")
+def test_rows_that_were_changed_are_computed_again(name, whole, folder, counted):
+    array = np.load(folder / f"{name}.npy", mmap_mode="r+")
     array[77] += 1
     array.flush()
-    counted.clear()
-    assert_same(sweep(tmp_path / "sweep"), whole)
+    assert_same(sweep(folder), whole)
     assert counted == [30]
 
 
-@pytest.mark.parametrize(
-    "content", [b"", b"{", b"[]", b'{"words": ["+"], "totals": [0], "seal": "00"}']
-)
-def test_a_damaged_note_of_a_chunk_is_made_again(content, whole, tmp_path, counted):
-    sweep(tmp_path / "sweep")
-    (tmp_path / "sweep" / "chunk-00000002.json").write_bytes(content)
-    counted.clear()
-    assert_same(sweep(tmp_path / "sweep"), whole)
-    assert counted == [30]
+# the note of a chunk
 
 
-def test_a_lost_array_is_computed_again(whole, tmp_path):
-    sweep(tmp_path / "sweep")
-    (tmp_path / "sweep" / "x.npy").unlink()
-    assert_same(sweep(tmp_path / "sweep"), whole)
+NOTE = "chunk-00000002.json"
 
 
-@pytest.mark.parametrize("wrong", ["shape", "type", "text", "link", "pickle", "folder"])
-def test_a_file_that_is_no_such_array_is_refused(wrong, tmp_path):
-    sweep(tmp_path / "sweep")
-    path = tmp_path / "sweep" / "t.npy"
+def edited(**changes):
+    def damage(path):
+        path.write_text(json.dumps({**json.loads(path.read_text()), **changes}))
+
+    return damage
+
+
+def written(content):
+    return lambda path: path.write_bytes(content)
+
+
+def cut(part):
+    return lambda path: path.write_bytes(path.read_bytes()[: int(part * path.stat().st_size)])
+
+
+def flipped(place):
+    def damage(path):
+        data = bytearray(path.read_bytes())
+        data[int(place * len(data))] ^= 1
+        path.write_bytes(bytes(data))
+
+    return damage
+
+
+def a_pipe(path):
     path.unlink()
-    if wrong == "shape":
-        np.save(path, np.zeros(199))
-    elif wrong == "type":
-        np.save(path, np.zeros(200, np.float32))
-    elif wrong == "text":
-        path.write_text("no array")
-    elif wrong == "link":
-        np.save(tmp_path / "elsewhere.npy", np.zeros(200))
-        path.symlink_to(tmp_path / "elsewhere.npy")
-    elif wrong == "pickle":
-        np.save(path, np.array([{}] * 200, object), allow_pickle=True)
+    os.mkfifo(path)
+
+
+def a_link_to_itself(path):
+    path.unlink()
+    path.symlink_to(path)
+
+
+DAMAGE = {
+    "empty": written(b""),
+    "brace": written(b"{"),
+    "list": written(b"[]"),
+    "deep": written(b"[" * 100_000),
+    "no text": written(b"\xff\xfe\x00"),
+    **{f"cut at {p}": cut(p) for p in (0.1, 0.5, 0.9, 0.999)},
+    **{f"bit at {p}": flipped(p) for p in np.linspace(0, 0.9999, 25).round(4)},
+    "other words": edited(words=["+"]),
+    "words of no text": edited(words=[1, 2]),
+    "no words": edited(words=None),
+    "other totals": edited(totals=[0, 0, 0, 0]),
+    "no totals": edited(totals={}),
+    "no seal": edited(seal=None),
+    "another seal": edited(seal="00"),
+    "another place": lambda path: shutil.copy(path.with_name("chunk-00000000.json"), path),
+    "gone": lambda path: path.unlink(),
+    "pipe": a_pipe,
+    "link to itself": a_link_to_itself,
+}
+
+
+@pytest.mark.parametrize("kind", DAMAGE)
+def test_a_chunk_with_a_damaged_note_is_computed_again(kind, folder, whole, counted):
+    DAMAGE[kind](folder / NOTE)
+    assert_same(sweep(folder), whole)
+    assert counted == [30]
+    assert_same(sweep(folder), whole)
+    assert counted == [30]
+
+
+def test_a_chunk_of_another_problem_is_computed_again(folder, whole, counted, tmp_path):
+    other = ns.RandomStarts(200, low=[-6.0, -6.0], high=[6.0, 6.0], seed=6)
+    sweep(tmp_path / "other", starts=other)
+    for name in (NOTE, "x.npy", "t.npy", "status.npy", "itinerary.npy", "kinds.npy"):
+        shutil.copy(tmp_path / "other" / name, folder / name)
+    counted.clear()
+    assert_same(sweep(folder), whole)
+    assert counted == [30] * 6 + [20]
+
+
+def test_a_link_in_the_place_of_a_note_is_replaced_not_followed(folder, whole, tmp_path):
+    (tmp_path / "elsewhere").write_text("kept")
+    (folder / NOTE).unlink()
+    (folder / NOTE).symlink_to(tmp_path / "elsewhere")
+    assert_same(sweep(folder), whole)
+    assert (tmp_path / "elsewhere").read_text() == "kept" and not (folder / NOTE).is_symlink()
+
+
+def test_where_a_note_cannot_be_written_the_others_are_kept(folder):
+    (folder / NOTE).unlink()
+    (folder / NOTE).mkdir()
+    (folder / NOTE / "in the way").write_text("")
+    with pytest.raises(ns.OptionError, match="store"):
+        sweep(folder)
+    assert (folder / "chunk-00000001.json").exists() and not list(folder.glob(".part-*"))
+
+
+# the arrays
+
+
+@pytest.mark.parametrize("damage", [lambda path: path.unlink(), cut(0.6)])
+def test_a_lost_or_cut_array_is_computed_again(damage, whole, folder):
+    damage(folder / "x.npy")
+    assert_same(sweep(folder), whole)
+    size = (folder / "x.npy").stat()
+    assert 512 * size.st_blocks >= size.st_size or not hasattr(os, "posix_fallocate")
+
+
+def linked(path):
+    path.rename(path.parent.parent / "elsewhere.npy")
+    path.symlink_to(path.parent.parent / "elsewhere.npy")
+
+
+def a_folder(path):
+    path.unlink()
+    path.mkdir()
+
+
+ARRAYS = {
+    "shape": lambda path: np.save(path, np.zeros(199)),
+    "type": lambda path: np.save(path, np.zeros(200, np.float32)),
+    "bytes in another order": lambda path: np.save(path, np.zeros(200, ">f8")),
+    "text": written(b"no array"),
+    "empty": written(b""),
+    "pickle": lambda path: np.save(path, np.array([{}] * 200, object), allow_pickle=True),
+    "link": linked,
+    "folder": a_folder,
+    "pipe": a_pipe,
+}
+
+
+@pytest.mark.parametrize("wrong", ARRAYS)
+def test_a_file_that_is_no_such_array_is_refused(wrong, folder):
+    ARRAYS[wrong](folder / "t.npy")
+    with pytest.raises(ns.OptionError, match=r"store.*t\.npy"):
+        sweep(folder)
+
+
+@pytest.mark.parametrize("place", range(0, 128, 3))
+def test_no_bit_of_the_head_of_an_array_changes_results(place, folder, whole):
+    with (folder / "t.npy").open("r+b") as file:
+        file.seek(place)
+        byte = file.read(1)[0]
+        file.seek(place)
+        file.write(bytes([byte ^ 1]))
+    try:
+        found = sweep(folder)
+    except ns.OptionError as error:
+        assert "t.npy" in str(error)
     else:
-        path.mkdir()
-    with pytest.raises(ns.OptionError, match="store: expected an array of shape"):
-        sweep(tmp_path / "sweep")
-    if wrong == "link":
-        assert not np.load(tmp_path / "elsewhere.npy").any()
+        assert_same(found, whole)
+
+
+def test_two_kinds_of_damage_of_one_array_are_found(folder, whole, counted):
+    """Numbers beside the true ones by rounding, and a status that is none."""
+    for name, change in (("x", lambda a: a * (1 + 4e-16)), ("status", lambda a: 77)):
+        array = np.load(folder / f"{name}.npy", mmap_mode="r+")
+        array[90:120] = change(array[90:120])
+        array.flush()
+    assert_same(sweep(folder), whole)
+    assert counted == [30]
+
+
+# room and other runs
 
 
 needs_reserving = pytest.mark.skipif(
@@ -170,9 +305,9 @@ def test_the_room_of_all_rows_is_taken_before_the_first_is_computed(tmp_path, mo
     monkeypatch.setattr(work_module, "run_chunk", interrupted)
     with pytest.raises(KeyboardInterrupt):
         sweep(tmp_path / "sweep", starts=ns.RandomStarts(10**5, low=[0, 0], high=[1, 1]))
-    facts = [path.stat() for path in (tmp_path / "sweep").glob("*.npy")]
-    assert len(facts) == 10 and sum(f.st_size for f in facts) > 10**7
-    assert all(512 * f.st_blocks >= f.st_size for f in facts)
+    files = [path.stat() for path in (tmp_path / "sweep").glob("*.npy")]
+    assert len(files) == 10 and sum(f.st_size for f in files) > 10**7
+    assert all(512 * f.st_blocks >= f.st_size for f in files)
 
 
 @needs_reserving
@@ -183,7 +318,7 @@ def test_a_disk_without_room_is_told_at_once(code, whole, tmp_path, monkeypatch,
 
     with monkeypatch.context() as patched:
         patched.setattr(os, "posix_fallocate", full)
-        with pytest.raises(ns.OptionError, match=rf"{os.strerror(code)}[^$]*Make room"):
+        with pytest.raises(ns.OptionError, match=rf"store.*{os.strerror(code)}"):
             sweep(tmp_path / "sweep")
     left = {f.name for f in (tmp_path / "sweep").iterdir()}
     assert counted == [] and left <= {"problem.json", ".lock"}
@@ -205,7 +340,7 @@ def test_a_folder_that_another_run_writes_to_is_refused(whole, tmp_path, monkeyp
 
     def within(*args):
         monkeypatch.setattr(work_module, "run_chunk", run)
-        with pytest.raises(ns.OptionError, match="another run is writing") as caught:
+        with pytest.raises(ns.OptionError, match=r"store.* another run") as caught:
             sweep(tmp_path / "sweep")
         said.append(str(caught.value))
         return run(*args)
@@ -229,7 +364,7 @@ def test_so_is_one_of_another_process_until_that_ends(whole, tmp_path):
     run = [sys.executable, "-c", program, tmp_path / "sweep" / ".lock"]
     with subprocess.Popen(run, stdin=subprocess.PIPE, stdout=subprocess.PIPE) as other:
         assert other.stdout.readline() == b"held\n"
-        with pytest.raises(ns.OptionError, match="another run is writing"):
+        with pytest.raises(ns.OptionError, match=r"store.* another run"):
             sweep(tmp_path / "sweep")
         other.kill()
     assert_same(sweep(tmp_path / "sweep"), whole)
@@ -241,7 +376,7 @@ def test_a_link_in_the_place_of_the_lock_is_not_followed(tmp_path):
     (tmp_path / "sweep" / ".lock").unlink()
     (tmp_path / "elsewhere").write_text("kept")
     (tmp_path / "sweep" / ".lock").symlink_to(tmp_path / "elsewhere")
-    with pytest.raises(ns.OptionError, match="a folder that can be read and written"):
+    with pytest.raises(ns.OptionError, match="store"):
         sweep(tmp_path / "sweep")
     assert (tmp_path / "elsewhere").read_text() == "kept"
 
@@ -277,17 +412,94 @@ def test_a_disk_that_is_too_small_ends_no_process(tmp_path):
     run = [*mounts, tmp_path, sys.executable, "-c", program, tmp_path / "sweep"]
     found = subprocess.run(run, capture_output=True, text=True, check=False)
     assert found.returncode == 0, found
-    assert os.strerror(errno.ENOSPC) in found.stdout and "Make room" in found.stdout
+    assert os.strerror(errno.ENOSPC) in found.stdout
 
 
-def test_another_problem_and_a_checkpoint_are_refused(tmp_path):
-    sweep(tmp_path / "sweep")
-    with pytest.raises(ns.OptionError, match="another system, start"):
-        sweep(tmp_path / "sweep", starts=ns.RandomStarts(200, [0, 0], [1, 1]))
-    with pytest.raises(ns.OptionError, match="another system, start"):
-        ns.ensemble(BLOCK, STARTS, work=ns.Work(checkpoint=tmp_path / "sweep"), **OPTIONS)
-    with pytest.raises(ns.OptionError, match="one of them"):
-        ns.Work(store="a", checkpoint="b")
+# the problem and the folder
+
+
+def test_another_problem_is_refused(folder):
+    with pytest.raises(ns.OptionError, match=r"store.* another system"):
+        sweep(folder, starts=ns.RandomStarts(200, [0, 0], [1, 1]))
+
+
+HEADS = {
+    **{
+        f"chunk {c!r}"[:20]: edited(chunk=c)
+        for c in (0, -5, 3, 49, 10**9, 10**400, True, 4.0, "4", None, [4])
+    },
+    "empty": written(b""),
+    "number": written(b"3"),
+    "list": written(b"[]"),
+    "deep": written(b"[" * 4000),
+    "long": written(b"[" * 100_000),
+    "no text": written(b"\xff\xfe\x00"),
+    "cut": cut(0.5),
+    "pipe": a_pipe,
+    "link to itself": a_link_to_itself,
+    "seal": edited(seal="0" * 64),
+}
+
+
+@pytest.mark.parametrize("kind", HEADS)
+def test_a_damaged_problem_is_refused(kind, folder):
+    HEADS[kind](folder / "problem.json")
+    with pytest.raises(ns.OptionError, match=r"store.* damaged problem"):
+        sweep(folder)
+
+
+@pytest.mark.parametrize("version", [1, 2, 4, 99])
+def test_another_version_is_refused(version, folder):
+    edited(format=version)(folder / "problem.json")
+    with pytest.raises(ns.OptionError, match=r"store.* another version"):
+        sweep(folder)
+
+
+def test_a_folder_with_nothing_but_files_under_way_is_used(tmp_path, whole):
+    """A process that is killed while it writes the first file leaves only that and its lock."""
+    (tmp_path / ".part-abc").write_bytes(b"half")
+    (tmp_path / ".lock").write_bytes(b"")
+    assert_same(sweep(tmp_path), whole)
+
+
+def test_a_folder_with_other_files_is_refused_and_left_alone(tmp_path):
+    (tmp_path / "thesis.tex").write_text("precious")
+    with pytest.raises(ns.OptionError, match=r"store.* other files"):
+        sweep(tmp_path)
+    assert [path.name for path in tmp_path.iterdir()] == ["thesis.tex"]
+
+
+def test_a_whole_store_is_read_where_nothing_can_be_written(folder, whole, counted, monkeypatch):
+    monkeypatch.setattr(os, "access", lambda path, mode: mode != os.W_OK)
+    before = {path.name: path.read_bytes() for path in folder.iterdir()}
+    found = sweep(folder)
+    assert_same(found, whole)
+    found.x[:] = 0.0  # in memory only
+    assert counted == [] and before == {p.name: p.read_bytes() for p in folder.iterdir()}
+
+
+@pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write")
+def test_a_folder_that_cannot_be_written(folder, whole):
+    folder.chmod(0o500)
+    assert_same(sweep(folder), whole)
+    (folder / NOTE).write_text("")
+    with pytest.raises(ns.OptionError, match="store"):
+        sweep(folder)
+    with pytest.raises(ns.OptionError, match="store"):
+        sweep(folder / "below")
+
+
+@pytest.mark.parametrize("name", ["file", "file/below", "nul\0", "x" * 300])
+def test_a_path_that_can_be_no_folder(name, tmp_path):
+    (tmp_path / "file").write_text("")
+    with pytest.raises(ns.OptionError, match="store"):
+        sweep(tmp_path / name)
+
+
+@pytest.mark.parametrize("path", [3, 2.5, b"bytes", "", ["a"]])
+def test_a_path_that_is_none(path):
+    with pytest.raises(ns.OptionError, match="store"):
+        ns.Work(store=path)
 
 
 def test_nothing_is_stored_for_no_starts(tmp_path):

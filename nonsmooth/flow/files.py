@@ -1,9 +1,8 @@
-"""Files in folders that others may have touched: read with care, written whole.
+"""Safe reading and atomic writing of files in folders that others may change.
 
-A file is read only if it is a regular one of a bounded size; a link, a device or a pipe in its place
-is as good as none. It is written under a new name, made exclusively and for its owner alone, and
-then renamed, so that it is there whole or not at all and a link in its place is replaced, not
-followed.
+Only regular files of a bounded size are read; links, devices and pipes count as missing. A file is written
+under a new name that only its owner can open, and then renamed: it is there whole or not at all, and a link
+in its place is replaced, not followed.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import stat
 import tempfile
 from pathlib import Path
 
-#: How names of files under way begin; one that a killed process left behind means nothing.
+#: Prefix of the names of unfinished files; those that a killed process left are ignored.
 PART = ".part-"
 
 _CAREFULLY = os.O_RDONLY | sum(
@@ -22,7 +21,7 @@ _CAREFULLY = os.O_RDONLY | sum(
 
 
 def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
-    """Return what a file holds, or None where there is no such file."""
+    """Return the content of a file, or None where there is no such file."""
     try:
         handle = os.open(path, _CAREFULLY)
     except (OSError, ValueError):
@@ -42,7 +41,7 @@ def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
 
 
 def replace(path: Path, data: bytes) -> None:
-    """Write a file at once."""
+    """Write a file, whole or not at all."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=PART)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -54,7 +53,7 @@ def replace(path: Path, data: bytes) -> None:
 
 
 def fault(facts: os.stat_result) -> str:
-    """Why a file or folder is not this user's alone to write; empty where it is."""
+    """Reason why others than this user can write a file or folder; empty if only this user can."""
     if not hasattr(os, "geteuid"):  # a system without owners and modes of this kind
         return ""
     if facts.st_uid != os.geteuid():

@@ -1,7 +1,7 @@
-"""One chosen mode's smooth flow, forward or backward in time, with its event functions.
+"""The smooth flow of one mode, forward or backward in time, with its event functions.
 
-The building block for manifolds and dividing surfaces: no switching, no stopping at guards unless
-asked. Backward flows are smooth problems here because the mode is fixed.
+Manifolds and dividing surfaces are computed with it. The mode never changes, so the backward flow is a smooth
+problem too.
 """
 
 from __future__ import annotations
@@ -125,7 +125,8 @@ def follow(
     for name in (u for u in ends if isinstance(u, str)):
         if name not in names:
             raise OptionError(
-                f"until: expected a name among {names} or an expression, received {name!r}."
+                f"until has {name!r}, which is no event function. Give a name among {names} or an "
+                "expression."
             )
         ending.add(name)
     x = system.extended_point(point, t_start)
@@ -187,7 +188,7 @@ class _Follower:
         self.levels = self.surfaces.values(x, p)[0][self.sliding]
         self.record = Record(system, p)
         self.record.point(t_start, x)
-        # functions whose zero here is not news, and how many coefficients are known to vanish
+        # functions that are zero at the start of the step, and how many coefficients vanish
         self.fresh = dict.fromkeys(range(len(self.guards)), 0)
 
     def run(self) -> Trajectory:
@@ -244,7 +245,7 @@ class _Follower:
         )
 
     def _leave_singular_point(self, e: Expansion, left: float) -> bool:
-        """Take the driver's short step where high derivatives do not exist; forward only."""
+        """Take a short step where high derivatives do not exist; forward only."""
         if self.sign < 0:
             return False
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))

@@ -80,12 +80,12 @@ def test_files_that_are_none_are_refused(tmp_path):
     run().save(tmp_path / "cut")
     (tmp_path / "cut").write_bytes((tmp_path / "cut").read_bytes()[:-200])
     for name in ("missing", "text", "other.npz", "pickled", "cut"):
-        with pytest.raises(ns.OptionError, match=r"path: expected a file written by save"):
+        with pytest.raises(ns.OptionError, match=r"^path"):
             ns.load(tmp_path / name)
     run().save(tmp_path / "run")
-    with pytest.raises(ns.OptionError, match="expected a saved Ensemble, received a Trajectory"):
+    with pytest.raises(ns.OptionError, match=r"^path .*Trajectory"):
         ns.Ensemble.load(tmp_path / "run")
-    with pytest.raises(ns.OptionError, match="expected a file that can be written"):
+    with pytest.raises(ns.OptionError, match=r"^path"):
         run().save(tmp_path / "no folder" / "run")
 
 
@@ -100,9 +100,9 @@ def test_a_run_as_tables():
     bumps = events[events.name == "bumper"]
     assert len(bumps) and np.array_equal(bumps.v_after, -bumps.v)
     assert result.to_pandas("samples").loc[1.0].tolist() == result(1.0).tolist()
-    with pytest.raises(ns.OptionError, match="'points', 'events' or 'samples', received 'steps'"):
+    with pytest.raises(ns.OptionError, match=r"what is 'steps'"):
         result.to_pandas("steps")
-    with pytest.raises(ns.OptionError, match="expected a run with samples"):
+    with pytest.raises(ns.OptionError, match="samples"):
         ns.simulate(BLOCK, [0.0, 0.0], 1.0).to_pandas("samples")
 
 
@@ -133,7 +133,7 @@ def test_an_ensemble_as_a_table_and_as_a_data_set():
 def test_libraries_that_are_not_there_are_asked_for(name, monkeypatch):
     monkeypatch.setitem(sys.modules, name, None)
     for make in MADE.values():
-        with pytest.raises(ns.OptionError, match=rf"to_{name}: expected {name} to be installed"):
+        with pytest.raises(ns.OptionError, match=rf"^to_{name} needs {name}"):
             getattr(make(), f"to_{name}")()
 
 
@@ -147,11 +147,11 @@ def test_a_file_of_another_format_and_what_is_no_result_are_refused(tmp_path):
     head = arrays["tree"].tobytes().replace(b'"format": ', b'"format": 9')
     assert head != arrays["tree"].tobytes()
     np.savez(path, **{**arrays, "tree": np.frombuffer(head, np.uint8)})
-    with pytest.raises(ns.OptionError, match=r"written by save.*format 9"):
+    with pytest.raises(ns.OptionError, match=r"^path .*format 9"):
         ns.load(path)
-    with pytest.raises(ns.OptionError, match="a result of numbers and systems, received <object"):
+    with pytest.raises(ns.OptionError, match=r"^save .*<object"):
         saving._packed(object())
-    with pytest.raises(ns.OptionError, match="arrays of numbers, received <U1"):
+    with pytest.raises(ns.OptionError, match=r"^save .*<U1"):
         saving._packed([np.array(["a"])])
 
 

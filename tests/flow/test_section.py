@@ -168,19 +168,19 @@ def test_samples_survive_a_store_and_other_requests_are_another_problem(tmp_path
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"at": "h1"}, r"at: expected a name of \['h0'\] or a kind"),
-        ({"at": "end"}, "at: expected a name"),
-        ({"at": -1.0}, "period: expected a positive number, received -1.0"),
-        ({"at": [x]}, "a period or an expression"),
-        ({"at": 50.0}, "at least 1 periods"),
-        ({"at": ns.Section("entry", direction=1)}, "Only surfaces are chosen by direction"),
-        ({"at": ns.Section(1.0, after=True)}, "Times have no direction"),
-        ({"at": "h0", "t_eval": [1.0]}, "expected one of them"),
-        ({"t_eval": [[1.0]]}, r"t_eval: expected times in a row .* received shape \(1, 1\)"),
-        ({"t_eval": [2.0, 1.0]}, "received times that go back"),
-        ({"t_eval": [0.0, 11.0]}, r"to t_end = 10.0, received times from 0.0 to 11.0"),
-        ({"t_eval": [math.nan]}, "some that are not finite"),
-        ({"t_eval": "all"}, "t_eval: expected an array of times, received 'all'"),
+        ({"at": "h1"}, r"^at .*\['h0'\]"),
+        ({"at": "end"}, "^at "),
+        ({"at": -1.0}, "^period"),
+        ({"at": [x]}, "^at "),
+        ({"at": 50.0}, "^at .* 1 periods"),
+        ({"at": ns.Section("entry", direction=1)}, "^direction"),
+        ({"at": ns.Section(1.0, after=True)}, "^at .*direction="),
+        ({"at": "h0", "t_eval": [1.0]}, "^t_eval and at"),
+        ({"t_eval": [[1.0]]}, r"^t_eval .*\(1, 1\)"),
+        ({"t_eval": [2.0, 1.0]}, "^t_eval .* decrease"),
+        ({"t_eval": [0.0, 11.0]}, "^t_eval .* 11.0"),
+        ({"t_eval": [math.nan]}, "^t_eval .* finite"),
+        ({"t_eval": "all"}, "^t_eval .*'all'"),
     ],
 )
 def test_bad_requests_are_refused_by_name(options, message):
@@ -192,10 +192,10 @@ def test_bad_requests_are_refused_by_name(options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"direction": 2}, "direction: expected -1"),
-        ({"every": 0}, "every: expected a positive whole number"),
-        ({"skip": -1}, "skip: expected a whole number >= 0"),
-        ({"count": 0.5}, "count: expected a positive whole number"),
+        ({"direction": 2}, "^direction"),
+        ({"every": 0}, "^every"),
+        ({"skip": -1}, "^skip"),
+        ({"count": 0.5}, "^count"),
     ],
 )
 def test_bad_sections_are_refused(options, message):
@@ -203,8 +203,8 @@ def test_bad_sections_are_refused(options, message):
         ns.Section("h0", **options)
 
 
-def test_an_ensemble_must_know_how_many_hits_to_keep():
-    with pytest.raises(ns.OptionError, match="expected count= with a section at events"):
+def test_an_ensemble_must_know_how_many_samples_to_keep():
+    with pytest.raises(ns.OptionError, match="count"):
         ns.ensemble(TWO_SPRINGS, [0.0, 1.0], 10.0, at="h0")
 
 
@@ -256,9 +256,9 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
             assert run(at).sample_t == pytest.approx(quarters[1:2], abs=1e-9)
     many = ns.ensemble(system, [[1.0, 0.0, 1.0, 0.0]], 9.5, at=ns.Section(z, 1, count=1))
     assert many.sample_t[0] == pytest.approx(quarters[1:2], abs=1e-9)
-    with pytest.raises(ns.OptionError, match=r"expected a name of \['h0', 'h1'\]"):
+    with pytest.raises(ns.OptionError, match=r"^at .*\['h0', 'h1'\]"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at="h2")
-    with pytest.raises(ns.OptionError, match="It is a set, which is reached from all sides"):
+    with pytest.raises(ns.OptionError, match=r"^direction"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))
 
 

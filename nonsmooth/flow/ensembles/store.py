@@ -201,7 +201,7 @@ class Store:
         )
 
     def _refused(self, wrong: str, advice: str = "Choose") -> OptionError:
-        return OptionError(f"store: {str(self.folder)!r} {wrong}. {advice} another folder.")
+        return OptionError(f"store {str(self.folder)!r} {wrong}. {advice} another folder.")
 
 
 def _sealed(content: dict[str, Any]) -> dict[str, Any]:

@@ -13,7 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...flow.watched import LegsWatch, passing, watched
+from ...flow.fixed import LegsWatch, passing, watched
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from .legs import Leg, leg_name

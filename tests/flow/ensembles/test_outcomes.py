@@ -74,7 +74,7 @@ def test_bins_hold_both_ends_and_nothing_outside():
 
 @pytest.mark.parametrize("ranges", [{"z": (0, 1)}, {"x": (1, 1)}, {"x": 3}, {"x": (0, np.inf)}])
 def test_ranges_are_refused(system, ranges):
-    with pytest.raises(ns.OptionError, match=r"ranges: expected names among \('x', 'v', 't'\)"):
+    with pytest.raises(ns.OptionError, match=r"^ranges .*\('x', 'v', 't'\)"):
         ns.outcomes(system, STARTS, 1.0, ranges=ranges)
 
 

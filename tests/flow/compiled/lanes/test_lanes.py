@@ -290,7 +290,7 @@ def test_bad_input(system):
 
 
 def test_an_executor_of_another_kind_is_refused():
-    with pytest.raises(OptionError, match=r"executor: expected a concurrent\.futures\.Executor"):
+    with pytest.raises(OptionError, match=r"^executor"):
         Work(executor=3)
 
 
@@ -360,9 +360,9 @@ def test_interrupt_from_the_keyboard_is_heard_inside_the_chunks_of_threads(
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [
-        ({"system": None}, "system: expected a FilippovSystem"),
-        ({"parameters": [0.3]}, "expected a mapping"),
-        ({"work": 3}, "work: expected a Work"),
+        ({"system": None}, "^system"),
+        ({"parameters": [0.3]}, "parameters"),
+        ({"work": 3}, "^work"),
     ],
 )
 def test_arguments_of_another_kind_are_refused(arguments, message):

@@ -1,7 +1,6 @@
 """Samples at sections, periods and given times are those of closed forms, in every engine."""
 
 import math
-import pickle
 
 import casadi as ca
 import numpy as np
@@ -152,17 +151,6 @@ def test_engines_and_chunks_agree_on_hits_of_random_runs():
             assert np.allclose(one.sample_x, every[0].sample_x, atol=1e-8, equal_nan=True)
         small = ns.ensemble(dry, starts, 20.0, at=at, work=ns.Work(threads=2, chunk=7))
         assert np.array_equal(small.sample_x, every[1].sample_x, equal_nan=True)
-
-
-def test_samples_survive_a_store_and_other_requests_are_another_problem(tmp_path):
-    work = ns.Work(store=tmp_path / "saved", chunk=2, threads=1)
-    starts = [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]
-    first = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
-    again = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
-    assert np.array_equal(first.sample_x, again.sample_x)
-    assert np.array_equal(pickle.loads(pickle.dumps(again)).sample_t, first.sample_t)
-    with pytest.raises(ns.OptionError, match=r"store.* another system"):
-        ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.5], work=work)
 
 
 @pytest.mark.parametrize(

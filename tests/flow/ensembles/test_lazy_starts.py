@@ -74,13 +74,6 @@ def test_a_single_point_is_a_grid_without_axes():
     assert many.t.shape == () and many.x.shape == (2,)
 
 
-def test_they_are_part_of_what_a_store_belongs_to(tmp_path):
-    work = ns.Work(store=tmp_path / "sweep", progress=False)
-    ns.ensemble(BLOCK, ns.RandomStarts(10, [0, 0], [1, 1], seed=1), 1.0, work=work)
-    with pytest.raises(ns.OptionError, match=r"store.* another system"):
-        ns.ensemble(BLOCK, ns.RandomStarts(10, [0, 0], [1, 1], seed=2), 1.0, work=work)
-
-
 @pytest.mark.parametrize(
     "make",
     [

@@ -2,12 +2,15 @@
 
 import errno
 import json
+import multiprocessing
 import os
+import pickle
 import shutil
 import signal
 import subprocess
 import sys
 import time
+from concurrent.futures import BrokenExecutor, Executor, Future, ProcessPoolExecutor
 
 import casadi as ca
 import numpy as np
@@ -25,9 +28,9 @@ STARTS = ns.RandomStarts(200, low=[-6.0, -6.0], high=[6.0, 6.0], seed=5)
 OPTIONS = dict(t_end=9.0, at_event=("entry", 1), t_eval=[1.0, 5.0])
 
 
-def sweep(store=None, chunk=30, starts=STARTS, **kwargs):
-    work = ns.Work(store=store, chunk=chunk, threads=1, progress=False, **kwargs)
-    return ns.ensemble(BLOCK, starts, work=work, **OPTIONS)
+def sweep(store=None, chunk=30, starts=STARTS, system=BLOCK, executor=None, **options):
+    work = ns.Work(store=store, chunk=chunk, threads=1, executor=executor, progress=False)
+    return ns.ensemble(system, starts, work=work, **{**OPTIONS, **options})
 
 
 @pytest.fixture(scope="module")
@@ -80,6 +83,7 @@ def test_its_arrays_are_mapped_not_held(tmp_path):
         while array.base is not None and not isinstance(array, np.memmap):
             array = array.base
         assert isinstance(array, np.memmap)
+    assert_same(pickle.loads(pickle.dumps(found)), found)
 
 
 @pytest.fixture()
@@ -94,6 +98,7 @@ def counted(monkeypatch):
 
 def test_what_is_there_is_not_computed_again(whole, folder, counted):
     assert_same(sweep(folder, chunk=7), whole)  # the folder has its own size of a chunk
+    assert_same(sweep(folder, system=pickle.loads(pickle.dumps(BLOCK))), whole)
     assert counted == []
 
 
@@ -110,6 +115,49 @@ def test_an_interruption_costs_what_was_under_way(whole, tmp_path, counted, monk
         with pytest.raises(KeyboardInterrupt):
             sweep(tmp_path / "sweep")
     counted.clear()
+    assert_same(sweep(tmp_path / "sweep"), whole)
+    assert counted == [30, 30, 30, 20]
+
+
+class Interrupted(Executor):
+    """Ctrl-C after three chunks."""
+
+    left = 3
+
+    def submit(self, fn, /, *args, **kwargs):
+        future = Future()
+        self.left -= 1
+        if self.left < 0:
+            future.set_exception(KeyboardInterrupt())
+        else:
+            future.set_result(fn(*args, **kwargs))
+        return future
+
+
+def die(*_):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+class Murdered(ProcessPoolExecutor):
+    """A pool whose worker the system kills after three chunks, as when memory runs out."""
+
+    left = 3
+
+    def __init__(self):
+        super().__init__(1, mp_context=multiprocessing.get_context("spawn"))
+
+    def submit(self, fn, /, *args, **kwargs):
+        self.left -= 1
+        return super().submit(fn if self.left >= 0 else die, *args, **kwargs)
+
+
+@pytest.mark.parametrize(
+    ("pool", "error"), [(Interrupted, KeyboardInterrupt), (Murdered, BrokenExecutor)]
+)
+@pytest.mark.skipif(sys.platform == "win32", reason="signals")
+def test_so_does_one_of_an_executor(pool, error, whole, tmp_path, counted):
+    with pool() as executor, pytest.raises(error):
+        sweep(tmp_path / "sweep", executor=executor)
     assert_same(sweep(tmp_path / "sweep"), whole)
     assert counted == [30, 30, 30, 20]
 
@@ -418,9 +466,30 @@ def test_a_disk_that_is_too_small_ends_no_process(tmp_path):
 # the problem and the folder
 
 
-def test_another_problem_is_refused(folder):
+@pytest.mark.parametrize(
+    "other",
+    [
+        {"starts": ns.RandomStarts(200, [0, 0], [1, 1])},
+        {"starts": ns.RandomStarts(199, low=[-6.0, -6.0], high=[6.0, 6.0], seed=5)},
+        {"starts": ns.RandomStarts(200, low=[-6.0, -6.0], high=[6.0, 6.0], seed=6)},
+        {"t_end": 9.5},
+        {"tol": 1e-9},
+        {"t_eval": [1.0, 5.5]},
+        {"parameters": {"mu": 0.2}},
+        {"parameters": {"mu": np.ones(200)}},
+    ],
+)
+def test_another_problem_is_refused(other, folder):
     with pytest.raises(ns.OptionError, match=r"store.* another system"):
-        sweep(folder, starts=ns.RandomStarts(200, [0, 0], [1, 1]))
+        sweep(folder, **other)
+
+
+def test_other_numbers_are_another_problem(tmp_path):
+    starts = np.linspace(-1, 1, 20).reshape(10, 2)
+    sweep(tmp_path / "sweep", starts=starts)
+    starts[7, 1] = np.nextafter(starts[7, 1], 1)
+    with pytest.raises(ns.OptionError, match=r"store.* another system"):
+        sweep(tmp_path / "sweep", starts=starts)
 
 
 HEADS = {
@@ -563,9 +632,7 @@ def test_a_worker_that_is_lost_costs_its_chunk(whole, tmp_path):
                     os.kill(killed[0], signal.SIGKILL)
                 return future
 
-        executor = Killing(client)
-        work = ns.Work(store=tmp_path / "sweep", chunk=10, executor=executor, progress=False)
-        found = ns.ensemble(BLOCK, STARTS, work=work, **OPTIONS)
+        found = sweep(tmp_path / "sweep", chunk=10, executor=Killing(client))
         assert killed and killed[0] not in client.run(os.getpid).values()
     assert_same(found, whole)
 

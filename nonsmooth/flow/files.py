@@ -27,10 +27,10 @@ def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
     except (OSError, ValueError):
         return None
     try:
-        facts = os.fstat(handle)
-        if not stat.S_ISREG(facts.st_mode) or facts.st_size > most:
+        info = os.fstat(handle)
+        if not stat.S_ISREG(info.st_mode) or info.st_size > most:
             return None
-        if private and fault(facts):
+        if private and writable_by_others(info):
             return None
         with os.fdopen(handle, "rb", closefd=False) as file:
             return file.read(most)
@@ -52,12 +52,12 @@ def replace(path: Path, data: bytes) -> None:
         raise
 
 
-def fault(facts: os.stat_result) -> str:
+def writable_by_others(info: os.stat_result) -> str:
     """Reason why others than this user can write a file or folder; empty if only this user can."""
     if not hasattr(os, "geteuid"):  # a system without owners and modes of this kind
         return ""
-    if facts.st_uid != os.geteuid():
-        return f"it belongs to user {facts.st_uid}, not to this one, {os.geteuid()}"
-    if facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"others than its owner can write it (mode {stat.S_IMODE(facts.st_mode):04o})"
+    if info.st_uid != os.geteuid():
+        return f"it belongs to user {info.st_uid}, not to this one, {os.geteuid()}"
+    if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"others than its owner can write it (mode {stat.S_IMODE(info.st_mode):04o})"
     return ""

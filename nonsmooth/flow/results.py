@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -92,19 +92,8 @@ class Chunk:
 
     def part(self, first: int, last: int) -> Chunk:
         """Return the arrays of the trajectories first to last - 1, to be written in place."""
-        cut = slice(first, last)
-        return Chunk(
-            x=self.x[cut],
-            t=self.t[cut],
-            status=self.status[cut],
-            itinerary=self.itinerary[cut],
-            words=[],
-            kinds=self.kinds[cut],
-            at_x=None if self.at_x is None else self.at_x[cut],
-            at_t=None if self.at_t is None else self.at_t[cut],
-            sample_t=None if self.sample_t is None else self.sample_t[cut],
-            sample_x=None if self.sample_x is None else self.sample_x[cut],
-        )
+        arrays: dict[str, Any] = {name: a[first:last] for name, a in self.arrays().items()}
+        return replace(self, words=[], totals=np.zeros(4, np.int64), **arrays)
 
     def forget(self) -> None:
         """Fill the arrays of events and samples with NaN."""
@@ -268,28 +257,27 @@ class Collected:
     def ensemble(self, codes: NDArray[np.int32] | None = None) -> Ensemble:
         """Return the results, with the itineraries sorted and their numbers in ``codes``."""
         words, every = sorted(self._words), self.all
-        place = np.empty(len(words), np.int32)
+        position = np.empty(len(words), np.int32)
         for k, word in enumerate(words):
-            place[self._words[word]] = k
+            position[self._words[word]] = k
         code = every.itinerary if codes is None else codes
         for first, last, numbers in self._parts:
-            code[first:last] = place[numbers].take(every.itinerary[first:last])
-        n, shape = every.x.shape[1], self.shape
+            code[first:last] = position[numbers].take(every.itinerary[first:last])
+
+        def shaped(a: Any) -> Any:
+            return None if a is None else a.reshape((*self.shape, *a.shape[1:]))
+
         return Ensemble(
-            x=every.x.reshape(*shape, n),
-            t=every.t.reshape(shape),
-            status=every.status.reshape(shape),
+            x=shaped(every.x),
+            t=shaped(every.t),
+            status=shaped(every.status),
             itineraries=tuple(words),
-            itinerary_code=code.reshape(shape),
+            itinerary_code=shaped(code),
             events=self._events(),
-            event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
-            event_t=None if every.at_t is None else every.at_t.reshape(shape),
-            sample_x=None
-            if every.sample_x is None
-            else every.sample_x.reshape(*shape, *every.sample_x.shape[1:]),
-            sample_t=None
-            if every.sample_t is None
-            else every.sample_t.reshape(*shape, *every.sample_t.shape[1:]),
+            event_x=shaped(every.at_x),
+            event_t=shaped(every.at_t),
+            sample_x=shaped(every.sample_x),
+            sample_t=shaped(every.sample_t),
             state_names=self.system.state_names,
         )
 

@@ -139,7 +139,7 @@ def _several(value: Any) -> list[Any]:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """The one mode that is followed, with its guards and the watched functions only watched."""
+    """The mode that is followed, with its guards."""
 
     mode: str
     modes: Modes
@@ -182,7 +182,7 @@ class _Follower:
         self.guards = chosen.guards
         self.stepper = Stepper(system, self.modes, options)
         self.surfaces = Surfaces(system)
-        self.unknowns = np.zeros(system.surface_count)  # multipliers of what slides
+        self.unknowns = np.zeros(system.surface_count)  # multipliers of the sliding surfaces
         self.x, self.t, self.t_end, self.ending = x, t_start, t_end, ending
         self.sign = -1.0 if t_end < t_start else 1.0
         self.levels = self.surfaces.values(x, p)[0][self.sliding]
@@ -232,7 +232,7 @@ class _Follower:
                 return Status.STOPPED, f"{stopped!r} is zero at t = {self.t:.10g}."
 
     def _blur(self) -> float:
-        """Zeros closer than this are one instant."""
+        """Largest distance in time between simultaneous zeros."""
         return 1e-14 * max(1.0, abs(self.t))
 
     def _expand(self) -> Expansion:

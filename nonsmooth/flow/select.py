@@ -8,12 +8,9 @@ from weakref import WeakSet
 
 from ..model import OptionError
 from .compiled.building.compilers import ADVICE, CompilerError, find_compiler
-from .warn import CompilerWarning, warn_once
-
-__all__ = ["ENGINES", "CompilerWarning", "compiled_or_none", "use_compiled"]
+from .warn import warn_once
 
 ENGINES = ("auto", "reference", "compiled")
-
 
 T = TypeVar("T")
 

@@ -25,9 +25,6 @@ from .starts import Cut
 _REFERENCE = threading.Lock()
 
 
-ENGINES = ("reference", "tape", "lanes")
-
-
 @dataclass(frozen=True)
 class Job:
     """System and options that all chunks of an ensemble share."""
@@ -37,7 +34,7 @@ class Job:
     at: tuple[int, int] | None
     times: Times | None
     room: int | None
-    engine: str
+    engine: str  # reference, tape or lanes
 
 
 def shipped(job: Job) -> Job:

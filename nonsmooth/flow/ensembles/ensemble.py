@@ -171,8 +171,8 @@ def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
 def engine_for(
     system: FilippovSystem, options: Options, engine: str, count: int, step: bool
 ) -> str:
-    """Return the one of ``chunks.ENGINES`` that runs."""
-    # It is compiled here, so that all chunks run the same one.
+    """Return the driver of all chunks: reference, tape or lanes."""
+    # It is compiled here, so that all chunks use the same one.
     lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
     if not use_compiled(engine, tape is not None) or tape is None:
         return "reference"

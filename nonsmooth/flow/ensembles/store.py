@@ -80,7 +80,8 @@ class Store:
             names = [path.name for path in self.folder.iterdir()]
         except (OSError, ValueError) as error:
             raise self._unusable(error) from error
-        if not all(name.startswith((files.PART, _LOCK)) for name in names):
+        unknown = [name for name in names if not name.startswith((files.PART, _LOCK))]
+        if unknown and "problem.json" not in unknown:  # which another run may have just written
             raise self._refused("holds other files than the results of an ensemble")
 
     @contextmanager

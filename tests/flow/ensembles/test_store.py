@@ -429,17 +429,6 @@ def test_a_link_in_the_place_of_the_lock_is_not_followed(tmp_path):
     assert (tmp_path / "elsewhere").read_text() == "kept"
 
 
-def test_a_run_that_was_refused_or_interrupted_holds_nothing(whole, tmp_path, monkeypatch):
-    def interrupted(*args):
-        raise KeyboardInterrupt
-
-    with monkeypatch.context() as patched:
-        patched.setattr(work_module, "run_chunk", interrupted)
-        with pytest.raises(KeyboardInterrupt):
-            sweep(tmp_path / "sweep")
-    assert_same(sweep(tmp_path / "sweep"), whole)
-
-
 @pytest.mark.slow
 @needs_reserving
 def test_a_disk_that_is_too_small_ends_no_process(tmp_path):

@@ -1,7 +1,7 @@
-"""One chosen mode's smooth flow, forward or backward in time, with its event functions.
+"""The smooth flow of one mode, forward or backward in time, with its event functions.
 
-The building block for manifolds and dividing surfaces: no switching, no stopping at guards unless
-asked. Backward flows are smooth problems here because the mode is fixed.
+Manifolds and dividing surfaces are computed with it. The mode never changes, so the backward flow is a smooth
+problem too.
 """
 
 from __future__ import annotations
@@ -128,7 +128,8 @@ def follow(
     for name in (u for u in ends if isinstance(u, str)):
         if name not in names:
             raise OptionError(
-                f"until: expected a name among {names} or an expression, received {name!r}."
+                f"until has {name!r}, which is no event function. Give a name among {names} or an "
+                "expression."
             )
         ending.add(name)
     x = system.extended_point(point, t_start)
@@ -141,7 +142,7 @@ def _several(value: Any) -> list[Any]:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """The one mode that is followed, whose modes only watch its guards and the watched functions."""
+    """The mode that is followed, with its guards."""
 
     mode: str
     modes: Modes
@@ -186,13 +187,13 @@ class _Follower:
         self.guards = chosen.guards
         self.stepper = Stepper(system, self.modes, options)
         self.surfaces = Surfaces(system)
-        self.unknowns = np.zeros(system.surface_count)  # multipliers of what slides
+        self.unknowns = np.zeros(system.surface_count)  # multipliers of the sliding surfaces
         self.x, self.t, self.t_end, self.ending = x, t_start, t_end, ending
         self.sign = -1.0 if t_end < t_start else 1.0
         self.levels = self.surfaces.values(x, p)[0][self.sliding]
         self.record = Record(system, p)
         self.record.point(t_start, x)
-        # functions whose zero here is not news, and how many coefficients are known to vanish
+        # functions that are zero at the start of the step, and how many coefficients vanish
         self.fresh = dict.fromkeys(range(len(self.guards)), 0)
 
     def run(self) -> Trajectory:
@@ -236,7 +237,7 @@ class _Follower:
                 return Status.STOPPED, messages.stopped(stopped, self.t)
 
     def _blur(self) -> float:
-        """Zeros closer than this are one instant."""
+        """Largest distance in time between simultaneous zeros."""
         return 1e-14 * max(1.0, abs(self.t))
 
     def _expand(self) -> Expansion:
@@ -249,7 +250,7 @@ class _Follower:
         )
 
     def _leave_singular_point(self, e: Expansion, left: float) -> bool:
-        """Take the driver's short step where high derivatives do not exist; forward only."""
+        """Take a short step where high derivatives do not exist; forward only."""
         if self.sign < 0:
             return False
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))

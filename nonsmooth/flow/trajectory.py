@@ -1,4 +1,4 @@
-"""What a run returns: steps with their Taylor polynomials, events, itinerary, status."""
+"""Trajectory of a run: Taylor polynomials of its steps, events, itinerary, status."""
 
 from __future__ import annotations
 
@@ -151,7 +151,7 @@ class Trajectory(Savable):
     steps : Steps
         Accepted steps with their Taylor polynomials.
     sample_t, sample_x : ndarray (K,), (K, n) or None
-        Times and states asked for with ``t_eval`` (NaN after an early end) or ``at``.
+        Times and states of the samples by ``t_eval`` (NaN after an early end) or ``at``.
     """
 
     system: FilippovSystem
@@ -179,8 +179,8 @@ class Trajectory(Savable):
         slack = 1e-12 * max(1.0, abs(low), abs(high))
         if times.size and not (low - slack <= times.min() and times.max() <= high + slack):
             raise PointError(
-                f"time: expected values in [{low}, {high}], received values from {times.min()} to "
-                f"{times.max()}. The run ended with status {self.status}: {self.message}"
+                f"time has values from {times.min()} to {times.max()}. Give times in [{low}, {high}]: "
+                f"the run ended with status {self.status}. {self.message}"
             )
         n = self.x.shape[1]
         if not len(self.steps):
@@ -226,7 +226,7 @@ class Trajectory(Savable):
         return tables.trajectory_set(self)
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the run: why it ended, its modes, its states over time."""
+        """Notebook representation: status, itinerary, states over time."""
         rows = (
             ("time", f"{self.t[0]:g} to {self.t[-1]:g}, {len(self.events)} events"),
             ("itinerary", _shorten(self.itinerary)),

@@ -254,13 +254,13 @@ class Search:
         return looks, many.x if self.period is None else looks[:, -1], labels
 
     def _work(self, what: str) -> Work:
-        """The work of one round: its checkpoint is a folder of its own."""
+        """The work of one round: its store is a folder of its own."""
         self.begun += 1
-        if self.work.checkpoint is None:
+        if self.work.store is None:
             return self.work
-        folder = Path(self.work.checkpoint)
+        folder = Path(self.work.store)
         folder.mkdir(parents=True, exist_ok=True)
-        return replace(self.work, checkpoint=folder / f"{self.begun:03d}-{what}")
+        return replace(self.work, store=folder / f"{self.begun:03d}-{what}")
 
 
 def _thinned(points: Array, scale: Array, least: float) -> Array:

@@ -148,7 +148,7 @@ def basins(
     t_start, parameters, tol, rtol, atol : optional
         As in :func:`simulate`; parameters are numbers.
     work : Work, optional
-        Threads or executor, progress bars, and a checkpoint: after an interruption the same call
+        Threads or executor, progress bars, and a store: after an interruption the same call
         goes on from there.
 
     Returns

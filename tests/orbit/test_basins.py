@@ -119,9 +119,7 @@ def test_known_attractors_come_first_and_labels_survive_a_file(tmp_path):
     assert list(again.axes) == ["x", "v"]
 
 
-def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
-    tmp_path, monkeypatch
-):
+def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_store(tmp_path, monkeypatch):
     grid = {"x": np.linspace(-3, 3, 9), "v": np.linspace(-2, 2, 6)}
     space = Search._look.__globals__
     plain, calls, last = space["ensemble"], [], 10**6
@@ -135,7 +133,7 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
     monkeypatch.setitem(space, "ensemble", ensemble)
     truth = ns.basins(WELL, grid, t_end=160.0, work=QUIET)
     last, calls = len(calls), []
-    work = ns.Work(threads=1, progress=False, checkpoint=tmp_path / "saved")
+    work = ns.Work(threads=1, progress=False, store=tmp_path / "saved")
     cut = ns.basins(WELL, grid, t_end=160.0, work=work)
     assert not cut.complete and "interrupted" in repr(cut)
     decided = cut.labels != 0

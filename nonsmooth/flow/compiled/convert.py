@@ -82,8 +82,8 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
     status, t = Status(run.status), float(run.t[-1])
     if status is Status.REACHED_END:
         return messages.reached_end(options.t_end)
-    if status is Status.STOPPED and REASONS[run.reason] == "looked_at":
-        return messages.looked_at(run.where, t)
+    if status is Status.STOPPED and REASONS[run.reason] == "sampled":
+        return messages.sampled(run.where, t)
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
     if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":

@@ -88,10 +88,10 @@ class Bookkeeping:
 
     def _count_hit(self, kind: str, before: str, name: str) -> None:
         hits = self.options.hits
-        if hits is not None and hits.meets(self.t, kind, name, before):
+        if hits is not None and hits.has(self.t, kind, name, before):
             self._hits += 1
             if self._hits >= hits.last:
-                self.end(Status.STOPPED, messages.looked_at(hits.count or 0, self.t))
+                self.end(Status.STOPPED, messages.sampled(hits.count or 0, self.t))
 
     def close_segment(self, following: str) -> None:
         """End the stretch of steps in a mode, where another follows."""

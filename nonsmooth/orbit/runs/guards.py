@@ -13,8 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 
+from ...flow.fixed import LegsWatch, passing, watched
 from ...flow.names import described, guard_name
-from ...flow.watched import LegsWatch, passing, watched
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from .legs import Leg, leg_name

@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from ...flow.options import tolerances
 from ...flow.saving import Savable
-from ...flow.section import Section
+from ...flow.section import Section, sectioned
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
-from ...flow.view import sectioned
 from ...model import (
     Array,
     FilippovSystem,

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import watched
+from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.compiled.shooting import bordered_direction
 from nonsmooth.model.derivatives.variational import guarded_field
@@ -176,7 +176,7 @@ def test_tests_of_an_orbit_are_the_same_without_the_interpreter(monkeypatch, orb
     orbit, _ = orbit_and_names
     p, known = orbit.parameter_vector, {}
     found = conditions_of(orbit.problem, orbit.evaluation, p, known)
-    for module in (watched, multipliers):
+    for module in (fixed, multipliers):
         monkeypatch.setattr(module, "has_interpreter", lambda: False)
     again = conditions_of(orbit.problem, orbit.evaluation, p, {})
     assert list(found) == list(again) and set(known) <= set(found)
@@ -201,7 +201,7 @@ def test_guards_at_the_ends_of_legs_are_those_of_the_states_there():
     orbit, _ = whole_friction()
     problem, at, p = orbit.problem, orbit.evaluation, orbit.parameter_vector
     fields = [guarded_field(orbit.system, leg.mode) for leg in problem.legs]
-    _, _, values = watched.LegsWatch(fields)(list(at.starts), p, at.durations, 1e-6)
+    _, _, values = fixed.LegsWatch(fields)(list(at.starts), p, at.durations, 1e-6)
     for field, value, flown in zip(fields, values, at.flown, strict=True):
         expected = field.starts.copied(flown.end, p)[1][:, 0]
         np.testing.assert_allclose(value, expected, rtol=1e-12, atol=1e-13)

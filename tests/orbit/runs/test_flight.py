@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import fixed, watched
+from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.model.derivatives.variational import guarded_field
 from nonsmooth.orbit.runs import flight
@@ -103,17 +103,17 @@ def test_residuals_have_more_digits_than_doubles():
 def test_guards_are_watched_alike_in_c_and_in_python(monkeypatch):
     field, p = guarded_field(BELT, "-"), BELT.parameter_vector()
     start = np.array([0.2, -0.4, 0.1])
-    found = watched.watched(field, start, p, 6.0, 1e-6)
-    passed = watched.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9)
-    monkeypatch.setattr(watched, "has_interpreter", lambda: False)
-    again = watched.watched(field, start, p, 6.0, 1e-6)
+    found = fixed.watched(field, start, p, 6.0, 1e-6)
+    passed = fixed.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9)
+    monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
+    again = fixed.watched(field, start, p, 6.0, 1e-6)
     extrema = [rows[rows[:, 3] != 0.0] for rows in (found, again)]
     assert len(extrema[0]) >= 3
     np.testing.assert_allclose(
         *(rows[np.lexsort(rows.T[:2])] for rows in extrema), rtol=1e-10, atol=1e-11
     )
     assert passed == pytest.approx(
-        watched.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9), rel=1e-13
+        fixed.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9), rel=1e-13
     )
 
 

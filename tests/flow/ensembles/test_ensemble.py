@@ -1,8 +1,7 @@
-"""An ensemble gives each start the result of its own run, however the work is cut up or interrupted."""
+"""An ensemble gives each start the result of its own run, however the work is divided."""
 
 import concurrent.futures
 import multiprocessing
-import os
 import pickle
 import signal
 import sys
@@ -18,12 +17,11 @@ from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.flow.constants import KINDS
 from nonsmooth.flow.ensembles import chunks
 from nonsmooth.flow.ensembles import work as work_module
-from nonsmooth.flow.ensembles.checkpoint import Checkpoint
 from nonsmooth.flow.ensembles.ensemble import ensemble
 from nonsmooth.flow.ensembles.work import Work
 from nonsmooth.model import (
+    DefinitionError,
     FilippovSystem,
-    NonsmoothError,
     OptionError,
     ParameterError,
     PointError,
@@ -168,136 +166,39 @@ def test_dask_cluster_gives_the_same_bits(system, starts):
         )
 
 
-class _Interrupt(concurrent.futures.Executor):
-    """An executor whose user presses Ctrl-C after some chunks."""
-
-    def __init__(self, after):
-        self.left = after
-
-    def submit(self, fn, /, *args, **kwargs):
-        future = concurrent.futures.Future()
-        if self.left == 0:
-            future.set_exception(KeyboardInterrupt())
-        else:
-            self.left -= 1
-            future.set_result(fn(*args, **kwargs))
-        return future
+NONE = np.zeros((4, 2))
 
 
-@needs_compiler
-def test_interrupted_sweep_goes_on_where_it_was(system, starts, tmp_path, monkeypatch):
-    whole = ensemble(system, starts, 5.0, at_event=("entry", 1))
-    folder = tmp_path / "sweep"
-    options = {"at_event": ("entry", 1)}
-    again = Work(checkpoint=folder)
-    with pytest.raises(KeyboardInterrupt):
-        work = Work(chunk=40, executor=_Interrupt(3), checkpoint=folder)
-        ensemble(system, starts, 5.0, **options, work=work)
-    finished = len(list(folder.glob("chunk-*.npz")))
-    assert 0 < finished < 8
-    saved = []
-    original = Checkpoint.save
-    monkeypatch.setattr(
-        Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
-    )
-    same(whole, ensemble(system, starts, 5.0, **options, work=again))  # the folder knows its chunk
-    assert len(saved) == 8 - finished
-    next(folder.glob("chunk-*.npz")).write_bytes(b"cut off")
-    copy = pickle.loads(pickle.dumps(system))
-    same(whole, ensemble(copy, starts, 5.0, **options, work=again))
-    assert len(saved) == 8 - finished + 1
+@pytest.mark.parametrize(
+    ("arguments", "error", "message"),
+    [
+        ({"x0": np.zeros((4, 3))}, PointError, "^x0 .*shape"),
+        ({"x0": [["a", "b"]]}, PointError, "^x0 .*numbers"),
+        ({"parameters": {"belt": np.zeros(3)}}, PointError, "broadcast"),
+        ({"parameters": {"bolt": 1.0}}, ParameterError, "names"),
+        ({"parameters": [0.3]}, ParameterError, "parameters"),
+        ({"at_event": ("hop", 1)}, OptionError, "^at_event"),
+        ({"at_event": ("exit", 0)}, OptionError, "^at_event"),
+        ({"at_event": ("end", 1)}, OptionError, "^at_event"),
+        ({"at_event": 3}, OptionError, "^at_event"),
+        ({"engine": "warp"}, OptionError, "^engine"),
+        ({"tol": 2.0}, OptionError, "^tol"),
+        ({"work": 3}, OptionError, "^work"),
+        ({"system": None}, DefinitionError, "^system"),
+    ],
+)
+def test_bad_arguments_are_refused(arguments, error, message, system):
+    given = {"system": system, "x0": NONE, "t_end": 1.0, **arguments}
+    with pytest.raises(error, match=message):
+        ensemble(**given)
 
 
-def _die(*_):
-    os.kill(os.getpid(), signal.SIGKILL)
-
-
-class _Murdered(concurrent.futures.ProcessPoolExecutor):
-    """A pool whose worker the system kills after some chunks, as when memory runs out."""
-
-    left = 3
-
-    def submit(self, fn, /, *args, **kwargs):
-        self.left -= 1
-        return super().submit(fn if self.left >= 0 else _die, *args, **kwargs)
-
-
-@needs_compiler
-@pytest.mark.skipif(sys.platform == "win32", reason="signals")
-def test_a_sweep_whose_worker_was_killed_goes_on_where_it_was(
-    system, starts, tmp_path, monkeypatch
-):
-    whole = ensemble(system, starts, 5.0)
-    context = multiprocessing.get_context("spawn")
-    with (
-        _Murdered(1, mp_context=context) as pool,
-        pytest.raises(concurrent.futures.BrokenExecutor),
-    ):
-        ensemble(
-            system,
-            starts,
-            5.0,
-            work=Work(chunk=40, executor=pool, checkpoint=tmp_path / "sweep"),
-        )
-    assert len(list((tmp_path / "sweep").glob("chunk-*.npz"))) == 3
-    saved = []
-    original = Checkpoint.save
-    monkeypatch.setattr(
-        Checkpoint, "save", lambda self, k, c: (saved.append(k), original(self, k, c))
-    )
-    same(whole, ensemble(system, starts, 5.0, work=Work(checkpoint=tmp_path / "sweep")))
-    assert sorted(saved) == [3, 4, 5, 6, 7]
-
-
-def test_checkpoint_of_another_problem_is_refused(system, starts, tmp_path):
-    few = starts[:4]
-    ensemble(system, few, 1.0, work=Work(checkpoint=tmp_path / "a"))
-    for other in (
-        lambda path: ensemble(system, few + 1e-16, 2.0, work=Work(checkpoint=path)),
-        lambda path: ensemble(system, few[:3], 1.0, work=Work(checkpoint=path)),
-        lambda path: ensemble(system, few, 1.0, tol=1e-9, work=Work(checkpoint=path)),
-        lambda path: ensemble(
-            system, few, 1.0, parameters={"belt": 0.2}, work=Work(checkpoint=path)
-        ),
-        lambda path: ensemble(
-            system, few, 1.0, parameters={"belt": np.ones(4)}, work=Work(checkpoint=path)
-        ),
-    ):
-        with pytest.raises(OptionError, match="another"):
-            other(tmp_path / "a")
-    (tmp_path / "b").mkdir()
-    (tmp_path / "b" / "thesis.tex").write_text("precious")
-    with pytest.raises(OptionError, match="something else"):
-        ensemble(system, few, 1.0, work=Work(checkpoint=tmp_path / "b"))
-
-
-def test_bad_input(system):
-    with pytest.raises(PointError, match="shape"):
-        ensemble(system, np.zeros((4, 3)), 1.0)
-    with pytest.raises(PointError, match="broadcast"):
-        ensemble(system, np.zeros((4, 2)), 1.0, parameters={"belt": np.zeros(3)})
-    with pytest.raises(ParameterError, match="names"):
-        ensemble(system, np.zeros((4, 2)), 1.0, parameters={"bolt": 1.0})
-    with pytest.raises(PointError, match="numbers"):
-        ensemble(system, [["a", "b"]], 1.0)
-    for options in (
-        {"at_event": ("hop", 1)},
-        {"at_event": ("exit", 0)},
-        {"at_event": ("end", 1)},
-        {"at_event": 3},
-        {"engine": "warp"},
-        {"tol": 2.0},
-    ):
-        with pytest.raises(OptionError):
-            ensemble(system, np.zeros((4, 2)), 1.0, **options)
-    for options in ({"threads": 0}, {"chunk": -1}, {"chunk": 2.5}):
-        with pytest.raises(OptionError):
-            Work(**options)
-
-
-def test_an_executor_of_another_kind_is_refused():
-    with pytest.raises(OptionError, match="executor"):
-        Work(executor=3)
+@pytest.mark.parametrize(
+    "options", [{"threads": 0}, {"chunk": -1}, {"chunk": 2.5}, {"executor": 3}]
+)
+def test_bad_work_is_refused(options):
+    with pytest.raises(OptionError, match=f"^{next(iter(options))}"):
+        Work(**options)
 
 
 def test_quiet_without_a_terminal(system, starts, capfd):
@@ -363,24 +264,9 @@ def test_interrupt_from_the_keyboard_is_heard_inside_the_chunks_of_threads(
     assert Pressed.pressed
 
 
-@pytest.mark.parametrize(
-    ("arguments", "message"),
-    [
-        ({"system": None}, "system"),
-        ({"parameters": [0.3]}, "parameters"),
-        ({"work": 3}, "work"),
-    ],
-)
-def test_arguments_of_another_kind_are_refused(arguments, message):
-    x = ca.SX.sym("x")
-    given = {"system": FilippovSystem([x], surface=x, above=[-1], below=[1]), **arguments}
-    with pytest.raises(NonsmoothError, match=message):
-        ensemble(x0=[[1.0]], t_end=1.0, **given)
-
-
 @pytest.mark.slow
-def test_what_lanes_hand_over_has_no_itineraries_of_its_own():
-    """Starts on the surface at a fold are handed over; their neighbours are not."""
+def test_runs_that_fall_back_share_the_itineraries_of_lanes():
+    """Starts on the surface at a fold fall back to the scalar driver; their neighbours do not."""
     x, v = ca.SX.sym("x"), ca.SX.sym("v")
     system = FilippovSystem([x, v], surface=v, above=[v, -x - 0.4], below=[v, -x + 0.4])
     starts = np.stack([np.linspace(-2.0, 2.0, 401), np.zeros(401)], axis=1)

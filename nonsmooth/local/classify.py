@@ -8,6 +8,8 @@ distances are dimensionless and unchanged when h or a field is multiplied by a p
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -25,12 +27,9 @@ from ..model import (
 )
 from ..model.checks import positive
 from .checks import MARGIN, require_linear
-from .local_object import LocalObject, spectrum
 from .point.intersections import Intersection, Meeting
-from .point.lie_derivatives import Numbers
 from .point.regions import region_of
-from .point.sides import SIDES
-from .point.surface_point import Place, place
+from .point.surface_point import FIELDS, SIDES, Numbers, Place, place
 from .read_only import ReadOnly
 from .searches.boundary_equilibria import boundary_equilibrium_of
 from .searches.equilibria import equilibrium_distance, kind_of
@@ -46,6 +45,67 @@ from .searches.pseudo_equilibria import (
 )
 from .searches.search import Found
 from .two_folds import classify_two_fold
+
+# What a point is: the answer of ``classify``.
+
+
+@dataclass(frozen=True, eq=False)
+class LocalObject:
+    """What a point is.
+
+    Attributes
+    ----------
+    kind : str
+        ``"crossing"``, ``"sliding"``, ``"fold"``, ``"cusp"``, ``"fold-fold"`` (plane),
+        ``"two-fold"``, ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"``,
+        ``"intersection"`` (of surfaces, where no mode or several can go on) or ``"degenerate"``.
+    label : str
+        Its class: ``"crossing up"``, ``"attracting sliding"``, ``"visible"``, ``"II2"``,
+        ``"VV-C1"``, ``"stable focus"``, ``"pseudo-saddle"``, ``"BF3"``, ``"crossing to +-"``, ...
+    side : {"+", "-", ""}
+        The field to which a fold, cusp, equilibrium or boundary equilibrium belongs.
+    point : ndarray (n,)
+        The point, in the order of the states.
+    distance : float
+        To the nearest degenerate case; below the margin the kind is ``"degenerate"``.
+    nearest : str
+        Which condition that is, e.g. ``"L1 = 0"``.
+    margins : mapping
+        Distance from each condition that was looked at.
+    evidence : mapping
+        Numbers: ``h``, ``L1``, ``L2``, and what decided the class.
+    detail : object
+        The Fold, TwoFold, FoldFold, BoundaryEquilibrium, PseudoEquilibrium or Intersection, if there is
+        one.
+    """
+
+    kind: str
+    label: str
+    side: str
+    point: Array
+    distance: float
+    nearest: str
+    margins: Mapping[str, float]
+    evidence: Mapping[str, float]
+    detail: Any = None
+
+    def __str__(self) -> str:
+        field = f" of {FIELDS[self.side]}" if self.side else ""
+        name = self.label if self.label == self.kind else f"{self.kind}: {self.label}"
+        numbers = ", ".join(f"{k} = {v:.6g}" for k, v in self.evidence.items())
+        away = f"{self.distance:.3g} from {self.nearest}" if self.nearest else "nothing is near"
+        return f"{name}{field} at {self.point.tolist()} ({away}). {numbers}"
+
+
+def spectrum(eigenvalues: NDArray[Any]) -> dict[str, float]:
+    """Eigenvalues as numbers: real parts, and imaginary parts where they are not zero."""
+    values: dict[str, float] = {}
+    for i, v in enumerate(eigenvalues, 1):
+        values[f"Re lambda{i}"] = float(v.real)
+        if v.imag:
+            values[f"Im lambda{i}"] = float(v.imag)
+    return values
+
 
 # ``classify`` where several surfaces meet: what goes on there, and how clearly.
 

@@ -20,8 +20,7 @@ from ...model import (
 from ...model.checks import positive
 from ...model.laws.frozen import Frozen
 from .higher_codimension import law_at
-from .lie_derivatives import Numbers
-from .surface_point import TOLERANCE, on_surface, place
+from .surface_point import TOLERANCE, Numbers, on_surface, place
 
 
 class Region(Enum):

@@ -17,9 +17,7 @@ from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
 from ...solvers.newton import solve_many
-from ..point.lie_derivatives import ManyNumbers
-from ..point.sides import SIDES, Side
-from ..point.surface_point import Place
+from ..point.surface_point import SIDES, ManyNumbers, Place, Side
 from ..searches.equilibria import Equilibrium, find_equilibrium
 from ..searches.folds import Fold, find_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium

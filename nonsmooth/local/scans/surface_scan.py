@@ -18,14 +18,11 @@ from numpy.typing import NDArray
 
 from ...model import Array, DefinitionError, FilippovSystem, NonsmoothError, evaluator, explain
 from ...solvers.newton import solve_many
-from ..point.lie_derivatives import ManyNumbers
 from ..point.regions import Region
-from ..point.sides import FIELDS, SIDES, Side, side_index
-from ..point.surface_point import Place
-from ..searches.find_two_fold import find_two_fold
+from ..point.surface_point import FIELDS, SIDES, ManyNumbers, Place, Side, side_index
+from ..searches.find_two_fold import TwoFold, find_two_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all, search
-from ..searches.two_fold import TwoFold
 from .box import Box
 from .contours import middle_of_sign_changes, refined, zero_lines
 

@@ -27,8 +27,7 @@ from ..checks import (
     require_autonomous,
     require_linear,
 )
-from ..point.sides import FIELDS, SIDES, Side, side_index
-from ..point.surface_point import Place, on_surface, place
+from ..point.surface_point import FIELDS, SIDES, Place, Side, on_surface, place, side_index
 from ..read_only import ReadOnly
 from .equilibria import equilibrium_distance
 from .search import search

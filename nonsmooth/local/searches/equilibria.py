@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters
 from ..checks import require_autonomous
-from ..point.sides import FIELDS, Side, side_index
-from ..point.surface_point import TOLERANCE, Place, place
+from ..point.surface_point import FIELDS, TOLERANCE, Place, Side, place, side_index
 from .search import Found, search
 
 #: Eigenvalues whose real part is below this, relative to the largest, decide nothing.

@@ -24,8 +24,7 @@ from ...model import (
 )
 from ...model.checks import positive
 from ..checks import MARGIN, relative_difference
-from ..point.lie_derivatives import Numbers
-from ..point.surface_point import Place, on_surface, place
+from ..point.surface_point import Numbers, Place, on_surface, place
 from ..read_only import ReadOnly
 from .folds import bend
 

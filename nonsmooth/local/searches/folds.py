@@ -15,9 +15,16 @@ from numpy.typing import ArrayLike
 
 from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
 from ...model.checks import positive
-from ..point.lie_derivatives import Numbers
-from ..point.sides import FIELDS, Side, side_index
-from ..point.surface_point import TOLERANCE, Place, on_surface, place
+from ..point.surface_point import (
+    FIELDS,
+    TOLERANCE,
+    Numbers,
+    Place,
+    Side,
+    on_surface,
+    place,
+    side_index,
+)
 from .search import Found, search, unknowns
 
 

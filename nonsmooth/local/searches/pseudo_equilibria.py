@@ -28,9 +28,8 @@ from ...model import (
 )
 from ..checks import require_autonomous, require_linear
 from ..point.intersections import Meeting
-from ..point.lie_derivatives import Numbers
 from ..point.regions import Region, region_of
-from ..point.surface_point import TOLERANCE, Place, place
+from ..point.surface_point import TOLERANCE, Numbers, Place, place
 from .equilibria import by_real_part, kind_of
 from .search import Found, search
 

@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...model import Array
-from ..point.sides import Side
+from ..point.surface_point import Side
 from .reduced_flow import ReducedFlow
 
 _POINTS = 61

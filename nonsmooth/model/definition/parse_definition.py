@@ -7,8 +7,8 @@ states, time, parameters and multipliers, and functions of the first three.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
 
 import casadi as ca
 
@@ -16,10 +16,94 @@ from ..checks import real
 from ..errors import DefinitionError, ParameterError, explain
 from ..expressions.graph import require_smooth
 from ..reading import Expression, Parameters, column, listed, require_known, scalar, symbols
-from .consistency import require_consistent
+from ..values import Array
 from .events import Impact, Reset, Stop
-from .form import Definition
-from .vectors import read_entry, require_alike
+
+if TYPE_CHECKING:
+    from .system import FilippovSystem
+
+
+from ..expressions.cancel import powers
+from ..reading import require_finite, require_unique
+from ..values import parameter_values
+
+# The one form of a system, whichever way it was written: a field with multipliers, functions, names.
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A system as symbols and expressions."""
+
+    states: ca.SX
+    time: ca.SX
+    parameters: ca.SX
+    multipliers: ca.SX
+    field: ca.SX
+    surfaces: ca.SX
+    guards: ca.SX
+    maps: ca.SX
+    reactions: ca.SX
+    gaps: ca.SX
+    restitutions: ca.SX
+    stops: tuple[tuple[str, int], ...]
+    resets: tuple[tuple[str, int], ...]
+    impacts: tuple[str, ...]
+    defaults: dict[str, float | None]
+    hidden: bool
+    sizes: tuple[int, ...] = ()
+    renamed: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def extended_states(self) -> ca.SX:
+        """The states, followed by the time where the system depends on it."""
+        return ca.vertcat(self.states, self.time)
+
+    @property
+    def gap_rates(self) -> ca.SX:
+        """Rates of the gaps (c,), in states, parameters and time."""
+        x = self.extended_states
+        free = ca.vertcat(self.field, ca.SX.ones(self.time.numel(), 1))
+        rates = ca.jtimes(self.gaps, x, free) if self.gaps.numel() else ca.SX(0, 1)
+        return ca.densify(rates)
+
+    @property
+    def names(self) -> dict[str, list[str]]:
+        """Names of the states and of the parameters."""
+        return {
+            "states": [s.name() for s in listed(self.states)],
+            "parameters": [s.name() for s in listed(self.parameters)],
+        }
+
+    def state(self) -> dict[str, Any]:
+        """Plain values from which ``from_state`` makes an equal definition."""
+        inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
+        outputs = [self.field, self.surfaces, self.guards, self.maps, self.gaps, self.restitutions]
+        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed}
+        return {
+            **{name: value for name, value in some.items() if value},
+            "definition": ca.Function("definition", inputs, outputs).serialize(),
+            "names": [[str(s) for s in listed(v)] for v in inputs],
+            "defaults": self.defaults,
+            "stops": self.stops,
+            "resets": self.resets,
+            "impacts": self.impacts,
+            "hidden": self.hidden,
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Definition:
+        """Make the definition that ``state`` was taken from, over new symbols."""
+        function = ca.Function.deserialize(state["definition"])
+        vectors = [ca.vertcat(*map(ca.SX.sym, names)) for names in state["names"]]
+        vectors = [v if v.numel() else ca.SX(0, 1) for v in vectors]
+        expressions = [ca.SX(e) for e in function.call(vectors)]
+        inputs = ("states", "time", "parameters", "multipliers", "reactions")
+        outputs = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
+        rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
+        parts = dict(zip((*inputs, *outputs), (*vectors, *expressions), strict=True))
+        sizes, renamed = tuple(state.get("sizes", ())), tuple(state.get("renamed", ()))
+        return cls(**parts, **rest, sizes=sizes, renamed=renamed)
+
 
 _DIRECTIONS = (-1, 0, 1)
 
@@ -254,3 +338,218 @@ def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> t
         given.append(ca.SX.sym(f"reaction{j}"))
         field = field + given[-1] * _direction(impact, gap, rate, x)
     return ca.vertcat(*given) if given else ca.SX(0, 1), field
+
+
+# Reading sets of codimension two and three: vectors among the surfaces and the multipliers.
+
+#: Largest codimension of a set: slip has two components, three with drilling.
+LARGEST = 3
+
+
+def read_entry(value: Any, what: str) -> list[ca.SX]:
+    """Read a surface (a scalar) or a set (a vector of two or three) as a list of expressions."""
+    if not isinstance(value, (list, tuple)) and not (
+        isinstance(value, (ca.SX, ca.DM)) and ca.SX(value).numel() > 1
+    ):
+        return [scalar(value, what)]
+    entries = listed(value)
+    if isinstance(value, (ca.SX, ca.DM)) and 1 not in value.shape:
+        raise DefinitionError(
+            f"{what}: expected a scalar or a column, received a matrix of shape {value.shape}."
+        )
+    if not 1 <= len(entries) <= LARGEST:
+        raise DefinitionError(
+            explain(
+                what,
+                expected=f"a scalar, or a vector of at most {LARGEST} switching functions",
+                received=f"{len(entries)} of them",
+                advice="A vector is one set on which all of them vanish, as slip in the plane does; "
+                "surfaces that do not belong together are entries of their own.",
+            )
+        )
+    return [scalar(e, f"{what}[{i}]") for i, e in enumerate(entries)]
+
+
+def require_alike(sizes: Sequence[int], multipliers: Any) -> None:
+    """Refuse multipliers that are not shaped as the surfaces."""
+    entries = [len(listed(entry)) for entry in listed(multipliers)]
+    if max((*sizes, *entries), default=1) == 1 or list(sizes) == entries:
+        return
+    raise DefinitionError(
+        explain(
+            "multipliers",
+            expected=f"one for each surface, as many components as it has: {list(sizes)}",
+            received=str(entries),
+            advice="surfaces=[casadi.vertcat(h1, h2)] goes with multipliers=[casadi.vertcat(l1, l2)].",
+        )
+    )
+
+
+def require_linear_sets(d: Definition) -> None:
+    """Refuse sets whose multipliers do not enter linearly together, or are multiplied by a
+    reaction."""
+    first = 0
+    for i, size in enumerate(d.sizes):
+        lam = d.multipliers[first : first + size]
+        first += size
+        if size == 1:
+            continue
+        if not ca.is_linear(d.field, lam):
+            raise DefinitionError(
+                f"multiplier {lam}: expected a field linear in all of its components together, "
+                "received a nonlinear one. Hidden dynamics has one multiplier for each surface."
+            )
+        if d.reactions.numel() and ca.depends_on(ca.jacobian(d.field, lam), d.reactions):
+            raise DefinitionError(
+                explain(
+                    f"multiplier {lam} of surface {i}",
+                    expected="a load in states, time and parameters",
+                    received="the reaction of an impact",
+                    advice="Impulses with friction in the plane are not treated: give the contact a "
+                    "compliance, whose force is the load, or friction in one direction.",
+                )
+            )
+
+
+def multiplier_enters(system: FilippovSystem, members: Sequence[int], p: Array) -> bool:
+    """Whether the multiplier of a set enters the field with given parameters."""
+    d = system.definition
+    columns = ca.jacobian(d.field, d.multipliers[list(members)])
+    if d.parameters.numel():
+        columns = ca.substitute(columns, d.parameters, ca.SX(p.tolist()))
+    return not ca.densify(columns).is_zero()
+
+
+# Whether a definition describes a system: its symbols, its functions, how multipliers enter.
+
+
+def require_consistent(d: Definition) -> None:
+    """Refuse a definition that describes no system."""
+    guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
+    named = [("field", d.field, True)]
+    named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
+    named += [(name, d.guards[i], False) for i, name in enumerate(guards)]
+    named += [(f"map of reset {n!r}", d.maps[:, j], False) for j, (n, _) in enumerate(d.resets)]
+    for j, name in enumerate(d.impacts):
+        named += [(f"gap of {name!r}", d.gaps[j], False)]
+        named += [(f"restitution of {name!r}", d.restitutions[j], False)]
+    known = ca.vertcat(d.extended_states, d.parameters, d.multipliers, d.reactions)
+    require_unique(known)
+    moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
+    for what, expression, multipliers in named:
+        require_known(expression, known, what, **d.names)
+        if not multipliers and ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
+            raise DefinitionError(
+                f"{what}: expected an expression in states, time and parameters, received one "
+                "with a multiplier. Only the field may contain multipliers."
+            )
+        require_finite(expression, known, what)
+        require_smooth(expression, moving, d.parameters, what)
+    for i, name in enumerate(guards):
+        if not ca.depends_on(d.guards[i], d.extended_states):
+            raise DefinitionError(_without_states(name, d.guards[i], d))
+        _require_simple(name, d.guards[i], d)
+    for i, h in enumerate(listed(d.surfaces)):
+        if not ca.depends_on(h, d.states):
+            raise DefinitionError(_without_states(f"surface {i}", h, d))
+        _require_simple(f"surface {i}", h, d)
+    for j in range(len(d.impacts)):
+        _check_impact(d, j)
+    if not d.hidden:
+        _require_linear(d)
+    require_linear_sets(d)
+
+
+def _check_impact(d: Definition, j: int) -> None:
+    what, gap, rate = f"gap of {d.impacts[j]!r}", d.gaps[j], d.gap_rates[j]
+    if not ca.depends_on(gap, d.states):
+        raise DefinitionError(_without_states(what, gap, d))
+    _require_simple(what, gap, d)
+    if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
+        raise DefinitionError(
+            explain(
+                what,
+                expected="a function of positions, whose rate no multiplier enters",
+                received=f"{gap}, with the rate {rate}",
+                advice="Forces act on velocities: a gap is a function of positions and time.",
+            )
+        )
+    effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
+    if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):
+        raise DefinitionError(
+            explain(
+                f"reaction of {d.impacts[j]!r}",
+                expected="a multiplier that enters the field linearly and moves the gap's rate",
+                received="one that does not move it" if effect.is_zero() else "a nonlinear one",
+                advice="Write the force that opens the contact as reaction times its direction.",
+            )
+        )
+    e = d.restitutions[j]
+    if e.is_constant() and not 0.0 <= float(e) <= 1.0:
+        raise DefinitionError(
+            f"restitution of {d.impacts[j]!r}: expected a number from 0 to 1, received {float(e):g}."
+        )
+
+
+def consistent_parameters(
+    d: Definition, names: Sequence[str], parameters: Parameters | None
+) -> Array:
+    """Numbers for all parameters; a restitution that depends on nothing else must be one."""
+    p = parameter_values(names, d.defaults, parameters)
+    for j, name in enumerate(d.impacts):
+        e = d.restitutions[j]
+        if e.is_constant() or ca.depends_on(e, d.extended_states):
+            continue
+        value = float(ca.evalf(ca.substitute(e, d.parameters, ca.DM(p))))
+        if not 0.0 <= value <= 1.0:
+            raise ParameterError(
+                f"restitution of {name!r}: expected a number from 0 to 1, received {value:g} (= {e})."
+            )
+    return p
+
+
+def _require_linear(d: Definition) -> None:
+    for lam in listed(d.multipliers):
+        if not ca.is_linear(d.field, lam):
+            raise DefinitionError(
+                f"multiplier {lam}: expected a field linear in it (Filippov's convex "
+                "combination), received a nonlinear one. Nonlinear multipliers are hidden "
+                "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
+                "different multipliers are fine."
+            )
+
+
+def _require_simple(what: str, function: ca.SX, d: Definition) -> None:
+    """Refuse a power of something that is zero on the surface, as far as it is in sight."""
+    x = d.extended_states
+    for factor, power in powers(function, x, d.parameters):
+        if power > 1 and ca.depends_on(factor, x) and ca.is_linear(factor, x):
+            raise DefinitionError(
+                explain(
+                    what,
+                    expected="a function with simple zeros",
+                    received=f"{function}, which has the factor {factor} {power} times",
+                    advice="Where the gradient vanishes too, the surface cannot be located to "
+                    "rounding: use the factor once if the power is odd; an even one does not "
+                    "change the sign.",
+                )
+            )
+
+
+def _without_states(what: str, function: ca.SX, d: Definition) -> str:
+    """Message for a surface, stop or reset that no motion can cross."""
+    if d.time.numel() and ca.depends_on(function, d.time):
+        received, advice = (
+            f"the function {function} of time alone",
+            "Make a clock a state: c with c' = 1, started at the time, and the surface a function "
+            "of c.",
+        )
+    else:
+        received = f"the constant {function}"
+        advice = "A surface is the zero set of a function of the states."
+    return explain(
+        what,
+        expected=f"a function of the states {tuple(d.names['states'])}",
+        received=received,
+        advice=advice,
+    )

@@ -12,9 +12,8 @@ Sources: Keller 1977 (pseudo-arclength); Allgower & Georg 1990; Kuznetsov 2004, 
 
 from ..newton import Secant, Values, converge
 from .arc import Arc, ahead, trace
-from .curve import Curve, Point
+from .curve import Curve, Point, Zero
 from .pieces import Departure, changes_around, depart, directions, other_direction, pieces
-from .zeros import Zero
 
 __all__ = [
     "Arc",

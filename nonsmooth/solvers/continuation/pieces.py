@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import Array, DefinitionError
-from .arc import Arc
-from .checks import require_curve, vector
+from .arc import Arc, require_curve, vector
 from .curve import Curve, Point
 
 

@@ -21,7 +21,6 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
-    explain,
     layer_of,
     require_system,
 )
@@ -330,13 +329,10 @@ class _Question:
         x, gradient = self.numbers.x, self.numbers.gradient
         foot = x - self.numbers.h * gradient / (gradient @ gradient)
         raise PointError(
-            explain(
-                f"point {x}",
-                expected="a point of the surface h = 0, or an equilibrium of a field",
-                received=f"h = {self.numbers.h:.6g} (about {self.numbers.distance:.3g} away), "
-                f"F1 = {self.numbers.fields[0].tolist()}, F2 = {self.numbers.fields[1].tolist()}",
-                advice=f"The nearest point of the surface is about {foot.tolist()}.",
-            )
+            f"point {x}: expected a point of the surface h = 0, or an equilibrium of a field, "
+            f"received h = {self.numbers.h:.6g} (about {self.numbers.distance:.3g} away), F1 = "
+            f"{self.numbers.fields[0].tolist()}, F2 = {self.numbers.fields[1].tolist()}. The "
+            f"nearest point of the surface is about {foot.tolist()}."
         )
 
     def _equilibrium(self, k: int, status: str) -> LocalObject:

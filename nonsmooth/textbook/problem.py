@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..flow import Trajectory, simulate
-from ..model import Array, FilippovSystem, OptionError, explain
+from ..model import Array, FilippovSystem, OptionError
 
 #: Values are compared to nine digits, or to their own if they have fewer.
 RELATIVE = 1e-9
@@ -63,12 +63,8 @@ class Reference:
         found = np.atleast_1d(np.asarray(computed, dtype=float))
         if found.shape != known.shape:
             raise OptionError(
-                explain(
-                    self.quantity,
-                    expected=f"shape {known.shape}",
-                    received=f"shape {found.shape}",
-                    advice="Compare like with like; `how` says what the value is.",
-                )
+                f"{self.quantity}: expected shape {known.shape}, received shape {found.shape}. "
+                "Compare like with like; `how` says what the value is."
             )
         scale = np.where(known == 0.0, 1.0, np.abs(known))
         return float(np.max(np.abs(found - known) / scale))

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..model import FilippovSystem, OptionError, explain
+from ..model import FilippovSystem, OptionError
 from .problem import RELATIVE, Problem, Reference, problem
 
 #: One example (sigma, nu) of each class of the decision table.
@@ -111,12 +111,8 @@ def _by_label(
 ) -> tuple[tuple[int, int], tuple[float, float]]:
     if label not in TWO_FOLDS:
         raise OptionError(
-            explain(
-                "label",
-                expected=f"one of {', '.join(TWO_FOLDS)}, or two signs with nu=",
-                received=repr(label),
-                advice="The labels are the classes of the two-fold's decision table.",
-            )
+            f"label: expected one of {', '.join(TWO_FOLDS)}, or two signs with nu=, received "
+            f"{label!r}. The labels are the classes of the two-fold's decision table."
         )
     if nu is not None:
         raise OptionError(

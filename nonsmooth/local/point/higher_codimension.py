@@ -23,7 +23,6 @@ from ...model import (
     Parameters,
     PointError,
     coupled_of,
-    explain,
     require_system,
 )
 from ...model.checks import positive
@@ -161,12 +160,9 @@ def law_at(
     distance = float(np.linalg.norm(h[own]))
     if not distance <= tol * slope * (1.0 + float(np.linalg.norm(x))):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"a point on the set {system.surface_names[own[0]]} = 0",
-                received=f"h = {h[own].tolist()}",
-                advice="Limit directions belong to points of the set, where all components vanish.",
-            )
+            f"point {x}: expected a point on the set {system.surface_names[own[0]]} = 0, received "
+            f"h = {h[own].tolist()}. Limit directions belong to points of the set, where all "
+            "components vanish."
         )
     law = frozen(coupled, letters, x, np.zeros(coupled.count), p, own)
     if not (np.all(np.isfinite(law.a)) and np.all(np.isfinite(law.m))):
@@ -177,12 +173,8 @@ def law_at(
 def _members(system: FilippovSystem, surface: int | None) -> tuple[int, ...]:
     if not system.sets:
         raise DefinitionError(
-            explain(
-                "system",
-                expected="one with a vector multiplier, a set of codimension two or three",
-                received=repr(system),
-                advice="At a surface orbits arrive from two sides: see region.",
-            )
+            "system: expected one with a vector multiplier, a set of codimension two or three, "
+            f"received {system!r}. At a surface orbits arrive from two sides: see region."
         )
     if surface is None:
         return system.sets[0]
@@ -209,12 +201,8 @@ def _letters(system: FilippovSystem, h: Array, members: tuple[int, ...], mode: s
         for entry in system.entries:
             if entry != members and not any(h[i] for i in entry):
                 raise PointError(
-                    explain(
-                        "point",
-                        expected=f"a side of {system.surface_names[entry[0]]}",
-                        received="a point on it too",
-                        advice="Say with mode= what the others do, one letter each.",
-                    )
+                    f"point: expected a side of {system.surface_names[entry[0]]}, received a "
+                    "point on it too. Say with mode= what the others do, one letter each."
                 )
     for i in members:
         letters[i] = "s"

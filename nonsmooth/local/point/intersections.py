@@ -198,12 +198,9 @@ def _meeting(
         )
     if np.linalg.matrix_rank(found.h_x[chosen] / lengths[chosen, None]) < min(len(chosen), x.size):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"independent gradients of surfaces {chosen}",
-                received=f"{found.h_x[chosen].tolist()}",
-                advice="Two surfaces that touch are no intersection of this kind.",
-            )
+            f"point {x}: expected independent gradients of surfaces {chosen}, received "
+            f"{found.h_x[chosen].tolist()}. Two surfaces that touch are no intersection of this "
+            "kind."
         )
     return chosen
 
@@ -270,13 +267,9 @@ class Meeting:
                     return [(self._mode(letters), self._with(lam))], True
         if k > _TRIED:
             raise DefinitionError(
-                explain(
-                    f"surfaces {self.surfaces}",
-                    expected=f"at most {_TRIED}, or rates whose complementarity problem is shown to have "
-                    "one solution (P-matrix)",
-                    received=f"{k} surfaces",
-                    advice="simulate says where a run goes from there.",
-                )
+                f"surfaces {self.surfaces}: expected at most {_TRIED}, or rates whose "
+                f"complementarity problem is shown to have one solution (P-matrix), received {k} "
+                "surfaces. simulate says where a run goes from there."
             )
         every = list(product((1.0, -1.0, 0.0), repeat=k))
         return [pair for letters in every for pair in self._solved(np.array(letters))], True

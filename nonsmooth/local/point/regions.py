@@ -13,7 +13,6 @@ from ...model import (
     Parameters,
     PointError,
     call,
-    explain,
     motion,
     require_system,
 )
@@ -158,13 +157,10 @@ def _region_of_set(law: Frozen, tol: float) -> Region:
 def _refuse_crossing(numbers: Numbers, found: Region, what: str) -> None:
     if found in (Region.CROSSING_UP, Region.CROSSING_DOWN):
         raise PointError(
-            explain(
-                what,
-                expected="a point of the sliding region or its boundary, L1 L2 <= 0",
-                received=f"{found} at {numbers.x.tolist()}, L1 = {numbers.lie[0]:.6g}, "
-                f"L2 = {numbers.lie[1]:.6g}",
-                advice="Orbits cross the surface here; no convex combination is tangent to it.",
-            )
+            f"{what}: expected a point of the sliding region or its boundary, L1 L2 <= 0, "
+            f"received {found} at {numbers.x.tolist()}, L1 = {numbers.lie[0]:.6g}, L2 = "
+            f"{numbers.lie[1]:.6g}. Orbits cross the surface here; no convex combination is "
+            "tangent to it."
         )
 
 
@@ -212,13 +208,9 @@ def alpha(
     _refuse_crossing(numbers, found, "alpha")
     if found is Region.TWO_FOLD:
         raise PointError(
-            explain(
-                "alpha",
-                expected="L1 and L2 not both zero",
-                received=f"both fields tangent at {x.tolist()}",
-                advice="alpha is 0/0 at a two-fold and its limit depends on the direction; the "
-                "sliding field itself is finite where the two fields coincide (sliding_field).",
-            )
+            "alpha: expected L1 and L2 not both zero, received both fields tangent at "
+            f"{x.tolist()}. alpha is 0/0 at a two-fold and its limit depends on the direction; "
+            "the sliding field itself is finite where the two fields coincide (sliding_field)."
         )
     if not found.sliding:
         return 0.0 if found is Region.TANGENT_ABOVE else 1.0
@@ -271,13 +263,9 @@ def sliding_field(
     _refuse_crossing(numbers, found, "sliding field")
     if found is Region.TWO_FOLD and not coincide(numbers, tol):
         raise PointError(
-            explain(
-                "sliding field",
-                expected="L1 and L2 not both zero, or F1 = F2",
-                received=f"both fields tangent and different at {x.tolist()}",
-                advice="The sliding field is 0/0 at this two-fold and its limit depends on "
-                "the direction; ask find_two_fold for the class of the point.",
-            )
+            "sliding field: expected L1 and L2 not both zero, or F1 = F2, received both fields "
+            f"tangent and different at {x.tolist()}. The sliding field is 0/0 at this two-fold "
+            "and its limit depends on the direction; ask find_two_fold for the class of the point."
         )
     build = motion(system, where.mode)
     function = system.function(("sliding field", where.mode), lambda: [build.field])

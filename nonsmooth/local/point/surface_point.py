@@ -22,7 +22,6 @@ from ...model import (
     PointError,
     call,
     evaluator,
-    explain,
     motion,
     require_system,
 )
@@ -156,12 +155,8 @@ def side_index(side: object) -> int:
     """0 for ``+`` and 1 for ``-``."""
     if side not in SIDES:
         raise DefinitionError(
-            explain(
-                "side",
-                expected="'+' (the field F1, h > 0) or '-' (F2, h < 0)",
-                received=repr(side),
-                advice="Folds and equilibria belong to one of the two fields.",
-            )
+            f"side: expected '+' (the field F1, h > 0) or '-' (F2, h < 0), received {side!r}. "
+            "Folds and equilibria belong to one of the two fields."
         )
     return SIDES.index(side)
 
@@ -242,15 +237,12 @@ class Place:
         numbers = self.at(x)
         if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
             raise PointError(
-                explain(
-                    f"point {x}",
-                    expected="a state where the fields and the derivatives of h, L1 and L2 are "
-                    "finite",
-                    received=f"h={numbers.h}, F1={numbers.fields[0]}, F2={numbers.fields[1]}, "
-                    f"grad L1={numbers.lie_gradients[0]}, grad L2={numbers.lie_gradients[1]}",
-                    advice="A root or logarithm left its domain, or a form such as sqrt(x)*x has "
-                    "an infinite factor in its derivative: write it as one power.",
-                )
+                f"point {x}: expected a state where the fields and the derivatives of h, L1 and "
+                f"L2 are finite, received h={numbers.h}, F1={numbers.fields[0]}, "
+                f"F2={numbers.fields[1]}, grad L1={numbers.lie_gradients[0]}, grad "
+                f"L2={numbers.lie_gradients[1]}. A root or logarithm left its domain, or a form "
+                "such as sqrt(x)*x has an infinite factor in its derivative: write it as one "
+                "power."
             )
         return numbers
 
@@ -360,12 +352,8 @@ def place(
     if system.surface_count == 0 and smooth:
         if surface or mode:
             raise DefinitionError(
-                explain(
-                    "surface and mode",
-                    expected="none, as the system has no surface",
-                    received=f"surface {surface!r}, mode {mode!r}",
-                    advice="Leave them out.",
-                )
+                "surface and mode: expected none, as the system has no surface, received surface "
+                f"{surface!r}, mode {mode!r}. Leave them out."
             )
         return Place(system, 0, "", p), x
     require_surface(system)
@@ -376,13 +364,9 @@ def place(
     letters[surface] = "s"
     if letters.count("s") > 1:
         raise DefinitionError(
-            explain(
-                f"mode {''.join(letters)!r}",
-                expected="one sliding surface",
-                received=str(letters.count("s")),
-                advice="This floor looks at one surface: give + or - to the others. For several "
-                "that slide at once see sliding_branches and intersection_range.",
-            )
+            f"mode {''.join(letters)!r}: expected one sliding surface, received "
+            f"{letters.count('s')}. This floor looks at one surface: give + or - to the others. "
+            "For several that slide at once see sliding_branches and intersection_range."
         )
     return Place(system, int(surface), "".join(letters), p), x
 
@@ -394,12 +378,8 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     for i, value in enumerate(values):
         if i != surface and value == 0:
             raise PointError(
-                explain(
-                    f"point {x}",
-                    expected=f"a side of surface {i}",
-                    received=f"a point on surfaces {surface} and {i}",
-                    advice="Choose the side with mode=, one letter per surface.",
-                )
+                f"point {x}: expected a side of surface {i}, received a point on surfaces "
+                f"{surface} and {i}. Choose the side with mode=, one letter per surface."
             )
     return "".join("+" if value > 0 else "-" for value in values)
 
@@ -420,22 +400,15 @@ def on_surface(where: Place, x: Array, tol: float) -> Numbers:
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"a regular point of surface {where.surface}",
-                received="grad h = 0",
-                advice="The zero set of h is not a surface there; write h with a nonzero gradient.",
-            )
+            f"point {x}: expected a regular point of surface {where.surface}, received grad h = "
+            "0. The zero set of h is not a surface there; write h with a nonzero gradient."
         )
     if numbers.distance > tol * (1 + np.linalg.norm(x)):
         foot = x - numbers.h * numbers.gradient / (numbers.gradient @ numbers.gradient)
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"a point on surface {where.surface}, h = 0",
-                received=f"h = {numbers.h:.6g} (about {numbers.distance:.3g} away)",
-                advice=f"The nearest point of the surface is about {foot.tolist()} (one Newton "
-                "step along grad h; repeat it where the surface is curved), or raise tol.",
-            )
+            f"point {x}: expected a point on surface {where.surface}, h = 0, received h = "
+            f"{numbers.h:.6g} (about {numbers.distance:.3g} away). The nearest point of the "
+            f"surface is about {foot.tolist()} (one Newton step along grad h; repeat it where the "
+            "surface is curved), or raise tol."
         )
     return numbers

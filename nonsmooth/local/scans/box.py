@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, OptionError, explain
+from ...model import Array, OptionError
 
 _ROUNDING = 1e-9
 
@@ -31,12 +31,8 @@ class Box:
         finite = values.shape == (4,) and bool(np.all(np.isfinite(values)))
         if not finite or not (values[0] < values[1] and values[2] < values[3]):
             raise OptionError(
-                explain(
-                    "box",
-                    expected="(xmin, xmax, ymin, ymax) with xmin < xmax and ymin < ymax",
-                    received=repr(box),
-                    advice="For example (-1, 1, -2, 2).",
-                )
+                "box: expected (xmin, xmax, ymin, ymax) with xmin < xmax and ymin < ymax, "
+                f"received {box!r}. For example (-1, 1, -2, 2)."
             )
         return cls(*map(float, values))
 

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, DefinitionError, FilippovSystem, NonsmoothError, evaluator, explain
+from ...model import Array, DefinitionError, FilippovSystem, NonsmoothError, evaluator
 from ...solvers.newton import solve_many
 from ..point.regions import Region
 from ..point.surface_point import FIELDS, SIDES, ManyNumbers, Place, Side, side_index
@@ -69,12 +69,8 @@ class SurfaceScan:
             chosen = [str(name) for name in coordinates]
             if len(chosen) != 2 or len(set(chosen)) != 2 or not set(chosen) <= set(names):
                 raise DefinitionError(
-                    explain(
-                        "coordinates",
-                        expected=f"two of the states {names}",
-                        received=repr(coordinates),
-                        advice="Leave it out to draw over the two along which the surface is flattest.",
-                    )
+                    f"coordinates: expected two of the states {names}, received {coordinates!r}. "
+                    "Leave it out to draw over the two along which the surface is flattest."
                 )
             pairs = [(names.index(chosen[0]), names.index(chosen[1]))]
         where = Place(system, 0, "s", system.parameter_vector(parameters))
@@ -82,12 +78,9 @@ class SurfaceScan:
         best = max(scans, key=lambda scan: scan._steepness())
         if not best._steepness() > 0:
             raise DefinitionError(
-                explain(
-                    "surface",
-                    expected="one over the box, h = 0 solvable for the remaining state",
-                    received=f"none over {[names[i] for i in best.shown]} in {box.limits}",
-                    advice="Choose other coordinates=, another box or guess=.",
-                )
+                "surface: expected one over the box, h = 0 solvable for the remaining state, "
+                f"received none over {[names[i] for i in best.shown]} in {box.limits}. Choose "
+                "other coordinates=, another box or guess=."
             )
         return best
 

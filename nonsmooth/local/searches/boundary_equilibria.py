@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
 from ..checks import (
     MARGIN,
@@ -179,13 +179,10 @@ def boundary_equilibrium(
     k = int(np.argmin(found)) if side is None else side_index(side)
     if found[k] > tol:
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"an equilibrium of a field (to {tol:.1e})",
-                received=f"F1 = {numbers.fields[0].tolist()}, F2 = {numbers.fields[1].tolist()}; "
-                f"the nearest zero is about {found[k]:.3g} away",
-                advice="find_boundary_equilibrium(system, near, vary=parameter) finds one.",
-            )
+            f"point {x}: expected an equilibrium of a field (to {tol:.1e}), received F1 = "
+            f"{numbers.fields[0].tolist()}, F2 = {numbers.fields[1].tolist()}; the nearest zero "
+            f"is about {found[k]:.3g} away. find_boundary_equilibrium(system, near, "
+            "vary=parameter) finds one."
         )
     return boundary_equilibrium_of(
         x, k, numbers.gradient, numbers.fields[1 - k], derivatives[k], margin

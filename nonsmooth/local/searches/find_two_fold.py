@@ -17,7 +17,6 @@ from ...model import (
     FilippovSystem,
     Parameters,
     PointError,
-    explain,
     real_array,
 )
 from ...model.checks import positive
@@ -63,12 +62,9 @@ class Chart:
         states, n = real_array(x, "states"), self._dimension
         if states.ndim == 0 or states.shape[-1] != n:
             raise PointError(
-                explain(
-                    "states",
-                    expected=f"shape (..., {n}) for the states {self.where.system.state_names}",
-                    received=f"shape {states.shape}",
-                    advice="States are on the last axis.",
-                )
+                f"states: expected shape (..., {n}) for the states "
+                f"{self.where.system.state_names}, received shape {states.shape}. States are on "
+                "the last axis."
             )
         if not np.all(np.isfinite(states)):
             raise PointError("states: expected finite numbers, received NaN or inf.")
@@ -569,12 +565,8 @@ def two_fold(
     allowed = tol * (1 + np.linalg.norm(x)) * np.where(lengths > 0, lengths, 1.0)
     if np.any(np.abs(numbers.lie) > allowed):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected="a two-fold, L1 = L2 = 0",
-                received=f"L1 = {numbers.lie[0]:.6g}, L2 = {numbers.lie[1]:.6g}",
-                advice="find_two_fold(system, near=point) goes to the nearest one.",
-            )
+            f"point {x}: expected a two-fold, L1 = L2 = 0, received L1 = {numbers.lie[0]:.6g}, L2 "
+            f"= {numbers.lie[1]:.6g}. find_two_fold(system, near=point) goes to the nearest one."
         )
     return _build(where, Found(x))
 

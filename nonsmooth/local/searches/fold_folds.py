@@ -19,7 +19,6 @@ from ...model import (
     FilippovSystem,
     Parameters,
     PointError,
-    explain,
     require_system,
 )
 from ...model.checks import positive
@@ -118,12 +117,9 @@ def fold_fold(
     numbers = on_surface(where, x, tol)
     if np.any(np.abs(numbers.angles) > tol):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected="a fold-fold, L1 = L2 = 0",
-                received=f"L1 = {numbers.lie[0]:.6g}, L2 = {numbers.lie[1]:.6g}",
-                advice="In the plane fold-folds happen at isolated values of a parameter.",
-            )
+            f"point {x}: expected a fold-fold, L1 = L2 = 0, received L1 = {numbers.lie[0]:.6g}, "
+            f"L2 = {numbers.lie[1]:.6g}. In the plane fold-folds happen at isolated values of a "
+            "parameter."
         )
     return fold_fold_of(where, numbers, margin)
 
@@ -161,12 +157,8 @@ def require_planar(system: FilippovSystem, what: str) -> None:
     if system.extended_dimension != 2:
         size = f"{system.dimension} states{' and time' if system.time_dependent else ''}"
         raise DefinitionError(
-            explain(
-                what,
-                expected="a planar system without explicit time",
-                received=size,
-                advice="In three and more dimensions two folds meet in a two-fold: find_two_fold.",
-            )
+            f"{what}: expected a planar system without explicit time, received {size}. In three "
+            "and more dimensions two folds meet in a two-fold: find_two_fold."
         )
 
 

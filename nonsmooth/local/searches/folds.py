@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
 from ..point.surface_point import (
     FIELDS,
@@ -192,12 +192,9 @@ def fold(
     numbers = on_surface(where, x, positive(tol, "tol"))
     if abs(numbers.angles[k]) > tol:
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"L{k + 1} = 0, the field {FIELDS[side]} tangent to the surface",
-                received=f"L{k + 1} = {numbers.lie[k]:.6g}",
-                advice="find_fold(system, near=point) goes to the nearest fold.",
-            )
+            f"point {x}: expected L{k + 1} = 0, the field {FIELDS[side]} tangent to the surface, "
+            f"received L{k + 1} = {numbers.lie[k]:.6g}. find_fold(system, near=point) goes to the "
+            "nearest fold."
         )
     length = float(np.linalg.norm(numbers.lie_gradients[k])) or 1.0
     residual = max(numbers.distance, abs(float(numbers.lie[k])) / length)

@@ -22,7 +22,6 @@ from ...model import (
     LayerNumbers,
     Parameters,
     PointError,
-    explain,
     layer_of,
     require_system,
 )
@@ -208,13 +207,9 @@ def pseudo_equilibrium_at(where: Place, found: Found) -> PseudoEquilibrium:
     l1, l2 = numbers.lie
     if l1 == l2:
         raise PointError(
-            explain(
-                f"pseudo-equilibrium at {x.tolist()}",
-                expected="L1 != L2",
-                received=f"L1 = L2 = {l1:.6g}",
-                advice="The sliding field is not defined there (a fold-fold or a boundary "
-                "equilibrium): classify(system, point) names it.",
-            )
+            f"pseudo-equilibrium at {x.tolist()}: expected L1 != L2, received L1 = L2 = {l1:.6g}. "
+            "The sliding field is not defined there (a fold-fold or a boundary equilibrium): "
+            "classify(system, point) names it."
         )
     alpha = float(l1 / (l1 - l2))
     matrix, _ = sliding_matrix(numbers, derivatives)
@@ -305,12 +300,8 @@ def find_on_intersection(
     chosen, n = np.flatnonzero(letters == 0.0), x.size
     if chosen.size > n:
         raise DefinitionError(
-            explain(
-                f"mode {mode!r}",
-                expected=f"at most {n} surfaces that meet in a space of {n} states",
-                received=f"{chosen.size}",
-                advice="Give + or - to the others.",
-            )
+            f"mode {mode!r}: expected at most {n} surfaces that meet in a space of {n} states, "
+            f"received {chosen.size}. Give + or - to the others."
         )
     layer = layer_of(system)
 
@@ -390,12 +381,9 @@ def along_intersection(at: LayerNumbers, surfaces: list[int]) -> tuple[Array, Ar
     slope = at.rates_l[np.ix_(surfaces, surfaces)]
     if np.linalg.cond(slope) * TOLERANCE > 1.0:
         raise PointError(
-            explain(
-                "pseudo-equilibrium on an intersection",
-                expected="multipliers that are determined by the rates of the surfaces",
-                received=f"d(rates)/d(multipliers) = {slope.tolist()}, singular",
-                advice="The sliding flow is not defined there.",
-            )
+            "pseudo-equilibrium on an intersection: expected multipliers that are determined by "
+            f"the rates of the surfaces, received d(rates)/d(multipliers) = {slope.tolist()}, "
+            "singular. The sliding flow is not defined there."
         )
     drift = np.linalg.solve(slope, at.rates_x[surfaces])
     whole = at.field_x - at.field_l[:, surfaces] @ drift

@@ -74,12 +74,8 @@ def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: 
     unknown = [name for name in names if name not in system.state_names]
     if unknown:
         raise DefinitionError(
-            explain(
-                "hold",
-                expected=f"names of states among {list(system.state_names)}",
-                received=str(unknown),
-                advice="Parameters keep their value anyway.",
-            )
+            f"hold: expected names of states among {list(system.state_names)}, received "
+            f"{unknown}. Parameters keep their value anyway."
         )
     free = [i for i, name in enumerate(system.state_names) if name not in names]
     if len(free) < equations:
@@ -130,12 +126,8 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
     found: list[Any] = []
     if not callable(search):
         raise OptionError(
-            explain(
-                "search",
-                expected="a function of a start",
-                received=repr(search),
-                advice="For example lambda x: nonsmooth.find_fold(system, x).",
-            )
+            f"search: expected a function of a start, received {search!r}. For example lambda x: "
+            "nonsmooth.find_fold(system, x)."
         )
     for start in np.atleast_2d(real_array(starts, "starts")):
         try:

@@ -1,4 +1,4 @@
-"""What can happen at the zero of a function besides a switch: stops, resets and impacts."""
+"""Events of a system besides switching: stops, resets, impacts and clocks."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import Any
 
 import casadi as ca
 
-from ..errors import DefinitionError, explain
+from ..errors import DefinitionError
 from ..reading import Expression, column, listed, scalar
 
 
@@ -76,7 +76,7 @@ class Reset:
 
 @dataclass(frozen=True)
 class Impact:
-    """A gap that is never negative: bodies hit it, come to rest on it, and are let go.
+    """A unilateral contact: a gap that is never negative, with Newton's restitution.
 
     The contact is open (letter ``o``) or closed (``c``). Where the gap falls to zero with a rate v,
     an impulse along the reaction turns it into -restitution v. Impacts that accumulate end in the
@@ -116,9 +116,6 @@ class Impact:
     name: str = "impact"
 
 
-# Clocks: what happens periodically in time, such as the carrier of a pulse-width modulation.
-
-
 @dataclass(frozen=True, eq=False)
 class Clock:
     """A phase that runs from 0 to its period and starts again.
@@ -144,9 +141,8 @@ class Clock:
 
     Notes
     -----
-    A tick leads to ``phase - period``, which is zero to rounding: what rounding moved a tick is not
-    lost, and clocks do not drift. A surface that the jump of the phase carries across changes its
-    side in the same event (contract of events, 8).
+    A tick leads to ``phase - period``, which is zero to rounding, so clocks do not drift. If the jump of
+    the phase changes the side of a surface, that is part of the same event (contract of events, 8).
 
     Examples
     --------
@@ -189,12 +185,8 @@ def with_clocks(clocks: Any, given: dict[str, Any]) -> dict[str, Any]:
     for i, clock in enumerate(clocks):
         if not isinstance(clock, Clock):
             raise DefinitionError(
-                explain(
-                    f"clocks[{i}]",
-                    expected="a Clock",
-                    received=f"{clock!r} ({type(clock).__name__})",
-                    advice="Write clocks=[nonsmooth.Clock(period)].",
-                )
+                f"clocks[{i}]: expected a Clock, received {clock!r} ({type(clock).__name__}). "
+                "Write clocks=[nonsmooth.Clock(period)]."
             )
     states, phases = listed(given["states"]), [c.phase for c in clocks]
     n, result = len(states), {**given, "states": [*states, *phases]}
@@ -211,7 +203,7 @@ def with_clocks(clocks: Any, given: dict[str, Any]) -> dict[str, Any]:
 def _widened(reset: Any, n: int, phases: Sequence[Any]) -> Any:
     """A reset of the other states, which leaves the phases as they are."""
     if not isinstance(reset, Reset) or len(listed(reset.map)) != n:
-        return reset  # refused by the definition
+        return reset  # the definition refuses it
     return Reset(reset.function, [*listed(reset.map), *phases], reset.direction, reset.name)
 
 

@@ -1,33 +1,36 @@
-"""Reading the definition of a system: what a user wrote, checked, as symbols and expressions.
+"""Read and check the definition of a system: one form for all ways in which it can be written.
 
-Both ways in, two fields of one surface or a field with multipliers, end in one form: a field in
-states, time, parameters and multipliers, and functions of the first three.
+The form is a field in states, time, parameters and multipliers, with functions of the first three.
+A vector h of k switching functions with a vector of k multipliers is a set h = 0 of codimension k:
+the multiplier is h/|h| off the set and at most 1 in length on it. Coulomb friction in the plane has
+k = 2, with drilling friction k = 3. With k = 1 the set is a surface.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import casadi as ca
 
 from ..checks import real
-from ..errors import DefinitionError, ParameterError, explain
-from ..expressions.graph import require_smooth
-from ..reading import Expression, Parameters, column, listed, require_known, scalar, symbols
-from ..values import Array
-from .events import Impact, Reset, Stop
-
-if TYPE_CHECKING:
-    from .system import FilippovSystem
-
-
+from ..errors import DefinitionError, ParameterError
 from ..expressions.cancel import powers
-from ..reading import require_finite, require_unique
-from ..values import parameter_values
-
-# The one form of a system, whichever way it was written: a field with multipliers, functions, names.
+from ..expressions.graph import require_smooth
+from ..reading import (
+    Expression,
+    Parameters,
+    column,
+    listed,
+    require_finite,
+    require_known,
+    require_unique,
+    scalar,
+    symbols,
+)
+from ..values import Array, parameter_values
+from .events import Impact, Reset, Stop
 
 
 @dataclass(frozen=True)
@@ -134,12 +137,14 @@ def read_definition(
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
-        require_alike(sizes, multipliers)
+        _require_alike(sizes, multipliers)
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    (stops, resets, impacts), renamed = _told_apart([_items(*k) for k in kinds], _own_names(sizes))
+    (stops, resets, impacts), renamed = _unique_names(
+        [_items(*k) for k in kinds], _own_names(sizes)
+    )
     guards = [column([s.function], f"stop {s.name!r}", 1) for s in stops]
     guards += [column([r.function], f"reset {r.name!r}", 1) for r in resets]
     maps = [column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
@@ -166,19 +171,15 @@ def read_definition(
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
     )
-    require_consistent(definition)
+    _require_consistent(definition)
     return definition
 
 
 def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:
     if lam.numel() != h.numel():
         raise DefinitionError(
-            explain(
-                "multipliers",
-                expected=f"one for each of the {h.numel()} surfaces",
-                received=str(lam.numel()),
-                advice="Surface i switches multiplier i.",
-            )
+            f"multipliers: expected one for each of the {h.numel()} surfaces, received "
+            f"{lam.numel()}. Surface i switches multiplier i."
         )
 
 
@@ -191,7 +192,7 @@ def read_function(definition: Definition, value: Any, what: str) -> ca.SX:
     return expression
 
 
-# Pieces of a definition --------------------------------------------------------------------------
+# parts of a definition ---------------------------------------------------------------------------
 
 
 def _parameters(
@@ -220,7 +221,7 @@ def _surfaces(
             "function goes to surface=, several to surfaces=."
         )
     given = [surface] if surface is not None else listed(surfaces)
-    entries = [read_entry(v, f"surface {i}") for i, v in enumerate(given)]
+    entries = [_read_entry(v, f"surface {i}") for i, v in enumerate(given)]
     expressions = [e for entry in entries for e in entry]
     sizes = tuple(len(entry) for entry in entries)
     return ca.vertcat(*expressions) if expressions else ca.SX(0, 1), sizes
@@ -232,12 +233,9 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
     for i, item in enumerate(items):
         if not isinstance(item, kind):
             raise DefinitionError(
-                explain(
-                    f"{what}[{i}]",
-                    expected=f"a {kind.__name__}",
-                    received=f"{item!r} ({type(item).__name__})",
-                    advice=f"Write {what}=[nonsmooth.{kind.__name__}(function, ...)].",
-                )
+                f"{what}[{i}]: expected a {kind.__name__}, received {item!r} "
+                f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
+                "...)]."
             )
         if kind is Impact:
             continue
@@ -250,16 +248,15 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
 
 
 def _own_names(sizes: Sequence[int]) -> set[str]:
-    """Names that guards of a system have by themselves: of surfaces and sets, and of the ends of sliding."""
+    """Names reserved for the guards of surfaces and sets and for the ends of sliding."""
     of_each = {f"{what}{k}" for k in range(len(sizes)) for what in ("h", "lambda")}
     return of_each | ({"L_F1 h", "L_F2 h", "stability of sliding"} if sizes else set())
 
 
-def _told_apart(
+def _unique_names(
     kinds: Sequence[list[Any]], own: set[str]
 ) -> tuple[list[list[Any]], tuple[tuple[str, str], ...]]:
-    """Events with names of their own."""
-    # Events are found again by their names, so that two of one name would have the derivatives of the first.
+    """Events with different names, by which they are found again; and which were renamed."""
     taken, used = {item.name for items in kinds for item in items} | own, set(own)
     found, renamed = list[list[Any]](), list[tuple[str, str]]()
     for items in kinds:
@@ -282,16 +279,10 @@ def _two_fields(
     above: Any, below: Any, field: Any, multipliers: Any, h: ca.SX, n: int
 ) -> tuple[ca.SX, ca.SX]:
     if field is not None or multipliers is not None or h.numel() != 1:
+        received = "a mixture of the two forms" if h.numel() == 1 else f"{h.numel()} surfaces"
         raise DefinitionError(
-            explain(
-                "definition",
-                expected="above= and below= with one surface=, or field= with multipliers= and "
-                "surfaces=",
-                received="a mixture of the two forms"
-                if h.numel() == 1
-                else f"{h.numel()} surfaces",
-                advice="Two fields belong to exactly one surface.",
-            )
+            "definition: expected above= and below= with one surface=, or field= with multipliers= "
+            f"and surfaces=, received {received}. Two fields belong to exactly one surface."
         )
     f1, f2 = column(above, "above", n), column(below, "below", n)
     lam = ca.SX.sym("lambda")
@@ -310,13 +301,9 @@ def _direction(impact: Impact, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
     velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
     if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
         raise DefinitionError(
-            explain(
-                f"reaction of {impact.name!r}",
-                expected="reaction=, a symbol in the field",
-                received=f"none, and the rate {rate} of the gap, which is not linear in the states that "
-                "are not in the gap",
-                advice="The direction in which the contact pushes cannot be seen from it.",
-            )
+            f"reaction of {impact.name!r}: the rate {rate} of the gap is not linear in the states "
+            "that are not in the gap, so it does not give the direction of the reaction. Give "
+            "reaction=, a symbol in the field."
         )
     return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
 
@@ -340,13 +327,13 @@ def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> t
     return ca.vertcat(*given) if given else ca.SX(0, 1), field
 
 
-# Reading sets of codimension two and three: vectors among the surfaces and the multipliers.
+# sets of codimension two and three --------------------------------------------------------------
 
 #: Largest codimension of a set: slip has two components, three with drilling.
-LARGEST = 3
+_LARGEST = 3
 
 
-def read_entry(value: Any, what: str) -> list[ca.SX]:
+def _read_entry(value: Any, what: str) -> list[ca.SX]:
     """Read a surface (a scalar) or a set (a vector of two or three) as a list of expressions."""
     if not isinstance(value, (list, tuple)) and not (
         isinstance(value, (ca.SX, ca.DM)) and ca.SX(value).numel() > 1
@@ -357,37 +344,28 @@ def read_entry(value: Any, what: str) -> list[ca.SX]:
         raise DefinitionError(
             f"{what}: expected a scalar or a column, received a matrix of shape {value.shape}."
         )
-    if not 1 <= len(entries) <= LARGEST:
+    if not 1 <= len(entries) <= _LARGEST:
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"a scalar, or a vector of at most {LARGEST} switching functions",
-                received=f"{len(entries)} of them",
-                advice="A vector is one set on which all of them vanish, as slip in the plane does; "
-                "surfaces that do not belong together are entries of their own.",
-            )
+            f"{what}: expected a scalar or a vector of at most {_LARGEST} switching functions, "
+            f"received {len(entries)} of them. A vector is one set, on which all its components "
+            "vanish; give surfaces that do not belong together as separate entries."
         )
     return [scalar(e, f"{what}[{i}]") for i, e in enumerate(entries)]
 
 
-def require_alike(sizes: Sequence[int], multipliers: Any) -> None:
-    """Refuse multipliers that are not shaped as the surfaces."""
+def _require_alike(sizes: Sequence[int], multipliers: Any) -> None:
+    """Refuse multipliers whose shapes differ from those of the surfaces."""
     entries = [len(listed(entry)) for entry in listed(multipliers)]
     if max((*sizes, *entries), default=1) == 1 or list(sizes) == entries:
         return
     raise DefinitionError(
-        explain(
-            "multipliers",
-            expected=f"one for each surface, as many components as it has: {list(sizes)}",
-            received=str(entries),
-            advice="surfaces=[casadi.vertcat(h1, h2)] goes with multipliers=[casadi.vertcat(l1, l2)].",
-        )
+        f"multipliers: they have {entries} components, but the surfaces have {list(sizes)}. "
+        "surfaces=[casadi.vertcat(h1, h2)] goes with multipliers=[casadi.vertcat(l1, l2)]."
     )
 
 
-def require_linear_sets(d: Definition) -> None:
-    """Refuse sets whose multipliers do not enter linearly together, or are multiplied by a
-    reaction."""
+def _require_linear_sets(d: Definition) -> None:
+    """Refuse sets whose multipliers enter nonlinearly or are multiplied by a reaction."""
     first = 0
     for i, size in enumerate(d.sizes):
         lam = d.multipliers[first : first + size]
@@ -401,30 +379,17 @@ def require_linear_sets(d: Definition) -> None:
             )
         if d.reactions.numel() and ca.depends_on(ca.jacobian(d.field, lam), d.reactions):
             raise DefinitionError(
-                explain(
-                    f"multiplier {lam} of surface {i}",
-                    expected="a load in states, time and parameters",
-                    received="the reaction of an impact",
-                    advice="Impulses with friction in the plane are not treated: give the contact a "
-                    "compliance, whose force is the load, or friction in one direction.",
-                )
+                f"multiplier {lam} of surface {i}: it is multiplied by the reaction of an impact, "
+                "and impulses with friction in the plane are not implemented. Give the contact a "
+                "compliance, whose force is the load, or friction in one direction."
             )
 
 
-def multiplier_enters(system: FilippovSystem, members: Sequence[int], p: Array) -> bool:
-    """Whether the multiplier of a set enters the field with given parameters."""
-    d = system.definition
-    columns = ca.jacobian(d.field, d.multipliers[list(members)])
-    if d.parameters.numel():
-        columns = ca.substitute(columns, d.parameters, ca.SX(p.tolist()))
-    return not ca.densify(columns).is_zero()
+# checks of the whole definition ------------------------------------------------------------------
 
 
-# Whether a definition describes a system: its symbols, its functions, how multipliers enter.
-
-
-def require_consistent(d: Definition) -> None:
-    """Refuse a definition that describes no system."""
+def _require_consistent(d: Definition) -> None:
+    """Refuse unknown symbols, functions that are not smooth, and multipliers that do not fit."""
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     named = [("field", d.field, True)]
     named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
@@ -446,43 +411,30 @@ def require_consistent(d: Definition) -> None:
         require_finite(expression, known, what)
         require_smooth(expression, moving, d.parameters, what)
     for i, name in enumerate(guards):
-        if not ca.depends_on(d.guards[i], d.extended_states):
-            raise DefinitionError(_without_states(name, d.guards[i], d))
-        _require_simple(name, d.guards[i], d)
+        _require_zero_set(name, d.guards[i], d.extended_states, d)
     for i, h in enumerate(listed(d.surfaces)):
-        if not ca.depends_on(h, d.states):
-            raise DefinitionError(_without_states(f"surface {i}", h, d))
-        _require_simple(f"surface {i}", h, d)
+        _require_zero_set(f"surface {i}", h, d.states, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
     if not d.hidden:
         _require_linear(d)
-    require_linear_sets(d)
+    _require_linear_sets(d)
 
 
 def _check_impact(d: Definition, j: int) -> None:
     what, gap, rate = f"gap of {d.impacts[j]!r}", d.gaps[j], d.gap_rates[j]
-    if not ca.depends_on(gap, d.states):
-        raise DefinitionError(_without_states(what, gap, d))
-    _require_simple(what, gap, d)
+    _require_zero_set(what, gap, d.states, d)
     if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
         raise DefinitionError(
-            explain(
-                what,
-                expected="a function of positions, whose rate no multiplier enters",
-                received=f"{gap}, with the rate {rate}",
-                advice="Forces act on velocities: a gap is a function of positions and time.",
-            )
+            f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a "
+            "gap is a function of positions and time."
         )
     effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
     if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):
+        fault = "does not change the gap's rate" if effect.is_zero() else "enters nonlinearly"
         raise DefinitionError(
-            explain(
-                f"reaction of {d.impacts[j]!r}",
-                expected="a multiplier that enters the field linearly and moves the gap's rate",
-                received="one that does not move it" if effect.is_zero() else "a nonlinear one",
-                advice="Write the force that opens the contact as reaction times its direction.",
-            )
+            f"reaction of {d.impacts[j]!r}: {d.reactions[j]} {fault}. Write the force that opens the "
+            "contact as reaction times its direction."
         )
     e = d.restitutions[j]
     if e.is_constant() and not 0.0 <= float(e) <= 1.0:
@@ -519,37 +471,23 @@ def _require_linear(d: Definition) -> None:
             )
 
 
-def _require_simple(what: str, function: ca.SX, d: Definition) -> None:
-    """Refuse a power of something that is zero on the surface, as far as it is in sight."""
+def _require_zero_set(what: str, function: ca.SX, states: ca.SX, d: Definition) -> None:
+    """Refuse a function that does not depend on the states, or with a visible multiple zero."""
+    if not ca.depends_on(function, states):
+        received = f"the constant {function}"
+        advice = "A surface is the zero set of a function of the states."
+        if d.time.numel() and ca.depends_on(function, d.time):
+            received = f"the function {function} of time alone"
+            advice = "Make a clock a state, c' = 1, and the surface a function of c."
+        raise DefinitionError(
+            f"{what}: expected a function of the states {tuple(d.names['states'])}, received "
+            f"{received}. {advice}"
+        )
     x = d.extended_states
     for factor, power in powers(function, x, d.parameters):
         if power > 1 and ca.depends_on(factor, x) and ca.is_linear(factor, x):
             raise DefinitionError(
-                explain(
-                    what,
-                    expected="a function with simple zeros",
-                    received=f"{function}, which has the factor {factor} {power} times",
-                    advice="Where the gradient vanishes too, the surface cannot be located to "
-                    "rounding: use the factor once if the power is odd; an even one does not "
-                    "change the sign.",
-                )
+                f"{what}: {function} has the factor {factor} {power} times, so its gradient "
+                "vanishes on the surface, which cannot be located to rounding. Use the factor once "
+                "if the power is odd; an even power does not change the sign."
             )
-
-
-def _without_states(what: str, function: ca.SX, d: Definition) -> str:
-    """Message for a surface, stop or reset that no motion can cross."""
-    if d.time.numel() and ca.depends_on(function, d.time):
-        received, advice = (
-            f"the function {function} of time alone",
-            "Make a clock a state: c with c' = 1, started at the time, and the surface a function "
-            "of c.",
-        )
-    else:
-        received = f"the constant {function}"
-        advice = "A surface is the zero set of a function of the states."
-    return explain(
-        what,
-        expected=f"a function of the states {tuple(d.names['states'])}",
-        received=received,
-        advice=advice,
-    )

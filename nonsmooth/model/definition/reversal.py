@@ -1,4 +1,4 @@
-"""Time reversal: the same orbits run through backward."""
+"""Time reversal of a system: its orbits in the opposite direction."""
 
 from __future__ import annotations
 
@@ -10,16 +10,15 @@ from .system import FilippovSystem
 
 def reversed_system(system: FilippovSystem) -> FilippovSystem:
     """Return the system with all fields reversed, without its stops."""
-    # Backward in time attracting sliding repels and repelling sliding attracts.
     for what, found in (
-        ("time", system.time_dependent),
+        ("explicit time", system.time_dependent),
         ("resets", system.resets),
         ("impacts", system.impacts),
     ):
         if found:
             raise DefinitionError(
-                f"system: expected one without {what}, received {system!r}. It cannot be followed "
-                "backward as a system; nonsmooth.flow.follow runs one smooth mode backward."
+                f"system: {system!r} has {what} and cannot be reversed in time. "
+                "nonsmooth.flow.follow runs one smooth mode backward."
             )
 
     def build() -> FilippovSystem:

@@ -1,4 +1,4 @@
-"""Sections that a system does not have itself: a function of the states, looked at where it is zero."""
+"""Poincare sections added to a system as events that do not change the state."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ SECTION = "section"
 
 
 def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
-    """Return the system with a last reset, at a function's zeros, that changes nothing."""
+    """Return the system with a last reset, at a function's zeros, that does not change the state."""
     d = system.definition
     h = read_function(d, function, SECTION)
     if not ca.depends_on(h, d.extended_states):
@@ -43,8 +43,7 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
 
 
 def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
-    """Name of the surface where a function is zero, written alike, and its sign there."""
-    # A component of a set is none: it is zero elsewhere too.
+    """Name of the surface h = 0 with h = +-function, and that sign; components of a set do not count."""
     for i in range(system.surface_count):
         if i in system.set_of:
             continue
@@ -56,7 +55,7 @@ def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
 
 
 def _vanishes(expression: ca.SX) -> bool:
-    """Whether an expression is a sum in which everything cancels; only linear ones are seen through."""
+    """Whether a linear expression is zero after simplification."""
     symbols = ca.vertcat(*ca.symvar(expression))
     if not ca.is_linear(expression, symbols):
         return False

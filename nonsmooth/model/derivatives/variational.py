@@ -1,8 +1,7 @@
-"""The variational equations of a mode, with exact derivatives.
+"""The variational equations of a mode: X' = Df X and P' = Df P + f_p beside the state.
 
-Beside the state of a leg travel X' = Df X and P' = Df P + f_p: derivatives by the start and by
-parameters. Together they are one smooth field, given as expressions; entries of X and P that cannot
-move are left out of its state (structural zeros, the row of time).
+X and P are the derivatives by the start and by parameters. Together with the state they form one
+smooth field, without the entries that are constant (structural zeros, the row of time).
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ ORDER = 20
 
 @dataclass(frozen=True)
 class Blocks:
-    """Where the entries of x, X and P are in the state of a variational field."""
+    """The pattern of the entries of x, X and P in the state of a variational field."""
 
     states: int
     starts: int
@@ -51,30 +50,7 @@ class Blocks:
 
 
 class VariationalField:
-    """One mode's flow with derivatives by its start and by parameters, as one smooth field.
-
-    Parameters
-    ----------
-    of_mode : Motion
-        With all multipliers solved for (``explicit``).
-    chosen : tuple of int
-        Parameters by which one differentiates.
-
-    Attributes
-    ----------
-    states, field : SX
-        Of the whole field; the first entries are the states of the mode, time last where the
-        system depends on it.
-    blocks : Blocks
-
-    Examples
-    --------
-    >>> x, v, k = (ca.SX.sym(s) for s in "xvk")
-    >>> system = FilippovSystem([x, v], field=[v, -k * x], parameters={k: 1.0})
-    >>> whole = VariationalField(explicit(system, ""), (0,))
-    >>> whole.states.numel(), whole.blocks.moving.shape
-    (8, (2, 4))
-    """
+    """The flow of an explicit mode with derivatives by its start and by ``chosen`` parameters."""
 
     def __init__(self, of_mode: Motion, chosen: tuple[int, ...] = ()):
         self.motion, self.chosen = of_mode, chosen
@@ -132,10 +108,7 @@ class VariationalField:
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
-        """Entries of z whose errors are measured together: states, those of X, those of P.
-
-        The time, which is exact, is in none.
-        """
+        """Entries of z whose errors are measured together: of x without time, of X, of P."""
         of_column = np.repeat(
             np.arange(self.blocks.moving.shape[1]), self.blocks.moving.sum(axis=0)
         )
@@ -176,20 +149,7 @@ class VariationalField:
         return Evaluator(ca.Function("multipliers", [self.motion.states, p], outputs))
 
     def start(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
-        """The state z at the start of a leg: X = 1, P = 0.
-
-        Parameters
-        ----------
-        x : ndarray (N,)
-        p : ndarray
-        unknowns : ndarray (k,), optional
-            Multipliers near which those that are states are looked for.
-
-        Raises
-        ------
-        DegenerateError
-            No multipliers, or more than one set of them, keep the sliding.
-        """
+        """The state z at the start of a leg, X = 1 and P = 0; ``unknowns`` is a guess of multipliers."""
         return self.blocks.pack(self.initial(x, p, unknowns))
 
     def initial(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
@@ -209,7 +169,7 @@ class VariationalField:
         return matrix
 
     def states_at(self, x: Array, p: Array) -> Array:
-        """The states (N + k,) of the leg at extended states (N,): with the multipliers that are states."""
+        """Extended states (N,) and the multipliers that are states of the leg; (N + k,)."""
         if self.blocks.states == self.blocks.starts:
             return x
         return np.concatenate([x, self._unknowns(x, p, None)])
@@ -302,7 +262,7 @@ def plain_field(system: FilippovSystem, mode: str) -> PlainField:
 
 
 class GuardedField(PlainField):
-    """One mode's flow with its guards along it, as a smooth field to be stepped through."""
+    """One mode's flow with its guards along it."""
 
     @cached_property
     def series(self) -> Series:

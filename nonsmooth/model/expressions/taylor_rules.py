@@ -1,9 +1,8 @@
-"""Graphs as lists of Taylor rules: what has to be known to expand each operation in a power series.
+"""Graphs as lists of Taylor rules, by which each operation is expanded in a power series.
 
-Most operations need one rule. Others need series of their own beside them: sin the cosine, tan its
-square plus one, a whole power the squares that lead to it. A rule's arguments are numbers of rules;
-a sine and a cosine refer to each other. The recurrences behind the rules are in ``jets`` (on any
-arithmetic) and in ``flow/compiled/interpreter/programs.h``.
+Most operations need one rule. Others need further series: sin the cosine, tan its square plus one. A
+rule's arguments are numbers of rules; a sine and a cosine refer to each other. The recurrences of the
+rules are in ``jets`` (on any arithmetic) and in ``flow/compiled/interpreter/programs.h``.
 """
 
 from __future__ import annotations
@@ -79,9 +78,9 @@ class _Lowering:
             rule = _EXPANSIONS.get(node.op)
             if rule is None:
                 raise NotSmoothError(
-                    f"CasADi's operation {node.op!r}: expected one with a Taylor recurrence "
-                    "(arithmetic, powers, sqrt, exp, log, trigonometric and hyperbolic functions "
-                    "and their inverses, atan2, erf), received another. Write it with these."
+                    f"CasADi's operation {node.op!r} has no Taylor recurrence. Write it with "
+                    "arithmetic, powers, sqrt, exp, log, trigonometric and hyperbolic functions and "
+                    "their inverses, atan2 and erf."
                 )
             number = rule(self, *args)
         self.place.append(number)
@@ -200,12 +199,12 @@ _EXPANSIONS: dict[str, Callable[..., int]] = {
 
 
 def touched(rules: Sequence[Rule], states: int) -> list[int]:
-    """Return the rules that inputs of the moving vector enter that come after the states."""
+    """Return the rules that depend on inputs of the moving vector after the states."""
     return [j for j, yes in enumerate(entered(rules, lambda k: k >= states)) if yes]
 
 
 def entered(rules: Sequence[Rule], wanted: Callable[[int], bool]) -> list[bool]:
-    """Return whether each rule is entered by some of the inputs of the moving vector."""
+    """Return whether each rule depends on some of the inputs of the moving vector."""
     found = [False] * len(rules)
     for _ in range(2):  # a sine and its cosine refer to each other
         for j, rule in enumerate(rules):

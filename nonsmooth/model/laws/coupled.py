@@ -29,9 +29,9 @@ from ..expressions.graph import depends_on, instructions
 from ..expressions.identity import vanish_on
 from ..expressions.jets import Expansion
 from ..expressions.linearity import linearity
-from ..expressions.simplification import economise
+from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import lower, touched
-from ..expressions.unused_terms import awake
+from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .evaluators import Evaluator
 from .multiplier_series import MultiplierSeries, unit
@@ -290,7 +290,7 @@ class Coupled:
         for i in range(m):
             signs = () if i in self.system.set_of else (1.0, -1.0)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
-        return awake(self._symbols, [ca.densify(e) for e in expressions], held)
+        return without_unused_terms(self._symbols, [ca.densify(e) for e in expressions], held)
 
     # numbers -----------------------------------------------------------------------------------
 
@@ -339,7 +339,7 @@ class Coupled:
         key = tuple(self.sliding(mode)) if stability else ()
         if key not in self._series:
             outputs = [*self.outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
-            outputs = economise(self._symbols, self.awake(outputs), [True, False])
+            outputs = simplified(self._symbols, self.awake(outputs), [True, False])
             nodes, rows = instructions(self._symbols, outputs)
             rules, place = lower(nodes, depends_on(nodes, [True, False]))
             rows = [[place[j] for j in row] for row in rows]

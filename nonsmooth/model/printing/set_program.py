@@ -19,7 +19,7 @@ import casadi as ca
 from ..definition.system import FilippovSystem
 from ..expressions.graph import depends_on, instructions
 from ..expressions.jets import Coefficient, Expansion, Expressions, scaled, value_of
-from ..expressions.simplification import economise
+from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import lower, touched
 from ..laws.coupled import Coupled
 from .ccode import Program
@@ -137,7 +137,7 @@ class _Writer:
         """The series of some outputs in states and unknowns, and the rules that unknowns enter."""
         inputs = [ca.vertcat(self.x, unknowns), self.p]
         outputs = [ca.densify(e) for e in outputs]
-        nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
+        nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
         rules, place = lower(nodes, depends_on(nodes, [True, False]))
         rows = [[place[j] for j in row] for row in rows]
         still = [self.p[i] for i in range(self.p.numel())]

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import depends_on, instructions
-from ..expressions.simplification import economise
+from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import RULES, Rule, entered, lower
 from ..laws.coupled import Coupled
 from ..values import Array
@@ -211,7 +211,7 @@ def _rules_of(
 ) -> tuple[list[Rule], list[list[int]]]:
     """Rules of expressions, and the numbers of those of each output."""
     outputs = [ca.densify(o) for o in outputs]
-    nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
+    nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
     rules, place = lower(nodes, depends_on(nodes, [True, False]))
     return rules, [[place[j] for j in row] for row in rows]
 

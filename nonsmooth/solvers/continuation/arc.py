@@ -20,7 +20,6 @@ from ...model import (
     NonsmoothError,
     OptionError,
     PointError,
-    explain,
     is_real,
     real_array,
     whole,
@@ -304,12 +303,8 @@ def require_curve(curve: Any) -> None:
     """Refuse what is no curve."""
     if not isinstance(curve, Curve):
         raise DefinitionError(
-            explain(
-                "curve",
-                expected="an instance of a subclass of nonsmooth.continuation.Curve",
-                received=repr(curve),
-                advice="Write class Mine(Curve) with equations(self, u), and give Mine().",
-            )
+            "curve: expected an instance of a subclass of nonsmooth.continuation.Curve, received "
+            f"{curve!r}. Write class Mine(Curve) with equations(self, u), and give Mine()."
         )
 
 
@@ -324,12 +319,8 @@ def vector(values: Any, what: str, size: int | None = None) -> Array:
     else:
         return np.asarray(found, float)
     raise PointError(
-        explain(
-            what,
-            expected=f"{expected} of finite numbers",
-            received=received,
-            advice="One for each unknown of the curve, the parameter included.",
-        )
+        f"{what}: expected {expected} of finite numbers, received {received}. One for each "
+        "unknown of the curve, the parameter included."
     )
 
 
@@ -346,12 +337,8 @@ def check_trace(
     require_curve(curve)
     if not isinstance(rows, (Sequence, np.ndarray)) or isinstance(rows, str) or not len(rows):
         raise PointError(
-            explain(
-                "rows",
-                expected="a list of points of the curve, at least one",
-                received=repr(rows),
-                advice="Write [np.array([...])].",
-            )
+            f"rows: expected a list of points of the curve, at least one, received {rows!r}. "
+            "Write [np.array([...])]."
         )
     size = vector(rows[-1], "rows[-1]").size
     found = [vector(row, f"rows[{i}]", size) for i, row in enumerate(rows)]
@@ -377,12 +364,8 @@ def _check_bounds(bounds: Any, size: int) -> None:
                 if k in range(-size, size) and low <= high:
                     continue
         raise OptionError(
-            explain(
-                "bounds",
-                expected=f"entries (index, low, high) with an index below {size} and low <= high",
-                received=repr(entry),
-                advice="For example bounds=[(0, -1.0, 1.0)].",
-            )
+            f"bounds: expected entries (index, low, high) with an index below {size} and low <= "
+            f"high, received {entry!r}. For example bounds=[(0, -1.0, 1.0)]."
         )
 
 

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...model import Array, DefinitionError, NonsmoothError, explain, is_real
+from ...model import Array, DefinitionError, NonsmoothError, is_real
 from ..newton import Secant, converge
 
 if TYPE_CHECKING:
@@ -34,12 +34,8 @@ def read_tests(found: Any) -> dict[str, float]:
     else:
         received = repr(found)
     raise DefinitionError(
-        explain(
-            "curve.tests",
-            expected="a mapping of names to numbers",
-            received=received,
-            advice='For example return {"half": float(point.u[0]) - 0.5}.',
-        )
+        f"curve.tests: expected a mapping of names to numbers, received {received}. For example "
+        'return {"half": float(point.u[0]) - 0.5}.'
     )
 
 

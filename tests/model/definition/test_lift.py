@@ -298,14 +298,14 @@ def test_smooth_expressions_have_no_surface():
 @pytest.mark.parametrize(
     ("expression", "message"),
     [
-        (ca.floor(x), r"rhs\[1\]: floor: expected .*, received one of the states: floor\(x\)"),
+        (ca.floor(x), r"rhs\[1\]: floor: floor\(x\)"),
         (ca.ceil(x), "infinitely many surfaces"),
         (ca.fmod(x, 2), "fmod"),
         (ca.remainder(x, 2), "remainder"),
         (ca.if_else(x == 0, 1, 2), "Equality holds on a surface only"),
         (x != y, "Equality holds on a surface only"),
-        (ca.if_else(x, 1, 2), "a condition that is not a comparison: x"),
-        (ca.logic_not(x), "A number that moves is no condition"),
+        (ca.if_else(x, 1, 2), "if_else: x"),
+        (ca.logic_not(x), "logic_not"),
     ],
 )
 def test_what_cannot_be_lifted_is_named(expression, message):
@@ -314,15 +314,15 @@ def test_what_cannot_be_lifted_is_named(expression, message):
 
 
 def test_definitions_are_checked():
-    with pytest.raises(ns.DefinitionError, match=r"sign of sin\(t\), which is known beforehand"):
+    with pytest.raises(ns.DefinitionError, match=r"a switch: sign of sin\(t\)"):
         lift([x], [ca.sign(ca.sin(t))], time=t)
-    with pytest.raises(ns.DefinitionError, match=r"received also \['q'\]"):
+    with pytest.raises(ns.DefinitionError, match=r"rhs: it contains \['q'\]"):
         lift([x], [ca.sign(ca.SX.sym("q"))])
     with pytest.raises(ns.DefinitionError, match="rhs: expected one expression"):
         lift([x], [x, x])
     with pytest.raises(ns.DefinitionError, match=r"rhs\[0\]: expected CasADi SX expressions"):
         lift([x], [ca.MX.sym("x")])
-    with pytest.raises(ns.DefinitionError, match="at most 6 others, received 7"):
+    with pytest.raises(ns.DefinitionError, match="a switch inside a switch"):
         lift([x], [ca.sign(x + sum(ca.fabs(x - k) for k in range(7)))])
     with pytest.raises(ns.NotSmoothError, match="stop"):
         lift([x], [ca.sign(x)], stops=[ns.Stop(ca.fabs(x) - 1)])

@@ -235,11 +235,11 @@ def test_width_is_positive(bad):
 def test_wrong_requests_are_refused():
     with pytest.raises(ns.OptionError, match=r"transition: expected one of \['algebraic', "):
         ns.regularise(RELAY, 0.1, transition="cubic")
-    with pytest.raises(ns.OptionError, match="received one from 0 to 1"):
+    with pytest.raises(ns.OptionError, match="transition: it goes from 0 to 1"):
         ns.regularise(RELAY, 0.1, transition=lambda s: (1 + ca.tanh(s)) / 2)
     with pytest.raises(ns.NotSmoothError):
         ns.regularise(RELAY, 0.1, transition=lambda s: ca.fmax(-1, ca.fmin(1, s)))
-    with pytest.raises(ns.DefinitionError, match="name: expected one that the system does not"):
+    with pytest.raises(ns.DefinitionError, match="name: "):
         ns.regularise(RELAY, 0.1, name="mu")
     with pytest.raises(ns.ParameterError, match="eps"):
         ns.simulate(ns.regularise(RELAY, None), [1.0, 0.0], 1.0)

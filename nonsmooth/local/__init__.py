@@ -1,4 +1,4 @@
-"""WHAT HAPPENS at a point of a surface, without time stepping: regions, folds, two-folds."""
+"""Analysis at points of surfaces, without time stepping: regions, folds, two-folds, equilibria."""
 
 from ..model import mode_field
 from . import two_folds

@@ -1,4 +1,4 @@
-"""Checks and margins that the questions of this floor share."""
+"""Checks and margins that the functions of ``local`` share."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def require_surface(system: FilippovSystem) -> None:
 
 
 def require_autonomous(system: FilippovSystem, what: str) -> None:
-    """Refuse explicit time: what stays at one place does so for all time."""
+    """Refuse explicit time."""
     require_system(system)
     if system.time_dependent:
         raise DefinitionError(
@@ -28,7 +28,7 @@ def require_autonomous(system: FilippovSystem, what: str) -> None:
 
 
 def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
-    """Refuse a multiplier that enters nonlinearly: alpha would not be Filippov's."""
+    """Refuse a multiplier that enters nonlinearly, for which alpha is not Filippov's weight."""
     if system.nonlinear[surface]:
         raise DefinitionError(
             f"{what}: expected multiplier {surface} to enter the field linearly, received hidden "
@@ -40,7 +40,7 @@ def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
 def parameter_index(
     system: FilippovSystem, name: str, what: str = "parameter", advice: str = "Give its name."
 ) -> int:
-    """Return which of its parameters a system calls by a name."""
+    """Index of a parameter by its name."""
     if name not in system.parameter_names:
         raise DefinitionError(
             f"{what}: expected a parameter among {list(system.parameter_names)}, received "

@@ -38,7 +38,7 @@ class Region(Enum):
     TANGENT_ABOVE = "tangency of the field above"  # L1 = 0
     TANGENT_BELOW = "tangency of the field below"  # L2 = 0
     TWO_FOLD = "tangency of both fields"  # L1 = L2 = 0
-    MIXED = "sliding that neither attracts nor repels"  # on several surfaces, or a set where M is not positive definite
+    MIXED = "sliding that neither attracts nor repels"  # or a set where M is not positive definite
     SLIDING = "sliding"  # of a set of codimension two or three: |M^-1 a| < 1
     CROSSING = "crossing"  # |M^-1 a| > 1
     BOUNDARY = "boundary of sliding"  # |M^-1 a| = 1
@@ -265,7 +265,7 @@ def sliding_field(
         raise PointError(
             "sliding field: expected L1 and L2 not both zero, or F1 = F2, received both fields "
             f"tangent and different at {x.tolist()}. The sliding field is 0/0 at this two-fold "
-            "and its limit depends on the direction; ask find_two_fold for the class of the point."
+            "and its limit depends on the direction; find_two_fold gives the class of the point."
         )
     build = motion(system, where.mode)
     function = system.function(("sliding field", where.mode), lambda: [build.field])

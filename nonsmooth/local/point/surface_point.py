@@ -1,8 +1,7 @@
-"""A place to ask questions: one surface of a system with its parameters, and the numbers at a point.
+"""One surface of a system at a point: h, the two fields, their Lie derivatives, and all gradients.
 
-Everything in this floor is read from here: h, the two fields, L_i = F_i . grad h, L_ij = F_i . grad
-L_j (so L12 is F1 . grad L2), and every derivative of these, exact. Vectors have a time component
-where the system depends on time.
+L_i = F_i . grad h and L_ij = F_i . grad L_j, so L12 is F1 . grad L2. Derivatives are exact. Points
+and vectors have N coordinates: the states, then time if the system depends on it.
 """
 
 from __future__ import annotations
@@ -27,34 +26,44 @@ from ...model import (
 )
 from ..checks import require_surface
 
-# What is known at a point of a surface, or at many: h, the two fields, L1, L2 and their gradients.
+#: Default of ``tol`` at a given point: an angle, and a relative distance.
+TOLERANCE = 1e-10
+
+#: A side of a surface: ``+`` (h > 0, field F1) or ``-`` (h < 0, field F2).
+Side = Literal["+", "-"]
+
+#: In the order in which fields, Lie derivatives and Jacobians are listed.
+SIDES: tuple[Side, Side] = ("+", "-")
+
+#: Names of the fields.
+FIELDS: dict[str, str] = {"+": "F1 (above)", "-": "F2 (below)"}
+
+
+def side_index(side: object) -> int:
+    """0 for ``+`` and 1 for ``-``."""
+    if side not in SIDES:
+        raise DefinitionError(
+            f"side: expected '+' (the field F1, h > 0) or '-' (F2, h < 0), received {side!r}. "
+            "Folds and equilibria belong to one of the two fields."
+        )
+    return SIDES.index(side)
+
+
+def other(side: Side) -> Side:
+    """The other side."""
+    return "-" if side == "+" else "+"
 
 
 @dataclass(frozen=True, eq=False)
 class Numbers:
-    """Values at one point.
+    """Values at one point."""
 
-    Attributes
-    ----------
-    x : ndarray (N,)
-    h : float
-        The switching function.
-    gradient : ndarray (N,)
-        grad h.
-    fields : ndarray (2, N)
-        F1 (above) and F2 (below).
-    lie : ndarray (2,)
-        L1 and L2.
-    lie_gradients : ndarray (2, N)
-        grad L1 and grad L2.
-    """
-
-    x: Array
+    x: Array  # (N,)
     h: float
-    gradient: Array
-    fields: Array
-    lie: Array
-    lie_gradients: Array
+    gradient: Array  # grad h (N,)
+    fields: Array  # F1 (above) and F2 (below) (2, N)
+    lie: Array  # L1 and L2 (2,)
+    lie_gradients: Array  # (2, N)
 
     @property
     def second(self) -> dict[str, float]:
@@ -92,25 +101,14 @@ class Numbers:
 
 @dataclass(frozen=True, eq=False)
 class ManyNumbers:
-    """Values at k points; NaN where a field is undefined.
+    """Values at k points, as in ``Numbers``; NaN where a field is undefined."""
 
-    Attributes
-    ----------
-    x : ndarray (k, N)
-    h : ndarray (k,)
-    gradient : ndarray (k, N)
-    fields : ndarray (k, 2, N)
-    lie : ndarray (k, 2)
-    lie_gradients : ndarray (k, 2, N)
-        As in :class:`Numbers`.
-    """
-
-    x: Array
-    h: Array
-    gradient: Array
-    fields: Array
-    lie: Array
-    lie_gradients: Array
+    x: Array  # (k, N)
+    h: Array  # (k,)
+    gradient: Array  # (k, N)
+    fields: Array  # (k, 2, N)
+    lie: Array  # (k, 2)
+    lie_gradients: Array  # (k, 2, N)
 
     @property
     def values(self) -> Array:
@@ -140,52 +138,13 @@ class ManyNumbers:
             return self.numerator / (self.lie[:, 1:] - self.lie[:, :1])
 
 
-# The two sides of a surface as letters, ``+`` (h > 0, field F1) and ``-`` (h < 0, field F2).
-
-Side = Literal["+", "-"]
-
-#: In the order in which fields, Lie derivatives and Jacobians are listed.
-SIDES: tuple[Side, Side] = ("+", "-")
-
-#: The fields in words.
-FIELDS: dict[str, str] = {"+": "F1 (above)", "-": "F2 (below)"}
-
-
-def side_index(side: object) -> int:
-    """0 for ``+`` and 1 for ``-``."""
-    if side not in SIDES:
-        raise DefinitionError(
-            f"side: expected '+' (the field F1, h > 0) or '-' (F2, h < 0), received {side!r}. "
-            "Folds and equilibria belong to one of the two fields."
-        )
-    return SIDES.index(side)
-
-
-def other(side: Side) -> Side:
-    """The other side."""
-    return "-" if side == "+" else "+"
-
-
-#: Default of ``tol`` for questions about a given point: an angle, and a relative distance.
-TOLERANCE = 1e-10
-
-
 @dataclass(frozen=True, eq=False)
 class Place:
-    """One surface of a system with its parameters: where questions of this floor are asked.
-
-    Attributes
-    ----------
-    system : FilippovSystem
-    surface : int
-    mode : str
-        One letter per surface, ``s`` for this one; empty for a smooth system.
-    parameters : ndarray
-    """
+    """One surface of a system with values of its parameters."""
 
     system: FilippovSystem
     surface: int
-    mode: str
+    mode: str  # one letter per surface, ``s`` for this one; empty for a smooth system
     parameters: Array
 
     def side(self, letter: str) -> str:
@@ -228,12 +187,7 @@ class Place:
         return Numbers(x, float(h[0, 0]), g, np.array([f1, f2]), lie, np.array([g1, g2]))
 
     def finite_at(self, x: Array) -> Numbers:
-        """Evaluate as ``at`` does and refuse NaN and inf.
-
-        Raises
-        ------
-        PointError
-        """
+        """Evaluate as ``at`` does and refuse NaN and inf."""
         numbers = self.at(x)
         if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
             raise PointError(
@@ -276,7 +230,7 @@ class Place:
 
     @property
     def others(self) -> tuple[int, ...]:
-        """The surfaces that are not looked at."""
+        """The other surfaces."""
         return tuple(j for j in range(self.system.surface_count) if j != self.surface)
 
     # derivatives -------------------------------------------------------------------------------
@@ -325,10 +279,7 @@ class Place:
         return self._rows("lie parameters", build, x)
 
     def orbit(self, x: Array, letter: str, order: int) -> tuple[Array, Array]:
-        """Taylor coefficients of the orbit of F1 or F2 (N, order + 1) and of h on it (order + 1,).
-
-        Coefficient k of h is its Lie derivative L^k h over k!.
-        """
+        """Taylor coefficients of an orbit (N, order + 1) and of h on it, L^k h/k! (order + 1,)."""
         jet = motion(self.system, self.side(letter)).jet_function(order)
         states, guards = call(jet, x, self.parameters)
         # the guard of a side is h there, and positive
@@ -345,15 +296,15 @@ def place(
     *,
     smooth: bool = False,
 ) -> tuple[Place, Array]:
-    """Check the arguments that every function of this floor shares."""
+    """Check the arguments of a function at a point; ``smooth`` allows a system without surfaces."""
     require_system(system)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
     if system.surface_count == 0 and smooth:
         if surface or mode:
             raise DefinitionError(
-                "surface and mode: expected none, as the system has no surface, received surface "
-                f"{surface!r}, mode {mode!r}. Leave them out."
+                f"surface and mode: received {surface!r} and {mode!r}, but the system has no surface. "
+                "Leave them out."
             )
         return Place(system, 0, "", p), x
     require_surface(system)
@@ -365,8 +316,8 @@ def place(
     if letters.count("s") > 1:
         raise DefinitionError(
             f"mode {''.join(letters)!r}: expected one sliding surface, received "
-            f"{letters.count('s')}. This floor looks at one surface: give + or - to the others. "
-            "For several that slide at once see sliding_branches and intersection_range."
+            f"{letters.count('s')}. Give + or - to the others; for several sliding surfaces use "
+            "sliding_branches or intersection_range."
         )
     return Place(system, int(surface), "".join(letters), p), x
 
@@ -395,8 +346,7 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
 
 
 def on_surface(where: Place, x: Array, tol: float) -> Numbers:
-    """Evaluate at a point of the surface."""
-    # The point counts as on the surface when its distance is at most ``tol (1 + |x|)``.
+    """Evaluate at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):
         raise PointError(

@@ -1,4 +1,4 @@
-"""A rectangle of a plane and the grids over it, where scans look for special points."""
+"""A rectangle of a plane and grids over it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Level lines and sign changes of functions that are known on a grid."""
+"""Zero lines and sign changes of functions on a grid."""
 
 from __future__ import annotations
 

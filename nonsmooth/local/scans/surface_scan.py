@@ -1,8 +1,7 @@
-"""Everything special on a switching surface of three states: regions, fold curves, cusps, two-folds.
+"""Scan of a switching surface of three states: regions, fold curves, cusps, two-folds.
 
-The surface is taken as a graph over two of the states. Special points are found by sign changes on
-a grid and then solved for, so two of a kind closer than the grid (1/200 of the box) can be missed:
-a scan is no proof.
+The surface is a graph over two of the states. Points are found by sign changes on a grid and then
+solved for. Two of a kind closer than the grid (1/200 of the box) can be missed.
 """
 
 from __future__ import annotations
@@ -78,9 +77,9 @@ class SurfaceScan:
         best = max(scans, key=lambda scan: scan._steepness())
         if not best._steepness() > 0:
             raise DefinitionError(
-                "surface: expected one over the box, h = 0 solvable for the remaining state, "
-                f"received none over {[names[i] for i in best.shown]} in {box.limits}. Choose "
-                "other coordinates=, another box or guess=."
+                "surface: h = 0 cannot be solved for the remaining state over "
+                f"{[names[i] for i in best.shown]} in {box.limits}. Choose other coordinates=, another "
+                "box or guess=."
             )
         return best
 

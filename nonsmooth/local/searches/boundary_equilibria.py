@@ -1,11 +1,11 @@
-"""Boundary equilibria: a zero of one field on the surface, the bifurcation it is, and its search.
+"""Boundary equilibria: zeros of one field on the surface, their search and their bifurcation.
 
 F1 = A x + ... vanishes on h = 0 where F2 = E. With C = grad h, d = C.E and s = C A^-1 E, s < 0 is
 persistence and s > 0 a nonsmooth fold (di Bernardo, Budd, Champneys & Kowalczyk 2008, ch. 5, in any
 dimension). In the plane the equilibrium's type splits these into BF1 to BF5 (focus), BN1, BN2
 (stable node), BS1 to BS3 (saddle) after Kuznetsov, Rinaldi & Gragnani 2003, and UN1, UN2 (unstable
 node, Hogan, Homer, Jeffrey & Szalai 2016). The table is for d > 0; d < 0 is its time reversal
-(A, E -> -A, -E). Every class has margins: dimensionless distances from where it changes.
+(A, E -> -A, -E). The margins of a class are dimensionless distances from where it changes.
 """
 
 from __future__ import annotations

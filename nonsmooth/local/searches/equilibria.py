@@ -1,4 +1,4 @@
-"""Equilibria of the two fields, found by Newton's method in R^n and named by their eigenvalues."""
+"""Equilibria of the two fields: their search by Newton's method, and their kind by eigenvalues."""
 
 from __future__ import annotations
 
@@ -71,8 +71,7 @@ class Equilibrium:
 
 
 def equilibrium_distance(field: Array, derivative: Array, x: Array) -> float:
-    """How far the next zero of a field is, to first order, relative to $1 + |x|$."""
-    # Infinite where the linearised equations have no solution.
+    """Distance of the next zero of a field to first order over 1 + |x|; inf if there is none."""
     length, size = 1 + float(np.linalg.norm(x)), float(np.linalg.norm(derivative, 2))
     norm = float(np.linalg.norm(field))
     if norm <= TOLERANCE * size * length or norm == 0.0:

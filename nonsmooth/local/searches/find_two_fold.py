@@ -1,4 +1,8 @@
-"""Finding two-folds by Newton's method, and describing one at a known point."""
+"""Two-folds of a system, h = L1 = L2 = 0: their search, normal form and class.
+
+The coordinates z1 = theta h, z2 = -phi theta L1, z3 = theta L2/phi of the normal form (Jeffrey &
+Colombo 2009) are these functions of the state, not their linearisation.
+"""
 
 from __future__ import annotations
 
@@ -27,167 +31,6 @@ from ..point.surface_point import FIELDS, SIDES, Numbers, Place, on_surface, pla
 from ..read_only import ReadOnly
 from ..two_folds import Boundary, Classification, NormalForm, classify_two_fold, normal_form
 from .search import Found, search, unknowns
-
-# Coordinates of the normal form as functions of the state, and the states that have given ones.
-
-
-@dataclass(frozen=True, eq=False)
-class Chart:
-    """The coordinates (z1, z2, z3) near a two-fold.
-
-    Attributes
-    ----------
-    where : Place
-    point : ndarray (N,)
-        The two-fold, time included where the system depends on it.
-    scales : ndarray (3,)
-        Of h, L1 and L2.
-    """
-
-    where: Place
-    point: Array
-    scales: Array
-
-    @property
-    def _dimension(self) -> int:
-        return self.where.system.dimension
-
-    def _extended(self, x: Array) -> Array:
-        """Append the two-fold's time to states (k, n)."""
-        tail = np.tile(self.point[self._dimension :], (len(x), 1))
-        return np.hstack([x, tail])
-
-    def __call__(self, x: ArrayLike) -> Array:
-        """Return z (..., 3) at states (..., n)."""
-        states, n = real_array(x, "states"), self._dimension
-        if states.ndim == 0 or states.shape[-1] != n:
-            raise PointError(
-                f"states: expected shape (..., {n}) for the states "
-                f"{self.where.system.state_names}, received shape {states.shape}. States are on "
-                "the last axis."
-            )
-        if not np.all(np.isfinite(states)):
-            raise PointError("states: expected finite numbers, received NaN or inf.")
-        many = self.where.many(self._extended(states.reshape(-1, n)))
-        return (many.values * self.scales).reshape(*states.shape[:-1], 3)
-
-    def tangents(self) -> Array:
-        """States per unit of z1, z2 and z3 at the two-fold: the derivative of ``inverse``; (n, 3)."""
-        gradients = self.where.at(self.point).gradients[:, : self._dimension]
-        return np.asarray(np.linalg.pinv(self.scales[:, None] * gradients), dtype=np.float64)
-
-    def inverse(self, z: ArrayLike, tol: float, max_iterations: int) -> Array:
-        """Return states (..., n) with coordinates (..., 2), (z2, z3) on the surface, or (..., 3).
-
-        Raises
-        ------
-        PointError, ConvergenceError
-        """
-        target = np.asarray(z, dtype=float)
-        if target.ndim == 0 or target.shape[-1] not in (2, 3) or not np.all(np.isfinite(target)):
-            raise PointError(
-                f"z: expected finite numbers of shape (..., 2) or (..., 3), received {z!r}."
-            )
-        if target.shape[-1] == 2:
-            target = np.concatenate([np.zeros((*target.shape[:-1], 1)), target], axis=-1)
-        wanted, n = target.reshape(-1, 3), self._dimension
-
-        def equations(x: Array, which: NDArray[np.int64]) -> tuple[Array, Array]:
-            many, scales = self.where.many(self._extended(x)), self.scales
-            return many.values * scales - wanted[which], many.gradients[:, :, :n] * scales[:, None]
-
-        starts = np.tile(self.point[:n], (len(wanted), 1))
-        x, converged = solve_many(equations, starts, tol=positive(tol, "tol"))
-        for k in np.flatnonzero(~converged):
-            x[k] = self._one(wanted[k], tol, max_iterations)
-        return x.reshape(*target.shape[:-1], n)
-
-    def _one(self, wanted: Array, tol: float, max_iterations: int) -> Array:
-        """Search with damping, where full steps went astray."""
-
-        def equations(x: Array) -> tuple[Array, Array]:
-            numbers = self.where.at(x)
-            values = np.array([numbers.h, *numbers.lie]) * self.scales - wanted
-            return values, numbers.gradients * self.scales[:, None]
-
-        n, what = self._dimension, f"state at z = {wanted.tolist()}"
-        found = search(
-            equations, self.point, range(n), tol=tol, max_iterations=max_iterations, what=what
-        )
-        return found.x[:n]
-
-
-# A two-fold: a point where both fields are tangent to the surface, h = L1 = L2 = 0, with its class.
-
-# A two-fold in words: what ``print(fold)`` shows.
-
-_WIDTH = 98
-
-
-def _count(number: float) -> str:
-    if math.isnan(number):
-        return "not decided at leading order"
-    return {0.0: "none", 1.0: "one", math.inf: "infinitely many"}[number]
-
-
-def _numbers(values: NDArray[Any]) -> str:
-    def one(value: complex) -> str:
-        if value.imag:
-            return f"{value.real:.6g}{value.imag:+.6g}i"
-        return f"{value.real:.6g}"
-
-    return ", ".join(one(complex(v)) for v in values)
-
-
-def _point(fold: TwoFold) -> str:
-    size = max(1.0, *(abs(v) for v in fold.point))
-    rounded = (0.0 if abs(v) < 1e-14 * size else v for v in fold.point)
-    text = f"[{', '.join(f'{v:.10g}' for v in rounded)}]"
-    return text + (f", t = {fold.t:.10g}" if fold.system.time_dependent else "")
-
-
-def two_fold_in_words(fold: TwoFold) -> str:
-    """Write the paragraph for a two-fold."""
-    c = fold.classification
-    title = f"{fold.kind.capitalize()} two-fold at {_point(fold)}"
-    lines = [f"{title}, {'' if c.label.startswith('boundary') else 'class '}{c.label}."]
-    (s1, s2), (n1, n2) = fold.sigma, fold.nu
-    lines.append(f"sigma = ({s1:+d}, {s2:+d}), nu = ({n1:.6g}, {n2:.6g})")
-    slopes = _numbers(fold.slopes)
-    lines.append(f"eigenvalues {_numbers(fold.eigenvalues)} with slopes z3/z2 = {slopes}")
-    lines.append(
-        f"canards (Da -> s -> Dr): {_count(fold.canards)}; "
-        f"faux canards (Dr -> s -> Da): {_count(fold.faux_canards)}"
-    )
-    if fold.coincident_fields:
-        lines.append(
-            "The two fields coincide at s: Delta = 0, the sliding flow is smooth through s and a "
-            "run along it goes on."
-        )
-    lines.append(c.determinism)
-    if fold.system.dimension > 3 and 1.0 in (c.canards, c.faux_canards):
-        lines.append(
-            f"With {fold.system.dimension} states two-folds form a set of dimension "
-            f"{fold.system.dimension - 3}; one orbit reads a set of codimension one."
-        )
-    for boundary in c.boundaries:
-        if boundary.harmless and not (fold.coincident_fields and boundary.name == "Delta=0"):
-            lines.append(
-                f"On the boundary {boundary.name} ({boundary.meaning}); the class is "
-                f"{boundary.between[0]} on both sides."
-            )
-    if fold.iterations:
-        plural = "" if fold.iterations == 1 else "s"
-        lines.append(
-            f"Found {fold.distance:.3g} from the start in {fold.iterations} iteration{plural}, "
-            f"residual {fold.residual:.2g}."
-        )
-    wrapped = [textwrap.fill(line, _WIDTH, subsequent_indent="  ") for line in lines[:1]]
-    wrapped += [
-        textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="  ")
-        for line in lines[1:]
-    ]
-    return "\n".join(wrapped)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -326,7 +169,7 @@ class TwoFold:
         return self.classification.boundaries
 
     def __str__(self) -> str:
-        return two_fold_in_words(self)
+        return description(self)
 
     def _repr_html_(self) -> str:
         """How a notebook shows the two-fold: its class, its numbers, and what follows from them."""
@@ -336,8 +179,8 @@ class TwoFold:
             ("sigma, nu", f"{self.sigma}, ({self.nu[0]:.6g}, {self.nu[1]:.6g})"),
             ("canards", f"{self.canards:g}, faux {self.faux_canards:g}"),
         )
-        words = card("", [("", self.classification.determinism)])
-        return card(f"{self.kind} two-fold, class {self.label}", rows, quadrants(real)) + words
+        meaning = card("", [("", self.classification.determinism)])
+        return card(f"{self.kind} two-fold, class {self.label}", rows, quadrants(real)) + meaning
 
     def __repr__(self) -> str:
         return f"TwoFold({self.label}, {self.kind}, point={self.point.tolist()})"
@@ -445,6 +288,151 @@ class TwoFold:
         return math.nan
 
 
+@dataclass(frozen=True, eq=False)
+class Chart:
+    """The coordinates (z1, z2, z3) near a two-fold, and their inverse."""
+
+    where: Place
+    point: Array  # the two-fold (N,)
+    scales: Array  # of h, L1 and L2 (3,)
+
+    @property
+    def _dimension(self) -> int:
+        return self.where.system.dimension
+
+    def _extended(self, x: Array) -> Array:
+        """Append the two-fold's time to states (k, n)."""
+        tail = np.tile(self.point[self._dimension :], (len(x), 1))
+        return np.hstack([x, tail])
+
+    def __call__(self, x: ArrayLike) -> Array:
+        """Return z (..., 3) at states (..., n)."""
+        states, n = real_array(x, "states"), self._dimension
+        if states.ndim == 0 or states.shape[-1] != n:
+            raise PointError(
+                f"states: expected shape (..., {n}) for the states "
+                f"{self.where.system.state_names}, received shape {states.shape}. States are on "
+                "the last axis."
+            )
+        if not np.all(np.isfinite(states)):
+            raise PointError("states: expected finite numbers, received NaN or inf.")
+        many = self.where.many(self._extended(states.reshape(-1, n)))
+        return (many.values * self.scales).reshape(*states.shape[:-1], 3)
+
+    def tangents(self) -> Array:
+        """States per unit of z1, z2 and z3 at the two-fold: the derivative of ``inverse``; (n, 3)."""
+        gradients = self.where.at(self.point).gradients[:, : self._dimension]
+        return np.asarray(np.linalg.pinv(self.scales[:, None] * gradients), dtype=np.float64)
+
+    def inverse(self, z: ArrayLike, tol: float, max_iterations: int) -> Array:
+        """Return states (..., n) with coordinates (..., 2), (z2, z3) on the surface, or (..., 3)."""
+        target = np.asarray(z, dtype=float)
+        if target.ndim == 0 or target.shape[-1] not in (2, 3) or not np.all(np.isfinite(target)):
+            raise PointError(
+                f"z: expected finite numbers of shape (..., 2) or (..., 3), received {z!r}."
+            )
+        if target.shape[-1] == 2:
+            target = np.concatenate([np.zeros((*target.shape[:-1], 1)), target], axis=-1)
+        wanted, n = target.reshape(-1, 3), self._dimension
+
+        def equations(x: Array, which: NDArray[np.int64]) -> tuple[Array, Array]:
+            many, scales = self.where.many(self._extended(x)), self.scales
+            return many.values * scales - wanted[which], many.gradients[:, :, :n] * scales[:, None]
+
+        starts = np.tile(self.point[:n], (len(wanted), 1))
+        x, converged = solve_many(equations, starts, tol=positive(tol, "tol"))
+        for k in np.flatnonzero(~converged):
+            x[k] = self._one(wanted[k], tol, max_iterations)
+        return x.reshape(*target.shape[:-1], n)
+
+    def _one(self, wanted: Array, tol: float, max_iterations: int) -> Array:
+        """Search with damping, where full steps diverged."""
+
+        def equations(x: Array) -> tuple[Array, Array]:
+            numbers = self.where.at(x)
+            values = np.array([numbers.h, *numbers.lie]) * self.scales - wanted
+            return values, numbers.gradients * self.scales[:, None]
+
+        n, what = self._dimension, f"state at z = {wanted.tolist()}"
+        found = search(
+            equations, self.point, range(n), tol=tol, max_iterations=max_iterations, what=what
+        )
+        return found.x[:n]
+
+
+# print(fold) -------------------------------------------------------------------------------------
+
+_WIDTH = 98
+
+
+def _count(number: float) -> str:
+    if math.isnan(number):
+        return "not decided at leading order"
+    return {0.0: "none", 1.0: "one", math.inf: "infinitely many"}[number]
+
+
+def _numbers(values: NDArray[Any]) -> str:
+    def one(value: complex) -> str:
+        if value.imag:
+            return f"{value.real:.6g}{value.imag:+.6g}i"
+        return f"{value.real:.6g}"
+
+    return ", ".join(one(complex(v)) for v in values)
+
+
+def _point(fold: TwoFold) -> str:
+    size = max(1.0, *(abs(v) for v in fold.point))
+    rounded = (0.0 if abs(v) < 1e-14 * size else v for v in fold.point)
+    text = f"[{', '.join(f'{v:.10g}' for v in rounded)}]"
+    return text + (f", t = {fold.t:.10g}" if fold.system.time_dependent else "")
+
+
+def description(fold: TwoFold) -> str:
+    """Describe a two-fold in a paragraph."""
+    c = fold.classification
+    title = f"{fold.kind.capitalize()} two-fold at {_point(fold)}"
+    lines = [f"{title}, {'' if c.label.startswith('boundary') else 'class '}{c.label}."]
+    (s1, s2), (n1, n2) = fold.sigma, fold.nu
+    lines.append(f"sigma = ({s1:+d}, {s2:+d}), nu = ({n1:.6g}, {n2:.6g})")
+    slopes = _numbers(fold.slopes)
+    lines.append(f"eigenvalues {_numbers(fold.eigenvalues)} with slopes z3/z2 = {slopes}")
+    lines.append(
+        f"canards (Da -> s -> Dr): {_count(fold.canards)}; "
+        f"faux canards (Dr -> s -> Da): {_count(fold.faux_canards)}"
+    )
+    if fold.coincident_fields:
+        lines.append(
+            "The two fields coincide at s: Delta = 0, the sliding flow is smooth through s and a "
+            "run along it goes on."
+        )
+    lines.append(c.determinism)
+    if fold.system.dimension > 3 and 1.0 in (c.canards, c.faux_canards):
+        lines.append(
+            f"With {fold.system.dimension} states two-folds form a set of dimension "
+            f"{fold.system.dimension - 3}; one orbit reads a set of codimension one."
+        )
+    for boundary in c.boundaries:
+        if boundary.harmless and not (fold.coincident_fields and boundary.name == "Delta=0"):
+            lines.append(
+                f"On the boundary {boundary.name} ({boundary.meaning}); the class is "
+                f"{boundary.between[0]} on both sides."
+            )
+    if fold.iterations:
+        plural = "" if fold.iterations == 1 else "s"
+        lines.append(
+            f"Found {fold.distance:.3g} from the start in {fold.iterations} iteration{plural}, "
+            f"residual {fold.residual:.2g}."
+        )
+    wrapped = [textwrap.fill(line, _WIDTH, subsequent_indent="  ") for line in lines[:1]]
+    wrapped += [
+        textwrap.fill(line, _WIDTH, initial_indent="  ", subsequent_indent="  ")
+        for line in lines[1:]
+    ]
+    return "\n".join(wrapped)
+
+
+# the search --------------------------------------------------------------------------------------
+
 #: Normalised grad h, grad L1, grad L2 whose smallest singular value is below this are dependent.
 DEPENDENT = 1e-12
 #: |L_ii| below this times |F_i| |grad L_i| is zero: a cusp.
@@ -452,7 +440,7 @@ CUSP = 1e-11
 
 
 def _refuse_degenerate(numbers: Numbers, linear: bool) -> None:
-    """Refuse dependent gradients and cusps; ``linear``: the search met a multiple root."""
+    """Refuse dependent gradients and cusps; ``linear`` after linear convergence."""
     lengths = np.linalg.norm(numbers.gradients, axis=1)
     smallest, at = independence(numbers), numbers.x.tolist()
     if smallest <= DEPENDENT or linear:

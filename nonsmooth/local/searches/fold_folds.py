@@ -2,7 +2,7 @@
 
 F1 = (a1, b1 x), F2 = (a2, b2 x) in a tangent coordinate x: VV1, VV2, VI1 to VI3, II1, II2 by
 visibility and directions; only VI with opposite directions needs the sizes (Kuznetsov, Rinaldi &
-Gragnani 2003). Every class has margins: dimensionless distances from where it changes.
+Gragnani 2003). The margins of a class are dimensionless distances from where it changes.
 """
 
 from __future__ import annotations

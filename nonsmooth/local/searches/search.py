@@ -1,8 +1,4 @@
-"""One search for every special point: equations on some of the states, the others held.
-
-Folds, two-folds, equilibria and pseudo-equilibria differ in their equations only; the iteration is
-that of :mod:`nonsmooth.solvers.newton`.
-"""
+"""The search for special points: Newton's method on equations in some of the states, others held."""
 
 from __future__ import annotations
 
@@ -20,7 +16,6 @@ from ...model import (
     FilippovSystem,
     NonsmoothError,
     OptionError,
-    explain,
     real_array,
 )
 from ...solvers.newton import Equations, solve
@@ -79,16 +74,15 @@ def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: 
         )
     free = [i for i, name in enumerate(system.state_names) if name not in names]
     if len(free) < equations:
-        raise DefinitionError(
-            explain(
-                what,
-                expected=f"at least {equations} free states, one for each equation",
-                received=f"{len(free)} ({system.dimension} states, {len(names)} held)",
-                advice="In the plane a two-fold (fold-fold) happens at isolated values of a "
-                "parameter: make that parameter a state with derivative 0 to find it."
-                if equations == 3 and system.dimension < 3
-                else "Hold fewer states.",
+        advice = "Hold fewer states."
+        if equations == 3 and system.dimension < 3:
+            advice = (
+                "In the plane a two-fold (fold-fold) happens at isolated values of a parameter: make "
+                "that parameter a state with derivative 0 to find it."
             )
+        raise DefinitionError(
+            f"{what}: expected at least {equations} free states, one for each equation, received "
+            f"{len(free)} ({system.dimension} states, {len(names)} held). {advice}"
         )
     return free
 

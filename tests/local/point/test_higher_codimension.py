@@ -141,7 +141,7 @@ def test_beside_a_surface_the_side_is_known_or_asked_for():
     assert ns.region(system, [0, 0, 1.0], surface=1) is ns.Region.CROSSING
     assert ns.region(system, [0, 0, -1.0], surface=1) is ns.Region.SLIDING
     assert ns.region(system, [0, 0, 0.0], surface=1, mode="-s") is ns.Region.SLIDING
-    with pytest.raises(ns.PointError, match=r"a side of h0.*mode="):
+    with pytest.raises(ns.PointError, match=r"point: .*h0.*mode="):
         ns.region(system, [0, 0, 0.0], surface=1)
     with pytest.raises(ns.DefinitionError, match=r"one of \[1\], received 0"):
         ns.local.limit_directions(system, [0, 0, 1.0], surface=0)

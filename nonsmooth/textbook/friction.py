@@ -1,4 +1,4 @@
-"""Oscillators with dry friction: they stick where the surface attracts from both sides."""
+"""Oscillators with dry friction."""
 
 from __future__ import annotations
 

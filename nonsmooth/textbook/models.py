@@ -1,4 +1,4 @@
-"""Models from applications: a harvested population, an ocean box, a jump at a state."""
+"""Models from applications: a harvested population, an ocean box, a state-dependent jump."""
 
 from __future__ import annotations
 

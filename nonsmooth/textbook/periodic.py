@@ -1,4 +1,4 @@
-"""Systems known for their periodic orbits and the bifurcations of these."""
+"""Systems with periodic orbits and their bifurcations."""
 
 from __future__ import annotations
 

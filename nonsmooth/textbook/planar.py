@@ -1,4 +1,4 @@
-"""Small systems on the line and in the plane: crossing, sliding, repelling, cycles."""
+"""Systems on the line and in the plane: crossing, sliding, repelling, cycles."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Coulomb friction in the plane: bodies that slide in two directions and come to rest, roll, or never do."""
+"""Coulomb friction in the plane: blocks, balls and a disc that slide in two directions."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""A textbook problem and its reference values: what a test or a page of the manual reads."""
+"""A textbook problem and its reference values."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Reference:
     quantity : str
         Unique within its problem.
     value : float or tuple of float
-        The answer, known from outside the code.
+        The reference solution, known independently of this library.
     tolerance : float
         Largest error relative to each value; absolute where the value is 0.
     how : str
@@ -94,7 +94,7 @@ class Reference:
 def stated(
     quantity: str, how: str, *digits: str, at: Mapping[str, float] | None = None
 ) -> Reference:
-    """Reference from decimal digits; few digits make the tolerance wider than 1e-9."""
+    """Reference from decimal digits; the tolerance is 1e-9, or wider for few digits."""
     numbers = [Decimal(d) for d in digits]
     tolerance = RELATIVE
     for text, number in zip(digits, numbers, strict=True):
@@ -121,7 +121,7 @@ class Problem:
     name : str
         Of the function that makes it.
     title : str
-        What the problem is, in a few words.
+        A short description.
     source : str
         Where it comes from.
     system : FilippovSystem
@@ -133,9 +133,9 @@ class Problem:
     t_end : float
         When its standard run ends.
     references : tuple of Reference
-        Answers that are known from outside the code.
+        Values known independently of this library.
     note : str
-        What is special or uncertain, e.g. parameters quoted from memory.
+        A remark, e.g. on parameters quoted from memory.
     """
 
     name: str

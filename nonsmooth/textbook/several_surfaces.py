@@ -1,4 +1,4 @@
-"""Systems with more than one surface, and what Filippov's convention leaves open there."""
+"""Systems with several surfaces, and choices that Filippov's convention leaves open."""
 
 from __future__ import annotations
 

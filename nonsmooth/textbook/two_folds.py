@@ -116,8 +116,8 @@ def _by_label(
         )
     if nu is not None:
         raise OptionError(
-            f"nu: expected none with the label {label!r}, received {nu!r}. A label stands for one "
-            "example; give the signs sigma to choose nu."
+            f"nu: received {nu!r}, but the label {label!r} already fixes nu. Give the signs sigma to "
+            "choose nu."
         )
     return TWO_FOLDS[label]
 

@@ -99,7 +99,7 @@ def test_two_fold_from_numbers():
     assert textbook.two_fold(sigma=(1, 1), nu=(2, -2)).parameters == {"nu1": 2.0, "nu2": -2.0}
     for arguments, message in [
         (("VV-X",), "one of VV-C1"),
-        (("II-C", (1, 2)), "expected none with the label"),
+        (("II-C", (1, 2)), "nu: "),
         (((1, 0), (1, 2)), "two signs"),
         (((1, 1), None), "two finite numbers"),
         (((1, 1), (1, math.nan)), "two finite numbers"),

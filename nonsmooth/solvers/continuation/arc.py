@@ -1,4 +1,4 @@
-"""Tracing one arc: predictor, corrector, step control, located zeros, and why it ends.
+"""Pseudo-arclength continuation of one arc: predictor, corrector, step control, zeros, ends.
 
 The predictor is the polynomial in arclength through the last points. A step that fails, bends too
 much or leads to a point that is not on the curve is halved. A step in which a test changes its sign
@@ -29,7 +29,7 @@ from .curve import Curve, Point, Zero, zeros_between
 #: Steps turn by no more than this, and grow where they turn by less than a third of it; rad.
 BEND = 0.3
 _ROWS = 6  # points of the predictor
-#: Steps are not shortened below this share of the largest to see what they hide.
+#: Steps are not shortened below this share of the largest to look for hidden ends.
 _SEEN = 1e-5
 
 
@@ -44,8 +44,8 @@ class Arc:
     zeros : list of Zero
         Zeros of the tests, in their order along the arc.
     end : str
-        ``"bound"``, ``"closed"``, ``"junction"``, ``"step too small"``, ``"points"`` (as many as
-        asked for), ``"interrupted"``, the name of the test that ended it, or what the curve said.
+        ``"bound"``, ``"closed"``, ``"junction"``, ``"step too small"``, ``"points"`` (``most`` of
+        them), ``"interrupted"``, the name of the test that ended it, or the text that the curve gave.
     """
 
     points: list[Point] = field(default_factory=list)
@@ -75,7 +75,7 @@ def trace(
     Parameters
     ----------
     curve : Curve
-        The curve: its equations and what is watched along it.
+        The curve: its equations and test functions.
     rows : sequence of ndarray (N,)
         At least one point of the curve; earlier ones help the predictor.
     tangent : ndarray (N,)
@@ -296,11 +296,11 @@ def angle(step: Array, direction: Array) -> float:
     return math.acos(max(min(float(step @ direction) / length, 1.0), -1.0)) if length else math.pi
 
 
-# What is asked of a curve of one's own, and of where it is to be followed from: refused in words.
+# checks of the arguments -----------------------------------------------------------------------
 
 
 def require_curve(curve: Any) -> None:
-    """Refuse what is no curve."""
+    """Refuse all but a Curve."""
     if not isinstance(curve, Curve):
         raise DefinitionError(
             "curve: expected an instance of a subclass of nonsmooth.continuation.Curve, received "
@@ -384,15 +384,15 @@ def _check_curve(curve: Curve, u: Array) -> None:
         )
     if type(curve).equations is Curve.equations:
         raise DefinitionError(
-            "curve: expected one with equations, received a subclass of Curve without. Write "
-            "equations(self, u), which returns their values and their Jacobian."
+            "curve: its class does not define equations. Write equations(self, u), which returns their "
+            "values and their Jacobian."
         )
     if not curve.exact:
-        return  # estimates of a derivative keep what they have seen
+        return  # an evaluation would change the carried Jacobian
     try:
         given = curve.equations(u)
     except (NonsmoothError, np.linalg.LinAlgError):
-        return  # the arc ends there, and says so
+        return  # the arc ends there with its reason
     try:
         shapes = [part.shape for part in given if isinstance(part, np.ndarray)]
     except TypeError:

@@ -1,4 +1,4 @@
-"""What is continued: N - 1 smooth equations in N unknowns, and a point of the curve they define.
+"""Curves, N - 1 smooth equations in N unknowns: their points, and zeros of test functions on them.
 
 Lengths and angles are measured in unknowns divided by their ``scale``. A guess is corrected in the
 hyperplane across a direction (pseudo-arclength; Keller 1977), so turning points are regular points.
@@ -7,36 +7,13 @@ hyperplane across a direction (pseudo-arclength; Keller 1977), so turning points
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from ...model import Array, DefinitionError, NonsmoothError, is_real
 from ..newton import Secant, converge
-
-if TYPE_CHECKING:
-    pass  # MOVED
-
-from dataclasses import replace
-
-
-def read_tests(found: Any) -> dict[str, float]:
-    """What ``Curve.tests`` returned, as numbers by name; they may have poles."""
-    if type(found) is dict and all(type(k) is str and type(v) is float for k, v in found.items()):
-        return found
-    if isinstance(found, Mapping):
-        number = lambda v: is_real(v) or isinstance(v, (float, np.floating))
-        wrong = [k for k, v in found.items() if not (isinstance(k, str) and number(v))]
-        if not wrong:
-            return {k: float(v) for k, v in found.items()}
-        received = f"{found[wrong[0]]!r} under the name {wrong[0]!r}"
-    else:
-        received = repr(found)
-    raise DefinitionError(
-        f"curve.tests: expected a mapping of names to numbers, received {received}. For example "
-        'return {"half": float(point.u[0]) - 0.5}.'
-    )
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,7 +31,7 @@ class Point:
     jacobian : ndarray (N - 1, N)
         Of the equations by scaled unknowns; empty for a curve without derivatives.
     tests : mapping of str to float
-        Functions whose zeros are looked for.
+        Functions whose zeros are located.
     """
 
     u: Array
@@ -65,7 +42,7 @@ class Point:
 
 
 class Curve:
-    """A curve in $R^N$; subclasses say by which equations, and what to watch along it.
+    """A curve in $R^N$; subclasses give its equations and test functions.
 
     Attributes
     ----------
@@ -77,12 +54,12 @@ class Curve:
         Whether ``equations`` gives the derivative itself, not a :class:`~nonsmooth.continuation.Secant`
         estimate of it; then tangents come from it, otherwise from the chord.
     parameter : int or None
-        The unknown whose turning points are looked for, under the name ``"fold"``.
+        The unknown whose turning points are located, under the name ``"fold"``.
     branching : bool
-        Whether branch points are looked for, under the name ``"branch point"``.
+        Whether branch points are located, under the name ``"branch point"``.
     snaps : bool
-        Whether the end is solved for (``snap``) also where corrections fail, as they do for equations
-        that are not defined beyond it; without derivatives always.
+        Whether the end is solved for (``snap``) also where corrections fail, as they do where equations
+        are not defined beyond it; without derivatives always.
 
     Examples
     --------
@@ -106,7 +83,7 @@ class Curve:
     snaps: bool = False
 
     def equations(self, u: Array) -> tuple[Array, Array]:
-        """Return the values of the equations and their Jacobian; what a subclass must give.
+        """Return the values of the equations and their Jacobian; every subclass defines it.
 
         Parameters
         ----------
@@ -166,7 +143,7 @@ class Curve:
         return self.ends(zero.name)
 
     def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
-        """Whether a step hides something that ends the curve; then shorter ones are taken.
+        """Whether a step hides an end of the curve; then shorter steps are taken.
 
         Parameters
         ----------
@@ -208,7 +185,7 @@ class Curve:
         return ""
 
     def snap(self, u: Array, tangent: Array, reach: float) -> Array | None:
-        """Solve for the end of the curve, where it is known what ends it; None if it is not near.
+        """Solve for the end of the curve, where its condition is known; None if it is not near.
 
         Parameters
         ----------
@@ -219,7 +196,7 @@ class Curve:
         """
         return None
 
-    # what follows from the equations ------------------------------------------------------------
+    # computed from the equations ----------------------------------------------------------------
 
     def scaled(self, u: Array) -> tuple[Array, Array]:
         """Return values and Jacobian by scaled unknowns.
@@ -309,7 +286,7 @@ class Curve:
         return Point(u, tangent, arclength, jacobian, tests)
 
     def solve(self, matrix: Array, right: Array) -> Array:
-        """Solve the linear equations of a corrector; a subclass may know their structure.
+        """Solve the linear equations of a corrector; a subclass may use their structure.
 
         Parameters
         ----------
@@ -331,7 +308,7 @@ class Curve:
         return np.asarray(np.linalg.solve(matrix, right), float)
 
     def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
-        """Return the tangent that a Jacobian says, and a determinant.
+        """Return the tangent of a Jacobian, and a determinant.
 
         The determinant is that of the Jacobian bordered by the tangent: it changes its sign at a simple
         branch point.
@@ -372,10 +349,28 @@ class Curve:
         return float(sign) * float(np.exp(size))
 
 
-# Zeros of test functions between two points of a curve, located along it.
+def read_tests(found: Any) -> dict[str, float]:
+    """What ``Curve.tests`` returned, as numbers by name; they may have poles."""
+    if type(found) is dict and all(type(k) is str and type(v) is float for k, v in found.items()):
+        return found
+    if isinstance(found, Mapping):
+        number = lambda v: is_real(v) or isinstance(v, (float, np.floating))
+        wrong = [k for k, v in found.items() if not (isinstance(k, str) and number(v))]
+        if not wrong:
+            return {k: float(v) for k, v in found.items()}
+        received = f"{found[wrong[0]]!r} under the name {wrong[0]!r}"
+    else:
+        received = repr(found)
+    raise DefinitionError(
+        f"curve.tests: expected a mapping of names to numbers, received {received}. For example "
+        'return {"half": float(point.u[0]) - 0.5}.'
+    )
+
+
+# zeros of test functions -----------------------------------------------------------------------
 
 _HALVINGS = 30  # of what is left of a step in which a curve is lost
-_NODES = 8  # points from which what is singular at a branch point is interpolated
+_NODES = 8  # points of the interpolation through a branch point
 
 
 @dataclass(frozen=True, eq=False)
@@ -387,7 +382,7 @@ class Zero:
     name : str
         Of the test.
     point : Point
-        Where on the curve the watched function is zero.
+        The point of the curve where the test is zero.
     slope : float
         Derivative of the test by arclength, from the ends of the step.
     together : tuple of str
@@ -402,8 +397,7 @@ class Zero:
 
 def zeros_between(curve: Curve, a: Point, b: Point) -> list[Zero]:
     """Zeros in the step from a to b, in their order; a test that jumps or has a pole has none."""
-    # Where the equations are singular at the zero of a test that ends the curve it cannot be located
-    # along the curve; then it is taken to be at the last point before it.
+    # A zero that ends the curve, where the equations are singular, is put at the last point before it.
     names = [k for k in a.tests if k in b.tests and a.tests[k] * b.tests[k] < 0]
     names.sort(key=lambda name: not (curve.singular(name) and curve.ends(name)))
     segment = _Segment(curve, a, b)
@@ -547,8 +541,8 @@ class _Segment:
 
     def interpolated(self, name: str) -> Point | None:
         """Zero of a test where the corrector is singular, from points around it."""
-        # At a branch point the equations are singular across every hyperplane. Both the test and the
-        # curve are smooth through it, so polynomials through points on both sides are right there.
+        # The equations are singular there across every hyperplane, but the test and the curve are
+        # smooth, so polynomials through points on both sides are accurate.
         low, high = self.a.tests[name], self.b.tests[name]
         middle, width = low / (low - high), 0.5
         point: Point | None = None
@@ -557,7 +551,7 @@ class _Segment:
             pairs = [(w, p) for w in wanted.tolist() if (p := self.at(w)) is not None]
             least = 1e-9 * (
                 abs(low) + abs(high)
-            )  # not on a branch that crosses where the test is zero
+            )  # not on a crossing branch, where the test is zero
             pairs = [(w, p) for w, p in pairs if abs(p.tests.get(name, 0.0)) > least]
             if len(pairs) < _NODES - 2:
                 return point

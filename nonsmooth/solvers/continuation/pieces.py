@@ -1,4 +1,4 @@
-"""Curves made of pieces: each with equations of its own, the next beginning where one ends."""
+"""Curves made of pieces, each with its own equations, and how to leave branch points."""
 
 from __future__ import annotations
 
@@ -88,7 +88,7 @@ def depart(
     Parameters
     ----------
     curve : Curve
-        The curve: its equations and what is watched along it.
+        The curve: its equations and test functions.
     u : ndarray (N,)
         The point of the curve to leave from.
     direction : ndarray (N,)
@@ -175,7 +175,7 @@ def changes_around(
     start : float
         The way ahead; the way back is left out.
     count, leave_out, halvings : int, optional
-        Angles looked at, of them left out at either end, and bisections of an interval.
+        Angles on the circle, those left out at either end, and bisections of an interval.
 
     Yields
     ------

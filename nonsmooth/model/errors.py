@@ -53,11 +53,5 @@ class MissingError(NonsmoothError, ImportError):
 
 
 def explain(what: str, *, expected: object, received: object, advice: str) -> str:
-    """Compose a message from what was expected, what was received, and advice.
-
-    Examples
-    --------
-    >>> print(explain("the start", expected="2 numbers", received="3", advice="Drop one."))
-    the start: expected 2 numbers, received 3. Drop one.
-    """
+    """Compose a message from what was expected, what was received, and advice."""
     return f"{what}: expected {expected}, received {received}. {advice}"

@@ -132,13 +132,7 @@ def kelvin_voigt_bounce() -> Problem:
         [x, u, y, v, spin],
         surface=u + spin,
         multipliers=lam,
-        field=[
-            u,
-            -(2 * d1 * eta * u + eta**2 * x) + friction,
-            v,
-            load,
-            ca.SX(5) / 2 * friction,
-        ],
+        field=[u, -(2 * d1 * eta * u + eta**2 * x) + friction, v, load, ca.SX(5) / 2 * friction],
         stops=[Stop(load, direction=-1, name="separation")],
         parameters={d1: 0.3, d2: 0.2, eta: 0.3, mu: 0.3, weight: 0.01},
     )

@@ -195,12 +195,7 @@ class Meeting:
 
     @classmethod
     def at_point(
-        cls,
-        system: FilippovSystem,
-        x: Array,
-        p: Array,
-        surfaces: Sequence[int] | None,
-        tol: float,
+        cls, system: FilippovSystem, x: Array, p: Array, surfaces: Sequence[int] | None, tol: float
     ) -> Meeting:
         """The intersection at a point, of chosen surfaces or of all those through it."""
         require_surface(system)

@@ -7,15 +7,7 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import (
-    Array,
-    FilippovSystem,
-    Parameters,
-    PointError,
-    call,
-    motion,
-    require_system,
-)
+from ...model import Array, FilippovSystem, Parameters, PointError, call, motion, require_system
 from ...model.checks import positive
 from ...model.laws.frozen import Frozen
 from .higher_codimension import law_at

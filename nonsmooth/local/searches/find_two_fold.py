@@ -15,14 +15,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import (
-    Array,
-    DegenerateError,
-    FilippovSystem,
-    Parameters,
-    PointError,
-    real_array,
-)
+from ...model import Array, DegenerateError, FilippovSystem, Parameters, PointError, real_array
 from ...model.checks import positive
 from ...notebook import card, quadrants
 from ...solvers.newton import solve_many

@@ -13,14 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import (
-    Array,
-    DefinitionError,
-    FilippovSystem,
-    Parameters,
-    PointError,
-    require_system,
-)
+from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
 from ..checks import MARGIN, relative_difference
 from ..point.surface_point import Numbers, Place, on_surface, place

@@ -232,10 +232,7 @@ class _Lifter:
         return _Value(operation(op, [a.e for a in args]), inside)
 
     def _over_sides(
-        self,
-        args: list[_Value],
-        inside: frozenset[int],
-        build: Callable[[list[_Value]], _Value],
+        self, args: list[_Value], inside: frozenset[int], build: Callable[[list[_Value]], _Value]
     ) -> _Value:
         """Sum ``build`` over the sides of the switches ``inside``, with their weights."""
         if not inside:

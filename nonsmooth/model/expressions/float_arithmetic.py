@@ -62,13 +62,7 @@ BINARY: dict[str, Callable[[float, float], float]] = {
 
 
 class Numbers:
-    """Doubles as coefficients of series (see ``jets.Arithmetic``).
-
-    Examples
-    --------
-    >>> Numbers().apply("sqrt", [2.25]), Numbers().divide(1.0, None), Numbers().apply("log", [-1.0])
-    (1.5, inf, nan)
-    """
+    """Doubles as coefficients of series (see ``jets.Arithmetic``)."""
 
     def number(self, value: float) -> float | None:
         """Return a constant, None for 0."""

@@ -3,7 +3,7 @@
 On a surface that does not slide the multiplier is the number +1 or -1. On those that slide the
 multipliers keep G_i = grad h_i . f(x, lambda) at zero: coefficient k of lambda enters coefficient k of
 G linearly, with the matrix M = dG/dlambda at the start of the step (``multiplier_series``; also where
-lambda enters nonlinearly: hidden dynamics). Nothing here grows as the number of modes.
+lambda enters nonlinearly: hidden dynamics). The size does not grow with the number of modes.
 
 Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), the
 unknown is nu_i = n_i lambda_i (``factors``).
@@ -37,7 +37,7 @@ from .evaluators import Evaluator
 from .multiplier_series import MultiplierSeries, unit
 from .switches import Guard
 
-# Numbers of a system at one point: what steps are measured with.
+# error scales ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Yardsticks:
     factor_gradient: Array
 
 
-# What is solved for while a surface slides: its multiplier, or its product with a common factor.
+# factors of multipliers ------------------------------------------------------------------------
 
 
 def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX], list[ca.SX]]:

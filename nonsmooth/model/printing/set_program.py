@@ -1,10 +1,9 @@
-"""The functions of a system with one set that lanes call, as a C program: a jet for each of its modes.
+"""The functions of a system with one set, for lanes, as a C program: a jet for each of its modes.
 
 Off the set lambda = h/|h|; on it the unknowns nu = factor lambda keep h' = G at zero; where it is left h = r u
 with |u| = 1 and u = lambda (``multiplier_series``). Each is written out order by order.
 
-Towards a set that is reached, and away from one that was left, series in time converge up to the branch point
-there only, a part of the way that does not grow with the order. With dt = (1 - w s/3)^2 ds, 1/w the time to
+Near a set that is reached or was left, series in time converge up to the branch point there only. With dt = (1 - w s/3)^2 ds, 1/w the time to
 it (negative: since it), that point is at s = 3/w, and a step of a part f of the way in s is one of
 1 - (1 - f)^3 in time.
 """

@@ -1,7 +1,7 @@
-"""A system as lists of instructions, which the interpreter in C runs at once: nothing is compiled.
+"""A system as lists of instructions, which the interpreter in C runs without compilation.
 
-``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Tape`` all that a driver needs of
-a system, in any mode (``model.coupled``). Generation is linear in the graph.
+``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Tape`` all functions of a system
+that a driver calls, in any mode (``model.coupled``).
 """
 
 from __future__ import annotations

@@ -2,14 +2,13 @@
 
 from .calls import call
 from .checks import is_real, real, real_array, whole
+from .definition.derived_systems import SECTION, reversed_system, surface_of, with_section
 from .definition.events import Clock, Impact, Reset, Stop
 from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
 from .definition.regularise import regularise
-from .definition.reversal import reversed_system
 from .definition.system import FilippovSystem, multiplier_enters, require_system
 from .derivatives.forcing import is_function, periods, read_period
-from .derivatives.sections import SECTION, surface_of, with_section
 from .derivatives.start_maps import StartMap
 from .errors import (
     ConvergenceError,

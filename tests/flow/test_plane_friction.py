@@ -268,8 +268,8 @@ def test_what_is_no_set_is_refused():
     l1, l2 = plane.columns("l1", "l2")
     pair = ca.vertcat(v[0], v[1])
     for surfaces, multipliers, message in [
-        ([pair], [l1], r"\[2\], received \[1\]"),
-        ([v[0]], [ca.vertcat(l1, l2)], r"\[1\], received \[2\]"),
+        ([pair], [l1], "multipliers: "),
+        ([v[0]], [ca.vertcat(l1, l2)], "multipliers: "),
         ([ca.vertcat(*v)], [ca.SX.sym("l", 4)], "at most 3 switching functions"),
         ([ca.SX.zeros(2, 2)], [ca.vertcat(l1, l2)], "received a matrix"),
     ]:

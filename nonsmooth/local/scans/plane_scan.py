@@ -22,8 +22,7 @@ from ..searches.equilibria import Equilibrium, find_equilibrium
 from ..searches.folds import Fold, find_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all
-from .box import Box
-from .contours import inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
+from .box import Box, inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
 
 _GRID = 161  # for the surface
 _CELLS = 61  # for equilibria

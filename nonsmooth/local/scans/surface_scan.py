@@ -22,8 +22,7 @@ from ..point.surface_point import FIELDS, SIDES, ManyNumbers, Place, Side, side_
 from ..searches.find_two_fold import TwoFold, find_two_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all, search
-from .box import Box
-from .contours import middle_of_sign_changes, refined, zero_lines
+from .box import Box, middle_of_sign_changes, refined, zero_lines
 
 _GRID = 201
 _MOST = 50  # starts of one search

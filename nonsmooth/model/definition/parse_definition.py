@@ -142,9 +142,7 @@ def read_definition(
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    (stops, resets, impacts), renamed = _unique_names(
-        [_items(*k) for k in kinds], _own_names(sizes)
-    )
+    (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
     guards = [column([s.function], f"stop {s.name!r}", 1) for s in stops]
     guards += [column([r.function], f"reset {r.name!r}", 1) for r in resets]
     maps = [column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
@@ -253,7 +251,7 @@ def _own_names(sizes: Sequence[int]) -> set[str]:
     return of_each | ({"L_F1 h", "L_F2 h", "stability of sliding"} if sizes else set())
 
 
-def _unique_names(
+def _distinct(
     kinds: Sequence[list[Any]], own: set[str]
 ) -> tuple[list[list[Any]], tuple[tuple[str, str], ...]]:
     """Events with different names, by which they are found again; and which were renamed."""

@@ -100,7 +100,7 @@ def two_fold(
         system,
         (0.0, 1.0, 0.6),
         2.0,
-        references,
+        *references,
         title=f"Normal form of the two-fold, {name}",
         source="Filippov 1988; Teixeira 1990; Colombo & Jeffrey 2011",
     )

@@ -49,11 +49,53 @@ class Blocks:
         return whole.T
 
 
-class VariationalField:
+class PlainField:
+    """One mode's flow as a smooth field, with all multipliers solved for (``explicit``)."""
+
+    def __init__(self, of_mode: Motion):
+        self.motion, self.states, self.field = of_mode, of_mode.states, of_mode.field
+
+    @property
+    def parameters(self) -> ca.SX:
+        """Symbols of the parameters."""
+        return self.motion.system.parameter_symbols
+
+    @property
+    def entries(self) -> int:
+        """Number of states."""
+        return int(self.states.numel())
+
+    @cached_property
+    def groups(self) -> tuple[NDArray[np.intp], ...]:
+        """Entries whose errors are measured together; the time is exact."""
+        moving = np.arange(self.entries)
+        system = self.motion.system
+        return (np.delete(moving, system.dimension) if system.time_dependent else moving,)
+
+    @cached_property
+    def jets(self) -> Evaluator:
+        """(y, p) -> Taylor coefficients (entries, ORDER + 1) of the flow."""
+        jet, _ = taylor(self.field, ca.SX(0, 1), self.states, self.parameters, ORDER)
+        inputs = [self.states, self.parameters]
+        return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
+
+    @cached_property
+    def series(self) -> Series:
+        """The Taylor rules of the field."""
+        return series_of([self.states, self.parameters], [self.field])
+
+
+def plain_field(system: FilippovSystem, mode: str) -> PlainField:
+    """Return the field of a mode without guards, built once per system."""
+    return system.cached(("plain field", mode), lambda: PlainField(explicit(system, mode)))
+
+
+class VariationalField(PlainField):
     """The flow of an explicit mode with derivatives by its start and by ``chosen`` parameters."""
 
     def __init__(self, of_mode: Motion, chosen: tuple[int, ...] = ()):
-        self.motion, self.chosen = of_mode, chosen
+        super().__init__(of_mode)
+        self.chosen = chosen
         system = of_mode.system
         y, f, p = of_mode.states, of_mode.field, system.parameter_symbols
         size, n, q = y.numel(), system.extended_dimension, len(chosen)
@@ -83,28 +125,6 @@ class VariationalField:
                     chosen_rates.append(ca.densify(rates[i, j - 1]))
                     kept.append(symbols[j][i])
         self.states, self.field = ca.vertcat(*kept), ca.vertcat(*chosen_rates)
-
-    @property
-    def parameters(self) -> ca.SX:
-        """Symbols of the parameters."""
-        return self.motion.system.parameter_symbols
-
-    @cached_property
-    def jets(self) -> Evaluator:
-        """(z, p) -> Taylor coefficients (m, ORDER + 1) of the whole field's flow."""
-        jet, _ = taylor(self.field, ca.SX(0, 1), self.states, self.parameters, ORDER)
-        inputs = [self.states, self.parameters]
-        return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
-
-    @property
-    def entries(self) -> int:
-        """Number of entries of z."""
-        return int(self.states.numel())
-
-    @cached_property
-    def series(self) -> Series:
-        """The Taylor rules of the whole field."""
-        return series_of([self.states, self.parameters], [self.field])
 
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
@@ -225,51 +245,13 @@ def variational_field(
     return system.cached(key, lambda: VariationalField(explicit(system, mode), chosen))
 
 
-class PlainField:
-    """One mode's flow as a smooth field."""
-
-    def __init__(self, of_mode: Motion):
-        self.motion = of_mode
-        system = of_mode.system
-        moving = np.arange(of_mode.states.numel())
-        if system.time_dependent:
-            moving = np.delete(moving, system.dimension)
-        #: Entries whose errors are measured together; the time is exact.
-        self.groups: tuple[NDArray[np.intp], ...] = (moving,)
-
-    @property
-    def entries(self) -> int:
-        """Number of states."""
-        return int(self.motion.states.numel())
-
-    @cached_property
-    def jets(self) -> Evaluator:
-        """(y, p) -> Taylor coefficients (N + k, ORDER + 1) of the flow."""
-        m, p = self.motion, self.motion.system.parameter_symbols
-        jet, _ = taylor(m.field, ca.SX(0, 1), m.states, p, ORDER)
-        return Evaluator(ca.Function("jets", [m.states, p], [ca.densify(jet)], {"cse": True}))
-
-    @cached_property
-    def series(self) -> Series:
-        """The Taylor rules of the field."""
-        m = self.motion
-        return series_of([m.states, m.system.parameter_symbols], [m.field])
-
-
-def plain_field(system: FilippovSystem, mode: str) -> PlainField:
-    """Return the field of a mode without guards, built once per system."""
-    return system.cached(("plain field", mode), lambda: PlainField(explicit(system, mode)))
-
-
 class GuardedField(PlainField):
     """One mode's flow with its guards along it."""
 
     @cached_property
     def series(self) -> Series:
         """The Taylor rules of the field and of the guards."""
-        m = self.motion
-        inputs = [m.states, m.system.parameter_symbols]
-        return series_of(inputs, [m.field, m.functions])
+        return series_of([self.states, self.parameters], [self.field, self.motion.functions])
 
     @cached_property
     def jets(self) -> Evaluator:

@@ -56,7 +56,7 @@ def test_wrong_requests_are_refused():
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until="h7")
     with pytest.raises(ns.DefinitionError, match="mode"):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="up")
-    with pytest.raises(ns.DefinitionError, match=r"also \['q'\]"):
+    with pytest.raises(ns.DefinitionError, match=r"contains \['q'\]"):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", watch=[ca.SX.sym("q")])
     with pytest.raises(ns.NotSmoothError):
         ns.flow.follow(PARABOLA, [0.0, 0.0], 1.0, mode="+", until=[ca.fabs(x)])

@@ -36,7 +36,7 @@ class StartMap:
         extra = [s for s in ca.symvar(states) if not ca.depends_on(u, s)]
         if extra:
             raise OptionError(
-                f"starts: the expressions contain {extra} besides the two coordinates. Give numbers for "
+                f"starts: the expressions contain {[str(s) for s in extra]} besides the two coordinates. Give numbers for "
                 "them."
             )
         self._function = ca.Function("starts", [u], [states, ca.jacobian(states, u)])

@@ -282,7 +282,7 @@ def curve(**given):
     [
         ({"curve": None}, ns.DefinitionError, "curve: expected an instance of a subclass"),
         ({"curve": Circle}, ns.DefinitionError, "curve: expected an instance of a subclass"),
-        ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "one with equations"),
+        ({"curve": ns.continuation.Curve()}, ns.DefinitionError, "curve: "),
         ({"curve": curve(equations=lambda self, u: None)}, ns.DefinitionError, "expected arrays"),
         ({"curve": curve(equations=lambda self, u: u @ u)}, ns.DefinitionError, "expected arrays"),
         (

@@ -111,7 +111,7 @@ def test_each_region_is_named_once():
         (
             lambda s: ns.plot.sliding_portrait(s, BOX, coordinates=("z1", "z2")),
             ns.DefinitionError,
-            "no surface|none over",
+            "surface: ",
         ),
         (lambda s: ns.plot.sliding_portrait(s, BOX, orbits=-1), ns.OptionError, "orbits"),
     ],

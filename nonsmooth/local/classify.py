@@ -377,7 +377,7 @@ class _Classifier:
         return self._pseudo_equilibrium()
 
     def _speed_ratio(self, along: Array) -> float:
-        """Sliding speed relative to the fields: zero where no linearisation says so (g' = 0)."""
+        """Sliding speed relative to the fields if within ``tol``, else inf; for zeros with g' = 0."""
         slow = min(float(np.linalg.norm(f)) for f in self.numbers.fields)
         ratio = float(np.linalg.norm(along)) / slow
         return ratio if ratio <= self.tol else float("inf")

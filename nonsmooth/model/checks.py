@@ -69,7 +69,7 @@ def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArra
     if isinstance(values, ca.DM) and 1 in values.shape:
         return np.array(values, dtype=float).ravel()
     if values is None:
-        return np.array(np.nan)  # no axis: the caller says which shape is expected
+        return np.array(np.nan)  # a wrong shape, which the caller refuses
     try:
         array = np.asarray(values)
         fits = array.dtype.kind in "iuf" and not _is_masked(values)

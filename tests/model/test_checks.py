@@ -1,4 +1,4 @@
-"""What a user gives is read strictly, and every refusal is a NonsmoothError that says what is wrong."""
+"""Arguments are read strictly, and every refusal is a NonsmoothError that names the argument."""
 
 import subprocess
 import sys
@@ -112,13 +112,13 @@ def test_a_parameter_given_twice_is_refused():
     ],
 )
 @pytest.mark.parametrize("system", [None, "system", [X, Y]], ids=repr)
-def test_a_system_is_asked_for_where_there_is_none(call, system):
+def test_what_is_no_system_is_refused(call, system):
     with pytest.raises(ns.DefinitionError, match="system: expected a FilippovSystem, received"):
         call(system)
 
 
 @pytest.mark.parametrize("time", ["a", 0.5 + 1j, [True]], ids=repr)
-def test_dense_output_is_asked_at_real_times(time):
+def test_dense_output_takes_real_times(time):
     with pytest.raises(ns.PointError, match="time: expected real numbers"):
         ns.simulate(SYSTEM, [3.0, 0.0], 1.0)(time)
 

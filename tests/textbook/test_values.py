@@ -1,4 +1,4 @@
-"""Every reference value of the textbook is met by a computation, to 1e-9 or to its own digits."""
+"""Every reference value of the textbook is computed to 1e-9 or to its own digits."""
 
 import functools
 import math

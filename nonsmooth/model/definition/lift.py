@@ -22,8 +22,8 @@ The result is affine in each multiplier: Filippov's convention (Filippov 1988, s
 only the values beside a surface count. Where a multiplier enters in another way, as in sign(x)**2
 or exp(sign(x)), it is replaced by the affine function with the same values at +1 and -1; this too
 is exact off the surfaces. On the surface the expression as written could be read as Jeffrey's
-hidden dynamics instead (Jeffrey 2018), with another sliding field: ``LiftedSwitch.hidden`` says
-so, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are
+hidden dynamics instead (Jeffrey 2018), with another sliding field: ``LiftedSwitch.hidden`` is
+true then, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are
 continuous and leave no such choice: fabs(h) = 0 on h = 0.
 """
 

@@ -127,7 +127,7 @@ def read_definition(
     impacts: Any,
     hidden: bool,
 ) -> Definition:
-    """Read what a user gave to FilippovSystem, whose docstring says what each is."""
+    """Read and check the arguments of FilippovSystem."""
     x = symbols(states, "states")
     if x.numel() == 0:
         raise DefinitionError("states: expected at least one symbol, received none.")

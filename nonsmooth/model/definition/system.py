@@ -375,8 +375,9 @@ class FilippovSystem:
         return self.parse_letters(mode)[: self.surface_count]
 
     def parse_letters(self, mode: str) -> tuple[int, ...]:
-        """Turn the letters of surfaces and impacts into signs: ``+`` 1, ``-`` -1, ``s`` 0, ``o`` 1
-        and ``c`` 0. Letters of the impacts may be missing: open.
+        """Turn the letters of surfaces and impacts into signs.
+
+        ``+`` and ``o`` are 1, ``-`` is -1, ``s`` and ``c`` are 0. Impacts without a letter are open.
 
         Raises
         ------

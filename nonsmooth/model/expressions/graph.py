@@ -57,7 +57,7 @@ class Node:
     payload: Hashable = None  # the value of a ``const``, (input, position) of an ``input``
 
     @property
-    def place(self) -> tuple[int, int]:
+    def source(self) -> tuple[int, int]:
         """Input vector and position of an ``input`` node."""
         return cast("tuple[int, int]", self.payload)
 
@@ -118,7 +118,7 @@ def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
         if node.op == "const":
             values.append(algebra.constant(cast("float", node.payload)))
         elif node.op == "input":
-            values.append(algebra.symbol(*node.place))
+            values.append(algebra.symbol(*node.source))
         else:
             values.append(algebra.apply(node.op, [values[k] for k in node.args]))
     return values
@@ -135,7 +135,7 @@ def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
     result: list[bool] = []
     for node in nodes:
         if node.op == "input":
-            result.append(variable[node.place[0]])
+            result.append(variable[node.source[0]])
         else:
             result.append(any(result[a] for a in node.args))
     return result

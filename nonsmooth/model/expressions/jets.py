@@ -101,8 +101,8 @@ def expansion_of(outputs: Sequence[ca.SX], states: ca.SX, others: ca.SX) -> Expa
     """Return the expansion of expressions, simplified first; ``others`` are constant in time."""
     inputs = [states, others]
     nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
-    rules, place = lower(nodes, depends_on(nodes, [True, False]))
-    rows = [[place[j] for j in row] for row in rows]
+    rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+    rows = [[rule_of[j] for j in row] for row in rows]
     still = [others[i] for i in range(others.numel())]
     return Expansion(rules, rows, still, Expressions())
 
@@ -217,7 +217,7 @@ class Expansion:
         return lambda k: None if k else value
 
     def _input(self, rule: Rule, _: list[Any]) -> Callable[[int], Any]:
-        vector, position = rule.place
+        vector, position = rule.source
         if vector == 0:
             return lambda k: self._moving[position]
         return lambda k: None if k else self._still[position]

@@ -82,7 +82,7 @@ class _Reader:
         if node.op == "const":
             return ca.SX(node.payload)
         if node.op == "input":
-            vector, position = node.place
+            vector, position = node.source
             return self._inputs[vector][position]
         return operation(node.op, args)
 

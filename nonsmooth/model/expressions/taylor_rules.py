@@ -45,7 +45,7 @@ class Rule:
     args: tuple[int, ...] = ()
     operation: str = ""
     numbers: tuple[float, ...] = ()
-    place: tuple[int, int] = (-1, -1)
+    source: tuple[int, int] = (-1, -1)
 
 
 def lower(nodes: Sequence[Node], moving: Sequence[bool]) -> tuple[list[Rule], list[int]]:
@@ -53,7 +53,7 @@ def lower(nodes: Sequence[Node], moving: Sequence[bool]) -> tuple[list[Rule], li
     lowering = _Lowering()
     for node, moves in zip(nodes, moving, strict=True):
         lowering.add(node, moves, moving)
-    return lowering.rules, lowering.place
+    return lowering.rules, lowering.rule_of
 
 
 class _Lowering:
@@ -61,15 +61,15 @@ class _Lowering:
 
     def __init__(self) -> None:
         self.rules: list[Rule] = []
-        self.place: list[int] = []
+        self.rule_of: list[int] = []
         self._pairs: dict[tuple[str, int], int] = {}
 
     def add(self, node: Node, moves: bool, moving: Sequence[bool]) -> None:
-        args = tuple(self.place[a] for a in node.args)
+        args = tuple(self.rule_of[a] for a in node.args)
         if node.op == "const":
             number = self._new("constant", numbers=(cast("float", node.payload),))
         elif node.op == "input":
-            number = self._new("input", place=node.place)
+            number = self._new("input", source=node.source)
         elif not moves:
             number = self._new("apply", *args, operation=node.op)
         elif node.op in ("pow", "constpow"):
@@ -83,7 +83,7 @@ class _Lowering:
                     "their inverses, atan2 and erf."
                 )
             number = rule(self, *args)
-        self.place.append(number)
+        self.rule_of.append(number)
 
     def _new(self, rule: str, *args: int, **more: object) -> int:
         self.rules.append(Rule(rule, args, **more))  # type: ignore[arg-type]
@@ -208,6 +208,6 @@ def entered(rules: Sequence[Rule], wanted: Callable[[int], bool]) -> list[bool]:
     found = [False] * len(rules)
     for _ in range(2):  # a sine and its cosine refer to each other
         for j, rule in enumerate(rules):
-            own = rule.place[0] == 0 and wanted(rule.place[1])
+            own = rule.source[0] == 0 and wanted(rule.source[1])
             found[j] = found[j] or own or any(found[a] for a in rule.args)
     return found

@@ -341,8 +341,8 @@ class Coupled:
             outputs = [*self.outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
             outputs = simplified(self._symbols, self.awake(outputs), [True, False])
             nodes, rows = instructions(self._symbols, outputs)
-            rules, place = lower(nodes, depends_on(nodes, [True, False]))
-            rows = [[place[j] for j in row] for row in rows]
+            rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+            rows = [[rule_of[j] for j in row] for row in rows]
             late = touched(rules, self.system.extended_dimension)
             self._series[key] = Expansion(rules, rows, [], Numbers()), late
         return self._series[key]

@@ -137,8 +137,8 @@ class _Writer:
         inputs = [ca.vertcat(self.x, unknowns), self.p]
         outputs = [ca.densify(e) for e in outputs]
         nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
-        rules, place = lower(nodes, depends_on(nodes, [True, False]))
-        rows = [[place[j] for j in row] for row in rows]
+        rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+        rows = [[rule_of[j] for j in row] for row in rows]
         still = [self.p[i] for i in range(self.p.numel())]
         return Expansion(rules, rows, still, Expressions()), touched(rules, self.n)
 

@@ -171,7 +171,7 @@ def values_of(
         if node.op == "const":
             constant[j] = cast("float", node.payload)
         elif node.op == "input":
-            args[j] = node.place
+            args[j] = node.source
         else:
             args[j, : len(node.args)] = node.args
     return Values(
@@ -212,8 +212,8 @@ def _rules_of(
     """Rules of expressions, and the numbers of those of each output."""
     outputs = [ca.densify(o) for o in outputs]
     nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
-    rules, place = lower(nodes, depends_on(nodes, [True, False]))
-    return rules, [[place[j] for j in row] for row in rows]
+    rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+    return rules, [[rule_of[j] for j in row] for row in rows]
 
 
 def _series(
@@ -281,7 +281,7 @@ def _reached(
 
 
 def _is_still(rule: Rule) -> bool:
-    return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.place[0] == 1)
+    return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.source[0] == 1)
 
 
 def _lines(rules: Sequence[Rule], still: Sequence[bool], time: int | None) -> list[bool]:
@@ -291,7 +291,7 @@ def _lines(rules: Sequence[Rule], still: Sequence[bool], time: int | None) -> li
         sums = rule.rule in ("add", "sub", "neg", "twice", "affine")
         scaled = rule.rule == "mul" and any(still[a] for a in rule.args)
         scaled |= rule.rule == "div" and still[rule.args[1]]
-        own = rule.rule == "input" and rule.place == (0, time)
+        own = rule.rule == "input" and rule.source == (0, time)
         found.append(still[j] or own or ((sums or scaled) and all(found[a] for a in rule.args)))
     return found
 
@@ -309,7 +309,7 @@ _SPECIAL = {
 def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ...]]:
     """Name and arguments of a rule: with what does not move nothing is convolved."""
     if rule.rule == "input":
-        return rule.rule, rule.place
+        return rule.rule, rule.source
     for k, (name, turned) in enumerate(_SPECIAL.get(rule.rule, ())):
         if not moving[rule.args[k]] and moving[rule.args[1 - k]]:
             return name, rule.args[::-1] if turned else rule.args

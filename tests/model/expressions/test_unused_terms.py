@@ -1,4 +1,4 @@
-"""What a mode multiplies by zero is not looked at, and nothing else changes."""
+"""Terms that a mode multiplies by zero are zero, and nothing else changes."""
 
 import casadi as ca
 import numpy as np

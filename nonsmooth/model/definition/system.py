@@ -307,7 +307,7 @@ class FilippovSystem:
         return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
 
     def entry_of(self, function: int) -> int:
-        """Number, in names and modes, of the surface or set of a switching function."""
+        """Number, in names and modes, of the surface or set of a switching ``function`` (index)."""
         return next(k for k, members in enumerate(self.entries) if function in members)
 
     @cached_property
@@ -316,7 +316,7 @@ class FilippovSystem:
         return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
 
     def spelled(self, mode: str) -> str:
-        """Shorten a mode to one letter for each surface, set and impact."""
+        """Shorten a ``mode`` to one letter for each surface, set and impact."""
         if not self.sets:
             return mode
         letters = [mode[members[0]] for members in self.entries]
@@ -324,7 +324,7 @@ class FilippovSystem:
         return "".join(shown) + mode[self.surface_count :]
 
     def widened(self, mode: str) -> str:
-        """Widen a mode to one letter for each switching function and impact."""
+        """Widen a ``mode`` to one letter for each switching function and impact."""
         if not self.sets or not isinstance(mode, str):
             return mode
         if len(mode) not in (len(self.entries), len(self.entries) + len(self.impacts)):
@@ -363,7 +363,7 @@ class FilippovSystem:
         return tuple(result)
 
     def parse_mode(self, mode: str) -> tuple[int, ...]:
-        """Turn the letters of the surfaces into signs: ``+`` 1, ``-`` -1, ``s`` 0.
+        """Turn the letters of the surfaces in a ``mode`` into signs: ``+`` 1, ``-`` -1, ``s`` 0.
 
         The letters of a set, ``*`` and ``s``, stand for each of its switching functions: 2 and 0.
 
@@ -375,7 +375,7 @@ class FilippovSystem:
         return self.parse_letters(mode)[: self.surface_count]
 
     def parse_letters(self, mode: str) -> tuple[int, ...]:
-        """Turn the letters of surfaces and impacts into signs.
+        """Turn the letters of surfaces and impacts in a ``mode`` into signs.
 
         ``+`` and ``o`` are 1, ``-`` is -1, ``s`` and ``c`` are 0. Impacts without a letter are open.
 
@@ -398,7 +398,7 @@ class FilippovSystem:
         return tuple(letters[letter] for letter in whole)
 
     def require_mode(self, mode: object) -> None:
-        """Refuse all but one letter for each surface and set, without letters internal to a run."""
+        """Refuse a ``mode`` without one letter for each surface and set, or with letters of runs."""
         known = ["*s" if len(members) > 1 else "+-s" for members in self.entries]
         whole = [*known, *["oc"] * len(self.impacts)]
         fits = isinstance(mode, str) and len(mode) in (len(known), len(whole))
@@ -419,7 +419,7 @@ class FilippovSystem:
         )
 
     def surface_index(self, surface: int) -> int:
-        """Check the number of a surface."""
+        """Check the number of a ``surface``."""
         if isinstance(surface, bool) or not isinstance(surface, (int, np.integer)):
             raise DefinitionError(f"surface: expected an index (int), received {surface!r}.")
         if not 0 <= surface < self.surface_count:
@@ -431,7 +431,7 @@ class FilippovSystem:
     # expressions -----------------------------------------------------------------------------
 
     def surface_function(self, surface: int = 0) -> ca.SX:
-        """Return the switching function h of a surface (SX scalar)."""
+        """Return the switching function h of a ``surface`` (SX scalar)."""
         return self.definition.surfaces[self.surface_index(surface)]
 
     def field(self, mode: str) -> ca.SX:
@@ -448,9 +448,9 @@ class FilippovSystem:
         return self.field_with(ca.DM(list(signs)))
 
     def field_with(self, multipliers: Any, reactions: Any = None) -> ca.SX:
-        """Right-hand side for given multipliers (values or expressions), time row included.
+        """Right-hand side for ``multipliers`` (values or expressions), time row included.
 
-        Reactions of impacts are zero unless given.
+        The ``reactions`` of impacts are zero unless given.
         """
         d, f = self.definition, self.definition.field
         if self.surface_count:
@@ -460,11 +460,7 @@ class FilippovSystem:
         return ca.vertcat(f, ca.SX.ones(d.time.numel(), 1))
 
     def gradient(self, expression: Expression) -> ca.SX:
-        """Derivatives of a scalar with respect to the states, then time if it depends on it.
-
-        Returns
-        -------
-        SX row (1, extended dimension)
+        """Derivatives of a scalar ``expression`` with respect to the states, then time (SX row).
 
         Examples
         --------
@@ -476,11 +472,7 @@ class FilippovSystem:
         return ca.densify(ca.jacobian(scalar(expression, "expression"), self.extended_states))
 
     def parameter_gradient(self, expression: Expression) -> ca.SX:
-        """Derivatives of a scalar with respect to the parameters, in the order of their names.
-
-        Returns
-        -------
-        SX row (1, number of parameters)
+        """Derivatives of a scalar ``expression`` with respect to the parameters (SX row).
 
         Examples
         --------
@@ -536,13 +528,13 @@ class FilippovSystem:
     # numeric -----------------------------------------------------------------------------------
 
     def cached(self, key: Hashable, build: Callable[[], T]) -> T:
-        """Return the cached value of ``key``, built if it is not among the last 256."""
+        """Return the cached value of ``key``, made by ``build`` if it is not among the last 256."""
         return self._cache.get(key, build)
 
     def function(
         self, key: Hashable, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
     ) -> ca.Function:
-        """Return the function of ``states`` and parameters of some expressions, cached by ``key``."""
+        """Return the function of ``states`` and parameters that ``build`` gives, cached by ``key``."""
 
         def made() -> ca.Function:
             outputs = [ca.densify(ca.SX(e)) for e in build()]

@@ -308,7 +308,7 @@ def place(
             )
         return Place(system, 0, "", p), x
     require_surface(system)
-    system.surface_function(surface)  # refuses what is no index or out of range
+    system.surface_function(surface)  # refuses a wrong index
     letters = list(_signs(system, x, p, surface) if mode is None else mode)
     if mode is not None:
         system.require_mode(mode)

@@ -187,7 +187,7 @@ def orbit(flow: ReducedFlow, z: ArrayLike, count: int = 250) -> Orbit:
 
 
 def _end(matrix: Array, z: Array) -> tuple[Array, str]:
-    """Times from 0 to the end of the stay in Da, and what is there."""
+    """Times from 0 to the end of the stay in Da, and the name of the end."""
     last, component = leaving(matrix, z)
     if component >= 0:
         times = np.linspace(0.0, last, 1500)

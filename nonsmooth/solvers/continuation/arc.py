@@ -292,7 +292,7 @@ def ahead(rows: Sequence[Array], size: float, tangent: Array) -> Array:
 def angle(step: Array, direction: Array) -> float:
     """Angle of a step with a direction of length 1; pi for none."""
     length = math.sqrt(float(step @ step))
-    # what is not a number stays so
+    # NaN stays NaN
     return math.acos(max(min(float(step @ direction) / length, 1.0), -1.0)) if length else math.pi
 
 

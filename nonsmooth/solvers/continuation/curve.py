@@ -369,7 +369,7 @@ def read_tests(found: Any) -> dict[str, float]:
 
 # zeros of test functions -----------------------------------------------------------------------
 
-_HALVINGS = 30  # of what is left of a step in which a curve is lost
+_HALVINGS = 30  # of a step in which the curve is lost
 _NODES = 8  # points of the interpolation through a branch point
 
 

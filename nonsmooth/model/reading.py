@@ -1,4 +1,4 @@
-"""Reading expressions that a user gave: scalars, columns, symbols; what is foreign is refused."""
+"""Reading of expressions that a user gave: scalars, columns, matrices, symbols."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ from typing import Any
 import casadi as ca
 import numpy as np
 
-from .errors import DefinitionError, explain
+from .errors import DefinitionError
 
 Expression = Any  # a CasADi SX scalar, a number, or (for vectors) a sequence of these
 Parameters = Mapping[Any, float | None]
 
 
-#: Advice where a function was given.
+#: Advice where a function was given instead of an expression.
 _CALL = (
     " Call it with the symbols and give what it returns, field=f(x, v). Inside, symbols have no truth "
     "value: write casadi.if_else(x > 0, a, b) and use FilippovSystem.from_expression, not 'if'."
@@ -23,7 +23,7 @@ _CALL = (
 
 
 def listed(value: Any) -> list[Any]:
-    """Return a sequence of what a user gave: one thing, a vector, a sequence, or None for nothing."""
+    """Return a list of what a user gave: one item, a vector, a sequence, or None for an empty one."""
     if value is None:
         return []
     if isinstance(value, (ca.SX, ca.DM)):
@@ -76,15 +76,9 @@ def column(values: Any, what: str, length: int) -> ca.SX:
         )
     items = listed(values)
     if len(items) != length:
+        expected = "one expression" if length == 1 else f"{length} expressions, one for each state"
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"{length} expressions, one for each state"
-                if length != 1
-                else "one expression",
-                received=str(len(items)),
-                advice="The order is that of the states.",
-            )
+            f"{what}: expected {expected}, received {len(items)}. The order is that of the states."
         )
     return ca.vertcat(*[scalar(v, f"{what}[{i}]") for i, v in enumerate(items)])
 
@@ -95,12 +89,8 @@ def symbols(values: Any, what: str) -> ca.SX:
     for i, item in enumerate(items):
         if not (isinstance(item, ca.SX) and item.is_scalar() and item.is_symbolic()):
             raise DefinitionError(
-                explain(
-                    f"{what}[{i}]",
-                    expected="a scalar symbol made by casadi.SX.sym",
-                    received=f"{item!r} ({type(item).__name__})",
-                    advice="MX symbols, expressions and strings are not symbols.",
-                )
+                f"{what}[{i}]: expected a scalar symbol made by casadi.SX.sym, received {item!r} "
+                f"({type(item).__name__}). MX symbols, expressions and strings are not symbols."
             )
     return ca.vertcat(*items) if items else ca.SX(0, 1)
 
@@ -134,12 +124,8 @@ def require_known(
             else "Add it to states=, parameters= or time=, or give it a number."
         )
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"the states {list(states)} and parameters {list(parameters)}",
-                received=f"also {[str(s) for s in foreign]}",
-                advice=cause,
-            )
+            f"{what}: it contains {[str(s) for s in foreign]}, but the states are {list(states)} and "
+            f"the parameters {list(parameters)}. {cause}"
         )
 
 

@@ -53,7 +53,7 @@ def _instructions(program: Program, numbers: Numbers) -> list[list[Any]]:
         if node.op == "const":
             nodes.append(["const", text(exact(node.payload, numbers))])
         elif node.op == "input":
-            nodes.append(["input", *node.place])
+            nodes.append(["input", *node.source])
         elif node.op == "power":
             nodes.append(["power", node.args[0], node.payload])
         else:

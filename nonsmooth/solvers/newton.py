@@ -5,9 +5,9 @@ so the root found is close to the start. Equations are divided by the length of 
 residuals are distances, whatever the units of the equations. A step is halved until the residual
 falls. The iteration goes on to rounding and is accepted if the residual is below ``tol``.
 
-A good guess of as many equations as unknowns needs none of this: ``converge`` takes full steps and
-stops as soon as the next one would be below ``tol``. Where derivatives are dear, ``Secant`` carries
-the Jacobian from one evaluation to the next (Broyden 1965).
+From a good guess of as many equations as unknowns ``converge`` takes full steps and stops as soon as
+the next one would be below ``tol``; ``Secant`` carries the Jacobian from one evaluation to the next
+(Broyden 1965). ``solve_many`` takes full steps from many starts at once.
 """
 
 from __future__ import annotations
@@ -22,58 +22,18 @@ from numpy.typing import NDArray
 from ..model import Array, ConvergenceError, DefinitionError, OptionError, PointError, real_array
 from ..model.checks import positive
 
-# Newton's method of :mod:`nonsmooth.solvers.newton` for many starts at once, without damping.
-
-#: Points (k, n) and which of all starts they belong to (k,) -> values (k, m), Jacobians (k, m, n).
-ManyEquations = Callable[[Array, NDArray[np.int64]], tuple[Array, Array]]
-
-_FAR = 1e8  # a longer step has left the problem
-
-
-def solve_many(
-    equations: ManyEquations, starts: Array, *, tol: float, iterations: int = 10
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Find a root close to each start."""
-    x = np.array(starts, dtype=float)
-    residual = np.full(len(x), np.inf)
-    index = np.arange(len(x))
-    for _ in range(iterations):
-        if not index.size:
-            break
-        values, jacobian = equations(x[index], index)
-        lengths = np.linalg.norm(jacobian, axis=2)
-        good = np.isfinite(values).all(1) & np.isfinite(lengths).all(1) & (lengths > 0).all(1)
-        residual[index[~good]] = np.inf
-        index, values, jacobian, lengths = index[good], values[good], jacobian[good], lengths[good]
-        residual[index] = np.max(np.abs(values) / lengths, axis=1, initial=0.0)
-        step = _least_norm(values / lengths, jacobian / lengths[..., None])
-        x[index] -= step
-        length = np.linalg.norm(step, axis=1)
-        residual[index[length >= _FAR]] = np.inf
-        small = length <= 2.0**-48 * (1 + np.linalg.norm(x[index], axis=1))
-        index = index[~small & (length < _FAR)]
-    return x, residual <= tol * (1 + np.linalg.norm(x, axis=1))
-
-
-def _least_norm(values: Array, jacobian: Array) -> Array:
-    """Shortest steps (k, n) that solve equations (k, m) with rows of length 1."""
-    if values.shape[1] == 1:
-        return values * jacobian[:, 0]
-    return (np.linalg.pinv(jacobian) @ values[..., None])[..., 0]
-
-
 Equations = Callable[[Array], tuple[Array, Array]]
 Values = Callable[[Array], Array]
 
 _HALVINGS = 40
 
-#: Changes over steps shorter than this part of the unknowns are rounding, which says nothing.
+#: Changes over steps shorter than this part of the unknowns are rounding.
 _SHORT = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """What a search found."""
+    """The root that a search found."""
 
     x: Array
     residual: float
@@ -118,7 +78,7 @@ def _evaluate(equations: Equations, x: Array) -> _Values:
 
 
 def _damped(equations: Equations, at: _Values, step: Array) -> tuple[_Values, float] | None:
-    """Halve the step until the residual falls; None if it never does."""
+    """Halve the step until the residual falls; None if it does not."""
     factor, old = 1.0, at.residual
     for _ in range(_HALVINGS):
         trial = _evaluate(equations, at.x + factor * step)
@@ -223,7 +183,7 @@ class Secant:
         self._last: tuple[Array, Array] | None = None
 
     def forget(self) -> bool:
-        """Take fresh differences next time; whether there was anything to forget."""
+        """Discard the Jacobian; whether there was one."""
         had, self.jacobian, self._last = self.jacobian is not None, None, None
         return had
 
@@ -262,8 +222,8 @@ def converge(
     Parameters
     ----------
     equations : callable
-        Takes unknowns (n,) and returns values (n,) and Jacobian (n, n); a :class:`Secant` is tried again with fresh
-        differences.
+        Takes unknowns (n,) and returns values (n,) and Jacobian (n, n); a :class:`Secant` is tried again
+        with fresh differences.
     start : ndarray (n,)
         Where the iteration starts.
     tol : float, optional
@@ -323,3 +283,43 @@ def _full_steps(
             return None
         last = size
     return None
+
+
+# many starts -----------------------------------------------------------------------------------
+
+#: Points (k, n) and which of all starts they belong to (k,) -> values (k, m), Jacobians (k, m, n).
+ManyEquations = Callable[[Array, NDArray[np.int64]], tuple[Array, Array]]
+
+_FAR = 1e8  # a longer step has left the problem
+
+
+def solve_many(
+    equations: ManyEquations, starts: Array, *, tol: float, iterations: int = 10
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Find a root close to each start."""
+    x = np.array(starts, dtype=float)
+    residual = np.full(len(x), np.inf)
+    index = np.arange(len(x))
+    for _ in range(iterations):
+        if not index.size:
+            break
+        values, jacobian = equations(x[index], index)
+        lengths = np.linalg.norm(jacobian, axis=2)
+        good = np.isfinite(values).all(1) & np.isfinite(lengths).all(1) & (lengths > 0).all(1)
+        residual[index[~good]] = np.inf
+        index, values, jacobian, lengths = index[good], values[good], jacobian[good], lengths[good]
+        residual[index] = np.max(np.abs(values) / lengths, axis=1, initial=0.0)
+        step = _least_norm(values / lengths, jacobian / lengths[..., None])
+        x[index] -= step
+        length = np.linalg.norm(step, axis=1)
+        residual[index[length >= _FAR]] = np.inf
+        small = length <= 2.0**-48 * (1 + np.linalg.norm(x[index], axis=1))
+        index = index[~small & (length < _FAR)]
+    return x, residual <= tol * (1 + np.linalg.norm(x, axis=1))
+
+
+def _least_norm(values: Array, jacobian: Array) -> Array:
+    """Shortest steps (k, n) that solve equations (k, m) with rows of length 1."""
+    if values.shape[1] == 1:
+        return values * jacobian[:, 0]
+    return (np.linalg.pinv(jacobian) @ values[..., None])[..., 0]

@@ -1,11 +1,11 @@
-"""Boundary equilibria: a zero of one field on the surface, the bifurcation it is, and its search.
+"""Boundary equilibria: zeros of one field on the surface, their search and their bifurcation.
 
 F1 = A x + ... vanishes on h = 0 where F2 = E. With C = grad h, d = C.E and s = C A^-1 E, s < 0 is
 persistence and s > 0 a nonsmooth fold (di Bernardo, Budd, Champneys & Kowalczyk 2008, ch. 5, in any
 dimension). In the plane the equilibrium's type splits these into BF1 to BF5 (focus), BN1, BN2
 (stable node), BS1 to BS3 (saddle) after Kuznetsov, Rinaldi & Gragnani 2003, and UN1, UN2 (unstable
 node, Hogan, Homer, Jeffrey & Szalai 2016). The table is for d > 0; d < 0 is its time reversal
-(A, E -> -A, -E). Every class has margins: dimensionless distances from where it changes.
+(A, E -> -A, -E). The margins of a class are dimensionless distances from where it changes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
 from ..checks import (
     MARGIN,
@@ -27,8 +27,7 @@ from ..checks import (
     require_autonomous,
     require_linear,
 )
-from ..point.sides import FIELDS, SIDES, Side, side_index
-from ..point.surface_point import Place, on_surface, place
+from ..point.surface_point import FIELDS, SIDES, Place, Side, on_surface, place, side_index
 from ..read_only import ReadOnly
 from .equilibria import equilibrium_distance
 from .search import search
@@ -180,13 +179,10 @@ def boundary_equilibrium(
     k = int(np.argmin(found)) if side is None else side_index(side)
     if found[k] > tol:
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"an equilibrium of a field (to {tol:.1e})",
-                received=f"F1 = {numbers.fields[0].tolist()}, F2 = {numbers.fields[1].tolist()}; "
-                f"the nearest zero is about {found[k]:.3g} away",
-                advice="find_boundary_equilibrium(system, near, vary=parameter) finds one.",
-            )
+            f"point {x}: expected an equilibrium of a field (to {tol:.1e}), received F1 = "
+            f"{numbers.fields[0].tolist()}, F2 = {numbers.fields[1].tolist()}; the nearest zero "
+            f"is about {found[k]:.3g} away. find_boundary_equilibrium(system, near, "
+            "vary=parameter) finds one."
         )
     return boundary_equilibrium_of(
         x, k, numbers.gradient, numbers.fields[1 - k], derivatives[k], margin

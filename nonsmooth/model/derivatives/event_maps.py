@@ -1,7 +1,6 @@
-"""What an event does to the state, with exact derivatives.
+"""Maps of events: the function e(x, p) of an event and the state g(x, p) after it, with gradients.
 
-At the end of a leg an event e(x, p) = 0 happens and the state goes through a reset g(x, p), the identity
-if there is none. Both are read off the definition of the system, and come with their gradients.
+g is the identity if the event does not reset the state.
 """
 
 from __future__ import annotations
@@ -24,32 +23,13 @@ from ..values import Array
 
 @dataclass(frozen=True, eq=False)
 class PlainMap:
-    """An event's state after it and function, without derivatives.
-
-    Attributes
-    ----------
-    values : Values
-    """
+    """g and e without derivatives."""
 
     values: Values
 
 
 class EventMap:
-    """What happens at the end of a leg: the event's function e, and the state g after it.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    states, event, after : SX
-        States of the leg (multipliers included), e (a scalar), g (N,).
-    guard : Guard
-        What the event is.
-
-    Attributes
-    ----------
-    smooth : bool
-        Whether g is the identity.
-    """
+    """The event at the end of a leg: e and g in its states; ``smooth`` where g is the identity."""
 
     def __init__(
         self,
@@ -88,25 +68,14 @@ class EventMap:
 
 @dataclass(frozen=True)
 class AtEvent:
-    """An event's function and the state after it, with their derivatives.
+    """Numbers of an event map at a point, for N states, k multipliers and q parameters."""
 
-    Attributes
-    ----------
-    after : ndarray (N,)
-        g.
-    after_state, after_parameters : ndarray (N, N + k), (N, all parameters)
-    value : float
-        e.
-    gradient, by_parameters : ndarray (N + k,), (all parameters,)
-        Of e.
-    """
-
-    after: Array
-    after_state: Array
-    after_parameters: Array
-    value: float
-    gradient: Array
-    by_parameters: Array
+    after: Array  # g (N,)
+    after_state: Array  # (N, N + k)
+    after_parameters: Array  # (N, q)
+    value: float  # e
+    gradient: Array  # of e by states and multipliers (N + k,)
+    by_parameters: Array  # of e (q,)
 
 
 def event_map(

@@ -1,4 +1,4 @@
-"""Second and third derivatives of fields and functions along them, as normal forms and touches need them."""
+"""Second and third derivatives of fields and guards, for normal forms and tangencies."""
 
 from __future__ import annotations
 
@@ -12,8 +12,7 @@ from .variational import guarded_field
 
 
 def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
-    """(x, u), p -> A, B(u, .), C(u, u, .) of the field of a mode, and gradient and Hessian of
-    the function of the surface on which it slides (zero without)."""
+    """(x, u), p -> A, B(u, .), C(u, u, .) of a mode's field; h_x, h_xx of the sliding surface or 0."""
 
     def build() -> Evaluator:
         f, x, p = mode_field(system, mode), system.extended_states, system.parameter_symbols
@@ -30,8 +29,7 @@ def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int) -> Evaluator:
-    """x, p -> the field of a mode, the field across one of its surfaces, and the gradient of L_F
-    h of the first along that surface's function."""
+    """x, p -> the field F of a mode, the field across one of its surfaces, and grad L_F h."""
 
     def build() -> list[ca.SX]:
         turned = mode[:surface] + ("-" if side > 0 else "+") + mode[surface + 1 :]

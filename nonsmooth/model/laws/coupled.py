@@ -3,7 +3,7 @@
 On a surface that does not slide the multiplier is the number +1 or -1. On those that slide the
 multipliers keep G_i = grad h_i . f(x, lambda) at zero: coefficient k of lambda enters coefficient k of
 G linearly, with the matrix M = dG/dlambda at the start of the step (``multiplier_series``; also where
-lambda enters nonlinearly: hidden dynamics). Nothing here grows as the number of modes.
+lambda enters nonlinearly: hidden dynamics). The size does not grow with the number of modes.
 
 Where the field is affine in all multipliers and what multiplies lambda_i has a factor n_i(x), the
 unknown is nu_i = n_i lambda_i (``factors``).
@@ -29,15 +29,15 @@ from ..expressions.graph import depends_on, instructions
 from ..expressions.identity import vanish_on
 from ..expressions.jets import Expansion
 from ..expressions.linearity import linearity
-from ..expressions.simplification import economise
+from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import lower, touched
-from ..expressions.unused_terms import awake
+from ..expressions.unused_terms import without_unused_terms
 from ..values import Array
 from .evaluators import Evaluator
 from .multiplier_series import MultiplierSeries, unit
 from .switches import Guard, event_guards
 
-# Numbers of a system at one point: what steps are measured with.
+# error scales ----------------------------------------------------------------------------------
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Yardsticks:
     factor_gradient: Array
 
 
-# What is solved for while a surface slides: its multiplier, or its product with a common factor.
+# factors of multipliers ------------------------------------------------------------------------
 
 
 def with_factors(system: FilippovSystem, lam: ca.SX) -> tuple[ca.SX, list[ca.SX], list[ca.SX]]:
@@ -286,7 +286,7 @@ class Coupled:
         for i in range(m):
             signs = () if i in self.system.set_of else (1.0, -1.0)
             held[n + i] = (*signs, 0.0) if self.scaled[i] else signs
-        return awake(self._symbols, [ca.densify(e) for e in expressions], held)
+        return without_unused_terms(self._symbols, [ca.densify(e) for e in expressions], held)
 
     # numbers -----------------------------------------------------------------------------------
 
@@ -335,10 +335,10 @@ class Coupled:
         key = tuple(self.sliding(mode)) if stability else ()
         if key not in self._series:
             outputs = [*self.outputs, ca.vertcat(*stability) if stability else ca.SX(0, 1)]
-            outputs = economise(self._symbols, self.awake(outputs), [True, False])
+            outputs = simplified(self._symbols, self.awake(outputs), [True, False])
             nodes, rows = instructions(self._symbols, outputs)
-            rules, place = lower(nodes, depends_on(nodes, [True, False]))
-            rows = [[place[j] for j in row] for row in rows]
+            rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+            rows = [[rule_of[j] for j in row] for row in rows]
             late = touched(rules, self.system.extended_dimension)
             self._series[key] = Expansion(rules, rows, [], Numbers()), late
         return self._series[key]

@@ -1,4 +1,4 @@
-"""A mode as one smooth field of the states, with the multipliers of what slides solved for.
+"""A mode as one smooth field of the states, with its multipliers solved for.
 
 ``motion`` eliminates the multiplier of one surface. Of several surfaces, closed contacts and friction
 on them the multipliers solve grad h_i . f(x, lambda) = 0, rates of gaps included: linear equations

@@ -1,4 +1,4 @@
-"""A set of codimension two or more seen from close by: h' = a - M lambda with a and M frozen."""
+"""The law h' = a - M lambda close to a set of codimension two or more, with a and M frozen."""
 
 from __future__ import annotations
 

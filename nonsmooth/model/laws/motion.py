@@ -1,11 +1,11 @@
-"""The smooth motion of one mode: its field, its guards, and their jets as fast functions.
+"""The smooth motion of one mode: its field, its guards, and their jets.
 
 A guard is a function that is positive inside the mode; the mode ends where it falls through zero:
 
 - ``surface``: s_i h_i for a surface that does not slide (s_i = +1 or -1);
-- ``exit``: what its kind of sliding says (``switches``).
+- ``exit``: the end of its kind of sliding (``switches``).
 
-Stops and resets follow the guards as they were given; their direction is the driver's business.
+Stops and resets follow the guards as they were given; the driver checks their direction.
 """
 
 from __future__ import annotations

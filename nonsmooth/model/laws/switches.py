@@ -1,4 +1,4 @@
-"""How a mode moves on its surfaces: the kinds of sliding, each with its field, exits and letters.
+"""The kinds of sliding of a mode, each with its field, exits and letters.
 
 ``Free`` has no sliding surface. ``Affine`` slides on one surface whose multiplier enters linearly:
 the multiplier is eliminated symbolically. ``Implicit`` slides on several surfaces, or on one whose

@@ -17,8 +17,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...local.point.sides import SIDES, Side, side_index
-from ...local.point.surface_point import Place
+from ...local.point.surface_point import SIDES, Place, Side, side_index
 from ...local.read_only import ReadOnly
 from ...local.searches.boundary_equilibria import boundary_equilibrium_of
 from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at

@@ -15,8 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...local.point.sides import SIDES, Side
-from ...local.point.surface_point import Place, place
+from ...local.point.surface_point import SIDES, Place, Side, place
 from ...local.searches.boundary_equilibria import find_boundary_equilibrium
 from ...model import Array, FilippovSystem, NonsmoothError
 from ...model.derivatives.variational import variational_field

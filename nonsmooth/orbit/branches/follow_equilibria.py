@@ -8,8 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...local.checks import parameter_index, require_autonomous, require_linear
-from ...local.point.sides import Side
-from ...local.point.surface_point import place
+from ...local.point.surface_point import Side, place
 from ...local.searches.equilibria import find_equilibrium
 from ...local.searches.pseudo_equilibria import find_pseudo_equilibrium
 from ...model import FilippovSystem, Parameters, require_system, whole

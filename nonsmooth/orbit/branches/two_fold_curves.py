@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...local.point.surface_point import Place, place
-from ...local.searches.find_two_fold import search_two_fold
+from ...local.searches.find_two_fold import TwoFold, search_two_fold
 from ...local.searches.search import unknowns
-from ...local.searches.two_fold import TwoFold
 from ...model import (
     Array,
     ConvergenceError,

@@ -26,9 +26,8 @@ from ...flow.names import guard_name
 from ...flow.options import Tolerances
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
-from ...local.point.lie_derivatives import Numbers
 from ...local.point.regions import coincide
-from ...local.point.surface_point import Place
+from ...local.point.surface_point import Numbers, Place
 from ...model import Array, OptionError, Surfaces, motion
 
 #: Where a path along an eigenline begins, and where one of a node is taken to be at s: times, and

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...flow.saving import Savable
-from ...local.searches.two_fold import TwoFold
+from ...local.searches.find_two_fold import TwoFold
 from ...model import (
     Array,
     DegenerateError,

@@ -19,9 +19,8 @@ import numpy as np
 
 from ...flow.follow import follow
 from ...flow.simulate import simulate
-from ...local.point.lie_derivatives import Numbers
-from ...local.point.surface_point import place
-from ...local.searches.two_fold import TwoFold
+from ...local.point.surface_point import Numbers, place
+from ...local.searches.find_two_fold import TwoFold
 from ...model import (
     Array,
     ConvergenceError,

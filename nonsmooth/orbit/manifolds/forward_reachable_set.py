@@ -19,8 +19,7 @@ from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local import TwoFold, find_two_fold
-from ...local.point.lie_derivatives import Numbers
-from ...local.point.surface_point import Place, place
+from ...local.point.surface_point import Numbers, Place, place
 from ...model import (
     Array,
     FilippovSystem,

@@ -8,7 +8,7 @@ import numpy as np
 
 from ...flow.ensembles.progress import progress_bar
 from ...local import Equilibrium, Fold, FoldFold, PseudoEquilibrium
-from ...local.searches.two_fold import TwoFold
+from ...local.searches.find_two_fold import TwoFold
 from ...model import (
     FilippovSystem,
     OptionError,

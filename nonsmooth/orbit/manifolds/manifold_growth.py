@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from ...flow.saving import Savable
 from ...local import Equilibrium, Fold, FoldFold
 from ...local.point.regions import Region
-from ...local.searches.two_fold import TwoFold
+from ...local.searches.find_two_fold import TwoFold
 from ...model import Array, DegenerateError, Surfaces, mode_field
 from ..periodic.orbit import PeriodicOrbit
 from .arcs import Arc, Follower, InterruptedOrbit, lengths

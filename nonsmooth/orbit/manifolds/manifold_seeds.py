@@ -10,7 +10,7 @@ import numpy as np
 from ...flow.options import tolerances
 from ...flow.simulate import simulate
 from ...local.point.surface_point import place
-from ...local.searches.two_fold import TwoFold
+from ...local.searches.find_two_fold import TwoFold
 from ...model import Array, DegenerateError, NonsmoothError, Surfaces, reversed_system
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit

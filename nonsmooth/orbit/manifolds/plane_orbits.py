@@ -9,7 +9,7 @@ import numpy as np
 
 from ...flow import Status, Trajectory, simulate
 from ...local.point.regions import Region
-from ...local.point.sides import SIDES
+from ...local.point.surface_point import SIDES
 from ...local.scans.plane_scan import PlaneScan
 from ...model import Array, FilippovSystem, Stop
 from .evenly_spaced_orbits import Cut, SpacedOrbit, evenly_spaced, polyline, until_rest

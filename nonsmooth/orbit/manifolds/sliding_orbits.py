@@ -13,11 +13,10 @@ from functools import cached_property
 import numpy as np
 
 from ...flow import Status, follow
-from ...local.point.sides import SIDES
-from ...local.point.surface_point import place
+from ...local.point.surface_point import SIDES, place
 from ...local.scans.surface_scan import SurfaceScan
+from ...local.searches.find_two_fold import TwoFold
 from ...local.searches.pseudo_equilibria import PseudoEquilibrium, sliding_matrix
-from ...local.searches.two_fold import TwoFold
 from ...model import Array, FilippovSystem, Stop
 from .evenly_spaced_orbits import Cut, SpacedOrbit, evenly_spaced, polyline
 

@@ -18,7 +18,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
-from ...local.point.sides import SIDES, Side, other
+from ...local.point.surface_point import SIDES, Side, other
 from ...local.scans.box import Box
 from ...local.two_folds import ReducedFlow, diabolo_slopes, flight_above, flight_below
 from ...local.two_folds.flights import has_diabolo

@@ -300,7 +300,7 @@ class Program:
             if node.op == "const":
                 values.append(arithmetic.constant(node.payload))
             elif node.op == "input":
-                values.append(arithmetic.symbol(*node.place))
+                values.append(arithmetic.symbol(*node.source))
             elif node.op == "power":
                 values.append(arithmetic.power(values[node.args[0]], node.payload))
             else:

@@ -39,7 +39,7 @@ def _impact(written: Written, k: int, count: int) -> Watch:
     reactions[k] = tape.symbol(4, 0)
     field = written.field(multipliers, reactions)
     column = [tape.gradient(f, [reactions[k]])[0] for f in field]
-    inputs = [tape.nodes[a].place for a in tape.ancestors(column) if tape.nodes[a].op == "input"]
+    inputs = [tape.nodes[a].source for a in tape.ancestors(column) if tape.nodes[a].op == "input"]
     if any(vector in (3, 4) for vector, _ in inputs):
         raise DefinitionError(
             explain(

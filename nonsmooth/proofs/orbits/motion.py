@@ -54,7 +54,7 @@ class Mode:
         rows = [tape.gradient(k, x) for k in nodes]
         self.affine_watches = [
             all(
-                tape.nodes[a].op != "input" or tape.nodes[a].place[0] == 1
+                tape.nodes[a].op != "input" or tape.nodes[a].source[0] == 1
                 for a in tape.ancestors(row)
             )
             for row in rows

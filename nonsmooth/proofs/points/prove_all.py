@@ -8,7 +8,7 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...local.point.sides import FIELDS, Side
+from ...local.point.surface_point import FIELDS, Side
 from ...model import FilippovSystem, OptionError, explain, real, require_system, whole
 from ..arithmetic.decimals import given
 from ..arithmetic.enclosure import Enclosure

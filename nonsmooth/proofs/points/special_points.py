@@ -8,7 +8,7 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from ...local.point.sides import FIELDS, Side, side_index
+from ...local.point.surface_point import FIELDS, Side, side_index
 from ...local.two_folds.classification import TABLE
 from ...model import DefinitionError, explain
 from ..arithmetic.algebra import Difference

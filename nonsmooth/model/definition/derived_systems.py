@@ -1,4 +1,4 @@
-"""Sections that a system does not have itself: a function of the states, looked at where it is zero."""
+"""Systems derived from a system: with a Poincare section, or reversed in time."""
 
 from __future__ import annotations
 
@@ -9,16 +9,42 @@ from typing import Any
 import casadi as ca
 
 from ..cache import Content
-from ..definition.parse_definition import read_function
-from ..definition.system import FilippovSystem
 from ..errors import DefinitionError
+from .parse_definition import read_function
+from .system import FilippovSystem
 
 #: Name of the section of a system that was given one.
 SECTION = "section"
 
 
+def _changed(system: FilippovSystem, **changes: Any) -> FilippovSystem:
+    """A system with some parts of its definition replaced."""
+    changed = FilippovSystem.__new__(FilippovSystem)
+    state = replace(system.definition, **changes).state()
+    changed.__setstate__({**state, "lifted": system.lifted})
+    return changed
+
+
+def reversed_system(system: FilippovSystem) -> FilippovSystem:
+    """Return the system with all fields reversed, without its stops."""
+    for what, found in (
+        ("explicit time", system.time_dependent),
+        ("resets", system.resets),
+        ("impacts", system.impacts),
+    ):
+        if found:
+            raise DefinitionError(
+                f"system: {system!r} has {what} and cannot be reversed in time. "
+                "nonsmooth.flow.follow runs one smooth mode backward."
+            )
+    d = system.definition
+    return system.cached(
+        "reversed", lambda: _changed(system, field=-d.field, guards=d.guards[:0], stops=())
+    )
+
+
 def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
-    """Return the system with a last reset, at a function's zeros, that changes nothing."""
+    """Return the system with a last reset, at a function's zeros, that does not change the state."""
     d = system.definition
     h = read_function(d, function, SECTION)
     if not ca.depends_on(h, d.extended_states):
@@ -29,22 +55,15 @@ def with_section(system: FilippovSystem, function: Any, direction: int) -> Filip
     name = next(n for n in chain([SECTION], numbered) if n not in taken)
 
     def build() -> FilippovSystem:
-        definition = replace(
-            d,
-            guards=ca.vertcat(d.guards, h) if d.guards.numel() else h,
-            maps=ca.horzcat(d.maps, d.states) if d.resets else d.states,
-            resets=(*d.resets, (name, direction)),
-        )
-        wider = FilippovSystem.__new__(FilippovSystem)
-        wider.__setstate__({**definition.state(), "lifted": system.lifted})
-        return wider
+        guards = ca.vertcat(d.guards, h) if d.guards.numel() else h
+        maps = ca.horzcat(d.maps, d.states) if d.resets else d.states
+        return _changed(system, guards=guards, maps=maps, resets=(*d.resets, (name, direction)))
 
     return system.cached((SECTION, Content([known], h), direction), build)
 
 
 def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
-    """Name of the surface where a function is zero, written alike, and its sign there."""
-    # A component of a set is none: it is zero elsewhere too.
+    """Name of the surface h = 0 with h = +-function, and that sign; components of a set do not count."""
     for i in range(system.surface_count):
         if i in system.set_of:
             continue
@@ -56,7 +75,7 @@ def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
 
 
 def _vanishes(expression: ca.SX) -> bool:
-    """Whether an expression is a sum in which everything cancels; only linear ones are seen through."""
+    """Whether a linear expression is zero after simplification."""
     symbols = ca.vertcat(*ca.symvar(expression))
     if not ca.is_linear(expression, symbols):
         return False

@@ -1,4 +1,4 @@
-"""Eigenvalues in enclosures, and what their signs say about a point of rest."""
+"""Enclosures of eigenvalues, and the kind of an equilibrium by their signs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..arithmetic.intervals import sign
 
 
 def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[str, arb]]:
-    """Name a point of rest by the signs of its eigenvalues."""
+    """Kind of an equilibrium by the signs of its eigenvalues, why it is undecided, and eigenvalues."""
     if not jacobian:
         return "stable node", "", {}  # nothing to move along
     matrix = arb_mat([list(row) for row in jacobian])

@@ -7,7 +7,7 @@ import pytest
 from flint import arb
 
 import nonsmooth as ns
-from nonsmooth.proofs.arithmetic.instructions import Program, Tape
+from nonsmooth.proofs.arithmetic.instructions import ExpressionGraph, Program
 from nonsmooth.proofs.arithmetic.interval_arrays import Intervals, evaluate_many
 from nonsmooth.proofs.arithmetic.intervals import Enclosures, between, ends, exact, precision
 from tests.proofs.random_graphs import Exact, Undefined, expression
@@ -17,10 +17,10 @@ DIGITS = 40
 
 def on_tape(f, symbols):
     """A program of an expression's value and gradient."""
-    tape = Tape()
-    inputs = [tape.symbol(0, i) for i in range(len(symbols))]
-    ((root,),) = tape.insert([f], [ca.vertcat(*symbols)], [inputs])
-    return Program(tape, [[root], tape.gradient(root, inputs)])
+    graph = ExpressionGraph()
+    inputs = [graph.symbol(0, i) for i in range(len(symbols))]
+    ((root,),) = graph.insert([f], [ca.vertcat(*symbols)], [inputs])
+    return Program(graph, [[root], graph.gradient(root, inputs)])
 
 
 def check_random_expressions(seed, graphs, samples):
@@ -109,9 +109,9 @@ def test_written_constants_are_decimals():
     program = on_tape(x - 0.1, [x])
     with precision(200):
         stored = program(Enclosures([[arb(0)]], "stored"))[0][0]
-        written = program(Enclosures([[arb(0)]], "written"))[0][0]
+        system_graph = program(Enclosures([[arb(0)]], "written"))[0][0]
     assert ends(stored) == (-exact(0.1),) * 2
-    low, high = ends(written)
+    low, high = ends(system_graph)
     assert low <= exact("-0.1") <= high and not low <= -exact(0.1) <= high
 
 

@@ -1,7 +1,7 @@
-"""One HTML page from its parts: styles, scripts and data inside, nothing loaded from elsewhere.
+"""Self-contained HTML pages with styles, scripts and data inside.
 
-The parts that every such page shares (its colours, and ``controls.js`` for planes, draggable points
-and sliders) are in the folder ``web`` beside this module.
+Parts that all pages share (colours; ``controls.js`` for planes, draggable points and sliders) are in
+the folder ``web``.
 """
 
 from __future__ import annotations

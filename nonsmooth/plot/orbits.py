@@ -1,4 +1,4 @@
-"""Periodic orbits in their phase plane, and their multipliers beside the unit circle."""
+"""Periodic orbits in a phase plane, and Floquet multipliers beside the unit circle."""
 
 from __future__ import annotations
 
@@ -127,7 +127,7 @@ def periodic_orbit(
 
 
 def _words(mode: str) -> str:
-    """What a legend says of a mode."""
+    """Entry of a legend for a mode."""
     return f"mode {mode}".replace("-", "\N{MINUS SIGN}") if mode else "smooth"
 
 

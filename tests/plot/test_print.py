@@ -12,7 +12,7 @@ from matplotlib.image import imread
 import bounce
 import nonsmooth as ns
 from nonsmooth.orbit import Basins
-from nonsmooth.plot.print_figure import PrintFigure
+from nonsmooth.plot.style import PrintFigure
 from papers.pictures import faults
 
 x, v, mu = (ca.SX.sym(name) for name in ("x", "v", "mu"))

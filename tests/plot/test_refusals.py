@@ -58,7 +58,7 @@ def test_branches_of_different_parameters_are_not_drawn_in_one_picture():
     one, two = (
         ns.continue_equilibrium(system, [0.0, 1.0], name, bounds=(-0.1, 0.1)) for name in "ab"
     )
-    with pytest.raises(ns.OptionError, match="branches in one parameter, received a, b"):
+    with pytest.raises(ns.OptionError, match=r"found.*parameter"):
         ns.plot.branch([one, two])
 
 

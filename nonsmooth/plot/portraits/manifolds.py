@@ -13,6 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from ...model import OptionError
 from ...orbit import Manifold
 from .. import style
+from ..arguments import results
 
 _STABLE, _UNSTABLE = style.BLUE, style.VERMILLION
 
@@ -63,7 +64,7 @@ def manifold(
     >>> both = [ns.manifold(system, saddle, stable=s, length=1.0) for s in (True, False)]
     >>> figure = ns.plot.manifold(both, names=["x", "y"])
     """
-    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
+    several = results(found, Manifold, "dividing_curves draws curves in a plane of starts.")
     spatial = _dimension(several) == 3
     with style.settings():
         if ax is None and spatial:
@@ -90,15 +91,10 @@ def manifold(
 
 
 def _dimension(several: list[Manifold]) -> int:
-    sizes = {len(m.point) for m in several if isinstance(m, Manifold)}
-    if (
-        len(sizes) != 1
-        or sizes & {2, 3} == set()
-        or not all(isinstance(m, Manifold) for m in several)
-    ):
+    sizes = {len(m.point) for m in several}
+    if len(sizes) != 1 or not sizes <= {2, 3}:
         raise OptionError(
-            f"found: expected manifolds of a system with two or three states, received {several!r}. "
-            "Curves in a plane of starts are drawn by dividing_curves."
+            f"found: expected manifolds of a system with two or three states, received {several!r}."
         )
     return sizes.pop()
 

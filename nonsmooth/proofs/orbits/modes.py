@@ -52,7 +52,6 @@ class Mode:
         nodes = [w.node for w in event_functions]
         self._field = Program(graph, [list(field)])
         self._jacobian = Program(graph, rows)
-        self._both = Program(graph, [list(field), *rows])
         self._event_values = Program(graph, [nodes])
         self._slopes = Program(graph, [graph.gradient(k, x) for k in nodes])
         moving = graph.ancestors(k for row in rows for k in row)

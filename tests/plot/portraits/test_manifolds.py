@@ -41,8 +41,8 @@ def test_a_surface_in_space():
 def test_what_does_not_fit_is_refused():
     saddle = ns.find_pseudo_equilibrium(PLANE, [0.1, 0.0])
     found = ns.manifold(PLANE, saddle, length=0.2)
-    with pytest.raises(ns.OptionError, match="found: expected manifolds"):
+    with pytest.raises(ns.OptionError, match="found"):
         ns.plot.manifold([found, PLANE])
     space = Figure().add_subplot(projection="3d")  # pyplot would keep its figure
-    with pytest.raises(ns.OptionError, match="ax: expected axes of as many dimensions"):
+    with pytest.raises(ns.OptionError, match="ax"):
         ns.plot.manifold(found, ax=space)

@@ -1,4 +1,4 @@
-"""What the pictures of a two-fold share: what they draw, its title, and how its lines are marked."""
+"""Titles, line styles and names in pictures of two-folds."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SIGNS = {1: "+", -1: "−"}
 
 @dataclass(frozen=True)
 class Portrait:
-    """A two-fold as the pictures need it: the linear flow and its class."""
+    """The reduced flow of a two-fold and its class."""
 
     flow: ReducedFlow
     classification: Classification
@@ -38,7 +38,7 @@ class Portrait:
 
 
 def portrait_of(fold: object, caller: str) -> Portrait:
-    """Read what is drawn from a two-fold, or from a pair (sigma, nu)."""
+    """The flow and class of a two-fold, or of a pair (sigma, nu)."""
     if isinstance(fold, TwoFold):
         return Portrait(fold.form.flow, fold.classification, fold.coincident_fields)
     try:
@@ -87,8 +87,8 @@ def line_style(value: float, flow: ReducedFlow) -> tuple[str, str, Any]:
     return color, name, "-" if value < 0 else style.LONG_DASH
 
 
-def name_places(parts: list[Sector]) -> dict[str, Array]:
-    """Where the names of the regions stand, in the z2-z3 plane: away from the eigenlines."""
+def label_points(parts: list[Sector]) -> dict[str, Array]:
+    """Points of the names of the regions in the z2-z3 plane, away from the eigenlines."""
     widest = max(parts, key=lambda part: part.high - part.low)
     middle = 0.84 * to_box((widest.low + widest.high) / 2)
     return {
@@ -110,8 +110,7 @@ def number(value: float) -> str:
 
 
 def line_names(ax: Axes, portrait: Portrait, passages: bool = True) -> None:
-    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside
-    them."""
+    """Name the folds, the lines outside of sliding and the parts of crossing orbits."""
     labels, flow, along = Labels(ax), portrait.flow, np.linspace(0.1, 0.98, 23)
     both = np.concatenate([-along[::-1], along])
     for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):

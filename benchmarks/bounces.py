@@ -1,4 +1,4 @@
-"""The two bounces: work against precision for every solver, then the fastest settings in turns."""
+"""Work and precision of every solver on the two bounces, then the fastest settings in turns."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from . import ours, reference
-from .measure import alternate
+from . import library, reference
 from .peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
 from .problems import Array, random_starts
 from .reference import Ends
+from .timing import alternate
 
 #: Largest error on the random starts at which speeds are compared.
 TARGET = 1e-9
@@ -41,13 +41,15 @@ def ladder(loose: float, tight: float, each: int) -> tuple[float, ...]:
 
 
 def solvers() -> list[Solver]:
-    """All that is compared; the first is the library."""
+    """The solvers; the first is the library."""
     hy, sp = heyoka_modes, scipy_dop853
     taylor = ladder(-4, -14, 4)
     fixed = lambda make, **options: lambda name, tol: make(name, tol, **options)
     return [
-        Solver("nonsmooth", ours.make, taylor, 100_000, 200_000),
-        Solver("nonsmooth, reference driver", ours.reference_driver, ladder(-6, -12, 1), 200, 100),
+        Solver("nonsmooth", library.make, taylor, 100_000, 200_000),
+        Solver(
+            "nonsmooth, reference driver", library.reference_driver, ladder(-6, -12, 1), 200, 100
+        ),
         Solver("heyoka, one integrator per mode", hy.make, taylor, 100_000, 10_000, hy.available),
         Solver(
             "heyoka, one integrator and callbacks",

@@ -1,7 +1,7 @@
-"""High-precision references, independent of the library: Taylor series in mpmath, by hand.
+"""Reference solutions by Taylor series in mpmath, of order 30 with 34 digits.
 
-Order 30 with 34 digits; fields, guards and the logic at the surface are written out again here and
-share only the constants with ``problems``.
+Fields, guards and the rules at the surface are independent of the library and share only the constants
+with ``problems``.
 """
 
 from __future__ import annotations

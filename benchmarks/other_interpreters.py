@@ -1,23 +1,20 @@
-"""Peers that live in interpreters of their own: Siconos and nosnoc, on a shorter stick-slip run.
+"""A stick-slip run beside Siconos and nosnoc, which run in other interpreters.
 
-Name the interpreters in the environment variables below; without them the section says so.
+Environment variables, below, name the interpreters.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import nonsmooth as ns
 
-from .measure import ONE_THREAD
 from .problems import BELTS, STICK, STICK_START, stick_slip_system
+from .timing import run_peer
 
 BELT, T_END = BELTS["many events"], 100.0
 #: Label, environment variable, script, steps to try.
@@ -41,7 +38,9 @@ def run(quick: bool) -> dict[str, Any]:
         if python is None:
             result[label] = {"missing": f"name an interpreter that has it in {variable}"}
             continue
-        found = _peer(python, script, list(steps[:1] if quick else steps))
+        chosen = list(steps[:1] if quick else steps)
+        problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": chosen}
+        found = run_peer(python, script, problem)
         for row in found["rows"]:
             row["error"] = float(np.abs(np.array(row.pop("x")) - truth).max())
         result[label] = found
@@ -62,15 +61,3 @@ def _ours(truth: np.ndarray) -> list[dict[str, Any]]:
         error = float(np.abs(end.x[-1] - truth).max())
         rows.append({"tolerance": tolerance, "error": error, "seconds": float(np.median(seconds))})
     return rows
-
-
-def _peer(python: str, script: str, steps: list[float]) -> dict[str, Any]:
-    problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": steps}
-    path = Path(__file__).with_name("peers") / f"{script}.py"
-    call = [python, str(path), json.dumps(problem)]
-    environment = os.environ | ONE_THREAD
-    done = subprocess.run(call, capture_output=True, text=True, check=False, env=environment)
-    if done.returncode:
-        return {"missing": f"failed: {done.stderr.strip()[-200:]}", "rows": []}
-    found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
-    return found

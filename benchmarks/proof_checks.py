@@ -1,8 +1,7 @@
-"""Proofs against other methods: complete lists and Newton's method, bounces and mpmath.
+"""Check of proofs by other methods: complete lists by Newton's method, bounces by mpmath.
 
-Random systems: no zero that Newton's method finds is missing from a list that is proven complete, and
-each zero on it is found. Random bounces: itineraries and ends are those of ``reference``, which shares
-no code with the library.
+For random systems Newton's method finds the zeros of a complete list, and no others. For random bounces
+itineraries and ends are those of ``reference``, which shares no code with the library.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
 
 @dataclass
 class Lists:
-    """What was counted over random systems."""
+    """Counts over random systems."""
 
     systems: int = 0
     complete: int = 0
@@ -87,7 +86,7 @@ def lists(seed: int, systems: int, starts: int) -> Lists:
 
 
 def bounces(name: str, seed: int, count: int) -> dict[str, Any]:
-    """Prove random landings of the ``linear`` or ``nonlinear`` bounce, with mpmath as the judge."""
+    """Prove random landings of the ``linear`` or ``nonlinear`` bounce, and compare with mpmath."""
     starts = random_starts(count, seed=seed)
     truth = reference.solve(name, starts)
     system = bounce_system(name)

@@ -32,5 +32,5 @@ def test_cells_marks_and_legend():
 def test_other_grids_are_refused():
     found = ns.basins(WELL, [[1.0, 0.0]], t_end=100.0)
     for given in (found, WELL):
-        with pytest.raises(ns.OptionError, match="found: expected Basins of a grid with two axes"):
+        with pytest.raises(ns.OptionError, match="found"):
             ns.plot.basins(given)

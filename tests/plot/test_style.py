@@ -68,9 +68,9 @@ def test_axes_are_those_given_or_new_ones_that_pyplot_does_not_know():
 
 @pytest.mark.parametrize("size", [None, 3, (1,), (1, -1), (1, np.inf), "ab"])
 def test_wrong_sizes_and_axes_are_refused(size):
-    with pytest.raises(ns.OptionError, match="size: expected a width and a height"):
+    with pytest.raises(ns.OptionError, match="size"):
         style.new_figure(size)
-    with pytest.raises(ns.OptionError, match="ax: expected matplotlib axes"):
+    with pytest.raises(ns.OptionError, match="ax"):
         style.axes_for("ax", (1, 1))
 
 

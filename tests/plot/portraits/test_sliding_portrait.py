@@ -95,12 +95,6 @@ def test_each_region_is_named_once():
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda s: ns.plot.sliding_portrait("no", BOX), ns.DefinitionError, "system first"),
-        (
-            lambda s: ns.plot.sliding_portrait(ns.textbook.planar_relay().system, BOX),
-            ns.DefinitionError,
-            "phase_portrait",
-        ),
         (lambda s: ns.plot.sliding_portrait(s, (1, 0, 0, 1)), ns.OptionError, "xmin < xmax"),
         (lambda s: ns.plot.sliding_portrait(s, "box"), ns.OptionError, "xmin < xmax"),
         (
@@ -113,7 +107,6 @@ def test_each_region_is_named_once():
             ns.DefinitionError,
             "no surface|none over",
         ),
-        (lambda s: ns.plot.sliding_portrait(s, BOX, orbits=-1), ns.OptionError, "orbits"),
     ],
 )
 def test_bad_input_is_refused_with_advice(call, error, words):

@@ -1,27 +1,17 @@
-"""Lists, ranges in pieces and points of rest are checked by a program of its own, altered ones are not."""
+"""The checker accepts saved lists, pieces of ranges, equilibria and orbits, and refuses altered ones."""
 
 import json
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import casadi as ca
 import pytest
 
 import nonsmooth as ns
+from tests.proofs.checking import run
 
-CHECKER = Path(__file__).parents[2] / "checker"
 x, y, z, p, q = (ca.SX.sym(s) for s in "xyzpq")
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
 FLAT = [(-1.5, 1.5), (-1, 1)]
-
-
-def run(path):
-    done = subprocess.run(
-        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
-    )
-    return done.returncode, done.stdout + done.stderr
 
 
 def checked(proof, path):

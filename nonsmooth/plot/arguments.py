@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from ..model import DefinitionError, FilippovSystem, NonsmoothError, OptionError, explain
+from ..model import DefinitionError, FilippovSystem, NonsmoothError, OptionError
 
 
 def results(
@@ -13,8 +13,7 @@ def results(
     """One result of a kind, or a sequence of them, as a list."""
     several = list(found) if isinstance(found, (list, tuple)) else [found]
     if not several or not all(isinstance(one, kind) for one in several):
-        expected, received = f"{kind.__name__} or several", repr(found)[:60]
-        raise error(explain("found", expected=expected, received=received, advice=advice))
+        raise error(f"found is {repr(found)[:60]}, not a {kind.__name__} or several. {advice}")
     return several
 
 
@@ -22,8 +21,9 @@ def same(several: list[Any], attribute: str) -> Any:
     """The common value of an attribute of results that are drawn in one figure."""
     values = sorted({getattr(one, attribute) for one in several})
     if len(values) > 1:
-        expected, advice = f"results with the same {attribute}", "Draw them in separate figures."
-        raise OptionError(explain("found", expected=expected, received=str(values), advice=advice))
+        raise OptionError(
+            f"found has several {attribute}: {values}. Draw them in separate figures."
+        )
     return values[0]
 
 
@@ -44,5 +44,6 @@ def require_one_surface(system: object, caller: str, dimension: int, others: str
         received, advice = "hidden dynamics", "Its sliding field is not a convex combination."
     else:
         return
-    expected = f"an autonomous FilippovSystem of {dimension} states and 1 surface"
-    raise DefinitionError(explain(caller, expected=expected, received=received, advice=advice))
+    raise DefinitionError(
+        f"{caller} draws autonomous systems of {dimension} states and 1 surface, not {received}. {advice}"
+    )

@@ -71,8 +71,8 @@ def basins(
     """
     if not isinstance(found, Basins) or len(found.axes) != 2:
         raise OptionError(
-            "found: expected Basins of a grid with two axes, received "
-            f"{found!r}. Give the grid as a mapping: two states with axes, numbers for the others."
+            f"found is {found!r}, not Basins of a grid with two axes. Give the grid as a mapping: two "
+            "states with axes, numbers for the others."
         )
     with style.settings():
         figure, axes = style.axes_for(ax, size)

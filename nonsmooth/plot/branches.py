@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..local import Equilibrium
-from ..model import Array, DefinitionError, NonsmoothError, OptionError, explain
+from ..model import Array, DefinitionError, NonsmoothError, OptionError
 from ..orbit import BifurcationCurve, Branch, BranchEvent, Connection, PeriodicOrbit
 from . import style
 from .arguments import results, same
@@ -165,12 +165,8 @@ def _measure(one: Branch, against: Measure | None) -> tuple[Callable[[Any], floa
         return lambda orbit: float(orbit.period), "period"
     if against not in system.state_names:
         raise OptionError(
-            explain(
-                "against",
-                expected=f"a state {list(system.state_names)}{', period' * orbits} or a function",
-                received=repr(against),
-                advice="Leave it out for the default.",
-            )
+            f"against={against!r} is not a state {list(system.state_names)}{', period' * orbits} or a "
+            "function. Leave it out for the default."
         )
     k = system.state_names.index(against)
     if not orbits:

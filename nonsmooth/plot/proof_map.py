@@ -66,8 +66,8 @@ def proof_map(
     ranges = {k: v for k, v in getattr(proof, "parameters", {}).items() if v.low != v.high}
     if not hasattr(proof, "pieces") or not 1 <= len(ranges) <= 2:
         raise OptionError(
-            "proof: expected a Proof for one or two ranges of parameters, received "
-            f"{proof!r} with {len(ranges)}. Give ns.certify pairs (low, high) for one or two names."
+            f"proof is {proof!r} with {len(ranges)} ranges of parameters, but must have one or two "
+            "ranges. Give certify pairs (low, high) for one or two names."
         )
     names, pieces = list(ranges), sorted(proof.pieces or (proof,), key=_corner(list(ranges)))
     labels = list(dict.fromkeys(_label(p) for p in pieces))

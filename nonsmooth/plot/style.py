@@ -35,7 +35,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import ArrayLike
 
-from ..model import Array, OptionError, explain
+from ..model import Array, OptionError
 
 BLACK = "#000000"
 ORANGE = "#E69F00"
@@ -142,14 +142,7 @@ def check_size(size: object) -> tuple[float, float]:
     except (TypeError, ValueError):
         width = height = float("nan")
     if not (0 < width < np.inf and 0 < height < np.inf):
-        raise OptionError(
-            explain(
-                "size",
-                expected="a width and a height in inches",
-                received=repr(size),
-                advice="For example size=(6, 5).",
-            )
-        )
+        raise OptionError(f"size={size!r} is not a width and a height in inches, such as (6, 5).")
     return width, height
 
 
@@ -243,9 +236,8 @@ def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
         figure = new_figure(size)
         return figure, figure.add_subplot()
     if not isinstance(ax, Axes):
-        received, advice = type(ax).__name__, "For example ax=pyplot.subplots()[1]."
         raise OptionError(
-            explain("ax", expected="matplotlib axes", received=received, advice=advice)
+            f"ax is a {type(ax).__name__}, not matplotlib axes. For example ax=pyplot.subplots()[1]."
         )
     parent = ax.get_figure(root=True)
     assert parent is not None

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from ..model import DefinitionError, FilippovSystem, ParameterError, explain
+from ..model import DefinitionError, FilippovSystem, ParameterError
 from .arithmetic.flint import arb
 from .arithmetic.instructions import ExpressionGraph
 from .arithmetic.intervals import Numbers, between, enclose, exact, exact_range
@@ -90,21 +90,12 @@ class SurfaceFunctions:
             signs = [float(s) for s in letters[: len(signs)]]
             if 0 in letters[len(signs) :]:
                 raise DefinitionError(
-                    explain(
-                        "mode",
-                        expected="open contacts",
-                        received=repr(self.mode),
-                        advice="Points of closed contacts are not proven.",
-                    )
+                    f"mode {self.mode!r} has closed contacts, whose points are not proven. Give a mode with open ones."
                 )
         if any(s == 0 for i, s in enumerate(signs) if i != self.surface):
             raise DefinitionError(
-                explain(
-                    "mode",
-                    expected="a side, + or -, of every other surface",
-                    received=repr(self.mode),
-                    advice="Proofs do not cover sliding on several surfaces at once.",
-                )
+                f"mode {self.mode!r} must give a side, + or -, of every other surface. Proofs do not cover "
+                "sliding on several surfaces at once."
             )
         return [[s if i == self.surface else t for i, t in enumerate(signs)] for s in (1.0, -1.0)]
 

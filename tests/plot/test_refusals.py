@@ -25,7 +25,7 @@ def test_portraits_are_of_autonomous_systems_with_one_surface(draw, n):
         [x, y, z][:n], surface=x, above=[1, t, *rest], below=[1, 1, *rest], time=t
     )
     for wrong, received in (
-        (1, "received int"),
+        (1, "not int"),
         (system(5 - n), f"{5 - n} states: x, y"),
         (system(n, [y, -x, *rest]), "0 surfaces"),
         (system(n, [-lam, -kap, *rest], **two), "2 surfaces"),

@@ -83,7 +83,7 @@ def dividing_curves(
         figure, axes = style.axes_for(ax, size)
         if hasattr(axes, "get_zlim"):
             raise OptionError(
-                f"ax: expected axes of a plane, received {type(axes).__name__}. Leave projection out."
+                f"ax is {type(axes).__name__}, not axes of a plane. Leave projection out."
             )
         named = Labels(axes) if labels else None
         for one in several:

@@ -74,8 +74,8 @@ def manifold(
         figure, axes = style.axes_for(ax, size)
         if spatial != hasattr(axes, "get_zlim"):
             raise OptionError(
-                "ax: expected axes of as many dimensions as the manifolds, received "
-                f"{type(axes).__name__}. Make them with projection='3d' for three states."
+                f"ax is {type(axes).__name__}, which does not have the dimension of the manifolds. "
+                "Make them with projection='3d' for three states."
             )
         for one in several:
             _draw(axes, one)
@@ -94,7 +94,7 @@ def _dimension(several: list[Manifold]) -> int:
     sizes = {len(m.point) for m in several}
     if len(sizes) != 1 or not sizes <= {2, 3}:
         raise OptionError(
-            f"found: expected manifolds of a system with two or three states, received {several!r}."
+            f"found must be manifolds of one system with two or three states, not {several!r}."
         )
     return sizes.pop()
 

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike
 from ...local import Equilibrium, Fold, PseudoEquilibrium
 from ...local.scans.box import Box
 from ...local.scans.plane_scan import Piece, PlaneScan
-from ...model import Array, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, FilippovSystem, Parameters, PointError
 from ...orbit.manifolds.plane_orbits import PlaneOrbits
 from .. import style
 from ..arguments import require_one_surface
@@ -147,12 +147,8 @@ def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
         raise PointError(
-            explain(
-                "starts",
-                expected="finite numbers of shape (k, 2)",
-                received=f"shape {points.shape}" if points.size else repr(starts),
-                advice=f"One row ({', '.join(system.state_names)}) for each orbit.",
-            )
+            f"starts has shape {points.shape}, but must have finite rows ({', '.join(system.state_names)}), "
+            "one for each orbit."
         )
     return points
 

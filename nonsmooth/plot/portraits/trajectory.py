@@ -14,7 +14,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ...flow import Event, Segment, Trajectory
-from ...model import DefinitionError, OptionError, explain, whole
+from ...model import DefinitionError, OptionError, whole
 from .. import style
 from .surfaces import draw_surfaces
 
@@ -99,12 +99,8 @@ def trajectory(
     plane = run.system.dimension == 2 if phase_plane is None else phase_plane
     if plane and run.system.dimension != 2:
         raise DefinitionError(
-            explain(
-                "phase_plane",
-                expected="a system of 2 states",
-                received=f"{run.system.dimension} states: {', '.join(run.system.state_names)}",
-                advice="Leave phase_plane= out to draw states against time.",
-            )
+            f"phase_plane=True needs 2 states, but the system has {run.system.dimension}: "
+            f"{', '.join(run.system.state_names)}. Leave it out to draw states against time."
         )
     return _draw(run, names, plane, whole(samples, "samples"), size, figure)
 
@@ -169,12 +165,7 @@ class _Part:
 def _checked(run: object) -> Trajectory:
     if not isinstance(run, Trajectory):
         raise DefinitionError(
-            explain(
-                "trajectory",
-                expected="a Trajectory",
-                received=type(run).__name__,
-                advice="Make one with simulate(system, x0, t_end=...).",
-            )
+            f"trajectory cannot draw a {type(run).__name__}. Make a Trajectory with simulate(system, x0, t_end)."
         )
     return run
 
@@ -184,12 +175,7 @@ def _states(run: Trajectory, states: list[str] | None) -> list[str]:
     unknown = [name for name in states or [] if name not in known]
     if unknown or states == []:
         raise OptionError(
-            explain(
-                "states",
-                expected=f"names among {known}",
-                received=repr(states),
-                advice="Leave states= out to draw all of them.",
-            )
+            f"states={states!r} are not names among {known}. Leave states= out to draw all of them."
         )
     return list(states) if states else known
 

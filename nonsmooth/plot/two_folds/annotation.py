@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from ...local import TwoFold
 from ...local.two_folds import Classification, ReducedFlow, classify_two_fold
 from ...local.two_folds.reduced_flow import Sector, eigenlines
-from ...model import Array, DefinitionError, explain
+from ...model import Array, DefinitionError
 from .. import style
 from ..labels import Labels
 
@@ -47,13 +47,8 @@ def portrait_of(fold: object, caller: str) -> Portrait:
         sigma, nu = (int(s1), int(s2)), (float(n1), float(n2))
     except (TypeError, ValueError) as error:
         raise DefinitionError(
-            explain(
-                caller,
-                expected="a two-fold as find_two_fold returns it, or a pair (sigma, nu) such as "
-                "((1, -1), (-2.0, -0.5))",
-                received=f"{type(fold).__name__} {str(fold)[:60]!r}",
-                advice="Find one with find_two_fold(system, near=point).",
-            )
+            f"{caller} cannot draw {type(fold).__name__} {str(fold)[:60]!r}. Give a two-fold from "
+            "find_two_fold, or a pair (sigma, nu) such as ((1, -1), (-2.0, -0.5))."
         ) from error
     return Portrait(ReducedFlow(sigma, nu), classify_two_fold(sigma, nu))
 

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ...model import OptionError, explain, whole
+from ...model import OptionError, whole
 from .. import style
 from .annotation import line_names, portrait_of
 from .class_map import two_fold_map
@@ -143,12 +143,7 @@ def _chosen(cases: Sequence[str] | None) -> list[str]:
     unknown = [name for name in chosen if name not in CASES]
     if unknown or not chosen or isinstance(cases, str):
         raise OptionError(
-            explain(
-                "cases",
-                expected=f"names among {list(CASES)}",
-                received=repr(cases),
-                advice="Leave cases= out to draw all of them.",
-            )
+            f"cases={cases!r} are not names among {list(CASES)}. Leave cases= out to draw all of them."
         )
     return chosen
 

@@ -92,7 +92,7 @@ def two_fold_map(
     '$\\\\nu_1$'
     """
     if kind not in SIGMA:
-        raise OptionError(f"kind: expected one of {list(SIGMA)}, received {kind!r}.")
+        raise OptionError(f"kind={kind!r} is not one of {list(SIGMA)}.")
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         _fill(axes, kind)

@@ -137,8 +137,7 @@ def two_fold_3d(
     portrait = portrait_of(fold, "two_fold_3d")
     if not 5.0 <= elevation <= 85.0:
         raise OptionError(
-            f"elevation: expected degrees from 5 to 85, received {elevation!r}. The surface is "
-            "seen from above."
+            f"elevation={elevation!r} is not within 5 to 85 degrees. The surface is seen from above."
         )
     direction = azimuth_of(portrait.flow) if azimuth is None else math.radians(azimuth)
     camera = Camera(direction, math.radians(elevation), stretch_of(portrait.flow))

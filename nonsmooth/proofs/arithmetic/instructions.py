@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any, cast
 
-from ...model import NotSmoothError, explain
+from ...model import NotSmoothError
 from ...model.expressions.graph import Node, evaluate, instructions
 
 #: Constants are folded where they are whole multiples of 1/_PARTS and at most _PARTS: these have the
@@ -169,12 +169,8 @@ class _Inserted:
     def apply(self, op: str, args: Sequence[int]) -> int:
         if op in _JUMPS:
             raise NotSmoothError(
-                explain(
-                    f"the operation {op!r}",
-                    expected="operations that are continuous where they are defined",
-                    received="one that jumps, and no theorem holds across a jump",
-                    advice="Declare the switch as a surface; of parameters alone, give its value.",
-                )
+                f"the operation {op!r} jumps, and no theorem holds across a jump. Declare the switch as a "
+                "surface; of parameters alone, give its value."
             )
         return self.graph.apply(op, args)
 

@@ -13,7 +13,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
-from ...model import NonsmoothError, OptionError, explain
+from ...model import NonsmoothError, OptionError
 from .flint import arb, ctx, fmpq
 
 Numbers = Literal["stored", "written"]
@@ -38,12 +38,7 @@ def exact(value: Any, numbers: Numbers = "stored", what: str = "number") -> Frac
 
 
 def _no_number(what: str, value: Any) -> str:
-    return explain(
-        what,
-        expected="a finite number, or one written as a string",
-        received=repr(value),
-        advice="For example 0.3 or '0.3'.",
-    )
+    return f"{what} is {value!r}, not a finite number. Write it as 0.3 or '0.3'."
 
 
 def exact_range(
@@ -53,14 +48,7 @@ def exact_range(
     ends = tuple(value) if isinstance(value, (tuple, list)) else (value, value)
     fractions = [exact(v, numbers, what) for v in ends]
     if len(fractions) != 2 or fractions[0] > fractions[1]:
-        raise error(
-            explain(
-                what,
-                expected="a number or (low, high) with low <= high",
-                received=repr(value),
-                advice="For example (0.29, 0.31).",
-            )
-        )
+        raise error(f"{what} is {value!r}, not a number or (low, high) with low <= high.")
     return fractions[0], fractions[1]
 
 

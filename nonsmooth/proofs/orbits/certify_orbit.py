@@ -7,7 +7,7 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from ...model import FilippovSystem, OptionError, PointError, explain, require_system, whole
+from ...model import FilippovSystem, OptionError, PointError, require_system, whole
 from ..arithmetic.decimals import enclosure, given
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb, ctx
@@ -100,9 +100,7 @@ def certify_orbit(
     require_system(system)
     duration = exact(t_end, numbers, "t_end")
     if duration <= 0:
-        raise OptionError(
-            explain("t_end", expected="a positive time", received=repr(t_end), advice="")
-        )
+        raise OptionError(f"t_end={t_end!r} is not positive. Give the duration of the orbit.")
     whole(bits, "bits", least=32)
     whole(max_bits, "max_bits", least=32)
     whole(max_steps, "max_steps")
@@ -130,12 +128,8 @@ def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> 
         values = []
     if len(values) != system.dimension:
         raise PointError(
-            explain(
-                "x0",
-                expected=f"{system.dimension} numbers or pairs, for {', '.join(system.state_names)}",
-                received=repr(x0),
-                advice="A pair (low, high) makes a box.",
-            )
+            f"x0={x0!r} does not have {system.dimension} numbers or pairs (low, high), for "
+            f"{', '.join(system.state_names)}."
         )
     return [
         exact_range(value, numbers, f"start of {name!r}", PointError)

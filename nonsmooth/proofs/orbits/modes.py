@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from ...model import DefinitionError, FilippovSystem, explain
+from ...model import DefinitionError, FilippovSystem
 from ..arithmetic.algebra import Difference
 from ..arithmetic.flint import arb, arb_mat
 from ..arithmetic.instructions import ExpressionGraph, Program
@@ -182,12 +182,8 @@ def _impact(system_graph: SystemGraph, k: int, count: int) -> EventFunction:
     inputs = [graph.nodes[a].place for a in graph.ancestors(column) if graph.nodes[a].op == "input"]
     if any(vector in (3, 4) for vector, _ in inputs):
         raise DefinitionError(
-            explain(
-                "certify_orbit",
-                expected=f"an impulse of {name!r} that no multiplier enters",
-                received="friction at the contact, or a reaction that enters nonlinearly",
-                advice="Impacts with friction are not proven.",
-            )
+            f"A multiplier enters the impulse of {name!r} (friction), or a reaction enters nonlinearly. "
+            "certify_orbit proves impacts without friction only."
         )
     effect = graph.dot(system_graph.gradient(rate), column)
     jump = graph.apply("mul", [graph.apply("add", [graph.constant(1), restitutions[k]]), rate])
@@ -214,12 +210,8 @@ class Modes:
     def __init__(self, system: FilippovSystem, numbers: Numbers, moving: Sequence[int] = ()):
         if any(system.nonlinear):
             raise DefinitionError(
-                explain(
-                    "certify_orbit",
-                    expected="multipliers that enter linearly",
-                    received="hidden dynamics",
-                    advice="Orbits with hidden dynamics are not proven.",
-                )
+                "A multiplier enters nonlinearly (hidden dynamics). certify_orbit proves orbits of systems with "
+                "linear multipliers only."
             )
         self.system, self.numbers = system, numbers
         self.system_graph = SystemGraph(system, moving)

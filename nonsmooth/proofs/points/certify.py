@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
-from ...model import FilippovSystem, OptionError, explain, real, whole
+from ...model import FilippovSystem, OptionError, real, whole
 from ..arithmetic.decimals import enclosure, given, inner
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import Numbers, between, precision, radius
@@ -30,14 +30,7 @@ READ = {
 def check_numbers(numbers: Any) -> None:
     """Raise OptionError unless ``numbers`` is "stored" or "written"."""
     if numbers not in READ:
-        raise OptionError(
-            explain(
-                "numbers",
-                expected="'stored' or 'written'",
-                received=repr(numbers),
-                advice="See certify.",
-            )
-        )
+        raise OptionError(f"numbers={numbers!r} is not 'stored' or 'written'. See certify.")
 
 
 def certify(

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
 from ...local.searches.search import unknowns
-from ...model import FilippovSystem, OptionError, explain
+from ...model import FilippovSystem, OptionError
 from ..arithmetic.decimals import given as given_range
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb
@@ -130,12 +130,8 @@ def instance_of(
     kind = {**kinds, PseudoEquilibrium: "pseudo-equilibrium"}.get(type(found))
     if kind is None:
         raise OptionError(
-            explain(
-                "certify",
-                expected="a TwoFold, Fold, Equilibrium or PseudoEquilibrium",
-                received=f"{found!r} ({type(found).__name__})",
-                advice="Find one first, for example with find_two_fold(system, near=...).",
-            )
+            f"certify cannot prove {found!r} ({type(found).__name__}): it is not a TwoFold, Fold, Equilibrium or "
+            "PseudoEquilibrium. Find one first, for example with find_two_fold(system, near=...)."
         )
     surface, mode, given = 0, None, dict(parameters or {})
     if isinstance(found, TwoFold):
@@ -146,12 +142,7 @@ def instance_of(
         given |= {k: v for k, v in found.parameters.items() if k not in names}
     if system is None:
         raise OptionError(
-            explain(
-                "system",
-                expected="the system that the point belongs to",
-                received="none",
-                advice="Write certify(found, system=system); only two-folds carry their system.",
-            )
+            "system is missing: only two-folds carry theirs. Write certify(found, system=system)."
         )
     functions = SurfaceFunctions(system, surface, mode)
     problem = PROBLEMS[kind](functions, numbers, getattr(found, "side", "+"))
@@ -199,12 +190,8 @@ def _across(
     missing = unknown - len(problem.nodes)
     if missing < 0:
         raise OptionError(
-            explain(
-                "hold",
-                expected=f"at least {len(problem.nodes) - len(problem.further)} free states",
-                received=f"{len(free)}",
-                advice="Hold fewer states.",
-            )
+            f"hold leaves {len(free)} free states, but a {problem.kind} needs at least "
+            f"{len(problem.nodes) - len(problem.further)}. Hold fewer states."
         )
     if missing == 0:
         return []

@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 
 from ...local.point.sides import FIELDS, Side
-from ...model import FilippovSystem, OptionError, explain, real, require_system, whole
+from ...model import FilippovSystem, OptionError, real, require_system, whole
 from ..arithmetic.decimals import given
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb
@@ -105,9 +105,7 @@ def prove_all(
     """
     require_system(system)
     if kind not in PROBLEMS:
-        raise OptionError(
-            explain("kind", expected=f"one of {list(PROBLEMS)}", received=repr(kind), advice="")
-        )
+        raise OptionError(f"kind={kind!r} is not one of {list(PROBLEMS)}.")
     limit = real(width, "width", low=5e-324, expected="a positive number")
     most = whole(max_boxes, "max_boxes")
     check_numbers(numbers)
@@ -129,14 +127,13 @@ def prove_all(
 def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> list[Any]:
     """Ranges of the states, or values of those that are held, as fractions."""
     names = system.state_names
-    expected = f"{len(names)} ranges (low, high) or numbers, for {', '.join(names)}"
     try:
         given = list(box)
     except TypeError:
         given = []
     if len(given) != len(names):
         raise OptionError(
-            explain("box", expected=expected, received=repr(box), advice="In the states' order.")
+            f"box={box!r} does not have {len(names)} ranges (low, high) or numbers, for {', '.join(names)}."
         )
     result: list[Any] = []
     for name, value in zip(names, given, strict=True):
@@ -145,12 +142,8 @@ def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> l
             ends = [exact(v, numbers, what) for v in value]
             if len(ends) != 2 or not 0 < ends[1] - ends[0] < _WIDEST:
                 raise OptionError(
-                    explain(
-                        what,
-                        expected="(low, high) with low < high, both finite, less than 1e300 apart",
-                        received=repr(value),
-                        advice="A number instead of a pair holds the state.",
-                    )
+                    f"{what} is {value!r}, but must be (low, high) with low < high, finite and less than 1e300 "
+                    "apart. A number instead of a pair holds the state."
                 )
             result.append((ends[0], ends[1]))
         else:
@@ -165,17 +158,15 @@ def _instance(
     free = [i for i, v in enumerate(ranges) if isinstance(v, tuple)]
     unknown = len(free) + len(problem.further)
     if unknown != len(problem.nodes):
+        advice = (
+            f"Otherwise points form a set of dimension {unknown - len(problem.nodes)}: give numbers to "
+            "hold states."
+            if unknown > len(problem.nodes)
+            else "Give more states a range."
+        )
         raise OptionError(
-            explain(
-                "box",
-                expected=f"{len(problem.nodes) - len(problem.further)} free states for a "
-                f"{problem.kind}, which has so many equations",
-                received=f"{len(free)}",
-                advice="Otherwise they are no isolated points but a set of dimension "
-                f"{unknown - len(problem.nodes)}: hold states by giving a number for their range."
-                if unknown > len(problem.nodes)
-                else "Give more states a range.",
-            )
+            f"box leaves {len(free)} states free, but a {problem.kind} needs "
+            f"{len(problem.nodes) - len(problem.further)}, as many as equations. {advice}"
         )
     values = [(v[0], v[0]) if isinstance(v, tuple) else (v, v) for v in ranges]
     return ProblemInstance(

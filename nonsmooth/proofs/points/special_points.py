@@ -10,7 +10,7 @@ from typing import Any
 
 from ...local.point.sides import FIELDS, Side, side_index
 from ...local.two_folds.classification import TABLE
-from ...model import DefinitionError, explain
+from ...model import DefinitionError
 from ..arithmetic.algebra import Difference
 from ..arithmetic.flint import arb
 from ..arithmetic.instructions import Program
@@ -267,12 +267,8 @@ class PseudoEquilibria(PointProblem):
         _autonomous(functions, self.kind)
         if functions.nonlinear:
             raise DefinitionError(
-                explain(
-                    "pseudo-equilibrium",
-                    expected="a multiplier that enters linearly",
-                    received="hidden dynamics",
-                    advice="Proofs follow Filippov's convex combination only.",
-                )
+                "the multiplier enters nonlinearly (hidden dynamics), but proofs of a pseudo-equilibrium follow "
+                "Filippov's convex combination. Give a field that is linear in it."
             )
 
     @cached_property
@@ -343,12 +339,8 @@ def _along_surface(
 def _autonomous(functions: SurfaceFunctions, what: str) -> None:
     if functions.system.time_dependent:
         raise DefinitionError(
-            explain(
-                what,
-                expected="a system that does not depend on time",
-                received=f"one that depends on {functions.system.definition.time}",
-                advice="Equilibria do not exist where fields change with time.",
-            )
+            f"the system depends on {functions.system.definition.time}, the time, but a proof of a "
+            f"{what} needs an autonomous system. Hold time at a value."
         )
 
 

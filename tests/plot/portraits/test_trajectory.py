@@ -114,12 +114,12 @@ def test_backward_and_empty_runs_are_drawn():
 
 
 def test_wrong_input_is_refused(run):
-    with pytest.raises(ns.DefinitionError, match="expected a Trajectory, received FilippovSystem"):
+    with pytest.raises(ns.DefinitionError, match="trajectory"):
         ns.plot.trajectory(BLOCK)
-    with pytest.raises(ns.OptionError, match=r"names among \['x', 'v'\]"):
+    with pytest.raises(ns.OptionError, match="states"):
         ns.plot.trajectory(run, states=["y"])
     line = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])
-    with pytest.raises(ns.DefinitionError, match="expected a system of 2 states, received 1"):
+    with pytest.raises(ns.DefinitionError, match="phase_plane"):
         ns.plot.trajectory(ns.simulate(line, [1.0], t_end=0.5), phase_plane=True)
 
 

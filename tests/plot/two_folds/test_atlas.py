@@ -120,9 +120,9 @@ def test_the_whole_atlas_is_drawn():
 def test_wrong_input_is_refused():
     for wrong in (["II-X"], [], "II-C"):
         for draw in (ns.plot.two_fold_atlas, ns.plot.two_fold_atlas_pages):
-            with pytest.raises(ns.OptionError, match="cases: expected names among"):
+            with pytest.raises(ns.OptionError, match="cases"):
                 draw(wrong)
     with pytest.raises(ns.OptionError, match="columns"):
         ns.plot.two_fold_atlas(["II-C"], columns=0)
-    with pytest.raises(ns.OptionError, match="kind: expected one of"):
+    with pytest.raises(ns.OptionError, match="kind"):
         ns.plot.two_fold_map("visible")

@@ -58,7 +58,7 @@ def test_the_multiplier_of_hidden_dynamics_has_no_pseudo_equilibrium_that_could_
         [x, y], surface=y, multipliers=lam, field=[-x, -(lam**3)], hidden=True
     )
     found = ns.find_pseudo_equilibrium(linear, [0.0, 0.0])
-    with pytest.raises(ns.DefinitionError, match="expected a multiplier that enters linearly"):
+    with pytest.raises(ns.DefinitionError, match="multiplier"):
         ns.certify(found, system=hidden)
 
 

@@ -1,4 +1,4 @@
-"""``python -m benchmarks [--quick] [--only SECTION ...]``: measure, and write build/benchmarks/."""
+"""Run benchmarks and write build/benchmarks/: ``python -m benchmarks [--quick] [--only SECTION ...]``."""
 
 from __future__ import annotations
 

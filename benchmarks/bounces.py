@@ -91,14 +91,14 @@ def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
     """Measure one bounce with every solver that is installed."""
     count = 60 if quick else 500
     starts = random_starts(count, seed=1)
-    truth = reference.kept(name, starts, folder)
+    solution = reference.kept(name, starts, folder)
     chosen: dict[Solver, float] = {}
     result: dict[str, Any] = {"starts": count, "target": TARGET, "solvers": {}}
     for solver in solvers():
         if not solver.available():
             result["solvers"][solver.label] = {"missing": "not installed"}
             continue
-        rows = precision(solver, name, starts, truth, quick)
+        rows = precision(solver, name, starts, solution, quick)
         good = [r for r in rows if r["error"] <= TARGET and r["wrong"] == 0]
         pick = max(good, key=lambda r: r["rate"]) if good else min(rows, key=lambda r: r["error"])
         result["solvers"][solver.label] = {"rows": rows, "pick": pick, "reached": bool(good)}
@@ -110,12 +110,12 @@ def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def precision(
-    solver: Solver, name: str, starts: Array, truth: Ends, quick: bool
+    solver: Solver, name: str, starts: Array, solution: Ends, quick: bool
 ) -> list[dict[str, Any]]:
     """Errors, wrong itineraries and a first speed over the solver's tolerances."""
     rows = []
     part = slice(0, solver.count)
-    expected = Ends(truth.t[part], truth.x[part], truth.itinerary[part])
+    expected = Ends(solution.t[part], solution.x[part], solution.itinerary[part])
     tolerances = solver.tolerances[:: 4 if quick else 1]
     work = random_starts(min(solver.timed, 200 if quick else solver.timed), seed=2)
     for tolerance in tolerances:

@@ -95,12 +95,12 @@ def run(
     """Errors at t_end and processor seconds of both, for the steps of Siconos and our tolerance."""
     if quick:
         count, t_end = min(count, 5), min(t_end, 20.0)
-    truth, _ = ours(count, t_end, 1e-3 * TOLERANCE, engine)
+    solution, _ = ours(count, t_end, 1e-3 * TOLERANCE, engine)
     found, seconds = ours(count, t_end, TOLERANCE, engine)
-    error = float(np.abs(found.x[-1] - truth.x[-1]).max())
+    error = float(np.abs(found.x[-1] - solution.x[-1]).max())
     row = {"tolerance": TOLERANCE, "error": error, "seconds": seconds, "events": len(found.events)}
     result: dict[str, Any] = {"blocks": count, "t_end": t_end, "nonsmooth": {"rows": [row]}}
-    result["same itinerary"] = found.itinerary == truth.itinerary
+    result["same itinerary"] = found.itinerary == solution.itinerary
     result["status"] = found.status.name
     label, python = "siconos, Moreau time stepping", os.environ.get(VARIABLE)
     if python is None:
@@ -108,7 +108,7 @@ def run(
         return result
     peer = siconos(python, count, t_end, list(steps[:1] if quick else steps))
     for row in peer["rows"]:
-        row["error"] = float(np.abs(np.array(row.pop("x")) - truth.x[-1]).max())
+        row["error"] = float(np.abs(np.array(row.pop("x")) - solution.x[-1]).max())
     result[label] = peer
     return result
 

@@ -28,15 +28,15 @@ def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
     ends, exact = solve(starts), tight(starts)
     driver = library.reference_driver(name, 1e-15)(starts[:sample])
     some = slice(0, 50 if quick else 500)
-    truth = reference.solve(name, starts[some])
+    solution = reference.solve(name, starts[some])
     result: dict[str, Any] = {
         "random starts": count,
         "wrong at the default tolerance": _differ(ends.itinerary, exact.itinerary),
         "largest difference": float(reference.error(ends, exact).max()),
         "against the reference driver": sample,
         "wrong against the reference driver": _differ(ends.itinerary[:sample], driver.itinerary),
-        "against mpmath": len(truth.t),
-        "wrong against mpmath": _differ(ends.itinerary[some], truth.itinerary),
+        "against mpmath": len(solution.t),
+        "wrong against mpmath": _differ(ends.itinerary[some], solution.itinerary),
         "boundaries": _boundaries(name, starts, exact.itinerary, 4 if quick else 40),
     }
     print(f"  {name}: {result}", flush=True)
@@ -49,11 +49,11 @@ def _differ(a: Codes, b: Codes) -> int:
 
 def letters(number: int) -> str:
     """Itinerary of a code."""
-    word = ""
+    itinerary = ""
     while number:
         number, digit = divmod(number - 1, 4)
-        word = LETTERS[digit] + word
-    return word
+        itinerary = LETTERS[digit] + itinerary
+    return itinerary
 
 
 def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, dict[str, Any]]:
@@ -68,14 +68,14 @@ def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, 
         key: {"starts": 0, "wrong": 0, "differs from 1e-14": 0, "which": []} for key in keys
     }
     for x, tight in ((low, a), (high, b)):
-        mine, truth = solve(x).itinerary, reference.solve(name, x).itinerary
+        mine, solution = solve(x).itinerary, reference.solve(name, x).itinerary
         for i, key in enumerate(keys):
             row = result[key]
             row["starts"] += 1
             row["differs from 1e-14"] += int(mine[i] != tight[i])
-            if mine[i] != truth[i]:
+            if mine[i] != solution[i]:
                 row["wrong"] += 1
-                given, right = letters(int(mine[i])), letters(int(truth[i]))
+                given, right = letters(int(mine[i])), letters(int(solution[i]))
                 row["which"].append([float(x[i, 1]), float(x[i, 4]), given, right])
     return result
 

@@ -28,12 +28,12 @@ def run(name: str, each: int) -> dict[str, Any]:
     codes = library.make(name, TOLERANCES[-1])(starts).itinerary
     low, high, a, b = pairs(name, starts, codes, each, 0.0)
     ends, believed = np.concatenate([low, high]), np.concatenate([a, b])
-    truth = reference.solve(name, ends).itinerary
+    solution = reference.solve(name, ends).itinerary
     outward = _outward(low, high)
     result: dict[str, Any] = {"starts": len(ends), "gap": float(np.abs(low - high).max())}
     for tolerance in TOLERANCES:
         solve = library.make(name, tolerance)
-        wrong = int((solve(ends).itinerary != truth).sum())
+        wrong = int((solve(ends).itinerary != solution).sum())
         farthest, judged = _farthest(name, solve, ends, outward, believed)
         result[f"{tolerance:g}"] = {"wrong": wrong, "farthest": farthest, "judged": judged}
         print(f"  {name} {tolerance:g}: {result[f'{tolerance:g}']} of {len(ends)}", flush=True)

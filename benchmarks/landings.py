@@ -113,9 +113,9 @@ def answers(piece: int, count: int, engine: str, which: Sequence[int] | None = N
             work=work,
         )
         ended = many.status == ns.Status.STOPPED
-        words = [str(ns.Status(s)) for s in many.status]
-        found[rows] = np.where(ended, many.itinerary, words)
-    return [str(word) for word in (found if which is None else found[list(which)])]
+        statuses = [str(ns.Status(s)) for s in many.status]
+        found[rows] = np.where(ended, many.itinerary, statuses)
+    return [str(one) for one in (found if which is None else found[list(which)])]
 
 
 def _compute(piece: int, engine: str, count: int, folder: Path) -> None:
@@ -131,12 +131,12 @@ def _compute_doubtful(count: int, folder: Path) -> None:
     path = folder / "doubtful.json"
     known: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
     rows: dict[int, list[int]] = {}
-    for found in summary(folder, count)["differ"]:
-        if f"{found['piece']}:{found['row']}" not in known and "reference" not in found:
-            rows.setdefault(found["piece"], []).append(found["row"])
+    for one in summary(folder, count)["differ"]:
+        if f"{one['piece']}:{one['row']}" not in known and "reference" not in one:
+            rows.setdefault(one["piece"], []).append(one["row"])
     for piece, which in rows.items():
-        words = answers(piece, count, "reference", which)
-        known |= {f"{piece}:{row}": word for row, word in zip(which, words, strict=True)}
+        found = answers(piece, count, "reference", which)
+        known |= {f"{piece}:{row}": itinerary for row, itinerary in zip(which, found, strict=True)}
         path.write_text(json.dumps(known))
 
 
@@ -148,7 +148,7 @@ def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
     path = folder / "doubtful.json"
     doubtful: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
     differ: list[dict[str, Any]] = []
-    words: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for piece in sorted(known["default"]):
         found = {
             engine: json.loads(files[piece].read_text())
@@ -156,19 +156,19 @@ def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
             if piece in files
         }
         for i, row in enumerate(zip(*found.values(), strict=True)):
-            words[row[0]] = words.get(row[0], 0) + 1
+            counts[row[0]] = counts.get(row[0], 0) + 1
             if len(set(row)) > 1:
                 differ.append(dict(piece=piece, row=i, **dict(zip(found, row, strict=True))))
                 own = doubtful.get(f"{piece}:{i}")
                 differ[-1] |= {"reference": own} if own else {}
-                differ[-1]["phases"] = len({phases(word) for word in row}) > 1
-    engine = {name: count * len(files) for name, files in known.items()}
-    return dict(landings=engine, itineraries=words, differ=differ)
+                differ[-1]["phases"] = len({phases(itinerary) for itinerary in row}) > 1
+    landings = {name: count * len(files) for name, files in known.items()}
+    return dict(landings=landings, itineraries=counts, differ=differ)
 
 
-def phases(word: str) -> str:
+def phases(itinerary: str) -> str:
     """An itinerary without passes through zero slip, which on a line are events or sharp turns."""
-    return re.sub(r"(\* )+\*", "*", word)
+    return re.sub(r"(\* )+\*", "*", itinerary)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
@@ -183,23 +183,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     if not options.report:
         with ProcessPoolExecutor(options.workers) as pool:
-            *rounds, last = (
+            *quick, last = (
                 [(piece, engine) for piece in range(options.count // options.piece)]
                 for engine in ENGINES
             )
             own = (options.piece, options.folder)
-            for future in [pool.submit(_compute, *r, *own) for part in rounds for r in part]:
+            for future in [pool.submit(_compute, *r, *own) for part in quick for r in part]:
                 future.result()
             pool.submit(_compute_doubtful, *own).result()
             for future in [pool.submit(_compute, *r, *own) for r in last]:
                 future.result()
     found = summary(options.folder, options.piece)
     print(f"landings: {found['landings']}")
-    for word, number in sorted(found["itineraries"].items(), key=lambda item: -item[1]):
-        print(f"  {number:7d}  {word}")
+    for itinerary, number in sorted(found["itineraries"].items(), key=lambda item: -item[1]):
+        print(f"  {number:7d}  {itinerary}")
     differ = found["differ"]
     other = sum(row["phases"] for row in differ)
-    print(f"two answers differ on {len(differ)}; in what slips and rolls when, on {other}")
+    print(f"two engines differ on {len(differ)}; in what slips and rolls when, on {other}")
     for row in differ:
         print(f"  {row}")
 

@@ -31,8 +31,8 @@ PEERS = (
 
 def run(quick: bool) -> dict[str, Any]:
     """Errors at t = 100 and processor seconds, for each step of each peer, and for ours."""
-    truth = ns.simulate(stick_slip_system(BELT), STICK_START, T_END, tol=1e-14).x[-1]
-    result: dict[str, Any] = {"nonsmooth": {"rows": _ours(truth)}}
+    solution = ns.simulate(stick_slip_system(BELT), STICK_START, T_END, tol=1e-14).x[-1]
+    result: dict[str, Any] = {"nonsmooth": {"rows": _ours(solution)}}
     for label, variable, script, steps in PEERS:
         python = os.environ.get(variable)
         if python is None:
@@ -42,13 +42,13 @@ def run(quick: bool) -> dict[str, Any]:
         problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": chosen}
         found = run_peer(python, script, problem)
         for row in found["rows"]:
-            row["error"] = float(np.abs(np.array(row.pop("x")) - truth).max())
+            row["error"] = float(np.abs(np.array(row.pop("x")) - solution).max())
         result[label] = found
         print(f"  {label}: {found}", flush=True)
     return result
 
 
-def _ours(truth: np.ndarray) -> list[dict[str, Any]]:
+def _ours(solution: np.ndarray) -> list[dict[str, Any]]:
     rows = []
     for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
         seconds = []
@@ -58,6 +58,6 @@ def _ours(truth: np.ndarray) -> list[dict[str, Any]]:
                 stick_slip_system(BELT), STICK_START, T_END, tol=tolerance, engine="compiled"
             )
             seconds.append(time.process_time() - begin)
-        error = float(np.abs(end.x[-1] - truth).max())
+        error = float(np.abs(end.x[-1] - solution).max())
         rows.append({"tolerance": tolerance, "error": error, "seconds": float(np.median(seconds))})
     return rows

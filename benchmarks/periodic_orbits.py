@@ -302,7 +302,7 @@ def _variational(start: Any, duration: float) -> Callable[[], Any]:
     return run
 
 
-#: What the issue asks for: name, limit, whether more is better.
+#: Name, limit, and whether more is better.
 TARGETS = {
     **{
         f"orbit {name}: times scipy, every state{turns}": (100.0, "at least")

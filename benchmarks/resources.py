@@ -1,4 +1,4 @@
-"""Memory of a large ensemble, scaling over threads and processes, and the share of the peak."""
+"""Memory of a large ensemble, scaling over threads and processes, and the peak rate of one core."""
 
 from __future__ import annotations
 

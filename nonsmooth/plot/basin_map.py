@@ -16,7 +16,7 @@ from . import style
 from .labels import Labels
 from .legends import beside
 
-#: Of attractors, in turn: told apart by deuteranopes too, light enough for dark marks.
+#: Colours of attractors in turn: distinct for deuteranopes too, light enough for dark marks.
 COLORS = ("#9ecae1", "#fdd0a2", "#9fdf5f", "#7f7fff", "#df7f7f", "#5f9fdf", "#ffdf3f", "#7f9f3f")
 _LISTED = 4  # attractors in a legend, beside other outcomes; more are named on the map
 _ENTRIES = 6  # of a legend

@@ -18,7 +18,7 @@ from . import style
 from .arguments import results, same
 from .labels import Labels
 
-#: Marker and fill of each kind of event; shape tells them apart without colour.
+#: Marker and fill of each kind of event; shapes differ without colour.
 MARKERS = {
     "fold": ("o", "white"),
     "pseudo-saddle-node": ("o", style.GREY),

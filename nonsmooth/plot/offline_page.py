@@ -16,7 +16,7 @@ from typing import Any
 from ..model import OptionError
 
 WEB = Path(__file__).parent / "web"
-#: In the page's head: a browser then refuses to load anything, also if a part asked for it.
+#: In the page's head, so that a browser loads nothing from elsewhere.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 

@@ -8,7 +8,7 @@ of the side), ``ATTRACTING`` and ``REPELLING`` for sliding orbits, ``TINT_ATTRAC
 ``DASHED`` (invisible folds), ``LONG_DASH``, ``DASH_DOT``, ``DOTS``. ``CLOUD``: points of long runs.
 
 Nothing here touches matplotlib's global settings: pictures are built inside ``settings()`` on
-figures that pyplot does not know. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
+figures that pyplot does not manage. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
 
 Examples
 --------
@@ -170,7 +170,7 @@ class PrintFigure(Figure):
             super().savefig(fname, **options)
 
     def _settle(self) -> None:
-        """Lay out until nothing moves: titles and square axes know their heights only when drawn."""
+        """Lay out until nothing moves, as heights of titles and square axes depend on the drawing."""
         before = list[tuple[int, ...]]()
         for _ in range(_LAYOUTS):
             self.draw_without_rendering()

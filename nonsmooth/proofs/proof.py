@@ -36,7 +36,7 @@ class Proof:
     exists : bool
         Whether existence and uniqueness are proven, also where the class is not decided.
     label : str
-        The class or kind; a boundary of classes where it was met exactly; ``""`` if undecided.
+        The class or kind; a boundary of classes where it is exactly on one; ``""`` if undecided.
     statement : str
         The theorem in words.
     point : mapping of str to Enclosure

@@ -1,5 +1,5 @@
-"""Every function that draws gives a picture fit for print: as wide as a page at most, text of 8 points,
-none cut off or on another, and no legend of more than six entries."""
+"""Every picture is fit for print: at most as wide as a page, text of 8 points, none cut off or
+overlapping, and no legend of more than six entries."""
 
 import dataclasses
 import io

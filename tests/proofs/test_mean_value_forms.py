@@ -1,4 +1,4 @@
-"""Functions on a set, as the checker has them, enclose their values at random points of the set."""
+"""Mean value forms of the checker enclose values at random points of a set."""
 
 import importlib
 import sys

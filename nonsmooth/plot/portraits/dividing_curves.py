@@ -99,12 +99,12 @@ def dividing_curves(
 def _draw(axes: Any, named: Labels | None, one: DividingCurves) -> None:
     color = style.BLUE if one.stable else style.VERMILLION
     for arc in one.arcs:
-        words, dashes = _KINDS[arc.kind]
+        description, dashes = _KINDS[arc.kind]
         axes.plot(*arc.points.T, color=color, linewidth=1.8, linestyle=dashes)
         if named is not None:
             back = "" if one.stable else ", backward"
             modes = arc.itinerary.replace("-", "\N{MINUS SIGN}")
-            named.name(f"{modes} {words}{back}", _middle(arc.points), color)
+            named.name(f"{modes} {description}{back}", _middle(arc.points), color)
     changes = _changes(one)
     if len(changes):
         look: Any = {"markersize": 4.5, "zorder": 5}

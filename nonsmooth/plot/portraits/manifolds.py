@@ -125,9 +125,9 @@ def _fit(axes: Any, several: list[Manifold]) -> None:
 
 
 def _legend(axes: Any, several: list[Manifold]) -> None:
-    words = {True: "stable manifold", False: "unstable manifold"}
+    labels = {True: "stable manifold", False: "unstable manifold"}
     handles = [
-        style.Line2D([], [], color=_STABLE if s else _UNSTABLE, label=words[s])
+        style.Line2D([], [], color=_STABLE if s else _UNSTABLE, label=labels[s])
         for s in (True, False)
         if any(m.stable == s for m in several)
     ]

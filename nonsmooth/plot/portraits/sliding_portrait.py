@@ -291,7 +291,7 @@ class _Portrait:
     def line_names(self) -> None:
         """Name folds, canards, manifolds and special points beside them."""
         for side, name in (("+", "F_1"), ("-", "F_2")):
-            for visible, word in ((True, "visible"), (False, "invisible")):
+            for visible, visibility in ((True, "visible"), (False, "invisible")):
                 pieces = [
                     piece
                     for fold in self.scan.folds
@@ -299,7 +299,7 @@ class _Portrait:
                     if fold.side == side and seen is visible
                 ]
                 if pieces:
-                    text = f"fold of ${name}$,\n{word}"
+                    text = f"fold of ${name}$,\n{visibility}"
                     self.labels.name(text, np.vstack(pieces), style.FIELDS[side])
         for name, curve in self.named.items():
             self.labels.name(name, curve, _SPECIAL[name][0])

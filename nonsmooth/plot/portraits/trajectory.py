@@ -18,7 +18,7 @@ from ...model import DefinitionError, OptionError, whole
 from .. import style
 from .surfaces import draw_surfaces
 
-#: Marker of each kind of event; shape tells them apart without colour.
+#: Marker of each kind of event; shapes differ without colour.
 MARKERS = {
     "crossing": ("o", "white", "crossing"),
     "entry": ("v", style.BLACK, "entry into sliding"),

@@ -46,11 +46,11 @@ def two_fold_explorer() -> str:
 def _data() -> dict[str, Any]:
     """Data of the page: the decision table, its maps, and examples."""
     kinds = {sigma: kind for kind, sigma in SIGMA.items()}
-    words = ("label", "folds", "condition", "into", "out_of", "determinism")
+    columns = ("label", "folds", "condition", "into", "out_of", "determinism")
     return dict(
         version=installed_version(),
         reach=REACH,
-        table=[{word: getattr(row, word) for word in words} for row in TABLE],
+        table=[{column: getattr(row, column) for column in columns} for row in TABLE],
         areas={
             kind: [(label, polygon.round(4).tolist()) for label, polygon in areas(kind)]
             for kind in SIGMA

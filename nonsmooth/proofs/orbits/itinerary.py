@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import sign
 from ..proof import UnprovenError
-from .modes import EventFunction, Modes, Range, beyond
+from .modes import EventFunction, Modes, Range, mode_after
 from .validated_flow import ValidatedFlow
 
 
@@ -71,7 +71,7 @@ class OrbitEnclosure(ValidatedFlow):
         zeros = 0
         for j in unknown:
             l1, l2 = self.modes.rates(j, mode, x, self.p)
-            found = beyond(l1, l2)
+            found = mode_after(l1, l2)
             if found is None:
                 raise UnprovenError(
                     f"{where}: on {self.modes.name(j)} with L1 in {l1.str(5)}, L2 in {l2.str(5)}: "
@@ -142,7 +142,7 @@ class OrbitEnclosure(ValidatedFlow):
                 raise UnprovenError(f"{function.name} at t = {self.t.str(8)} is not crossed")
         else:
             l1, l2 = self.modes.rates(j, before, x, self.p)
-            found = beyond(l1, l2)
+            found = mode_after(l1, l2)
             if found is None:
                 raise UnprovenError(
                     f"{function.name} at t = {self.t.str(8)}: L1 in {l1.str(5)}, L2 in {l2.str(5)}, so "

@@ -367,8 +367,8 @@ def _sliding(
     ]
 
 
-def beyond(l1: arb, l2: arb) -> tuple[str, int] | None:
-    """The mode beyond a point of the surface, and how many coefficients of h are zero in it."""
+def mode_after(l1: arb, l2: arb) -> tuple[str, int] | None:
+    """The mode after a point of the surface, and how many coefficients of h are zero in it."""
     if l1 < 0 and l2 > 0:
         return "s", 0
     if l1 > 0 and l2 > 0:

@@ -63,8 +63,8 @@ def _eigenvalues(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
         return None
     result = []
     for v in values:
-        # The mirror image of an eigenvalue is one too: where no other enclosure meets the mirrored
-        # one, it is the eigenvalue itself.
+        # The conjugate of an eigenvalue is one too: if no other enclosure overlaps it, the eigenvalue
+        # is real.
         mirrored = v.conjugate()
         own = not any(w is not v and w.overlaps(mirrored) for w in values)
         if not own and v.imag.contains(0):

@@ -124,7 +124,7 @@ def _grown(equations: Equations, u: list[arb], sizes: list[float], r: float, fou
 
 
 def _narrowed(equations: Equations, u: list[arb], found: Zero) -> Zero:
-    """Contract the enclosure to the working precision; a zero met exactly has radius 0."""
+    """Contract the enclosure to the working precision; an exact zero has radius 0."""
     for guess in _exact_guesses(u):
         values = entries(equations.values(guess))
         if all(v.is_zero() for v in values) and _within(guess, found.box):

@@ -51,7 +51,7 @@ def prove_all(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers, and with operations that interval arithmetic knows.
+        With scalar multipliers, and with operations of interval arithmetic.
     box : sequence of n pairs (low, high)
         For each state its range; a number holds a state at that value. As many states must be left
         free as there are equations: 3 for two-folds, 2 for folds, all for points of rest.
@@ -249,7 +249,7 @@ def _reason(low: Floats, high: Floats, search: Search) -> str:
             "not defined there"
         )
     return (
-        "a zero that is not simple (a double one, or several closer than can be told apart), or a "
+        "a zero that is not simple (a double one, or several that are too close to separate), or a "
         "branch point of an expression"
     )
 

@@ -1,4 +1,4 @@
-"""Orbits are proven: closed forms lie in their enclosures, doubtful ones are not proven."""
+"""Proven orbits enclose closed forms; undecided ones are not proven."""
 
 import casadi as ca
 import mpmath

@@ -1,4 +1,4 @@
-"""Verdicts on special points of systems whose points and numbers are known in closed form."""
+"""Special points are classified as in closed form."""
 
 import casadi as ca
 import numpy as np

@@ -80,13 +80,6 @@ def test_colours_that_appear_together_are_told_apart(name, eye):
     assert {pair for pair in PAIRS[name] if apart(*pair, eye) < 15.0} == set()
 
 
-def test_the_simulated_eye_confuses_red_and_green():
-    assert apart("#FF0000", "#00FF00", np.eye(3)) > 150
-    red, green = "#B05000", "#6A7800"  # of about one lightness
-    assert apart(red, green, DEUTERANOPIA) < apart(red, green, np.eye(3)) / 2
-    assert np.allclose(DEUTERANOPIA.sum(axis=1), 1.0, atol=1e-5)  # white stays white
-
-
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
 DRAWN = {
     "two_fold": lambda: ns.plot.two_fold(((-1, 1), (-2.0, -1.0))),

@@ -82,7 +82,7 @@ SLOW = [name for name in ORBITS if name not in QUICK]
 
 
 @pytest.mark.parametrize("names", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
-def test_orbits_from_boxes_and_for_ranges_are_followed_again(names, tmp_path):
+def test_orbits_from_boxes_and_for_ranges_are_checked(names, tmp_path):
     """Crossing, sliding, exits, stops, impacts, resets, a surface met while another slides."""
     paths = []
     for name in names:

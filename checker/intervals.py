@@ -12,7 +12,7 @@ ONE = 1 << BITS
 
 
 class CheckError(Exception):
-    """A claim that does not hold, or cannot be checked."""
+    """A claim that is false or cannot be checked."""
 
 
 class Iv:
@@ -78,7 +78,7 @@ def whole(n: int) -> Iv:
 
 
 def _smooth(slope: Callable[[Any], Any]) -> Callable[[Callable[[Iv], Iv]], Callable[[Any], Any]]:
-    """Functions of intervals, and by their slopes of whatever else knows the chain rule."""
+    """A function of intervals, and by its slope of forms with a chain rule."""
 
     def of(f: Callable[[Iv], Iv]) -> Callable[[Any], Any]:
         return lambda x: f(x) if type(x) is Iv else x.chained(f, slope)

@@ -1,4 +1,4 @@
-"""A proof that is interrupted keeps what was proven; what is no start, speed or range is refused."""
+"""An interrupted proof keeps its results; wrong starts, speeds and ranges raise errors."""
 
 import casadi as ca
 import pytest

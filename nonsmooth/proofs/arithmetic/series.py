@@ -1,7 +1,7 @@
-"""Power series with enclosed coefficients: what an expression becomes along a motion.
+"""Power series with enclosed coefficients, for expressions along a motion.
 
-Coefficients come from the field itself (Picard's iteration gains one order a pass), never from the
-jets of ``nonsmooth.model``, which hold reciprocals as doubles.
+Picard's iteration of the field gains one order a pass. The jets of ``nonsmooth.model`` do not serve,
+as they hold reciprocals as doubles.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any
 
 from .flint import arb, arb_series, ctx, fmpq
 from .instructions import Program
-from .intervals import OPERATIONS, Numbers, exact
+from .intervals import OPERATIONS, Numbers, exact, power_of
 
 
 @contextmanager
 def length(count: int) -> Iterator[None]:
-    """Compute with so many coefficients inside."""
+    """Set the length of series inside a ``with`` block."""
     old = ctx.cap
     ctx.cap = count
     try:
@@ -37,14 +37,7 @@ def _one() -> arb_series:
 
 
 def _power(a: arb_series, n: int) -> arb_series:
-    result: arb_series | None = None
-    while True:
-        if n & 1:
-            result = a if result is None else result * a
-        n >>= 1
-        if not n:
-            return _one() if result is None else result
-        a = a * a
+    return power_of(a, n, _one, lambda b: b * b)
 
 
 def _atan2(y: arb_series, x: arb_series) -> arb_series:
@@ -98,13 +91,7 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
 
 
 class Series:
-    """The arithmetic of power series.
-
-    Parameters
-    ----------
-    inputs : sequence of sequence of arb_series
-    numbers : {"stored", "written"}
-    """
+    """The arithmetic of power series."""
 
     power = staticmethod(_power)
 

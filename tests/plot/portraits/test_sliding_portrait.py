@@ -113,7 +113,6 @@ def test_each_region_is_named_once():
             ns.DefinitionError,
             "surface",
         ),
-        (lambda s: ns.plot.sliding_portrait(s, BOX, orbits=-1), ns.OptionError, "orbits"),
     ],
 )
 def test_bad_input_is_refused_with_advice(call, error, words):

@@ -1,8 +1,8 @@
-"""Starts bisected to rounding between two itineraries: which are wrong, and how far from the boundary.
+"""Wrong itineraries of starts bisected to rounding, and how far from the boundary they occur.
 
-``python -m benchmarks.edges``; mpmath judges every start. A run decides by states that have an error, so
-where it sees a boundary is off by what that error is worth in the start. The ends of a pair of neighbours,
-and starts at growing distances from it on both sides, say by how much.
+``python -m benchmarks.itinerary_boundaries``; the reference is mpmath. A
+run decides by states that have an error, which shifts the boundary in the starts. The ends of a pair of
+neighbours, and starts at growing distances from it on both sides, measure the shift.
 """
 
 from __future__ import annotations
@@ -12,8 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from . import ours, reference
-from .correctness import pairs
+from . import library, reference
+from .itineraries import pairs
 from .problems import Array, Codes, landings, random_starts
 
 BOUNCES = ("linear", "nonlinear")
@@ -25,15 +25,15 @@ DISTANCES = (0.0, *(2.0**-53 * 2.0**k for k in range(21)))
 def run(name: str, each: int) -> dict[str, Any]:
     """Wrong starts of one bounce at each tolerance, beside the boundary and farther from it."""
     starts = random_starts(100_000, seed=5)
-    codes = ours.make(name, TOLERANCES[-1])(starts).itinerary
+    codes = library.make(name, TOLERANCES[-1])(starts).itinerary
     low, high, a, b = pairs(name, starts, codes, each, 0.0)
     ends, believed = np.concatenate([low, high]), np.concatenate([a, b])
-    truth = reference.solve(name, ends).itinerary
+    solution = reference.solve(name, ends).itinerary
     outward = _outward(low, high)
     result: dict[str, Any] = {"starts": len(ends), "gap": float(np.abs(low - high).max())}
     for tolerance in TOLERANCES:
-        solve = ours.make(name, tolerance)
-        wrong = int((solve(ends).itinerary != truth).sum())
+        solve = library.make(name, tolerance)
+        wrong = int((solve(ends).itinerary != solution).sum())
         farthest, judged = _farthest(name, solve, ends, outward, believed)
         result[f"{tolerance:g}"] = {"wrong": wrong, "farthest": farthest, "judged": judged}
         print(f"  {name} {tolerance:g}: {result[f'{tolerance:g}']} of {len(ends)}", flush=True)
@@ -50,9 +50,8 @@ def _outward(low: Array, high: Array) -> Array:
 def _farthest(
     name: str, solve: Any, ends: Array, outward: Array, believed: Codes
 ) -> tuple[float, int]:
-    """Largest distance at which mpmath contradicts the engine, -1 if none, and how often it was
-    asked."""
-    # It is asked where the engine's answer is not that of the end, which is on the same side.
+    """Largest distance at which mpmath contradicts the engine, -1 if none, and starts it solved."""
+    # It solves starts whose itinerary is not that of the end, which is on the same side.
     judged = 0
     for distance in reversed(DISTANCES):
         moved = ends[:, [1, 4]] + distance * outward

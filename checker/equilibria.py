@@ -1,4 +1,4 @@
-"""Claims about points of rest and cusps: sides, and kinds by the signs of eigenvalues."""
+"""Status and kind of equilibria and pseudo-equilibria, by signs of h and of eigenvalues."""
 
 from __future__ import annotations
 
@@ -8,11 +8,6 @@ from typing import Any
 from intervals import CheckError, Iv, whole
 
 Matrix = list[list[Iv]]
-
-
-def elsewhere(at: Any) -> list[int]:
-    """Signs of what must be positive where the fields apply."""
-    return [v.v.sign() for v in at.positive]
 
 
 def equilibrium(at: Any, k: int) -> str:
@@ -53,7 +48,7 @@ def pseudo_equilibrium(at: Any) -> str:
 
 
 def kind(J: Matrix) -> str:
-    """Kind of a point of rest: Routh's array counts unstable eigenvalues, Sturm's chain real ones."""
+    """Kind of an equilibrium: Routh's array counts unstable eigenvalues, Sturm's chain real ones."""
     p = characteristic(J)
     unstable = _unstable(p)
     if 0 < unstable < len(J):

@@ -1,4 +1,4 @@
-"""This library, as its users call it."""
+"""Solvers of this library, as its users call it."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Clocks: alternated medians, fresh processes, peak memory.
+"""Timing of pieces of work in turns, and of scripts in fresh processes with their peak memory.
 
-A machine shared with others is noisy. Solvers therefore take turns (A B C A B C ...), each turn is
-timed with the processor time of this process, and what is reported is the median and the spread.
+On a shared machine times are noisy. Solvers therefore take turns (A B C A B C ...), each timed by the
+processor time of this process; results are the median and the spread.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ import numpy as np
 
 ROOT = Path(__file__).parent.parent
 
-#: One thread for the linear algebra of peers: for small systems more of them only wait for each other.
+#: One thread for the linear algebra of peers, as more do not pay for small systems.
 ONE_THREAD = dict.fromkeys(("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"), "1")
 Clock = Callable[[], float]
 
@@ -103,8 +103,24 @@ def fresh(script: str, environment: Mapping[str, str] | None = None) -> dict[str
     return {**result, "process": seconds}
 
 
+def run_peer(python: str, script: str, problem: dict[str, Any]) -> dict[str, Any]:
+    """Result of a script of ``peers`` in an interpreter of its own, which reads a problem as JSON."""
+    done = subprocess.run(
+        [python, str(Path(__file__).with_name("peers") / f"{script}.py")],
+        input=json.dumps(problem),
+        capture_output=True,
+        text=True,
+        check=False,
+        env=os.environ | ONE_THREAD,
+    )
+    if done.returncode:
+        return {"missing": f"failed: {done.stderr.strip()[-200:]}", "rows": []}
+    found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
+    return found
+
+
 def machine() -> dict[str, Any]:
-    """What the figures depend on; no names of hosts or folders."""
+    """Processor, load and versions, without names of hosts or folders."""
     import platform
 
     cpu = platform.processor() or platform.machine()

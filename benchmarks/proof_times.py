@@ -1,4 +1,4 @@
-"""Theorems in interval arithmetic: how long each kind takes."""
+"""Times of proofs in interval arithmetic."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import casadi as ca
 import bounce
 import nonsmooth as ns
 
-from .measure import alternate
+from .timing import alternate
 
 
 def chebyshev(n: int, u: ca.SX) -> ca.SX:
@@ -56,7 +56,7 @@ def one_bounce(model: bounce.ContactModel) -> Callable[[], Any]:
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """Time each proof, and say whether it was one."""
+    """Time each proof, and check that it is one."""
     side = 4 if quick else 10
     linear = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)
     soft = bounce.contact.DepthDampedKelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4)

@@ -1,4 +1,4 @@
-"""What is proven where: the pieces of a proof for ranges of parameters."""
+"""Map of what is proven over ranges of parameters."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def proof_map(
     legend: bool = True,
     title: str | None = None,
 ) -> Figure:
-    """Draw what is proven where, over one range of parameters or two.
+    """Draw a map of what is proven over one range of parameters or two.
 
     Pieces have the colour of the class that is proven for all of them; grey where there is a point with an
     undecided class, white where nothing is proven. Held states with a range count as parameters.
@@ -50,7 +50,7 @@ def proof_map(
     Raises
     ------
     OptionError
-        What is no proof for one range or two.
+        ``proof`` is no Proof for one range or two.
 
     Examples
     --------
@@ -66,8 +66,8 @@ def proof_map(
     ranges = {k: v for k, v in getattr(proof, "parameters", {}).items() if v.low != v.high}
     if not hasattr(proof, "pieces") or not 1 <= len(ranges) <= 2:
         raise OptionError(
-            "proof: expected a Proof for one or two ranges of parameters, received "
-            f"{proof!r} with {len(ranges)}. Give ns.certify pairs (low, high) for one or two names."
+            f"proof is {proof!r} with {len(ranges)} ranges of parameters, but must have one or two "
+            "ranges. Give certify pairs (low, high) for one or two names."
         )
     names, pieces = list(ranges), sorted(proof.pieces or (proof,), key=_corner(list(ranges)))
     labels = list(dict.fromkeys(_label(p) for p in pieces))
@@ -105,7 +105,7 @@ _UNDECIDED, _OPEN = "class undecided", "nothing"
 
 
 def _label(piece: Any) -> str:
-    """What is proven of a piece."""
+    """Class that is proven for a piece."""
     if piece.proven:
         return str(piece.label)
     return _UNDECIDED if piece.exists else _OPEN

@@ -1,4 +1,4 @@
-"""Functions on a set, as the checker has them, enclose their values at random points of the set."""
+"""Mean value forms of the checker enclose values at random points of a set."""
 
 import importlib
 import sys
@@ -15,7 +15,7 @@ CHECKER = Path(__file__).parents[2] / "checker"
 @pytest.fixture(scope="module")
 def checker():
     """The modules of the checker, which is a program and no package."""
-    names = ("intervals", "forms", "zeros")
+    names = ("intervals", "mean_value_forms", "zeros")
     before = dict(sys.modules)
     sys.path.insert(0, str(CHECKER))
     try:
@@ -43,7 +43,11 @@ def functions(elementary):
 
 @pytest.mark.parametrize("k", range(7))
 def test_values_are_in_their_ranges_and_moved_sets_hold_their_points(k, checker):
-    intervals, forms, rng = checker["intervals"], checker["forms"], np.random.default_rng(k)
+    intervals, forms, rng = (
+        checker["intervals"],
+        checker["mean_value_forms"],
+        np.random.default_rng(k),
+    )
     iv, unit = intervals.Iv, intervals.whole(1).a
     ours, theirs = functions(intervals)[k]
     holds = lambda enclosure, value: (
@@ -75,7 +79,11 @@ def test_values_are_in_their_ranges_and_moved_sets_hold_their_points(k, checker)
 
 def test_what_sets_are_tied_by_is_kept(checker):
     """x - x is nothing on a set, and a rotation there and back gives the set again."""
-    forms, iv, whole = checker["forms"], checker["intervals"].Iv, checker["intervals"].whole
+    forms, iv, whole = (
+        checker["mean_value_forms"],
+        checker["intervals"].Iv,
+        checker["intervals"].whole,
+    )
     states = forms.States([iv.of("9/10", "11/10"), iv.of("-1/10", "1/10")], True)
     p, q = states.values
     assert (p - p).zero
@@ -91,7 +99,7 @@ def test_what_sets_are_tied_by_is_kept(checker):
 
 def test_the_time_of_a_zero_is_a_function_on_the_set(checker):
     """x0 + v t falls through zero at -x0/v, and where it is then is known to second order."""
-    forms, zeros, iv = checker["forms"], checker["zeros"], checker["intervals"].Iv
+    forms, zeros, iv = checker["mean_value_forms"], checker["zeros"], checker["intervals"].Iv
     unit = checker["intervals"].whole(1).a
     x, v = forms.States([iv.of("9/10", "11/10"), iv.of("-2", "-9/5")], True).values
     time = zeros.first_zero([x, v], unit, 0)

@@ -1,4 +1,4 @@
-"""The sliding portrait of a two-fold: its four regions, folds and orbits in the z2-z3 plane.
+"""The sliding flow of a two-fold: its four regions, folds and orbits in the z2-z3 plane.
 
 Everything is drawn to leading order, where the portrait has no scale: orbits of one sector are
 scaled copies of each other.
@@ -7,6 +7,7 @@ scaled copies of each other.
 from __future__ import annotations
 
 import math
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -17,16 +18,16 @@ from matplotlib.patches import Patch, Polygon
 from ...local.two_folds import ReducedFlow, diabolo_slopes, flight_above
 from ...local.two_folds.flights import has_diabolo
 from ...local.two_folds.reduced_flow import Sector, eigenlines, sectors
-from ...model import Array, OptionError
+from ...model import Array, whole
 from .. import style
 from ..legends import beside, is_narrow
-from .labels_and_lines import (
+from .annotation import (
     TINTS,
     ZERO,
     Portrait,
+    label_points,
     line_names,
     line_style,
-    name_places,
     number,
     portrait_of,
     title_of,
@@ -54,7 +55,8 @@ def two_fold(
 
     The regions are attracting sliding (Da), repelling sliding (Dr) and crossing up (C1) and down
     (C2). Orbits are exact for the leading order; arrows show the direction of real time. Eigenlines
-    of the sliding field are virtual outside of sliding. Hatching marks the sliding orbits that connect to the two-fold where whole sectors of them do.
+    of the sliding field are virtual outside of sliding. Hatched and dotted
+    sectors are those whose orbits all connect to the two-fold.
 
     Parameters
     ----------
@@ -93,8 +95,7 @@ def two_fold(
     '$z_2$'
     """
     portrait = portrait_of(fold, "two_fold")
-    if isinstance(orbits, bool) or not isinstance(orbits, int) or orbits < 0:
-        raise OptionError(f"orbits: expected a whole number >= 0, received {orbits!r}.")
+    whole(orbits, "orbits", least=0)
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         parts = sectors(portrait.flow)
@@ -123,7 +124,7 @@ def _regions(ax: Axes) -> None:
 
 
 def _shade_sectors(ax: Axes, parts: list[Sector]) -> None:
-    """Hatch the sectors all of whose orbits reach s or come from it, and their mirror images."""
+    """Hatch the sectors whose orbits all reach s or all come from it, and their images."""
     for part in parts:
         if "s" not in (part.orbit.goes_to, part.orbit.comes_from):
             continue
@@ -199,28 +200,15 @@ def _eigenlines(ax: Axes, portrait: Portrait, numbers: bool) -> None:
             continue
         for at in (0.62, -0.42):
             tip = at * end - np.sign(-value) * 1e-3 * end
-            style.arrow(
-                ax,
-                tip + np.sign(-value) * 2e-3 * end,
-                tip,
-                color,
-                mutation_scale=16,
-                linewidth=0,
-                zorder=4.1,
-            )
+            tail = tip + np.sign(-value) * 2e-3 * end
+            style.arrow(ax, tail, tip, color, mutation_scale=16, linewidth=0, zorder=4.1)
         _along(ax, m, end, f"{name}, $\\kappa$ = {number(value)}" if numbers else name, color)
     if portrait.flow.discriminant > 0:
         for m in np.real(portrait.flow.slopes):
             if m < 0:
                 end = to_box(math.atan(m))
-                ax.plot(
-                    *np.array([-end, end]).T,
-                    color=style.GREY,
-                    linewidth=0.9,
-                    linestyle=":",
-                    zorder=1.5,
-                    gid="virtual eigenline",
-                )
+                faint: Any = {"color": style.GREY, "linewidth": 0.9, "linestyle": ":"}
+                ax.plot(*np.array([-end, end]).T, zorder=1.5, gid="virtual eigenline", **faint)
 
 
 def _along(ax: Axes, m: float, end: Array, name: str, color: str, away: float = 0.62) -> None:
@@ -255,44 +243,23 @@ def _crossing_arrows(ax: Axes, flow: ReducedFlow) -> None:
             colors = (style.BELOW, style.ABOVE) if sign > 0 else (style.ABOVE, style.BELOW)
             before, after = z - 0.13 * arriving, z + 0.15 * leaving
             dashes = ("--", "-") if sign > 0 else ("-", "--")
-            ax.plot(
-                *np.array([before, z]).T,
-                color=colors[0],
-                linewidth=1.2,
-                linestyle=dashes[0],
-                zorder=1.8,
-                gid="crosses 0" if sign > 0 else None,
-            )
-            ax.plot(
-                *np.array([z, after]).T,
-                color=colors[1],
-                linewidth=1.2,
-                linestyle=dashes[1],
-                zorder=1.8,
-                gid="crosses 1" if sign > 0 else None,
-            )
+            for k, part in enumerate(((before, z), (z, after))):
+                look: Any = {"color": colors[k], "linestyle": dashes[k], "linewidth": 1.2}
+                gid = f"crosses {k}" if sign > 0 else None
+                ax.plot(*np.array(part).T, zorder=1.8, gid=gid, **look)
             style.arrow(ax, after - 1e-3 * leaving, after, colors[1], linewidth=0, zorder=1.9)
-            ax.plot(
-                *z,
-                marker="o",
-                markersize=6,
-                markerfacecolor="white",
-                markeredgecolor=style.BLACK,
-                markeredgewidth=0.8,
-                zorder=1.95,
-            )
-            ax.plot(
-                *z,
-                marker="." if sign > 0 else "x",
-                markersize=3.4,
-                color=style.BLACK,
-                markeredgewidth=0.8,
-                zorder=1.96,
-            )
+            ring: Any = {
+                "markerfacecolor": "white",
+                "markeredgecolor": style.BLACK,
+                "markersize": 6,
+            }
+            ax.plot(*z, marker="o", markeredgewidth=0.8, zorder=1.95, **ring)
+            inner: Any = {"color": style.BLACK, "markeredgewidth": 0.8, "markersize": 3.4}
+            ax.plot(*z, marker="." if sign > 0 else "x", zorder=1.96, **inner)
 
 
 def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
-    """Draw the invariant lines of the return map of an invisible two-fold, where it has some."""
+    """Draw the invariant lines of the return map of an invisible two-fold."""
     if not has_diabolo(flow):
         return
     looks = ((style.FAUX_CANARD, style.DOTS), (style.CANARD, style.DASH_DOT))
@@ -313,8 +280,8 @@ def _diabolo(ax: Axes, flow: ReducedFlow) -> None:
 
 def _names(ax: Axes, parts: list[Sector]) -> None:
     box = {"boxstyle": "round,pad=0.18", "facecolor": "white", "edgecolor": "none", "alpha": 0.85}
-    for name, place in name_places(parts).items():
-        style.write(ax, place, name, fontsize=14, zorder=7, bbox=box)
+    for name, point in label_points(parts).items():
+        style.write(ax, point, name, fontsize=14, zorder=7, bbox=box)
     ax.plot(0, 0, "o", color=style.BLACK, markersize=5, zorder=8)
     ax.annotate(
         "$s$",

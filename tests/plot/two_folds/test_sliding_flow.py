@@ -166,18 +166,6 @@ def test_global_settings_and_pyplot_are_left_alone(draw):
     assert pyplot.get_fignums() == known
 
 
-@pytest.mark.slow
-@pytest.mark.parametrize("draw", [ns.plot.two_fold, ns.plot.two_fold_3d])
-@pytest.mark.parametrize(
-    "suffix, start", [("png", b"\x89PNG"), ("pdf", b"%PDF-"), ("svg", b"<?xml")]
-)
-def test_files_are_written_in_every_format(tmp_path, draw, suffix, start):
-    file = tmp_path / f"portrait.{suffix}"
-    draw(CLASSES["mix-C"]).savefig(file)
-    content = file.read_bytes()
-    assert content.startswith(start) and len(content) > 5000
-
-
 def test_drawing_on_given_axes():
     figure = Figure()
     FigureCanvasAgg(figure)

@@ -1,13 +1,13 @@
-"""Orbits in enclosures: interval Taylor steps from points or boxes, events by signs, modes by Filippov."""
+"""Validated integration of orbits from points or boxes, by interval Taylor steps with events."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from typing import Any
 
-from contacts import Place
-from forms import States, span
 from intervals import CheckError, Iv, whole
+from mean_value_forms import States, span
+from modes import Modes
 from polynomials import is_factored
 from series import Coefficients, Dual, constant, evaluate, minus, motion, negative, over, times
 from zeros import UnsureError, first_zero, passed, slope, value
@@ -20,14 +20,14 @@ Box = list[tuple[Fraction, Fraction]]
 
 
 class Guard:
-    """A function of time that is positive until it ends the mode, or is passed."""
+    """A function of time that is positive up to its event."""
 
     def __init__(self, kind: str, index: int, direction: int, c: Coefficients):
         self.kind, self.index, self.direction, self.c = kind, index, direction, c
 
 
 class Orbit:
-    """One orbit in progress, or all from a box: its states, time, and parameters with a range."""
+    """One orbit in progress, or all from a box: states, time and varying parameters."""
 
     def __init__(self, record: dict[str, Any], box: Box):
         self.record, self.graph, self.n = record, record["graph"], len(record["start"])
@@ -37,18 +37,18 @@ class Orbit:
         values = [Iv.of(*pair) for pair in start] + [whole(0)]
         values += [self.given[k] for k in self.moving]
         self.states = States(values, any(a < b for a, b in box))
-        self.place, self._factored = Place(record), set[str]()
+        self.modes, self._factored = Modes(record), set[str]()
         self.signs, self.zeros = dict[int, int](), dict[tuple[str, int], int]()
         claimed = [e["t"] for e in record["events"]] + list(record["end"])
         widths = [Fraction(b) - Fraction(a) for a, b in claimed]
         self._digits(max((b - a for a, b in box), default=Fraction(0)), widths)
-        self.word = self.place.start(self.x, self.p, box)
-        if self.place.began is not None and "s" not in self.word:
-            self.zeros[("surface", self.place.began)] = 1
-        self._arm()
+        self.mode = self.modes.start(self.x, self.p, box)
+        if self.modes.start_surface is not None and "s" not in self.mode:
+            self.zeros[("surface", self.modes.start_surface)] = 1
+        self._initial_signs()
 
     def _digits(self, wide: Fraction, widths: list[Fraction]) -> None:
-        """Tolerance and order of the steps, by what is claimed."""
+        """Set tolerance and order of the steps by the digits that are claimed."""
         finest = min([w for w in widths if w > wide / 10**6], default=Fraction(1, 10**20))
         digits = len(str(int(1 / finest)))
         digits = min(60, max(16, digits + 6)) if not wide else digits + 6
@@ -80,7 +80,7 @@ class Orbit:
         return evaluate(self.graph, [states, still, [], signs, none])
 
     def _sides(self, c: list[Coefficients]) -> tuple[list[Any], list[Coefficients]]:
-        """Both fields beside the surface that slides, and L1 and L2."""
+        """Both fields beside the sliding surface, and L1 and L2."""
         fields, lie = [], []
         for lam in self._beside():
             f = [self._values(c, lam)[k].v for k in self.graph["field"]]
@@ -89,30 +89,30 @@ class Orbit:
         return fields, lie
 
     def _beside(self) -> tuple[list[int], list[int]]:
-        """Multipliers on both sides of the surface that slides."""
-        letters, i = self.place.surfaces_of(self.word), self.word.index("s")
+        """Multipliers on both sides of the sliding surface."""
+        letters, i = self.modes.surfaces_of(self.mode), self.mode.index("s")
         lam = [1 if w == "+" else -1 for w in letters]
         return [1 if j == i else s for j, s in enumerate(lam)], lam
 
     def _along(self, c: list[Coefficients], f: list[Coefficients]) -> Coefficients:
-        """How fast the switching function of the surface that slides rises in a direction."""
-        node = self.graph["surfaces"][self.word.index("s")]
-        d = self._values(c, [0] * self.place.count, f)[node].d
+        """Rate of the switching function of the sliding surface in a direction."""
+        node = self.graph["surfaces"][self.mode.index("s")]
+        d = self._values(c, [0] * self.modes.count, f)[node].d
         return constant(whole(0)) if d is None else d
 
     def rates(self, c: list[Coefficients]) -> list[Coefficients]:
-        """The field of the mode along a motion, that of time and of what does not move."""
+        """Rates of states, time and varying parameters in the mode."""
         still = [constant(whole(0))] * len(self.moving)
         return [*self._field(c), constant(whole(1)), *still]
 
     def _field(self, c: list[Coefficients]) -> list[Coefficients]:
-        if "s" not in self.word:
-            lam = [1 if w == "+" else -1 for w in self.place.surfaces_of(self.word)]
+        if "s" not in self.mode:
+            lam = [1 if w == "+" else -1 for w in self.modes.surfaces_of(self.mode)]
             values = self._values(c, lam)
             return [values[k].v for k in self.graph["field"]]
-        hint = self.graph["sliding"][self.word]
-        if self.word not in self._factored:  # F1 - F2 = g G, so that g cancels
-            self._factored.add(self.word)
+        hint = self.graph["sliding"][self.mode]
+        if self.mode not in self._factored:  # F1 - F2 = g G, so that g cancels
+            self._factored.add(self.mode)
             if not is_factored(self.graph, self._beside(), hint["factor"], hint["direction"]):
                 raise CheckError("F1 - F2 is not the multiple that is claimed")
         values = self._values(c, self._beside()[0])
@@ -121,8 +121,8 @@ class Orbit:
         return [minus(p, times(a, q)) for p, q in zip(f, g, strict=True)]
 
     def guards(self, c: list[Coefficients]) -> list[Guard]:
-        """Everything that may end the mode, along a motion."""
-        letters = self.place.surfaces_of(self.word)
+        """The guards of the mode along a motion."""
+        letters = self.modes.surfaces_of(self.mode)
         values = self._values(c, [0] * len(letters))
         found = []
         for j, letter in enumerate(letters):
@@ -133,13 +133,13 @@ class Orbit:
                 found.append(Guard("exit", j, -1, l2))
             else:
                 found.append(Guard("surface", j, 0, h if letter == "+" else negative(h)))
-        for k, (kind, _, direction, node) in enumerate(self.place.ends):
+        for k, (kind, _, direction, node) in enumerate(self.modes.ends):
             turned = self.signs.get(k, 1)
             c_k = values[node].v if turned > 0 else negative(values[node].v)
             found.append(Guard(kind, k, direction, c_k))
         return found
 
-    def _arm(self, jumped: int | None = None) -> None:
+    def _initial_signs(self, jumped: int | None = None) -> None:
         """Signs of stops, resets and gaps at the start or after a jump."""
         self.signs = {}
         c = motion(self.rates, self.states.values, 4)
@@ -159,7 +159,7 @@ class Orbit:
     # steps ---------------------------------------------------------------------------------------
 
     def advance(self, end: Iv) -> tuple[Guard | None, bool]:
-        """One step, to the first event if one comes: its guard, and whether the end is reached."""
+        """Take one step, at most to the first event; return its guard, and whether the end is reached."""
         n, left = self.order, end - self.t
         c = motion(self.rates, self.states.values, n + 1)
         steps = [
@@ -173,7 +173,7 @@ class Orbit:
             if h <= 0:
                 break
             try:
-                hit = self._try(guards, h)
+                candidate = self._try(guards, h)
             except UnsureError as unsure:
                 if unsure.since < natural // 50:
                     raise
@@ -183,15 +183,15 @@ class Orbit:
                 h >>= 1
                 continue
             last = h >= left.b
-            if hit is not None and last and (left - hit[1]).b < 0:
-                hit = None
-            if hit is not None and last and (left - hit[1]).a < 0:
-                raise CheckError("whether an event is met before the end is undecided")
-            time = hit[1] if hit else left if last else Iv(h, h)
+            if candidate is not None and last and (left - candidate[1]).b < 0:
+                candidate = None
+            if candidate is not None and last and (left - candidate[1]).a < 0:
+                raise CheckError("whether an event is before the end is undecided")
+            time = candidate[1] if candidate else left if last else Iv(h, h)
             series = [[*v[:n], top] for v, top in zip(c, self._top, strict=True)]
             self.states.become([passed(v, time) for v in series])
             self.zeros = {}
-            return (hit[0] if hit else None), last and hit is None
+            return (candidate[0] if candidate else None), last and candidate is None
         raise CheckError(f"no step at t = {self.t.a / UNIT:.9g}")
 
     def _try(self, guards: list[Guard], h: int) -> tuple[Guard, Iv] | None:
@@ -201,33 +201,33 @@ class Orbit:
         scale = (h / UNIT) ** n
         if _size(self._top) * scale > 100 * self.tolerance:
             raise CheckError("the remainder is large")
-        hits = []
+        candidates = []
         for g, top in zip(guards, self.guards(tops), strict=True):
             if _size([top.c[n]]) * scale > 1e4 * self.tolerance:
                 raise CheckError("the remainder of a guard is large")
             series = [*(g.c[k] for k in range(n)), top.c[n]]
             t = first_zero(series, h, self.zeros.get((g.kind, g.index), 0))
             if t is not None:
-                hits.append((t, g, series))
-        for t, g, _ in hits:
-            if all(g is other or (t - s).b < 0 for s, other, _ in hits):
+                candidates.append((t, g, series))
+        for t, g, _ in candidates:
+            if all(g is other or (t - s).b < 0 for s, other, _ in candidates):
                 return g, t
-        return self._one_stop(hits) if hits else None
+        return self._one_stop(candidates) if candidates else None
 
-    def _one_stop(self, hits: list[tuple[Iv, Guard, list[Iv]]]) -> tuple[Guard, Iv]:
-        """Of zeros that may be at once the only one that counts, if it is a stop."""
-        soonest = min(t.b for t, *_ in hits)
-        together = [hit for hit in hits if hit[0].a <= soonest]
+    def _one_stop(self, candidates: list[tuple[Iv, Guard, list[Iv]]]) -> tuple[Guard, Iv]:
+        """The stop among zeros that may coincide, if no other is an event."""
+        soonest = min(t.b for t, *_ in candidates)
+        together = [candidate for candidate in candidates if candidate[0].a <= soonest]
         until = Iv(min(t.a for t, *_ in together), max(t.b for t, *_ in together))
-        counting = [hit for hit in together if self._counts(hit[1])]
-        passed = [hit for hit in together if not self._counts(hit[1])]
+        counting = [candidate for candidate in together if self._is_event(candidate[1])]
+        passed = [candidate for candidate in together if not self._is_event(candidate[1])]
         falls = all(value(slope(c), until).sign() < 0 for *_, c in passed)
         if len(counting) != 1 or counting[0][1].kind != "stop" or not falls:
             raise CheckError("which event comes first is undecided")
         return counting[0][1], counting[0][0]
 
-    def _counts(self, g: Guard) -> bool:
-        """Whether a zero of a guard means anything: stops, resets and impacts have a direction."""
+    def _is_event(self, g: Guard) -> bool:
+        """Whether a zero of a guard is an event: stops, resets and impacts have a direction."""
         passes = g.kind in ("stop", "reset", "impact")
         return not passes or g.direction * -self.signs[g.index] >= 0
 
@@ -245,26 +245,26 @@ class Orbit:
 
     # events --------------------------------------------------------------------------------------
 
-    def serve(self, g: Guard) -> tuple[str, str] | None:
-        """What happens at a guard's zero: kind and name of the event, None if it means nothing."""
+    def apply(self, g: Guard) -> tuple[str, str] | None:
+        """Apply a guard's zero; return kind and name of the event, None if it is not one."""
         if g.kind in ("stop", "reset", "impact"):
-            counts = self._counts(g)
+            counts = self._is_event(g)
             self.signs[g.index] = -self.signs[g.index]
             if not counts:
                 self.zeros[(g.kind, g.index)] = 1
                 return None
             if g.kind != "stop":
-                x, kept, slides = self.place.jumped(self.x, self.p, self.word, g.index)
+                x, kept, slides = self.modes.jumped(self.x, self.p, self.mode, g.index)
                 self.states.become([*x, *self.states.values[self.n :]])
-                self.word = self.place.word(self.x, self.p, slides)
-                self._arm(g.index if kept else None)
-            return g.kind, self.place.ends[g.index][1]
-        self.word, zeros, kind = self.place.switched(
-            (self.x, self.p), self.word, g.kind, g.index, g.direction
+                self.mode = self.modes.mode_at(self.x, self.p, slides)
+                self._initial_signs(g.index if kept else None)
+            return g.kind, self.modes.ends[g.index][1]
+        self.mode, zeros, kind = self.modes.switched(
+            (self.x, self.p), self.mode, g.kind, g.index, g.direction
         )
         if zeros:
             self.zeros[("surface", g.index)] = zeros
-        name = "surface" if self.place.count == 1 else f"surface {g.index}"
+        name = "surface" if self.modes.count == 1 else f"surface {g.index}"
         return kind, f"sliding on {name}" if g.kind == "exit" else name
 
 

@@ -1,8 +1,7 @@
-"""Proofs against other methods: complete lists and Newton's method, bounces and mpmath.
+"""Check of proofs by other methods: complete lists by Newton's method, bounces by mpmath.
 
-Random systems: no zero that Newton's method finds is missing from a list that is proven complete, and
-each zero on it is found. Random bounces: itineraries and ends are those of ``reference``, which shares
-no code with the library.
+For random systems Newton's method finds the zeros of a complete list, and no others. For random bounces
+itineraries and ends are those of ``reference``, which shares no code with the library.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
 
 @dataclass
 class Lists:
-    """What was counted over random systems."""
+    """Counts over random systems."""
 
     systems: int = 0
     complete: int = 0
@@ -87,19 +86,19 @@ def lists(seed: int, systems: int, starts: int) -> Lists:
 
 
 def bounces(name: str, seed: int, count: int) -> dict[str, Any]:
-    """Prove random landings of the ``linear`` or ``nonlinear`` bounce, with mpmath as the judge."""
+    """Prove random landings of the ``linear`` or ``nonlinear`` bounce, and compare with mpmath."""
     starts = random_starts(count, seed=seed)
-    truth = reference.solve(name, starts)
+    solution = reference.solve(name, starts)
     system = bounce_system(name)
     result: dict[str, Any] = {"starts": count, "proven": 0, "wrong itineraries": [], "outside": []}
     widest = 0.0
     for i, x in enumerate(starts):
         proof = ns.certify_orbit(system, list(x), T_MAX)
         result["proven"] += proof.proven and proof.status == "lift-off"
-        if code(proof.itinerary) != truth.itinerary[i]:
+        if code(proof.itinerary) != solution.itinerary[i]:
             result["wrong itineraries"].append(i)
         # The reference is rounded to doubles.
-        ends = [(proof.t, truth.t[i]), *zip(proof.end.values(), truth.x[i], strict=True)]
+        ends = [(proof.t, solution.t[i]), *zip(proof.end.values(), solution.x[i], strict=True)]
         if any(abs(e.middle - v) > e.radius + 1e-15 * (1 + abs(v)) for e, v in ends):
             result["outside"].append(i)
         widest = max(widest, *(e.radius for e, _ in ends))
@@ -134,7 +133,7 @@ def markdown(section: dict[str, Any]) -> str:
     counts = ", ".join(f"{k} {len(found[k])}" for k in ("missed", "twice", "unfound"))
     cases = f"{found['systems']}, {found['starts']:,} starts"
     lines = [
-        "| theorems and their judge | random cases | proven | wrong |",
+        "| theorems, checked by | random cases | proven | wrong |",
         "| --- | --- | --- | --- |",
         f"| lists of two-folds, Newton's method | {cases} | {found['complete']} complete, "
         f"{found['zeros']} two-folds | {counts} |",

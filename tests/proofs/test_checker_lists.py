@@ -1,27 +1,17 @@
-"""Lists, ranges in pieces and points of rest are checked by a program of its own, altered ones are not."""
+"""The checker accepts saved lists, pieces of ranges, equilibria and orbits, and refuses altered ones."""
 
 import json
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import casadi as ca
 import pytest
 
 import nonsmooth as ns
+from tests.proofs.checking import run
 
-CHECKER = Path(__file__).parents[2] / "checker"
 x, y, z, p, q = (ca.SX.sym(s) for s in "xyzpq")
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
 FLAT = [(-1.5, 1.5), (-1, 1)]
-
-
-def run(path):
-    done = subprocess.run(
-        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
-    )
-    return done.returncode, done.stdout + done.stderr
 
 
 def checked(proof, path):
@@ -74,7 +64,7 @@ def test_complete_lists_are_checked_and_shortened_ones_are_not(k, tmp_path):
         assert altered(path, lambda text: text["list"]["zeros"].pop())
 
 
-def test_a_list_may_not_count_what_is_elsewhere(tmp_path):
+def test_a_list_with_points_outside_its_box_is_refused(tmp_path):
     found = ns.prove_all(LISTS[3][0], [(-1.5, 1.5), (-1, 2)], "equilibrium", side="-")
     path = tmp_path / "list.json"
     found.save(path)
@@ -109,7 +99,7 @@ def test_kinds_in_space_are_checked_by_counting_eigenvalues(sign, tmp_path):
 
 
 @pytest.mark.slow
-def test_planar_points_of_rest_and_cusps_are_checked(tmp_path):
+def test_planar_equilibria_and_cusps_are_checked(tmp_path):
     node = plane([y - x, 1 - 2 * y], [1, 1])
     slides = plane([1 - x, -1], [-1 - x, 1])
     cusp = ns.FilippovSystem([x, y, z], surface=x, above=[y + z**2, 0 * x, 1], below=[1, 0, 0])
@@ -184,7 +174,7 @@ def orbits():
 
 @pytest.mark.slow_cases("0", "2")
 @pytest.mark.parametrize("k", range(3))
-def test_orbits_are_followed_again_and_others_are_not(k, tmp_path):
+def test_orbits_are_checked_and_altered_ones_are_refused(k, tmp_path):
     system, start, end, itinerary = list(orbits())[k]
     proof = ns.certify_orbit(system, start, end)
     path = tmp_path / "orbit.json"

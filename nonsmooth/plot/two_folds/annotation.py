@@ -1,4 +1,4 @@
-"""What the pictures of a two-fold share: what they draw, its title, and how its lines are marked."""
+"""Titles, line styles and names in pictures of two-folds."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from matplotlib.axes import Axes
 from ...local import TwoFold
 from ...local.two_folds import Classification, ReducedFlow, classify_two_fold
 from ...local.two_folds.reduced_flow import Sector, eigenlines
-from ...model import Array, DefinitionError, explain
+from ...model import Array, DefinitionError
 from .. import style
 from ..labels import Labels
 
@@ -30,7 +30,7 @@ _SIGNS = {1: "+", -1: "−"}
 
 @dataclass(frozen=True)
 class Portrait:
-    """A two-fold as the pictures need it: the linear flow and its class."""
+    """The reduced flow of a two-fold and its class."""
 
     flow: ReducedFlow
     classification: Classification
@@ -38,7 +38,7 @@ class Portrait:
 
 
 def portrait_of(fold: object, caller: str) -> Portrait:
-    """Read what is drawn from a two-fold, or from a pair (sigma, nu)."""
+    """The flow and class of a two-fold, or of a pair (sigma, nu)."""
     if isinstance(fold, TwoFold):
         return Portrait(fold.form.flow, fold.classification, fold.coincident_fields)
     try:
@@ -47,13 +47,8 @@ def portrait_of(fold: object, caller: str) -> Portrait:
         sigma, nu = (int(s1), int(s2)), (float(n1), float(n2))
     except (TypeError, ValueError) as error:
         raise DefinitionError(
-            explain(
-                caller,
-                expected="a two-fold as find_two_fold returns it, or a pair (sigma, nu) such as "
-                "((1, -1), (-2.0, -0.5))",
-                received=f"{type(fold).__name__} {str(fold)[:60]!r}",
-                advice="Find one with find_two_fold(system, near=point).",
-            )
+            f"{caller} cannot draw {type(fold).__name__} {str(fold)[:60]!r}. Give a two-fold from "
+            "find_two_fold, or a pair (sigma, nu) such as ((1, -1), (-2.0, -0.5))."
         ) from error
     return Portrait(ReducedFlow(sigma, nu), classify_two_fold(sigma, nu))
 
@@ -87,8 +82,8 @@ def line_style(value: float, flow: ReducedFlow) -> tuple[str, str, Any]:
     return color, name, "-" if value < 0 else style.LONG_DASH
 
 
-def name_places(parts: list[Sector]) -> dict[str, Array]:
-    """Where the names of the regions stand, in the z2-z3 plane: away from the eigenlines."""
+def label_points(parts: list[Sector]) -> dict[str, Array]:
+    """Points of the names of the regions in the z2-z3 plane, away from the eigenlines."""
     widest = max(parts, key=lambda part: part.high - part.low)
     middle = 0.84 * to_box((widest.low + widest.high) / 2)
     return {
@@ -110,8 +105,7 @@ def number(value: float) -> str:
 
 
 def line_names(ax: Axes, portrait: Portrait, passages: bool = True) -> None:
-    """Name the folds, the lines outside of sliding and the parts of crossing orbits, beside
-    them."""
+    """Name the folds, the lines outside of sliding and the parts of crossing orbits."""
     labels, flow, along = Labels(ax), portrait.flow, np.linspace(0.1, 0.98, 23)
     both = np.concatenate([-along[::-1], along])
     for k, (name, color) in enumerate((("F_1", style.ABOVE), ("F_2", style.BELOW))):

@@ -1,4 +1,4 @@
-"""Recorded orbits followed again, in pieces where that is needed, and compared with what is claimed."""
+"""Check of a recorded orbit: integrate it again, in pieces if needed, and compare with its claims."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from fractions import Fraction
 from itertools import islice, product
 from typing import Any
 
+from integration import UNIT, Box, Orbit
 from intervals import CheckError, Iv
-from journeys import UNIT, Box, Orbit
 
 FORMAT = "nonsmooth orbit 1"
 _STEPS, _PIECES, _PATIENT, _CORNERS = 4000, 64, 4, 8
 
 
 class RefutedError(CheckError):
-    """A claim that is false, so that a division into pieces does not help."""
+    """A false claim, so that a division into pieces does not help."""
 
 
 def check_orbit(record: dict[str, Any]) -> str:
-    """Follow a recorded orbit again and compare modes, events and end with what is claimed."""
+    """Integrate a recorded orbit again and compare modes, events and end with its claims."""
     # A box of starts and parameters is divided where it is too wide to be followed in one piece.
     if record.get("format") != FORMAT:
         raise CheckError(f"expected the format {FORMAT!r}, received {record.get('format')!r}")
@@ -48,10 +48,8 @@ def check_orbit(record: dict[str, Any]) -> str:
             (a, b) = piece[k]
             middle = (a + b) / 2
             todo += [[*piece[:k], half, *piece[k + 1 :]] for half in ((middle, b), (a, middle))]
-    words = f" and {pieces} pieces" if pieces > 1 else ""
-    return (
-        f"the orbit goes through {len(record['events'])} events as claimed, in {steps} steps{words}"
-    )
+    summary = f" and {pieces} pieces" if pieces > 1 else ""
+    return f"the orbit goes through {len(record['events'])} events as claimed, in {steps} steps{summary}"
 
 
 def _refuted(record: dict[str, Any], box: Box) -> None:
@@ -70,30 +68,32 @@ def _follow(record: dict[str, Any], piece: Box) -> int:
     """Follow one piece of a box; how many steps it took."""
     orbit, events = Orbit(record, piece), list(record["events"])
     end = Iv.of(record["duration"])
-    if record["first"] != orbit.word:
-        raise RefutedError(f"it begins in {orbit.word!r}, claimed is {record['first']!r}")
-    steps, ended, met = 0, False, None
-    while not (ended or (met is not None and met[0] == "stop")):
-        steps, before = steps + 1, orbit.word
+    if record["first"] != orbit.mode:
+        raise RefutedError(f"it begins in {orbit.mode!r}, claimed is {record['first']!r}")
+    steps, ended, event = 0, False, None
+    while not (ended or (event is not None and event[0] == "stop")):
+        steps, before = steps + 1, orbit.mode
         if steps > _STEPS:
             raise CheckError(f"more than {_STEPS} steps")
-        hit, ended = orbit.advance(end)
-        met = orbit.serve(hit) if hit else None
-        if met is not None:
-            _compare(orbit, before, met, events.pop(0) if events else None)
-    if events or record["status"] != ("end" if ended or met is None else met[1]):
+        guard, ended = orbit.advance(end)
+        event = orbit.apply(guard) if guard else None
+        if event is not None:
+            _compare(orbit, before, event, events.pop(0) if events else None)
+    if events or record["status"] != ("end" if ended or event is None else event[1]):
         raise RefutedError("the orbit does not end as claimed")
     _inside(orbit.x, record["end"], "the end")
     return steps
 
 
-def _compare(orbit: Orbit, before: str, met: tuple[str, str], claim: dict[str, Any] | None) -> None:
-    kind, name = met
+def _compare(
+    orbit: Orbit, before: str, event: tuple[str, str], claim: dict[str, Any] | None
+) -> None:
+    kind, name = event
     if claim is None:
-        raise RefutedError(f"an event is met that is not claimed: {kind} {name}")
-    found = {"kind": kind, "name": name, "before": before, "after": orbit.word}
+        raise RefutedError(f"an event is not claimed: {kind} {name}")
+    found = {"kind": kind, "name": name, "before": before, "after": orbit.mode}
     if any(claim[k] != v for k, v in found.items()):
-        raise RefutedError(f"claimed is {claim}, met was {found}")
+        raise RefutedError(f"claimed is {claim}, found was {found}")
     _inside([orbit.t], [claim["t"]], "the time of an event")
     _inside(orbit.x, claim["x"], "the state at an event")
 

@@ -1,4 +1,4 @@
-"""Verdicts on special points of systems whose points and numbers are known in closed form."""
+"""Special points are classified as in closed form."""
 
 import casadi as ca
 import numpy as np
@@ -41,7 +41,7 @@ def test_a_virtual_pseudo_equilibrium_lies_in_crossing():
     assert 2 in proof.point["lambda"]
 
 
-def test_points_of_rest_of_a_field_that_depends_on_time_are_refused():
+def test_equilibria_of_a_field_that_depends_on_time_are_refused():
     frozen = ns.FilippovSystem([x, y], surface=y, above=[-x, -1 - y], below=[-x, 1])
     moving = ns.FilippovSystem(
         [x, y], surface=y, above=[-x, -1 - y + ca.sin(t)], below=[-x, 1], time=t

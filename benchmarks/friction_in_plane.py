@@ -1,8 +1,7 @@
 """Friction in the plane, beside Siconos: blocks on an incline and on a disc, a sphere on a turntable.
 
-Bounces in 3-D are in ``space.py``.
-
-``python -m benchmarks.plane`` prints all; ``BENCH_SICONOS_PYTHON`` names an interpreter with Siconos.
+``python -m benchmarks.friction_in_plane`` prints all; ``BENCH_SICONOS_PYTHON`` names an interpreter that
+has Siconos.
 """
 
 from __future__ import annotations
@@ -23,7 +22,7 @@ from numpy.typing import NDArray
 
 import nonsmooth as ns
 
-from .measure import ONE_THREAD
+from .timing import ONE_THREAD
 
 Array = NDArray[np.float64]
 
@@ -82,7 +81,7 @@ class Ride:
 
     def peer(self, step: float) -> dict[str, Any]:
         """The floor's frame for Siconos."""
-        # The step is that next to the one asked for of which there is a whole number.
+        # The step is rounded so that t_end is a whole number of steps.
         step = self.t_end / round(self.t_end / step)
         size = 5 if self.inertia else 3
         mass, damping, stiffness = np.eye(size), np.zeros((size, size)), np.zeros((size, size))
@@ -104,14 +103,14 @@ class Ride:
             speed=[0.0, *speed.tolist(), *self.speed[2:]],
         )  # fmt: skip
 
-    def error(self, place: Array) -> float:
-        """Largest error of a place in the floor's frame at the end."""
+    def error(self, point: Array) -> float:
+        """Largest error of a point in the floor's frame at the end."""
         angle = self.turning * self.t_end
         c, s = math.cos(angle), math.sin(angle)
-        return float(np.abs(np.array([[c, -s], [s, c]]) @ place - self.end).max())
+        return float(np.abs(np.array([[c, -s], [s, c]]) @ point - self.end).max())
 
     def ours(self, tol: float) -> tuple[float, float]:
-        """Error of the place at the end, and processor seconds of the run."""
+        """Error of the position at the end, and processor seconds of the run."""
         system, start = self.system(), [*self.start, *self.speed]
         follow = lambda: ns.simulate(system, start, self.t_end, tol=tol)
         seconds = 1 / rate(follow, 1, turns=5)
@@ -140,16 +139,16 @@ RIDES = (
 def theirs(
     python: str, rides: tuple[Ride, ...] = RIDES
 ) -> list[tuple[Ride, float, dict[str, Any]]]:
-    """Runs of Siconos: step, and what it answered."""
-    asked = [(ride, step) for ride in rides for step in STEPS]
+    """Runs of Siconos: step and result."""
+    cases = [(ride, step) for ride in rides for step in STEPS]
     script = Path(__file__).parent / "peers" / "siconos_plane.py"
-    runs = json.dumps([ride.peer(step) for ride, step in asked])
+    runs = json.dumps([ride.peer(step) for ride, step in cases])
     call, environment = [python, str(script), runs], os.environ | ONE_THREAD
     done = subprocess.run(call, capture_output=True, text=True, env=environment)
     answers = [json.loads(row) for row in done.stdout.splitlines() if row.startswith("{")]
     gone = dict(failure=f"the process ended with {done.returncode}: {done.stderr[-200:]}")
-    answers += [gone] * (len(asked) - len(answers))
-    return [(*question, answer) for question, answer in zip(asked, answers, strict=True)]
+    answers += [gone] * (len(cases) - len(answers))
+    return [(*case, answer) for case, answer in zip(cases, answers, strict=True)]
 
 
 def main() -> None:

@@ -1,7 +1,7 @@
-"""Itineraries: a million random starts, and starts bisected to 1e-9 of every boundary between them.
+"""Wrong itineraries of random starts, and of starts bisected to 1e-9 of boundaries between itineraries.
 
-Random starts: the compiled engine at its default tolerance against itself at 1e-14 for all, against
-the reference driver at 1e-15 and against mpmath for samples. Boundaries: against mpmath for all.
+The compiled engine at its default tolerance is compared with itself at 1e-14 for all random starts, and
+with the reference driver at 1e-15 and mpmath for samples; at boundaries with mpmath for all.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from . import ours, reference
+from . import library, reference
 from .problems import LETTERS, Array, Codes, landings, random_starts
 
 DEFAULT, TIGHT = 1e-10, 1e-14
@@ -24,19 +24,19 @@ def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
     """Count wrong itineraries of one bounce."""
     count, sample = (5_000, 50) if quick else (1_000_000, 1_000)
     starts = random_starts(count, seed=5)
-    solve, tight = ours.make(name, DEFAULT), ours.make(name, TIGHT)
+    solve, tight = library.make(name, DEFAULT), library.make(name, TIGHT)
     ends, exact = solve(starts), tight(starts)
-    driver = ours.reference_driver(name, 1e-15)(starts[:sample])
+    driver = library.reference_driver(name, 1e-15)(starts[:sample])
     some = slice(0, 50 if quick else 500)
-    truth = reference.solve(name, starts[some])
+    solution = reference.solve(name, starts[some])
     result: dict[str, Any] = {
         "random starts": count,
         "wrong at the default tolerance": _differ(ends.itinerary, exact.itinerary),
         "largest difference": float(reference.error(ends, exact).max()),
         "against the reference driver": sample,
         "wrong against the reference driver": _differ(ends.itinerary[:sample], driver.itinerary),
-        "against mpmath": len(truth.t),
-        "wrong against mpmath": _differ(ends.itinerary[some], truth.itinerary),
+        "against mpmath": len(solution.t),
+        "wrong against mpmath": _differ(ends.itinerary[some], solution.itinerary),
         "boundaries": _boundaries(name, starts, exact.itinerary, 4 if quick else 40),
     }
     print(f"  {name}: {result}", flush=True)
@@ -49,19 +49,18 @@ def _differ(a: Codes, b: Codes) -> int:
 
 def letters(number: int) -> str:
     """Itinerary of a code."""
-    word = ""
+    itinerary = ""
     while number:
         number, digit = divmod(number - 1, 4)
-        word = LETTERS[digit] + word
-    return word
+        itinerary = LETTERS[digit] + itinerary
+    return itinerary
 
 
 def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, dict[str, Any]]:
-    """For each pair of neighbours: starts, and how many mpmath says are wrong."""
-    # mpmath is the judge of every start; the engine at a tight tolerance, which found the boundaries,
-    # is not, since it may be wrong in the same way.
+    """Starts and wrong itineraries, by mpmath, for each pair of neighbours."""
+    # The engine at a tight tolerance found the boundaries, so it may be wrong in the same way.
     low, high, a, b = pairs(name, starts, codes, each, GAP)
-    solve = ours.make(name, DEFAULT)
+    solve = library.make(name, DEFAULT)
     keys = [
         " | ".join(sorted((letters(int(u)), letters(int(v))))) for u, v in zip(a, b, strict=True)
     ]
@@ -69,14 +68,14 @@ def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, 
         key: {"starts": 0, "wrong": 0, "differs from 1e-14": 0, "which": []} for key in keys
     }
     for x, tight in ((low, a), (high, b)):
-        mine, truth = solve(x).itinerary, reference.solve(name, x).itinerary
+        mine, solution = solve(x).itinerary, reference.solve(name, x).itinerary
         for i, key in enumerate(keys):
             row = result[key]
             row["starts"] += 1
             row["differs from 1e-14"] += int(mine[i] != tight[i])
-            if mine[i] != truth[i]:
+            if mine[i] != solution[i]:
                 row["wrong"] += 1
-                given, right = letters(int(mine[i])), letters(int(truth[i]))
+                given, right = letters(int(mine[i])), letters(int(solution[i]))
                 row["which"].append([float(x[i, 1]), float(x[i, 4]), given, right])
     return result
 
@@ -84,8 +83,7 @@ def _boundaries(name: str, starts: Array, codes: Codes, each: int) -> dict[str, 
 def pairs(
     name: str, starts: Array, codes: Codes, each: int, gap: float
 ) -> tuple[Array, Array, Codes, Codes]:
-    """Bisect segments between starts of different itineraries until their ends are ``gap``
-    apart."""
+    """Bisect segments between starts of different itineraries until their ends are ``gap`` apart."""
     rng = np.random.default_rng(6)
     low, high = [], []
     for one, other in combinations(np.unique(codes), 2):
@@ -93,7 +91,7 @@ def pairs(
         low.append(starts[rng.choice(first, each)])
         high.append(starts[rng.choice(second, each)])
     x, y = np.concatenate(low), np.concatenate(high)
-    solve = ours.make(name, TIGHT)
+    solve = library.make(name, TIGHT)
     a, b = solve(x).itinerary, solve(y).itinerary
     while True:
         middle = landings(0.5 * (x[:, 1] + y[:, 1]), 0.5 * (x[:, 4] + y[:, 4]))

@@ -1,8 +1,8 @@
-"""Sets of states as parallelepipeds, and functions on them by their values and slopes.
+"""Sets of states as parallelepipeds, and functions on them in mean value form.
 
-A state of the set is c + B r with r in a box that is symmetric around zero. A function on the set is held as its value in
-the middle and its derivatives by r everywhere, which keeps what ties the states together (the mean value
-form; sets of Lohner 1987). Every operation on ``Iv`` works on ``Form`` too.
+The set is c + B r, r in a box that is symmetric around zero (Lohner 1987). A function on it is its value
+in the middle and its derivatives by r everywhere, which keeps the dependence between states. Every
+operation on ``Iv`` works on ``Form`` too.
 """
 
 from __future__ import annotations
@@ -127,7 +127,7 @@ class States:
         self.values = [Form(m, row, r, w) for m, row, w in zip(c, rows, around, strict=True)]
 
     def become(self, image: list[Iv]) -> None:
-        """The set is now where its states were moved to; errors are put into r."""
+        """Replace the set by its image; errors are put into r."""
         if not self.wide:
             self.values = image
             return

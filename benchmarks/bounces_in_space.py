@@ -1,4 +1,4 @@
-"""Bounces in 3-D, with friction in the plane of the ground, beside bounces in the plane: rates of one thread."""
+"""Rates of bounces in 3-D beside bounces in the plane, on one thread."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ import numpy as np
 import bounce
 import nonsmooth as ns
 
-from . import ours
-from .measure import alternate
+from . import library
 from .problems import D1, D2, ETA, KAPPA, MU, T_MAX, Array, G, landings
+from .timing import alternate
 
 NAME = "friction in the plane"
 TOLERANCE = 1e-9
@@ -31,15 +31,15 @@ def system(name: str) -> ns.FilippovSystem:
     the ground."""
     # States X, X', Z, Z', Y, Y' and the two components of slip.
     x = [ca.SX.sym(s) for s in ("X", "V", "Z", "U", "Y", "W", "h1", "h2")]
-    lam, place, speed = ca.SX.sym("lam", 2), ca.vertcat(x[0], x[2]), ca.vertcat(x[1], x[3])
+    lam, position, speed = ca.SX.sym("lam", 2), ca.vertcat(x[0], x[2]), ca.vertcat(x[1], x[3])
     y, w = x[4], x[5]
     if name == "linear":
         load = -2 * D2 * w - y - G
-        along = -2 * D1 * ETA * speed - ETA**2 * place
+        along = -2 * D1 * ETA * speed - ETA**2 * position
     else:
         load = -(2 * D2 * (1 - y) * w) - (1 + 2 * y**2) * y - G
         along = -(2 * D1 * ETA * (1 + ca.sumsqr(speed)) * (1 - y) * speed)
-        along -= ETA**2 * (1 - y) * place
+        along -= ETA**2 * (1 - y) * position
     friction = -MU * load * lam
     force, slip = along + friction, along + KAPPA * friction
     return ns.FilippovSystem(
@@ -78,7 +78,7 @@ def run(quick: bool) -> dict[str, Any]:
     rng = np.random.default_rng(0)
     flat = landings(rng.uniform(-1, 1, many), rng.uniform(-1, 1, many))
     systems = {name: system(name) for name in ("linear", "nonlinear")}
-    solve = ours.make("nonlinear", TOLERANCE)
+    solve = library.make("nonlinear", TOLERANCE)
     options: dict[str, Any] = dict(tol=TOLERANCE, engine="compiled", work=work)
     timings = alternate(
         {

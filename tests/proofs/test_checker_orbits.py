@@ -1,32 +1,24 @@
-"""Proven orbits from boxes are checked by a program of its own; what is altered is refused or true."""
+"""The checker accepts saved orbits from boxes; it refuses altered ones unless these are true."""
 
 import json
 import random
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.proofs.checking import run
 
-CHECKER = Path(__file__).parents[2] / "checker"
 x, y, z, u, v, a, b, mu, t = (ca.SX.sym(s) for s in ("x", "y", "z", "u", "v", "a", "b", "mu", "t"))
 
 
 def checked(paths):
-    """Which of the files are accepted, and what is said of each."""
-    done = subprocess.run(
-        [sys.executable, "-I", str(CHECKER), *map(str, paths)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    lines = done.stdout.splitlines()
-    assert len(lines) == len(paths), done.stdout + done.stderr
+    """Which of the files are accepted, and the line of each."""
+    _, output = run(*paths)
+    lines = output.splitlines()
+    assert len(lines) == len(paths), output
     return [": checked:" in line for line in lines], lines
 
 
@@ -90,7 +82,7 @@ SLOW = [name for name in ORBITS if name not in QUICK]
 
 
 @pytest.mark.parametrize("names", [QUICK, pytest.param(SLOW, marks=pytest.mark.slow)])
-def test_orbits_from_boxes_and_for_ranges_are_followed_again(names, tmp_path):
+def test_orbits_from_boxes_and_for_ranges_are_checked(names, tmp_path):
     """Crossing, sliding, exits, stops, impacts, resets, a surface met while another slides."""
     paths = []
     for name in names:

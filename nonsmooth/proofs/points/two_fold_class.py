@@ -1,7 +1,7 @@
-"""The class of a two-fold from enclosures of its second derivatives.
+"""The class of a two-fold from enclosures of its second Lie derivatives.
 
-Every decision is a sign of a polynomial in L11, L12, L21, L22, so that at a point known exactly also
-the boundaries between classes are decided: Delta = nu1 nu2 + sigma1 sigma2 has the sign of
+Every decision is a sign of a polynomial in L11, L12, L21, L22, so that boundaries between classes are
+decided at points that are known exactly: Delta = nu1 nu2 + sigma1 sigma2 has the sign of
 L11 L22 - L12 L21, T = nu1 + nu2 that of L12 - L21, and g - 2 of mixed folds follows from squares.
 The table itself is that of ``nonsmooth.two_folds``.
 """
@@ -19,7 +19,7 @@ FOLDS = {(1, -1): "VV", (-1, 1): "II", (1, 1): "VI", (-1, -1): "IV"}
 
 @dataclass(frozen=True)
 class ProvenClass:
-    """What enclosures decide about a two-fold."""
+    """The class of a two-fold, or why it is undecided."""
 
     sigma: tuple[int, int]
     label: str
@@ -28,7 +28,7 @@ class ProvenClass:
 
 
 def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass:
-    """Decide the class."""
+    """The class, from enclosures of L11, L12, L21, L22."""
     l11, l12, l21, l22 = second
     s = sign(l11), sign(l22)
     if 0 in s:
@@ -69,12 +69,12 @@ def proven_class(second: Sequence[arb], coincident: bool = False) -> ProvenClass
 
 
 def _product(a: arb, b: arb) -> arb:
-    """Of positive numbers, from both ends: wide ones stay positive."""
+    """Product of positive numbers by their ends, so that wide ones stay positive."""
     return hull(a.lower() * b.lower(), a.upper() * b.upper())
 
 
 def _ratio(a: arb, b: arb) -> arb:
-    """Of positive numbers, from both ends."""
+    """Quotient of positive numbers by their ends."""
     return hull(a.lower() / b.upper(), a.upper() / b.lower())
 
 

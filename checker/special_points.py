@@ -1,13 +1,13 @@
-"""What a recorded proof claims, checked: one zero in a box, where it is, and its class."""
+"""Check of a recorded special point: one zero in a box, its position and its class."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from typing import Any
 
-from graphs import D, run
+from derivatives import D, run
+from equilibria import equilibrium, pseudo_equilibrium
 from intervals import CheckError, Iv, whole
-from points import equilibrium, pseudo_equilibrium
 from polynomials import is_multiple
 from series import along_field
 
@@ -23,24 +23,24 @@ class Equations:
             raise CheckError(f"expected the format {FORMAT!r}, received {record.get('format')!r}")
         self.record, self.graph = record, record["graph"]
         self.n, self.unknowns = record["states"], [tuple(u) for u in record["unknowns"]]
-        self.further = sum(vector == 2 for vector, _ in self.unknowns)
+        self.extra = sum(vector == 2 for vector, _ in self.unknowns)
         self.p = [D(Iv.of(*pair)) for pair in record["parameters"]]
 
-    def place(self, u: list[Iv]) -> tuple[list[D], list[D]]:
+    def variables(self, u: list[Iv]) -> tuple[list[D], list[D]]:
         """States and further unknowns with their derivatives."""
-        size = self.n + self.further
+        size = self.n + self.extra
         unit = [[whole(int(i == j)) for j in range(size)] for i in range(size)]
         zero = [[whole(0)] * size for _ in range(size)]
         x = [D(Iv.of(*v), unit[i], zero) for i, v in enumerate(self.record["held"])]
-        more = [D(whole(0), unit[self.n + k], zero) for k in range(self.further)]
+        more = [D(whole(0), unit[self.n + k], zero) for k in range(self.extra)]
         for (vector, i), value in zip(self.unknowns, u, strict=True):
             target = x if vector == 0 else more
             target[i] = D(value, target[i].g, zero)
         return x, more
 
     def local(self, u: list[Iv]) -> Local:
-        """h, both fields and what follows, at a box."""
-        x, more = self.place(u)
+        """h, both fields and Lie derivatives on a box."""
+        x, more = self.variables(u)
         values = run(self.graph, x, self.p, more)
         return Local(self, values, more)
 
@@ -77,10 +77,10 @@ class Equations:
 
 
 class Local:
-    """Numbers of the theory at a box of points."""
+    """h, both fields and Lie derivatives on a box of points."""
 
     def __init__(self, equations: Equations, values: list[D], more: list[D]):
-        graph, self.size = equations.graph, equations.n + equations.further
+        graph, self.size = equations.graph, equations.n + equations.extra
         self.more, self.side = more, equations.record["side"]
         self.h = self._full(values[graph["surface"]])
         self.fields = [[self._full(values[k]) for k in graph[s]] for s in ("above", "below")]
@@ -170,7 +170,7 @@ def inverse(J: Matrix) -> Matrix:
 
 
 def check(record: dict[str, Any]) -> str:
-    """Check one proof; what was checked, in words."""
+    """Check one proof; return a summary."""
     equations = Equations(record)
     box = [Iv.of(*pair) for pair in record["box"]]
     matrix = [[Iv.of(v) for v in row] for row in record["matrix"]]
@@ -178,28 +178,28 @@ def check(record: dict[str, Any]) -> str:
     if not all(k.inside(b) for k, b in zip(image, box, strict=True)):
         raise CheckError("Krawczyk's operator does not map the box into its interior")
     point, exactly = _point(equations, record, box)
-    words = f"exactly one {record['kind']} in the box, at the claimed point"
-    words += " exactly" if exactly else ""
+    summary = f"exactly one {record['kind']} in the box, at the claimed point"
+    summary += " exactly" if exactly else ""
     label = record["claims"].get("label", "")
     if record["kind"] == "two-fold" and label:
         _two_fold_class(equations, record, point)
-        words += f"; class {label}"
+        summary += f"; class {label}"
     elif record["kind"] == "fold" and label in ("visible", "invisible"):
         k = "+-".index(record["side"])
         s = equations.local(point).second(k, k).sign() * (1 - 2 * k)
         if s == 0 or (s > 0) != (label == "visible"):
             raise CheckError(f"the fold is not proven to be {label}")
-        words += f"; {label}"
+        summary += f"; {label}"
     elif label:
         _kind(equations, record, point)
-        words += f"; {label}"
+        summary += f"; {label}"
     if any(v.v.sign() <= 0 for v in equations.local(point).positive):
         raise CheckError("it is not proven to be on the sides of the mode")
-    return words
+    return summary
 
 
 def _kind(equations: Equations, record: dict[str, Any], point: list[Iv]) -> None:
-    """Check that a point of rest, or a cusp, is what is claimed."""
+    """Check the claimed kind of an equilibrium or a cusp."""
     at, label = equations.local(point), record["claims"]["label"]
     if record["kind"] == "equilibrium":
         found = equilibrium(at, "+-".index(record["side"]))
@@ -232,7 +232,7 @@ def _point(equations: Equations, record: dict[str, Any], box: list[Iv]) -> tuple
 
 
 def _two_fold_class(equations: Equations, record: dict[str, Any], point: list[Iv]) -> None:
-    """The decision table again, from signs."""
+    """Check the class of a two-fold by signs."""
     at = equations.local(point)
     l11, l12, l21, l22 = (at.second(i, j) for i in (0, 1) for j in (0, 1))
     s = l11.sign(), l22.sign()

@@ -1,23 +1,20 @@
-"""Peers that live in interpreters of their own: Siconos and nosnoc, on a shorter stick-slip run.
+"""A stick-slip run beside Siconos and nosnoc, which run in other interpreters.
 
-Name the interpreters in the environment variables below; without them the section says so.
+Environment variables, below, name the interpreters.
 """
 
 from __future__ import annotations
 
-import json
 import os
-import subprocess
 import time
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 import nonsmooth as ns
 
-from .measure import ONE_THREAD
 from .problems import BELTS, STICK, STICK_START, stick_slip_system
+from .timing import run_peer
 
 BELT, T_END = BELTS["many events"], 100.0
 #: Label, environment variable, script, steps to try.
@@ -34,22 +31,24 @@ PEERS = (
 
 def run(quick: bool) -> dict[str, Any]:
     """Errors at t = 100 and processor seconds, for each step of each peer, and for ours."""
-    truth = ns.simulate(stick_slip_system(BELT), STICK_START, T_END, tol=1e-14).x[-1]
-    result: dict[str, Any] = {"nonsmooth": {"rows": _ours(truth)}}
+    solution = ns.simulate(stick_slip_system(BELT), STICK_START, T_END, tol=1e-14).x[-1]
+    result: dict[str, Any] = {"nonsmooth": {"rows": _ours(solution)}}
     for label, variable, script, steps in PEERS:
         python = os.environ.get(variable)
         if python is None:
             result[label] = {"missing": f"name an interpreter that has it in {variable}"}
             continue
-        found = _peer(python, script, list(steps[:1] if quick else steps))
+        chosen = list(steps[:1] if quick else steps)
+        problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": chosen}
+        found = run_peer(python, script, problem)
         for row in found["rows"]:
-            row["error"] = float(np.abs(np.array(row.pop("x")) - truth).max())
+            row["error"] = float(np.abs(np.array(row.pop("x")) - solution).max())
         result[label] = found
         print(f"  {label}: {found}", flush=True)
     return result
 
 
-def _ours(truth: np.ndarray) -> list[dict[str, Any]]:
+def _ours(solution: np.ndarray) -> list[dict[str, Any]]:
     rows = []
     for tolerance in (1e-4, 1e-6, 1e-8, 1e-10):
         seconds = []
@@ -59,18 +58,6 @@ def _ours(truth: np.ndarray) -> list[dict[str, Any]]:
                 stick_slip_system(BELT), STICK_START, T_END, tol=tolerance, engine="compiled"
             )
             seconds.append(time.process_time() - begin)
-        error = float(np.abs(end.x[-1] - truth).max())
+        error = float(np.abs(end.x[-1] - solution).max())
         rows.append({"tolerance": tolerance, "error": error, "seconds": float(np.median(seconds))})
     return rows
-
-
-def _peer(python: str, script: str, steps: list[float]) -> dict[str, Any]:
-    problem = {"belt": BELT, "t_end": T_END, **STICK, "start": STICK_START, "steps": steps}
-    path = Path(__file__).with_name("peers") / f"{script}.py"
-    call = [python, str(path), json.dumps(problem)]
-    environment = os.environ | ONE_THREAD
-    done = subprocess.run(call, capture_output=True, text=True, check=False, env=environment)
-    if done.returncode:
-        return {"missing": f"failed: {done.stderr.strip()[-200:]}", "rows": []}
-    found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
-    return found

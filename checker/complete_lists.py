@@ -1,12 +1,12 @@
-"""Lists of all special points in a box, and ranges of parameters in pieces: nothing is left out."""
+"""Check that a list of special points is complete, and that pieces cover ranges of parameters."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from typing import Any
 
-from claims import Equations, Matrix, check, inverse, krawczyk
 from intervals import CheckError, Iv, whole
+from special_points import Equations, Matrix, check, inverse, krawczyk
 
 _PIECES, _SMALLEST = 20_000, 1e-9
 
@@ -56,7 +56,7 @@ def check_list(record: dict[str, Any]) -> str:
             if key != "graph" and zero[key] != record["question"][key]:
                 if key == "held" and _same_held(zero, record["question"]):
                     continue
-                raise CheckError(f"a zero is one of another question: its {key} differs")
+                raise CheckError(f"a zero belongs to another problem: its {key} differs")
     points = [[Iv.of(*pair) for pair in zero["point"]] for zero in zeros]
     for n, one in enumerate(points):
         for other in points[:n]:
@@ -64,7 +64,7 @@ def check_list(record: dict[str, Any]) -> str:
                 raise CheckError("two points of the list may be the same")
     equations = Equations(record["question"])
     for n, point in enumerate(points):
-        _counted(equations, point, bounds, n < len(record["zeros"]))
+        _check_membership(equations, point, bounds, n < len(record["zeros"]))
     boxes = [[Iv.of(*pair) for pair in zero["box"]] for zero in zeros]
     pieces = _nothing_else(equations, bounds, boxes, points)
     return (
@@ -80,8 +80,10 @@ def _same_held(zero: dict[str, Any], question: dict[str, Any]) -> bool:
     return all(a == b for i, (a, b) in enumerate(pairs) if i not in free)
 
 
-def _counted(equations: Equations, point: list[Iv], bounds: list[Iv], counts: bool) -> None:
-    """Check that a zero is inside the box and one of those asked for, or that it is not."""
+def _check_membership(
+    equations: Equations, point: list[Iv], bounds: list[Iv], counts: bool
+) -> None:
+    """Check that a zero is, or is not, in the box and on the sides of the mode."""
     inside = all(b.a <= v.a and v.b <= b.b for v, b in zip(point, bounds, strict=True))
     outside = any(v.b < b.a or b.b < v.a for v, b in zip(point, bounds, strict=True))
     at = equations.local(point)
@@ -95,13 +97,13 @@ def _counted(equations: Equations, point: list[Iv], bounds: list[Iv], counts: bo
         or (equations.record["kind"] == "equilibrium" and at.h.v.zero)
     )
     if not (yes if counts else no):
-        raise CheckError("whether a zero is in the box and counts is not as claimed")
+        raise CheckError("whether a zero is in the box and on its sides is not as claimed")
 
 
 def _nothing_else(
     equations: Equations, bounds: list[Iv], boxes: list[list[Iv]], points: list[list[Iv]]
 ) -> int:
-    """Check that every piece of a box is without zeros, or holds a known one only."""
+    """Check that every piece of a box has no zeros but known ones."""
     todo, count = [bounds], 0
     sizes = [b.b - b.a for b in bounds]
     while todo:
@@ -113,7 +115,7 @@ def _nothing_else(
             all(b.a <= p.a and p.b <= b.b for p, b in zip(piece, box, strict=True)) for box in boxes
         ):
             continue
-        rest = _looked_at(equations, piece, points)
+        rest = _contracted(equations, piece, points)
         if rest is None:
             continue
         shares = [(v.b - v.a) / size for v, size in zip(rest, sizes, strict=True)]
@@ -126,8 +128,8 @@ def _nothing_else(
     return count
 
 
-def _looked_at(equations: Equations, piece: list[Iv], points: list[list[Iv]]) -> list[Iv] | None:
-    """What is left of a piece; None where it holds no zero but known ones."""
+def _contracted(equations: Equations, piece: list[Iv], points: list[list[Iv]]) -> list[Iv] | None:
+    """A piece contracted by Krawczyk's operator; None where it holds known zeros only."""
     try:
         f, J = equations.system(piece)
         if any(v.sign() for v in f):

@@ -1,23 +1,19 @@
-"""A Burridge-Knopoff chain: blocks on a belt, coupled by springs, each with a friction surface of its own.
+"""A Burridge-Knopoff chain, of blocks on a belt with springs and a friction surface each, beside Siconos.
 
     q_i'' = (q_{i-1} - 2 q_i + q_{i+1}) - k q_i - F_i lambda_i + b (q_i' - V),   lambda_i in Sgn(q_i' - V)
 
-Friction falls with the speed of slip by b, so that blocks go on sticking and slipping. Our error is that
-against a run of a tolerance a thousand times smaller; Siconos' is against the same run, and falls with
-its step h as O(h).
+Friction falls with the speed of slip by b, so that blocks keep sticking and slipping. Errors are against
+our run at a tolerance a thousand times smaller; that of Siconos falls with its step h as O(h).
 
-``python -m benchmarks.chain [--blocks 100] [--t-end 100] [--engine auto]`` prints the table alone.
+``python -m benchmarks.burridge_knopoff [--blocks 100] [--t-end 100] [--engine auto]`` prints the table alone.
 """
 
 from __future__ import annotations
 
 import argparse
-import json
 import os
-import subprocess
 import time
 from collections.abc import Sequence
-from pathlib import Path
 from typing import Any
 
 import casadi as ca
@@ -26,7 +22,7 @@ import numpy as np
 import nonsmooth as ns
 
 from . import report
-from .measure import ONE_THREAD
+from .timing import run_peer
 
 K, V, B = 0.1, 0.3, 0.1
 VARIABLE = "BENCH_SICONOS_PYTHON"
@@ -46,7 +42,7 @@ def start(count: int) -> np.ndarray:
 
 
 def stiffness(count: int) -> np.ndarray:
-    """Of the springs: forces are minus it times the displacements."""
+    """Stiffness matrix of the springs."""
     ends = np.eye(count, k=1) + np.eye(count, k=-1)
     return K * np.eye(count) + np.diag(ends.sum(axis=1)) - ends
 
@@ -86,20 +82,7 @@ def siconos(python: str, count: int, t_end: float, steps: list[float]) -> dict[s
         "start": start(count).tolist(),
         "steps": steps,
     }
-    path = Path(__file__).with_name("peers") / "siconos_chain.py"
-    call = [python, str(path)]
-    done = subprocess.run(
-        call,
-        input=json.dumps(problem),
-        capture_output=True,
-        text=True,
-        check=False,
-        env=os.environ | ONE_THREAD,
-    )
-    if done.returncode:
-        return {"missing": f"failed: {done.stderr.strip()[-200:]}", "rows": []}
-    found: dict[str, Any] = json.loads(done.stdout.strip().splitlines()[-1])
-    return found
+    return run_peer(python, "siconos_chain", problem)
 
 
 def run(
@@ -112,12 +95,12 @@ def run(
     """Errors at t_end and processor seconds of both, for the steps of Siconos and our tolerance."""
     if quick:
         count, t_end = min(count, 5), min(t_end, 20.0)
-    truth, _ = ours(count, t_end, 1e-3 * TOLERANCE, engine)
+    solution, _ = ours(count, t_end, 1e-3 * TOLERANCE, engine)
     found, seconds = ours(count, t_end, TOLERANCE, engine)
-    error = float(np.abs(found.x[-1] - truth.x[-1]).max())
+    error = float(np.abs(found.x[-1] - solution.x[-1]).max())
     row = {"tolerance": TOLERANCE, "error": error, "seconds": seconds, "events": len(found.events)}
     result: dict[str, Any] = {"blocks": count, "t_end": t_end, "nonsmooth": {"rows": [row]}}
-    result["same itinerary"] = found.itinerary == truth.itinerary
+    result["same itinerary"] = found.itinerary == solution.itinerary
     result["status"] = found.status.name
     label, python = "siconos, Moreau time stepping", os.environ.get(VARIABLE)
     if python is None:
@@ -125,14 +108,16 @@ def run(
         return result
     peer = siconos(python, count, t_end, list(steps[:1] if quick else steps))
     for row in peer["rows"]:
-        row["error"] = float(np.abs(np.array(row.pop("x")) - truth.x[-1]).max())
+        row["error"] = float(np.abs(np.array(row.pop("x")) - solution.x[-1]).max())
     result[label] = peer
     return result
 
 
 def main() -> None:
     """Print the table."""
-    parser = argparse.ArgumentParser(prog="python -m benchmarks.chain", description=__doc__)
+    parser = argparse.ArgumentParser(
+        prog="python -m benchmarks.burridge_knopoff", description=__doc__
+    )
     parser.add_argument("--blocks", type=int, default=100)
     parser.add_argument("--t-end", type=float, default=100.0)
     parser.add_argument("--engine", default="auto", choices=["auto", "compiled", "reference"])

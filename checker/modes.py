@@ -1,11 +1,11 @@
-"""Filippov's logic on surfaces, and jumps at resets and impacts, from values and derivatives."""
+"""Modes of a recorded system: Filippov's rules on surfaces, and maps of resets and impacts."""
 
 from __future__ import annotations
 
 from fractions import Fraction
 from typing import Any
 
-from graphs import D, run
+from derivatives import D, run
 from intervals import CheckError, Iv, whole
 
 #: States and parameters.
@@ -13,8 +13,8 @@ At = tuple[list[Iv], list[Iv]]
 UNIT = whole(1).a
 
 
-class Place:
-    """Questions about a point of a recorded system."""
+class Modes:
+    """Modes and jumps at points of a recorded system."""
 
     def __init__(self, record: dict[str, Any]):
         self.graph = record["graph"]
@@ -25,11 +25,11 @@ class Place:
         nodes = [*self.graph["guards"], *self.graph["gaps"]]
         self.ends = [(*e, node) for e, node in zip(ends, nodes, strict=True)]
         self.stops = len(record["stops"])
-        self.began: int | None = None
+        self.start_surface: int | None = None
 
-    def surfaces_of(self, word: str) -> str:
+    def surfaces_of(self, mode: str) -> str:
         """The letters of the surfaces."""
-        return word[: self.count]
+        return mode[: self.count]
 
     def _at(self, x: list[Iv], p: list[Iv], lam: list[Iv], further: bool = False) -> list[D]:
         """Values with derivatives by the states, and then by multipliers and reactions."""
@@ -51,15 +51,15 @@ class Place:
         values = self._at(x, p, [whole(0)] * self.count)
         return [values[k].v for k in self.graph["surfaces"]]
 
-    def word(self, x: list[Iv], p: list[Iv], slides: int | None = None) -> str:
-        """The mode of a point off all surfaces but one that it is on, if it is."""
+    def mode_at(self, x: list[Iv], p: list[Iv], slides: int | None = None) -> str:
+        """The mode of a point that lies on no surface, or on the one given."""
         signs = [h.sign() for h in self.heights(x, p)]
         if not all(s for j, s in enumerate(signs) if j != slides):
             raise CheckError("the side of a surface is undecided")
-        word = "".join("+" if s > 0 else "-" for s in signs) + "o" * self.contacts
+        mode = "".join("+" if s > 0 else "-" for s in signs) + "o" * self.contacts
         if slides is None:
-            return word
-        after, _ = self._beyond((x, p), word, slides)
+            return mode
+        after, _ = self._beyond((x, p), mode, slides)
         if after[slides] != "s":
             raise CheckError("a jump that ends the sliding is not checked here")
         return after
@@ -69,61 +69,61 @@ class Place:
         signs = [h.sign() for h in self.heights(x, p)]
         on = [j for j, s in enumerate(signs) if not s]
         if not on:
-            return self.word(x, p)
+            return self.mode_at(x, p)
         values = _rational(self.graph, box[: len(x)], box[len(x) :])
         if len(on) > 1 or values[self.graph["surfaces"][on[0]]] != 0:
             raise CheckError("the side of a surface at the start is undecided")
-        word = "".join({1: "+", -1: "-", 0: "?"}[s] for s in signs) + "o" * self.contacts
-        self.began = on[0]
-        return self._beyond((x, p), word, on[0])[0]
+        mode = "".join({1: "+", -1: "-", 0: "?"}[s] for s in signs) + "o" * self.contacts
+        self.start_surface = on[0]
+        return self._beyond((x, p), mode, on[0])[0]
 
-    def rates(self, at: At, word: str, surface: int) -> tuple[Iv, Iv]:
+    def rates(self, at: At, mode: str, surface: int) -> tuple[Iv, Iv]:
         """L1 and L2 at a surface."""
         found = []
         for s in (1, -1):
-            lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(word)]
+            lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(mode)]
             lam[surface] = whole(s)
             found.append(self._rate(at, lam, surface)[0])
         return found[0], found[1]
 
     def _rate(self, at: At, lam: list[Iv], surface: int) -> tuple[Iv, list[Iv]]:
-        """How fast a switching function rises in a field, and that field."""
+        """Rate of a switching function along a field, and that field."""
         values = self._at(*at, lam)
         f = [values[k].v for k in self.graph["field"]]
         return _dot(values[self.graph["surfaces"][surface]].g, f), f
 
-    def _beyond(self, at: At, word: str, j: int) -> tuple[str, int]:
-        signs = tuple(v.sign() for v in self.rates(at, word, j))
+    def _beyond(self, at: At, mode: str, j: int) -> tuple[str, int]:
+        signs = tuple(v.sign() for v in self.rates(at, mode, j))
         letters = {(-1, 1): ("s", 0), (1, 1): ("+", 1), (-1, -1): ("-", 1)}
         if signs not in letters:
             raise CheckError("what follows at a surface is undecided")
         letter, zeros = letters[signs]
-        return word[:j] + letter + word[j + 1 :], zeros
+        return mode[:j] + letter + mode[j + 1 :], zeros
 
     def switched(
-        self, at: At, word: str, guard: str, j: int, direction: int
+        self, at: At, mode: str, guard: str, j: int, direction: int
     ) -> tuple[str, int, str]:
-        """The mode after a surface was met or left, zeros of its function, and the event's kind."""
+        """The mode after an event at a surface, zeros of its function, and the event's kind."""
         if guard == "exit":
-            l1, l2 = self.rates(at, word, j)
+            l1, l2 = self.rates(at, mode, j)
             if (l2 if direction > 0 else -l1).sign() <= 0:
                 raise CheckError("the other field at an exit is undecided")
-            return word[:j] + ("+" if direction > 0 else "-") + word[j + 1 :], 2, "exit"
-        if "s" in word:
-            return self._across(at, word, j), 1, "crossing"
-        after, zeros = self._beyond(at, word, j)
+            return mode[:j] + ("+" if direction > 0 else "-") + mode[j + 1 :], 2, "exit"
+        if "s" in mode:
+            return self._across(at, mode, j), 1, "crossing"
+        after, zeros = self._beyond(at, mode, j)
         return after, zeros, "entry" if after[j] == "s" else "crossing"
 
-    def _across(self, at: At, word: str, j: int) -> str:
-        """Beyond a surface that is met while another slides."""
-        # For every multiplier of the one that is met the other attracts, and sliding on it leads across.
-        i, found = word.index("s"), []
+    def _across(self, at: At, mode: str, j: int) -> str:
+        """The mode after a surface is crossed while another slides."""
+        # For every multiplier of the crossed surface the other attracts, and sliding on it leads across.
+        i, found = mode.index("s"), []
         for s in (1, -1):
-            lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(word)]
+            lam = [whole(1 if w == "+" else -1) for w in self.surfaces_of(mode)]
             lam[i], lam[j] = whole(s), Iv(-UNIT, UNIT)
             found.append(self._rate(at, lam, i))
         (l1, f1), (l2, f2) = found
-        side = 1 if word[j] == "-" else -1
+        side = 1 if mode[j] == "-" else -1
         if l1.sign() >= 0 or l2.sign() <= 0:
             raise CheckError("whether a surface goes on sliding is undecided")
         a = l1 / (l1 - l2)
@@ -131,12 +131,12 @@ class Place:
         field = [p - a * (p - q) for p, q in zip(f1, f2, strict=True)]
         if _dot(values[self.graph["surfaces"][j]].g, field).sign() != side:
             raise CheckError(
-                "what follows where a surface is met while another slides is undecided"
+                "what follows where a surface is reached while another slides is undecided"
             )
-        return word[:j] + ("+" if side > 0 else "-") + word[j + 1 :]
+        return mode[:j] + ("+" if side > 0 else "-") + mode[j + 1 :]
 
     def jumped(
-        self, x: list[Iv], p: list[Iv], word: str, index: int
+        self, x: list[Iv], p: list[Iv], mode: str, index: int
     ) -> tuple[list[Iv], bool, int | None]:
         """The state after a reset or an impact."""
         # Also whether its own function stays zero, and the surface that slides if it is not left.
@@ -148,13 +148,13 @@ class Place:
             moved = {i for i, k in enumerate(rows) if self.graph["nodes"][k] != ["input", 0, i]}
         else:
             new, moved = self._struck(x, p, index - len(self.ends) + self.contacts)
-        slides = word.index("s") if "s" in word else None
+        slides = mode.index("s") if "s" in mode else None
         if slides is not None and self._depends(self.graph["surfaces"][slides], moved):
             slides = None
         return new, not self._depends(node, moved), slides
 
     def _depends(self, node: int, states: set[int]) -> bool:
-        """Whether a node has one of these states in it."""
+        """Whether a node depends on one of these states."""
         todo, seen = [node], set[int]()
         while todo:
             k = todo.pop()
@@ -168,7 +168,7 @@ class Place:
         return False
 
     def _struck(self, x: list[Iv], p: list[Iv], contact: int) -> tuple[list[Iv], set[int]]:
-        """Newton's law, and which states the impulse moves; friction is not known here."""
+        """State after Newton's impact law, and the states that change; there is no friction here."""
         n, graph = len(x), self.graph
         values = self._at(x, p, [whole(0)] * self.count, further=True)
         gap, f = values[graph["gaps"][contact]], [values[k] for k in graph["field"]]
@@ -197,7 +197,7 @@ def _dot(a: list[Iv], b: list[Iv]) -> Iv:
 def _rational(
     graph: dict[str, Any], *boxes: list[tuple[Fraction, Fraction]]
 ) -> list[Fraction | None]:
-    """Exact values of nodes, None where they are not known to be one rational number."""
+    """Exact values of nodes; None where they are not one rational number."""
     inputs = [[a if a == b else None for a, b in box] for box in boxes]
     values: list[Fraction | None] = []
     for op, *rest in graph["nodes"]:

@@ -1,9 +1,6 @@
-"""Periodic orbits, branches, gradients and legs: time and error beside scipy and heyoka.
+"""Time and error of periodic orbits, branches, gradients and arcs beside scipy and heyoka.
 
-scipy has finite differences for derivatives; one leg with its derivatives is compared with heyoka.
-
-    python -m benchmarks --only orbits
-
+scipy has finite differences for derivatives; heyoka is compared on one arc with its derivatives.
 Orbits start from two digits of a state, those of the relay from a run; all are solved with the itinerary
 given, and with their multipliers. Values are compared with closed forms or 20 digits of mpmath
 (``tests/data/orbits.json``).
@@ -24,15 +21,15 @@ import numpy as np
 import nonsmooth as ns
 from nonsmooth.orbit.runs.flight import Flights
 
-from .measure import Timing, alternate
 from .peers import scipy_shooting
+from .timing import Timing, alternate
 
 TOLERANCES = (1e-9, 1e-11, 1e-13)
 
 
 @dataclass(frozen=True)
 class Case:
-    """A periodic orbit with its truth."""
+    """A periodic orbit with its reference solution."""
 
     solve: Callable[[], ns.orbit.PeriodicOrbit]
     state: dict[int, float]
@@ -201,7 +198,7 @@ def two_blocks() -> tuple[ns.orbit.PeriodicOrbit, str, tuple[float, float]]:
 
 
 def bounces() -> tuple[ns.orbit.PeriodicOrbit, str, tuple[float, float]]:
-    """A ball on a table that vibrates; its restitution is a parameter of the reset."""
+    """A ball on a table that vibrates, with the restitution as a parameter."""
     y, v, t, r = (ca.SX.sym(s) for s in ("y", "v", "t", "r"))
     speed = 0.5 * ca.cos(2 * t)
     hit = ns.Reset(y - 0.25 * ca.sin(2 * t), [y, speed - r * (v - speed)], -1, "hit")
@@ -305,7 +302,7 @@ def _variational(start: Any, duration: float) -> Callable[[], Any]:
     return run
 
 
-#: What the issue asks for: name, limit, whether more is better.
+#: Name, limit, and whether more is better.
 TARGETS = {
     **{
         f"orbit {name}: times scipy, every state{turns}": (100.0, "at least")

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.attractors import Search
+from nonsmooth.orbit.basins import Search
 
 CASES = {
     case["id"]: case

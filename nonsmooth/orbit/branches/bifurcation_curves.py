@@ -19,8 +19,7 @@ from ...model import Array, ConvergenceError, DefinitionError, OptionError, expl
 from ...model.checks import positive
 from ...solvers.continuation import Arc, Curve, Point, Secant, Zero, directions, trace
 from ..homoclinic.homoclinic_orbits import Connection
-from .branch import BranchEnd, BranchEvent
-from .branch_curves import BranchCurve, check_bounds, end_of, progress_bar
+from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of, progress_bar
 from .homoclinic_curves import ConnectionCurve, event_of
 
 _NAMES = {

@@ -15,8 +15,7 @@ from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoc
 from ..homoclinic.loops import Loop
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.legs import fly
-from .branch import BranchEvent, FarSide
-from .branch_curves import BranchCurve
+from .branch import BranchCurve, BranchEvent, FarSide
 
 #: A connection is that of an orbit if their parameters differ by no more than this part of the bounds.
 _SAME = 0.05

@@ -14,24 +14,36 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...local import Equilibrium, PseudoEquilibrium
+from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, NonsmoothError
-from ...solvers.continuation import Departure, Point, Zero
+from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, explain, whole
+from ...model.checks import positive
+from ...model.derivatives.event_maps import surface_map
+from ...model.derivatives.variational import guarded_field, variational_field
+from ...solvers.continuation import Departure, Point, Zero, other_direction
 from ...solvers.newton import converge
-from ..periodic.boundary_value_problem import BoundaryProblem
+from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
+from ..periodic.multipliers import leg_maps, return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
-from ..periodic.symmetry import require_symmetric
-from ..runs.legs import fly
-from .branch import BranchEnd, BranchEvent, FarSide
-from .branch_curves import BranchCurve
-from .codimension_two import ENDS, degenerate
-from .conditions import Condition, condition_row, conditions_of, is_smooth
+from ..periodic.symmetry import halves, mirrored, once_round, require_symmetric
+from ..runs.legs import Leg, fly
+from .branch import (
+    Branch,
+    BranchCurve,
+    BranchEnd,
+    BranchEvent,
+    FarSide,
+    check_bounds,
+    follow_branch,
+)
+from .conditions import Condition, condition_row, conditions_of, is_smooth, minima
 from .family_ends import extent, hopf_point, surface_end
 from .homoclinic_curves import homoclinic_end
 from .itinerary_changes import Edited, edited, grown, kind_of
+from .normal_forms import normal_form
 from .orbit_equations import OrbitEquations
-from .smooth_events import as_doubling, as_pitchfork, smooth_side
-from .unfoldings import far_side
+from .unfoldings import contact_at, contact_numbers, far_side, touched
 
 #: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
@@ -374,3 +386,448 @@ class OrbitCurve(OrbitEquations):
 
 def _word(problem: BoundaryProblem) -> str:
     return " ".join(leg.mode or "o" for leg in problem.legs)
+
+
+# What branches off at the smooth bifurcations of a periodic orbit, and whether it is stable.
+
+
+_WORDS = {
+    "fold": "two orbits meet and vanish",
+    "branch point": "branches cross",
+    "period doubling": "an orbit of twice the period branches off",
+    "pitchfork": "two orbits without the symmetry branch off",
+    "Neimark-Sacker": "an invariant torus is born",
+}
+
+#: Angles that are this close to a strong resonance have normal forms of their own.
+_RESONANT = 1e-4
+
+
+def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
+    """Classify a smooth bifurcation."""
+    words, numbers = _WORDS[kind], dict[str, float]()
+    if kind in ("fold", "branch point"):
+        return FarSide("", words)
+    values = np.linalg.eigvals(return_map(problem, at))
+    critical = [int(np.argmin(np.abs(values + 1.0)))]
+    if kind == "Neimark-Sacker":
+        k, l = np.triu_indices(values.size, 1)
+        near = int(np.argmin(np.abs(values[k] * values[l] - 1.0)))
+        critical = [int(k[near]), int(l[near])]
+        pair = values[k[near]]
+        if abs(pair.imag) < 1e-9:
+            return None  # a neutral saddle: two real multipliers with the product 1
+        numbers["angle"] = angle = float(abs(np.angle(pair)))
+        if min(abs(3.0 * angle - 2.0 * np.pi), abs(4.0 * angle - 2.0 * np.pi)) < _RESONANT:
+            return FarSide("", f"{words}; not classified: a strong resonance", ReadOnly(numbers))
+    found = normal_form(problem, at, p, kind)
+    if not found:
+        return FarSide("", f"{words}; not classified: no orbits beside it", ReadOnly(numbers))
+    value, error = found.values()
+    numbers |= found
+    if abs(value) <= 10.0 * error:
+        return FarSide("", f"{words}; degenerate to rounding", ReadOnly(numbers))
+    grows = (value < 0.0) if kind == "Neimark-Sacker" else (value > 0.0)
+    rest = np.delete(values, critical)
+    stable = grows and bool(np.all(np.abs(rest) < 1.0))
+    what = "supercritical" if grows else "subcritical"
+    return FarSide("", f"{words} ({what}{', stable' if stable else ''})", ReadOnly(numbers))
+
+
+# Branch points of orbits that are the doubling or the pitchfork of a part of them, met from the other side.
+
+#: Branch points are found to about the square root of rounding; so is the multiplier -1 there.
+_PARTS = 1e-3
+
+#: Kind, curve and point of the event, its test, and what is beyond.
+Parting = tuple[str, "OrbitCurve", Point, str, FarSide]
+
+
+def as_doubling(curve: OrbitCurve, zero: Zero) -> Parting | None:
+    """Two rounds that become one."""
+    u, p = zero.point.u, curve.parameters_at(zero.point.u)
+    problem, once = once_round(curve.problem, u[: curve.problem.size], p)
+    whole = float(curve.problem.split(u)[1].sum())
+    if round(whole / float(problem.split(once)[1].sum())) != 2:
+        return None
+    return _part(curve, problem, once, zero, "period doubling")
+
+
+def as_pitchfork(curve: OrbitCurve, zero: Zero) -> Parting | None:
+    """An orbit that a reflection of coordinates maps to itself half a period later."""
+    u, p = zero.point.u, curve.parameters_at(zero.point.u)
+    for problem, half in halves(curve.problem, u[: curve.problem.size], p):
+        found = _part(curve, problem, half, zero, "pitchfork")
+        if found is not None:
+            return found
+    return None
+
+
+def _part(
+    curve: OrbitCurve, problem: BoundaryProblem, part: Array, zero: Zero, kind: str
+) -> Parting | None:
+    """The event of a part of the orbit whose return map has the multiplier -1."""
+    made = curve.with_problem(problem, part)
+    u = np.append(part, zero.point.u[-len(curve.free) :])
+    try:
+        tangent = np.linalg.svd(made.scaled(u / made.scale)[1])[2][-1]
+        point, at = made.point(u, tangent, tangent, 0.0), made.evaluation(u)
+        values = np.linalg.eigvals(return_map(problem, at))
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return None
+    if point is None or not float(np.abs(values + 1.0).min()) < _PARTS:
+        return None
+    side = smooth_side(problem, at, made.parameters_at(u), kind)
+    return None if side is None else (kind, made, point, kind, side)
+
+
+# What degenerates on a curve of bifurcations of periodic orbits: points of codimension two.
+
+#: Resonances by the cosine of their angle.
+_RESONANCES = {"1:1": 1.0, "1:2": -1.0, "1:3": -0.5, "1:4": 0.0}
+
+#: At these the curve ends.
+ENDS = ("1:1 resonance", "1:2 resonance")
+
+
+def degenerate(
+    problem: BoundaryProblem, condition: Condition | None, name: str, at: Evaluation, p: Array
+) -> dict[str, float]:
+    """Functions that vanish at points of codimension two on the curve of one event."""
+    if name == "Neimark-Sacker":
+        return _resonances(problem, at) | _cubic(problem, at, p, name)
+    if name in ("period doubling", "pitchfork"):
+        return _cubic(problem, at, p, name)
+    if condition is None or condition.guard is None:
+        return {}
+    if condition.what == "interior":
+        return _touches(problem, condition, at, p)
+    return _beginnings(problem, condition, at, p) if condition.what == "start" else {}
+
+
+def _cubic(problem: BoundaryProblem, at: Evaluation, p: Array, name: str) -> dict[str, float]:
+    """The coefficient of the normal form: where it vanishes a curve of folds begins."""
+    word = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
+    try:
+        found = normal_form(problem, at, p, name)
+    except np.linalg.LinAlgError:  # another multiplier is 1
+        return {}
+    return {word: next(iter(found.values()))} if found else {}
+
+
+def _resonances(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
+    values = np.linalg.eigvals(return_map(problem, at))
+    k, l = np.triu_indices(values.size, 1)
+    near = int(np.argmin(np.abs(values[k] * values[l] - 1.0)))
+    cosine = float((values[k[near]] + values[l[near]]).real) / 2.0
+    found = {f"{word} resonance": cosine - value for word, value in _RESONANCES.items()}
+    others = np.delete(values, [k[near], l[near]])  # the pair itself passes 1 and -1 where it ends
+    found["fold"] = float(np.prod(1.0 - others[np.abs(others) > 1e-9]).real)
+    found["period doubling"] = float(np.prod(1.0 + others[np.abs(others) > 1e-9]).real)
+    return found
+
+
+def _touches(
+    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
+) -> dict[str, float]:
+    i, guard = condition.leg, condition.guard
+    assert guard is not None
+    leg, x, duration = problem.legs[i], at.starts[i], float(at.durations[i])
+    found: dict[str, float] = {}
+    values = sorted(minima(problem.system, leg, condition, x, duration, p), key=abs)
+    if len(values) > 1:
+        found["a second touch"] = min(values[1:])
+    if guard.kind != "surface":
+        return found
+    y = touched(problem, condition, at, p)
+    try:
+        _, other, second = contact_at(problem, leg, guard.index, guard.side, y, p)
+    except NonsmoothError:
+        return found  # the leg slides elsewhere
+    normal = guard.side * surface_map(problem.system, guard.index)(y, p).gradient
+    found["two-fold"] = float(normal[: other.size] @ other)
+    found["touch of higher order"] = guard.side * float(second["L11"])
+    with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole
+        try:
+            numbers = contact_numbers(problem, condition, at, p)
+        except np.linalg.LinAlgError:
+            return found
+    found["fold with contact"] = numbers["det(I - A_i)"]
+    found["period doubling with contact"] = numbers["det(I + A_i)"]
+    return {key: value for key, value in found.items() if np.isfinite(value)}
+
+
+def _beginnings(
+    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
+) -> dict[str, float]:
+    i, guard, system = condition.leg, condition.guard, problem.system
+    field = guarded_field(system, problem.legs[i].mode)
+    k = field.motion.guards.index(guard)
+    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
+    order = 2 if problem.legs[i - 1].kind == "crossing" else 1
+    before = at.events[i - 1]
+    rate = at.flown[i - 1].rate[: before.gradient.size]
+    return {
+        "cusp with the other sliding bifurcation": float(field.jets(y, p)[1][k, order]),
+        "two-fold": float(before.gradient @ rate),
+    }
+
+
+# From a period doubling, pitchfork, branch or Hopf point to the branch that crosses or begins there.
+
+#: Distances from the event at which the new branch is looked for, relative to the orbit.
+_AWAY = (1e-3, 1e-2, 3e-2)
+
+#: An orbit this many times as long as the small one at a Hopf point is near a homoclinic orbit.
+_LONG = 10.0
+
+
+def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
+    """The branch that crosses at an event: its curve, and a point near the event."""
+    # Where rounds double the event itself comes first: the other half of the branch has the same orbits,
+    # begun a round later.
+    if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
+        return _around(event, free)
+    if event.kind not in ("period doubling", "pitchfork", "branch point"):
+        raise DefinitionError(
+            explain(
+                "orbit",
+                expected="a period doubling, pitchfork or branch point to switch branches at, or a "
+                "Hopf point of equilibria",
+                received=repr(event),
+                advice="Continue event.orbit, or continue_bifurcation the event.",
+            )
+        )
+    base: OrbitCurve = event.curve
+    assert event.point is not None
+    curve, u = base.freed(event.point.u, free, np.ones(1))
+    assert isinstance(curve, OrbitCurve)
+    if event.kind == "branch point":
+        way = other_direction(event.point)
+    else:
+        curve, u, way = _twice(curve, u)
+    for away in _AWAY:
+        found = curve.correct(u + away * way * curve.scale, way)
+        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
+            return curve, [u, found] if event.kind == "period doubling" else [found]
+    raise ConvergenceError(
+        explain(
+            event.kind,
+            expected="an orbit on the branch that crosses",
+            received="no convergence near it",
+            advice="Perhaps the crossing branch is vertical or the event is degenerate.",
+        )
+    )
+
+
+def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
+    """The small orbits around an equilibrium at its Hopf point."""
+    assert event.point is not None
+    system, at, n = event.curve.system, event.solution, event.curve.n
+    p, mode = event.curve.parameters_at(event.point.u), at.mode
+    slope = np.asarray(variational_field(system, mode).linear.copied(at.point, p)[1], float)
+    values, vectors = np.linalg.eig(slope)
+    turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
+    if not turning.size:
+        raise DefinitionError(
+            f"orbit: expected a Hopf point, received {event!r}, a neutral saddle."
+        )
+    k = turning[np.argmin(np.abs(values[turning].real))]
+    across, period = vectors[:, k].real, 2 * np.pi / float(values[k].imag)
+    across = across / np.linalg.norm(across)
+    phase = slope @ across
+    problem = BoundaryProblem(
+        system,
+        (Leg(mode),),
+        phase=phase / np.linalg.norm(phase),
+        reference=at.point.copy(),
+    )
+    u = np.concatenate([at.point, [period], p[list(free)]])
+    curve = OrbitCurve(problem, p, free, np.ones(1), u[: n + 1], np.inf)
+    size = event.curve.scale[:n]
+    curve.scale[: n + 1] = np.append(size, period)
+    way = np.concatenate([across / np.linalg.norm(across), np.zeros(2)])
+    for away in _AWAY:
+        found = curve.correct(u + away * way * curve.scale, way)
+        first = curve.correct(u + 0.01 * away * way * curve.scale, way)
+        if found is None or first is None:
+            continue
+        if np.abs((found - u) / curve.scale).max() < 10 * away:
+            curve.longest = _LONG * period
+            return curve, [first, found]  # an orbit of no size has no direction
+    raise ConvergenceError(
+        f"Hopf: expected small orbits around {at.point.tolist()}, received no convergence. Perhaps the "
+        "point is degenerate: the pair of eigenvalues does not cross the axis."
+    )
+
+
+def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
+    """Twice the legs, and the direction in which the orbit parts from its first round."""
+    problem = curve.problem
+    starts, durations = problem.split(u)
+    p = curve.parameters_at(u)
+    changes, times = _alternating(curve, u)
+    n = problem.dimension
+    shift = np.zeros(n)
+    if problem.forcing is not None:
+        shift[-1] = problem.advance(p)[0]
+    back = np.linalg.inv(problem.wrap)
+    second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
+    turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
+    legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
+    double = replace(
+        problem, legs=legs, symmetry=None, periods=2 * problem.periods, phase=None, reference=None
+    )
+    if problem.phase is not None:  # no event divides the rounds
+        double = replace(problem, legs=problem.legs, symmetry=None, periods=2 * problem.periods)
+        unknowns = double.pack(starts, 2.0 * durations)
+        way = np.concatenate([changes.ravel(), [0.0], np.zeros(len(curve.free))])
+        new = curve.with_problem(double, unknowns)
+        way = way / new.scale
+        return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
+    unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
+    way = np.append(
+        double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times])),
+        np.zeros(len(curve.free)),
+    )
+    new = curve.with_problem(double, unknowns)
+    way = way / new.scale
+    return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
+
+
+def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
+    """Changes of starts and durations in the direction that the legs' map turns round."""
+    problem, at = curve.problem, curve.evaluation(u)
+    maps = leg_maps(problem, at)
+    whole = np.eye(problem.dimension)
+    for step in maps:
+        whole = step @ whole
+    values, vectors = np.linalg.eig(whole)
+    d = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
+    changes, times = [], []
+    for step, flown, event in zip(maps, at.flown, at.events, strict=True):
+        changes.append(d)
+        times.append(
+            -float(event.gradient @ flown.by_start @ d) / float(event.gradient @ flown.rate)
+        )
+        d = step @ d
+    return np.array(changes), np.array(times)
+
+
+# The verb ``continue_orbit``: a periodic orbit, or the branch that crosses at an event, followed.
+
+#: An orbit this many times as long as the first one is near a homoclinic orbit.
+_LONG = 10.0
+
+
+def continue_orbit(
+    orbit: PeriodicOrbit | BranchEvent,
+    parameter: str,
+    *,
+    bounds: tuple[float, float],
+    step: float = 0.05,
+    max_points: int = 1000,
+    through: bool = True,
+    progress: bool = False,
+) -> Branch:
+    """Follow a periodic orbit as a parameter varies.
+
+    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The
+    itinerary is kept as long as it holds; what ends it is located in the itinerary with fewer legs,
+    where it is regular, and named.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit or BranchEvent
+        Where to start; at a period doubling, pitchfork or branch point the other branch is followed
+        (from a period doubling one way only: the other half has the same orbits, a round later), at a
+        Hopf point of equilibria the orbits around it.
+    parameter : str
+        Name of the parameter that varies.
+    bounds : (float, float)
+        Where the branch ends.
+    step : float, optional
+        Largest step where the branch bends, relative to the width of the bounds and to the size of
+        the orbit.
+    max_points : int, optional
+        Of each piece.
+    through : bool, optional
+        Whether to edit the itinerary and go on beyond what changes it.
+    progress : bool, optional
+        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
+
+    Returns
+    -------
+    Branch
+        Its ``solutions`` (or ``orbits``) are PeriodicOrbits. Events: ``"fold"``, ``"period
+        doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
+        point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
+        ``"adding-sliding"``, ``"impact grazing"``, ``"grazing, escaping"``, ``"corner"``,
+        ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
+        ``"boundary equilibrium"`` (with its class) or ``"two-fold"`` where others shrink to a point of a
+        surface.
+
+    Raises
+    ------
+    ConvergenceError
+        The orbit at the start does not solve its equations, or a branch cannot be entered.
+    DefinitionError
+        Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
+    OptionError
+        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range; a
+        parameter that breaks the symmetry by which half of the orbit is solved for.
+
+    Examples
+    --------
+    A relay that is forced, $x' = A cos t - sgn x$: crossing orbits end to cross at
+    $A = sqrt(1 + pi^2/4)$, below which they slide.
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
+    >>> relay = ns.FilippovSystem([x], surface=x, time=t, parameters={a: 2.5},
+    ...                           above=[a * ca.cos(t) - 1], below=[a * ca.cos(t) + 1])
+    >>> orbit = ns.periodic_orbit(relay, [0.5])
+    >>> branch = ns.continue_orbit(orbit, "a", bounds=(1.5, 3.0))
+    >>> [(e.kind, round(e.parameter, 12)) for e in branch.events]
+    [('crossing-sliding', 1.862095889119)]
+    """
+    positive(step, "step")
+    whole(max_points, "max_points", least=2)
+    curve, rows = _begin(orbit, parameter)
+    start = rows[-1]
+    low, high = check_bounds(bounds, float(start[-1]), parameter)
+    curve.widths = np.array([high - low])
+    curve.scale = np.append(curve.scale[:-1], high - low)
+    away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
+    return follow_branch(
+        curve,
+        start,
+        name=parameter,
+        bounds=(low, high),
+        step=step,
+        max_points=max_points,
+        through=through,
+        progress=progress,
+        away=away,
+    )
+
+
+def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCurve, list[Array]]:
+    """The curve and its first point; at a period doubling that one before."""
+    if not isinstance(orbit, (PeriodicOrbit, BranchEvent)):
+        raise DefinitionError(
+            explain(
+                "orbit",
+                expected="a PeriodicOrbit or an event of a branch of them",
+                received=repr(orbit),
+                advice="periodic_orbit(system, guess) finds one.",
+            )
+        )
+    system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
+    free = (parameter_index(system, parameter),)
+    if isinstance(orbit, BranchEvent):
+        return switched(orbit, free)
+    p, u = orbit.parameter_vector, orbit.unknowns
+    longest = _LONG * float(orbit.evaluation.durations.sum())
+    curve = OrbitCurve(orbit.problem, p, free, np.ones(1), u, longest)
+    return curve, [np.append(u, p[list(free)])]

@@ -11,7 +11,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.homoclinic import homoclinic_orbits
-from nonsmooth.orbit.homoclinic.saddle_loops import SaddleLoop
+from nonsmooth.orbit.homoclinic.loops import SaddleLoop
 from tests.orbit.periodic_cases import CASES
 
 x, y, c, rho = (ca.SX.sym(s) for s in ("x", "y", "c", "rho"))

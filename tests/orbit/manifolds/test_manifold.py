@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.manifolds.arcs import Follower
+from nonsmooth.orbit.manifolds.invariant_manifolds import Follower
 
 CASES = {
     case["id"]: case

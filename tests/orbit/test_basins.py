@@ -61,7 +61,7 @@ def test_a_repelling_circle_divides_rest_from_a_cycle():
     assert np.array_equal(crossing.labels == crossing.labels[6, 6], inside)
 
 
-def test_forced_systems_are_looked_at_after_each_period():
+def test_forced_systems_are_sampled_after_each_period():
     pushed = ns.FilippovSystem(
         [x], surface=x, multipliers=lam, field=[lam - x + 0.5 * ca.cos(t)], time=t
     )
@@ -123,7 +123,7 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
     tmp_path, monkeypatch
 ):
     grid = {"x": np.linspace(-3, 3, 9), "v": np.linspace(-2, 2, 6)}
-    space = Search._look.__globals__
+    space = Search._sample.__globals__
     plain, calls, last = space["ensemble"], [], 10**6
 
     def ensemble(*args, **options):

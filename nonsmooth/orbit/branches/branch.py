@@ -1,4 +1,8 @@
-"""Branches of solutions as one parameter varies: what is returned."""
+"""Branches of solutions as one parameter varies, and their continuation.
+
+Each piece is continued by :mod:`nonsmooth.continuation` with equations of its own; where one ends at an
+event the next one begins among the solutions beyond.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +21,6 @@ from ...model import (
     NonsmoothError,
     OptionError,
     PointError,
-    explain,
     real,
 )
 from ...notebook import card
@@ -27,10 +30,10 @@ from ...solvers.continuation import Arc, Curve, Departure, Point, Zero, pieces, 
 class BranchEnd(Enum):
     """Why a branch ends.
 
-    It reached a bound of the parameter (REACHED_BOUND), closed (CLOSED), met an event that nothing
-    continues (EVENT), has a period that diverges (PERIOD_DIVERGES), needs shorter steps than there are
-    (STEP_TOO_SMALL), has the number of points asked for (TOO_MANY_POINTS), or was interrupted
-    (INTERRUPTED).
+    REACHED_BOUND: the parameter reached a bound. CLOSED: the branch is a closed curve. EVENT: nothing
+    continues it beyond an event. PERIOD_DIVERGES: the period grows without bound. STEP_TOO_SMALL: no
+    solution was found at the shortest step. TOO_MANY_POINTS: it has ``max_points`` points. INTERRUPTED:
+    Ctrl-C.
     """
 
     REACHED_BOUND = "bound"
@@ -57,7 +60,7 @@ _ADVICE = {
     BranchEnd.PERIOD_DIVERGES: "The period grows without bound: a homoclinic orbit is near.",
     BranchEnd.STEP_TOO_SMALL: "Steps became too short: the solutions end here, or the equations do.",
     BranchEnd.TOO_MANY_POINTS: "Raise max_points to go on.",
-    BranchEnd.INTERRUPTED: "Interrupted; what was computed is here.",
+    BranchEnd.INTERRUPTED: "Interrupted; the branch has the points computed so far.",
 }
 
 
@@ -70,9 +73,9 @@ class FarSide:
     itinerary : str
         Or the kind of solution; empty if nothing continues the branch.
     verdict : str
-        What becomes of the solutions there, in words.
+        What becomes of the solutions there.
     numbers : mapping of str to float
-        What the verdict rests on.
+        The numbers that decide the verdict.
     """
 
     itinerary: str = ""
@@ -93,16 +96,16 @@ class BranchEvent:
     kind : str
         ``"fold"``, ``"Hopf"``, ``"period doubling"``, ``"grazing-sliding"``, ...
     parameter : float
-        Where the branch parameter is.
+        Value of the parameter.
     solution
-        What is continued, there: an equilibrium or a periodic orbit.
+        The equilibrium or periodic orbit there.
     far_side : FarSide
-        What continues the branch beyond the event.
+        The unfolding: what continues the branch beyond the event.
     coefficients : mapping of str to float
-        Of normal forms and conditions.
+        Coefficients of normal forms and conditions.
     curve, point, test
-        The equations that were continued, the point on them and the test that vanishes there, from
-        which ``continue_bifurcation`` and branch switching start.
+        The equations, the point on their curve and the test that vanishes there, from which
+        ``continue_bifurcation`` and branch switching start.
     """
 
     kind: str
@@ -124,7 +127,7 @@ class BranchEvent:
 
 
 def _beside(choices: Sequence[tuple[Any, Point]], wanted: float) -> list[Any]:
-    """The solution next to an event, in the first itinerary that holds there."""
+    """The solution next to an event, in the first itinerary that is admissible there."""
     for (curve, point), (_, far) in zip(choices, reversed(choices), strict=True):
         try:
             guess = curve.toward(point.u, wanted, float(far.u[-1]))
@@ -145,11 +148,11 @@ class Branch:
     parameter : str
         Name of the parameter that varies.
     values : ndarray (k,)
-        Of the parameter; a branch that turns back has values more than once.
+        Values of the parameter; a branch that turns back has values more than once.
     solutions : tuple of k solutions
         Equilibria or periodic orbits.
     events : tuple of BranchEvent
-        In their order along the branch.
+        Events in their order along the branch.
     ends : tuple of two BranchEnd
         Why it ends at its first and its last point.
     nodes : tuple of (curve, Point)
@@ -177,7 +180,7 @@ class Branch:
         Parameters
         ----------
         value : float
-            Of the parameter.
+            Value of the parameter.
 
         Returns
         -------
@@ -200,7 +203,7 @@ class Branch:
             va, vb = curve.value(a.u), other.value(b.u)
             if not min(va, vb) <= wanted <= max(va, vb) or va == vb:
                 continue
-            if curve is not other:  # beside an event, in the itinerary on whose side it is not
+            if curve is not other:  # beside an event: first in the itinerary beyond it
                 before = any(event.point is b for event in self.events)
                 ways = [(curve, a), (other, b)] if before else [(other, b), (curve, a)]
                 found += [] if wanted in (va, vb) else _beside(ways, wanted)
@@ -211,13 +214,8 @@ class Branch:
             found.append(curve.solution_at(guess, wanted))
         if not found:
             raise PointError(
-                explain(
-                    f"{self.parameter} = {wanted:.10g}",
-                    expected=f"a value that the branch reaches, in [{self.values.min():.10g}, "
-                    f"{self.values.max():.10g}]",
-                    received="one at which it has no solution",
-                    advice="Widen the bounds of the continuation.",
-                )
+                f"value: the branch has no solution at {self.parameter} = {wanted:.10g}. It reaches "
+                f"[{self.values.min():.10g}, {self.values.max():.10g}]: widen the bounds of the continuation."
             )
         return found
 
@@ -253,7 +251,7 @@ class Branch:
         return f"Branch({self.parameter!r}, {len(self)} points; {kinds or 'no events'})"
 
 
-# Following a branch of solutions both ways from its start, piece after piece.
+# Continuation -------------------------------------------------------------------------------------
 
 
 class BranchCurve(Curve):
@@ -274,26 +272,18 @@ class BranchCurve(Curve):
         raise NotImplementedError
 
     def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
-        """The same equations with other free parameters, and the point there.
-
-        Parameters
-        ----------
-        u : ndarray
-        free : tuple of int
-        widths : ndarray
-            Scales of these parameters.
-        """
+        """The same equations with other free parameters of the scales ``widths``, and the point there."""
         raise NotImplementedError
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
-        """What the end of a branch is, where more than that it ends can be said."""
+        """The event at the end of a branch, if one can be named."""
         return None
 
     def restart(self, u: Array) -> None:
         """Prepare to be followed from a point of it."""
 
     def turned(self, u: Array, tangent: Array) -> Array | None:
-        """Prepare to be followed on from a point, if need be; the tangent of the new equations."""
+        """Change the equations at a point, if need be; the tangent of the new ones."""
         return None
 
     def renewed(self, point: Point) -> Point | None:
@@ -309,7 +299,7 @@ class BranchCurve(Curve):
         return False
 
     def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
-        """A test and its derivatives by the unknowns, where few of them matter; else None."""
+        """A test and its derivatives by the unknowns, where known in closed form; else None."""
         return None
 
     def named(self, test: str, u: Array) -> str:
@@ -317,22 +307,22 @@ class BranchCurve(Curve):
         return test
 
     def double_zero(self, u: Array) -> bool:
-        """Whether two eigenvalues vanish together at a point, not one beside an imaginary pair."""
+        """Whether two eigenvalues vanish together at a point."""
         return False
 
     def require_valid(self, u: Array) -> None:
-        """Refuse a point at which what the equations take for granted does not hold."""
+        """Raise if an assumption of the equations does not hold at a point."""
 
     def describe(self, u: Array) -> Any:
         """The solution at a point of the curve."""
         raise NotImplementedError
 
     def event(self, zero: Zero) -> BranchEvent | None:
-        """What a located zero is; None if it is nothing."""
+        """The event at a located zero; None if there is none."""
         raise NotImplementedError
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
-        """How the branch goes on beyond an event that ends this curve."""
+        """The start of the branch beyond an event that ends this curve."""
         return None
 
     def unknowns_at(self, guess: Array, value: float) -> Array | None:
@@ -342,7 +332,7 @@ class BranchCurve(Curve):
         return self.correct(start, axis)
 
     def toward(self, guess: Array, value: float, end: float) -> Array:
-        """A guess at a value that lies towards an event at ``end``, where a leg vanishes like a root."""
+        """A guess at a value near an event at ``end``, where a leg vanishes like a square root."""
         u = guess
         while abs(value - end) < 0.25 * abs(self.value(u) - end):
             closer = self.unknowns_at(u, end + 0.25 * (self.value(u) - end))
@@ -356,12 +346,8 @@ class BranchCurve(Curve):
         u = self.unknowns_at(guess, value)
         if u is None:
             raise ConvergenceError(
-                explain(
-                    f"the branch at {value:.10g}",
-                    expected="a solution near its neighbours",
-                    received="no convergence",
-                    advice="Continue with a smaller step.",
-                )
+                f"the branch at {value:.10g}: no solution was found between its neighbours. Continue with a "
+                "smaller step."
             )
         u[-1] = value
         return self.describe(u)
@@ -375,12 +361,7 @@ def check_bounds(bounds: Sequence[float], value: float, name: str) -> tuple[floa
         low, high = np.nan, np.nan
     if not low <= value <= high or not np.isfinite(high - low) or low == high:
         raise OptionError(
-            explain(
-                "bounds",
-                expected=f"two numbers around {name} = {value:.10g}",
-                received=repr(bounds),
-                advice="Give (low, high).",
-            )
+            f"bounds={bounds!r} are not two numbers around {name} = {value:.10g}. Give (low, high)."
         )
     return low, high
 
@@ -397,10 +378,9 @@ def follow_branch(
     progress: bool = False,
     away: Departure | None = None,
 ) -> Branch:
-    """Continue a solution both ways to the bounds of the parameter, through events if asked to."""
-    # With ``away`` one way only, from an event.
+    """Continue a solution both ways to the bounds of the parameter, or one way ``away`` from an event."""
     if not isinstance(through, (bool, np.bool_)):
-        raise OptionError(f"through: expected True or False, received {through!r}.")
+        raise OptionError(f"through={through!r} is no truth value. Give True or False.")
     bar = progress_bar(progress)
 
     def report(point: Point) -> None:
@@ -429,7 +409,7 @@ def follow_branch(
 
 
 def progress_bar(progress: bool) -> Any:
-    """A bar that counts points, shown after a second; None if it is not asked for."""
+    """A bar that counts points, shown after a second; None without ``progress``."""
     if not progress:
         return None
     from tqdm import tqdm  # here: it is not needed to import the library
@@ -479,7 +459,7 @@ def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
         assert isinstance(departure.curve, BranchCurve)
         try:
             return departure.curve.onward(event, arc.zeros[-1])
-        except NonsmoothError:  # the itinerary beyond has no orbit that could be followed
+        except NonsmoothError:  # the itinerary beyond has no orbit
             return None
         except KeyboardInterrupt:
             half.end = BranchEnd.INTERRUPTED
@@ -514,9 +494,9 @@ def _elsewhere(event: BranchEvent, curve: BranchCurve) -> bool:
 
 
 def _drop_turning(arc: Arc) -> None:
-    """Forget a turning or branch point that only mirrors the event at which an arc ends."""
-    # Where a new leg grows like a square root the branch is tangent to a constant parameter, and where
-    # it grows like a cube root the equations are singular; so they are at a Hopf point.
+    """Drop turning and branch points that coincide with the event at the end of an arc."""
+    # Where a new leg grows like a square root the branch is tangent to a constant parameter. Where it grows
+    # like a cube root, and at a Hopf point, the equations are singular.
     if not arc.zeros or arc.zeros[-1].name != arc.end:
         return
     end = arc.zeros[-1].point.arclength

@@ -35,15 +35,15 @@ from ...solvers.continuation import Departure, Point, Zero, depart
 from .branch import Branch, BranchCurve, BranchEvent, FarSide, check_bounds, follow_branch
 from .normal_forms import hopf_coefficient
 
-#: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.
+#: Length of the first step from a boundary equilibrium.
 _START = 1e-4
 
-#: A state is known to this part of its size.
-_BESIDE = 1e-13
+#: Relative error of a state.
+_ROUNDING = 1e-13
 
 
 class Equilibria(BranchCurve):
-    """What curves of equilibria and pseudo-equilibria share."""
+    """Equations and events common to equilibria and pseudo-equilibria."""
 
     def __init__(self, where: Place, free: tuple[int, ...], scale: Array):
         self.where, self.free, self.scale = where, free, scale
@@ -81,17 +81,15 @@ class Equilibria(BranchCurve):
             return float("nan")
 
     def _vague(self, u: Array, frequency: float, value: float) -> float:
-        """By how much the first Lyapunov coefficient differs where the state does by its rounding."""
+        """Error of the first Lyapunov coefficient, by a state that differs by rounding."""
         beside = u.copy()
-        beside[: self.n] += _BESIDE * self.scale[: self.n] * np.cos(np.arange(self.n))
+        beside[: self.n] += _ROUNDING * self.scale[: self.n] * np.cos(np.arange(self.n))
         return abs(self.lyapunov(beside, frequency) - value)
 
     def bautin(self, u: Array) -> Mapping[str, float]:
         """The first Lyapunov coefficient, which vanishes at a Bautin point on a curve of Hopf points."""
         values = self.eigenvalues(u)
-        k, l = np.triu_indices(values.size, 1)
-        near = int(np.argmin(np.abs(values[k] + values[l])))
-        frequency = float(abs(values[k[near]].imag))
+        frequency = float(abs(values[_critical_pair(values)[0]].imag))
         value = self.lyapunov(u, frequency) if frequency else np.nan
         return {"Bautin": value} if np.isfinite(value) else {}
 
@@ -126,9 +124,8 @@ class Equilibria(BranchCurve):
         if zero.name == "branch point":
             return self.described(zero, "branch point", far_side=FarSide("", "branches cross"))
         values = self.eigenvalues(u)
-        k, l = np.triu_indices(values.size, 1)
-        nearest = int(np.argmin(np.abs(values[k] + values[l])))
-        frequency = float(abs(values[k[nearest]].imag))
+        pair = _critical_pair(values)
+        frequency = float(abs(values[pair[0]].imag))
         if frequency == 0.0:
             return None  # a neutral saddle
         numbers = {"frequency": frequency}
@@ -136,7 +133,7 @@ class Equilibria(BranchCurve):
         words = "a pair of eigenvalues crosses the imaginary axis"
         if np.isfinite(value):
             numbers["first Lyapunov coefficient"] = value
-            rest = np.delete(values, [k[nearest], l[nearest]])
+            rest = np.delete(values, pair)
             stable = value < 0.0 and bool(np.all(rest.real < 0.0))
             kind = "supercritical" if value < 0.0 else "subcritical"
             if abs(value) <= 10.0 * self._vague(u, frequency, value):
@@ -163,7 +160,7 @@ class Equilibria(BranchCurve):
         return replace(event, solution=found)
 
     def boundary_numbers(self, u: Array, k: int) -> Mapping[str, float]:
-        """What changes the class of a boundary equilibrium of F1 (k = 0) or F2 (k = 1)."""
+        """Functions that vanish where a boundary equilibrium of F1 (k = 0) or F2 (k = 1) changes class."""
         x, here = u[: self.n], self.place_at(u)
         numbers, a = here.finite_at(x), here.jacobians(x)[k]
         other, sign = numbers.fields[1 - k], 1.0 - 2.0 * k
@@ -217,7 +214,7 @@ class EquilibriumCurve(Equilibria):
         return own if surface == self.where.surface else f"{own} of surface {surface}"
 
     def _on(self, name: str) -> EquilibriumCurve:
-        """The same curve seen from the surface that a test is about."""
+        """The same curve with respect to the surface of a test."""
         j = next((j for j in self.where.others if self._boundary_of(j) == name), None)
         if j is None:
             return self
@@ -320,9 +317,15 @@ class PseudoEquilibriumCurve(Equilibria):
         return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
 
 
+def _critical_pair(values: NDArray[Any]) -> list[int]:
+    """Indices of the two eigenvalues whose sum is nearest to zero."""
+    k, l = np.triu_indices(values.size, 1)
+    near = int(np.argmin(np.abs(values[k] + values[l])))
+    return [int(k[near]), int(l[near])]
+
+
 def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | None:
-    """Leave a boundary equilibrium into the region where the new solutions are real."""
-    # ``inward`` is a gradient that must grow, or the sign with which alpha must.
+    """Leave a boundary equilibrium to real solutions: along a gradient ``inward``, or its sign of alpha."""
     _, jacobian = curve.scaled(u / curve.scale)
     tangent = np.linalg.svd(jacobian)[2][-1]
     if isinstance(inward, float):
@@ -331,9 +334,6 @@ def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | No
         growth = float((inward * curve.scale) @ tangent)
     direction = tangent if growth > 0 else -tangent
     return depart(curve, u, direction, _START, direction)
-
-
-# The verb ``continue_equilibrium``: an equilibrium or pseudo-equilibrium followed as a parameter varies.
 
 
 def continue_equilibrium(
@@ -361,23 +361,23 @@ def continue_equilibrium(
     system, parameters, surface, mode
         As in :func:`region`; a smooth system has neither surface nor mode.
     near : array_like (n,)
-        Start of the search for the first one.
+        Guess of the first one.
     parameter : str
         Name of the parameter that varies.
     bounds : (float, float)
-        Where the branch ends.
+        Bounds of the parameter at which the branch ends.
     side : {"+", "-"} or None, optional
         Of the field $F1$ or $F2$; None for a pseudo-equilibrium; ``"+"`` for the one field of a smooth system.
     step : float, optional
         Largest step where the branch bends, relative to the width of the bounds and to the size of
         the states.
     max_points : int, optional
-        Of each piece.
+        Largest number of points of each piece.
     through : bool, optional
         Whether to go on beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
         that end there too.
     progress : bool, optional
-        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
+        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
 
     Returns
     -------

@@ -1,9 +1,19 @@
-"""Periodic orbits as a parameter varies, through the bifurcations that change their itineraries.
+"""Branches of periodic orbits as a parameter varies, with their bifurcations.
 
-The boundary value problem of a fixed itinerary is continued by :mod:`nonsmooth.continuation`. What
-ends an itinerary is a zero of one of its tests (``conditions``). Of the two itineraries that meet
-there the one with fewer legs is regular, so the event is located in it; then the branch goes on in
-the other one (``edits``).
+The boundary value problem of a fixed itinerary is continued by :mod:`nonsmooth.continuation`. An itinerary
+ends at a zero of one of its tests (``conditions``). Of the two itineraries that meet there the one with
+fewer legs is regular, so the event is located in it, and the branch goes on in the other one
+(``itinerary_changes``).
+
+On curves of bifurcations in two parameters, points of codimension two are zeros of further tests. On a curve
+of grazing-sliding the touching is of higher order (L11 = 0), or at a two-fold (L2 = 0), or a multiplier with
+contact is 1 or -1, or the orbit touches a second time; on one of crossing- or switching-sliding L11 = 0 turns
+one into the other. On a curve of Neimark-Sacker points the angle is resonant; where the pair meets at 1 or -1
+the curve ends, as the numbers beyond are a neutral saddle's. There and on curves of period doublings the cubic
+coefficient of the normal form may vanish.
+
+Source: Kowalczyk, di Bernardo, Champneys et al. 2006 (Int. J. Bifurcation Chaos 16, 601); Kuznetsov 2004,
+ch. 9.
 """
 
 from __future__ import annotations
@@ -17,7 +27,7 @@ import numpy as np
 from ...local import Equilibrium, PseudoEquilibrium
 from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, explain, whole
+from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, whole
 from ...model.checks import positive
 from ...model.derivatives.event_maps import surface_map
 from ...model.derivatives.variational import guarded_field, variational_field
@@ -41,36 +51,36 @@ from .conditions import Condition, condition_row, conditions_of, is_smooth, mini
 from .family_ends import extent, hopf_point, surface_end
 from .homoclinic_curves import homoclinic_end
 from .itinerary_changes import Edited, edited, grown, kind_of
-from .normal_forms import normal_form
+from .normal_forms import normal_form, torus_pair
 from .orbit_equations import OrbitEquations
 from .unfoldings import contact_at, contact_numbers, far_side, touched
 
-#: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
+#: Durations of new legs, or distances along the branch, with which it leaves an event, relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
 
-#: Relative growth of a long period, over a change of the parameter by its bounds, that diverges.
+#: Relative growth of a long period, over a change of the parameter by its bounds, at which it diverges.
 _STEEP = 30.0
 
-#: An orbit that shrank to the first of these parts of its size where its itinerary ends, or to the second
-#: where it is lost, may be about to shrink to a point of a surface.
+#: Relative sizes below which an orbit may shrink to a point of a surface: where its itinerary ends, and where
+#: the branch is lost.
 _TINY, _SMALL = 1e-4, 1e-2
 
-#: A solution of a branch that takes less than this part of the guess is no orbit but a point.
+#: Period relative to that of the guess below which a solution is a point.
 _COLLAPSED = 1e-6
 
-#: Share of the way to an event at which the orbits before it are looked at.
+#: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
 
-#: What names an event of which several conditions vanish.
+#: Order of the conditions that name an event at which several vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 
 #: Cosines of the angle between the flow and the normal of the plane on which an orbit without events
-#: starts: below the first it gets a new plane, below the second a step was too long.
+#: starts, below which the plane is renewed, and below which a step was too long.
 _OBLIQUE, _LEFT = 0.9, 0.5
 
 
 class OrbitCurve(OrbitEquations):
-    """Periodic orbits of one itinerary, with what is watched along them and what happens where it ends."""
+    """Periodic orbits of one itinerary, with their tests and events."""
 
     def with_problem(self, problem: BoundaryProblem, u: Array) -> OrbitCurve:
         """The same parameters with another itinerary."""
@@ -97,13 +107,13 @@ class OrbitCurve(OrbitEquations):
         return name == "Hopf" or not is_smooth(name)
 
     def ends_at(self, zero: Zero) -> bool:
-        """As by name; and where doubled orbits become one, as beyond are the same, a round later."""
+        """As by name; also at a period doubling of doubled orbits, beyond which they repeat."""
         doubled = zero.name == "branch point" and as_doubling(self, zero) is not None
         return doubled or self.ends(zero.name)
 
     def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
-        """Whether an extremum of a guard was born in a step and has passed zero already."""
-        # Then either no motion is left at the end of the step, or none just before another event in it.
+        """Whether an extremum of a guard appeared in a step and has passed zero already."""
+        # Then the orbit is virtual at the end of the step, or just before another event in it.
         born = new.tests.keys() - last.tests.keys()
         if any(new.tests[k] < 0.0 and self._inside(k) for k in born) and ending is None:
             return True
@@ -130,18 +140,18 @@ class OrbitCurve(OrbitEquations):
         return float(self.problem.phase @ rate) / (float(np.linalg.norm(rate)) or 1.0)
 
     def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
-        """As of any curve; none where an orbit without events has nearly left its plane."""
+        """The point; None where an orbit without events is nearly tangent to its plane."""
         found = super().point(u, before, chord, arclength)
         lost = found is not None and self._on_plane and abs(self._across(u)) < _LEFT
         return None if lost else found
 
     def turned(self, u: Array, tangent: Array) -> Array | None:
-        """Take a plane across the flow at the start, where that of an orbit without events is oblique."""
+        """Renew the plane of an orbit without events where it is oblique to the flow."""
         if not self._on_plane or self._across(u) > _OBLIQUE:
             return None
         rate = self.evaluation(u).flown[0].rate[: self.problem.dimension]
         self.restart(u)
-        ahead = tangent * self.scale  # the same way, less what only moves along the orbit
+        ahead = tangent * self.scale  # without the component along the orbit
         ahead[: rate.size] -= float(rate @ ahead[: rate.size]) / float(rate @ rate) * rate
         ahead = ahead / self.scale
         return np.asarray(ahead / np.linalg.norm(ahead))
@@ -156,27 +166,26 @@ class OrbitCurve(OrbitEquations):
         durations = self.problem.split(guess[: self.problem.size])[1]
         if found.evaluation.durations.sum() < _COLLAPSED * durations.sum():
             raise ConvergenceError(
-                f"the branch at {value:.10g}: expected an orbit near its neighbours, received one that "
-                f"shrank to the point {found.start.tolist()}. Continue with a smaller step."
+                f"the branch at {value:.10g}: the solution is no orbit, but the point "
+                f"{found.start.tolist()}. Continue with a smaller step."
             )
         p = found.parameter_vector
         return replace(found, faults=tuple(faults_of(found.problem, found.evaluation, p)))
 
     def out(self, u: Array) -> str:
-        """The period diverges where it is long and grows without the parameter changing."""
+        """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         return "period diverges" if u[durations].sum() > self.longest and self._steep(u) else ""
 
     def _steep(self, u: Array) -> bool:
-        """Whether the period grows by far more than it would over the bounds of the parameter."""
+        """Whether the period grows steeply with the parameter."""
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         tangent = np.linalg.svd(self.equations(u)[1] * self.scale)[2][-1] * self.scale
         growth = abs(float(tangent[durations].sum())) * float(self.widths[-1])
         return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
-        """The point to which the orbit shrinks, or the homoclinic orbit where the period diverges, or would
-        if rounding allowed it."""
+        """The point to which the orbit shrinks, or the homoclinic orbit at which its period diverges."""
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
@@ -186,7 +195,7 @@ class OrbitCurve(OrbitEquations):
         return homoclinic_end(self.describe(u), name, float(self.widths[-1]))
 
     def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
-        """The point of a surface to which an orbit shrinks that is no larger than a part of the first one."""
+        """The point of a surface to which an orbit shrinks, if it is small relative to the first one."""
         if self.system.time_dependent or self.system.coupled or not self.system.surface_count:
             return None
         first = extent(
@@ -199,16 +208,14 @@ class OrbitCurve(OrbitEquations):
         return surface_end(self.describe(u), name, size, first)
 
     def faults(self, u: Array) -> list[str]:
-        """What the guards contradict."""
+        """Violated guards."""
         return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
 
     def require_valid(self, u: Array) -> None:
-        """Refuse half orbits of a system whose symmetry the parameter breaks."""
+        """Raise for half orbits of a system whose symmetry the parameter breaks."""
         if self.problem.symmetry is not None:
             virtual = tuple(self.faults(u))
             require_symmetric(replace(self.describe(u), faults=virtual))
-
-    # results ------------------------------------------------------------------------------------
 
     def describe(self, u: Array) -> PeriodicOrbit:
         p, unknowns = self.parameters_at(u), np.array(u[: self.problem.size])
@@ -225,10 +232,10 @@ class OrbitCurve(OrbitEquations):
 
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
         at, p = self.evaluation(u), self.parameters_at(u)
-        return degenerate(self.problem, self.known.get(name), name, at, p)
+        return _degenerate(self.problem, self.known.get(name), name, at, p)
 
     def ends_curve(self, name: str) -> bool:
-        return name in ENDS
+        return name in _ENDS
 
     def named(self, test: str, u: Array) -> str:
         if is_smooth(test) or test not in self.known:
@@ -248,24 +255,25 @@ class OrbitCurve(OrbitEquations):
         kind = kind_of(self.problem, conditions[0], at, p)
         beyond = self._edited(kind, conditions, u, p)
         if beyond is None or not beyond.test:
-            word = "" if beyond is None else _word(beyond.problem)
-            side = far_side(self.problem, kind, conditions[0], at, p, word, beyond)
+            itinerary = "" if beyond is None else _itinerary(beyond.problem)
+            side = far_side(self.problem, kind, conditions[0], at, p, itinerary, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
-        word, curve = _word(beyond.problem), self.with_problem(beyond.problem, beyond.u)
+        itinerary = _itinerary(beyond.problem)
+        curve = self.with_problem(beyond.problem, beyond.u)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
         if point is None:
-            side = FarSide(word, "not located on the side with fewer legs")
+            side = FarSide(itinerary, "not located on the side with fewer legs")
             return self._event(kind, self, zero.point, conditions[0].name, side)
         at, p = curve.evaluation(point.u), curve.parameters_at(point.u)
         test = curve.known[beyond.test]
         back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
-        side = far_side(curve.problem, kind, test, at, p, word, back)
+        side = far_side(curve.problem, kind, test, at, p, itinerary, back)
         return self._event(kind, curve, point, beyond.test, side)
 
     def _vanishing(self, zero: Zero) -> list[Condition]:
-        """Conditions that vanish together at a zero, those that name the event."""
-        # Where a leg vanishes the events beside it are tangent too; an orbit that is symmetric has
-        # each event several times.
+        """Conditions that vanish together at a zero, of the kind that names the event."""
+        # Where a leg vanishes its neighbours end tangentially too; a symmetric orbit has each event several
+        # times.
         small = [self.known[zero.name]]
         small += [self.known[n] for n in zero.together if n != zero.name and not is_smooth(n)]
         first = min(small, key=lambda c: _PRIORITY.index(c.what))
@@ -291,14 +299,14 @@ class OrbitCurve(OrbitEquations):
             return self._hopf(zero)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
         if zero.name == "branch point":
-            parting = as_doubling(self, zero) or as_pitchfork(self, zero)
-            if parting is not None:
-                return self._event(*parting)
+            shorter = as_doubling(self, zero) or as_pitchfork(self, zero)
+            if shorter is not None:
+                return self._event(*shorter)
         side = smooth_side(self.problem, at, p, zero.name)
         return None if side is None else self._event(zero.name, self, zero.point, zero.name, side)
 
     def _hopf(self, zero: Zero) -> BranchEvent:
-        """The orbit shrinks: where its equilibrium has two imaginary eigenvalues."""
+        """The Hopf point of the equilibrium to which the orbit shrinks."""
         u, leg = zero.point.u, self.problem.legs[0]
         p, (starts, durations) = self.parameters_at(u), self.problem.split(u)
         opposite = fly(self.system, leg, starts[0], 0.5 * float(durations[0]), p).end
@@ -316,12 +324,12 @@ class OrbitCurve(OrbitEquations):
         try:
             return edited(self.problem, kind, conditions, u[: self.problem.size], p)
         except NonsmoothError:
-            return None  # the letters fit no event there
+            return None  # no itinerary with such modes
 
     def located(self, guess: Array, name: str) -> Point | None:
         """The orbit at which a test of this itinerary vanishes, near a guess."""
         scale = self.scale
-        self.tests(Point(guess, np.zeros(guess.size)))  # what the conditions are
+        self.tests(Point(guess, np.zeros(guess.size)))  # sets the known conditions
         if name not in self.known or self.test_row(name, guess) is None:
             return None
 
@@ -342,8 +350,6 @@ class OrbitCurve(OrbitEquations):
         except (NonsmoothError, np.linalg.LinAlgError):
             return None
         return point
-
-    # beyond an event ----------------------------------------------------------------------------
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """The branch in the other itinerary."""
@@ -384,14 +390,13 @@ class OrbitCurve(OrbitEquations):
         return None
 
 
-def _word(problem: BoundaryProblem) -> str:
+def _itinerary(problem: BoundaryProblem) -> str:
     return " ".join(leg.mode or "o" for leg in problem.legs)
 
 
-# What branches off at the smooth bifurcations of a periodic orbit, and whether it is stable.
+# Smooth bifurcations ------------------------------------------------------------------------------
 
-
-_WORDS = {
+_VERDICTS = {
     "fold": "two orbits meet and vanish",
     "branch point": "branches cross",
     "period doubling": "an orbit of twice the period branches off",
@@ -399,25 +404,23 @@ _WORDS = {
     "Neimark-Sacker": "an invariant torus is born",
 }
 
-#: Angles that are this close to a strong resonance have normal forms of their own.
+#: Distance of an angle from a strong resonance within which the normal form does not hold.
 _RESONANT = 1e-4
 
 
 def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
     """Classify a smooth bifurcation."""
-    words, numbers = _WORDS[kind], dict[str, float]()
+    words, numbers = _VERDICTS[kind], dict[str, float]()
     if kind in ("fold", "branch point"):
         return FarSide("", words)
     values = np.linalg.eigvals(return_map(problem, at))
     critical = [int(np.argmin(np.abs(values + 1.0)))]
     if kind == "Neimark-Sacker":
-        k, l = np.triu_indices(values.size, 1)
-        near = int(np.argmin(np.abs(values[k] * values[l] - 1.0)))
-        critical = [int(k[near]), int(l[near])]
-        pair = values[k[near]]
-        if abs(pair.imag) < 1e-9:
+        critical = torus_pair(values)
+        one = values[critical[0]]
+        if abs(one.imag) < 1e-9:
             return None  # a neutral saddle: two real multipliers with the product 1
-        numbers["angle"] = angle = float(abs(np.angle(pair)))
+        numbers["angle"] = angle = float(abs(np.angle(one)))
         if min(abs(3.0 * angle - 2.0 * np.pi), abs(4.0 * angle - 2.0 * np.pi)) < _RESONANT:
             return FarSide("", f"{words}; not classified: a strong resonance", ReadOnly(numbers))
     found = normal_form(problem, at, p, kind)
@@ -434,17 +437,15 @@ def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -
     return FarSide("", f"{words} ({what}{', stable' if stable else ''})", ReadOnly(numbers))
 
 
-# Branch points of orbits that are the doubling or the pitchfork of a part of them, met from the other side.
-
-#: Branch points are found to about the square root of rounding; so is the multiplier -1 there.
+#: Error of the multiplier -1 at a branch point, which is located to about the square root of rounding.
 _PARTS = 1e-3
 
-#: Kind, curve and point of the event, its test, and what is beyond.
-Parting = tuple[str, "OrbitCurve", Point, str, FarSide]
+#: Kind of an event, its curve, point and test, and its unfolding.
+Located = tuple[str, OrbitCurve, Point, str, FarSide]
 
 
-def as_doubling(curve: OrbitCurve, zero: Zero) -> Parting | None:
-    """Two rounds that become one."""
+def as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
+    """Recognise a branch point as the period doubling of an orbit of half the period."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
     problem, once = once_round(curve.problem, u[: curve.problem.size], p)
     whole = float(curve.problem.split(u)[1].sum())
@@ -453,8 +454,8 @@ def as_doubling(curve: OrbitCurve, zero: Zero) -> Parting | None:
     return _part(curve, problem, once, zero, "period doubling")
 
 
-def as_pitchfork(curve: OrbitCurve, zero: Zero) -> Parting | None:
-    """An orbit that a reflection of coordinates maps to itself half a period later."""
+def as_pitchfork(curve: OrbitCurve, zero: Zero) -> Located | None:
+    """Recognise a branch point as the pitchfork of an orbit that is symmetric under a reflection."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
     for problem, half in halves(curve.problem, u[: curve.problem.size], p):
         found = _part(curve, problem, half, zero, "pitchfork")
@@ -465,8 +466,8 @@ def as_pitchfork(curve: OrbitCurve, zero: Zero) -> Parting | None:
 
 def _part(
     curve: OrbitCurve, problem: BoundaryProblem, part: Array, zero: Zero, kind: str
-) -> Parting | None:
-    """The event of a part of the orbit whose return map has the multiplier -1."""
+) -> Located | None:
+    """The event of a part of the orbit, if its return map has the multiplier -1."""
     made = curve.with_problem(problem, part)
     u = np.append(part, zero.point.u[-len(curve.free) :])
     try:
@@ -481,16 +482,16 @@ def _part(
     return None if side is None else (kind, made, point, kind, side)
 
 
-# What degenerates on a curve of bifurcations of periodic orbits: points of codimension two.
+# Points of codimension two ------------------------------------------------------------------------
 
-#: Resonances by the cosine of their angle.
+#: Cosines of the angles of resonances.
 _RESONANCES = {"1:1": 1.0, "1:2": -1.0, "1:3": -0.5, "1:4": 0.0}
 
-#: At these the curve ends.
-ENDS = ("1:1 resonance", "1:2 resonance")
+#: Points at which a curve ends.
+_ENDS = ("1:1 resonance", "1:2 resonance")
 
 
-def degenerate(
+def _degenerate(
     problem: BoundaryProblem, condition: Condition | None, name: str, at: Evaluation, p: Array
 ) -> dict[str, float]:
     """Functions that vanish at points of codimension two on the curve of one event."""
@@ -506,22 +507,21 @@ def degenerate(
 
 
 def _cubic(problem: BoundaryProblem, at: Evaluation, p: Array, name: str) -> dict[str, float]:
-    """The coefficient of the normal form: where it vanishes a curve of folds begins."""
-    word = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
+    """The coefficient of the normal form, at whose zeros a curve of folds begins."""
+    kind = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
     try:
         found = normal_form(problem, at, p, name)
     except np.linalg.LinAlgError:  # another multiplier is 1
         return {}
-    return {word: next(iter(found.values()))} if found else {}
+    return {kind: next(iter(found.values()))} if found else {}
 
 
 def _resonances(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
     values = np.linalg.eigvals(return_map(problem, at))
-    k, l = np.triu_indices(values.size, 1)
-    near = int(np.argmin(np.abs(values[k] * values[l] - 1.0)))
-    cosine = float((values[k[near]] + values[l[near]]).real) / 2.0
-    found = {f"{word} resonance": cosine - value for word, value in _RESONANCES.items()}
-    others = np.delete(values, [k[near], l[near]])  # the pair itself passes 1 and -1 where it ends
+    pair = torus_pair(values)
+    cosine = float((values[pair[0]] + values[pair[1]]).real) / 2.0
+    found = {f"{ratio} resonance": cosine - value for ratio, value in _RESONANCES.items()}
+    others = np.delete(values, pair)  # the pair itself passes 1 and -1 at the ends of the curve
     found["fold"] = float(np.prod(1.0 - others[np.abs(others) > 1e-9]).real)
     found["period doubling"] = float(np.prod(1.0 + others[np.abs(others) > 1e-9]).real)
     return found
@@ -573,30 +573,24 @@ def _beginnings(
     }
 
 
-# From a period doubling, pitchfork, branch or Hopf point to the branch that crosses or begins there.
+# Branch switching ---------------------------------------------------------------------------------
 
-#: Distances from the event at which the new branch is looked for, relative to the orbit.
+#: Distances from the event at which the new branch is searched, relative to the orbit.
 _AWAY = (1e-3, 1e-2, 3e-2)
 
-#: An orbit this many times as long as the small one at a Hopf point is near a homoclinic orbit.
+#: Period, relative to that of the first orbit, beyond which a branch may approach a homoclinic orbit.
 _LONG = 10.0
 
 
 def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
-    """The branch that crosses at an event: its curve, and a point near the event."""
-    # Where rounds double the event itself comes first: the other half of the branch has the same orbits,
-    # begun a round later.
+    """The branch that crosses or begins at an event: its curve, and a point near the event."""
+    # At a period doubling the event comes first, as the other half of the branch repeats the same orbits.
     if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
         return _around(event, free)
     if event.kind not in ("period doubling", "pitchfork", "branch point"):
         raise DefinitionError(
-            explain(
-                "orbit",
-                expected="a period doubling, pitchfork or branch point to switch branches at, or a "
-                "Hopf point of equilibria",
-                received=repr(event),
-                advice="Continue event.orbit, or continue_bifurcation the event.",
-            )
+            f"orbit={event!r} is no event at which to switch branches: a period doubling, pitchfork, branch "
+            "point or Hopf point of equilibria. Continue event.orbit, or continue_bifurcation the event."
         )
     base: OrbitCurve = event.curve
     assert event.point is not None
@@ -611,12 +605,8 @@ def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, lis
         if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
             return curve, [u, found] if event.kind == "period doubling" else [found]
     raise ConvergenceError(
-        explain(
-            event.kind,
-            expected="an orbit on the branch that crosses",
-            received="no convergence near it",
-            advice="Perhaps the crossing branch is vertical or the event is degenerate.",
-        )
+        f"orbit: no orbit of the other branch was found near the {event.kind}. That branch may be vertical, "
+        "or the event degenerate: give an orbit of it."
     )
 
 
@@ -630,7 +620,7 @@ def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list
     turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
     if not turning.size:
         raise DefinitionError(
-            f"orbit: expected a Hopf point, received {event!r}, a neutral saddle."
+            f"orbit={event!r} is a neutral saddle, from which no orbits start. Give a Hopf point."
         )
     k = turning[np.argmin(np.abs(values[turning].real))]
     across, period = vectors[:, k].real, 2 * np.pi / float(values[k].imag)
@@ -654,49 +644,40 @@ def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list
             continue
         if np.abs((found - u) / curve.scale).max() < 10 * away:
             curve.longest = _LONG * period
-            return curve, [first, found]  # an orbit of no size has no direction
+            return curve, [first, found]  # the tangent at the Hopf point itself is not defined
     raise ConvergenceError(
-        f"Hopf: expected small orbits around {at.point.tolist()}, received no convergence. Perhaps the "
-        "point is degenerate: the pair of eigenvalues does not cross the axis."
+        f"orbit: no small orbit was found around the Hopf point {at.point.tolist()}. It may be degenerate, "
+        "with a pair of eigenvalues that does not cross the axis: give an orbit."
     )
 
 
 def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
-    """Twice the legs, and the direction in which the orbit parts from its first round."""
+    """Twice the legs, and the direction in which the doubled orbit leaves the single one."""
     problem = curve.problem
     starts, durations = problem.split(u)
     p = curve.parameters_at(u)
     changes, times = _alternating(curve, u)
-    n = problem.dimension
-    shift = np.zeros(n)
-    if problem.forcing is not None:
-        shift[-1] = problem.advance(p)[0]
-    back = np.linalg.inv(problem.wrap)
-    second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
-    turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
-    legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
-    double = replace(
-        problem, legs=legs, symmetry=None, periods=2 * problem.periods, phase=None, reference=None
-    )
-    if problem.phase is not None:  # no event divides the rounds
-        double = replace(problem, legs=problem.legs, symmetry=None, periods=2 * problem.periods)
-        unknowns = double.pack(starts, 2.0 * durations)
-        way = np.concatenate([changes.ravel(), [0.0], np.zeros(len(curve.free))])
-        new = curve.with_problem(double, unknowns)
-        way = way / new.scale
-        return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
-    unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
-    way = np.append(
-        double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times])),
-        np.zeros(len(curve.free)),
-    )
+    if problem.phase is not None:  # no event ends the first turn
+        double = replace(problem, symmetry=None, periods=2 * problem.periods)
+        unknowns, way = double.pack(starts, 2.0 * durations), np.append(changes.ravel(), 0.0)
+    else:
+        shift = np.zeros(problem.dimension)
+        if problem.forcing is not None:
+            shift[-1] = problem.advance(p)[0]
+        back = np.linalg.inv(problem.wrap)
+        second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
+        turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
+        legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
+        double = replace(problem, legs=legs, symmetry=None, periods=2 * problem.periods)
+        unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
+        way = double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times]))
     new = curve.with_problem(double, unknowns)
-    way = way / new.scale
+    way = np.append(way, np.zeros(len(curve.free))) / new.scale
     return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
 
 
 def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
-    """Changes of starts and durations in the direction that the legs' map turns round."""
+    """Changes of starts and durations along the eigenvector of the multiplier -1."""
     problem, at = curve.problem, curve.evaluation(u)
     maps = leg_maps(problem, at)
     whole = np.eye(problem.dimension)
@@ -714,12 +695,6 @@ def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
     return np.array(changes), np.array(times)
 
 
-# The verb ``continue_orbit``: a periodic orbit, or the branch that crosses at an event, followed.
-
-#: An orbit this many times as long as the first one is near a homoclinic orbit.
-_LONG = 10.0
-
-
 def continue_orbit(
     orbit: PeriodicOrbit | BranchEvent,
     parameter: str,
@@ -732,29 +707,29 @@ def continue_orbit(
 ) -> Branch:
     """Follow a periodic orbit as a parameter varies.
 
-    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The
-    itinerary is kept as long as it holds; what ends it is located in the itinerary with fewer legs,
-    where it is regular, and named.
+    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The itinerary
+    is kept as long as it is admissible; the event at its end is located in the itinerary with fewer
+    legs, where it is regular, and named.
 
     Parameters
     ----------
     orbit : PeriodicOrbit or BranchEvent
         Where to start; at a period doubling, pitchfork or branch point the other branch is followed
-        (from a period doubling one way only: the other half has the same orbits, a round later), at a
-        Hopf point of equilibria the orbits around it.
+        (from a period doubling one way only, as the other half repeats its orbits), at a Hopf point of
+        equilibria the orbits around it.
     parameter : str
         Name of the parameter that varies.
     bounds : (float, float)
-        Where the branch ends.
+        Bounds of the parameter at which the branch ends.
     step : float, optional
         Largest step where the branch bends, relative to the width of the bounds and to the size of
         the orbit.
     max_points : int, optional
-        Of each piece.
+        Largest number of points of each piece.
     through : bool, optional
-        Whether to edit the itinerary and go on beyond what changes it.
+        Whether to change the itinerary and go on beyond events that end it.
     progress : bool, optional
-        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
+        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
 
     Returns
     -------
@@ -779,8 +754,8 @@ def continue_orbit(
 
     Examples
     --------
-    A relay that is forced, $x' = A cos t - sgn x$: crossing orbits end to cross at
-    $A = sqrt(1 + pi^2/4)$, below which they slide.
+    A forced relay, $x' = A cos t - sgn x$: crossing orbits begin to slide below
+    $A = sqrt(1 + pi^2/4)$.
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
@@ -813,15 +788,10 @@ def continue_orbit(
 
 
 def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCurve, list[Array]]:
-    """The curve and its first point; at a period doubling that one before."""
+    """The curve and its first point; from a period doubling or Hopf point with the one before."""
     if not isinstance(orbit, (PeriodicOrbit, BranchEvent)):
         raise DefinitionError(
-            explain(
-                "orbit",
-                expected="a PeriodicOrbit or an event of a branch of them",
-                received=repr(orbit),
-                advice="periodic_orbit(system, guess) finds one.",
-            )
+            f"orbit={orbit!r} is no PeriodicOrbit or event of a branch. Find one with periodic_orbit."
         )
     system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
     free = (parameter_index(system, parameter),)

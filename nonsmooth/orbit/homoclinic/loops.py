@@ -1,4 +1,26 @@
-"""Equations of homoclinic orbits: what chains of legs that begin and end at a saddle share."""
+"""Equations of homoclinic orbits, as chains of legs that begin and end at a saddle.
+
+To a saddle of one mode: the orbit begins at a distance e of the saddle x* in its unstable eigenspace and
+ends at a distance d in the stable one. With rows W_s, W_u that annihilate the other space,
+
+    W_s (x_1 - x*) = 0,  |x_1 - x*| = e,  W_u (x_end - x*) = 0,  |x_end - x*| = d.
+
+On a surface the mode slides, and h(x_1) = 0 takes the place of the direction across it. The error in the
+parameter is d^(2 + r), where r is the ratio of the unstable to the stable eigenvalue, and rounding is
+magnified by d^-(1 + r): d is chosen between the two.
+
+To a pseudo-saddle of the plane on attracting sliding: its unstable manifold is the surface, which leads to
+a visible fold, where the orbit leaves and lands on the pseudo-saddle in finite time. For the legs
+i = 1 .. N, the fold x_1, the pseudo-saddle P with its weight alpha and the parameter mu,
+
+    h(x_1) = 0,  L_i(x_1) = 0,  phi_i(x_i, T_i) = x_(i+1),  h(x_(i+1)) = 0,  phi_N(x_N, T_N) = P,
+    h(P) = 0,  (1 - alpha) F1(P) + alpha F2(P) = 0,
+
+without asymptotics.
+
+Source: Beyn 1990 (IMA J. Numer. Anal. 10, 379); Champneys, Kuznetsov & Sandstede 1996 (HomCont);
+Kuznetsov, Rinaldi & Gragnani 2003, "One-parameter bifurcations in planar Filippov systems".
+"""
 
 from __future__ import annotations
 
@@ -9,33 +31,21 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...flow.simulate import simulate
 from ...local import Equilibrium, PseudoEquilibrium
-from ...local.searches.folds import find_fold
 from ...local.searches.pseudo_equilibria import find_pseudo_equilibrium
-from ...model import Array, ConvergenceError, FilippovSystem, NonsmoothError
+from ...model import Array, ConvergenceError, FilippovSystem
 from ...model.derivatives.event_maps import event_map, surface_map
 from ...model.derivatives.variational import variational_field
 from ..periodic.orbit import OrbitLeg, named
 from ..runs.guards import watch
-from ..runs.legs import Flown, Leg, fly, stretches
+from ..runs.legs import Flown, Leg, fly
 
 
 class Loop(ABC):
-    """Equations of a homoclinic orbit in (starts, durations, ..., free parameters).
+    """Equations of a homoclinic orbit in (starts, durations, ..., free parameters)."""
 
-    Parameters
-    ----------
-    system : FilippovSystem
-    legs : sequence of Leg
-    free : tuple of int
-        Parameters that vary: one for a connection, two for a curve of them.
-    p : ndarray
-        All parameters.
-    held : sequence of (float or None), optional
-        Durations of legs that end at no event but are continued by the next one, 0 for that of the
-        next one: a long leg in several parts, over each of which errors grow by little.
-    """
+    # A long leg is divided into parts over which errors grow little: ``held`` has the duration of a part
+    # that another one continues (0: equal to that of the next), and None for the last part of a leg.
 
     def __init__(
         self,
@@ -80,7 +90,7 @@ class Loop(ABC):
         """Where the orbit begins and ends."""
 
     def tests(self, u: Array) -> dict[str, float]:
-        """What vanishes where the connection degenerates."""
+        """Functions that vanish where the connection degenerates."""
         found, p = dict[str, float](), self.parameters_at(u)
         whole = self.joined(u)
         for i, (leg, x, _, duration) in enumerate(whole):
@@ -96,7 +106,7 @@ class Loop(ABC):
         return found
 
     def joined(self, u: Array) -> list[tuple[Leg, Array, float, float]]:
-        """Legs with their starts, times and durations, those in parts put together."""
+        """Legs with their starts, times and durations, the parts of each joined."""
         starts, durations = self.split(u)
         result: list[tuple[Leg, Array, float, float]] = []
         t, begun = 0.0, True
@@ -122,7 +132,7 @@ class Loop(ABC):
         return np.zeros(0)
 
     def chain(self, u: Array, values: Array, jacobian: Array, row: int) -> tuple[int, Flown]:
-        """Fill the rows of legs that follow one another; the next row, and the end of the last leg."""
+        """Fill the rows of the chain of legs; return the next row and the end of the last leg."""
         starts, durations = self.split(u)
         p, free, n = self.parameters_at(u), list(self.free), self.system.dimension
         count, k, flown = len(self.legs), len(free), None
@@ -162,7 +172,7 @@ class Loop(ABC):
         return row, flown
 
     def described(self, u: Array) -> tuple[tuple[OrbitLeg, ...], tuple[str, ...]]:
-        """The legs with numbers, and what their guards contradict."""
+        """The legs with their numbers, and the guards that they violate."""
         p, legs, faults = self.parameters_at(u), list[OrbitLeg](), list[str]()
         for k, (leg, x, t, duration) in enumerate(self.joined(u)):
             legs.append(OrbitLeg(leg.mode, x, t, duration, leg.name, leg.kind))
@@ -175,7 +185,7 @@ class Loop(ABC):
         return tuple(legs), tuple(faults)
 
     def pieces(self, u: Array) -> tuple[OrbitLeg, ...]:
-        """The parts of the legs with numbers."""
+        """The parts of the legs with their numbers."""
         starts, durations = self.split(u)
         times = np.concatenate([[0.0], np.cumsum(durations)[:-1]])
         return tuple(
@@ -188,12 +198,12 @@ class Loop(ABC):
         )
 
 
-# Homoclinic orbits to saddles of one mode, by projections onto eigenspaces at both ends.
+# Saddles of one mode ------------------------------------------------------------------------------
 
 #: Distance from the saddle at which orbits leave it, relative to the loop.
 NEAR = 1e-5
 
-#: The error of the parameter that decides how close to the saddle the orbit ends.
+#: Error of the parameter from which the distance at the end of the orbit follows.
 _TRUNCATION = 1e-14
 
 
@@ -232,8 +242,7 @@ def equilibrium_of(system: FilippovSystem, mode: str, x: Array, p: Array) -> Arr
             return np.asarray(x)
         last = change
     raise ConvergenceError(
-        f"saddle: expected an equilibrium of mode {mode or 'o'!r} near {x.tolist()}, received no "
-        "convergence. Give a point closer to it.",
+        f"saddle: no equilibrium of mode {mode or 'o'!r} was found near {x.tolist()}. Give a closer point.",
         point=x,
     )
 
@@ -255,8 +264,8 @@ def spectrum_of(
     base = (stable, unstable) if reference is None else (reference.stable, reference.unstable)
     if (stable.shape, unstable.shape) != (base[0].shape, base[1].shape):
         raise ConvergenceError(
-            f"saddle: expected {base[1].shape[1]} unstable directions, received "
-            f"{unstable.shape[1]} at {x.tolist()}: an eigenvalue passed the imaginary axis.",
+            f"saddle: its unstable directions change from {base[1].shape[1]} to {unstable.shape[1]} at "
+            f"{x.tolist()}. An eigenvalue crossed the imaginary axis: stay on one side of it.",
             point=x,
         )
     try:
@@ -266,7 +275,7 @@ def spectrum_of(
         ]
     except np.linalg.LinAlgError as error:
         raise ConvergenceError(
-            f"saddle: its eigenspaces turned too far at {x.tolist()}."
+            f"saddle: its eigenspaces turned too far at {x.tolist()}. Give a better guess."
         ) from error
     values = values[np.argsort(np.abs(values))[held:]]
     return Spectrum(x, values, stable, unstable, np.asarray(rows[0]), np.asarray(rows[1]))
@@ -300,20 +309,20 @@ class SaddleLoop(Loop):
         super().__init__(system, legs, free, p, held)
         self.mode, self.near, self.far = mode, near, far
         self.reference = spectrum_of(system, mode, point, p)
-        self._at = self.reference.point  # the saddle where it was last
+        self._at = self.reference.point  # the last position of the saddle
 
     def spectrum(self, p: Array) -> Spectrum:
         """The saddle at other parameters."""
         return spectrum_of(self.system, self.mode, self._at, p, self.reference)
 
     def target(self) -> float:
-        """How close to the saddle the orbit should end, relative to its size."""
+        """Distance from the saddle at which the orbit should end, relative to its size."""
         values = self.reference.values.real
         ratio = float(values.max() / -self.reference.leading(True))
         return float(_TRUNCATION ** (1.0 / (2.0 + ratio)))
 
     def prolonged(self, u: Array, wait: float, far: float) -> tuple[SaddleLoop, Array]:
-        """The orbit with another part, of the duration ``wait``, that ends closer to the saddle."""
+        """The orbit with one more part of the duration ``wait``, ending at ``far`` from the saddle."""
         (starts, durations), p = self.split(u), self.parameters_at(u)
         last = fly(self.system, self.legs[-1], starts[-1], float(durations[-1]), p).end
         held = (*self.held[:-1], float(durations[-1]), None)
@@ -364,7 +373,7 @@ class SaddleLoop(Loop):
         return values, np.vstack([rows, away / size])
 
     def _moved(self, p: Array, index: int) -> tuple[Spectrum, Spectrum, float]:
-        """The saddle at two values of a parameter: differences only steer Newton's method."""
+        """The saddle at two values of a parameter; their difference only guides Newton's method."""
         size = 1e-6 * max(abs(float(p[index])), 1e-2)
         low, high = p.copy(), p.copy()
         low[index], high[index] = p[index] - size, p[index] + size
@@ -378,9 +387,9 @@ class SaddleLoop(Loop):
             side = here.values[(here.values.real < 0) == stable]
             side = side[np.argsort(np.abs(side.real))]
             if side.size > 1:
-                word = "stable" if stable else "unstable"
+                kind = "stable" if stable else "unstable"
                 a, b = side[:2]
-                found[f"double {word} eigenvalue"] = float(((a - b) ** 2).real)
+                found[f"double {kind} eigenvalue"] = float(((a - b) ** 2).real)
         return found
 
     def saddle(self, u: Array) -> Equilibrium | PseudoEquilibrium:
@@ -413,62 +422,11 @@ class SaddleLoop(Loop):
         )
 
 
-# Homoclinic orbits to pseudo-saddles of the plane, which they reach in finite time.
-
-#: A flight that is to become homoclinic lands within this part of its size from the pseudo-saddle.
-_CLOSE = 0.5
-
-
-def flight_to(
-    system: FilippovSystem, saddle: PseudoEquilibrium, p: Array
-) -> tuple[str, list[Leg], list[Array], list[float]]:
-    """The flight from a visible fold that lands nearest to the pseudo-saddle."""
-    values, best = named(system, p), None
-    told: list[str] = []
-    for side in "+-":
-        try:
-            fold = find_fold(system, saddle.point, side=side, parameters=values)  # type: ignore[arg-type]
-        except NonsmoothError as error:
-            told.append(f"side {side!r}: {error}")
-            continue
-        if fold.kind != "visible":
-            told.append(f"side {side!r}: its fold at {fold.point.tolist()} is not visible")
-            continue
-        size = float(np.linalg.norm(fold.point - saddle.point)) or 1.0
-        for k in range(9):
-            run = simulate(
-                system, fold.point, 4.0**k, parameters=values, start_mode=side, tol=1e-12
-            )
-            if any(e.kind == "entry" for e in run.events):
-                break
-        flown = []
-        for part in stretches(run):
-            flown.append(part)
-            if part.leg.kind == "entry":
-                break
-        if flown[-1].leg.kind != "entry":
-            told.append(f"side {side!r}: the orbit of the fold does not land")
-            continue
-        miss = float(np.linalg.norm(flown[-1].end - saddle.point)) / size
-        if miss > _CLOSE:
-            told.append(
-                f"side {side!r}: the orbit lands {miss:.2g} of the distance to the fold away"
-            )
-        elif best is None or miss < best[0]:
-            starts, times = [f.start for f in flown], [f.duration for f in flown]
-            best = (miss, side, [f.leg for f in flown], starts, times)
-    if best is None:
-        raise ConvergenceError(
-            f"homoclinic orbit: expected a visible fold whose orbit lands near the pseudo-saddle "
-            f"{saddle.point.tolist()}, received none ({'; '.join(told)}). Give a better guess of the "
-            "parameter.",
-            point=saddle.point,
-        )
-    return best[1:]
+# Pseudo-saddles of the plane ----------------------------------------------------------------------
 
 
 class PseudoSaddleLoop(Loop):
-    """A flight from a visible fold to a pseudo-saddle of a planar system."""
+    """An orbit from a visible fold to a pseudo-saddle of a planar system."""
 
     def __init__(
         self,

@@ -1,4 +1,15 @@
-"""Dividing surfaces cut by a plane of starts: where they are met, and the curves in the plane."""
+"""Dividing surfaces of two-folds, as curves in a plane of starts.
+
+Starts on a dividing surface have one itinerary up to where it is decided on which side of the switching
+surface the orbit goes on: at a two-fold, into which it slides, or where it grazes the surface. With the
+itinerary fixed this condition is a smooth function of the start, so an arc is continued like any curve. It
+ends where its itinerary ceases to be admissible, and the next arc begins there. Two kinds are computed:
+
+- orbits end at an *event* at which both fields agree across the surface (a contact that opens: with the
+  load its friction vanishes). They end on one side of the surface, on the other, or in it;
+- orbits go on, and a *two-fold* divides them: beside it they leave for either side. Where they do not slide
+  into it they are divided by grazing: what misses the surface and what crosses it.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +23,7 @@ import numpy as np
 from ...flow.follow import follow
 from ...flow.saving import Savable, savable
 from ...flow.simulate import simulate
+from ...flow.trajectory import Trajectory
 from ...local.point.lie_derivatives import Numbers
 from ...local.point.surface_point import place
 from ...local.searches.two_fold import TwoFold
@@ -24,7 +36,6 @@ from ...model import (
     OptionError,
     Parameters,
     StartMap,
-    explain,
 )
 from ...model.derivatives.event_maps import function_map
 from ...solvers.continuation import (
@@ -44,15 +55,15 @@ from ..runs.guards import change_fault
 from ..runs.itinerary import Arrival, FixedItinerary, leg_between, read_word
 from .two_fold_sheet import Meeting, TwoFoldSheet
 
-# Arcs of a dividing surface cut by a plane of starts: curves in the plane, followed arc by arc.
+# Arcs ---------------------------------------------------------------------------------------------
 
-#: Radius of the circle on which the arcs that leave a point are looked for, in scaled coordinates.
+#: Radius of the circle that is searched for the arcs that leave a point, in scaled coordinates.
 _CIRCLE = 1e-3
 
-#: What a curve ends with; after anything else another arc may follow.
-ENDS = ("reach", "rest", "bound", "closed", "interrupted")
+#: Ends of a curve; after any other end another arc may follow.
+_ENDS = ("reach", "rest", "bound", "closed", "interrupted")
 
-#: A junction is solved for up to this error, in so many steps.
+#: Error of a junction, and the most steps of Newton's method.
 _JUNCTION, _STEPS = 1e-13, 8
 
 
@@ -65,13 +76,13 @@ class Passage:
     x : ndarray (n,)
         State there.
     t, entry : float
-        Time of it, and of the beginning of the last leg.
+        Time there, and at the beginning of the last leg.
     value : float
-        What vanishes on an arc of this itinerary.
+        The condition, zero on an arc of this itinerary.
     corner : ndarray (2,)
-        What vanishes where an arc that just touches the surface meets one that slides into a two-fold.
+        Two conditions, zero where an arc that grazes the surface meets one that slides into a two-fold.
     fault : str
-        Empty if an orbit really moves so, else why not.
+        Why the orbit is not admissible; empty if it is.
     slope, corner_slope : ndarray (1, 2), (2, 2), optional
         Derivatives of ``value`` and ``corner`` by the coordinates of the plane.
     """
@@ -97,12 +108,12 @@ class Passages(Protocol):
     def exact(self) -> bool:
         """Whether passages come with derivatives."""
 
-    def passage(self, u: Array, word: str) -> Passage:
+    def passage(self, u: Array, itinerary: str) -> Passage:
         """The orbit from a start (2,) with a fixed itinerary, one letter for each leg."""
         ...
 
     def simulated(self, u: Array) -> str:
-        """The itinerary that a start really takes; its last letter says where the orbit goes on."""
+        """The itinerary of a simulation; its last letter is the side on which the orbit goes on."""
         ...
 
 
@@ -114,22 +125,22 @@ class DividingArc:
     Attributes
     ----------
     itinerary : str
-        Modes up to where it is decided on which side orbits go on: ``"+ s"`` slides into a two-fold,
-        ``"+"`` just touches the surface.
+        Modes up to where the side is decided: ``"+ s"`` slides into a two-fold, ``"+"`` grazes the
+        surface.
     points : ndarray (k, 2)
         Coordinates in the plane of starts, along the arc.
     entry, t : ndarray (k,)
         Times at which the last leg begins (at the first point, of the arc before), and at which it
         ends.
     decided : ndarray (k, n)
-        States there: points of the two-fold set, or where the surface is touched.
+        States there: points of the two-fold set, or of grazing.
     begin, end : str
-        Why the arc begins and ends where it does: ``"junction"`` with an arc of the other kind,
-        ``"bound"`` of the box, ``"closed"``, ``"interrupted"``, ``"lost"`` where no orbit of the
-        itinerary is found beyond (starts cross the surface there, say, and another arc follows), or
-        what ceases to hold. ``begin`` is empty where the curve was begun.
+        Why the arc begins and ends: ``"junction"`` with an arc of the other kind, ``"bound"`` of the
+        box, ``"closed"``, ``"interrupted"``, ``"lost"`` where no orbit of the itinerary is found beyond
+        (such as where starts cross the surface), or the condition that fails. ``begin`` is empty where
+        the computation started.
     starts : ndarray (k, n)
-        The states of ``points``, where they are asked for.
+        The states of ``points``; may be empty.
     """
 
     itinerary: str
@@ -157,15 +168,15 @@ class DividingArc:
 
 
 class StartCurve(Curve):
-    """Starts of one itinerary that are on a dividing surface, to be continued.
+    """Starts of one itinerary on a dividing surface, for continuation.
 
     Parameters
     ----------
     passages : Passages
-    word : str
-        The itinerary, one letter for each leg.
+    itinerary : str
+        One letter for each leg.
     out : callable, optional
-        Why the curve need not be followed beyond a start; empty if it is.
+        The reason to end the curve at a start; empty to go on.
     tol : float, optional
         Error of a point, in scaled coordinates.
     """
@@ -175,11 +186,11 @@ class StartCurve(Curve):
     def __init__(
         self,
         passages: Passages,
-        word: str,
+        itinerary: str,
         out: Callable[[Array], str] | None = None,
         tol: float = 1e-13,
     ):
-        self.passages, self.word, self.leaves, self.tol = passages, word, out, tol
+        self.passages, self.itinerary, self.leaves, self.tol = passages, itinerary, out, tol
         self.scale, self.exact = passages.scale, passages.exact
         self.known: dict[bytes, Passage] = {}
         self.secant = None if self.exact else Secant(self._condition, float(passages.scale))
@@ -195,10 +206,10 @@ class StartCurve(Curve):
         return np.array([self.passage(u).value])
 
     def passage(self, u: Array) -> Passage:
-        """Where the orbit of a start is decided, computed once for each."""
+        """The passage of a start, computed once for each."""
         key = u.tobytes()
         if key not in self.known:
-            self.known[key] = self.passages.passage(u, self.word)
+            self.known[key] = self.passages.passage(u, self.itinerary)
         return self.known[key]
 
     def fault(self, u: Array) -> str:
@@ -208,8 +219,8 @@ class StartCurve(Curve):
         return "" if self.leaves is None else self.leaves(u)
 
     def snap(self, u: Array, tangent: Array, reach: float) -> Array | None:
-        """The start ahead at which arcs that slide and arcs that touch the surface meet."""
-        free = self.word.rstrip("s")
+        """The junction ahead of an arc that slides and an arc that grazes."""
+        free = self.itinerary.rstrip("s")
         if free == "" or free[-1] == "s":
             return None
 
@@ -242,7 +253,7 @@ class StartCurve(Curve):
 def joint_root(
     values: Values, guess: Array, scale: float, tol: float, max_iterations: int
 ) -> Array | None:
-    """Root of two conditions near a start, by differences.
+    """Root of two conditions near a guess, by differences.
 
     Parameters
     ----------
@@ -262,9 +273,9 @@ def joint_root(
 class DividingTracer:
     """Follows a dividing surface in a plane of starts from arc to arc.
 
-    Each arc is continued by :mod:`nonsmooth.continuation`; where its itinerary ceases to hold the
-    end is located, and a junction is solved for. The next itinerary is what simulations on a small
-    circle have in common on both sides of the curve.
+    Each arc is continued by :mod:`nonsmooth.continuation`. Where its itinerary ceases to be admissible
+    the end is located, and a junction is solved for. The next itinerary is the common beginning of
+    simulations on a small circle on both sides of the curve.
 
     Parameters
     ----------
@@ -272,11 +283,11 @@ class DividingTracer:
     step : float
         Largest step on bent arcs, in scaled coordinates.
     out : callable, optional
-        Why the curve need not be followed beyond a start; empty if it is.
+        The reason to end the curve at a start; empty to go on.
     first : callable, optional
         The first step of an arc from its start.
     bounds : sequence of (index, low, high), optional
-        Where a coordinate ends the curve; it is solved for.
+        Bounds of coordinates at which the curve ends, exactly.
     """
 
     passages: Passages
@@ -286,36 +297,36 @@ class DividingTracer:
     bounds: Sequence[tuple[int, float, float]] = ()
 
     def arcs(
-        self, word: str, rows: list[Array], initial: str | None = None
+        self, itinerary: str, rows: list[Array], initial: str | None = None
     ) -> Iterator[DividingArc]:
-        """Arcs of the curve, each where the one before ends.
+        """Arcs of the curve, each beginning where the last one ends.
 
         Parameters
         ----------
-        word : str
+        itinerary : str
             Itinerary of the first arc, one letter for each leg.
         rows : list of ndarray (2,)
-            Two points of it at least.
+            At least two points of it.
         initial : str, optional
-            Itinerary of its first point, where that is another one.
+            Itinerary of its first point, if different.
         """
         step = (rows[-1] - rows[-2]) / self.passages.scale
-        start = Departure(self._curve(word), rows, step / float(np.linalg.norm(step)))
-        before = self.passages.passage(rows[0], word if initial is None else initial)
+        start = Departure(self._curve(itinerary), rows, step / float(np.linalg.norm(step)))
+        before = self.passages.passage(rows[0], itinerary if initial is None else initial)
         begin = ""
         for departure, arc in pieces(
             start,
             self._trace,
             self._following,
-            last=lambda arc: arc.end in ENDS,
+            last=lambda arc: arc.end in _ENDS,
         ):
             assert isinstance(departure.curve, StartCurve)
             made, before = self._made(departure.curve, arc, before)
             yield replace(made, begin=begin)
             begin = made.end
 
-    def _curve(self, word: str) -> StartCurve:
-        return StartCurve(self.passages, word, self.out)
+    def _curve(self, itinerary: str) -> StartCurve:
+        return StartCurve(self.passages, itinerary, self.out)
 
     def _trace(self, departure: Departure) -> Arc:
         first = 0.0 if self.first is None else self.first(departure.rows[-1])
@@ -331,8 +342,8 @@ class DividingTracer:
     def _following(self, before: Departure, arc: Arc) -> Departure | None:
         """The next arc: its itinerary, first two points and tangent."""
         assert isinstance(before.curve, StartCurve)
-        word, u, tangent = before.curve.word, arc.points[-1].u, arc.points[-1].tangent
-        joined = word[:-1] if word.endswith("s") else word + "s"
+        itinerary, u, tangent = before.curve.itinerary, arc.points[-1].u, arc.points[-1].tangent
+        joined = itinerary[:-1] if itinerary.endswith("s") else itinerary + "s"
         ways = self._ways(joined, u) if arc.end == "junction" else []
         for new, direction in chain(((joined, d) for d in ways), self._round(u, tangent)):
             found = depart(self._curve(new), u, direction, _CIRCLE, tangent)
@@ -340,43 +351,43 @@ class DividingTracer:
                 return found
         return None
 
-    def _ways(self, word: str, u: Array) -> list[Array]:
-        """Directions of an arc at its junction; none if its last leg cannot be flown there."""
+    def _ways(self, itinerary: str, u: Array) -> list[Array]:
+        """Directions of an arc at its junction; none if its last leg cannot be integrated there."""
         try:
-            return self._curve(word).directions(u)
+            return self._curve(itinerary).directions(u)
         except NonsmoothError:
             return []
 
     def _round(self, u: Array, tangent: Array) -> Iterator[tuple[str, Array]]:
-        """Itineraries and directions in which the curve leaves a point, by a small circle."""
+        """Itineraries and directions in which the curve leaves a point, on a small circle."""
 
-        def word(angle: float) -> str:
+        def ahead(angle: float) -> str:
             way = np.array([np.cos(angle), np.sin(angle)])
             return self.passages.simulated(u + _CIRCLE * self.passages.scale * way)
 
         straight = float(np.arctan2(tangent[1], tangent[0]))
-        for angle, a, b in changes_around(word, last_side, straight):
+        for angle, a, b in changes_around(ahead, last_side, straight):
             common = common_start(a, b)
             if common:
                 yield common, np.array([np.cos(angle), np.sin(angle)])
 
     def _made(self, curve: StartCurve, arc: Arc, first: Passage) -> tuple[DividingArc, Passage]:
-        """An arc with what happens at its points, and the passage of its last one."""
-        word, points = curve.word, arc.rows
+        """A DividingArc, and the passage of its last point."""
+        itinerary, points = curve.itinerary, arc.rows
         joins = arc.end == "junction"
         inner = [curve.passage(u) for u in points[1:-1]]
         # At a junction the last sliding leg has no length.
         last = (
-            self.passages.passage(points[-1], word.rstrip("s"))
+            self.passages.passage(points[-1], itinerary.rstrip("s"))
             if joins
             else curve.passage(points[-1])
         )
         after = last
-        if joins and word.endswith("s"):
+        if joins and itinerary.endswith("s"):
             last = replace(last, entry=last.t)
         row = [first, *inner, last]
         made = DividingArc(
-            " ".join(word),
+            " ".join(itinerary),
             np.array(points),
             np.array([p.entry for p in row]),
             np.array([p.t for p in row]),
@@ -386,38 +397,33 @@ class DividingTracer:
         return made, after
 
 
-def last_side(word: str) -> int:
+def last_side(itinerary: str) -> int:
     """The side on which an itinerary ends: 1, -1, or 0 while it slides."""
-    return {"+": 1, "-": -1}.get(word[-1:], 0)
+    return {"+": 1, "-": -1}.get(itinerary[-1:], 0)
 
 
 def common_start(a: str, b: str) -> str:
-    """What two itineraries begin with."""
+    """The common beginning of two itineraries."""
     differ = (k for k, (p, q) in enumerate(zip(a, b, strict=False)) if p != q)
     return a[: next(differ, min(len(a), len(b)))]
 
 
-# Orbits of a plane of starts up to where their side is decided: at an event, or at a two-fold.
+# Orbits of a plane of starts up to where their side is decided ------------------------------------
 
-# What a dividing surface of orbits that end at an event needs of the event.
-
-#: Relative distance of a two-fold from its event, and sine of the angle of both zeros there.
+#: Tolerance of the relative distance of a two-fold from its event, and of the sine of the angle between
+#: the zeros there of the event's function and of the difference of the fields.
 _AT_EVENT = 1e-7
 
 
 def require_event(
     system: FilippovSystem, until: object, fold: TwoFold, parameters: dict[str, float]
 ) -> None:
-    """Refuse an event unless at it both fields have the same component across the surface."""
+    """Raise unless both fields have the same component across the surface at an event."""
     names = [name for name, _ in system.stops]
     if until not in names:
         raise OptionError(
-            explain(
-                "until",
-                expected=f"the name of a stop of the system, among {names}",
-                received=repr(until),
-                advice="Stops are given with stops=[nonsmooth.Stop(function, name=...)].",
-            )
+            f"until={until!r} is no stop of the system, which has {names}. Define it with "
+            "stops=[nonsmooth.Stop(function, name=...)]."
         )
     event = system.definition.guards[names.index(until)]
     jump = system.lie_derivative("+") - system.lie_derivative("-")
@@ -429,10 +435,9 @@ def require_event(
     angle = float(np.linalg.svd(unit)[1][1])
     if not sizes.min() > 0.0 or aside > _AT_EVENT or angle > _AT_EVENT:
         raise DegenerateError(
-            f"of: expected a two-fold at the event {until!r}, and fields with the same component across "
-            f"the surface wherever it happens, received {fold.point.round(9).tolist()}, where the event's "
-            f"function is {at.value:.3g} and its zeros turn from those of the difference by {angle:.3g}. "
-            "Leave until out where orbits go on and two-folds part them."
+            f"of: at the two-fold {fold.point.round(9).tolist()} the function of the event {until!r} is "
+            f"{at.value:.3g}, and its zeros make the angle {angle:.3g} with those at which both fields have "
+            "the same component across the surface; both must be 0. Drop until where orbits go on."
         )
 
 
@@ -441,29 +446,28 @@ def read_begin(system: FilippovSystem, begin: Any) -> list[tuple[str, Array]]:
     if begin is None:
         return []
     try:
-        pairs = [("".join(read_word(system, word)), np.array(u, dtype=float)) for word, u in begin]
+        pairs = [
+            ("".join(read_word(system, itinerary)), np.array(u, dtype=float))
+            for itinerary, u in begin
+        ]
     except (TypeError, ValueError):
         pairs = []
     if len(pairs) < 2 or any(u.shape != (2,) or not np.isfinite(u).all() for _, u in pairs):
         raise OptionError(
-            explain(
-                "begin",
-                expected="two points or more of a curve, each as its itinerary and its two coordinates",
-                received=repr(begin),
-                advice="For example begin=[('+ s', (0.1, -0.5)), ('+ s', (0.11, -0.5))].",
-            )
+            f"begin={begin!r}, but it needs two or more points, each as an itinerary and two coordinates. "
+            "For example begin=[('+ s', (0.1, -0.5)), ('+ s', (0.11, -0.5))]."
         )
     return pairs
 
 
-#: Time and state (n,) at which an orbit begins, and the derivatives of the state by the coordinates
-#: of the plane (n, 2), if they are known.
+#: Time and state (n,) at which an orbit begins, and the derivatives (n, 2) of the state by the coordinates
+#: of the plane, or None.
 Start = tuple[float, Array, Array | None]
 
 
 @dataclass(frozen=True)
 class ComputedStarts:
-    """Starts of orbits that no formula gives, such as the ends of other runs.
+    """Starts of orbits without a formula, such as the ends of other runs.
 
     Attributes
     ----------
@@ -474,7 +478,7 @@ class ComputedStarts:
 
     Examples
     --------
-    Starts that a body comes to after a flight of the duration 1 without friction:
+    Starts that a body reaches after a free flight of the duration 1:
 
     >>> starts = ComputedStarts(lambda u: (1.0, [u[0], u[1] - 1.0, 0.0]), scale=1.0)
     >>> starts(np.array([0.5, 3.0]))
@@ -525,63 +529,63 @@ class EventPassages:
         self.parameters = parameters
         self._itineraries: dict[str, FixedItinerary] = {}
 
-    def itinerary(self, word: str) -> FixedItinerary:
+    def itinerary(self, itinerary: str) -> FixedItinerary:
         """The map of an itinerary to the event."""
-        if word not in self._itineraries:
-            self._itineraries[word] = FixedItinerary(
+        if itinerary not in self._itineraries:
+            self._itineraries[itinerary] = FixedItinerary(
                 self.system,
-                word,
+                itinerary,
                 until=self.until,
                 parameters=self.parameters,
                 tol=self.tol,
                 t_max=self.t_max,
             )
-        return self._itineraries[word]
+        return self._itineraries[itinerary]
 
     def numbers(self, x: Array, t: float = 0.0) -> Numbers:
         """h, L1, L2 and their gradients at a state."""
         where, extended = place(self.system, x, self.parameters, t)
         return where.at(extended)
 
-    def passage(self, u: Array, word: str) -> Passage:
-        """The orbit from a start to the event: of L1 + L2 after sliding, of h else.
+    def passage(self, u: Array, itinerary: str) -> Passage:
+        """The orbit from a start to the event; its value is L1 + L2 after sliding, else h.
 
         Parameters
         ----------
         u : ndarray (2,)
             Coordinates of the start.
-        word : str
-            Its itinerary; a last leg of sliding is not left before the event.
+        itinerary : str
+            One letter for each leg; a last leg of sliding is not left before the event.
         """
         t, x, slope = self.start(u)
-        itinerary = self.itinerary(word)
-        arrival = itinerary.arrive(x, t)
-        by_start = None if slope is None else itinerary.derivative(arrival)[1] @ slope
-        found = self.decided(arrival, word, by_start)
-        if last_side(word[0]) * self.numbers(x, t).h < 0.0:
-            return replace(found, fault="the start is on the other side of the surface")
+        fixed = self.itinerary(itinerary)
+        arrival = fixed.arrive(x, t)
+        by_start = None if slope is None else fixed.derivative(arrival)[1] @ slope
+        found = self.decided(arrival, itinerary, by_start)
+        if last_side(itinerary[0]) * self.numbers(x, t).h < 0.0:
+            return replace(found, fault="the start is on the wrong side of the surface")
         return found
 
-    def seed(self, u: Array, word: str) -> None:
-        """Nothing has to be known of an itinerary before its passages are computed.
+    def seed(self, u: Array, itinerary: str) -> None:
+        """Do nothing: passages to events need no preparation.
 
         Parameters
         ----------
         u : ndarray (2,)
-        word : str
+        itinerary : str
         """
 
-    def decided(self, arrival: Arrival, word: str, by_start: Array | None = None) -> Passage:
-        """Describe the end of an orbit; one that slid there must be at a visible two-fold.
+    def decided(self, arrival: Arrival, itinerary: str, by_start: Array | None = None) -> Passage:
+        """The passage at the end of an orbit; one that slides there must be at a visible two-fold.
 
         Parameters
         ----------
         arrival : Arrival
-        word : str
+        itinerary : str
         by_start : ndarray (n, 2), optional
             Derivatives of its end by the coordinates of the plane.
         """
-        at, slides, fault = self.numbers(arrival.x, arrival.t), word[-1] == "s", arrival.fault
+        at, slides, fault = self.numbers(arrival.x, arrival.t), itinerary[-1] == "s", arrival.fault
         second = at.second
         if slides and not second["L11"] > 0 > second["L22"]:
             fault = fault or "the two-fold at its end is not visible"
@@ -604,7 +608,7 @@ class EventPassages:
         )
 
     def simulated(self, u: Array) -> str:
-        """The itinerary to the event that a start really takes, one letter for each leg."""
+        """The itinerary of a simulation to the event, one letter for each leg."""
         t, x, _ = self.start(u)
         run = simulate(
             self.system,
@@ -618,7 +622,7 @@ class EventPassages:
 
 
 class TwoFoldPassages:
-    """Orbits that two-folds of a system part."""
+    """Orbits that two-folds divide."""
 
     exact = True
 
@@ -637,52 +641,52 @@ class TwoFoldPassages:
         self.duration, self.parameters, self.tol = duration, parameters, tol
         self._met: dict[str, Meeting] = {}
 
-    def passage(self, u: Array, word: str) -> Passage:
+    def passage(self, u: Array, itinerary: str) -> Passage:
         """The orbit from a start."""
-        return self._slides(u, word) if word.endswith("s") else self._touches(u, word)
+        return self._slides(u, itinerary) if itinerary.endswith("s") else self._grazes(u, itinerary)
 
     def simulated(self, u: Array) -> str:
-        """The itinerary that a start really takes, one letter for each leg."""
-        _, x, _ = self.start(u)
-        run = simulate(
-            self.system, x, self.duration, parameters=self.parameters, tol=max(self.tol, 1e-12)
-        )
-        return run.itinerary.replace(" ", "")
+        """The itinerary of a simulation, one letter for each leg."""
+        return self._run(u).itinerary.replace(" ", "")
 
-    def seed(self, u: Array, word: str) -> None:
-        """Take from a simulation beside a dividing surface where orbits of an itinerary meet the
-        sheet."""
-        _, x, _ = self.start(u)
-        run = simulate(
-            self.system, x, self.duration, parameters=self.parameters, tol=max(self.tol, 1e-12)
+    def _run(self, u: Array) -> Trajectory:
+        tol = max(self.tol, 1e-12)
+        return simulate(
+            self.system, self.start(u)[1], self.duration, parameters=self.parameters, tol=tol
         )
-        legs = len(word)
-        if len(run.events) < legs or not word.endswith("s"):
+
+    def seed(self, u: Array, itinerary: str) -> None:
+        """Guess from a simulation beside a dividing surface where orbits meet the sheet."""
+        run, legs = self._run(u), len(itinerary)
+        if len(run.events) < legs or not itinerary.endswith("s"):
             return
         entry = run.events[legs - 2] if legs > 1 else None
         leaves = run.events[legs - 1]
         start = (run.t[0], run.x[0]) if entry is None else (entry.t, entry.x_after)
-        self._met[word] = self.sheet.guess(start[1], leaves.x, leaves.t - start[0])
+        self._met[itinerary] = self.sheet.guess(start[1], leaves.x, leaves.t - start[0])
 
-    def _itinerary(self, word: str, until: object) -> FixedItinerary:
+    def _fixed(self, itinerary: str, until: object) -> FixedItinerary:
         return FixedItinerary(
-            self.system, word, until, parameters=self.parameters, tol=self.tol, t_max=self.duration
+            self.system,
+            itinerary,
+            until,
+            parameters=self.parameters,
+            tol=self.tol,
+            t_max=self.duration,
         )
 
-    # sliding into a two-fold --------------------------------------------------------------------
-
-    def _slides(self, u: Array, word: str) -> Passage:
+    def _slides(self, u: Array, itinerary: str) -> Passage:
         _, x, slope = self.start(u)
         assert slope is not None
         entry, fault, by_start = 0.0, "", slope
-        if len(word) > 1:
-            itinerary = self._itinerary(word[:-1], "h0")
-            arrival = itinerary.arrive(x)
-            by_start = itinerary.derivative(arrival)[1] @ slope
+        if len(itinerary) > 1:
+            fixed = self._fixed(itinerary[:-1], "h0")
+            arrival = fixed.arrive(x)
+            by_start = fixed.derivative(arrival)[1] @ slope
             x, entry = arrival.x, arrival.t
-            fault = arrival.fault or self._entry_fault(word, x)
-        met = self.sheet.meet(x, self._met.get(word))
-        self._met[word] = met
+            fault = arrival.fault or self._entry_fault(itinerary, x)
+        met = self.sheet.meet(x, self._met.get(itinerary))
+        self._met[itinerary] = met
         return Passage(
             met.fold,
             entry + met.duration + met.left,
@@ -693,34 +697,32 @@ class TwoFoldPassages:
             (met.slope @ by_start)[None, :],
         )
 
-    def _entry_fault(self, word: str, x: Array) -> str:
-        leg, p = leg_between(self.system, word[-2], "s"), self.sheet.parameters
+    def _entry_fault(self, itinerary: str, x: Array) -> str:
+        leg, p = leg_between(self.system, itinerary[-2], "s"), self.sheet.parameters
         return change_fault(self.system, leg, "s", x, x, p)
 
-    # touching the surface -----------------------------------------------------------------------
-
-    def _touches(self, u: Array, word: str) -> Passage:
-        """The last leg turns back from the surface: h is least there, and zero on the arc."""
+    def _grazes(self, u: Array, itinerary: str) -> Passage:
+        """The passage of an orbit whose last leg turns back from the surface: h is least there."""
         _, x, slope = self.start(u)
         assert slope is not None
-        itinerary = self._itinerary(word, self._lie(word[-1]))
-        arrival = self._turned(itinerary, itinerary.arrive(x), word[-1])
-        by_start = itinerary.derivative(arrival)[1] @ slope
+        fixed = self._fixed(itinerary, self._lie(itinerary[-1]))
+        arrival = self._turned(fixed, fixed.arrive(x), itinerary[-1])
+        by_start = fixed.derivative(arrival)[1] @ slope
         at = self.sheet.where.at(arrival.x)
-        other = 1 if word[-1] == "+" else 0
+        other = 1 if itinerary[-1] == "+" else 0
         corner = np.array([at.h, at.lie[other]])
         slopes = np.array([at.gradient, at.lie_gradients[other]]) @ by_start
         fault = arrival.fault
-        sign = 1.0 if word[-1] == "+" else -1.0
+        sign = 1.0 if itinerary[-1] == "+" else -1.0
         if not sign * at.lie[other] < 0.0:
-            fault = fault or "what has touched the surface does not cross it, but slides"
+            fault = fault or "an orbit that reaches the surface slides there and does not cross it"
         return Passage(arrival.x, arrival.t, arrival.entry, at.h, corner, fault, slopes[:1], slopes)
 
     def _lie(self, letter: str) -> Any:
         return self.system.lie_derivative(letter)
 
-    def _turned(self, itinerary: FixedItinerary, arrival: Arrival, letter: str) -> Arrival:
-        """The same orbit up to the turn at which it is nearest to the surface."""
+    def _turned(self, fixed: FixedItinerary, arrival: Arrival, letter: str) -> Arrival:
+        """The same orbit up to the turn nearest to the surface."""
         start, t = arrival.starts[-1], arrival.entry
         run = follow(
             self.system,
@@ -742,35 +744,35 @@ class TwoFoldPassages:
                 turns.append((abs(at.h), event.t, event.x))
         if not turns:
             raise ConvergenceError(
-                f"leg in mode {letter!r} from {np.array2string(start, precision=6)}: expected a turn "
-                f"back from the surface within {self.duration:g}, received none."
+                f"duration: the leg in mode {letter!r} from {np.array2string(start, precision=6)} does not "
+                f"turn back from the surface within {self.duration:g}. Give a longer duration."
             )
         _, end, x = min(turns, key=lambda turn: turn[0])
         fault = arrival.fault
         if end != arrival.t:
-            last = itinerary.leg(letter, t, start, (), t_end=end)
-            fault = itinerary.inside(last, f"leg {len(arrival.legs)} ({letter})")
+            last = fixed.leg(letter, t, start, (), t_end=end)
+            fault = fixed.inside(last, f"leg {len(arrival.legs)} ({letter})")
         durations = (*arrival.durations[:-1], end - t)
         return replace(arrival, x=x, t=end, fault=fault, durations=durations)
 
 
-#: Cells across the box between whose corners curves are looked for, and halvings of an edge.
+#: Cells across the box whose edges are searched for curves, and halvings of an edge.
 _CELLS, _HALVINGS = 8, 26
 
-#: What an arc has for every point of it.
+#: Attributes of an arc with one row for each point.
 _ROWS = ("points", "entry", "t", "decided")
 
-#: The first point beside the one where a curve is met, in scaled coordinates.
+#: Distance of the first point from the one where an edge crosses a curve, in scaled coordinates.
 _BESIDE = 1e-3
 
-#: A curve whose begin is given takes first steps of so much of the distance from there, and is closed
-#: this near to it.
+#: First step of a curve from a given beginning, relative to the distance from it, and the distance from
+#: it at which the curve is closed.
 _FIRST, _APART = 0.2, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingCurves(Savable):
-    """Where a plane of starts cuts the surface that divides orbits beside two-folds.
+    """Curves in which a plane of starts cuts a dividing surface of two-folds.
 
     Attributes
     ----------
@@ -778,7 +780,7 @@ class DividingCurves(Savable):
         Whether orbits that come to the two-folds divide (True), or those that leave them, backward
         in time.
     point : ndarray (n,)
-        The two-fold that was given.
+        The given two-fold.
     curves : list of list of DividingArc
         Curves in the plane, each as arcs that follow each other.
     complete : bool
@@ -797,7 +799,7 @@ class DividingCurves(Savable):
 
     @property
     def junctions(self) -> Array:
-        """Starts (k, 2) at which arcs that slide into a two-fold meet arcs that touch the surface."""
+        """Starts (k, 2) at which arcs that slide into a two-fold meet arcs that graze the surface."""
         found = [
             one.points[-1]
             for curve in self.curves
@@ -818,7 +820,7 @@ class DividingCurves(Savable):
 
 @dataclass(frozen=True)
 class Plane:
-    """A plane of starts with the part of it that is looked at."""
+    """A plane of starts with a box in it."""
 
     start: Callable[[Array], Start]
     box: Array
@@ -827,7 +829,7 @@ class Plane:
 
     @property
     def size(self) -> float:
-        """Of the box in the phase space."""
+        """Size of the box in the phase space."""
         corners = np.array([self.start(np.array(u))[1] for u in product(*self.box)])
         return float(np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()) or 1.0
 
@@ -840,12 +842,8 @@ def plane_of(system: FilippovSystem, starts: Any, box: Any) -> Plane:
         limits = np.zeros(0)
     if limits.shape != (2, 2) or not np.all(np.isfinite(limits) & (limits[:, :1] < limits[:, 1:])):
         raise OptionError(
-            explain(
-                "box",
-                expected="the range (low, high) of each of the two coordinates of the plane",
-                received=repr(box),
-                advice="For example box=[(-1, 1), (0, 2)].",
-            )
+            f"box={box!r}, but it needs the range (low, high) of each of the two coordinates of the plane. "
+            "For example box=[(-1, 1), (0, 2)]."
         )
     if isinstance(starts, ComputedStarts):
         return Plane(starts, limits, starts.scale, exact=False)
@@ -903,9 +901,9 @@ def dividing_curves(
         complete = False
     if not curves:
         raise DegenerateError(
-            f"starts: expected orbits of the box {plane.box.tolist()} on both sides of a dividing "
-            f"surface within the duration {duration:g}, received none. Move or widen the box, or give "
-            "another duration, at whose end orbits are on one side of the switching surface or the other."
+            f"starts: no dividing surface was found in the box {plane.box.tolist()} with the duration "
+            f"{duration:g}. Move or widen the box, or give a duration at whose end orbits are on one side "
+            "of the switching surface or the other."
         )
     return DividingCurves(stable, fold.point, curves, complete)
 
@@ -915,18 +913,18 @@ def _with_starts(arc: DividingArc, plane: Plane) -> DividingArc:
 
 
 def _require_plain(system: FilippovSystem) -> None:
-    """Refuse systems whose orbits the words of one surface do not tell."""
+    """Raise unless itineraries of one surface describe all orbits."""
     whole = system.surface_count == 1 and not any(system.nonlinear)
     if whole and not system.resets and not system.impacts and not system.sets:
         return
     raise DegenerateError(
-        f"system: expected one surface, and no resets, impacts or hidden dynamics, received {system!r}. "
-        "The curves in which a plane of starts cuts its dividing surfaces are not followed here."
+        f"system {system!r} has more than one surface, resets, impacts or hidden dynamics. Give one with "
+        "one surface and none of these."
     )
 
 
 class _Search:
-    """Looks for curves between the corners of cells and follows them."""
+    """Searches the edges of cells for curves and follows them."""
 
     def __init__(
         self,
@@ -948,11 +946,11 @@ class _Search:
         return float(np.linalg.norm((u - self.begin[0][1]) / self.plane.scale))
 
     def begun(self) -> Iterator[list[DividingArc]]:
-        """The curve of which points are given, from the last of them on."""
-        words, rows = [word for word, _ in self.begin], [u for _, u in self.begin]
+        """The curve through the given points, from the last of them."""
+        itineraries, rows = [key for key, _ in self.begin], [u for _, u in self.begin]
         arcs = list[DividingArc]()
         try:
-            for arc in self.tracer.arcs(words[-1], rows, words[0]):
+            for arc in self.tracer.arcs(itineraries[-1], rows, itineraries[0]):
                 arcs.append(arc)
         except KeyboardInterrupt:
             if not arcs:
@@ -962,7 +960,7 @@ class _Search:
         yield arcs
 
     def curves(self) -> Iterator[list[DividingArc]]:
-        """Curves that cross edges between corners whose orbits end on different sides."""
+        """Curves that cross edges whose corners have orbits that end on different sides."""
         axes = [np.linspace(low, high, _CELLS + 1) for low, high in self.plane.box]
         corners = {
             (i, j): np.array([axes[0][i], axes[1][j]])
@@ -985,7 +983,7 @@ class _Search:
         return any(_crosses(points, a, b) for points in self.traced)
 
     def _met(self, one: tuple[Array, str], other: tuple[Array, str]) -> list[DividingArc]:
-        """The curve that crosses an edge; none where the change of sides is not at a two-fold."""
+        """The curve that crosses an edge; none where sides do not change at a two-fold."""
         edge = (other[0] - one[0]) / self.plane.scale
         across = np.array([-edge[1], edge[0]]) / float(
             np.linalg.norm(edge)
@@ -994,19 +992,19 @@ class _Search:
             middle = 0.5 * (one[0] + other[0])
             label = self.passages.simulated(middle)
             side = last_side(label)
-            if side == 0:  # it slides for as long as it is looked at
+            if side == 0:  # it slides to the end of the run
                 break
             if side == last_side(one[1]):
                 one = middle, label
             else:
                 other = middle, label
-        word = common_start(one[1], other[1])
-        if not word:
+        itinerary = common_start(one[1], other[1])
+        if not itinerary:
             return []
         middle = 0.5 * (one[0] + other[0])
         try:
-            self.passages.seed(one[0], word)
-            curve = StartCurve(self.passages, word)
+            self.passages.seed(one[0], itinerary)
+            curve = StartCurve(self.passages, itinerary)
             u = curve.correct(middle, across)
             if u is None or curve.fault(u):
                 return []
@@ -1021,7 +1019,7 @@ class _Search:
             for way, half in zip(ways, halves, strict=True):
                 departure = depart(curve, u, way, _BESIDE, way)
                 if departure is not None:
-                    for arc in self.tracer.arcs(curve.word, departure.rows):
+                    for arc in self.tracer.arcs(curve.itinerary, departure.rows):
                         half.append(arc)
                 self.interrupted = bool(half) and half[-1].end == "interrupted"
                 if self.interrupted or (half and half[-1].end == "closed"):
@@ -1038,7 +1036,7 @@ class _Search:
 
 
 def _joined(one: DividingArc, other: DividingArc) -> DividingArc:
-    """Two arcs of one itinerary as one; the second begins where the first ends."""
+    """Two consecutive arcs of one itinerary as one."""
     pairs = ((getattr(arc, name) for arc in (one, other)) for name in _ROWS)
     points, entry, t, decided = (np.concatenate([a, b[1:]]) for a, b in pairs)
     return DividingArc(one.itinerary, points, entry, t, decided, other.end, one.begin)

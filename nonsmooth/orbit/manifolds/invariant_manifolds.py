@@ -1,4 +1,4 @@
-"""Stable and unstable manifolds of saddles and pseudo-saddles, orbits through folds, dividing surfaces."""
+"""Stable and unstable manifolds of saddles, pseudo-saddles, folds, two-folds and periodic orbits."""
 
 from __future__ import annotations
 
@@ -30,7 +30,6 @@ from ...model import (
     OptionError,
     Parameters,
     Surfaces,
-    explain,
     mode_field,
     real,
     require_system,
@@ -43,21 +42,18 @@ from ..runs.legs import fly
 from .canards import Slider, paths_from
 from .dividing_surfaces import DividingCurves, dividing_curves, plane_of, read_begin, require_event
 
-# What grows from a point along its eigenvectors: curves and surfaces made of orbits.
+# Orbits as curves of a given length ---------------------------------------------------------------
 
-
-# Orbits as curves of a given length, forward or backward, through switches.
-
-#: Steps between looks at the length of an orbit, and of all of it.
+#: Steps after which the length of an orbit is checked, and the most steps.
 _CHUNK, _LONGEST = 16, 20_000
 
-#: A chunk that is so many times as long as the orbit is to be is cut.
+#: Length of a chunk, relative to that of the orbit, beyond which it is repeated over a shorter time.
 _FAR = 4.0
 
-#: An orbit that grows by less than this part of its length in a chunk has come to rest.
+#: Growth in a chunk, relative to the length, below which an orbit has come to rest.
 _RESTS = 1e-7
 
-#: Points of a step from which its length is taken.
+#: Points of a step that measure its length.
 _FINE = 64
 
 
@@ -73,10 +69,10 @@ class Arc:
     t : ndarray (m,)
         Times since the start, negative where the orbit was followed backward.
     itinerary : str
-        Modes in the order in which they were met.
+        Modes in their order along the orbit.
     end : str
-        ``"length"`` reached, or why it is shorter: ``"rest"``, ``"sliding"`` (backward: what arrives
-        there comes from everywhere beside it), ``"interrupted"``, or the name of a status.
+        ``"length"`` reached, or why it is shorter: ``"rest"``, ``"sliding"`` (backward: orbits arrive
+        there from a whole neighbourhood), ``"interrupted"``, or the name of a status.
     """
 
     points: Array
@@ -90,7 +86,7 @@ class Arc:
 
 
 class InterruptedOrbit(KeyboardInterrupt):
-    """Ctrl-C while an orbit was followed; ``run`` is what there is of it, and ``arc`` its curve."""
+    """Ctrl-C while an orbit was followed, with the part ``run`` of it and its curve ``arc``."""
 
     def __init__(self, run: Trajectory):
         super().__init__()
@@ -110,7 +106,7 @@ class Follower:
     tol: float
 
     def arc(self, start: Array, mode: str | None = None) -> Arc | None:
-        """Follow the orbit from a start; None where it cannot leave in the mode asked for."""
+        """Follow the orbit from a start; None where it cannot leave in the given mode."""
         try:
             found = self.run(start, mode)
         except InterruptedOrbit as stopped:
@@ -140,7 +136,7 @@ class Follower:
                     raise
                 raise InterruptedOrbit(join(pieces)) from None
             far = float(lengths(part)[1][-1]) if len(part.steps) else 0.0
-            if not far <= _FAR * self.length:  # steps of a simple field are as long as one likes
+            if not far <= _FAR * self.length:  # steps of a polynomial field have any length
                 span = (
                     (self.length / far) ** 0.125 * float(part.t[-1] - t)
                     if far < np.inf
@@ -199,27 +195,27 @@ def lengths(run: Trajectory) -> tuple[Array, Array]:
 
 
 def _slides(run: Trajectory) -> float | None:
-    """When a run begins to slide."""
+    """The time at which a run begins to slide; None if it does not."""
     return next((e.t for e in run.events if e.kind == "entry"), None)
 
 
-# Where manifolds begin that are not those of a point of one mode: periodic orbits and two-folds.
+# Manifolds of periodic orbits and of canards ------------------------------------------------------
 
 Seed = Callable[[float], Arc | None]
 
-#: Orbits on a manifold of a periodic orbit start at this distance from it, relative to its size, and are
-#: shown from another one on, in spacings.
+#: Distance of starts from a periodic orbit, relative to its size, and distance from which its manifold
+#: is shown, in spacings.
 _FROM_ORBIT, _SHOWN = 1e-6, 0.5
 
-#: A multiplier this close to the unit circle decides nothing.
+#: Multipliers this close to the unit circle count as on it.
 _OFF_CIRCLE = 1e-6
 
 
 def orbit_seeds(orbit: PeriodicOrbit, follower: Follower, stable: bool) -> list[Seed]:
-    """Arcs of the surface of orbits that come to a periodic orbit, or leave it, by sheets."""
+    """The sheets of orbits that approach a periodic orbit or leave it, as functions of a start."""
     multiplier, x, v, period = _direction(orbit, stable)
-    rounds = 1 if multiplier > 0 else 2
-    factor = abs(multiplier) ** (-rounds if stable else rounds)
+    turns = 1 if multiplier > 0 else 2
+    factor = abs(multiplier) ** (-turns if stable else turns)
     size = float(np.abs(orbit.trajectory.x).max()) or 1.0
     shown = _SHOWN * follower.spacing
     count = max(0, math.ceil(math.log(shown / (_FROM_ORBIT * size)) / math.log(factor)))
@@ -232,30 +228,29 @@ def orbit_seeds(orbit: PeriodicOrbit, follower: Follower, stable: bool) -> list[
                 run = simulate(
                     system,
                     start,
-                    count * rounds * period,
+                    count * turns * period,
                     parameters=follower.parameters,
                     tol=min(follower.tol, 1e-11),
                 )
-                if run.t[-1] < count * rounds * period:
+                if run.t[-1] < count * turns * period:
                     return None
                 start = run.x[-1]
             return follower.arc(start)
 
         return seed
 
-    return [sheet(1.0), sheet(-1.0)] if rounds == 1 else [sheet(1.0)]
+    return [sheet(1.0), sheet(-1.0)] if turns == 1 else [sheet(1.0)]
 
 
 def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array, float]:
     """The multiplier, a point of the orbit inside a leg, the eigenvector there, and the period."""
     values = orbit.floquet.values
     outside = np.abs(values) < 1.0 - _OFF_CIRCLE if stable else np.abs(values) > 1.0 + _OFF_CIRCLE
-    word, n = "stable" if stable else "unstable", orbit.system.dimension
+    kind, n = "stable" if stable else "unstable", orbit.system.dimension
     if int(outside.sum()) != 1 or n != 3 or (stable and orbit.floquet.zeros):
         raise DegenerateError(
-            f"of: expected an orbit in three dimensions with one {word} multiplier other than 0, "
-            f"received {n} states and the multipliers {values.round(6).tolist()}. Its {word} manifold "
-            "is no surface."
+            f"of: the orbit has {n} states and the multipliers {values.round(6).tolist()}, so its {kind} "
+            f"manifold is no surface. Give one in three dimensions with one {kind} multiplier, not 0."
         )
     problem, at = orbit.problem, orbit.evaluation
     maps = leg_maps(problem, at)
@@ -277,9 +272,7 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
 
 
 def canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:
-    """The sliding orbit that comes to a two-fold in attracting sliding (or leaves it in
-    repelling)."""
-    # A function of a parameter from 0, at the two-fold, to 1.
+    """The canard of a two-fold in attracting (or repelling) sliding, by a parameter in [0, 1]."""
     system = reversed_system(follower.system) if stable else follower.system
     where, s = place(system, fold.point, follower.parameters)
     surfaces = Surfaces(system)
@@ -294,8 +287,8 @@ def canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[f
         many = "infinitely many" if paths else "none"
         side = "into it through attracting" if stable else "out of it through repelling"
         raise DegenerateError(
-            f"of: expected a two-fold with one canard {side} sliding, received {many} at "
-            f"{fold.point.tolist()} ({fold.label}). Nothing divides the orbits beside it."
+            f"of: the two-fold at {fold.point.tolist()} ({fold.label}) has {many} of the canards {side} "
+            "sliding. Give one with exactly one, which divides the orbits beside it."
         )
     run = paths[0].run
     t, along = lengths(run)
@@ -309,13 +302,13 @@ def canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[f
     return point
 
 
-# Surfaces swept by orbits: a bundle of arcs, denser where they part, and the triangles between.
+# Surfaces swept by orbits -------------------------------------------------------------------------
 
-#: Neighbours in a bundle are at most so many spacings apart, or there is a hole between them.
-_APART = 1.0
-_HOLE = 2.5
+#: Distance of neighbours, in spacings, above which one is put between them, and above which there is a
+#: hole in the surface.
+_APART, _HOLE = 1.0, 2.5
 
-#: A seed is put between two others down to this distance of their parameters.
+#: Smallest distance of the parameters of neighbours.
 _CLOSEST = 1e-10
 
 
@@ -327,7 +320,7 @@ def bundle(
     most: int,
     report: Callable[[], object] = lambda: None,
 ) -> tuple[list[tuple[float, Arc]], bool]:
-    """Arcs from seeds on a curve with the parameter 0 to 1, with further ones where they part."""
+    """Arcs from starts on a curve with the parameter 0 to 1, denser where they diverge."""
     arcs: dict[float, Arc] = {}
     tried: set[float] = set()
     new = np.linspace(0.0, 1.0, count, endpoint=not closed).tolist()
@@ -348,7 +341,7 @@ def bundle(
 
 
 def _wide(arcs: dict[float, Arc], closed: bool, spacing: float) -> list[float]:
-    """Parameters in the middle of neighbours that are too far apart."""
+    """Parameters midway between neighbours that are too far apart."""
     order = sorted(arcs)
     ends = [*order[1:], order[0] + 1.0] if closed and order else order[1:]
     return [
@@ -367,7 +360,7 @@ def _gap(one: Arc, other: Arc) -> float:
 def triangles(
     arcs: list[tuple[float, Arc]], closed: bool, spacing: float
 ) -> tuple[Array, NDArray[np.int64]]:
-    """Points (k, n) of all arcs and triangles (q, 3) between neighbours, but for holes."""
+    """Points (k, n) of all arcs and triangles (q, 3) between neighbours, without holes."""
     starts = np.cumsum([0, *[len(arc.points) for _, arc in arcs]])
     points = np.concatenate([arc.points for _, arc in arcs])
     found: list[tuple[int, int, int]] = []
@@ -385,10 +378,10 @@ def triangles(
     return points, table[small]
 
 
-#: Seeds are so far from the point, as a part of the length: the error is the square of it.
+#: Distance of starts from the point, relative to the length; the error is its square.
 _NEAR = 1e-6
 
-#: Eigenvalues with a real part below this, relative to the largest, decide nothing.
+#: Real parts of eigenvalues below this, relative to the largest eigenvalue, count as zero.
 _HYPERBOLIC = 1e-9
 
 _FIRST = 16  # arcs of a bundle at the beginning
@@ -396,7 +389,7 @@ _FIRST = 16  # arcs of a bundle at the beginning
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Manifold(Savable):
-    """Points that go to a point forward (stable) or backward (unstable) in time.
+    """A stable or unstable manifold, as curves or a surface of orbits.
 
     Attributes
     ----------
@@ -437,8 +430,15 @@ class Manifold(Savable):
         return f"Manifold({what}, of {point}, dimension {self.dimension}: {of}{cut})"
 
 
+def _too_high(dimension: int) -> DegenerateError:
+    return DegenerateError(
+        f"of: the manifold has {dimension} dimensions, but at most two are computed. Give another point "
+        "or stable=."
+    )
+
+
 class Grower:
-    """Local directions of a manifold and what grows from them."""
+    """Computes the manifold of one point or orbit from its local directions."""
 
     def __init__(
         self, follower: Follower, of: Any, stable: bool, most: int, report: Callable[[], object]
@@ -462,13 +462,11 @@ class Grower:
             return self._of_equilibrium()
         return self._of_pseudo_equilibrium()
 
-    # kinds of points -----------------------------------------------------------------------------
-
     def _of_equilibrium(self) -> Manifold:
         if self.of.status != "real":
             raise DegenerateError(
-                f"of: expected an equilibrium on its own side, received a {self.of.status} one at "
-                f"{self.point.tolist()}. It has no manifolds in the system."
+                f"of: the equilibrium at {self.point.tolist()} is {self.of.status}, so it has no "
+                "manifolds. Give one on its own side of the surface."
             )
         basis = self._directions(self.of.mode)
         if basis.shape[1] == 1:
@@ -479,8 +477,8 @@ class Grower:
         of = self.of
         if of.status != "real" or of.region is Region.MIXED or of.mode.count("s") != 1:
             raise DegenerateError(
-                f"of: expected a real pseudo-equilibrium on one surface, received {of}. Its manifolds "
-                "are not made of orbits of the system."
+                f"of: the manifolds of {of} do not consist of orbits. Give a real pseudo-equilibrium on "
+                "one surface."
             )
         basis = self._directions(of.mode)
         collects = (of.region is Region.ATTRACTING) == self.stable
@@ -490,10 +488,7 @@ class Grower:
         if collects and basis.shape[1] == 1:
             return self._sheets(basis[:, 0], sides)
         if collects:
-            raise DegenerateError(
-                f"of: expected a manifold of at most two dimensions, received one of "
-                f"{basis.shape[1] + 1}: all that slides to it, and what comes to that."
-            )
+            raise _too_high(basis.shape[1] + 1)
         if basis.shape[1] == 1:
             return self._curves([partial(self._arc, s * basis[:, 0], of.mode) for s in (1, -1)])
         return self._circle(basis, of.mode)
@@ -514,13 +509,11 @@ class Grower:
         if not count and isinstance(self.of, Equilibrium):
             kind = "stable" if self.stable else "unstable"
             raise DegenerateError(
-                f"of: expected a point with {kind} directions, received {self.of.kind!r} with the "
-                f"eigenvalues {values.round(6).tolist()}."
+                f"of: the {self.of.kind} with the eigenvalues {values.round(6).tolist()} has no {kind} "
+                "directions. Give another point or stable=."
             )
         self.node = apart
         return np.asarray(vectors[:, chosen].real if apart else u[:, :count])
-
-    # what grows ----------------------------------------------------------------------------------
 
     def _leave(self, mode: str) -> Arc | None:
         """The orbit of one mode from the point itself."""
@@ -546,15 +539,13 @@ class Grower:
             complete = False
         if not found:
             kind = "comes to" if self.stable else "leaves"
-            raise DegenerateError(f"of: expected a point that an orbit {kind}, received {self.of}.")
+            raise DegenerateError(f"of: no orbit {kind} {self.of}. Give another point or stable=.")
         return Manifold(self.stable, self.point, 1, found, complete=complete)
 
     def _circle(self, basis: Array, mode: str | None) -> Manifold:
         """A surface of the orbits that start on a small circle."""
         if basis.shape[1] > 2:
-            raise DegenerateError(
-                f"of: expected a manifold of at most two dimensions, received {basis.shape[1]}."
-            )
+            raise _too_high(basis.shape[1])
 
         def seed(u: float) -> Arc | None:
             return self._arc(basis @ self._around(u), mode)
@@ -562,9 +553,9 @@ class Grower:
         return self._surface(seed, True)
 
     def _around(self, u: float) -> Array:
-        """A direction in the eigenspace, by a parameter from 0 to 1 that goes round once."""
-        # With two real eigenvalues nearly all orbits leave along the strong direction; those that come
-        # far along the weak one start beside it, at angles that differ by factors.
+        """A direction in the eigenspace, by a parameter from 0 to 1 of one turn."""
+        # With two real eigenvalues nearly all orbits leave along the strong direction; those that go
+        # far along the weak one start beside it, at angles in geometric progression.
         if not self.node:
             return np.array([np.cos(2 * np.pi * u), np.sin(2 * np.pi * u)])
         quarter, part = divmod(4.0 * u, 1.0)
@@ -582,8 +573,8 @@ class Grower:
         """The orbits of both fields that end on the canard, or leave it."""
         if self.system.dimension != 3 or self.system.surface_count != 1:
             raise DegenerateError(
-                f"of: expected a two-fold of three states on one surface, received {self.system!r}. The "
-                "orbits that come to its canards are no surface."
+                f"of: the two-fold is one of {self.system!r}. Give one of three states on one surface, or "
+                "cut its dividing surface with starts=."
             )
         return self._from_curve(canard_curve(self.of, self.follower, self.stable), ["+", "-"])
 
@@ -633,7 +624,9 @@ class Grower:
             return np.asarray(surfaces.project(x, p, [mode.index("s")]))
 
         if not halves:
-            raise DegenerateError(f"of: expected a point that orbits slide to, received {self.of}.")
+            raise DegenerateError(
+                f"of: no orbit slides to {self.of}. Give another point or stable=."
+            )
         return point
 
     def _surface(self, seed: Any, closed: bool) -> Manifold:
@@ -641,7 +634,7 @@ class Grower:
         arcs, complete = bundle(seed, closed, f.spacing, _FIRST, self.most, self.report)
         if len(arcs) < 2:
             raise DegenerateError(
-                f"of: expected a point with orbits around it, received {self.of}."
+                f"of: fewer than two orbits start at {self.of}. Give another point."
             )
         points, table = triangles(arcs, closed, f.spacing)
         found = [arc for _, arc in arcs]
@@ -718,26 +711,25 @@ def manifold(
         periodic orbit of three states: the surface of one multiplier inside the unit circle, or one
         outside.
     stable : bool, optional
-        Whether orbits that come to the point are asked for (True) or those that leave it.
+        Whether to compute orbits that come to the point (True) or those that leave it.
     length : float
         Of the orbits on it. Not with ``starts``.
     starts : array_like (3, n), callable or orbit.ComputedStarts, optional
-        Of a two-fold of n states: a plane of starts, as a point and two directions, or as a function of
-        two coordinates that returns n expressions. The dividing surface is cut by it. With ``until``
-        also starts that are computed, with times of their own.
+        Of a two-fold of n states: a plane that cuts the dividing surface, as a point and two directions,
+        or as a function of two coordinates that returns n expressions; with ``until`` also computed
+        starts, with times of their own.
     box : array_like (2, 2)
         With ``starts``: the range of either coordinate.
     duration : float
-        With ``starts``: how long orbits are looked at. By then they are to have left the two-folds
-        to one side of the switching surface or the other. With ``until`` the longest duration of a leg.
+        With ``starts``: the duration of orbits, in which they should leave the two-folds to one side of
+        the switching surface or the other. With ``until`` the longest duration of a leg.
     until : str, optional
-        With ``starts``: the name of a stop at which orbits end, and both fields have the same component
-        across the surface, as a contact has that opens: with the load its friction vanishes. Then ``of``
-        is a two-fold there, and what is divided are ends on either side of the surface.
+        With ``starts``: the name of a stop at which orbits end and both fields have the same component
+        across the surface, as where a contact opens and friction vanishes with the load. Then ``of`` is
+        a two-fold there, and starts are divided by the side of the surface on which orbits end.
     begin : sequence of (str, (float, float)), optional
-        With ``starts``: points of one curve, each with its itinerary, that is followed from the last of
-        them on, up to the box, until it ends, or comes back to the first. Otherwise curves are looked for
-        in all of the box.
+        With ``starts``: points of one curve, each with its itinerary. It is followed from the last of
+        them until it leaves the box, ends, or closes. By default the whole box is searched.
     spacing : float, optional
         Of points along orbits and between them; a hundredth of the length unless given. With ``starts``
         the largest distance of points on bent curves, relative to half of the box or to the scale of
@@ -755,23 +747,24 @@ def manifold(
     -------
     Manifold
         Curves where the manifold has one dimension, a surface where it has two. Backward it ends
-        where it meets sliding: what arrives there comes from a whole neighbourhood. Ctrl-C ends it
-        with the orbits that it has (``complete`` is false then).
+        where it meets sliding, at which orbits arrive from a whole neighbourhood. After Ctrl-C it has
+        the orbits computed so far, and ``complete`` is False.
     DividingCurves
         With ``starts``: curves in the plane that divide orbits, made of arcs that slide into a two-fold
-        and arcs that just touch the surface, their junctions, and why they end.
+        and arcs that graze the surface, their junctions, and why they end.
 
     Raises
     ------
     DegenerateError
-        No such manifold, or one of more than two dimensions; with ``starts`` a two-fold that parts no
-        orbits, or none of the box, or a system with resets, impacts or several surfaces.
+        No such manifold, or one of more than two dimensions; with ``starts`` a two-fold that divides no
+        orbits of the box, or a system with resets, impacts or several surfaces.
     OptionError
         ``of`` is none of these points; explicit time; a length, spacing or number that is not positive.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     DefinitionError
-        ``system`` is none, or does not have the point's modes; hidden dynamics, vector multipliers.
+        ``system`` is not a FilippovSystem, or does not have the point's modes; hidden dynamics, vector
+        multipliers.
 
     Notes
     -----
@@ -780,9 +773,9 @@ def manifold(
     start at a distance of a millionth of ``length`` along eigenvectors.
 
     In n states two-folds fill a set of dimension n - 3, and the orbits that slide into it a surface of
-    dimension n - 1. A plane of starts meets it in curves. On either side orbits slide close to a two-fold
-    and leave it to different sides. A curve goes on where orbits no longer slide but touch the surface at a
-    visible fold beyond the two-folds: to one side they miss it, to the other they cross it.
+    dimension n - 1. A plane of starts cuts it in curves. On either side orbits slide close to a two-fold
+    and leave it to different sides. Beyond the two-folds a curve consists of orbits that graze the surface
+    at a visible fold: on one side they miss it, on the other they cross it.
 
     Examples
     --------
@@ -809,19 +802,13 @@ def manifold(
     require_system(system)
     if system.time_dependent:
         raise OptionError(
-            f"system: expected one without explicit time, received {system!r}. Its saddles move."
+            f"system {system!r} depends on time, so its saddles move. Give an autonomous one."
         )
     known = (Equilibrium, PseudoEquilibrium, Fold, FoldFold, TwoFold, PeriodicOrbit)
     if not isinstance(of, known):
         raise OptionError(
-            explain(
-                "of",
-                expected="an Equilibrium, a PseudoEquilibrium, a Fold, a FoldFold, a TwoFold or a "
-                "PeriodicOrbit",
-                received=f"{of!r}",
-                advice="Find it with find_equilibrium, find_pseudo_equilibrium, find_two_fold, fold or "
-                "periodic_orbit.",
-            )
+            f"of={of!r} is no Equilibrium, PseudoEquilibrium, Fold, FoldFold, TwoFold or PeriodicOrbit. "
+            "Find one with find_equilibrium, find_pseudo_equilibrium, find_two_fold or periodic_orbit."
         )
     if spacing is not None:
         spacing = real(spacing, "spacing", expected="a positive number", low=_LEAST)
@@ -832,7 +819,7 @@ def manifold(
         return _cut(system, of, stable, starts, box, end, spacing or 0.05, p, tol, progress)
     if until is not None or begin is not None:
         raise OptionError(
-            "until, begin: expected with starts=, a plane of starts, received without."
+            "until and begin apply only with starts=, a plane of starts. Give it or drop them."
         )
     long = real(length, "length", expected="a positive number", low=_LEAST)
     follower = Follower(system, p, not stable, long, spacing or long / 100, tol or 1e-10)
@@ -858,20 +845,17 @@ def _cut(
     """The dividing surface of a two-fold, cut by a plane of starts."""
     if not isinstance(of, TwoFold):
         raise OptionError(
-            f"of: expected a TwoFold with starts=, received {of!r}. Find one with find_two_fold, or "
-            "leave starts out."
+            f"of={of!r}, but starts= needs a TwoFold. Find one with find_two_fold, or drop starts."
         )
     duration, until, begin = end
     plane = plane_of(system, starts, box)
     if not plane.exact and until is None:
-        raise OptionError(
-            "starts: expected with until= where they are computed, received without. Give expressions."
-        )
+        raise OptionError("starts that are computed need until=. Give it, or give expressions.")
     if until is not None:
         require_event(system, until, of, parameters)
         if not stable:
             raise OptionError(
-                "stable: expected True with until=, received False. Stops are not met backward in time."
+                "stable=False does not go with until=, as stops are not met backward in time. Drop one."
             )
     span = real(duration, "duration", expected="a positive number", low=_LEAST)
     bar = progress_bar(None, progress, "arc")

@@ -1,4 +1,4 @@
-"""A periodic orbit written out as a run: its legs followed one after the other."""
+"""A periodic orbit as a run."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class _Leg(Protocol):
 def orbit_run(
     system: FilippovSystem, parameters: Mapping[str, float], legs: Sequence[_Leg]
 ) -> Trajectory:
-    """Follow each leg over its duration, and put them end to end."""
+    """Integrate each leg over its duration, and join them."""
     times, states, starts = list[Array](), list[Array](), list[float]()
     coefficients: list[Array] = []
     events: list[Event] = []

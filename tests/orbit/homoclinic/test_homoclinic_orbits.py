@@ -68,14 +68,14 @@ def test_what_is_no_connection_is_refused(spiral: ns.FilippovSystem) -> None:
         ns.find_homoclinic(relay, [0.5, -0.4], "c")
     z = ca.SX.sym("z")
     solid = ns.FilippovSystem([x, y, z], surface=z, above=[1, 1, -1], below=[1, 1, 1])
-    with pytest.raises(ns.ParameterError, match="among"):
+    with pytest.raises(ns.ParameterError, match="parameter"):
         ns.find_homoclinic(solid, [0.0, 0.0, 0.0], "c")
     forced = ns.FilippovSystem(
         [x], surface=x, above=[c * ca.cos(z)], below=[1], time=z, parameters={c: 1}
     )
     with pytest.raises(ns.OptionError, match="autonomous"):
         ns.find_homoclinic(forced, [0.0], "c")
-    with pytest.raises(ns.PointError, match=r"saddle.*numbers"):
+    with pytest.raises(ns.PointError, match="saddle"):
         ns.find_homoclinic(oscillator(), [0.0, 0.0, 0.0], "c")
     with pytest.raises(ns.DegenerateError, match="real saddle"):
         ns.find_homoclinic(oscillator(), [1.0, 0.0], "c")

@@ -1,4 +1,4 @@
-"""What needs a place and a motion: derivatives of runs, periodic orbits, branches, basins, futures."""
+"""Derivatives of runs, periodic and homoclinic orbits, their branches, manifolds and basins."""
 
 from ..solvers import continuation
 from .basins import Basins, basins

@@ -1,8 +1,6 @@
 """Basins have the boundaries of closed forms; interruptions lose nothing; statuses are labels."""
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -10,11 +8,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.basins import Search
+from tests.orbit.periodic_cases import CASES
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
-}
 x, y, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "lam"))
 WELL = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
 QUIET = ns.Work(threads=1, progress=False)
@@ -24,7 +19,7 @@ QUIET = ns.Work(threads=1, progress=False)
 def test_thresholds_of_the_double_well_to_rounding_by_narrowing_the_grid():
     """B2: released at rest from x0; each threshold is bracketed by labels and narrowed."""
     for threshold, low, high in zip(
-        map(float, CASES["B2"]["values"]["thresholds"]),
+        map(float, CASES["B2"]["thresholds"]),
         (2.2, 3.1, 4.5),
         (2.6, 3.6, 4.9),
         strict=True,

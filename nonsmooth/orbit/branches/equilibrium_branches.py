@@ -130,17 +130,17 @@ class Equilibria(BranchCurve):
             return None  # a neutral saddle
         numbers = {"frequency": frequency}
         value = self.lyapunov(u, frequency)
-        words = "a pair of eigenvalues crosses the imaginary axis"
+        verdict = "a pair of eigenvalues crosses the imaginary axis"
         if np.isfinite(value):
             numbers["first Lyapunov coefficient"] = value
             rest = np.delete(values, pair)
             stable = value < 0.0 and bool(np.all(rest.real < 0.0))
             kind = "supercritical" if value < 0.0 else "subcritical"
             if abs(value) <= 10.0 * self._vague(u, frequency, value):
-                words += ": degenerate to rounding"
+                verdict += ": degenerate to rounding"
             else:
-                words += f": orbits branch off ({kind}{', stable' if stable else ''})"
-        side = FarSide("", words, ReadOnly(numbers))
+                verdict += f": orbits branch off ({kind}{', stable' if stable else ''})"
+        side = FarSide("", verdict, ReadOnly(numbers))
         return self.described(zero, "Hopf", far_side=side, coefficients=ReadOnly(numbers))
 
     def boundary(self, zero: Zero, k: int) -> BranchEvent:
@@ -293,10 +293,10 @@ class PseudoEquilibriumCurve(Equilibria):
         if zero.name.startswith("alpha"):
             return self.boundary(zero, int(zero.name[-1]))
         if zero.name.startswith("intersection"):
-            words = (
+            verdict = (
                 f"it reaches surface {zero.name.split()[-1]}: not followed onto the intersection"
             )
-            return self.described(zero, "intersection", far_side=FarSide("", words))
+            return self.described(zero, "intersection", far_side=FarSide("", verdict))
         if zero.name == "two-fold":
             numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
             side = FarSide("", "sliding changes between attracting and repelling")

@@ -147,8 +147,8 @@ def _equilibrium(
     except (NonsmoothError, np.linalg.LinAlgError):
         return None
     label, verdict = event.solution.label, event.far_side.verdict
-    words = f"the orbit shrinks to a boundary equilibrium of F{curve.k + 1} ({label}; {verdict})"
-    side_of = FarSide("", words, event.far_side.numbers)
+    verdict = f"the orbit shrinks to a boundary equilibrium of F{curve.k + 1} ({label}; {verdict})"
+    side_of = FarSide("", verdict, event.far_side.numbers)
     return replace(event, solution=orbit, far_side=side_of, coefficients=side_of.numbers)
 
 
@@ -174,5 +174,5 @@ def _two_fold(
         return None
     if root is None or not np.abs(root[:-1] - x).max() < reach:
         return None
-    words = "the orbit shrinks to a two-fold, at which sliding changes its stability"
-    return BranchEvent("two-fold", float(root[-1]), orbit, FarSide("", words))
+    verdict = "the orbit shrinks to a two-fold, at which sliding changes its stability"
+    return BranchEvent("two-fold", float(root[-1]), orbit, FarSide("", verdict))

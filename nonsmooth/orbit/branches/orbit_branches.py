@@ -313,8 +313,8 @@ class OrbitCurve(OrbitEquations):
         n = self.system.dimension
         middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[:n]
         found = hopf_point(self.system, leg.mode, middle, p, self.free[-1])
-        words = "the orbit shrinks to an equilibrium"
-        event = self._event("Hopf", self, zero.point, "", FarSide("", words))
+        verdict = "the orbit shrinks to an equilibrium"
+        event = self._event("Hopf", self, zero.point, "", FarSide("", verdict))
         if found is None:
             return event
         numbers = ReadOnly({"frequency": found[2]})
@@ -410,9 +410,9 @@ _RESONANT = 1e-4
 
 def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
     """Classify a smooth bifurcation."""
-    words, numbers = _VERDICTS[kind], dict[str, float]()
+    verdict, numbers = _VERDICTS[kind], dict[str, float]()
     if kind in ("fold", "branch point"):
-        return FarSide("", words)
+        return FarSide("", verdict)
     values = np.linalg.eigvals(return_map(problem, at))
     critical = [int(np.argmin(np.abs(values + 1.0)))]
     if kind == "Neimark-Sacker":
@@ -422,19 +422,19 @@ def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -
             return None  # a neutral saddle: two real multipliers with the product 1
         numbers["angle"] = angle = float(abs(np.angle(one)))
         if min(abs(3.0 * angle - 2.0 * np.pi), abs(4.0 * angle - 2.0 * np.pi)) < _RESONANT:
-            return FarSide("", f"{words}; not classified: a strong resonance", ReadOnly(numbers))
+            return FarSide("", f"{verdict}; not classified: a strong resonance", ReadOnly(numbers))
     found = normal_form(problem, at, p, kind)
     if not found:
-        return FarSide("", f"{words}; not classified: no orbits beside it", ReadOnly(numbers))
+        return FarSide("", f"{verdict}; not classified: no orbits beside it", ReadOnly(numbers))
     value, error = found.values()
     numbers |= found
     if abs(value) <= 10.0 * error:
-        return FarSide("", f"{words}; degenerate to rounding", ReadOnly(numbers))
+        return FarSide("", f"{verdict}; degenerate to rounding", ReadOnly(numbers))
     grows = (value < 0.0) if kind == "Neimark-Sacker" else (value > 0.0)
     rest = np.delete(values, critical)
     stable = grows and bool(np.all(np.abs(rest) < 1.0))
     what = "supercritical" if grows else "subcritical"
-    return FarSide("", f"{words} ({what}{', stable' if stable else ''})", ReadOnly(numbers))
+    return FarSide("", f"{verdict} ({what}{', stable' if stable else ''})", ReadOnly(numbers))
 
 
 #: Error of the multiplier -1 at a branch point, which is located to about the square root of rounding.

@@ -140,15 +140,17 @@ def impact_numbers(
     numbers = {"leading multiplier": abs(leading), "its angle": float(np.angle(leading))}
     y = touched(problem, test, at, p)
     own = leg.field(system).rate.copied(leg.field(system).states_at(y, p), p)[0][:n, 0]
-    hit = Leg(leg.mode, guard.name, guard.kind).at_end(system, y, p)
-    if y.size != hit.gradient.size or np.abs(hit.after - y).max() > 1e-6 * (1 + np.abs(y).max()):
+    event = Leg(leg.mode, guard.name, guard.kind).at_end(system, y, p)
+    if y.size != event.gradient.size or np.abs(event.after - y).max() > 1e-6 * (
+        1 + np.abs(y).max()
+    ):
         return numbers
     sign = -guard.side if guard.kind == "reset" else 1
-    normal = (sign or 1) * hit.gradient
+    normal = (sign or 1) * event.gradient
     found = guard_rate_gradient(system, leg.mode, guard.name).copied(y, p)[0]
     rate = found.ravel() * (sign or 1)
     bend = float(rate @ own)
-    jump = (hit.after_state @ own - own) / bend
+    jump = (event.after_state @ own - own) / bend
     push = jump - own * float(rate @ jump) / bend
     outside = _around(problem, test, at, p, own, rate)
     after = outside @ push

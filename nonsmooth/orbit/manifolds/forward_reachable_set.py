@@ -206,12 +206,12 @@ def funnel(
     >>> import casadi as ca, nonsmooth as ns
     >>> x = ca.SX.sym("x")
     >>> system = ns.FilippovSystem([x], surface=x, above=[1], below=[-1])
-    >>> futures = ns.orbit.funnel(system, [0.0], 2.0, samples=5)
-    >>> futures
+    >>> reached = ns.orbit.funnel(system, [0.0], 2.0, samples=5)
+    >>> reached
     Funnel(repelling sliding of h0 at t = 0, 5 members: 2 +, 2 -, 1 s)
-    >>> futures(1.5)[:, 0]
+    >>> reached(1.5)[:, 0]
     array([ 1.5,  0.5, -1.5, -0.5,  0. ])
-    >>> print(futures.departures[1])
+    >>> print(reached.departures[1])
     leaves to + from path 0 at t = 1
     """
     if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 3:

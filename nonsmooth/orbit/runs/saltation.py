@@ -63,13 +63,9 @@ class Ended(Protocol):
     @property
     def rate(self) -> Array: ...
     @property
-    def after(self) -> Array: ...
-    @property
     def after_state(self) -> Array: ...
     @property
     def after_parameters(self) -> Array: ...
-    @property
-    def value(self) -> Array: ...
     @property
     def gradient(self) -> Array: ...
     @property
@@ -80,17 +76,15 @@ class _One(NamedTuple):
     """One event, stacked."""
 
     rate: Array
-    after: Array
     after_state: Array
     after_parameters: Array
-    value: Array
     gradient: Array
     value_parameters: Array
 
     @classmethod
     def of(cls, at: AtEvent, rate: Array) -> _One:
-        rows = (rate, at.after, at.after_state, at.after_parameters, np.array(at.value))
-        return cls(*[row[None] for row in (*rows, at.gradient, at.by_parameters)])
+        rows = (rate, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
+        return cls(*[row[None] for row in rows])
 
 
 def saltations(

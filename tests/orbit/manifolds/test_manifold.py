@@ -1,8 +1,6 @@
 """Manifolds are those of closed forms: separatrices through switches, thresholds, surfaces."""
 
-import json
 import sys
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -10,11 +8,8 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.manifolds.invariant_manifolds import Follower
+from tests.orbit.periodic_cases import CASES, PARAMETERS
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
-}
 x, y, z, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "t", "lam"))
 
 
@@ -49,14 +44,14 @@ def test_thresholds_of_the_double_well_are_on_the_orbits_through_its_fold():
             # close to v = 0 the curve is a parabola in v
             near = slice(k - 3, k + 5)
             thresholds.append(np.polyval(np.polyfit(w[near], p[near], 4), 0.0))
-    truth = [float(value) for value in CASES["B2"]["values"]["thresholds"]]
+    truth = [float(value) for value in CASES["B2"]["thresholds"]]
     assert sorted(thresholds)[:3] == pytest.approx(truth, abs=1e-9)
 
 
 def test_the_homoclinic_orbit_leaves_by_the_fold_and_ends_at_the_pseudo_saddle():
     """H1: at the homoclinic parameter the stable manifold begins at the visible fold."""
-    values = {k: float(s) for k, s in CASES["H1"]["values"].items()}
-    rho, c = float(CASES["H1"]["parameters"]["rho"]), values["c_homoclinic"]
+    values = {k: float(s) for k, s in CASES["H1"].items()}
+    rho, c = float(PARAMETERS["H1"]["rho"]), values["c_homoclinic"]
     system = ns.FilippovSystem(
         [x, y], surface=y, above=[rho * x - (y - 1), x + rho * (y - 1)], below=[c, 1]
     )
@@ -115,15 +110,8 @@ def test_an_interrupted_surface_keeps_its_orbits(monkeypatch):
     system = ns.FilippovSystem(
         [x, y, z], surface=x + 9, above=[-x, -y, z], below=[-x, -y, z + 0 * x]
     )
-    saddle, plain, calls = ns.find_equilibrium(system, [0.1, 0.1, 0.1]), Follower.arc, []
-
-    def arc(*args):
-        calls.append(1)
-        if len(calls) > 9:
-            raise KeyboardInterrupt
-        return plain(*args)
-
-    monkeypatch.setattr(Follower, "arc", arc)
+    saddle = ns.find_equilibrium(system, [0.1, 0.1, 0.1])
+    interrupt_after(monkeypatch, 9)
     found = ns.manifold(system, saddle, length=0.5, spacing=0.1)
     assert not found.complete and len(found.arcs) == 9 and "interrupted" in repr(found)
     assert np.abs(found.points[:, 2]).max() < 1e-12

@@ -1,19 +1,14 @@
 """Lyapunov exponents are those of closed forms: chaotic maps in flows, forced friction, linear decay."""
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import CASES, PARAMETERS
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
-}
 x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
 
 
@@ -22,7 +17,7 @@ def test_doubling_of_an_angle_by_squaring():
     clock, pull = ns.Clock(1.0, map=[u**2 - v**2, 2 * u * v]), (1 - u**2 - v**2) / 2
     system = ns.FilippovSystem([u, v], field=[u * pull, v * pull], clocks=clock)
     found = ns.lyapunov_spectrum(system, [math.cos(0.7), math.sin(0.7), 0.0], t_end=320.0)
-    truth = [float(value) for value in CASES["L2"]["values"]["spectrum"]]
+    truth = [float(value) for value in CASES["L2"]["spectrum"]]
     assert np.allclose(found.exponents, truth, rtol=0, atol=1e-9)
     assert np.all(found.errors < 1e-7) and found.t == pytest.approx(288.0)
     assert found.sum_check == pytest.approx(sum(truth), abs=1e-9)
@@ -40,7 +35,7 @@ def test_chebyshev_map_at_the_ticks_of_a_clock():
 
 def test_sum_of_forced_friction_is_that_of_its_closed_form():
     """D1: no sticking; the volume shrinks at the reversals only."""
-    p, values = CASES["D1"]["parameters"], CASES["D1"]["values"]
+    p, values = PARAMETERS["D1"], CASES["D1"]
     W = float(p["W"])
     system = ns.FilippovSystem(
         [x, v],

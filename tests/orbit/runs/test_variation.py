@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import json
 import pickle
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
@@ -13,11 +11,7 @@ from hypothesis import assume, given, settings
 from hypothesis import strategies as st
 
 import nonsmooth as ns
-
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
-}
+from tests.orbit.periodic_cases import CASES
 
 
 def throw() -> ns.FilippovSystem:
@@ -36,7 +30,7 @@ def throw() -> ns.FilippovSystem:
 
 
 def test_gradients_through_crossing_impact_and_entry_are_the_closed_forms() -> None:
-    values = CASES["G1"]["values"]
+    values = CASES["G1"]
     run = ns.simulate(throw(), [0.0, 3.0], t_end=2.0, tol=1e-14)
     s = ns.sensitivity(run)
     expected = {k: float(v) for k, v in values["dx_T"].items()}
@@ -258,7 +252,7 @@ def test_saltation_matrices_are_those_of_exact_fractions() -> None:
     def exact(rows) -> np.ndarray:
         return np.array([[eval(v) for v in row] for row in rows])  # fractions such as "-1/2"
 
-    values, at = CASES["S1"]["values"], [0.0, 0.0]
+    values, at = CASES["S1"], [0.0, 0.0]
     crossing = ns.FilippovSystem([x, y], surface=y, above=[1, -2], below=[3, -1])
     assert np.array_equal(
         ns.orbit.saltation_matrix(crossing, "+", "-", at), exact(values["crossing"])

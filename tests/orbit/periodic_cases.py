@@ -15,6 +15,10 @@ CASES: dict[str, dict[str, Any]] = {case["id"]: case["values"] for case in _DATA
 PARAMETERS: dict[str, dict[str, Any]] = {case["id"]: case.get("parameters", {}) for case in _DATA}
 
 
+def kinds(branch: ns.orbit.Branch) -> list[str]:
+    return [event.kind for event in branch.events]
+
+
 def symbols(names: str) -> list[ca.SX]:
     return [ca.SX.sym(name) for name in names.split()]
 

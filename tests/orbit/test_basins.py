@@ -19,10 +19,7 @@ QUIET = ns.Work(threads=1, progress=False)
 def test_thresholds_of_the_double_well_to_rounding_by_narrowing_the_grid():
     """B2: released at rest from x0; each threshold is bracketed by labels and narrowed."""
     for threshold, low, high in zip(
-        map(float, CASES["B2"]["thresholds"]),
-        (2.2, 3.1, 4.5),
-        (2.6, 3.6, 4.9),
-        strict=True,
+        map(float, CASES["B2"]["thresholds"]), (2.2, 3.1, 4.5), (2.6, 3.6, 4.9), strict=True
     ):
         for _ in range(6):
             axis = np.linspace(low, high, 41)
@@ -71,10 +68,7 @@ def test_forced_systems_are_sampled_after_each_period():
 
 def test_statuses_are_labels():
     system = ns.FilippovSystem(
-        [x, v],
-        field=[v, -1],
-        resets=ns.Reset(x, [x, -0.5 * v], -1),
-        stops=ns.Stop(x - 4, 1),
+        [x, v], field=[v, -1], resets=ns.Reset(x, [x, -0.5 * v], -1), stops=ns.Stop(x - 4, 1)
     )
     starts = [[1.0, 0.0], [1.0, 4.0], [-1e-3, 0.0], [-2e-3, 0.0]]
     found = ns.basins(system, starts, t_end=50.0, rounds=4, work=QUIET)
@@ -82,7 +76,7 @@ def test_statuses_are_labels():
     assert "stopped 25.00%" in repr(found)
 
 
-def test_what_runs_to_infinity_in_a_finite_time_has_failed():
+def test_escape_to_infinity_in_finite_time_is_labelled_failed():
     """x' = x^2 - 1 from 2 is infinite at ln(3)/2; from 0 it comes to -1."""
     found = ns.basins(
         ns.FilippovSystem([x], field=[x**2 - 1]), [[0.0], [2.0]], t_end=40.0, work=QUIET
@@ -160,6 +154,6 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
         ([0.0, 0.0], {"attractors": [[1.0]]}, ns.PointError, "attractors"),
     ],
 )
-def test_bad_requests_are_refused(grid, options, error, message):
+def test_invalid_arguments_raise(grid, options, error, message):
     with pytest.raises(error, match=message):
         ns.basins(WELL, grid, **{"t_end": 10.0, **options})

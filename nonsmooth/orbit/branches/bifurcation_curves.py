@@ -14,11 +14,12 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.ensembles.progress import progress_bar
 from ...model import Array, ConvergenceError, DefinitionError, OptionError, whole
 from ...model.checks import positive
 from ...solvers.continuation import Arc, Curve, Point, Secant, Zero, directions, trace
 from ..homoclinic.homoclinic_orbits import Connection
-from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of, progress_bar
+from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
 from .homoclinic_curves import ConnectionCurve, event_of
 
 _NAMES = {
@@ -273,7 +274,7 @@ def continue_bifurcation(
     k = start.size - 2
     start = _on_curve(curve, start, event.kind)
     halves: list[Arc] = []
-    tangent, bar = directions(curve, start)[0], progress_bar(progress)
+    tangent, bar = directions(curve, start)[0], progress_bar(None, progress, " points")
     for way in (-tangent, tangent):
         if halves and halves[0].end in ("closed", "interrupted"):
             break
@@ -288,11 +289,10 @@ def continue_bifurcation(
                 step=step,
                 most=max_points,
                 bounds=ends,
-                report=None if bar is None else lambda _: bar.update(),
+                report=lambda _: bar.update(),
             )
         )
-    if bar is not None:
-        bar.close()
+    bar.close()
     points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
     zeros = [*reversed(halves[0].zeros), *(halves[1].zeros if len(halves) > 1 else ())]
     for u in (points[0], points[-1]):

@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.ensembles.progress import progress_bar
 from ...local.read_only import ReadOnly
 from ...model import (
     Array,
@@ -381,12 +382,12 @@ def follow_branch(
     """Continue a solution both ways to the bounds of the parameter, or one way ``away`` from an event."""
     if not isinstance(through, (bool, np.bool_)):
         raise OptionError(f"through={through!r} is no truth value. Give True or False.")
-    bar = progress_bar(progress)
+    bar = progress_bar(None, progress, " points")
 
     def report(point: Point) -> None:
-        if bar is not None:
+        if progress:
             bar.set_postfix_str(f"{name} = {point.u[-1]:.6g}", refresh=False)
-            bar.update()
+        bar.update()
 
     forward = np.zeros(start.size)
     forward[-1] = 1.0
@@ -399,22 +400,12 @@ def follow_branch(
             halves.append(_Half(end=halves[0].end))
             continue
         halves.append(_half(way, through, options))
-    if bar is not None:
-        bar.close()
+    bar.close()
     branch = _joined(name, *halves)
     for at, point in (branch.nodes[0], branch.nodes[-1]):
         assert isinstance(at, BranchCurve)
         at.require_valid(point.u)
     return branch
-
-
-def progress_bar(progress: bool) -> Any:
-    """A bar that counts points, shown after a second; None without ``progress``."""
-    if not progress:
-        return None
-    from tqdm import tqdm  # here: it is not needed to import the library
-
-    return tqdm(disable=None, delay=1.0, unit=" points")
 
 
 @dataclass

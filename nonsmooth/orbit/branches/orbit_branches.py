@@ -627,10 +627,7 @@ def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list
     across = across / np.linalg.norm(across)
     phase = slope @ across
     problem = BoundaryProblem(
-        system,
-        (Leg(mode),),
-        phase=phase / np.linalg.norm(phase),
-        reference=at.point.copy(),
+        system, (Leg(mode),), phase=phase / np.linalg.norm(phase), reference=at.point.copy()
     )
     u = np.concatenate([at.point, [period], p[list(free)]])
     curve = OrbitCurve(problem, p, free, np.ones(1), u[: n + 1], np.inf)

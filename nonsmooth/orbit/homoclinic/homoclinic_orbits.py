@@ -35,15 +35,7 @@ from ...solvers.newton import Equations, converge, solve
 from ..periodic.orbit import OrbitLeg, named
 from ..periodic.orbit_run import orbit_run
 from ..runs.legs import Leg, Stretch, stretches
-from .loops import (
-    NEAR,
-    Loop,
-    PseudoSaddleLoop,
-    SaddleLoop,
-    Spectrum,
-    equilibrium_of,
-    spectrum_of,
-)
+from .loops import NEAR, Loop, PseudoSaddleLoop, SaddleLoop, Spectrum, equilibrium_of, spectrum_of
 
 # Guesses: orbits of an unstable manifold that return near the saddle -------------------------------
 

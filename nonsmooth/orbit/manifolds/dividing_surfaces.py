@@ -315,10 +315,7 @@ class DividingTracer:
         before = self.passages.passage(rows[0], itinerary if initial is None else initial)
         begin = ""
         for departure, arc in pieces(
-            start,
-            self._trace,
-            self._following,
-            last=lambda arc: arc.end in _ENDS,
+            start, self._trace, self._following, last=lambda arc: arc.end in _ENDS
         ):
             assert isinstance(departure.curve, StartCurve)
             made, before = self._made(departure.curve, arc, before)

@@ -66,11 +66,7 @@ class SlidingOrbits:
         return 100.0 / float(np.quantile(speed, 0.1)) if speed.size else 1.0
 
     def follow(
-        self,
-        start: Array,
-        ahead: bool = True,
-        cut: Cut | None = None,
-        tol: float = _TOLERANCE,
+        self, start: Array, ahead: bool = True, cut: Cut | None = None, tol: float = _TOLERANCE
     ) -> Array:
         """Follow the sliding orbit from a state to a fold, the edge of the box or rest."""
         scan, x = self.scan, start

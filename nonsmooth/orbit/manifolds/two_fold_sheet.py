@@ -174,13 +174,7 @@ class TwoFoldSheet:
         )
 
     def _met(
-        self,
-        point: Array,
-        fold: Array,
-        duration: float,
-        gap: float,
-        across: Array,
-        matrix: Array,
+        self, point: Array, fold: Array, duration: float, gap: float, across: Array, matrix: Array
     ) -> Meeting:
         n = point.size
         target = np.zeros(n + 3)

@@ -88,10 +88,7 @@ class _One(NamedTuple):
 
 
 def saltations(
-    ends: Ended,
-    after: Array,
-    named: Callable[[int], str],
-    events: NDArray[np.bool_] | None = None,
+    ends: Ended, after: Array, named: Callable[[int], str], events: NDArray[np.bool_] | None = None
 ) -> Saltation:
     """Saltation matrices of the events of many legs, stacked."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state

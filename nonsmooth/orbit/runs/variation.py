@@ -191,9 +191,7 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     parts = stretches(run)
     try:
         flight = Flights(system, [part.leg for part in parts], chosen)(
-            np.array([part.start for part in parts]),
-            np.array([part.duration for part in parts]),
-            p,
+            np.array([part.start for part in parts]), np.array([part.duration for part in parts]), p
         )
     except ConvergenceError:
         found = _one_by_one(run, parts, p, chosen)

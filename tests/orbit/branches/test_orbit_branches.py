@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import (
     CASES,
     excited_oscillator,
@@ -13,6 +14,7 @@ from tests.orbit.periodic_cases import (
     friction_oscillator,
     grazing_circle,
     impact_oscillator,
+    kinds,
     relay,
     scalar_relay,
     symbols,
@@ -28,10 +30,6 @@ def number(case, name):
 
 def digits(case, name):
     return pytest.approx(number(case, name), rel=1e-12, abs=0)
-
-
-def kinds(branch):
-    return [event.kind for event in branch.events]
 
 
 @pytest.fixture(scope="module")
@@ -195,15 +193,7 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
 def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    count, evaluation = [0], type(orbit.problem).evaluation
-
-    def interrupted(*args, **more):
-        count[0] += 1
-        if count[0] == calls:
-            raise KeyboardInterrupt
-        return evaluation(*args, **more)
-
-    monkeypatch.setattr(type(orbit.problem), "evaluation", interrupted)
+    interrupt(monkeypatch, type(orbit.problem), "evaluation", calls - 1, once=True)
     branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in branch.ends
     assert len(branch) >= calls // 10

@@ -381,7 +381,7 @@ def test_one_of_a_family_of_orbits() -> None:
 # Bad input ---------------------------------------------------------------------------------------
 
 
-def test_runs_that_do_not_close_are_refused() -> None:
+def test_runs_that_do_not_close_raise() -> None:
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     away = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[1, -x])
     with pytest.raises(ns.ConvergenceError, match="does not close"):
@@ -390,7 +390,7 @@ def test_runs_that_do_not_close_are_refused() -> None:
         ns.periodic_orbit(away, [2.0, 1.0], itinerary=[("-", "h0"), ("+", "h0")])
 
 
-def test_virtual_orbits_are_refused_unless_asked_for() -> None:
+def test_virtual_orbits_raise_without_the_option() -> None:
     system = grazing_circle()
     at = {"d": 0.9}
     free = ns.periodic_orbit(system, ns.simulate(system, [0.9, 0.0], 40, parameters={"d": 1.1}))
@@ -401,7 +401,7 @@ def test_virtual_orbits_are_refused_unless_asked_for() -> None:
     assert virtual.is_virtual and str(virtual).startswith("Virtual periodic orbit")
 
 
-def test_what_cannot_be_is_said() -> None:
+def test_invalid_arguments_raise() -> None:
     system = forced_friction()
     run = ns.simulate(system, [1.5, 0.0], 60.0)
     with pytest.raises(ns.ParameterError, match="mu"):
@@ -423,7 +423,7 @@ def test_no_convergence_names_the_leg() -> None:
         )
 
 
-def test_a_guess_that_goes_round_several_times_gives_the_orbit_once() -> None:
+def test_a_guess_of_several_periods_gives_the_prime_period() -> None:
     # Multipliers are a pair at 156 degrees, so a run comes back best after five periods.
     buck = ns.textbook.buck_converter()
     orbit = ns.periodic_orbit(buck.system, buck.run(tol=1e-13))

@@ -7,6 +7,8 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.orbit.runs import lyapunov
+from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import CASES, PARAMETERS
 
 x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
@@ -99,26 +101,16 @@ def test_lyapunov_spectra_are_saved(tmp_path):
         ({"t_end": 3.0}, ns.DegenerateError, "STOPPED"),
     ],
 )
-def test_what_cannot_be_counted_is_refused(options, error, message):
+def test_invalid_options_raise(options, error, message):
     system = ns.FilippovSystem([x], field=[1], stops=ns.Stop(x - 2))
     with pytest.raises(error, match=message):
         ns.lyapunov_spectrum(system, [0.0], **options)
 
 
-def test_interruption_keeps_what_was_counted(monkeypatch):
-    from nonsmooth.orbit.runs import lyapunov
-
+def test_an_interrupt_keeps_the_exponents_so_far(monkeypatch):
     clock = ns.Clock(1.0, map=[x / 2])
     system = ns.FilippovSystem([x], field=[0.0 * x], clocks=clock)
-    calls = iter(range(10**6))
-
-    def fly(*args):
-        if next(calls) > 100:
-            raise KeyboardInterrupt
-        return plain(*args)
-
-    plain = lyapunov.fly
-    monkeypatch.setattr(lyapunov, "fly", fly)
+    interrupt(monkeypatch, lyapunov, "fly", 101)
     found = ns.lyapunov_spectrum(system, [1.0, 0.0], t_end=200.0, transient=40.0, k=2)
     assert not found.complete and 10.0 <= found.t < 160.0 and "interrupted" in repr(found)
     assert np.allclose(np.sort(found.exponents), [-math.log(2), 0.0], atol=1e-9)

@@ -74,7 +74,7 @@ def test_jacobians_of_returns_multiply():
         assert np.allclose(whole, product, atol=1e-9)
 
 
-def test_a_start_on_the_section_is_no_hit_and_hits_may_be_passed_over():
+def test_a_start_on_the_section_is_no_return_and_returns_can_be_skipped():
     circle = ns.FilippovSystem([x, y], field=[-y, x])
     found = ns.orbit.poincare(circle, y, [1.0, 0.0], count=2, skip=1)
     assert np.allclose(found.t, [4 * math.pi, 6 * math.pi]) and "2 returns to section" in repr(
@@ -93,7 +93,7 @@ def test_a_period_may_be_an_expression_in_parameters():
     assert np.allclose(found.jacobian(2), [[math.exp(-0.5)]], atol=1e-12)
 
 
-def test_a_run_that_ends_before_has_fewer_hits(tmp_path):
+def test_a_run_that_ends_early_has_fewer_returns(tmp_path):
     away = ns.FilippovSystem([x, y], field=[-y, x], stops=ns.Stop(x + 0.5, -1))
     found = ns.orbit.poincare(away, x, [1.0, 0.0], count=4, direction=0)
     assert len(found.t) == 1 and found.run.events[-1].name == "stop"

@@ -154,7 +154,9 @@ class Equilibria(BranchCurve):
             "persistence": "persistence: one continues the other",
             "nonsmooth fold": "nonsmooth fold: equilibrium and pseudo-equilibrium annihilate",
         }.get(found.unfolding, "degenerate")
-        onward = "equilibrium" if isinstance(self, PseudoEquilibriumCurve) else "pseudo-equilibrium"
+        onward = (
+            "equilibrium" if isinstance(self, _PseudoEquilibriumCurve) else "pseudo-equilibrium"
+        )
         side = FarSide(onward, verdict, found.numbers)
         event = self.described(zero, "boundary equilibrium", far_side=side)
         return replace(event, solution=found)
@@ -241,11 +243,11 @@ class EquilibriumCurve(Equilibria):
         """Pseudo-equilibria with 0 < alpha < 1."""
         x, value, near = zero.point.u[: self.n], zero.point.u[-1], self._on(zero.name)
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
-        curve = PseudoEquilibriumCurve(near.where, self.free, scale)
+        curve = _PseudoEquilibriumCurve(near.where, self.free, scale)
         return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
 
 
-class PseudoEquilibriumCurve(Equilibria):
+class _PseudoEquilibriumCurve(Equilibria):
     """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
 
     def mode_at(self, u: Array) -> str:
@@ -431,7 +433,7 @@ def continue_equilibrium(
         pseudo = find_pseudo_equilibrium(system, near, **given)
         size = max(1.0, float(np.abs(pseudo.point).max()))
         scale = np.append(np.full(system.dimension, size), [1.0, high - low])
-        curve = PseudoEquilibriumCurve(where, (index,), scale)
+        curve = _PseudoEquilibriumCurve(where, (index,), scale)
         start = np.append(pseudo.point, [pseudo.alpha, value])
     else:
         found = find_equilibrium(system, near, side=side, **given)

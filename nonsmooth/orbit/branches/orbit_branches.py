@@ -108,7 +108,7 @@ class OrbitCurve(OrbitEquations):
 
     def ends_at(self, zero: Zero) -> bool:
         """As by name; also at a period doubling of doubled orbits, beyond which they repeat."""
-        doubled = zero.name == "branch point" and as_doubling(self, zero) is not None
+        doubled = zero.name == "branch point" and _as_doubling(self, zero) is not None
         return doubled or self.ends(zero.name)
 
     def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
@@ -299,10 +299,10 @@ class OrbitCurve(OrbitEquations):
             return self._hopf(zero)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
         if zero.name == "branch point":
-            shorter = as_doubling(self, zero) or as_pitchfork(self, zero)
+            shorter = _as_doubling(self, zero) or _as_pitchfork(self, zero)
             if shorter is not None:
                 return self._event(*shorter)
-        side = smooth_side(self.problem, at, p, zero.name)
+        side = _smooth_side(self.problem, at, p, zero.name)
         return None if side is None else self._event(zero.name, self, zero.point, zero.name, side)
 
     def _hopf(self, zero: Zero) -> BranchEvent:
@@ -408,7 +408,7 @@ _VERDICTS = {
 _RESONANT = 1e-4
 
 
-def smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
+def _smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
     """Classify a smooth bifurcation."""
     verdict, numbers = _VERDICTS[kind], dict[str, float]()
     if kind in ("fold", "branch point"):
@@ -444,7 +444,7 @@ _PARTS = 1e-3
 Located = tuple[str, OrbitCurve, Point, str, FarSide]
 
 
-def as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
+def _as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
     """Recognise a branch point as the period doubling of an orbit of half the period."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
     problem, once = once_round(curve.problem, u[: curve.problem.size], p)
@@ -454,7 +454,7 @@ def as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
     return _part(curve, problem, once, zero, "period doubling")
 
 
-def as_pitchfork(curve: OrbitCurve, zero: Zero) -> Located | None:
+def _as_pitchfork(curve: OrbitCurve, zero: Zero) -> Located | None:
     """Recognise a branch point as the pitchfork of an orbit that is symmetric under a reflection."""
     u, p = zero.point.u, curve.parameters_at(zero.point.u)
     for problem, half in halves(curve.problem, u[: curve.problem.size], p):
@@ -478,7 +478,7 @@ def _part(
         return None
     if point is None or not float(np.abs(values + 1.0).min()) < _PARTS:
         return None
-    side = smooth_side(problem, at, made.parameters_at(u), kind)
+    side = _smooth_side(problem, at, made.parameters_at(u), kind)
     return None if side is None else (kind, made, point, kind, side)
 
 

@@ -66,7 +66,7 @@ class Departure:
     size: float  # largest distance from the saddle
 
 
-def saddle_at(
+def _saddle_at(
     system: FilippovSystem, saddle: object, p: Array
 ) -> tuple[str, Equilibrium | PseudoEquilibrium]:
     """The saddle nearest to a given one or a point, and its mode."""
@@ -221,7 +221,7 @@ def _in_parts(
     )
 
 
-def flight_to(
+def _flight_to(
     system: FilippovSystem, saddle: PseudoEquilibrium, p: Array
 ) -> tuple[str, list[Leg], list[Array], list[float]]:
     """The orbit from a visible fold that lands nearest to a pseudo-saddle of the plane."""
@@ -478,9 +478,9 @@ def find_homoclinic(
     if guess is not None:
         given[parameter] = guess
     p, index = system.parameter_vector(given), names.index(parameter)
-    mode, at = saddle_at(system, saddle, p)
+    mode, at = _saddle_at(system, saddle, p)
     if isinstance(at, PseudoEquilibrium) and system.dimension == 2:
-        side, legs, starts, durations = flight_to(system, at, p)
+        side, legs, starts, durations = _flight_to(system, at, p)
         loop = PseudoSaddleLoop(system, legs, (index,), p, side)
         u = _solved(loop, loop.pack(starts, durations, at), parameter, max_iterations)
         return connection_of(loop, u, parameter)

@@ -363,8 +363,8 @@ class DividingTracer:
             return self.passages.simulated(u + _CIRCLE * self.passages.scale * way)
 
         straight = float(np.arctan2(tangent[1], tangent[0]))
-        for angle, a, b in changes_around(ahead, last_side, straight):
-            common = common_start(a, b)
+        for angle, a, b in changes_around(ahead, _last_side, straight):
+            common = _common_start(a, b)
             if common:
                 yield common, np.array([np.cos(angle), np.sin(angle)])
 
@@ -394,12 +394,12 @@ class DividingTracer:
         return made, after
 
 
-def last_side(itinerary: str) -> int:
+def _last_side(itinerary: str) -> int:
     """The side on which an itinerary ends: 1, -1, or 0 while it slides."""
     return {"+": 1, "-": -1}.get(itinerary[-1:], 0)
 
 
-def common_start(a: str, b: str) -> str:
+def _common_start(a: str, b: str) -> str:
     """The common beginning of two itineraries."""
     differ = (k for k, (p, q) in enumerate(zip(a, b, strict=False)) if p != q)
     return a[: next(differ, min(len(a), len(b)))]
@@ -559,7 +559,7 @@ class EventPassages:
         arrival = fixed.arrive(x, t)
         by_start = None if slope is None else fixed.derivative(arrival)[1] @ slope
         found = self.decided(arrival, itinerary, by_start)
-        if last_side(itinerary[0]) * self.numbers(x, t).h < 0.0:
+        if _last_side(itinerary[0]) * self.numbers(x, t).h < 0.0:
             return replace(found, fault="the start is on the wrong side of the surface")
         return found
 
@@ -618,7 +618,7 @@ class EventPassages:
         return run.itinerary.replace(" ", "")
 
 
-class TwoFoldPassages:
+class _TwoFoldPassages:
     """Orbits that two-folds divide."""
 
     exact = True
@@ -816,7 +816,7 @@ class DividingCurves(Savable):
 
 
 @dataclass(frozen=True)
-class Plane:
+class _Plane:
     """A plane of starts with a box in it."""
 
     start: Callable[[Array], Start]
@@ -831,7 +831,7 @@ class Plane:
         return float(np.linalg.norm(corners - corners.mean(axis=0), axis=1).max()) or 1.0
 
 
-def plane_of(system: FilippovSystem, starts: Any, box: Any) -> Plane:
+def plane_of(system: FilippovSystem, starts: Any, box: Any) -> _Plane:
     """Read a plane of starts and its box."""
     try:
         limits = np.asarray(box, dtype=float)
@@ -843,16 +843,16 @@ def plane_of(system: FilippovSystem, starts: Any, box: Any) -> Plane:
             "For example box=[(-1, 1), (0, 2)]."
         )
     if isinstance(starts, ComputedStarts):
-        return Plane(starts, limits, starts.scale, exact=False)
+        return _Plane(starts, limits, starts.scale, exact=False)
     states = StartMap(system, starts)
     half = np.asarray(limits[:, 1] - limits[:, 0]) / 2
-    return Plane(lambda u: (0.0, *states(u)), limits, half, exact=True)
+    return _Plane(lambda u: (0.0, *states(u)), limits, half, exact=True)
 
 
 def dividing_curves(
     system: FilippovSystem,
     fold: TwoFold,
-    plane: Plane,
+    plane: _Plane,
     *,
     stable: bool,
     duration: float,
@@ -865,10 +865,10 @@ def dividing_curves(
 ) -> DividingCurves:
     """Curves in a plane of starts that divide orbits beside two-folds."""
     _require_plain(system)
-    passages: TwoFoldPassages | EventPassages
+    passages: _TwoFoldPassages | EventPassages
     if until is None:
         sheet = TwoFoldSheet(system, fold.point, plane.size, parameters)
-        passages = TwoFoldPassages(
+        passages = _TwoFoldPassages(
             system, sheet, plane.start, plane.scale, duration, parameters=parameters, tol=tol
         )
     else:
@@ -905,7 +905,7 @@ def dividing_curves(
     return DividingCurves(stable, fold.point, curves, complete)
 
 
-def _with_starts(arc: DividingArc, plane: Plane) -> DividingArc:
+def _with_starts(arc: DividingArc, plane: _Plane) -> DividingArc:
     return replace(arc, starts=np.array([plane.start(u)[1] for u in arc.points]))
 
 
@@ -925,8 +925,8 @@ class _Search:
 
     def __init__(
         self,
-        plane: Plane,
-        passages: TwoFoldPassages | EventPassages,
+        plane: _Plane,
+        passages: _TwoFoldPassages | EventPassages,
         step: float,
         begin: Sequence[tuple[str, Array]] = (),
     ):
@@ -968,7 +968,7 @@ class _Search:
             for other_key in ((i + 1, j), (i, j + 1)):
                 other = labels.get(other_key, "")
                 a, b = corners[i, j], corners.get(other_key, corners[i, j])
-                if last_side(one) * last_side(other) >= 0 or self._crossed(a, b):
+                if _last_side(one) * _last_side(other) >= 0 or self._crossed(a, b):
                     continue
                 curve = self._met((a, one), (b, other))
                 if curve:
@@ -988,14 +988,14 @@ class _Search:
         for _ in range(_HALVINGS):
             middle = 0.5 * (one[0] + other[0])
             label = self.passages.simulated(middle)
-            side = last_side(label)
+            side = _last_side(label)
             if side == 0:  # it slides to the end of the run
                 break
-            if side == last_side(one[1]):
+            if side == _last_side(one[1]):
                 one = middle, label
             else:
                 other = middle, label
-        itinerary = common_start(one[1], other[1])
+        itinerary = _common_start(one[1], other[1])
         if not itinerary:
             return []
         middle = 0.5 * (one[0] + other[0])

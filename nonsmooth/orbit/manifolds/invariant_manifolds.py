@@ -85,7 +85,7 @@ class Arc:
         return f"Arc(length {length:.4g}, itinerary {self.itinerary!r}, ends by {self.end})"
 
 
-class InterruptedOrbit(KeyboardInterrupt):
+class _InterruptedOrbit(KeyboardInterrupt):
     """Ctrl-C while an orbit was followed, with the part ``run`` of it and its curve ``arc``."""
 
     def __init__(self, run: Trajectory):
@@ -109,7 +109,7 @@ class Follower:
         """Follow the orbit from a start; None where it cannot leave in the given mode."""
         try:
             found = self.run(start, mode)
-        except InterruptedOrbit as stopped:
+        except _InterruptedOrbit as stopped:
             stopped.arc = self._resampled(stopped.run, "interrupted")
             raise
         return None if found is None else self._resampled(*found)
@@ -134,7 +134,7 @@ class Follower:
             except KeyboardInterrupt:
                 if not pieces:
                     raise
-                raise InterruptedOrbit(join(pieces)) from None
+                raise _InterruptedOrbit(join(pieces)) from None
             far = float(lengths(part)[1][-1]) if len(part.steps) else 0.0
             if not far <= _FAR * self.length:  # steps of a polynomial field have any length
                 span = (
@@ -211,7 +211,7 @@ _FROM_ORBIT, _SHOWN = 1e-6, 0.5
 _OFF_CIRCLE = 1e-6
 
 
-def orbit_seeds(orbit: PeriodicOrbit, follower: Follower, stable: bool) -> list[Seed]:
+def _orbit_seeds(orbit: PeriodicOrbit, follower: Follower, stable: bool) -> list[Seed]:
     """The sheets of orbits that approach a periodic orbit or leave it, as functions of a start."""
     multiplier, x, v, period = _direction(orbit, stable)
     turns = 1 if multiplier > 0 else 2
@@ -271,7 +271,7 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
     return float(values[outside][0].real), flown.end[:n], v / np.linalg.norm(v), orbit.period
 
 
-def canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:
+def _canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:
     """The canard of a two-fold in attracting (or repelling) sliding, by a parameter in [0, 1]."""
     system = reversed_system(follower.system) if stable else follower.system
     where, s = place(system, fold.point, follower.parameters)
@@ -312,7 +312,7 @@ _APART, _HOLE = 1.0, 2.5
 _CLOSEST = 1e-10
 
 
-def bundle(
+def _bundle(
     seed: Callable[[float], Arc | None],
     closed: bool,
     spacing: float,
@@ -432,12 +432,12 @@ class Manifold(Savable):
 
 def _too_high(dimension: int) -> DegenerateError:
     return DegenerateError(
-        f"of: the manifold has {dimension} dimensions, but at most two are computed. Give another point "
-        "or stable=."
+        f"of: the manifold has {dimension} dimensions, but at most two are computed. Give another "
+        "point, or change stable=."
     )
 
 
-class Grower:
+class _Grower:
     """Computes the manifold of one point or orbit from its local directions."""
 
     def __init__(
@@ -456,7 +456,7 @@ class Grower:
         if isinstance(self.of, TwoFold):
             return self._of_two_fold()
         if isinstance(self.of, PeriodicOrbit):
-            seeds = orbit_seeds(self.of, self.follower, self.stable)
+            seeds = _orbit_seeds(self.of, self.follower, self.stable)
             return self._surfaces(seeds)
         if isinstance(self.of, Equilibrium):
             return self._of_equilibrium()
@@ -486,7 +486,7 @@ class Grower:
         if collects and basis.shape[1] == 0:
             return self._curves([partial(self._leave, mode) for mode in sides])
         if collects and basis.shape[1] == 1:
-            return self._sheets(basis[:, 0], sides)
+            return self._from_curve(self._sliding_curve(basis[:, 0]), sides)
         if collects:
             raise _too_high(basis.shape[1] + 1)
         if basis.shape[1] == 1:
@@ -510,7 +510,7 @@ class Grower:
             kind = "stable" if self.stable else "unstable"
             raise DegenerateError(
                 f"of: the {self.of.kind} with the eigenvalues {values.round(6).tolist()} has no {kind} "
-                "directions. Give another point or stable=."
+                "directions. Give another point, or change stable=."
             )
         self.node = apart
         return np.asarray(vectors[:, chosen].real if apart else u[:, :count])
@@ -531,7 +531,7 @@ class Grower:
                     found.append(arc)
                 self.report()
         except KeyboardInterrupt as stopped:
-            part = stopped.arc if isinstance(stopped, InterruptedOrbit) else None
+            part = stopped.arc if isinstance(stopped, _InterruptedOrbit) else None
             if part is not None and len(part.points) > 1:
                 found.append(part)
             if not found:
@@ -539,7 +539,9 @@ class Grower:
             complete = False
         if not found:
             kind = "comes to" if self.stable else "leaves"
-            raise DegenerateError(f"of: no orbit {kind} {self.of}. Give another point or stable=.")
+            raise DegenerateError(
+                f"of: no orbit {kind} {self.of}. Give another point, or change stable=."
+            )
         return Manifold(self.stable, self.point, 1, found, complete=complete)
 
     def _circle(self, basis: Array, mode: str | None) -> Manifold:
@@ -565,10 +567,6 @@ class Grower:
         turned = [(x, y), (-y, x), (-x, -y), (y, -x)][int(quarter) % 4]
         return np.array(turned)
 
-    def _sheets(self, direction: Array, sides: list[str]) -> Manifold:
-        """A surface of the orbits of both fields that end on the curve that slides to the point."""
-        return self._from_curve(self._sliding_curve(direction), sides)
-
     def _of_two_fold(self) -> Manifold:
         """The orbits of both fields that end on the canard, or leave it."""
         if self.system.dimension != 3 or self.system.surface_count != 1:
@@ -576,9 +574,11 @@ class Grower:
                 f"of: the two-fold is one of {self.system!r}. Give one of three states on one surface, or "
                 "cut its dividing surface with starts=."
             )
-        return self._from_curve(canard_curve(self.of, self.follower, self.stable), ["+", "-"])
+        return self._from_curve(_canard_curve(self.of, self.follower, self.stable), ["+", "-"])
 
     def _from_curve(self, curve: Callable[[float], Array], sides: list[str]) -> Manifold:
+        """A surface of the orbits of both fields that end on a sliding curve."""
+
         def orbit(mode: str, u: float) -> Arc | None:
             return self.follower.arc(curve(u), mode)
 
@@ -625,13 +625,13 @@ class Grower:
 
         if not halves:
             raise DegenerateError(
-                f"of: no orbit slides to {self.of}. Give another point or stable=."
+                f"of: no orbit slides to {self.of}. Give another point, or change stable=."
             )
         return point
 
     def _surface(self, seed: Any, closed: bool) -> Manifold:
         f = self.follower
-        arcs, complete = bundle(seed, closed, f.spacing, _FIRST, self.most, self.report)
+        arcs, complete = _bundle(seed, closed, f.spacing, _FIRST, self.most, self.report)
         if len(arcs) < 2:
             raise DegenerateError(
                 f"of: fewer than two orbits start at {self.of}. Give another point."
@@ -825,7 +825,7 @@ def manifold(
     follower = Follower(system, p, not stable, long, spacing or long / 100, tol or 1e-10)
     most, bar = whole(max_orbits, "max_orbits"), progress_bar(None, progress, "orbit")
     try:
-        return Grower(follower, of, stable, most, bar.update).grow()
+        return _Grower(follower, of, stable, most, bar.update).grow()
     finally:
         bar.close()
 

@@ -41,7 +41,7 @@ from .orbit import PeriodicOrbit, named
 # Forcing ------------------------------------------------------------------------------------------
 
 
-def forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
+def _forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
     """The period of the forcing as a function of the parameters, given or from the system; or None."""
     if not system.time_dependent:
         return None
@@ -56,7 +56,7 @@ def forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
     return Forcing(system, period)
 
 
-def span_of(forcing: Forcing | None, p: Array) -> float | None:
+def _span_of(forcing: Forcing | None, p: Array) -> float | None:
     """The period of the forcing at some parameters; None for autonomous systems."""
     return None if forcing is None else _positive(forcing(p)[0])
 
@@ -107,7 +107,7 @@ def is_about(duration: float, about: float) -> bool:
 
 
 @dataclass(frozen=True, eq=False)
-class Recurrence:
+class _Recurrence:
     """A stretch of a run that nearly closes."""
 
     parts: tuple[Stretch, ...]
@@ -122,7 +122,7 @@ def recurrence(
     period: float | None,
     first: bool,
     about: float | None = None,
-) -> Recurrence | None:
+) -> _Recurrence | None:
     """The legs of a run that nearly close; None if there are none."""
     parts = [part for part in stretches(run) if part.duration > 0.0]
     if len(parts) > 1 and not parts[-1].leg.name:
@@ -149,7 +149,7 @@ def recurrence(
     good = [i for i, apart in enumerate(distances) if apart <= max(3.0 * best, 1e-9)]
     i = min(good, key=lambda i: abs(others[i] - anchor))
     low, high = sorted((anchor, others[i]))
-    return Recurrence(tuple(parts[low:high]), periods[i], distances[i])
+    return _Recurrence(tuple(parts[low:high]), periods[i], distances[i])
 
 
 def _moves(run: Trajectory, part: Stretch) -> bool:
@@ -199,7 +199,7 @@ def _without_events(
     period: float | None,
     first: bool,
     about: float | None,
-) -> Recurrence | None:
+) -> _Recurrence | None:
     """A recurrence within one leg: after whole periods, or on a plane across the flow."""
     if not parts:
         return None
@@ -218,7 +218,7 @@ def _without_events(
         periods = (high - low) / period if period else 0.0
         leg = type(part.leg)(part.leg.mode)
         cut = Stretch(leg, low, high - low, x, x, x)
-        found.append(Recurrence((cut,), round(2 * periods) / 2, distance))
+        found.append(_Recurrence((cut,), round(2 * periods) / 2, distance))
     best = min((r.distance for r in found), default=np.inf)
     good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]
     return min(good, key=lambda r: r.parts[0].duration) if good else None
@@ -259,7 +259,7 @@ def _returns(
     return [float(brentq(above, times[k], times[k + 1], xtol=1e-13 * end)) for k in away]
 
 
-def require_steady(run: Trajectory) -> None:
+def _require_steady(run: Trajectory) -> None:
     """Raise for a run that chatters: it had too many events, and the times between them shrink."""
     if run.status is not Status.TOO_MANY_EVENTS or len(run.events) < _MANY:
         return
@@ -278,7 +278,7 @@ def require_steady(run: Trajectory) -> None:
     )
 
 
-def refused(run: Trajectory, found: Recurrence | None) -> ConvergenceError:
+def refused(run: Trajectory, found: _Recurrence | None) -> ConvergenceError:
     """The error for a run without a recurrence."""
     best = (
         "has no two events of one kind"
@@ -323,7 +323,7 @@ def _require_alone(guess: Any, **given: Any) -> None:
 
 def _require_same(problem: BoundaryProblem, period: Any, mirror: Array | None, p: Array) -> None:
     """Raise for a period of the forcing or a symmetry other than that of an orbit."""
-    own, other = problem.forcing, None if period is None else forcing_of(problem.system, period)
+    own, other = problem.forcing, None if period is None else _forcing_of(problem.system, period)
     if own is not None and other is not None and abs(other(p)[0] / own(p)[0] - 1.0) > _OTHER:
         raise OptionError(
             f"period = {other(p)[0]:.10g} differs from that of the given PeriodicOrbit, {own(p)[0]:.10g}. "
@@ -406,17 +406,17 @@ def start_of(
         _require_alone(guess, itinerary=itinerary, t_start=t_start or None)
         given = {**guess.parameters, **_by_name(parameters)}
         p = system.parameter_vector(given)
-        forcing, about = forcing_of(system, period), _half(about_of(system, period, p), mirror)
+        forcing, about = _forcing_of(system, period), _half(about_of(system, period, p), mirror)
         found = recurrence(
-            guess, symmetry=mirror, period=span_of(forcing, p), first=False, about=about
+            guess, symmetry=mirror, period=_span_of(forcing, p), first=False, about=about
         )
-        require_steady(guess)
+        _require_steady(guess)
         if found is None or found.distance > _CLOSE:
             raise refused(guess, found)
         return _from_recurrence(system, found, forcing, mirror, p)
     p = system.parameter_vector(parameters)
-    forcing = forcing_of(system, period)
-    span = span_of(forcing, p)
+    forcing = _forcing_of(system, period)
+    span = _span_of(forcing, p)
     x = system.extended_point(real_array(guess, "guess"), t_start)
     if itinerary is not None:
         return _from_word(system, x, itinerary, forcing, mirror, p)
@@ -467,7 +467,7 @@ def _from_orbit(
 
 def _from_recurrence(
     system: FilippovSystem,
-    found: Recurrence,
+    found: _Recurrence,
     forcing: Forcing | None,
     mirror: Array | None,
     p: Array,
@@ -536,7 +536,7 @@ def _from_word(
 
 def _from_mode(system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, p: Array) -> Start:
     """Integrate one mode over the number of periods of the forcing after which it closes best."""
-    span, n, y, apart = span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
+    span, n, y, apart = _span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
     for _ in range(_MOST_PERIODS):
         y = fly(system, leg, y, span, p).end[: x.size]
         apart.append(float(np.abs(y[:n] - x[:n]).max()))
@@ -574,7 +574,7 @@ def _simulated(
     hint: float | None,
     forced: bool,
     p: Array,
-) -> Recurrence:
+) -> _Recurrence:
     """Simulate from a state, longer and longer, until the run recurs."""
     # With resets the state may be one just after a reset, which is due again when a run begins there. So a
     # state a little later is tried first.
@@ -586,7 +586,7 @@ def _simulated(
             starts = [later[: x.size], x]
         except NonsmoothError:
             pass
-    best: Recurrence | None = None
+    best: _Recurrence | None = None
     run: Trajectory | None = None
     for start in starts:
         run, found = _recurring(system, start, mirror, hint or natural, hint, forced, p)
@@ -595,7 +595,7 @@ def _simulated(
         if best is not None and best.distance < _GOOD:
             break
     assert run is not None
-    require_steady(run)
+    _require_steady(run)
     if best is None or best.distance > _CLOSE:
         raise refused(run, best)
     return best
@@ -609,10 +609,10 @@ def _recurring(
     hint: float | None,
     forced: bool,
     p: Array,
-) -> tuple[Trajectory, Recurrence | None]:
+) -> tuple[Trajectory, _Recurrence | None]:
     n, values = system.dimension, named(system, p)
     t = float(x[-1]) if system.time_dependent else 0.0
-    best: Recurrence | None = None
+    best: _Recurrence | None = None
     given = {"period": hint, "about": None} if forced else {"period": None, "about": hint}
     for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
         run = simulate(

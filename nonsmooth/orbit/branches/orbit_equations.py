@@ -10,7 +10,7 @@ from ...flow.compiled.shooting import bordered_direction
 from ...flow.fixed import has_interpreter
 from ...model import Array
 from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, demands_of
-from .branch_curves import BranchCurve
+from .branch import BranchCurve
 from .conditions import Condition
 
 # Bordered equations of an orbit with many legs, solved from leg to leg.

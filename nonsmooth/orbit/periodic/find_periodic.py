@@ -26,10 +26,8 @@ from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import leg_name
 from .boundary_value_problem import CLOSE, COARSE, FINAL, ROUNDING, BoundaryProblem, Evaluation
-from .forcing import about_of
-from .guess import Start, start_of
+from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
-from .recurrence import is_about
 from .shooting import shot
 from .symmetry import mirror_of, once_round, require_symmetric
 

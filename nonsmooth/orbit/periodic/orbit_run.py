@@ -1,4 +1,4 @@
-"""The legs of a periodic orbit, and the orbit as a run: its legs followed one after the other."""
+"""The legs of a periodic orbit, and the orbit as a run."""
 
 from __future__ import annotations
 
@@ -55,7 +55,7 @@ def orbit_leg(
 def orbit_run(
     system: FilippovSystem, parameters: Mapping[str, float], legs: Sequence[OrbitLeg]
 ) -> Trajectory:
-    """Follow each leg over its duration, and put them end to end."""
+    """Integrate each leg over its duration, and join them."""
     times, states, starts = list[Array](), list[Array](), list[float]()
     coefficients: list[Array] = []
     events: list[Event] = []

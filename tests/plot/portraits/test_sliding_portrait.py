@@ -95,7 +95,7 @@ def test_each_region_is_named_once():
 @pytest.mark.parametrize(
     ("call", "error", "words"),
     [
-        (lambda s: ns.plot.sliding_portrait("no", BOX), ns.DefinitionError, "sliding_portrait"),
+        (lambda s: ns.plot.sliding_portrait("no", BOX), ns.DefinitionError, "FilippovSystem"),
         (
             lambda s: ns.plot.sliding_portrait(ns.textbook.planar_relay().system, BOX),
             ns.DefinitionError,

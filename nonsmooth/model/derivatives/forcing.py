@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -13,7 +12,6 @@ from ..definition.periods import read_period
 from ..definition.system import FilippovSystem
 from ..errors import OptionError, explain
 from ..laws.evaluators import Evaluator
-from ..printing.tape import Values, values_of
 from ..values import Array
 
 
@@ -53,19 +51,13 @@ class Forcing:
         self.expression = ca.SX(period)
         p = system.parameter_symbols
         slope = ca.jacobian(self.expression, p)
-        self._outputs = [ca.densify(e) for e in (self.expression, slope)]
-        self._inputs = [ca.SX(0, 1), p]
-        self._function = Evaluator(ca.Function("period", self._inputs, self._outputs))
+        outputs = [ca.densify(e) for e in (self.expression, slope)]
+        self._function = Evaluator(ca.Function("period", [ca.SX(0, 1), p], outputs))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled with its system, as a function of the parameters."""
         function = ca.Function("period", [self._system.parameter_symbols], [self.expression])
         return _restored, (self._system, function.serialize(), self.found)
-
-    @cached_property
-    def values(self) -> Values:
-        """The period and its derivatives as a graph."""
-        return values_of(self._inputs, self._outputs)
 
     def __call__(self, p: Array) -> tuple[float, Array]:
         """The period, and its derivatives by all parameters."""

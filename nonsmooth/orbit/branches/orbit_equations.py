@@ -6,10 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...flow.compiled.shooting import bordered_direction
-from ...flow.fixed import has_interpreter
 from ...model import Array
-from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, demands_of
+from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
 from .branch_curves import BranchCurve
 from .conditions import Condition
 
@@ -86,12 +84,6 @@ def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
 #: Equations of more unknowns are solved from leg to leg.
 _MANY = 24
 
-#: Steps below this that do not shrink are rounding: near a branch point it is magnified.
-_NOISE = 1e-8
-
-#: Newton's method in one call: steps of it, along a leg, and unknowns. Others are left to what hears an interrupt.
-_MOST, _MOST_STEPS, _UNKNOWNS = 10, 1000, 100
-
 
 class OrbitEquations(BranchCurve):
     """Periodic orbits of one itinerary in the unknowns (starts, durations, parameters)."""
@@ -131,50 +123,19 @@ class OrbitEquations(BranchCurve):
         key = u.tobytes()
         if key not in self._found:
             p, unknowns = self.parameters_at(u), u[: self.problem.size]
-            self._keep(key, self.problem.evaluate(unknowns, p, self.free))
+            at = self.problem.evaluate(unknowns, p, self.free)
+            self._found.pop(self._last, None)
+            self._found[key], self._last = at, key
         return self._found[key]
-
-    def _keep(self, key: bytes, at: Evaluation) -> None:
-        self._found.pop(self._last, None)
-        self._found[key], self._last = at, key
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         at = self.evaluation(u)
         return at.residual, at.whole
 
-    def correct(self, guess: Array, across: Array, *, max_iterations: int = _MOST) -> Array | None:
-        """As of any curve; in one call where that can be, which leaves the equations at the point too."""
-        problem = self.problem
-        if problem.is_direct and len(self.free) == 1 and guess.size <= _UNKNOWNS:
-            wrap = None if problem.symmetry is None else problem.wrap
-            demands = demands_of(
-                problem.forcing,
-                problem.periods,
-                tol=self.tol,
-                noise=_NOISE,
-                most=_MOST,
-                most_steps=_MOST_STEPS,
-            )
-            flights = problem.flights(self.free)
-            found = flights.corrected(guess, self.p, self.scale, wrap, across, demands)
-            if found is not None:
-                u = found[0].unknowns
-                self._keep(u.tobytes(), problem.evaluation(*found))
-                return u
-        return super().correct(guess, across, max_iterations=max_iterations)
-
     def solve(self, matrix: Array, right: Array) -> Array:
         if not self._many:
             return super().solve(matrix, right)
         return eliminated(self.problem, matrix, right).solution()
-
-    def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
-        if self._many or not has_interpreter():
-            return super().along(jacobian, before)
-        found = bordered_direction(jacobian, before)
-        if found is None:
-            raise np.linalg.LinAlgError("the equations are singular: a branch point")
-        return found
 
     def determinant(self, matrix: Array) -> float:
         if not self._many:

@@ -25,12 +25,11 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.shooting import Demands, SolvedOrbit
-from ...flow.fixed import MOST_STEPS, TOLERANCE, values_program
+from ...flow.fixed import TOLERANCE
 from ...model import Array, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from ...model.derivatives.forcing import Forcing
-from ..runs.flight import EXTENDED, Flight, Flights, flights_of
+from ..runs.flight import Flight, Flights, flights_of
 from ..runs.legs import Flown, Leg, fly
 
 # Where the parts of the equations of an orbit are in their Jacobian.
@@ -62,40 +61,6 @@ def places_of(count: int, n: int) -> Places:
         places[times, times].ravel(),
         np.roll(np.arange(count), -1),
     )
-
-
-# What is asked of Newton's method where the equations of a whole orbit are solved in one call.
-
-#: Newton's method ends when the next step would be below this, relative to the orbit.
-CLOSE = 1e-10
-
-#: Steps below this, relative to the orbit, are rounding.
-ROUNDING = 1e-14
-
-#: Legs far from the orbit are flown with local errors up to this.
-COARSE = 1e-8
-
-#: Steps below this, relative to the orbit, change its derivatives by rounding.
-FINAL = 1e-13
-
-#: Steps below this that do not shrink are rounding of the equations.
-NOISE = 1e-11
-
-
-def demands_of(
-    forcing: Forcing | None,
-    periods: float,
-    *,
-    tol: float = CLOSE,
-    noise: float = NOISE,
-    longest: float = 0.0,
-    most: int = 1,
-    most_steps: int = MOST_STEPS,
-) -> Demands:
-    """Demands on an orbit."""
-    period = None if forcing is None else values_program(forcing).pointer
-    local = (TOLERANCE, COARSE, EXTENDED, FINAL, ROUNDING)
-    return Demands(tol, noise, *local, longest, periods, period, most, most_steps)
 
 
 #: Up to so many unknowns a dense solution is faster than elimination in Python.
@@ -243,13 +208,6 @@ class BoundaryProblem:
             A leg cannot be flown.
         """
         columns = list(chosen)
-        if self.is_direct:
-            free = np.concatenate([u[: self.size], p[columns]])
-            wrap = None if self.symmetry is None else self.wrap
-            demands = demands_of(self.forcing, self.periods)
-            found = self.flights(chosen).evaluated(free, p, wrap, tol, demands)
-            if found is not None:
-                return self.evaluation(*found)
         starts, durations = self.split(u)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
             return self._assembled(self.flights(chosen)(starts, durations, p, tol), u, p, columns)
@@ -285,16 +243,6 @@ class BoundaryProblem:
             self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
         whole = np.hstack([jacobian, by_parameters])
         return Evaluation(residual, whole, flight, starts, durations)
-
-    @cached_property
-    def is_direct(self) -> bool:
-        """Whether the equations can be had in one call."""
-        return self.phase is None and not self.kept and self.flights().is_direct
-
-    def evaluation(self, solved: SolvedOrbit, flight: Flight) -> Evaluation:
-        """The equations as one call gives them."""
-        starts, durations = self.split(solved.unknowns)
-        return Evaluation(solved.residual, solved.jacobian, flight, starts, durations)
 
     def exact_residual(self, u: Array, p: Array) -> Array | None:
         """Residual with errors far below those of doubles; None where there is no such one.

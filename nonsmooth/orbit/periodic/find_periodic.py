@@ -25,12 +25,11 @@ from ...model import (
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import Leg, leg_name
-from .boundary_value_problem import CLOSE, COARSE, FINAL, ROUNDING, BoundaryProblem, Evaluation
+from .boundary_value_problem import BoundaryProblem, Evaluation
 from .forcing import about_of
 from .guess import Start, start_of
 from .orbit import PeriodicOrbit, faults_of, named
 from .recurrence import is_about
-from .shooting import shot
 from .symmetry import mirror_of, once_round, require_symmetric
 
 # What a solution of the equations of an orbit must be to count as one.
@@ -247,6 +246,18 @@ def periodic_orbit(
     return orbit
 
 
+#: Newton's method ends when the next step would be below this, relative to the orbit.
+_CLOSE = 1e-10
+
+#: Steps below this, relative to the orbit, are rounding.
+_ROUNDING = 1e-14
+
+#: Legs far from the orbit are flown with local errors up to this.
+_COARSE = 1e-8
+
+#: Steps below this, relative to the orbit, change its derivatives by rounding.
+_FINAL = 1e-13
+
 #: Larger steps from an orbit of a family, relative to the orbit, are rounding that is magnified along it.
 _POLISH = 1e-3
 
@@ -270,14 +281,14 @@ class _Solver:
     def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
         """The orbit, to rounding."""
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
-        found = shot(self.problem, u, self.p, longest, max_iterations)
-        if found is not None:
-            self.iterations += found[2]
-            return found[:2]
         scales = self.problem.scales(u)
         last: list[Array] = []
+        first: list[tuple[Array, Evaluation]] = []
 
         def equations(v: Array) -> tuple[Array, Array]:
+            if first and np.array_equal(v, first[0][0]):  # the guess, again
+                self.last = first[0][0] * scales, first[0][1]
+                return first[0][1].residual, first[0][1].jacobian * scales
             u = v * scales
             self.last = u, None
             durations = self.problem.split(u)[1]
@@ -287,10 +298,12 @@ class _Solver:
                     f"Leg {i + 1} {leg_name(self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
-            size = float(np.abs(v - last[-1]).max()) if last else 1e-2
+            size = float(np.abs(v - last[-1]).max()) if last else 0.0
             # after a step of this size the next one is its square, and what it leaves its fourth power
-            tol = min(max(1e-3 * size**4, TOLERANCE), COARSE)
+            tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
             at = self.problem.evaluate(u, self.p, tol=tol)
+            if not last:
+                first.append((v, at))
             last.append(v)
             self.last = u, at
             self.iterations += 1
@@ -302,7 +315,7 @@ class _Solver:
             root = converge(
                 equations,
                 u / scales,
-                tol=CLOSE,
+                tol=_CLOSE,
                 max_iterations=max_iterations,
                 linear=self.problem.solve,
             )
@@ -310,13 +323,15 @@ class _Solver:
             root, reason = None, str(error)
             if not last:  # not even the guess can be followed: no shorter step helps
                 raise self._failure(reason) from error
-        before = list(last)
+        before, reached = list(last), self.last
         nearest = self._of_family(equations, u / scales, root, max_iterations)
         last[:] = before
         if nearest is not root and nearest is not None:
             return self._polished(nearest * scales, _POLISH)
         if root is None and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
+        elif root is not None and reached[1] is not None:
+            return self._polished(self._nearer(root * scales, reached[1]))
         if root is None:
             raise self._failure(reason)
         return self._polished(root * scales)
@@ -390,9 +405,9 @@ class _Solver:
             exact = self.problem.exact_residual(u, self.p)
             step = self._step(at.jacobian, at.residual if exact is None else exact)
             size = float(np.abs(step / scales).max())
-            if exact is not None and size <= FINAL:  # the derivatives are those of the orbit
+            if exact is not None and size <= _FINAL:  # the derivatives are those of the orbit
                 return self._moved(u, step, at, exact)
-            if size <= ROUNDING or size > largest:
+            if size <= _ROUNDING or size > largest:
                 break
             try:
                 there = self.problem.evaluate(u + step, self.p)
@@ -403,6 +418,14 @@ class _Solver:
                 break
             u, at = u + step, there
         return u, at
+
+    def _nearer(self, u: Array, at: Evaluation) -> Array:
+        """One more step with the derivatives of the last one, where the residual has more digits."""
+        exact = self.problem.exact_residual(u, self.p)
+        if exact is None:
+            return u
+        step = self._step(at.jacobian, exact)
+        return u + step if np.abs(step / self.problem.scales(u)).max() <= _CLOSE else u
 
     def _step(self, jacobian: Array, residual: Array) -> Array:
         try:

@@ -15,12 +15,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.shooting import reduced_map, whole_map
-from ...flow.fixed import has_interpreter
 from ...model import Array
 from ...model.derivatives.event_maps import surface_map
 from ..runs.legs import leg_name
-from ..runs.saltation import GRAZING, saltations
+from ..runs.saltation import saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation
 
 #: A direction of which a leg leaves no more than this part is lost.
@@ -114,10 +112,6 @@ def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
 
 def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
     """As ``return_map``; None where it is not finite, as an event is grazed."""
-    if has_interpreter():
-        flight, wrap = at.flight, None if problem.symmetry is None else problem.wrap
-        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
-        return whole_map(legs, wrap, np.ones(problem.dimension))
     with np.errstate(all="ignore"):
         found = return_map(problem, at)
     return found if np.isfinite(found).all() else None
@@ -125,18 +119,12 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
 
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
-    flight = at.flight
     # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
     units = _units(problem, at)
-    basis = _kept(problem, at, p, units)
-    if has_interpreter():
-        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
-        wrap = None if problem.symmetry is None else problem.wrap
-        found = reduced_map(legs, wrap, units, basis, GRAZING, _LOST)
-        if found is not None:
-            return found
     monodromy(problem, at)  # DegenerateError where an event is grazed
-    return _passed(problem, at, units, basis)
+    maps = leg_maps(problem, at) * (units / units[:, None])
+    flown = at.flight.by_start[:, : problem.dimension] * (units / units[:, None])
+    return reduced_map(maps, flown, _kept(problem, at, p, units))
 
 
 def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -152,11 +140,10 @@ def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
     return units
 
 
-def _passed(problem: BoundaryProblem, at: Evaluation, units: Array, basis: Array) -> Array:
-    """The return map on what the legs leave of some directions."""
-    count, n = len(problem.legs), problem.dimension
-    maps = leg_maps(problem, at) * (units / units[:, None])
-    flown = at.flight.by_start[:, :n] * (units / units[:, None])
+def reduced_map(maps: Array, flown: Array, basis: Array) -> Array:
+    """Product of maps (L, n, n) of legs on what these leave of some directions (n, r)."""
+    # Directions are lost beside those that the legs carry, ``flown`` (L, n, n).
+    count, n = len(maps), maps.shape[1]
     bases: list[Array] = [np.eye(n)] * count
     for _ in range(2):
         for i in range(count):

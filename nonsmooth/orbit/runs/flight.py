@@ -15,20 +15,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.shooting import Demands, FollowedProgram, OrbitProgram, SolvedOrbit
 from ...flow.compiled.smooth import LegsProgram
-from ...flow.fixed import (
-    MOST_STEPS,
-    TOLERANCE,
-    followed_program,
-    has_interpreter,
-    legs_program,
-    stuck,
-)
+from ...flow.fixed import MOST_STEPS, TOLERANCE, has_interpreter, legs_program, stuck
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
-from ...model.derivatives.variational import guarded_field, plain_field
-from .guards import ending
+from ...model.derivatives.variational import plain_field
 from .legs import Flown, Leg, fly, leg_name
 
 #: Local errors of the steps in extended precision.
@@ -144,114 +135,6 @@ class Flights:
             return None
         n, (results, rest) = starts.shape[1], found
         return results[:, :n], rest[:, :n], results[:, n]
-
-    @cached_property
-    def _orbit_program(self) -> OrbitProgram | None:
-        """Newton's method on an orbit of these legs, where each ends by one event."""
-        if len(set(self.sizes)) > 1 or not has_interpreter():
-            return None
-        if self._plain_program is None:
-            return None
-        n, q = self._most, len(self.system.parameter_names)
-        start, fixed, ours, theirs = self._template
-        legs, plain = self._program, self._plain_program
-        return OrbitProgram(legs, plain, n, q, self.chosen, ours, theirs, start, fixed)
-
-    @cached_property
-    def _followed_program(self) -> FollowedProgram | None:
-        if self._orbit_program is None:
-            return None
-        system, maps = self.system, [leg.map(self.system) for leg in self.legs]
-        events = [at for at in maps if at is not None]
-        names = len(system.parameter_names)
-        return followed_program(
-            [guarded_field(system, leg.mode) for leg in self.legs],
-            [ending(system, leg) for leg in self.legs],
-            events,
-            [event.plain for event in events],
-            (system.extended_dimension, system.dimension, names),
-        )
-
-    def followed(self, x: Array, p: Array, times: float) -> tuple[Array, Array] | None:
-        """Follow the legs from a state, each to its event, whatever other guards say.
-
-        Parameters
-        ----------
-        x : ndarray (N,)
-        p : ndarray
-        times : float
-            A leg is followed for so many of the times in which the state changes by its size.
-
-        Returns
-        -------
-        starts, durations : ndarray (L + 1, N), (L,)
-            The last start is the end. None where a leg does not come to its event, and for legs that
-            do not end by one event each.
-        """
-        program = self._followed_program
-        return None if program is None else program(x, p, times, TOLERANCE, MOST_STEPS)
-
-    def newton(
-        self, u: Array, p: Array, scales: Array, wrap: Array | None, demands: Demands
-    ) -> tuple[SolvedOrbit, Flight] | None:
-        """Solve the equations of an orbit of these legs; None where that is not to be had.
-
-        Parameters
-        ----------
-        u : ndarray (m,)
-            Starts of the legs, then durations.
-        p : ndarray
-            All parameters.
-        scales : ndarray (m,)
-            Sizes of the unknowns.
-        wrap : ndarray (N, N) or None
-            Symmetry that maps the end of the last leg.
-        demands : Demands
-        """
-        program = self._orbit_program
-        found = program.newton(u, p, scales, wrap, demands) if program is not None else None
-        return None if found is None else (found, self._flight_of(found, p.size))
-
-    def evaluated(
-        self, u: Array, p: Array, wrap: Array | None, tol: float, demands: Demands
-    ) -> tuple[SolvedOrbit, Flight] | None:
-        """Their equations at starts, durations and chosen parameters (m + k,); as ``newton``."""
-        program = self._orbit_program
-        found = program.evaluate(u, p, wrap, tol, demands) if program is not None else None
-        return None if found is None else (found, self._flight_of(found, p.size))
-
-    def corrected(
-        self,
-        u: Array,
-        p: Array,
-        scales: Array,
-        wrap: Array | None,
-        across: Array,
-        demands: Demands,
-    ) -> tuple[SolvedOrbit, Flight] | None:
-        """Their solution with one chosen parameter across a direction in units ``scales``; as ``newton``."""
-        program = self._orbit_program
-        if program is None:
-            return None
-        found = program.correct(u, p, scales, wrap, across, demands)
-        return None if found is None else (found, self._flight_of(found, p.size))
-
-    @property
-    def is_direct(self) -> bool:
-        """Whether ``newton``, ``evaluated`` and ``corrected`` are to be had."""
-        return self._orbit_program is not None
-
-    def _flight_of(self, found: SolvedOrbit, parameters: int) -> Flight:
-        n, whole = self._most, found.whole
-        return Flight(
-            self.sizes,
-            whole[:, :, 0],
-            found.before[:, :n],
-            found.after[:, :n],
-            whole[:, :, 1 : 1 + n],
-            whole[:, :, 1 + n :],
-            *self._events(found.results, n, parameters),
-        )
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:

@@ -186,15 +186,15 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
 def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    count, evaluation = [0], type(orbit.problem).evaluation
+    count, evaluate = [0], type(orbit.problem).evaluate
 
     def interrupted(*args, **more):
         count[0] += 1
         if count[0] == calls:
             raise KeyboardInterrupt
-        return evaluation(*args, **more)
+        return evaluate(*args, **more)
 
-    monkeypatch.setattr(type(orbit.problem), "evaluation", interrupted)
+    monkeypatch.setattr(type(orbit.problem), "evaluate", interrupted)
     branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in branch.ends
     assert len(branch) >= calls // 10

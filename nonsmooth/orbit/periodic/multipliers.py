@@ -8,6 +8,7 @@ dimension lost are exact. The full matrix gives them with rounding, which estima
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -18,7 +19,7 @@ from numpy.typing import NDArray
 from ...model import Array
 from ...model.derivatives.event_maps import surface_map
 from ..runs.legs import leg_name
-from ..runs.saltation import saltations
+from ..runs.saltation import passages, saltations
 from .boundary_value_problem import BoundaryProblem, Evaluation
 
 #: A direction of which a leg leaves no more than this part is lost.
@@ -121,7 +122,7 @@ def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
     # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
     units = _units(problem, at)
-    monodromy(problem, at)  # DegenerateError where an event is grazed
+    passages(at.flight, *_events(problem, at))  # DegenerateError where an event is grazed
     maps = leg_maps(problem, at) * (units / units[:, None])
     flown = at.flight.by_start[:, : problem.dimension] * (units / units[:, None])
     return reduced_map(maps, flown, _kept(problem, at, p, units))
@@ -170,21 +171,18 @@ def _range(matrix: Array, size: float) -> Array:
     """Orthonormal basis of the range of a matrix, without what is lost beside ``size``."""
     if not matrix.shape[1]:
         return matrix
+    if matrix.shape[1] == 1:
+        length = float(np.linalg.norm(matrix))
+        return matrix / length if length > _LOST * size else matrix[:, :0]
     u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
 
 
 def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
-    n, flight = problem.dimension, at.flight
-    after = np.roll(flight.before[:, :n], -1, axis=0)
-    if problem.symmetry is not None:
-        after[-1] = np.linalg.solve(problem.wrap, after[-1])
-    jumps = saltations(
-        flight, after, lambda i: f"leg {i + 1} {leg_name(problem.legs[i])}", _events(problem)
-    ).matrix
-    product: Array = np.eye(n)
-    for step in jumps @ flight.by_start:
+    jumps = saltations(at.flight, *_events(problem, at)).matrix
+    product: Array = np.eye(problem.dimension)
+    for step in jumps @ at.flight.by_start:
         product = step @ product
     return np.asarray(problem.wrap @ product, float)
 
@@ -201,5 +199,13 @@ def stability(values: NDArray[np.complex128], error: float) -> str:
     return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"
 
 
-def _events(problem: BoundaryProblem) -> NDArray[np.bool_]:
-    return np.array([bool(leg.name) for leg in problem.legs])
+def _events(
+    problem: BoundaryProblem, at: Evaluation
+) -> tuple[Array, Callable[[int], str], NDArray[np.bool_]]:
+    """Fields after the events of legs, their names, and which legs have one."""
+    after = np.roll(at.flight.before[:, : problem.dimension], -1, axis=0)
+    if problem.symmetry is not None:
+        after[-1] = np.linalg.solve(problem.wrap, after[-1])
+    legs = problem.legs
+    named = lambda i: f"leg {i + 1} {leg_name(legs[i])}"
+    return after, named, np.array([bool(leg.name) for leg in legs])

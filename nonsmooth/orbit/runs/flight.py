@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 from typing import Any
 
@@ -79,6 +79,12 @@ class Flight:
         )
 
 
+@lru_cache(maxsize=256)
+def _event_places(n: int, most: int, q: int) -> tuple[int, ...]:
+    """Where g, g_x, g_p, e, e_x and e_p begin and end."""
+    return (0, *accumulate((n, n * most, n * q, 1, most, q)))
+
+
 class Flights:
     """Legs to be flown again and again.
 
@@ -138,19 +144,21 @@ class Flights:
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
-        """Matrices (x, X, P) at the starts, transposed, and those of entries that do not move."""
+        """States of all legs at a start 0, and matrices (x, X, P), transposed, of entries that do not move."""
+        # Then places of the entries that move: in these matrices, and in the states.
         width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
         count, most = len(self.legs), self._most
-        start, fixed = np.zeros((2, count, columns, most))
+        start, fixed = np.zeros((count, width)), np.zeros((count, columns, most))
         ours, theirs = list[NDArray[Any]](), list[NDArray[Any]]()
         for i, field in enumerate(self.fields):
             b = field.blocks
-            start[i, 1 : 1 + b.starts, : b.starts] = np.eye(b.starts)
             fixed[i, :, : b.states] = b.fixed.T
             moving = np.zeros((columns, most), bool)
             moving[:, : b.states] = b.moving.T
             ours.append(np.flatnonzero(moving) + i * columns * most)
             theirs.append(i * width + np.arange(len(ours[-1])))
+            if b.states == b.starts:
+                start[i, : len(ours[-1])] = b.pack(np.eye(b.states, columns, 1))
         return start, fixed, np.concatenate(ours), np.concatenate(theirs)
 
     def __call__(self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE) -> Flight:
@@ -159,13 +167,13 @@ class Flights:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
         template, fixed, ours, theirs = self._template
-        whole = template.copy()
-        whole[:, 0, :n] = starts
-        if most > n:
+        z = template.copy()
+        if most == n:
+            z[:, :n] = starts
+        else:
             for i, field in enumerate(self.fields):
-                whole[i] = field.initial(starts[i], p).T
-        z = np.zeros((len(self.legs), self._program.width))
-        z.ravel()[theirs] = whole.ravel()[ours]
+                own = field.start(starts[i], p)
+                z[i, : own.size] = own
         flown = self._program(z, p, durations, tol, MOST_STEPS)
         if flown.failed >= 0:
             i = flown.failed
@@ -189,8 +197,7 @@ class Flights:
     def _events(self, results: Array, n: int, q: int) -> tuple[Array, ...]:
         """What the events' programs give: g, g_x, g_p, e, e_x, e_p."""
         count, most = len(self.legs), self._most
-        sizes = (n, n * most, n * q, 1, most, q)
-        at = (0, *accumulate(sizes))
+        at = _event_places(n, most, q)
         if not results.shape[1]:
             results = np.zeros((count, at[-1]))
         g, gx, gp, e, ex, ep = [results[:, a:b] for a, b in pairwise(at)]

@@ -105,13 +105,22 @@ class _One(NamedTuple):
         return cls(*[row[None] for row in (*rows, at.gradient, at.by_parameters)])
 
 
-def saltations(
+class Passed(NamedTuple):
+    """How legs pass their events: speeds across them, angles, jumps of the field, and where it has none."""
+
+    speed: Array
+    angle: Array
+    jump: Array
+    kept: NDArray[np.bool_]
+
+
+def passages(
     ends: Ended,
     after: Array,
     named: Callable[[int], str],
     events: NDArray[np.bool_] | None = None,
-) -> Saltation:
-    """Saltation matrices of the events of many legs, stacked."""
+) -> Passed:
+    """Passages of the events of many legs, none of which may be grazed."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state
     speed = (e * rate).sum(axis=1)
     size = _norms(e) * _norms(rate)
@@ -128,10 +137,21 @@ def saltations(
     if grazed.size:
         i = int(grazed[0])
         raise DegenerateError(grazing(named(i), float(angle[i]), ends, i, jump[i]))
+    return Passed(speed, angle, jump, kept)
+
+
+def saltations(
+    ends: Ended,
+    after: Array,
+    named: Callable[[int], str],
+    events: NDArray[np.bool_] | None = None,
+) -> Saltation:
+    """Saltation matrices of the events of many legs, stacked."""
+    speed, angle, jump, kept = passages(ends, after, named, events)
     with np.errstate(divide="ignore", invalid="ignore"):
-        time_x = -e / speed[:, None]
+        time_x = -ends.gradient / speed[:, None]
         time_p = -ends.value_parameters / speed[:, None]
-    matrix, by_parameters = g, ends.after_parameters
+    matrix, by_parameters = ends.after_state, ends.after_parameters
     if not kept.all():
         jump[kept] = 0.0
         x, p = np.where(kept[:, None], 0.0, time_x), np.where(kept[:, None], 0.0, time_p)

@@ -51,6 +51,8 @@ class Forcing:
         self.expression = ca.SX(period)
         p = system.parameter_symbols
         slope = ca.jacobian(self.expression, p)
+        self._constant = bool(slope.nnz() == 0)
+        self._last: tuple[float, Array] | None = None
         outputs = [ca.densify(e) for e in (self.expression, slope)]
         self._function = Evaluator(ca.Function("period", [ca.SX(0, 1), p], outputs))
 
@@ -61,8 +63,10 @@ class Forcing:
 
     def __call__(self, p: Array) -> tuple[float, Array]:
         """The period, and its derivatives by all parameters."""
-        value, slope = self._function.copied(np.zeros(0), p)
-        return float(value[0, 0]), slope[0]
+        if self._last is None or not self._constant:
+            value, slope = self._function.copied(np.zeros(0), p)
+            self._last = float(value[0, 0]), slope[0]
+        return self._last
 
 
 def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:

@@ -56,6 +56,9 @@ class OrbitEquations(BranchCurve):
         at = self.evaluation(u)
         return at.residual, at.whole
 
+    def values(self, u: Array) -> Array | None:
+        return self.problem.residual(u[: self.problem.size], self.parameters_at(u))
+
     def solve(self, matrix: Array, right: Array) -> Array:
         return self.problem.solve(matrix, right)
 

@@ -161,7 +161,7 @@ class BoundaryProblem:
 
     @cached_property
     def has_many(self) -> bool:
-        """Whether equations are solved from leg to leg: each has an event, and nothing else is demanded."""
+        """Whether equations are solved from leg to leg: many legs, each with an event, and no more."""
         return self.size > _DENSE and not self.kept and all(leg.name for leg in self.legs)
 
     @cached_property
@@ -252,26 +252,28 @@ class BoundaryProblem:
             self._keep(residual, jacobian, by_parameters, starts[0], p, chosen)
         return Evaluation(residual, whole, flight, starts, durations)
 
-    def exact_residual(self, u: Array, p: Array) -> Array | None:
-        """Residual with errors far below those of doubles; None where there is no such one.
+    def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
+        """Residual without derivatives, if wanted in extended precision; None where legs do not allow it.
 
         Parameters
         ----------
         u : ndarray (m,)
         p : ndarray
+        extended : bool, optional
         """
         starts, durations = self.split(u)
         if self.phase is not None or self.kept:
             return None
-        found = self.flights(()).exact(starts, durations, p)
+        found = self.flights(()).ends(starts, durations, p, extended)
         if found is None:
             return None
         after, rest, value = found
-        if self.symmetry is not None:
-            after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
-        gap = after - starts[places_of(*starts.shape).next_leg]
-        gap[-1, -1] -= self.advance(p)[0]
-        gap += rest
+        with np.errstate(over="ignore", invalid="ignore"):
+            if self.symmetry is not None:
+                after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
+            gap = after - starts[places_of(*starts.shape).next_leg]
+            gap[-1, -1] -= self.advance(p)[0]
+            gap += rest
         return np.concatenate([gap.ravel(), value])
 
     def flights(self, chosen: tuple[int, ...] = ()) -> Flights:
@@ -404,8 +406,8 @@ class Small:
 
 def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
     """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border."""
-    # Durations first, then the starts of all legs but the first: n^3 operations for each leg. Columns and
-    # rows may be scaled. The last column of what is small is the right-hand side.
+    # Durations first, then the starts of all legs but the first: n^3 operations for each leg.
+    # Columns and rows may be scaled. The last columns of blocks are their constant parts.
     count, n, m = len(problem.legs), problem.dimension, problem.size
     few = n + len(matrix) - m
     rows = np.arange(count * n).reshape(count, n)

@@ -246,7 +246,7 @@ def periodic_orbit(
     return orbit
 
 
-#: Newton's method ends when the next step would be below this, relative to the orbit.
+#: Steps below this, relative to the orbit, that do not shrink are rounding of the equations.
 _CLOSE = 1e-10
 
 #: Steps below this, relative to the orbit, are rounding.
@@ -255,7 +255,7 @@ _ROUNDING = 1e-14
 #: Legs far from the orbit are flown with local errors up to this.
 _COARSE = 1e-8
 
-#: Steps below this, relative to the orbit, change its derivatives by rounding.
+#: Steps below this, relative to the orbit, change its derivatives by rounding: Newton's method ends.
 _FINAL = 1e-13
 
 #: Larger steps from an orbit of a family, relative to the orbit, are rounding that is magnified along it.
@@ -315,23 +315,23 @@ class _Solver:
             root = converge(
                 equations,
                 u / scales,
-                tol=_CLOSE,
+                tol=_FINAL,
                 max_iterations=max_iterations,
                 linear=self.problem.solve,
+                noise=_CLOSE,
+                values=lambda v: self.problem.residual(v * scales, self.p),
             )
         except (ConvergenceError, DegenerateError) as error:
             root, reason = None, str(error)
             if not last:  # not even the guess can be followed: no shorter step helps
                 raise self._failure(reason) from error
-        before, reached = list(last), self.last
+        before = list(last)
         nearest = self._of_family(equations, u / scales, root, max_iterations)
         last[:] = before
         if nearest is not root and nearest is not None:
             return self._polished(nearest * scales, _POLISH)
         if root is None and u.size <= _LARGE:
             root = self._damped(equations, u / scales, 2 * max_iterations)
-        elif root is not None and reached[1] is not None:
-            return self._polished(self._nearer(root * scales, reached[1]))
         if root is None:
             raise self._failure(reason)
         return self._polished(root * scales)
@@ -402,7 +402,7 @@ class _Solver:
         """Two more steps at most, as long as they shrink and are not too large: to rounding."""
         at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
         for _ in range(2):
-            exact = self.problem.exact_residual(u, self.p)
+            exact = self.problem.residual(u, self.p, extended=True)
             step = self._step(at.jacobian, at.residual if exact is None else exact)
             size = float(np.abs(step / scales).max())
             if exact is not None and size <= _FINAL:  # the derivatives are those of the orbit
@@ -418,14 +418,6 @@ class _Solver:
                 break
             u, at = u + step, there
         return u, at
-
-    def _nearer(self, u: Array, at: Evaluation) -> Array:
-        """One more step with the derivatives of the last one, where the residual has more digits."""
-        exact = self.problem.exact_residual(u, self.p)
-        if exact is None:
-            return u
-        step = self._step(at.jacobian, exact)
-        return u + step if np.abs(step / self.problem.scales(u)).max() <= _CLOSE else u
 
     def _step(self, jacobian: Array, residual: Array) -> Array:
         try:

@@ -125,26 +125,35 @@ class Flights:
         of_legs = [fields[leg.mode] for leg in self.legs]
         return legs_program(of_legs, events, len(self.system.parameter_names))
 
-    def exact(self, starts: Array, durations: Array, p: Array) -> tuple[Array, Array, Array] | None:
-        """States after the events and the events' functions with more digits than a double has.
+    def ends(
+        self, starts: Array, durations: Array, p: Array, extended: bool
+    ) -> tuple[Array, Array, Array] | None:
+        """States after the events and the events' functions, without derivatives.
 
         Returns
         -------
         after, rest, value : ndarray (L, N), (L, N), (L,)
-            States rounded, and what that leaves. None where there are no more digits to be had.
+            States rounded, and in extended precision what that leaves. None where legs fail or
+            where not each is a flow of the states to one event.
         """
         program = self._plain_program if has_interpreter() else None
         if program is None:
             return None
-        found = program.extended(starts, p, durations, EXTENDED, MOST_STEPS)
-        if found is None:
+        n = starts.shape[1]
+        if extended:
+            found = program.extended(starts, p, durations, EXTENDED, MOST_STEPS)
+            if found is None:
+                return None
+            results, rest = found
+            return results[:, :n], rest[:, :n], results[:, n]
+        flown = program(starts, p, durations, TOLERANCE, MOST_STEPS)
+        if flown.failed >= 0:
             return None
-        n, (results, rest) = starts.shape[1], found
-        return results[:, :n], rest[:, :n], results[:, n]
+        return flown.results[:, :n], np.zeros_like(starts), flown.results[:, n]
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
-        """States of all legs at a start 0, and matrices (x, X, P), transposed, of entries that do not move."""
+        """States of all legs at a start 0, and matrices (x, X, P)^T of entries that do not move."""
         # Then places of the entries that move: in these matrices, and in the states.
         width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
         count, most = len(self.legs), self._most

@@ -123,11 +123,13 @@ def passages(
     """Passages of the events of many legs, none of which may be grazed."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state
     speed = (e * rate).sum(axis=1)
-    size = _norms(e) * _norms(rate)
-    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
     carried = (g @ rate[:, :, None])[:, :, 0]
     jump = after - carried
-    kept = _norms(jump) <= _CONTINUOUS * np.maximum(_norms(after), _norms(carried))
+    with np.errstate(over="ignore"):
+        of_e, of_rate, of_jump, of_after, of_carried = map(_norms, (e, rate, jump, after, carried))
+    size = of_e * of_rate
+    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
+    kept = of_jump <= _CONTINUOUS * np.maximum(of_after, of_carried)
     if events is not None:
         kept |= ~events
     grazed = np.flatnonzero((angle < GRAZING) & ~kept)
@@ -162,8 +164,7 @@ def saltations(
 
 def _norms(rows: Array) -> Array:
     """Lengths of rows, also of those whose squares overflow."""
-    with np.errstate(over="ignore"):
-        found: Array = np.sqrt((rows * rows).sum(axis=1))
+    found: Array = np.sqrt((rows * rows).sum(axis=1))
     if not np.isinf(found).any():
         return found
     largest = np.abs(rows).max(axis=1)

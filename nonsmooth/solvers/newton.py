@@ -12,6 +12,7 @@ the Jacobian from one evaluation to the next (Broyden 1965).
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -327,7 +328,7 @@ def _full_steps(
             step = -linear(jacobian, values)
         except np.linalg.LinAlgError:
             return None
-        size = float(np.linalg.norm(step)) / scale
+        size = math.sqrt(float(step @ step)) / scale
         x = x + step
         if size <= tol or (np.isfinite(last) and size * size <= tol * last):
             return x
@@ -359,7 +360,7 @@ def _chords(
         if found is None or not np.isfinite(found).all():
             break
         step = -solved(found)
-        size = float(np.linalg.norm(step)) / scale
+        size = math.sqrt(float(step @ step)) / scale
         ratio = size / last
         # a full step leaves the square of its size, one with the same derivatives twice as much of its own
         rate = max(ratio, rate) if again else 2.0 * ratio

@@ -269,11 +269,13 @@ class BoundaryProblem:
             return None
         after, rest, value = found
         with np.errstate(over="ignore", invalid="ignore"):
-            if self.symmetry is not None:
-                after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
+            for part in (after, rest) if self.symmetry is not None else ():
+                if part is not None:
+                    part[-1] = self.wrap @ part[-1]
             gap = after - starts[places_of(*starts.shape).next_leg]
             gap[-1, -1] -= self.advance(p)[0]
-            gap += rest
+            if rest is not None:
+                gap += rest
         return np.concatenate([gap.ravel(), value])
 
     def flights(self, chosen: tuple[int, ...] = ()) -> Flights:

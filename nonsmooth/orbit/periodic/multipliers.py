@@ -8,6 +8,7 @@ dimension lost are exact. The full matrix gives them with rounding, which estima
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
@@ -20,7 +21,7 @@ from ...model import Array
 from ...model.derivatives.event_maps import surface_map
 from ..runs.legs import leg_name
 from ..runs.saltation import passages, saltations
-from .boundary_value_problem import BoundaryProblem, Evaluation
+from .boundary_value_problem import BoundaryProblem, Evaluation, places_of
 
 #: A direction of which a leg leaves no more than this part is lost.
 _LOST = 1e-12
@@ -146,11 +147,13 @@ def reduced_map(maps: Array, flown: Array, basis: Array) -> Array:
     # Directions are lost beside those that the legs carry, ``flown`` (L, n, n).
     count, n = len(maps), maps.shape[1]
     bases: list[Array] = [np.eye(n)] * count
-    for _ in range(2):
-        for i in range(count):
-            size = float(np.linalg.norm(flown[i] @ basis)) if basis.size else 0.0
-            basis = _range(maps[i] @ basis, size)
-            bases[(i + 1) % count] = basis
+    for i in range(2 * count):
+        k, following = i % count, (i + 1) % count
+        size = _length(flown[k] @ basis) if basis.size else 0.0
+        basis = _range(maps[k] @ basis, size)
+        if i >= count and basis.shape[1] == bases[following].shape[1]:
+            break  # the second time round nothing more is lost
+        bases[following] = basis
     first = min(range(count), key=lambda i: bases[i].shape[1])
     product: Array = np.eye(bases[first].shape[1])
     for k in range(count):
@@ -167,12 +170,16 @@ def _kept(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> A
     return np.asarray(np.linalg.svd(np.array(rows) * units)[2][len(rows) :].T)
 
 
+def _length(matrix: Array) -> float:
+    return math.sqrt(float(np.vdot(matrix, matrix)))
+
+
 def _range(matrix: Array, size: float) -> Array:
     """Orthonormal basis of the range of a matrix, without what is lost beside ``size``."""
     if not matrix.shape[1]:
         return matrix
     if matrix.shape[1] == 1:
-        length = float(np.linalg.norm(matrix))
+        length = _length(matrix)
         return matrix / length if length > _LOST * size else matrix[:, :0]
     u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
@@ -203,7 +210,8 @@ def _events(
     problem: BoundaryProblem, at: Evaluation
 ) -> tuple[Array, Callable[[int], str], NDArray[np.bool_]]:
     """Fields after the events of legs, their names, and which legs have one."""
-    after = np.roll(at.flight.before[:, : problem.dimension], -1, axis=0)
+    following = places_of(len(problem.legs), problem.dimension).next_leg
+    after = at.flight.before[following, : problem.dimension]
     if problem.symmetry is not None:
         after[-1] = np.linalg.solve(problem.wrap, after[-1])
     legs = problem.legs

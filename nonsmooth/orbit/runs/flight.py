@@ -127,12 +127,12 @@ class Flights:
 
     def ends(
         self, starts: Array, durations: Array, p: Array, extended: bool
-    ) -> tuple[Array, Array, Array] | None:
+    ) -> tuple[Array, Array | None, Array] | None:
         """States after the events and the events' functions, without derivatives.
 
         Returns
         -------
-        after, rest, value : ndarray (L, N), (L, N), (L,)
+        after, rest, value : ndarray (L, N), (L, N) or None, (L,)
             States rounded, and in extended precision what that leaves. None where legs fail or
             where not each is a flow of the states to one event.
         """
@@ -149,7 +149,7 @@ class Flights:
         flown = program(starts, p, durations, TOLERANCE, MOST_STEPS)
         if flown.failed >= 0:
             return None
-        return flown.results[:, :n], np.zeros_like(starts), flown.results[:, n]
+        return flown.results[:, :n], None, flown.results[:, n]
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:

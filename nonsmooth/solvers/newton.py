@@ -70,7 +70,7 @@ _HALVINGS = 40
 
 #: After full steps below the first size, relative to the unknowns, others with the same Jacobian are tried:
 #: so many, as long as each is below this part of the one before.
-_SMALL, _CHORDS, _CONTRACTS = 1e-2, 4, 0.05
+_SMALL, _CHORDS, _CONTRACTS = 1e-3, 4, 0.05
 
 #: Changes over steps shorter than this part of the unknowns are rounding, which says nothing.
 _SHORT = 1e-11

@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from ..model import Array, ConvergenceError, Evaluator
 from ..model.derivatives.variational import ORDER, GuardedField
 from ..model.printing.tape import Series, Values
-from .compiled.shooting import FollowedProgram
 from .compiled.smooth import LegsProgram, SmoothProgram, ValuesProgram, WatchProgram
 from .compiled.tape import library
 from .reference.polynomial import first_crossing, first_root, sign_changes
@@ -112,20 +111,6 @@ def legs_program(
         [None if event is None else values_program(event) for event in events],
         parameters,
     )
-
-
-def followed_program(
-    fields: Sequence[CompiledField],
-    ends: Sequence[tuple[int, int]],
-    events: Sequence[Evaluated],
-    plain: Sequence[Evaluated],
-    dimensions: tuple[int, int, int],
-) -> FollowedProgram:
-    """Program that integrates legs one after the other, each up to its event."""
-    own = [[values_program(event) for event in each] for each in (events, plain)]
-    rows, directions = zip(*ends, strict=True)
-    programs = [program_of(field) for field in fields]
-    return FollowedProgram(programs, rows, directions, own[0], own[1], dimensions)
 
 
 def values_program(event: Evaluated) -> ValuesProgram:

@@ -12,6 +12,7 @@ the next one would be below ``tol``; ``Secant`` carries the Jacobian from one ev
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -26,6 +27,10 @@ Equations = Callable[[Array], tuple[Array, Array]]
 Values = Callable[[Array], Array]
 
 _HALVINGS = 40
+
+#: After full steps below the first size, relative to the unknowns, others with the same Jacobian are tried:
+#: so many, as long as each is below this part of the one before.
+_SMALL, _CHORDS, _CONTRACTS = 1e-3, 4, 0.05
 
 #: Changes over steps shorter than this part of the unknowns are rounding.
 _SHORT = 1e-11
@@ -213,6 +218,7 @@ def converge(
     max_iterations: int = 30,
     linear: Callable[[Array, Array], Array] | None = None,
     noise: float = 1e-11,
+    values: Callable[[Array], Array | None] | None = None,
 ) -> Array | None:
     """Root of as many equations as unknowns from a good guess, or None.
 
@@ -236,6 +242,9 @@ def converge(
         Solves the linear equations of a step, where their structure is known.
     noise : float, optional
         Steps below this, relative to ``scale``, that shrink no more are taken to be rounding.
+    values : callable, optional
+        Takes unknowns (n,) and returns the values alone, where that is cheaper, or None where it fails. Then
+        steps with the Jacobian of the last full one follow it as long as they shrink fast.
 
     Examples
     --------
@@ -249,10 +258,15 @@ def converge(
         )
     start = real_array(start, "start")
     carried = isinstance(equations, Secant) and equations.jacobian is not None
-    root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
+    given = tol, scale, max_iterations, linear or _dense, noise, values
+    root = _full_steps(equations, start, *given)
     if root is None and carried and isinstance(equations, Secant) and equations.forget():
-        root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
+        root = _full_steps(equations, start, *given)
     return root
+
+
+def _dense(matrix: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, right), float)
 
 
 def _full_steps(
@@ -261,8 +275,9 @@ def _full_steps(
     tol: float,
     scale: float,
     most: int,
-    linear: Callable[[Array, Array], Array] | None,
+    linear: Callable[[Array, Array], Array],
     noise: float,
+    plain: Callable[[Array], Array | None] | None,
 ) -> Array | None:
     x, last = np.array(start, dtype=float), np.inf
     for _ in range(most):
@@ -270,10 +285,10 @@ def _full_steps(
         if not (np.isfinite(values).all() and np.isfinite(jacobian).all()):
             return None
         try:
-            step = -(np.linalg.solve if linear is None else linear)(jacobian, values)
+            step = -linear(jacobian, values)
         except np.linalg.LinAlgError:
             return None
-        size = float(np.linalg.norm(step)) / scale
+        size = math.sqrt(float(step @ step)) / scale
         x = x + step
         if size <= tol or (np.isfinite(last) and size * size <= tol * last):
             return x
@@ -282,6 +297,11 @@ def _full_steps(
         if not size <= 1e6:
             return None
         last = size
+        if plain is not None and size <= _SMALL:
+            solved = lambda r, matrix=jacobian: linear(matrix, r)
+            x, last, is_root = _chords(plain, solved, x, size, scale, tol)
+            if is_root:
+                return x
     return None
 
 
@@ -323,3 +343,32 @@ def _least_norm(values: Array, jacobian: Array) -> Array:
     if values.shape[1] == 1:
         return values * jacobian[:, 0]
     return (np.linalg.pinv(jacobian) @ values[..., None])[..., 0]
+
+
+def _chords(
+    values: Callable[[Array], Array | None],
+    solved: Callable[[Array], Array],
+    x: Array,
+    last: float,
+    scale: float,
+    tol: float,
+) -> tuple[Array, float, bool]:
+    """Steps with the Jacobian of the last full one: their end, the last size, whether it is the root."""
+    rate = 0.0
+    for again in range(_CHORDS):
+        found = values(x)
+        if found is None or not np.isfinite(found).all():
+            break
+        step = -solved(found)
+        size = math.sqrt(float(step @ step)) / scale
+        ratio = size / last
+        # a full step leaves the square of its size, one with the same derivatives twice as much of its own
+        rate = max(ratio, rate) if again else 2.0 * ratio
+        if not ratio <= 1.0:
+            break
+        x, last = x + step, size
+        if size <= tol or rate * size <= 0.1 * tol:
+            return x, size, True
+        if ratio > _CONTRACTS:
+            break
+    return x, last, False

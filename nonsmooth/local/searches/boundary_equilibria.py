@@ -244,13 +244,14 @@ def _planar_class(
         (np.linalg.norm(ca) * np.linalg.norm(c)) or 1.0
     )
     numbers = {"trace": trace, "determinant": det, "pseudo": -d / s if s else math.nan}
+    beside = d / s if s else math.inf
     if det < 0:
         if s < 0:
             return "BS3", numbers
         unstable = 0.5 * (trace + math.sqrt(disc))
         numbers["unstable"] = -unstable
-        margins["W^u meets the pseudo-node"] = relative_difference(d / s, unstable)
-        return ("BS1" if d / s < unstable else "BS2"), numbers
+        margins["W^u meets the pseudo-node"] = _apart(beside, unstable)
+        return ("BS1" if beside < unstable else "BS2"), numbers
     margins["trace"] = abs(trace) / size
     margins["focus or node"] = abs(disc) / (trace**2 + 4 * det)
     if disc > 0:
@@ -262,8 +263,13 @@ def _planar_class(
         return "BF1", numbers
     landing = fold_orbit_landing(0.5 * trace, 0.5 * math.sqrt(-disc))
     numbers["landing"] = landing
-    margins["fold orbit meets the pseudo-saddle"] = relative_difference(d / s, -landing)
-    return ("BF2" if -landing < d / s else "BF3"), numbers
+    margins["fold orbit meets the pseudo-saddle"] = _apart(beside, -landing)
+    return ("BF2" if -landing < beside else "BF3"), numbers
+
+
+def _apart(u: float, v: float) -> float:
+    """Relative difference; of an infinite number from a finite one it is 1."""
+    return relative_difference(u, v) if math.isfinite(u) else 1.0
 
 
 def fold_orbit_landing(rho: float, omega: float) -> float:

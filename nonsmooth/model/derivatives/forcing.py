@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
@@ -12,7 +11,6 @@ from ..checks import is_real
 from ..definition.system import FilippovSystem
 from ..errors import OptionError
 from ..laws.evaluators import Evaluator
-from ..printing.tape import Values, values_of
 from ..values import Array
 
 
@@ -58,24 +56,22 @@ class Forcing:
         self.expression = ca.SX(period)
         p = system.parameter_symbols
         slope = ca.jacobian(self.expression, p)
-        self._outputs = [ca.densify(e) for e in (self.expression, slope)]
-        self._inputs = [ca.SX(0, 1), p]
-        self._function = Evaluator(ca.Function("period", self._inputs, self._outputs))
+        self._constant = bool(slope.nnz() == 0)
+        self._last: tuple[float, Array] | None = None
+        outputs = [ca.densify(e) for e in (self.expression, slope)]
+        self._function = Evaluator(ca.Function("period", [ca.SX(0, 1), p], outputs))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled with its system, as a function of the parameters."""
         function = ca.Function("period", [self._system.parameter_symbols], [self.expression])
         return _restored, (self._system, function.serialize(), self.found)
 
-    @cached_property
-    def values(self) -> Values:
-        """The period and its derivatives as a graph."""
-        return values_of(self._inputs, self._outputs)
-
     def __call__(self, p: Array) -> tuple[float, Array]:
         """The period, and its derivatives by all parameters."""
-        value, slope = self._function.copied(np.zeros(0), p)
-        return float(value[0, 0]), slope[0]
+        if self._last is None or not self._constant:
+            value, slope = self._function.copied(np.zeros(0), p)
+            self._last = float(value[0, 0]), slope[0]
+        return self._last
 
 
 def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:

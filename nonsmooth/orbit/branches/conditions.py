@@ -10,6 +10,7 @@ Each test is a smooth function along the branch, which goes on, virtual, beyond 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -70,9 +71,9 @@ def conditions_of(
     for condition, value in tests(at, p):
         name = condition.name
         known.setdefault(name, condition)
-        if np.isfinite(value):
+        if math.isfinite(value):
             found[name] = value
-    found.update((name, v) for name, v in smooth_tests(problem, at).items() if np.isfinite(v))
+    found.update((name, v) for name, v in smooth_tests(problem, at).items() if math.isfinite(v))
     return found
 
 

@@ -2,95 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
-from ...flow.compiled.shooting import bordered_direction
-from ...flow.fixed import has_interpreter
 from ...model import Array
-from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, demands_of
+from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
 from .branch import BranchCurve
 from .conditions import Condition
-
-# Bordered equations of an orbit with many legs, solved from leg to leg.
-
-
-@dataclass(frozen=True, eq=False)
-class Small:
-    """What elimination leaves of bordered equations."""
-
-    matrix: Array
-    right: Array
-    starts: list[tuple[Array, Array]]
-    durations: list[tuple[Array, float]]
-    pivots: float
-
-    def determinant(self) -> float:
-        """Of all equations, up to a factor that keeps its sign."""
-        return float(np.linalg.det(self.matrix)) * self.pivots
-
-    def solution(self) -> Array:
-        """All unknowns."""
-        few = np.linalg.solve(self.matrix, self.right)
-        n = self.starts[0][0].shape[0]
-        rows = [a @ few + c for a, c in self.starts]
-        times = [float(b @ few + d) for b, d in self.durations]
-        return np.concatenate([*rows, times, few[n:]])
-
-
-def applies(problem: BoundaryProblem) -> bool:
-    """Whether every leg has an event that determines its duration, and nothing else is demanded."""
-    return not problem.kept and not any(leg.timed for leg in problem.legs)
-
-
-def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
-    """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border."""
-    # Columns and rows may be scaled.
-    count, n, m = len(problem.legs), problem.dimension, problem.size
-    k = len(matrix) - m
-    few = n + k
-    a, c = np.eye(n, few), np.zeros(n)
-    starts, durations = list[tuple[Array, Array]](), list[tuple[Array, float]]()
-    border = np.zeros((k, few))
-    border[:, n:] = matrix[m:, m:]
-    level = right[m:].copy()
-    pivots = 1.0
-    small, rest = np.zeros((n, few)), np.zeros(n)
-    for i in range(count):
-        own, time = slice(i * n, (i + 1) * n), count * n + i
-        row = matrix[time]
-        if row[time] == 0.0:  # the leg's event is grazed
-            raise np.linalg.LinAlgError(f"leg {i + 1}: its event does not determine its duration")
-        pivots *= float(row[time] / np.linalg.norm(row))
-        b = -(row[own] @ a) / row[time]
-        b[n:] -= row[m:] / row[time]
-        d = float((right[time] - row[own] @ c) / row[time])
-        starts.append((a, c))
-        durations.append((b, d))
-        border += matrix[m:, own] @ a + np.outer(matrix[m:, time], b)
-        level -= matrix[m:, own] @ c + matrix[m:, time] * d
-        ahead = matrix[own, own] @ a + np.outer(matrix[own, time], b)
-        ahead[:, n:] += matrix[own, m:]
-        constant = matrix[own, own] @ c + matrix[own, time] * d - right[own]
-        if i + 1 == count:
-            small, rest = ahead, -constant
-            if count > 1:
-                small[:, :n] += matrix[own, :n]
-            break
-        diagonal = -np.diag(matrix[own, (i + 1) * n : (i + 2) * n])
-        a, c = ahead / diagonal[:, None], constant / diagonal
-    return Small(np.vstack([small, border]), np.append(rest, level), starts, durations, pivots)
-
-
-#: Equations of more unknowns are solved from leg to leg.
-_MANY = 24
-
-#: Steps below this that do not shrink are rounding: near a branch point it is magnified.
-_NOISE = 1e-8
-
-#: Newton's method in one call: steps of it, along a leg, and unknowns. Others are left to what hears an interrupt.
-_MOST, _MOST_STEPS, _UNKNOWNS = 10, 1000, 100
 
 
 class OrbitEquations(BranchCurve):
@@ -110,7 +27,6 @@ class OrbitEquations(BranchCurve):
         self.system, self.widths = problem.system, widths
         self.scale = np.append(problem.scales(u, p), widths)
         self.known: dict[str, Condition] = {}
-        self._many = problem.size > _MANY and applies(problem)
         self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
 
     # equations ----------------------------------------------------------------------------------
@@ -131,52 +47,32 @@ class OrbitEquations(BranchCurve):
         key = u.tobytes()
         if key not in self._found:
             p, unknowns = self.parameters_at(u), u[: self.problem.size]
-            self._keep(key, self.problem.evaluate(unknowns, p, self.free))
+            at = self.problem.evaluate(unknowns, p, self.free)
+            self._found.pop(self._last, None)
+            self._found[key], self._last = at, key
         return self._found[key]
-
-    def _keep(self, key: bytes, at: Evaluation) -> None:
-        self._found.pop(self._last, None)
-        self._found[key], self._last = at, key
 
     def equations(self, u: Array) -> tuple[Array, Array]:
         at = self.evaluation(u)
         return at.residual, at.whole
 
-    def correct(self, guess: Array, across: Array, *, max_iterations: int = _MOST) -> Array | None:
-        """As of any curve; in one call where that can be, which leaves the equations at the point too."""
-        problem = self.problem
-        if problem.is_direct and len(self.free) == 1 and guess.size <= _UNKNOWNS:
-            wrap = None if problem.symmetry is None else problem.wrap
-            demands = demands_of(
-                problem.forcing,
-                problem.periods,
-                tol=self.tol,
-                noise=_NOISE,
-                most=_MOST,
-                most_steps=_MOST_STEPS,
-            )
-            flights = problem.flights(self.free)
-            found = flights.corrected(guess, self.p, self.scale, wrap, across, demands)
-            if found is not None:
-                u = found[0].unknowns
-                self._keep(u.tobytes(), problem.evaluation(*found))
-                return u
-        return super().correct(guess, across, max_iterations=max_iterations)
+    def values(self, u: Array) -> Array | None:
+        return self.problem.residual(u[: self.problem.size], self.parameters_at(u))
 
     def solve(self, matrix: Array, right: Array) -> Array:
-        if not self._many:
-            return super().solve(matrix, right)
-        return eliminated(self.problem, matrix, right).solution()
+        return self.problem.solve(matrix, right)
 
     def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
-        if self._many or not has_interpreter():
+        if not self.problem.has_many:
             return super().along(jacobian, before)
-        found = bordered_direction(jacobian, before)
-        if found is None:
-            raise np.linalg.LinAlgError("the equations are singular: a branch point")
-        return found
+        target = np.zeros(before.size)
+        target[-1] = 1.0
+        small = eliminated(self.problem, np.vstack([jacobian, before]), target)
+        tangent = small.solution()
+        length = float(np.linalg.norm(tangent))
+        return tangent / length, small.determinant() * length
 
     def determinant(self, matrix: Array) -> float:
-        if not self._many:
+        if not self.problem.has_many:
             return super().determinant(matrix)
         return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()

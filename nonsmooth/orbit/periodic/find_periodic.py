@@ -25,10 +25,9 @@ from ...model import (
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
 from ..runs.legs import leg_name
-from .boundary_value_problem import CLOSE, COARSE, FINAL, ROUNDING, BoundaryProblem, Evaluation
+from .boundary_value_problem import BoundaryProblem, Evaluation
 from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
-from .shooting import shot
 from .symmetry import mirror_of, once_round, require_symmetric
 
 # What a solution of the equations of an orbit must be to count as one.
@@ -244,6 +243,18 @@ def periodic_orbit(
     return orbit
 
 
+#: Steps below this, relative to the orbit, that do not shrink are rounding of the equations.
+_CLOSE = 1e-10
+
+#: Steps below this, relative to the orbit, are rounding.
+_ROUNDING = 1e-14
+
+#: Legs far from the orbit are flown with local errors up to this.
+_COARSE = 1e-8
+
+#: Steps below this, relative to the orbit, change its derivatives by rounding: Newton's method ends.
+_FINAL = 1e-13
+
 #: Larger steps from an orbit of a family, relative to the orbit, are rounding that is magnified along it.
 _POLISH = 1e-3
 
@@ -267,14 +278,14 @@ class _Solver:
     def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
         """The orbit, to rounding."""
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
-        found = shot(self.problem, u, self.p, longest, max_iterations)
-        if found is not None:
-            self.iterations += found[2]
-            return found[:2]
         scales = self.problem.scales(u)
         last: list[Array] = []
+        first: list[tuple[Array, Evaluation]] = []
 
         def equations(v: Array) -> tuple[Array, Array]:
+            if first and np.array_equal(v, first[0][0]):  # the guess, again
+                self.last = first[0][0] * scales, first[0][1]
+                return first[0][1].residual, first[0][1].jacobian * scales
             u = v * scales
             self.last = u, None
             durations = self.problem.split(u)[1]
@@ -284,10 +295,12 @@ class _Solver:
                     f"Leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
-            size = float(np.abs(v - last[-1]).max()) if last else 1e-2
+            size = float(np.abs(v - last[-1]).max()) if last else 0.0
             # after a step of this size the next one is its square, and what it leaves its fourth power
-            tol = min(max(1e-3 * size**4, TOLERANCE), COARSE)
+            tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
             at = self.problem.evaluate(u, self.p, tol=tol)
+            if not last:
+                first.append((v, at))
             last.append(v)
             self.last = u, at
             self.iterations += 1
@@ -299,9 +312,11 @@ class _Solver:
             root = converge(
                 equations,
                 u / scales,
-                tol=CLOSE,
+                tol=_FINAL,
                 max_iterations=max_iterations,
                 linear=self.problem.solve,
+                noise=_CLOSE,
+                values=lambda v: self.problem.residual(v * scales, self.p),
             )
         except (ConvergenceError, DegenerateError) as error:
             root, reason = None, str(error)
@@ -384,12 +399,12 @@ class _Solver:
         """Two more steps at most, as long as they shrink and are not too large: to rounding."""
         at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
         for _ in range(2):
-            exact = self.problem.exact_residual(u, self.p)
+            exact = self.problem.residual(u, self.p, extended=True)
             step = self._step(at.jacobian, at.residual if exact is None else exact)
             size = float(np.abs(step / scales).max())
-            if exact is not None and size <= FINAL:  # the derivatives are those of the orbit
+            if exact is not None and size <= _FINAL:  # the derivatives are those of the orbit
                 return self._moved(u, step, at, exact)
-            if size <= ROUNDING or size > largest:
+            if size <= _ROUNDING or size > largest:
                 break
             try:
                 there = self.problem.evaluate(u + step, self.p)

@@ -31,7 +31,6 @@ from ...model import (
 )
 from ...model.derivatives.forcing import Forcing, frequencies
 from ...model.derivatives.variational import plain_field
-from ..runs.flight import flights_of
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
 from ..runs.legs import Leg, Stretch, fly, leg_name, stretches
@@ -528,8 +527,7 @@ def _from_word(
     if forcing is not None and mirror is None and (leg := lone_leg(system, itinerary)) is not None:
         return _from_mode(system, x, leg, forcing, p)
     legs = word_legs(system, itinerary, mirror is not None)
-    found = flights_of(system, legs).followed(x, p, _LONGEST)
-    starts, durations = found or _followed(system, legs, x, p)
+    starts, durations = _followed(system, legs, x, p)
     periods = 0.0
     if forcing is not None:
         count = float(durations.sum()) / forcing(p)[0]

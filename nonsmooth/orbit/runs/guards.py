@@ -190,7 +190,8 @@ def faults_along(
     closes: bool,
 ) -> list[str]:
     """What the guards contradict along legs that follow each other, leg by leg."""
-    guards = LegGuards(system, legs)
+    made = lambda: LegGuards(system, legs)  # kept for an orbit, which is one of many of a family
+    guards = system.cached(("guards of legs", tuple(legs)), made) if closes else made()
     fields, (rows, begins, _) = guards.fields, guards(starts, p, durations)
     result, count = list[str](), len(legs)
     for i, leg in enumerate(legs):

@@ -87,17 +87,31 @@ class _One(NamedTuple):
         return cls(*[row[None] for row in rows])
 
 
-def saltations(
-    ends: Ended, after: Array, named: Callable[[int], str], events: NDArray[np.bool_] | None = None
-) -> Saltation:
-    """Saltation matrices of the events of many legs, stacked."""
+class Passed(NamedTuple):
+    """How legs pass their events: speeds across them, angles, jumps of the field, and where it has none."""
+
+    speed: Array
+    angle: Array
+    jump: Array
+    kept: NDArray[np.bool_]
+
+
+def passages(
+    ends: Ended,
+    after: Array,
+    named: Callable[[int], str],
+    events: NDArray[np.bool_] | None = None,
+) -> Passed:
+    """Passages of the events of many legs, none of which may be grazed."""
     e, rate, g = ends.gradient, ends.rate, ends.after_state
     speed = (e * rate).sum(axis=1)
-    size = _norms(e) * _norms(rate)
-    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
     carried = (g @ rate[:, :, None])[:, :, 0]
     jump = after - carried
-    kept = _norms(jump) <= _CONTINUOUS * np.maximum(_norms(after), _norms(carried))
+    with np.errstate(over="ignore"):
+        of_e, of_rate, of_jump, of_after, of_carried = map(_norms, (e, rate, jump, after, carried))
+    size = of_e * of_rate
+    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
+    kept = of_jump <= _CONTINUOUS * np.maximum(of_after, of_carried)
     if events is not None:
         kept |= ~events
     grazed = np.flatnonzero((angle < GRAZING) & ~kept)
@@ -107,10 +121,21 @@ def saltations(
     if grazed.size:
         i = int(grazed[0])
         raise DegenerateError(_grazing(named(i), float(angle[i]), ends, i, jump[i]))
+    return Passed(speed, angle, jump, kept)
+
+
+def saltations(
+    ends: Ended,
+    after: Array,
+    named: Callable[[int], str],
+    events: NDArray[np.bool_] | None = None,
+) -> Saltation:
+    """Saltation matrices of the events of many legs, stacked."""
+    speed, angle, jump, kept = passages(ends, after, named, events)
     with np.errstate(divide="ignore", invalid="ignore"):
-        time_x = -e / speed[:, None]
+        time_x = -ends.gradient / speed[:, None]
         time_p = -ends.value_parameters / speed[:, None]
-    matrix, by_parameters = g, ends.after_parameters
+    matrix, by_parameters = ends.after_state, ends.after_parameters
     if not kept.all():
         jump[kept] = 0.0
         x, p = np.where(kept[:, None], 0.0, time_x), np.where(kept[:, None], 0.0, time_p)
@@ -120,9 +145,8 @@ def saltations(
 
 
 def _norms(rows: Array) -> Array:
-    """Lengths of rows, without overflow."""
-    with np.errstate(over="ignore"):
-        found: Array = np.sqrt((rows * rows).sum(axis=1))
+    """Lengths of rows, also of those whose squares overflow."""
+    found: Array = np.sqrt((rows * rows).sum(axis=1))
     if not np.isinf(found).any():
         return found
     largest = np.abs(rows).max(axis=1)

@@ -97,6 +97,16 @@ class Curve:
         """
         raise NotImplementedError
 
+    def values(self, u: Array) -> Array | None:
+        """Return the values of the equations alone, where that is cheaper; else None.
+
+        Parameters
+        ----------
+        u : ndarray (N,)
+            The unknowns.
+        """
+        return None
+
     def fault(self, u: Array) -> str:
         """Say why a zero of the equations is not a point of the curve; empty if it is one.
 
@@ -233,6 +243,10 @@ class Curve:
             values, jacobian = self.scaled(v)
             return np.append(values, across @ v - level), np.vstack([jacobian, across])
 
+        def plain(v: Array) -> Array | None:
+            values = self.values(v * self.scale)
+            return None if values is None else np.append(values, across @ v - level)
+
         def attempt() -> Array | None:
             # exact derivatives converge quadratically: near a branch point rounding is magnified
             noise = 1e-8 if self.exact else 1e-11
@@ -243,6 +257,7 @@ class Curve:
                 max_iterations=max_iterations,
                 linear=self.solve,
                 noise=noise,
+                values=plain,
             )
 
         try:

@@ -193,7 +193,7 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
 def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    interrupt(monkeypatch, type(orbit.problem), "evaluation", calls - 1, once=True)
+    interrupt(monkeypatch, type(orbit.problem), "evaluate", calls - 1, once=True)
     branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in branch.ends
     assert len(branch) >= calls // 10

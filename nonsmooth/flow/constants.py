@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 
-from ..model.laws.multiplier_series import FALL, LIMIT_FALL
+from ..model.laws.coupled import FALL, LIMIT_FALL
 
 __all__ = ["FALL", "LIMIT_FALL"]  # and all below
 

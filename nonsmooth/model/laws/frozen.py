@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..values import Array
-from .coupled import Coupled
-from .multiplier_series import unit
+from .coupled import Coupled, unit
 
 
 @dataclass(frozen=True)

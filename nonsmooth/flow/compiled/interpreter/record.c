@@ -83,7 +83,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }
 
-/* nonsmooth/flow/reference/bookkeeping.py */
+/* nonsmooth/flow/reference/driver.py */
 static double interval_back(const Run *r, int back) { return r->interval[(r->history - back) % HISTORY]; }
 static int64_t pattern_back(const Run *r, int back) { return r->pattern[(r->history - back) % HISTORY]; }
 

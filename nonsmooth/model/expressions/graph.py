@@ -14,6 +14,7 @@ from typing import Protocol, TypeVar, cast
 import casadi as ca
 
 from ..errors import NotSmoothError
+from ..reading import refuse_call
 
 #: CasADi's operation codes by number, e.g. ``OPERATIONS[4] == "mul"``.
 OPERATIONS: dict[int, str] = {
@@ -90,6 +91,10 @@ def instructions(
             register[target[0]] = number(Node(op, (), (source[0], source[1])))
         elif op == "output":
             rows[target[0]][target[1]] = register[source[0]]
+        elif op == "call":
+            refuse_call(function.instructions_sx()[k].which_function(), "expression")
+        elif op in ("printme", "lift"):  # their second argument is no part of the value
+            register[target[0]] = register[source[0]]
         else:
             register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
     return nodes, rows

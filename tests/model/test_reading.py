@@ -12,7 +12,6 @@ m = ca.MX.sym("m")
 KNOTS = np.linspace(-2.0, 2.0, 9)
 
 
-
 class Cube(ca.Callback):
     """A Function of which CasADi knows no operations, as an external one."""
 
@@ -30,7 +29,10 @@ TABLES = {
     "linear": ca.interpolant("my_table", "linear", [KNOTS], KNOTS**3),
     "bspline": ca.interpolant("my_table", "bspline", [KNOTS], KNOTS**3),
     "a table inside": ca.Function(
-        "outer", [x], [ca.interpolant("my_table", "linear", [KNOTS], KNOTS)(x)], {"never_inline": True}
+        "outer",
+        [x],
+        [ca.interpolant("my_table", "linear", [KNOTS], KNOTS)(x)],
+        {"never_inline": True},
     ),
     "a root": ca.Function("outer", [x], [ROOT(0, x)], {"never_inline": True}),
     "MX": ca.Function("my_table", [m], [ca.sin(m)], {"never_inline": True}),

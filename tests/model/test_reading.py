@@ -6,6 +6,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.flow import follow
+from nonsmooth.model.expressions.graph import instructions
 
 x, v, t, p, lam = (ca.SX.sym(s) for s in ("x", "v", "t", "p", "lam"))
 m = ca.MX.sym("m")
@@ -177,10 +178,15 @@ def test_what_casadi_itself_evaluates_is_right():
 
 
 def test_a_message_inside_an_expression_changes_no_value():
-    """CasADi's printme and lift are their first argument."""
-    for expression in (ca.sin(x).printme(v), ca.SX.binary(ca.OP_LIFT, ca.sin(x), v)):
-        run, plain = (
-            ns.simulate(ns.FilippovSystem([x, v], field=[v, -e]), [1.0, 0.2], 1.0)
-            for e in (expression, ca.sin(x))
-        )
-        np.testing.assert_array_equal(run.x, plain.x)
+    """CasADi's printme is its first argument."""
+    run, plain = (
+        ns.simulate(ns.FilippovSystem([x, v], field=[v, -e]), [1.0, 0.2], 1.0)
+        for e in (ca.sin(x).printme(v), ca.sin(x))
+    )
+    np.testing.assert_array_equal(run.x, plain.x)
+
+
+def test_no_graph_is_walked_past_a_call():
+    """What has not been read as an argument is refused where graphs are read."""
+    with pytest.raises(ns.DefinitionError, match="'my_table'"):
+        instructions([x], [TABLES["linear"](x)])

@@ -13,8 +13,9 @@ from typing import Protocol, TypeVar, cast
 
 import casadi as ca
 
-from ..errors import NotSmoothError
+from ..errors import DefinitionError, NotSmoothError
 from ..reading import refuse_call
+from .float_arithmetic import BINARY, UNARY
 
 #: CasADi's operation codes by number, e.g. ``OPERATIONS[4] == "mul"``.
 OPERATIONS: dict[int, str] = {
@@ -93,8 +94,13 @@ def instructions(
             rows[target[0]][target[1]] = register[source[0]]
         elif op == "call":
             refuse_call(function.instructions_sx()[k].which_function(), "expression")
-        elif op in ("printme", "lift"):  # their second argument is no part of the value
+        elif op == "printme":  # prints its second argument where CasADi evaluates it
             register[target[0]] = register[source[0]]
+        elif op not in UNARY and op not in BINARY:
+            raise DefinitionError(
+                f"expression: CasADi's operation {op!r} is not supported. Write it with "
+                f"arithmetic and elementary functions: {', '.join((*UNARY, *BINARY))}."
+            )
         else:
             register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
     return nodes, rows

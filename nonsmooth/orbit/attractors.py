@@ -29,6 +29,9 @@ _DENSE = 8
 #: So many times the runs that are left over after the whole time may show further attractors.
 _FURTHER = 4
 
+#: Starts that are compared with an attractor between two moments at which Ctrl-C is heard.
+_ROWS = 4096
+
 
 @savable
 @dataclass(frozen=True, eq=False, repr=False)
@@ -120,8 +123,10 @@ class Search:
         """Attractor beside which all looks (m, K, n) are, from 1; 0 where there is none."""
         label = np.zeros(len(looks), np.int32)
         for k, tree in enumerate(self._trees):
-            distance, _ = tree.query(looks / self.scale, p=np.inf)
-            label[np.all(distance <= self.near, axis=1) & (label == 0)] = k + 1
+            for first in range(0, len(looks), _ROWS):
+                part = slice(first, first + _ROWS)
+                distance, _ = tree.query(looks[part] / self.scale, p=np.inf)
+                label[part][np.all(distance <= self.near, axis=1) & (label[part] == 0)] = k + 1
         return label
 
     def _learn(self, history: Array) -> NDArray[np.int32]:

@@ -71,7 +71,7 @@ def instructions(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[list[Node], list[list[int]]]:
     """Value-number the graph of dense ``outputs`` over ``inputs``."""
-    function = ca.Function("graph", list(inputs), [ca.densify(ca.SX(o)) for o in outputs])
+    function = ca.Function("graph", list(inputs), [_dense(o) for o in outputs])
     nodes: list[Node] = []
     known: dict[Node, int] = {}
     register: dict[int, int] = {}
@@ -104,6 +104,12 @@ def instructions(
         else:
             register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
     return nodes, rows
+
+
+def _dense(output: ca.SX) -> ca.SX:
+    """A dense output; CasADi's conversions lose Ctrl-C, so only what needs one has one."""
+    dense = isinstance(output, ca.SX) and output.is_dense()
+    return output if dense else ca.densify(ca.SX(output))
 
 
 V = TypeVar("V")

@@ -50,6 +50,9 @@ _DENSE = 8
 #: Number of searches for further attractors among the undecided runs.
 _FURTHER = 4
 
+#: Starts that are compared with an attractor in one call, during which Ctrl-C waits.
+_ROWS = 4096
+
 
 @savable
 @dataclass(frozen=True, eq=False, repr=False)
@@ -136,8 +139,10 @@ class Search:
         """Number, from 1, of the attractor near all samples (m, K, n) of a run; 0 for none."""
         label = np.zeros(len(sampled), np.int32)
         for k, tree in enumerate(self._trees):
-            distance, _ = tree.query(sampled / self.scale, p=np.inf)
-            label[np.all(distance <= self.near, axis=1) & (label == 0)] = k + 1
+            for first in range(0, len(sampled), _ROWS):
+                part = slice(first, first + _ROWS)
+                distance, _ = tree.query(sampled[part] / self.scale, p=np.inf)
+                label[part][np.all(distance <= self.near, axis=1) & (label[part] == 0)] = k + 1
         return label
 
     def _recurrent(self, history: Array) -> NDArray[np.int32]:

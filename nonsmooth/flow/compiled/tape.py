@@ -61,6 +61,8 @@ _FIRST = {"step": 64, "point": 128, "event": 64}
 
 #: How rooms grow: pages that are not written cost nothing, so by much as long as they are small (bytes).
 _SMALL, _MUCH, _LITTLE = 1 << 26, 16, 2
+#: Rows that are copied at once.
+_COPIED = 1 << 16
 
 #: Rooms of all kinds that C asks for before a step.
 _NEEDED = {"step": 2, "point": 4, "event": 4}
@@ -123,7 +125,8 @@ class Output:
             self._rooms[kind] = room * (_MUCH if small else _LITTLE)
             self._blocks[kind] = self._block(kind)
             for name, array in self._of(kind, size).items():
-                array[:] = written[name]
+                for k in range(0, size, _COPIED):  # Ctrl-C is heard between the pieces
+                    array[k : k + _COPIED] = written[name][k : k + _COPIED]
         self._point_to(counts)
 
     def filled(self, counts: Sequence[int]) -> dict[str, NDArray[Any]]:

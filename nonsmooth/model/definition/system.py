@@ -69,7 +69,8 @@ class FilippovSystem:
     Raises
     ------
     DefinitionError
-        Shapes, foreign symbols, a constant surface, a multiplier that enters nonlinearly.
+        Shapes, foreign symbols, a constant surface, a multiplier that enters nonlinearly, a CasADi
+        Function that is no graph of SX operations (``interpolant``, ``rootfinder``, external ones).
     NotSmoothError
         sign, fabs, fmin, fmax, if_else or a comparison of the states in an expression.
 

@@ -12,7 +12,9 @@ from typing import Protocol, TypeVar, cast
 
 import casadi as ca
 
-from ..errors import NotSmoothError
+from ..errors import DefinitionError, NotSmoothError
+from ..reading import refuse_call
+from .float_arithmetic import BINARY, UNARY
 
 #: CasADi's operation codes by number, e.g. ``OPERATIONS[4] == "mul"``.
 OPERATIONS: dict[int, str] = {
@@ -66,7 +68,7 @@ def instructions(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[list[Node], list[list[int]]]:
     """Value-number the graph of dense ``outputs`` over ``inputs``."""
-    function = ca.Function("graph", list(inputs), [ca.densify(ca.SX(o)) for o in outputs])
+    function = ca.Function("graph", list(inputs), [_dense(o) for o in outputs])
     nodes: list[Node] = []
     known: dict[Node, int] = {}
     register: dict[int, int] = {}
@@ -87,9 +89,24 @@ def instructions(
             register[target[0]] = number(Node(op, (), (source[0], source[1])))
         elif op == "output":
             rows[target[0]][target[1]] = register[source[0]]
+        elif op == "call":
+            refuse_call(function.instructions_sx()[k].which_function(), "expression")
+        elif op == "printme":  # prints its second argument where CasADi evaluates it
+            register[target[0]] = register[source[0]]
+        elif op not in UNARY and op not in BINARY:
+            raise DefinitionError(
+                f"expression: CasADi's operation {op!r} is not supported. Write it with "
+                f"arithmetic and elementary functions: {', '.join((*UNARY, *BINARY))}."
+            )
         else:
             register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
     return nodes, rows
+
+
+def _dense(output: ca.SX) -> ca.SX:
+    """A dense output; CasADi's conversions lose Ctrl-C, so only what needs one has one."""
+    dense = isinstance(output, ca.SX) and output.is_dense()
+    return output if dense else ca.densify(ca.SX(output))
 
 
 V = TypeVar("V")

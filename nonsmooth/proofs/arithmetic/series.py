@@ -50,6 +50,15 @@ def _atan2(y: arb_series, x: arb_series) -> arb_series:
     return -half - (x / y).atan() if up < 0 else arb_series([arb.nan()])
 
 
+def _erfinv(a: arb_series) -> arb_series:
+    """Each pass of w' = sqrt(pi)/2 exp(w^2) a' gains a coefficient."""
+    start = arb_series([a[0].erfinv()])
+    w, factor = start, arb.pi().sqrt() / 2
+    for _ in range(ctx.cap - 1 if len(a) > 1 else 0):
+        w = start + ((w * w).exp() * a.derivative() * factor).integral()
+    return w
+
+
 def _still(op: str) -> Callable[..., arb_series]:
     """An operation that is only known of constants."""
 
@@ -66,7 +75,7 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
         op: getattr(arb_series, op)
         for op in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "erf")
     },
-    **{op: _still(op) for op in ("fabs", "fmin", "fmax", "erfinv")},
+    **{op: _still(op) for op in ("fabs", "fmin", "fmax")},
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
@@ -86,6 +95,7 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
     "pow": lambda a, b: (b * a.log()).exp(),
     "hypot": lambda a, b: (a * a + b * b).sqrt(),
     "atan2": _atan2,
+    "erfinv": _erfinv,
     "pi": lambda: arb_series([arb.pi()]),
 }
 

@@ -84,6 +84,8 @@ class ValidatedFlow:
     def moved(self, image: list[arb], derivative: arb_mat) -> None:
         """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
         product = derivative * self.frame
+        if not all(v.is_finite() for v in (*image, *entries(product))):
+            raise UnprovenError(f"the flow has no enclosure at t = {float(self.t.mid()):.9g}")
         wide = any(radius(v) > 0 for v in entries(self.r))
         frame = orthogonal(product) if wide else identity(self.n)
         inverse = frame.inv()

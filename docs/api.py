@@ -160,7 +160,8 @@ def _member(path: str, name: str) -> str:
     defined, shown = place(path, name), f"{path}.{name}"
     if defined == shown:
         return f"::: {defined}\n{_OPTIONS.get(name, '')}"
-    options = f"    options:\n      heading: {shown}\n      toc_label: {shown}\n"
+    label = name.rpartition(".")[2]
+    options = f"    options:\n      heading: {shown}\n      toc_label: {label}\n"
     return f"[](){{#{shown}}}\n\n::: {defined}\n{options}"
 
 

@@ -36,7 +36,7 @@ _LATEX = {
     "<=": r"\le ", ">=": r"\ge ", "!=": r"\neq ", "->": r"\to ", "<<": r"\ll ", ">>": r"\gg ",
     "+-": r"\pm ", "-+": r"\mp ", "..": r"\ldots ", "~": r"\sim ", "*": r"\cdot ", ".": r"\cdot ",
     "eps": r"\varepsilon ", "epsilon": r"\varepsilon ", "phi": r"\varphi ", "grad": r"\nabla ",
-    "inf": r"\infty ", "sign": r"\operatorname{sgn}",
+    "inf": r"\infty ", ";": r";\; ", "sign": r"\operatorname{sgn}",
 }  # fmt: skip
 _TELLS = re.compile(
     rf"[=<>^~]|(?<![A-Za-z])(?:{_GREEK})(?![a-z])|'|\d/\d|[A-Za-z]\d|(?<=[A-Za-z])_\d|_[A-Za-z+-]"
@@ -79,7 +79,7 @@ def page(text: str) -> str:
 
 
 def _may_be_mathematics(word: str) -> bool:
-    if word in {"a", "I", "O", *(f"({letter})" for letter in "abcdABC")}:
+    if word in {"a", "I", "O", "m/s", *(f"({letter})" for letter in "abcdABC")}:
         return False
     bare = word.rstrip(",;:.")
     tokens = _TOKEN.finditer(bare)
@@ -88,6 +88,9 @@ def _may_be_mathematics(word: str) -> bool:
 
 def _run(text: str) -> str:
     """A run of words that may be mathematics, typeset if it is."""
+    place = re.match(r"\s*\d[\d.]*,\s+", text)  # as in "Sec. 3.2, alpha"
+    if place:
+        return place[0] + _run(text[place.end() :])
     bare = text.strip()
     if not _TELLS.search(bare):
         return html.escape(text, quote=False)

@@ -114,7 +114,7 @@ def status_table() -> str:
 def error_table() -> str:
     """Every exception and warning, which builtin it also is, and when it is raised."""
     rows = []
-    for module in (ns, bounce, bounce.golf):
+    for module in (ns, ns.orbit, ns.proofs, bounce, bounce.golf):
         for name in module.__all__:
             thing = getattr(module, name)
             if not (inspect.isclass(thing) and issubclass(thing, (ns.NonsmoothError, Warning))):

@@ -81,4 +81,5 @@ def on_page_content(html: str, page: Any, **_: Any) -> str:
         html = _NOTHING.sub("", html)
     if page.file.src_uri.startswith(("papers/", "benchmarks")):  # plain text, for terminals too
         html = formulas.page(html)
-    return typeset.labelled(typeset.mathematics(_ROLE.sub("", html), read))
+    html = typeset.mathematics(_ROLE.sub("", html), read)
+    return typeset.labelled(typeset.unbroken(html))

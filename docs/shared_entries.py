@@ -1,6 +1,6 @@
 """An extension of griffe: of parameters that a docstring describes together, each shows its own type.
 
-By itself griffe takes the annotation of the first for all of them.
+By itself griffe takes the annotation of the first for all of them, and `optional` for a type.
 """
 
 from __future__ import annotations
@@ -13,7 +13,10 @@ import griffe
 _SECTION = re.compile(
     r"^((?:Other )?Parameters\n-+\n)((?:.*\n?)+?)(?=^[A-Z][\w ]*\n-+$|\Z)", re.MULTILINE
 )
-_TOGETHER = re.compile(r"^(\w+(?:, \w+)+)\n((?:[^\S\n]+.*\n?)+)", re.MULTILINE)
+_TOGETHER = re.compile(
+    r"^(\w+(?:, \w+)+(?= : optional\n|\n)|\w+(?= : optional\n))(?: : optional)?\n((?:[^\S\n]+.*\n?)+)",
+    re.MULTILINE,
+)
 
 
 def one_each(doc: str) -> str:

@@ -16,6 +16,7 @@ from latex2mathml.converter import convert
 _FORMULA = re.compile(
     r'<(?P<tag>span|div) class="arithmatex">\\[(\[](?P<latex>.*?)\\[)\]]</(?P=tag)>', re.DOTALL
 )
+_MARKED = re.compile(r"\(?<math\b(?:(?!</math>).)*</math>[).,;:]+", re.DOTALL)
 _TABLE = re.compile(r"<table>.*?</table>", re.DOTALL)
 _HEAD = re.compile(r"<th(?:\s[^>]*)?>(.*?)</th>", re.DOTALL)
 _ROW = re.compile(r"<tr>.*?</tr>", re.DOTALL)
@@ -46,6 +47,11 @@ def mathematics(page: str, read: Callable[[str, str], str] = formula) -> str:
         return read(html.unescape(found["latex"]).strip(), display)
 
     return _FORMULA.sub(typeset, page)
+
+
+def unbroken(page: str) -> str:
+    """Keep a formula and the mark after it on one line."""
+    return _MARKED.sub(r'<span class="unbroken">\g<0></span>', page)
 
 
 def labelled(page: str) -> str:

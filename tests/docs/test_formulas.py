@@ -44,6 +44,8 @@ def seen(text: str) -> str:
         ("dv_N/dt = lambda_N - g", "[dvN/dt=λN−g]"),
         ("lambda~ of the force", "[λ~] of the force"),
         ("dv/dt~ = m^-1 lambda~", "[dv/dt~=m−1λ~]"),
+        ("Sec. 3.2, alpha made explicit", "Sec. 3.2, [α] made explicit"),
+        ("1.53 m/s -> 71.1", "1.53 m/s [→71.1]"),
     ],
 )
 def test_formulas(text, expected):

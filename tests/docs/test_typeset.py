@@ -28,3 +28,9 @@ def test_every_formula_of_a_page_is_typeset(page):
     for latex in formulas(page):
         made = typeset.formula(latex.strip())
         assert made.startswith("<math") and made.count("<mrow>") == made.count("</mrow>")
+
+
+def test_a_mark_stays_on_the_line_of_its_formula():
+    page = "<p>so (<math>x</math>), and <math>y</math> too</p>"
+    held = '<span class="unbroken">(<math>x</math>),</span>'
+    assert typeset.unbroken(page) == f"<p>so {held} and <math>y</math> too</p>"

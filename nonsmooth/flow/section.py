@@ -18,7 +18,7 @@ from .trajectory import Event
 KINDS_OF_SECTIONS = KINDS[:-1]
 
 
-@savable
+@savable()
 @dataclass(frozen=True)
 class Section:
     """Where a run is looked at, for Poincare maps, stroboscopic pictures and bifurcation diagrams.

@@ -2,6 +2,7 @@
 
 from .calls import call
 from .checks import is_real, real, real_array, whole
+from .definition import instruction_form
 from .definition.clock import Clock
 from .definition.events import Impact, Reset, Stop
 from .definition.found_switches import LiftedSwitch
@@ -69,6 +70,7 @@ __all__ = [
     "evaluator",
     "explain",
     "followed",
+    "instruction_form",
     "is_function",
     "is_real",
     "layer_of",

@@ -30,7 +30,7 @@ _DENSE = 8
 _FURTHER = 4
 
 
-@savable
+@savable(points="* n")
 @dataclass(frozen=True, eq=False, repr=False)
 class Attractor:
     """What runs come back to.

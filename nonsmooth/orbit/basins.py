@@ -43,7 +43,7 @@ _NAMES = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Basins(Savable):
+class Basins(Savable, labels="...", starts="... n nan", axes="*"):
     """Which attractor each start goes to.
 
     Attributes

@@ -15,8 +15,9 @@ from .form import Definition
 from .vectors import require_linear_sets
 
 
-def require_consistent(d: Definition) -> None:
+def require_consistent(d: Definition, given: bool = True) -> None:
     """Refuse a definition that describes no system."""
+    # A section that a system got may have multiple zeros, so that only what is ``given`` must have simple ones.
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     named = [("field", d.field, True)]
     named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
@@ -40,7 +41,8 @@ def require_consistent(d: Definition) -> None:
     for i, name in enumerate(guards):
         if not ca.depends_on(d.guards[i], d.extended_states):
             raise DefinitionError(_without_states(name, d.guards[i], d))
-        _require_simple(name, d.guards[i], d)
+        if given:
+            _require_simple(name, d.guards[i], d)
     for i, h in enumerate(listed(d.surfaces)):
         if not ca.depends_on(h, d.states):
             raise DefinitionError(_without_states(f"surface {i}", h, d))

@@ -26,7 +26,7 @@ _RESTS = 1e-7
 _FINE = 64
 
 
-@savable
+@savable(points="m n", t="m")
 @dataclass(frozen=True, eq=False, repr=False)
 class Arc:
     """A curve along an orbit.

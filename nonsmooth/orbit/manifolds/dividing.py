@@ -40,7 +40,7 @@ _FIRST, _APART = 0.2, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DividingCurves(Savable):
+class DividingCurves(Savable, point="n"):
     """Where a plane of starts cuts the surface that divides orbits beside two-folds.
 
     Attributes

@@ -91,7 +91,7 @@ class Passages(Protocol):
         ...
 
 
-@savable
+@savable(points="k 2", entry="k", t="k", decided="k n", starts="k n | 0 0")
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingArc:
     """Starts of one itinerary on a dividing surface.

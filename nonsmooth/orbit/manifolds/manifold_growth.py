@@ -106,7 +106,7 @@ _FIRST = 16  # arcs of a bundle at the beginning
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Manifold(Savable):
+class Manifold(Savable, point="n", points="k n | 0 0", triangles="q 3 <points"):
     """Points that go to a point forward (stable) or backward (unstable) in time.
 
     Attributes

@@ -36,7 +36,7 @@ _ENDLESS = 1e12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoincareOrbit(Savable):
+class PoincareOrbit(Savable, points="m n", t="m"):
     """Successive hits of a section.
 
     Attributes

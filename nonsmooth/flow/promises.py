@@ -15,7 +15,6 @@ import dataclasses
 import math
 import types
 from collections.abc import Callable, Mapping, Sequence
-from functools import cache
 from typing import Any, Union, get_args, get_origin, get_type_hints
 
 import numpy as np
@@ -42,13 +41,18 @@ class Promises:
     def __init__(self, classes: Mapping[type[Any], Promised]):
         self.classes = classes
         self.shared: dict[str, Any] = {}
+        self.hints: dict[type[Any], dict[str, Any]] = {}
 
     def require(self, value: Any) -> None:
         """Check a result and all objects in it."""
-        hints, promised = _hints(type(value)), self.classes[type(value)]
+        cls = type(value)
+        promised = self.classes[cls]
+        if cls not in self.hints:
+            self.hints[cls] = get_type_hints(cls)
+        hints = self.hints[cls]
         lengths = dict[str, Any]()
         for field in dataclasses.fields(value):
-            where = f"{type(value).__name__}.{field.name}"
+            where = f"{cls.__name__}.{field.name}"
             try:
                 spec = _Spec(self, promised.shapes.get(field.name, ""), lengths, value)
                 spec.require(getattr(value, field.name), hints[field.name])
@@ -56,11 +60,6 @@ class Promises:
                 raise ValueError(f"{where}: {error}") from error
         if promised.check is not None:
             promised.check(value)
-
-
-@cache
-def _hints(cls: Any) -> dict[str, Any]:
-    return get_type_hints(cls)
 
 
 class _Spec:

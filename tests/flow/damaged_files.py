@@ -1,9 +1,10 @@
-"""Damaged and crafted files of results: ``python tests/flow/damaged_files.py COUNT [SEED]`` reads that many.
+"""Damaged and crafted files of results: ``python -m tests.flow.damaged_files COUNT [SEED]`` reads that many.
 
 A process of its own, since what is looked for may end it. It prints one line of counts and fails where reading a
 file, or what is done with a result that was read, raises anything but the library's errors.
 """
 
+import copy
 import io
 import json
 import struct
@@ -194,30 +195,35 @@ def _with_tree(parts, text):
     return archive_of(parts)
 
 
-def retold(rng, data, within=()):
+def replaced(rng, tree, junk=JUNK):
+    """Change one part of a tree: another value, left out, doubled."""
+    places = _places(tree, [])[1:]
+    leaves = (
+        [p for p in places if not any(q[:-1] == p for q in places)] if len(places) < 3000 else []
+    )
+    chosen = leaves if leaves and rng.random() < 0.5 else places
+    if not chosen:
+        return
+    *road, last = chosen[rng.integers(len(chosen))]
+    for key in road:
+        tree = tree[key]
+    new, choice = copy.deepcopy(junk[rng.integers(len(junk))]), rng.integers(4)
+    if choice == 0 and isinstance(tree[last], (int, float)):
+        new = type(tree[last])(tree[last] + rng.integers(-2, 3))
+    if choice == 1:
+        del tree[last]
+    elif choice == 2 and isinstance(tree, list):
+        tree.insert(last, new)
+    else:
+        tree[last] = new
+
+
+def retold(rng, data, within=None):
     """Some parts of the tree: other values, other shapes, left out, doubled, nested deeply."""
     parts = parts_of(data)
     tree = _tree_of(parts)
     for _ in range(rng.integers(1, 3)):
-        top = tree
-        for key in within:
-            top = top[key]
-        places = _places(top, [])
-        leaves = [p for p in places[1:] if not any(q[:-1] == p for q in places)]
-        chosen = leaves if rng.random() < 0.5 else places[1:]
-        *road, last = chosen[rng.integers(len(chosen))]
-        for key in road:
-            top = top[key]
-        junk = JUNK[rng.integers(len(JUNK))]
-        choice = rng.integers(4)
-        if choice == 0 and isinstance(top[last], (int, float)):
-            junk = type(top[last])(top[last] + rng.integers(-2, 3))
-        if choice == 1:
-            del top[last]
-        elif choice == 2 and isinstance(top, list):
-            top.insert(last, junk)
-        else:
-            top[last] = junk
+        replaced(rng, tree.get(within, tree))
     text = json.dumps(tree)
     if rng.random() < 0.05:
         text = text.replace('"s"', "[" * 10**5, 1)
@@ -229,7 +235,7 @@ def rewired(rng, data):
     parts = parts_of(data)
     tree = _tree_of(parts)
     if not tree["systems"] or rng.random() < 0.3:
-        return retold(rng, data, ("systems",) if tree["systems"] else ())
+        return retold(rng, data, "systems" if tree["systems"] else None)
     mapping = tree["systems"][0]["mapping"]
     arrays = [
         value["array"] for _, value in mapping if isinstance(value, dict) and "array" in value

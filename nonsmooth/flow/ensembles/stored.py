@@ -106,7 +106,7 @@ class Stored(Checkpoint):
             array = np.load(path, mmap_mode="r+", allow_pickle=False)
             if array.shape != shape or array.dtype != dtype:
                 raise ValueError(f"an array of shape {array.shape} and type {array.dtype}")
-        except (OSError, ValueError) as error:
+        except Exception as error:  # whatever a damaged header drives NumPy to
             raise OptionError(
                 explain(
                     "store",

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.flow.ensembles import checkpoint
 from nonsmooth.flow.ensembles.checkpoint import Checkpoint
 
 CHUNK, COUNT = 4, 10
@@ -227,7 +228,19 @@ def edited(**changes):
     return damage
 
 
+def sealed_anew(chunk):
+    def damage(path):
+        own = {k: v for k, v in json.loads(path.read_text()).items() if k != "seal"} | {
+            "chunk": chunk
+        }
+        path.write_text(json.dumps(checkpoint._sealed(own)))
+
+    return damage
+
+
 HEADS = {
+    "sealed": sealed_anew(10**40),
+    "sealed too": sealed_anew(0),
     **{
         f"chunk {c!r}"[:20]: edited(chunk=c)
         for c in (0, -5, 3, 49, 10**9, 10**400, True, 4.0, "4", None, [4])

@@ -131,7 +131,9 @@ def test_a_lost_array_is_computed_again(whole, tmp_path):
     assert_same(sweep(tmp_path / "sweep"), whole)
 
 
-@pytest.mark.parametrize("wrong", ["shape", "type", "text", "link", "pickle", "folder"])
+@pytest.mark.parametrize(
+    "wrong", ["shape", "type", "text", "link", "pickle", "folder", "empty", "archive", "header"]
+)
 def test_a_file_that_is_no_such_array_is_refused(wrong, tmp_path):
     sweep(tmp_path / "sweep")
     path = tmp_path / "sweep" / "t.npy"
@@ -142,6 +144,14 @@ def test_a_file_that_is_no_such_array_is_refused(wrong, tmp_path):
         np.save(path, np.zeros(200, np.float32))
     elif wrong == "text":
         path.write_text("no array")
+    elif wrong == "empty":
+        path.write_bytes(b"")
+    elif wrong == "archive":
+        np.savez(tmp_path / "other.npz", t=np.zeros(200))
+        path.write_bytes((tmp_path / "other.npz").read_bytes())
+    elif wrong == "header":
+        np.save(path, np.zeros(200))
+        path.write_bytes(path.read_bytes().replace(b"'shape': (200,)", b"'shape': ((200,"))
     elif wrong == "link":
         np.save(tmp_path / "elsewhere.npy", np.zeros(200))
         path.symlink_to(tmp_path / "elsewhere.npy")

@@ -28,8 +28,9 @@ from .vectors import LARGEST
 #: Operations of an instruction list; a list names those that it uses.
 _OPERATIONS = ("const", "input", *UNARY, *BINARY)
 
-#: Most instructions of a system in a file, and most that are nested: CasADi prints nested ones by recursion.
-MOST, DEEPEST = 1_000_000, 4_000
+#: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
+#: by recursion.
+MOST, DEEPEST = 200_000, 4_000
 
 _INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
 _OUTPUTS = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
@@ -46,10 +47,11 @@ def written(system: FilippovSystem) -> dict[str, Any]:
             f"system: {unknown[0]!r} is an operation of CasADi that files do not have. Write the "
             "expression with elementary functions."
         )
-    if len(nodes) > MOST or _depth(nodes) > DEEPEST:
+    size, depth = max(len(nodes), sum(map(len, rows))), _depth(nodes)
+    if size > MOST or depth > DEEPEST:
         raise DefinitionError(
-            f"system: it has {len(nodes)} instructions, {_depth(nodes)} of them nested; files have at "
-            f"most {MOST} and {DEEPEST}. Save the arrays of the result with numpy.savez."
+            f"system: it has {size} instructions or entries and instructions nested {depth} deep; files have "
+            f"at most {MOST}, nested {DEEPEST} deep. Save the arrays of the result with numpy.savez."
         )
     constants = [node.payload for node in nodes if node.op == "const"]
     args, used = np.zeros((len(nodes), 2), np.int32), 0
@@ -133,6 +135,7 @@ def _expressions(plain: Mapping[str, Any], vectors: Sequence[ca.SX]) -> list[ca.
     nodes = _nodes(plain, [v.numel() for v in vectors])
     outputs = _array(plain, "outputs", np.int32)
     shapes = [_shape(s) for s in _list(plain, "shapes", len(_OUTPUTS))]
+    _require(outputs.size <= MOST, f"at most {MOST} outputs")
     _require(sum(r * c for r, c in shapes) == outputs.size, "as many outputs as shapes have")
     _require(_within(outputs, len(nodes)), "outputs among the instructions")
     _require(_depth(nodes) <= DEEPEST, f"at most {DEEPEST} nested instructions")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import stat
+import sys
 from typing import Any
 
 from intervals import CheckError
@@ -55,12 +56,23 @@ def read(name: str) -> dict[str, Any]:
             facts = os.fstat(handle)
             if not stat.S_ISREG(facts.st_mode) or facts.st_size > _LARGEST:
                 raise CheckError(f"it is no file of at most {_LARGEST} bytes")
-            text = json.loads(file.read(_LARGEST))
+            text = _parsed(file.read(_LARGEST))
     except (OSError, ValueError, RecursionError) as error:
         raise CheckError(f"it cannot be read: {error}") from error
     if not isinstance(text, dict) or not isinstance(text.get("proofs", []), list):
         raise CheckError("it holds no proofs")
     return text
+
+
+def _parsed(content: bytes) -> Any:
+    """What a text in JSON stands for; RecursionError where it is nested deeply."""
+    # The limit of the other modules is for calls in Python, not for those of the parser in C.
+    limit = sys.getrecursionlimit()
+    sys.setrecursionlimit(1_000)
+    try:
+        return json.loads(content)
+    finally:
+        sys.setrecursionlimit(limit)
 
 
 def require_graph(graph: dict[str, Any]) -> None:

@@ -20,12 +20,12 @@ from numpy.typing import NDArray
 
 from ..model import FilippovSystem, LiftedSwitch, NonsmoothError, OptionError, instruction_form
 from . import archive, files
-from .promises import Promised, Promises
+from .schema import Schema, Validator
 from .status import Status
 
 _FORMAT = 2
 _FIELDS: dict[str, type[Any]] = {}
-_PROMISED: dict[type[Any], Promised] = {}
+_SCHEMAS: dict[type[Any], Schema] = {}
 C = TypeVar("C", bound=type[Any])
 
 #: Longest axis of an array; one beside an axis of length zero costs nothing else.
@@ -34,10 +34,10 @@ _LONGEST = 1 << 48
 
 def savable(*, check: Callable[[Any], None] | None = None, **shapes: str) -> Callable[[C], C]:
     """Register a dataclass whose instances may be part of a saved result, with the shapes of its fields."""
-    # How shapes are written is in ``promises.py``; ``check`` raises ValueError for what they cannot say.
+    # How shapes are written is in ``schema.py``; ``check`` raises ValueError for what they cannot say.
 
     def register(cls: C) -> C:
-        _FIELDS[cls.__name__], _PROMISED[cls] = cls, Promised(shapes, check)
+        _FIELDS[cls.__name__], _SCHEMAS[cls] = cls, Schema(shapes, check)
         return cls
 
     return register
@@ -46,9 +46,9 @@ def savable(*, check: Callable[[Any], None] | None = None, **shapes: str) -> Cal
 class Savable:
     """A result that can be written to a file; :func:`load` reads it."""
 
-    def __init_subclass__(cls, **promised: Any) -> None:
+    def __init_subclass__(cls, **schema: Any) -> None:
         super().__init_subclass__()
-        savable(**promised)(cls)
+        savable(**schema)(cls)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result to a file, with its system; :func:`nonsmooth.load` reads it.
@@ -213,7 +213,7 @@ def _read(path: str | bytes | os.PathLike[Any]) -> Any:
     result = reader.value(head["result"])
     if not isinstance(result, Savable):
         raise ValueError(f"a {type(result).__name__} is no result")
-    Promises(_PROMISED).require(result)
+    Validator(_SCHEMAS).require(result)
     return result
 
 

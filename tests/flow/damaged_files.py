@@ -226,7 +226,7 @@ def retold(rng, data, within=None):
         replaced(rng, tree.get(within, tree))
     text = json.dumps(tree)
     if rng.random() < 0.05:
-        text = text.replace('"s"', "[" * 10**5, 1)
+        text = text.replace(": ", ": " + "[" * 10**5, 1)
     return _with_tree(parts, text)
 
 

@@ -67,7 +67,7 @@ def damaged(rng, text):
     for _ in range(rng.integers(1, 3)):
         replaced(rng, tree, (*JUNK, *MORE))
     text = json.dumps(tree)
-    return (text.replace('"', "[" * 10**5, 1) if rng.random() < 0.02 else text).encode()
+    return (text.replace(": ", ": " + "[" * 10**5, 1) if rng.random() < 0.02 else text).encode()
 
 
 def main(count, seed=0):

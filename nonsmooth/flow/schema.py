@@ -1,12 +1,13 @@
-"""Check of values read from files against the types and shapes that their classes declare.
+"""Validation of values read from files against the types and shapes that their classes declare.
 
-The types are the annotations of the fields. The shapes are texts such as ``"m n"``: a letter is a length
-that is the same in all fields of one object (``n`` and ``N``, of states and of states and time, in the
-whole result), ``*`` any length, ``...`` any number of leading axes, a number itself; ``|`` separates
-alternatives, and what stands before ``;`` is the length of a sequence of arrays, which may be one array
-too. Numbers must be finite
-unless ``nan`` is among the words; ``<points`` says that they are numbers of entries of another field,
-``status`` that they are values of ``Status``.
+The types are the annotations of the fields. The shapes are texts such as ``"m n"``, one word for each axis:
+
+- a letter is a length, the same in all fields of one object; ``n`` and ``N`` are the numbers of states, and of
+  states and time, in the whole result; a number is itself, ``*`` any length, ``...`` any number of leading axes;
+- ``|`` separates alternatives; what stands before ``;`` is the length of a sequence of arrays, or the first axis
+  of one array in its place;
+- ``nan`` allows numbers that are not finite, ``<points`` requires positions in the field ``points``, ``status``
+  values of ``Status``.
 """
 
 from __future__ import annotations
@@ -28,25 +29,25 @@ _SHARED = ("n", "N")
 
 
 @dataclasses.dataclass(frozen=True)
-class Promised:
+class Schema:
     """The shapes of a class's fields, and a check of what shapes cannot say."""
 
     shapes: Mapping[str, str]
     check: Callable[[Any], None] | None
 
 
-class Promises:
+class Validator:
     """Checks the objects of one result; ValueError where one does not fit."""
 
-    def __init__(self, classes: Mapping[type[Any], Promised]):
-        self.classes = classes
+    def __init__(self, schemas: Mapping[type[Any], Schema]):
+        self.schemas = schemas
         self.shared: dict[str, Any] = {}
         self.hints: dict[type[Any], dict[str, Any]] = {}
 
     def require(self, value: Any) -> None:
         """Check a result and all objects in it."""
         cls = type(value)
-        promised = self.classes[cls]
+        schema = self.schemas[cls]
         if cls not in self.hints:
             self.hints[cls] = get_type_hints(cls)
         hints = self.hints[cls]
@@ -54,19 +55,19 @@ class Promises:
         for field in dataclasses.fields(value):
             where = f"{cls.__name__}.{field.name}"
             try:
-                spec = _Spec(self, promised.shapes.get(field.name, ""), lengths, value)
+                spec = _Spec(self, schema.shapes.get(field.name, ""), lengths, value)
                 spec.require(getattr(value, field.name), hints[field.name])
             except ValueError as error:
                 raise ValueError(f"{where}: {error}") from error
-        if promised.check is not None:
-            promised.check(value)
+        if schema.check is not None:
+            schema.check(value)
 
 
 class _Spec:
     """The shape of a field in an object, with the lengths that are known so far."""
 
-    def __init__(self, promises: Promises, text: str, lengths: dict[str, Any], owner: Any):
-        self.promises, self.lengths, self.owner = promises, lengths, owner
+    def __init__(self, validator: Validator, text: str, lengths: dict[str, Any], owner: Any):
+        self.validator, self.lengths, self.owner = validator, lengths, owner
         count, separator, rest = text.partition(";")
         self.count = count.strip() if separator else ""
         self.words = (rest if separator else text).replace("|", " | ").split()
@@ -117,8 +118,8 @@ class _Spec:
             self._length("N", value.extended_dimension)
         else:
             _demand(type(value) is hint, f"it is no {getattr(hint, '__name__', hint)}")
-            if hint in self.promises.classes:
-                self.promises.require(value)
+            if hint in self.validator.schemas:
+                self.validator.require(value)
 
     def _array(self, value: Any, scalar: Any, inside: bool) -> None:
         _demand(isinstance(value, np.ndarray), "it is no array")
@@ -156,7 +157,7 @@ class _Spec:
                 self._length(word, length)
 
     def _length(self, word: str, length: Any) -> None:
-        known = self.promises.shared if word in _SHARED else self.lengths
+        known = self.validator.shared if word in _SHARED else self.lengths
         expected = int(word) if word.isdigit() else known.setdefault(word, length)
         _demand(expected == length, f"it has the length {length} where {word} is {expected}")
 

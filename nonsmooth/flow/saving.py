@@ -210,10 +210,13 @@ def _read(path: str | bytes | os.PathLike[Any]) -> Any:
     reader = _Reader(rows)
     systems = [instruction_form.read_system(reader.value(s)) for s in head["systems"]]
     reader.systems = systems
+    validator = Validator(_SCHEMAS)
+    for switch in (switch for system in systems for switch in system.lifted):
+        validator.require(switch)
     result = reader.value(head["result"])
     if not isinstance(result, Savable):
         raise ValueError(f"a {type(result).__name__} is no result")
-    Validator(_SCHEMAS).require(result)
+    validator.require(result)
     return result
 
 

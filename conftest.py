@@ -28,7 +28,8 @@ HERE = Path(__file__).parent
 SHIPPED = {
     "test_every_operation",
     "test_random_landings_agree_with_the_interpreter",
-    "test_lanes.py",
+    "ensembles/test_ensemble.py",
+    "ensembles/test_store.py",
 }
 COMPILED = HERE / "tests" / "flow" / "compiled"
 WHOLE = os.environ.get("HYPOTHESIS_PROFILE", "quick") != "quick"
@@ -80,8 +81,8 @@ def few_compilations(
     if not slow and request.path.name != "test_special.py":
         monkeypatch.setattr(tape.TapeEngine, "compile", lambda engine: tape.library())
         monkeypatch.setattr(tape, "_LONG", 500_000)
-    names = {request.path.name, request.node.name}
-    shipped = COMPILED in request.path.parents and (WHOLE or bool(names & SHIPPED))
+    names = {"/".join(request.path.parts[-2:]), request.node.name}
+    shipped = bool(names & SHIPPED) or (WHOLE and COMPILED in request.path.parents)
     if not (slow or shipped):
         monkeypatch.setattr(engine, "FLAGS", (*engine.FLAGS, "-O0"))
     yield

@@ -1,1 +1,1 @@
-"""Speeds and errors beside other tools: ``python -m benchmarks`` or ``make bench``."""
+"""Benchmarks of speed and error beside other tools: ``python -m benchmarks`` or ``make bench``."""

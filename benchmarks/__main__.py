@@ -1,4 +1,4 @@
-"""``python -m benchmarks [--quick] [--only SECTION ...]``: measure, and write build/benchmarks/."""
+"""Run benchmarks and write build/benchmarks/: ``python -m benchmarks [--quick] [--only SECTION ...]``."""
 
 from __future__ import annotations
 
@@ -11,51 +11,51 @@ from typing import Any
 
 from . import (
     bounces,
-    chain,
-    correctness,
-    elsewhere,
+    bounces_in_space,
+    burridge_knopoff,
     gpu,
+    itineraries,
     long_runs,
-    orbits,
-    proofs,
+    other_interpreters,
+    periodic_orbits,
+    proof_checks,
+    proof_times,
     report,
     resources,
     short_runs,
-    space,
     startup,
-    theorems,
     two_folds,
 )
-from .measure import ROOT, machine
+from .timing import ROOT, machine
 
 BOUNCES = ("linear", "nonlinear")
 FOLDER = ROOT / "build" / "benchmarks"
 
 
 def sections(folder: Path, quick: bool) -> dict[str, Callable[[], Any]]:
-    """What can be measured, by name."""
+    """The sections by name."""
     return {
         "peak": resources.peak,
         "bounces": lambda: {name: bounces.run(name, folder, quick) for name in BOUNCES},
-        space.NAME: lambda: space.run(quick),
+        bounces_in_space.NAME: lambda: bounces_in_space.run(quick),
         "long runs": lambda: long_runs.run(quick),
-        "elsewhere": lambda: elsewhere.run(quick),
-        "chain": lambda: chain.run(quick),
+        "elsewhere": lambda: other_interpreters.run(quick),
+        "chain": lambda: burridge_knopoff.run(quick),
         gpu.NAME: lambda: gpu.run(quick),
-        "orbits": lambda: orbits.run(quick),
+        "orbits": lambda: periodic_orbits.run(quick),
         "two-folds": lambda: two_folds.run(quick),
-        "proofs": lambda: proofs.run(quick),
-        "theorems": lambda: theorems.run(quick),
+        "proofs": lambda: proof_times.run(quick),
+        "theorems": lambda: proof_checks.run(quick),
         "short runs": lambda: short_runs.run(quick),
         "startup": lambda: startup.run(quick),
         "memory": lambda: resources.memory(quick),
         "scaling": lambda: resources.scaling(quick),
-        "correctness": lambda: {name: correctness.run(name, folder, quick) for name in BOUNCES},
+        "correctness": lambda: {name: itineraries.run(name, folder, quick) for name in BOUNCES},
     }
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run the sections asked for; results of the others are kept from the last run."""
+    """Run the chosen sections; results of the others are kept from the last run."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks", description=__doc__)
     parser.add_argument(
         "--quick", action="store_true", help="small sizes: a minute, not for figures"

@@ -1,4 +1,4 @@
-"""The two bounces: work against precision for every solver, then the fastest settings in turns."""
+"""Work and precision of every solver on the two bounces, then the fastest settings in turns."""
 
 from __future__ import annotations
 
@@ -10,11 +10,11 @@ from typing import Any
 
 import numpy as np
 
-from . import ours, reference
-from .measure import alternate
+from . import library, reference
 from .peers import diffrax_modes, heyoka_callbacks, heyoka_modes, scipy_dop853
 from .problems import Array, random_starts
 from .reference import Ends
+from .timing import alternate
 
 #: Largest error on the random starts at which speeds are compared.
 TARGET = 1e-9
@@ -41,13 +41,15 @@ def ladder(loose: float, tight: float, each: int) -> tuple[float, ...]:
 
 
 def solvers() -> list[Solver]:
-    """All that is compared; the first is the library."""
+    """The solvers; the first is the library."""
     hy, sp = heyoka_modes, scipy_dop853
     taylor = ladder(-4, -14, 4)
     fixed = lambda make, **options: lambda name, tol: make(name, tol, **options)
     return [
-        Solver("nonsmooth", ours.make, taylor, 100_000, 200_000),
-        Solver("nonsmooth, reference driver", ours.reference_driver, ladder(-6, -12, 1), 200, 100),
+        Solver("nonsmooth", library.make, taylor, 100_000, 200_000),
+        Solver(
+            "nonsmooth, reference driver", library.reference_driver, ladder(-6, -12, 1), 200, 100
+        ),
         Solver("heyoka, one integrator per mode", hy.make, taylor, 100_000, 10_000, hy.available),
         Solver(
             "heyoka, one integrator and callbacks",
@@ -89,14 +91,14 @@ def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
     """Measure one bounce with every solver that is installed."""
     count = 60 if quick else 500
     starts = random_starts(count, seed=1)
-    truth = reference.kept(name, starts, folder)
+    solution = reference.kept(name, starts, folder)
     chosen: dict[Solver, float] = {}
     result: dict[str, Any] = {"starts": count, "target": TARGET, "solvers": {}}
     for solver in solvers():
         if not solver.available():
             result["solvers"][solver.label] = {"missing": "not installed"}
             continue
-        rows = precision(solver, name, starts, truth, quick)
+        rows = precision(solver, name, starts, solution, quick)
         good = [r for r in rows if r["error"] <= TARGET and r["wrong"] == 0]
         pick = max(good, key=lambda r: r["rate"]) if good else min(rows, key=lambda r: r["error"])
         result["solvers"][solver.label] = {"rows": rows, "pick": pick, "reached": bool(good)}
@@ -108,12 +110,12 @@ def run(name: str, folder: Path, quick: bool) -> dict[str, Any]:
 
 
 def precision(
-    solver: Solver, name: str, starts: Array, truth: Ends, quick: bool
+    solver: Solver, name: str, starts: Array, solution: Ends, quick: bool
 ) -> list[dict[str, Any]]:
     """Errors, wrong itineraries and a first speed over the solver's tolerances."""
     rows = []
     part = slice(0, solver.count)
-    expected = Ends(truth.t[part], truth.x[part], truth.itinerary[part])
+    expected = Ends(solution.t[part], solution.x[part], solution.itinerary[part])
     tolerances = solver.tolerances[:: 4 if quick else 1]
     work = random_starts(min(solver.timed, 200 if quick else solver.timed), seed=2)
     for tolerance in tolerances:

@@ -1,8 +1,6 @@
-"""Bounces on an NVIDIA card, where there is one: their bits beside those of the same text as C++, and how many a second.
+"""Bounces on an NVIDIA card: rates, and bits compared with the same text as C++.
 
-    python -m benchmarks --only gpu
-
-Without a card the section says what is missing. The peer is diffrax, where JAX sees the card too.
+The peer is diffrax, if JAX has the card too.
 """
 
 from __future__ import annotations
@@ -32,7 +30,7 @@ LOW, HIGH = np.array([0.0, 0.0, 0.0, -1.0, -2.0]), np.array([0.0, 2.0, 0.0, -1.0
 
 
 def ends(name: str, x: Array, machine: Machine) -> Chunk:
-    """Return what a machine makes of starts (m, 5), without what it hands over."""
+    """Results of a machine for starts (m, 5), without those that fall back to the CPU."""
     system, chunk = bounce_system(name), Chunk.empty(len(x), bounce_system(name), False)
     kernel = Kernel(system, OPTIONS.order, machine)
     kernel.run(Source.rows(x), 0, len(x), system.parameter_vector(), OPTIONS, None, chunk)
@@ -40,7 +38,7 @@ def ends(name: str, x: Array, machine: Machine) -> Chunk:
 
 
 def compared(name: str, count: int, one: Machine, two: Machine) -> dict[str, Any]:
-    """How many of some bounces two machines give the same bits, the same itinerary, and hand over."""
+    """Number of bounces with the same bits and itinerary on two machines, and of those that fall back."""
     a, b = (ends(name, random_starts(count, seed=5), machine) for machine in (one, two))
     same = (a.t == b.t) & np.all(a.x == b.x, axis=1) & (a.status == b.status)
     words = [np.array([*c.words, ""], object)[c.itinerary] for c in (a, b)]
@@ -53,7 +51,7 @@ def compared(name: str, count: int, one: Machine, two: Machine) -> dict[str, Any
 
 
 def seconds(work: Any, turns: int) -> float:
-    """Least time of some turns by the clock on the wall, after one that is not timed: the card works apart."""
+    """Least wall time of some turns after one untimed, as the card works asynchronously."""
     work()
     found = []
     for _ in range(turns):
@@ -64,7 +62,7 @@ def seconds(work: Any, turns: int) -> float:
 
 
 def rates(name: str, count: int, machine: Machine, turns: int) -> dict[str, float]:
-    """Bounces a second, starts made there: of the kernel alone, reduced there, and with all results here."""
+    """Bounces a second with starts made on the card: kernel alone, outcomes, and all results."""
     system, p = bounce_system(name), bounce_system(name).parameter_vector()
     kernel, box = Kernel(system, OPTIONS.order, machine), Source.box(LOW, HIGH, 0)
 
@@ -96,7 +94,7 @@ def peer(count: int) -> float | None:
 
 
 def run(quick: bool) -> dict[str, Any]:
-    """Bits, rates and the peer's rate; or why there are none."""
+    """Bits, rates and the peer's rate, or why there are none."""
     try:
         fast, plain = card(True), card(False)
     except DeviceError as error:

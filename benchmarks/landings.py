@@ -1,9 +1,9 @@
-"""Random landings in 3-D: is an itinerary wrong? Slow, so it is done in pieces, and goes on where it was.
+"""Itineraries of random landings in 3-D by several engines.
 
-``python -m benchmarks.landings`` runs what is missing and prints the counts; interrupt it at any time.
-Every landing is followed by the compiled engine at its default tolerance and at 1e-14, with the
-spin as a state, and as a bounce, with the slip as a state; by the reference driver at 1e-14 those
-on which these answers differ, and then all, in their order. Landings of which any two differ are listed.
+``python -m benchmarks.landings`` runs what is missing and prints the counts; it can be interrupted. The
+compiled engine integrates every landing at its default tolerance and at 1e-14, with the spin as a
+state, and as a bounce, with the slip as a state; the reference driver at 1e-14 those with different
+results first, then all. Landings with different results are listed.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from numpy.typing import NDArray
 import bounce
 import nonsmooth as ns
 
-from .measure import ROOT
+from .timing import ROOT
 
 Array = NDArray[np.float64]
 
@@ -35,7 +35,7 @@ PARAMETERS = ("mu", "d1", "d2", "eta", "G", "k")
 PIECE, TOTAL = 500, 100_000
 DEFAULT, TIGHT = 1e-10, 1e-14
 T_END = 100.0
-#: The questions, from the quickest; the last asks the reference driver.
+#: From the quickest to the slowest, the reference driver.
 ENGINES = ("default", "tight", "bounce", "reference")
 
 
@@ -81,8 +81,8 @@ def drawn(piece: int, count: int) -> dict[str, Array]:
     return dict(**p, v=v, w=w)
 
 
-def answers(piece: int, count: int, asked: str, which: Sequence[int] | None = None) -> list[str]:
-    """Itineraries of a piece's landings, or of some; a run that did not lift off says so in the place of it."""
+def answers(piece: int, count: int, engine: str, which: Sequence[int] | None = None) -> list[str]:
+    """Itineraries of landings of a piece; a run without lift-off has its status instead."""
     found = np.empty(count, dtype=object)
     cases, work = drawn(piece, count), ns.Work(progress=False, threads=1)
     for i, load in enumerate(LOADS):
@@ -93,7 +93,7 @@ def answers(piece: int, count: int, asked: str, which: Sequence[int] | None = No
             continue
         own = {name: values[rows] for name, values in cases.items()}
         v, w = own.pop("v"), own.pop("w")
-        if asked == "bounce":
+        if engine == "bounce":
             turf = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5, G=1e-4, load=load)
             own["inertia"] = own.pop("k")
             shots = bounce.lift_off(
@@ -108,71 +108,71 @@ def answers(piece: int, count: int, asked: str, which: Sequence[int] | None = No
             starts,
             T_END,
             parameters=own,
-            tol=DEFAULT if asked == "default" else TIGHT,
-            engine="reference" if asked == "reference" else "auto",
+            tol=DEFAULT if engine == "default" else TIGHT,
+            engine="reference" if engine == "reference" else "auto",
             work=work,
         )
         ended = many.status == ns.Status.STOPPED
-        words = [str(ns.Status(s)) for s in many.status]
-        found[rows] = np.where(ended, many.itinerary, words)
-    return [str(word) for word in (found if which is None else found[list(which)])]
+        statuses = [str(ns.Status(s)) for s in many.status]
+        found[rows] = np.where(ended, many.itinerary, statuses)
+    return [str(one) for one in (found if which is None else found[list(which)])]
 
 
-def _ask(piece: int, asked: str, count: int, folder: Path) -> None:
-    path = folder / f"{asked}-{piece:04d}.json"
+def _compute(piece: int, engine: str, count: int, folder: Path) -> None:
+    path = folder / f"{engine}-{piece:04d}.json"
     if not path.exists():
         partial = path.with_suffix(f".{os.getpid()}")
-        partial.write_text(json.dumps(answers(piece, count, asked)))
+        partial.write_text(json.dumps(answers(piece, count, engine)))
         partial.replace(path)
 
 
-def _ask_doubtful(count: int, folder: Path) -> None:
-    """Ask the reference driver of the landings on which the quick answers differ."""
+def _compute_doubtful(count: int, folder: Path) -> None:
+    """Run the reference driver for the landings on which the quick engines differ."""
     path = folder / "doubtful.json"
     known: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
     rows: dict[int, list[int]] = {}
-    for found in summary(folder, count)["differ"]:
-        if f"{found['piece']}:{found['row']}" not in known and "reference" not in found:
-            rows.setdefault(found["piece"], []).append(found["row"])
+    for one in summary(folder, count)["differ"]:
+        if f"{one['piece']}:{one['row']}" not in known and "reference" not in one:
+            rows.setdefault(one["piece"], []).append(one["row"])
     for piece, which in rows.items():
-        words = answers(piece, count, "reference", which)
-        known |= {f"{piece}:{row}": word for row, word in zip(which, words, strict=True)}
+        found = answers(piece, count, "reference", which)
+        known |= {f"{piece}:{row}": itinerary for row, itinerary in zip(which, found, strict=True)}
         path.write_text(json.dumps(known))
 
 
 def summary(folder: Path = FOLDER, count: int = PIECE) -> dict[str, Any]:
-    """How many landings were asked of each engine, and where two of them differ."""
+    """Number of landings of each engine, and those on which two engines differ."""
     known = {
-        asked: {int(f.stem[-4:]): f for f in folder.glob(f"{asked}-*.json")} for asked in ENGINES
+        engine: {int(f.stem[-4:]): f for f in folder.glob(f"{engine}-*.json")} for engine in ENGINES
     }
     path = folder / "doubtful.json"
     doubtful: dict[str, str] = json.loads(path.read_text()) if path.exists() else {}
     differ: list[dict[str, Any]] = []
-    words: dict[str, int] = {}
+    counts: dict[str, int] = {}
     for piece in sorted(known["default"]):
         found = {
-            asked: json.loads(files[piece].read_text())
-            for asked, files in known.items()
+            engine: json.loads(files[piece].read_text())
+            for engine, files in known.items()
             if piece in files
         }
         for i, row in enumerate(zip(*found.values(), strict=True)):
-            words[row[0]] = words.get(row[0], 0) + 1
+            counts[row[0]] = counts.get(row[0], 0) + 1
             if len(set(row)) > 1:
                 differ.append(dict(piece=piece, row=i, **dict(zip(found, row, strict=True))))
                 own = doubtful.get(f"{piece}:{i}")
                 differ[-1] |= {"reference": own} if own else {}
-                differ[-1]["phases"] = len({phases(word) for word in row}) > 1
-    asked = {name: count * len(files) for name, files in known.items()}
-    return dict(landings=asked, itineraries=words, differ=differ)
+                differ[-1]["phases"] = len({phases(itinerary) for itinerary in row}) > 1
+    landings = {name: count * len(files) for name, files in known.items()}
+    return dict(landings=landings, itineraries=counts, differ=differ)
 
 
-def phases(word: str) -> str:
-    """An itinerary without its passes through zero slip, which on a line are events or very sharp turns."""
-    return re.sub(r"(\* )+\*", "*", word)
+def phases(itinerary: str) -> str:
+    """An itinerary without passes through zero slip, which on a line are events or sharp turns."""
+    return re.sub(r"(\* )+\*", "*", itinerary)
 
 
 def main(arguments: Sequence[str] | None = None) -> None:
-    """Run what is missing, or only print what is known."""
+    """Run what is missing, or only print the results."""
     parser = argparse.ArgumentParser(prog="python -m benchmarks.landings", description=__doc__)
     parser.add_argument("--count", type=int, default=TOTAL, help="landings (100000)")
     parser.add_argument("--piece", type=int, default=PIECE, help="landings in a piece (500)")
@@ -183,23 +183,23 @@ def main(arguments: Sequence[str] | None = None) -> None:
     options.folder.mkdir(parents=True, exist_ok=True)
     if not options.report:
         with ProcessPoolExecutor(options.workers) as pool:
-            *rounds, last = (
-                [(piece, asked) for piece in range(options.count // options.piece)]
-                for asked in ENGINES
+            *quick, last = (
+                [(piece, engine) for piece in range(options.count // options.piece)]
+                for engine in ENGINES
             )
             own = (options.piece, options.folder)
-            for future in [pool.submit(_ask, *r, *own) for part in rounds for r in part]:
+            for future in [pool.submit(_compute, *r, *own) for part in quick for r in part]:
                 future.result()
-            pool.submit(_ask_doubtful, *own).result()
-            for future in [pool.submit(_ask, *r, *own) for r in last]:
+            pool.submit(_compute_doubtful, *own).result()
+            for future in [pool.submit(_compute, *r, *own) for r in last]:
                 future.result()
     found = summary(options.folder, options.piece)
     print(f"landings: {found['landings']}")
-    for word, number in sorted(found["itineraries"].items(), key=lambda item: -item[1]):
-        print(f"  {number:7d}  {word}")
+    for itinerary, number in sorted(found["itineraries"].items(), key=lambda item: -item[1]):
+        print(f"  {number:7d}  {itinerary}")
     differ = found["differ"]
     other = sum(row["phases"] for row in differ)
-    print(f"two answers differ on {len(differ)}; in what slips and rolls when, on {other}")
+    print(f"two engines differ on {len(differ)}; in what slips and rolls when, on {other}")
     for row in differ:
         print(f"  {row}")
 

@@ -1,4 +1,4 @@
-"""One long stick-slip run, T = 1e4, with few and with many events, dense output off and on."""
+"""Time of a stick-slip run to T = 1e4, with few and many events, without and with dense output."""
 
 from __future__ import annotations
 
@@ -11,9 +11,9 @@ import numpy as np
 import nonsmooth as ns
 
 from .bounces import TARGET, ladder
-from .measure import alternate
 from .peers import heyoka_modes, scipy_dop853
 from .problems import BELTS, LETTERS, STICK_START, Array, stick_slip, stick_slip_system
+from .timing import alternate
 
 #: The last state, and a number that two itineraries share if they are the same.
 End = tuple[Array, int]
@@ -28,18 +28,18 @@ def run(quick: bool) -> dict[str, Any]:
 
 
 def _belt(belt: float, t_end: float, quick: bool) -> dict[str, Any]:
-    truth, other = _ours(belt, 1e-15, t_end, True)(), None
+    solution, other = _ours(belt, 1e-15, t_end, True)(), None
     result: dict[str, Any] = {"solvers": {}, "events": _events(belt, t_end)}
     if heyoka_modes.available():
         other = _heyoka(belt, 1e-15, t_end, False)()
-        result["reference: difference to heyoka at 1e-15"] = _error(other, truth)
+        result["reference: difference to heyoka at 1e-15"] = _error(other, solution)
     work = {}
     for label, (make, tolerances) in _solvers(belt, t_end).items():
         rows = []
         for tolerance in tolerances[:: 4 if quick else 1]:
             end = make(tolerance)()
-            rows.append({"tolerance": tolerance, "error": _error(end, truth)})
-            rows[-1]["wrong"] = int(end[1] != truth[1])
+            rows.append({"tolerance": tolerance, "error": _error(end, solution)})
+            rows[-1]["wrong"] = int(end[1] != solution[1])
             if rows[-1]["error"] <= TARGET and not rows[-1]["wrong"]:
                 break
         result["solvers"][label] = {"rows": rows, "pick": rows[-1]}
@@ -56,8 +56,8 @@ def _belt(belt: float, t_end: float, quick: bool) -> dict[str, Any]:
     return result
 
 
-def _error(end: End, truth: End) -> float:
-    return float(np.abs(end[0] - truth[0]).max())
+def _error(end: End, solution: End) -> float:
+    return float(np.abs(end[0] - solution[0]).max())
 
 
 def _events(belt: float, t_end: float) -> int:

@@ -1,4 +1,4 @@
-"""The problems, written once: plain formulas that floats, arrays and every peer's symbols accept."""
+"""The problems as plain formulas for floats, arrays and every peer's symbols."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""High-precision references, independent of the library: Taylor series in mpmath, by hand.
+"""Reference solutions by Taylor series in mpmath, of order 30 with 34 digits.
 
-Order 30 with 34 digits; fields, guards and the logic at the surface are written out again here and
-share only the constants with ``problems``.
+Fields, guards and the rules at the surface are independent of the library and share only the constants
+with ``problems``.
 """
 
 from __future__ import annotations
@@ -110,11 +110,11 @@ def first_fall(c: Series, h: Any, drop: int) -> Any | None:
     """First zero in (0, h] where a series goes from positive to negative; None without one."""
     high = c[drop:]
     slope = [k * v for k, v in enumerate(high)][1:]
-    places = [mp.mpf(0), *sorted(_extrema(slope, h)), h]
-    values = [mp.polyval(high, place, asc=True) for place in places]
-    for k in range(len(places) - 1):
+    times = [mp.mpf(0), *sorted(_extrema(slope, h)), h]
+    values = [mp.polyval(high, time, asc=True) for time in times]
+    for k in range(len(times) - 1):
         if values[k] > 0 >= values[k + 1]:
-            return _zero(high, places[k], places[k + 1])
+            return _zero(high, times[k], times[k + 1])
     return None
 
 

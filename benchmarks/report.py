@@ -1,4 +1,4 @@
-"""From measured numbers to a table in Markdown and pictures."""
+"""Tables in Markdown and pictures of the results."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from typing import Any
 from nonsmooth.plot import style
 from nonsmooth.plot.labels import Labels
 
-from . import gpu, orbits, space, theorems
+from . import bounces_in_space, gpu, periodic_orbits, proof_checks
 
-#: What the project asks of itself, and whether more or less is better.
+#: Targets, and whether more or less is better.
 TARGETS = {
     "linear bounce: times heyoka, one integrator per mode": (38.0, "at least"),
     "linear bounce: times scipy": (3000.0, "at least"),
@@ -39,7 +39,7 @@ TARGETS = {
     "proof: a linear bounce (s)": (0.05, "at most"),
     "proof: all 100 two-folds of a box (s)": (10.0, "at most"),
     "wrong or missing theorems": (0, "at most"),
-    **{**orbits.TARGETS, **space.TARGETS},
+    **{**periodic_orbits.TARGETS, **bounces_in_space.TARGETS},
     "wrong itineraries, random starts": (0, "at most"),
     "wrong itineraries, within 1e-9 of a boundary": (0, "at most"),
 }
@@ -77,8 +77,8 @@ def figures(results: dict[str, Any]) -> dict[str, float]:
         found["a new system: first result (s)"] = short["first result"]["low"]
         found["a new system: 40 pendulums (s)"] = short["40 pendulums"]["low"]
     if "theorems" in results:
-        found["wrong or missing theorems"] = theorems.wrong(results["theorems"])
-    found |= orbits.figures(results.get("orbits", {})) | space.figures(results)
+        found["wrong or missing theorems"] = proof_checks.wrong(results["theorems"])
+    found |= periodic_orbits.figures(results.get("orbits", {})) | bounces_in_space.figures(results)
     return found | _startup(results) | _itineraries(results)
 
 
@@ -324,9 +324,9 @@ _SECTIONS: dict[str, Callable[[dict[str, Any]], str]] = {
     "peak": _peak,
     "two-folds": _folds,
     "proofs": _proofs,
-    "theorems": theorems.markdown,
-    "orbits": lambda section: orbits.markdown(section, table),
-    space.NAME: lambda section: space.markdown(section, table),
+    "theorems": proof_checks.markdown,
+    "orbits": lambda section: periodic_orbits.markdown(section, table),
+    bounces_in_space.NAME: lambda section: bounces_in_space.markdown(section, table),
     gpu.NAME: lambda section: gpu.markdown(section, table),
     "correctness": _correct,
 }

@@ -1,6 +1,6 @@
-"""Short work with new systems: what is there at once, though no compiler has seen the system.
+"""Times of short runs of new systems, before a program is compiled for them.
 
-Processor seconds in a fresh process after the import, the interpreter being there from before.
+Processor seconds in a fresh process after the import, with a cached interpreter.
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from .measure import fresh
+from .timing import fresh
 
 _SCRIPT = """
 import json, time

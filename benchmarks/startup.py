@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from .measure import fresh
 from .peers import diffrax_modes, heyoka_modes
+from .timing import fresh
 
 _OURS = """
 from benchmarks.problems import bounce_system, random_starts, T_MAX
@@ -46,7 +46,7 @@ def run(quick: bool) -> dict[str, Any]:
             for cold, word in ((True, "cold"), (False, "cached")):
                 cases[f"heyoka, {many}, {word}"] = (_peer("heyoka_modes", 1e-7, count), cold)
     if diffrax_modes.available():
-        # JAX keeps nothing between processes unless told to.
+        # JAX keeps nothing between processes by default.
         cases["diffrax, 500 bounces, cold"] = (_peer("diffrax_modes", 1e-10, 500), False)
     with tempfile.TemporaryDirectory() as cache:
         for script, _ in cases.values():

@@ -1,7 +1,7 @@
-"""Two-folds over a grid of parameters: found and classified, beside a script written by hand.
+"""Two-folds over a grid of parameters, found and classified, beside a script written by hand.
 
-No peer classifies two-folds. The script below is what one would write without the library for this
-one system: derivatives by hand, a root finder, the decision table typed in.
+No peer classifies two-folds. The script is for this one system: derivatives by hand, a root finder and
+the decision table.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from scipy.optimize import fsolve
 
 import nonsmooth as ns
 
-from .measure import alternate
+from .timing import alternate
 
 
 def system() -> ns.FilippovSystem:

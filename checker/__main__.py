@@ -2,7 +2,7 @@
 
     python checker proof.json
 
-These files share no code with the library that proves: they have their own interval arithmetic,
+These files share no code with ``nonsmooth.proofs``: they have their own interval arithmetic,
 functions, derivatives, polynomials and reading of the decision table.
 """
 
@@ -12,15 +12,15 @@ import sys
 from collections.abc import Callable
 from typing import Any
 
-from claims import check
+from complete_lists import check_cover, check_list
 from intervals import CheckError
-from lists import check_cover, check_list
-from orbits import check_orbit
+from orbit_proofs import check_orbit
 from records import read
+from special_points import check
 
 
 def main(arguments: list[str]) -> int:
-    """Check every proof of every file; 1 if one fails."""
+    """Check every proof of every file; return 1 if one fails, 2 without files."""
     if not arguments:
         print(__doc__)
         return 2
@@ -36,16 +36,16 @@ def main(arguments: list[str]) -> int:
             continue
         for k, (work, given) in enumerate(claims):
             try:
-                words = f"checked: {work(given)}"
-            except Exception as error:  # whatever a damaged record drives the checks to
-                words = f"NOT CHECKED: {error!r}"
-            failed += not words.startswith("checked")
-            print(f"{name}[{k}]: {words}")
+                result = f"checked: {work(given)}"
+            except Exception as error:  # whatever a damaged record raises in the checks
+                result = f"NOT CHECKED: {error!r}"
+            failed += not result.startswith("checked")
+            print(f"{name}[{k}]: {result}")
     return int(failed > 0)
 
 
 def claimed(text: dict[str, Any]) -> list[tuple[Callable[[Any], str], Any]]:
-    """What a file claims, each with what checks it."""
+    """The claims of a file, each with the function that checks it."""
     work: list[tuple[Callable[[Any], str], Any]] = [(_point, r) for r in text.get("proofs", [])]
     if "ranges" in text:
         work.append((lambda t: check_cover(t["ranges"], t["proofs"]), text))

@@ -23,7 +23,7 @@ _NUMBER = re.compile(
 
 
 class CheckError(Exception):
-    """A claim that does not hold, or cannot be checked."""
+    """A claim that is false or cannot be checked."""
 
 
 def number(value: Any) -> Fraction:
@@ -110,7 +110,7 @@ def whole(n: int) -> Iv:
 
 
 def _smooth(slope: Callable[[Any], Any]) -> Callable[[Callable[[Iv], Iv]], Callable[[Any], Any]]:
-    """Functions of intervals, and by their slopes of whatever else knows the chain rule."""
+    """A function of intervals, and by its slope of forms with a chain rule."""
 
     def of(f: Callable[[Iv], Iv]) -> Callable[[Any], Any]:
         return lambda x: f(x) if type(x) is Iv else x.chained(f, slope)

@@ -1,4 +1,4 @@
-"""Recorded instructions as polynomials with rational coefficients in what is no polynomial."""
+"""Recorded instructions as polynomials with rational coefficients; other operations are atoms."""
 
 from __future__ import annotations
 
@@ -77,7 +77,7 @@ def polynomials(
 
 
 def _inverse(p: Polynomial, node: int) -> Polynomial:
-    """One over a number, or an inverse that stands for itself."""
+    """One over a number, or an inverse as an atom."""
     return {(): 1 / p[()]} if list(p) == [()] else {((("inv", node), 1),): Fraction(1)}
 
 

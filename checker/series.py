@@ -1,7 +1,6 @@
 """Power series of recorded instructions along a motion, with a derivative along another direction.
 
-Coefficients are computed when they are asked for, each once: a motion needs those of its rates one order
-after another.
+Coefficients are computed on first use, as a motion needs those of its rates one order after another.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ from intervals import PI, CheckError, Iv, atan, cos, erf, exp, log, sin, sqrt, w
 
 ZERO, ONE_ = whole(0), whole(1)
 
-# A coefficient asks for those that it is made of: as deep as the graph is.
+# The recursion of coefficients is as deep as the graph.
 sys.setrecursionlimit(100_000)
 
 
@@ -38,7 +37,7 @@ class Series:
 
 
 class Constant(Series):
-    """A series of one coefficient, which is computed when it is asked for."""
+    """A series of one coefficient, which is computed on first use."""
 
     __slots__ = ()
 

@@ -1,9 +1,9 @@
-"""First zeros of polynomials of time, with coefficients that may be functions on a set."""
+"""First zeros of polynomials of time, whose coefficients may be functions on a set."""
 
 from __future__ import annotations
 
-from forms import ZERO, Form, middle, span
 from intervals import CheckError, Iv, whole
+from mean_value_forms import ZERO, Form, middle, span
 
 
 class UnsureError(CheckError):
@@ -26,8 +26,8 @@ def value(c: list[Iv], t: Iv) -> Iv:
 
 
 def first_zero(c: list[Iv], h: int, drop: int) -> Iv | None:
-    """The first zero in (0, h] of what is positive just after 0; it is simple."""
-    # So many coefficients as ``drop`` says are zero, whatever their enclosures are.
+    """The first zero in (0, h] of a polynomial that is positive just after 0; it is simple."""
+    # The first ``drop`` coefficients are zero, whatever their enclosures are.
     rough, falls = [span(v) for v in c], slope([span(v) for v in c])
     todo, count = [(0, h)], 0
     while todo:
@@ -47,7 +47,7 @@ def first_zero(c: list[Iv], h: int, drop: int) -> Iv | None:
 
 
 def _fallen(c: list[Iv], falls: list[Iv], times: tuple[int, int, int]) -> int | None:
-    """When what falls from a on is negative; None where that is not proven."""
+    """A time at which a polynomial that falls from a on is negative; None if not proven."""
     a, b, h = times
     if value(c, Iv(a, a)).sign() <= 0:
         return None
@@ -69,7 +69,7 @@ def _narrowed(c: list[Iv], t: Iv) -> Iv:
     r, rows = _slopes(c)
     along = [value(row, wide) for row in rows]
     time: Iv = wide
-    for _ in range(3):  # the rate, too, is a function on the set: better known with the time
+    for _ in range(3):  # the rate is a function on the set, too: narrower with the time
         rate = span(value(rates, time))
         time = Form(own, [ZERO if v.zero else -v / rate for v in along], r, span(time))
     return time

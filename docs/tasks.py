@@ -41,7 +41,7 @@ TASKS = {
     ),
     "many": _task(
         "Run many starts",
-        "Arrays of starts or of parameters, in threads, on a cluster, with checkpoints; and which "
+        "Arrays of starts or of parameters, in threads, on a cluster, in a store on disk; and which "
         "attractor each start goes to.",
         "nonsmooth",
         "ensemble Ensemble Grid RandomStarts Work outcomes flow.Outcomes basins orbit.Basins",

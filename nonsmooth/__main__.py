@@ -1,4 +1,4 @@
-"""On the command line, ``python -m nonsmooth``: the textbook (list, show NAME) and the explorer."""
+"""The command line ``python -m nonsmooth``: list, show NAME (textbook problems), explore (two-folds)."""
 
 from __future__ import annotations
 

@@ -1,7 +1,6 @@
-"""How results show themselves in a notebook: a title, a few rows, a small picture as SVG.
+"""HTML representations of results for notebooks: a title, rows, and a small picture as SVG.
 
-Everything that is shown is escaped. Pictures are drawn from numbers at hand, without another package, so
-that showing a result costs no more than printing it.
+All text is escaped. Pictures need no other package.
 """
 
 from __future__ import annotations
@@ -49,7 +48,7 @@ def lines(t: ArrayLike, columns: ArrayLike, names: Sequence[str]) -> str:
         return ""
     drawn = []
     for k, name in list(enumerate(names))[: len(COLOURS)]:
-        points = _points(_scaled(along, _WIDTH), _HEIGHT - _scaled(values[:, k], _HEIGHT))
+        points = np.column_stack([_scaled(along, _WIDTH), _HEIGHT - _scaled(values[:, k], _HEIGHT)])
         drawn.append(_polyline(points, COLOURS[k]))
         low, high = (_NUMBER.format(v) for v in (values[:, k].min(), values[:, k].max()))
         text = html.escape(f"{name}: {low} to {high}")
@@ -104,10 +103,6 @@ def _scaled(values: Array, size: float) -> Array:
     with np.errstate(over="ignore", invalid="ignore"):
         part = (values - low) / (high - low) if high > low else np.full(len(values), 0.5)
     return np.nan_to_num(4 + (size - 8) * part, nan=size / 2)
-
-
-def _points(x: Array, y: Array) -> Array:
-    return np.column_stack([x, y])
 
 
 def _polyline(points: Array, colour: str) -> str:

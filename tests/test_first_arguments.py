@@ -12,7 +12,7 @@ import pytest
 import bounce
 import nonsmooth as ns
 
-ROOMS = [
+PACKAGES = [
     *(ns, ns.local, ns.orbit, ns.plot, ns.two_folds),
     *(bounce, bounce.golf, bounce.laws, bounce.plot),
 ]
@@ -27,8 +27,12 @@ INSIDE = (
 
 
 def public():
-    """Every function of the front doors, and the classes that users make things of, by name."""
-    found = {f"{room.__name__}.{n}": getattr(room, n) for room in ROOMS for n in room.__all__}
+    """Every public function, and the classes whose objects users make, by name."""
+    found = {
+        f"{package.__name__}.{n}": getattr(package, n)
+        for package in PACKAGES
+        for n in package.__all__
+    }
     kept = {name: f for name, f in found.items() if inspect.isfunction(f) or f in CLASSES}
     return {name: f for name, f in kept.items() if _takes(f)}
 

@@ -1,4 +1,4 @@
-"""The shape of the project holds: floors without a client's words, no traces of a machine, every
+"""The layout of the project holds: no word of the client in nonsmooth, no trace of a machine, every
 public name documented, no function longer than a screen, nothing private used elsewhere."""
 
 import ast

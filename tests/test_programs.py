@@ -1,4 +1,4 @@
-"""The programs that show the front door run as written, and their comments hold."""
+"""The example programs of the public API run as written, and their comments hold."""
 
 import math
 import runpy

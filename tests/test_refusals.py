@@ -25,7 +25,7 @@ def test_what_is_no_work():
         lambda: ns.ensemble(SMOOTH, [0.0, 0.0], t_end=1.0, work=2),
         lambda: ns.basins(SMOOTH, [[0.0, 0.0]], t_end=1.0, work=2),
     ):
-        with pytest.raises(ns.OptionError, match="work"):
+        with pytest.raises(ns.OptionError, match=r"^work .*2"):
             ask()
 
 

@@ -1,9 +1,8 @@
-"""One module for each peer, as strong as its own interface lets us make it.
+"""Solvers by other tools, each in its fastest form.
 
-Each offers ``make(problem, tolerance) -> solve`` and ``solve(starts) -> Ends``; none has Filippov's
-logic, so that is written here for each: one smooth solver per mode, terminal events, and the choice
-of the next mode between runs. None can start on a surface without seeing it as an event at once:
-the state is pushed off by ``NUDGE``.
+Each module has ``make(problem, tolerance) -> solve`` and ``solve(starts) -> Ends``. Filippov's rules are
+added here: one smooth solver per mode, terminal events, and the choice of the next mode. States are
+pushed off a surface by ``NUDGE``, as it would be an event at once.
 """
 
 NUDGE = 1e-15

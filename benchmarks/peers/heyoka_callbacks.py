@@ -1,4 +1,4 @@
-"""heyoka, the strongest form found: one integrator whose parameters are the mode.
+"""heyoka, in its fastest form: one integrator whose parameters are the mode.
 
 The friction is p0*load + p1*along, so that a Python callback at each event changes the mode and the
 integrator goes on without returning. The push off the surface is needed: without it 114 (linear) and

@@ -1,6 +1,6 @@
 """nosnoc: the stick-slip run by finite elements with switch detection, in an interpreter that has it.
 
-Run by ``benchmarks.elsewhere`` as a script: it imports nothing of this project. Every step is a
+Run by ``benchmarks.other_interpreters`` as a script: it imports nothing of this project. Every step is a
 nonlinear program with complementarity constraints, solved by IPOPT. nosnoc has no terminal events,
 so the bounces, which end at lift-off, are not posed to it.
 """
@@ -46,7 +46,7 @@ def run(belt, t_end, h, A, c, omega, F, start):
 
 def main():
     """Read the problem from the command line, print the rows."""
-    problem = json.loads(sys.argv[1])
+    problem = json.load(sys.stdin)
     steps = problem.pop("steps")
     rows = []
     for h in steps:

@@ -1,6 +1,6 @@
 """Siconos: a chain of blocks on a belt by its time-stepping scheme, in an interpreter that has Siconos.
 
-Run by ``benchmarks.chain`` as a script: it imports nothing of this project. Moreau's time stepping with
+Run by ``benchmarks.burridge_knopoff`` as a script: it imports nothing of this project. Moreau's time stepping with
 relays, of order one at switches; each step solves a linear complementarity problem by Lemke's method.
 """
 

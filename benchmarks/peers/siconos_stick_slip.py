@@ -1,6 +1,6 @@
 """Siconos: the stick-slip run by its time-stepping scheme, in an interpreter that has Siconos.
 
-Run by ``benchmarks.elsewhere`` as a script: it imports nothing of this project. The forcing is a
+Run by ``benchmarks.other_interpreters`` as a script: it imports nothing of this project. The forcing is a
 harmonic oscillator among the states, which makes the system linear with a relay. Its event-driven
 scheme does not take relays, so this is Moreau's time stepping, of order one at switches.
 """
@@ -39,7 +39,7 @@ def run(belt, t_end, h, A, c, omega, F, start):
 
 def main():
     """Read the problem from the command line, print the rows."""
-    problem = json.loads(sys.argv[1])
+    problem = json.load(sys.stdin)
     steps = problem.pop("steps")
     rows = []
     for h in steps:

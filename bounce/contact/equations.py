@@ -234,23 +234,37 @@ class Equations:
             raise self._no_form(what, f"it returns shape {result.shape}")
         if _has_nan(result):
             raise self._no_form(what, f"it returns {result}")
-        return ca.densify(result)
+        return self._without_calls(what, ca.densify(result))
 
     def _scalar(self, what: str, value: Any) -> ca.SX:
         if self.directions == 2 and isinstance(value, ca.SX) and value.shape != (1, 1):
             raise self._no_form(what, f"it returns shape {value.shape}")
         try:
             result = ca.SX(value)
-            if result.shape == (1, 1) and not _has_nan(result):
-                return ca.densify(result)
             received = f"shape {result.shape}" if result.shape != (1, 1) else f"{result}"
+            right = result.shape == (1, 1) and not _has_nan(result)
         except (TypeError, ValueError, NotImplementedError):
-            received = f"{value!r} ({type(value).__name__})"
+            received, right = f"{value!r} ({type(value).__name__})", False
+        if right:
+            return self._without_calls(what, ca.densify(result))
         raise ModelError(
             f"{type(self.model).__name__}.{what} returns {received}, not a scalar CasADi expression of "
             "the states and parameters. Add a missing `return`, and take functions from casadi instead "
             "of math."
         )
+
+    def _without_calls(self, what: str, value: ca.SX) -> ca.SX:
+        """Write out Functions that CasADi has not inlined; refuse tables, as systems do."""
+        symbols = ca.symvar(value)
+        if not ca.Function("called", symbols, [value]).find_functions():
+            return value
+        entries = ca.vertsplit(value)
+        states = [ca.SX.sym(f"entry_{k}") for k in range(len(entries))]
+        try:
+            system = ns.FilippovSystem(states, field=entries, parameters=symbols)
+        except ns.DefinitionError as error:
+            raise ModelError(f"{type(self.model).__name__}.{what}: {error}") from error
+        return system.field("")[: len(entries)]
 
     def _require_isotropy(self) -> None:
         """Refuse forces that do not turn with the ball, as powers of components do not."""

@@ -84,7 +84,7 @@ def lift_off(
     tol, t_max : float, optional
         As in :func:`simulate`.
     work : nonsmooth.Work, optional
-        Threads, executor, chunk, bar and checkpoint of :func:`nonsmooth.ensemble`; by default no bar.
+        Threads, executor, chunk, bar and store of :func:`nonsmooth.ensemble`; by default no bar.
     engine : {"auto", "reference", "compiled"}
         Which driver: ``"auto"`` takes the compiled one where there is a compiler.
     device : {None, "cuda"}, optional
@@ -237,8 +237,8 @@ class _Bounces:
         return going if part.rows is None else going & part.rows
 
     def touch_down(self, t_max: float, work: ns.Work, options: dict[str, Any]) -> None:
-        """Move rows whose load is not positive at once to where it is; this keeps no checkpoint."""
-        options = {**options, "work": replace(work, checkpoint=None)}
+        """Move rows whose load is not positive at once to where it is; this needs no store."""
+        options = {**options, "work": replace(work, store=None)}
         for part in self.parts:
             root, short, later, longest = self._rise(part.blueprint)
             going = self._going(part)
@@ -322,8 +322,8 @@ class _Bounces:
             later = len(runs.itineraries) * self.free[rows]
             code[rows] = len(named) + runs.itinerary_code + later
             named += [*runs.itineraries, *(f"F {itinerary}" for itinerary in runs.itineraries)]
-            if work.checkpoint is not None:  # the second part, if any, has its own
-                work = replace(work, checkpoint=f"{os.fspath(work.checkpoint)}-weightless")
+            if work.store is not None:  # the second part, if any, has its own
+                work = replace(work, store=f"{os.fspath(work.store)}-weightless")
         start = np.stack([self._rows(self.given[n]) for n in ("x", "xdot", "y", "ydot")], axis=-1)
         stay = (self.status == _LIFTED_OFF) & rests(self.states, start)
         self.status[stay] = int(BounceStatus.NO_LIFT_OFF)

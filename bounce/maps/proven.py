@@ -138,8 +138,10 @@ def proven_map(
         try:
             a, b, c, d = box
             proof = certify(model, (a, b), ydot, (c, d), parameters=parameters, **options)
+            interrupted = proof.why == "interrupted"  # a proof keeps what it has, too
         except KeyboardInterrupt:
             interrupted = True
+        if interrupted:
             found += [(rest, "undecided", "") for rest, _ in [*todo, (box, level)]]
             break
         if proof.proven or level >= depth:

@@ -1,22 +1,22 @@
-"""MOVING through time: events and resets, drivers, trajectories, ensembles.
+"""Motion in time: events and resets, drivers, trajectories, ensembles.
 
-The contract of events, the same in every engine (``tests/flow/test_contract.py`` has each sentence):
+The contract of events, the same in every engine (``tests/flow/test_contract.py`` checks each sentence):
 
-1. A stop or reset is met where its function passes zero in its direction: falling (-1), rising (1),
-   either way (0). A touch without a passage is not met.
-2. What happens exactly at ``t_end``, to rounding, happens.
-3. At one instant a stop is served first and ends the run; then resets, in the order in which they
-   were given; then surfaces. After a reset the state that it led to is looked at anew. What a jump
-   carries across is not met.
-4. A start on the zero of a stop is no event: the stop is armed once the motion has left it.
-5. A start on the zero of a reset with a direction is met at once if the motion leaves zero that way.
-6. A start on the zero of one without a direction is not met. If the reset would turn the motion round
-   there, it is a wall and nobody has said on which side the body is: NON_UNIQUE.
-7. A reset is not met again before the motion has left its zero. A motion that it leaves pressed
-   against its zero, without a rate, rests there: ACCUMULATION.
+1. A stop or reset fires where its function passes through zero in its direction: falling (-1), rising (1),
+   either way (0). A touch without a passage does not fire it.
+2. An event exactly at ``t_end``, to rounding, happens.
+3. At one instant a stop comes first and ends the run; then resets, in the order in which they were given;
+   then surfaces. After a reset the events of the new state are determined again. A zero that a jump moves
+   the state across is no event.
+4. A start on the zero of a stop is no event: the stop can fire once the motion has left its zero.
+5. A start on the zero of a reset with a direction fires it at once if the motion leaves zero that way.
+6. A start on the zero of a reset without a direction does not fire it. If the reset would reverse the
+   motion there, it is a wall whose side is not given: NON_UNIQUE.
+7. After firing, a reset can fire again only once its function has been nonzero. A motion that it leaves
+   pressed against its zero, without a rate, rests there: ACCUMULATION.
 8. A reset that changes the side of a surface is one event, with the mode that starts after it.
-9. After a reset that ends on the zero of another stop or reset, that one is met if the motion goes
-   on from the side where it was to the other.
+9. After a reset that ends on the zero of another stop or reset, that one fires if the motion continues
+   through zero, from its side before the reset to the other.
 """
 
 from .ensembles.ensemble import ensemble

@@ -1,4 +1,4 @@
-"""Trajectories put together: pieces end to end, and a backward piece read forward."""
+"""Concatenation of trajectories, parts of them, and reversal of backward ones."""
 
 from __future__ import annotations
 
@@ -8,14 +8,13 @@ from dataclasses import replace
 import numpy as np
 
 from ..model import Array
-from .constants import change
+from .names import change
 from .reference.polynomial import shift
 from .trajectory import Event, Segment, Steps, Trajectory
 
 
 def forward(run: Trajectory) -> Trajectory:
-    """Read a trajectory that was followed backward in time from its end to its start."""
-    # The events are left out, but for the end.
+    """Reverse a trajectory that was followed backward in time; of its events only the end is kept."""
     mode, count = run.segments[0].mode, len(run.steps)
     starts, coefficients = np.zeros(count), []
     for k, (begin, c) in enumerate(zip(run.steps.starts, run.steps.coefficients, strict=True)):

@@ -1,14 +1,13 @@
-"""Facts of the event logic that every driver shares: constants, kinds, priorities, reasons.
+"""Constants of the event logic in every driver: tolerances, kinds, priorities, reasons.
 
-The drivers in C get them from here too (``compiled/codegen.py`` writes them into the source), so a
-number or an order has one place.
+``compiled/building/codegen.py`` writes them into the sources in C.
 """
 
 from __future__ import annotations
 
 import sys
 
-from ..model.laws.multiplier_series import FALL, LIMIT_FALL
+from ..model.laws.coupled import FALL, LIMIT_FALL
 
 __all__ = ["FALL", "LIMIT_FALL"]  # and all below
 
@@ -17,40 +16,39 @@ EPSILON = sys.float_info.epsilon
 #: Local errors add up over a run; a twentieth keeps the global error near the tolerance.
 SAFETY = 0.05
 
-#: The last terms of a guard's series stay below this part of all of them, however small the guard is
-#: beside the tolerance: beyond its circle of convergence a polynomial has roots that the guard has not.
+#: Largest part of a guard's series in its last terms: beyond the circle of convergence the polynomial has
+#: roots that the guard does not have.
 RESOLVED = 1e-3
 
-#: A defect this many times the local tolerance is no truncation error.
+#: Defects above this many local tolerances are no truncation errors.
 WRONG = 200.0
 
-#: A step is looked at in every octave below it, down to a length that is known to be safe, if it is
-#: more than this many times the one before in its mode; or, if it is the first there, more than so many
-#: times the time in which the state changes by its size, down to this part of that time.
+#: A step is checked in every octave below it, down to a safe length, if it is more than GROWTH times the
+#: one before in its mode. The first step there is checked if it is more than FAR times the time in which
+#: the state changes by its size, down to FIRST of that time.
 GROWTH = 2.0
 FAR = 10.0
 FIRST = 0.01
 
-#: Points inside a step at which the defect is looked at besides the end, and in each such octave.
+#: Points inside a step at which the defect is checked besides the end, and in each such octave.
 CHECKS, OCTAVE = 1, 8
 
-#: So many steps that had to be halved for their defect, most of them in a row, are an end.
+#: A run ends after this many steps that were halved for their defect, most of them in a row.
 SHORTENED = 40
 
-#: Halved steps are steady above this part of the one before. Steady ones are an end only if they do not
-#: grow and are much shorter (FAR) than what the series allows: at a branch point.
+#: Halved steps above this part of the one before are steady. They end a run only if they do not grow and
+#: are much shorter (FAR) than the series allows: at a branch point.
 STEADY = 0.9
 
-#: Part of a step at which its end is looked at, and of one that ends with an event: that may be the
-#: end of the field's domain, or a point where it is 0/0.
+#: Part of a step at which its end is checked, and that of a step to an event, which may be the end of the
+#: field's domain or a point where it is 0/0.
 JUST = 1 - 1e-9
 BEFORE_EVENT = 0.99
 
-#: Two events closer than this, relative to the time, and than the rounding of their roots, are
-#: simultaneous; a stop is then served first.
+#: Events closer than this, relative to the time, and than the rounding of their roots, are simultaneous.
 TIE = 8 * EPSILON
 
-#: What comes this much after the end of a run, relative to the time, is at its end.
+#: An event this much after the end of a run, relative to the time, is at its end.
 AT_END = 64 * EPSILON
 
 #: Lanes leave events closer than this, relative to the time, to the scalar driver.
@@ -59,7 +57,7 @@ NEAR = 1e-13
 #: Rounding of a polynomial's value, relative to the sum of the magnitudes of its terms.
 ROUNDING = 4 * EPSILON
 
-#: The same where a root's place is asked for.
+#: The same for the location of a root.
 ROOT_ROUNDING = 16 * EPSILON
 
 #: A point is on a surface where h is zero to this much of its terms.
@@ -71,14 +69,14 @@ VANISHES = 64 * EPSILON
 #: Both fields are tangent where they are at this angle to the surface.
 TANGENT = 2e-14
 
-#: A step this short, relative to the time and to that of the run, is swallowed by rounding.
+#: Shortest step, relative to the time and to that of the run, that rounding does not cancel.
 SHORTEST = 4 * EPSILON
 
-#: Halvings of the interval before two roots count as one that touches without crossing.
+#: Halvings of an interval before two roots count as a touch without crossing.
 DEPTH = 52
 
-# Events that accumulate: the patterns that are tried (an impact 1, a crossing pair 2, a relay pair
-# 4), blocks of each, how steady their ratio is, and what is left, relative to the time of the run.
+# Accumulation of events: lengths of patterns (an impact 1, a crossing pair 2, a relay pair 4), blocks of
+# each, largest spread and value of their ratio, and largest time left, relative to that of the run.
 LAGS = (1, 2, 3, 4, 6)
 BLOCKS = 6
 SPREAD = 0.02
@@ -86,25 +84,25 @@ SHRINKS = 0.9999
 REMAINING = 1e-6
 AT_ONCE = 40  # events at one instant
 
-#: A set h = 0 is reached in one step where what friction's turning could still do is this part of the
-#: local tolerance. One that was left is far where |h| is this much of its terms.
+#: A set h = 0 is reached in one step where the remaining rotation of friction is below this part of the
+#: local tolerance. One that was left is far where |h| is above this part of its terms.
 REACHED = 0.1
 LEFT = 1e-6
 
-#: A set is reached where no more than so many of the shortest steps are left to it.
+#: A set is reached where at most this many of the shortest steps are left to it.
 TENFOLD = 20.0
 
-#: Coefficients of a series grow as the inverse time to a set to their order: it is reached before they
-#: are larger than this.
+#: Coefficients of a series grow as the inverse time to a set to their order: the set is reached before
+#: they are larger than this.
 OVERFLOW = 1e280
 
 #: Kinds of events, by number in ensembles and in C.
 KINDS = ("crossing", "entry", "exit", "stop", "reset", "impact", "contact", "release", "end")
 
-#: So many of them, the first and the last, can happen without resets and impacts.
+#: The first and the last of these, as many, can happen without resets and impacts.
 SIMPLE_KINDS = 5
 
-#: Kinds of guards, by number in C, and which is served first among simultaneous ones.
+#: Kinds of guards, by number in C, and their priority among simultaneous ones (0 first).
 GUARDS = (
     *("surface", "exit", "stop", "reset", "impact", "release", "branch"),
     *("near", "slip"),
@@ -138,7 +136,7 @@ REASONS = (
     "pressed",
     "two_sided",
     "multiple_zero",
-    "looked_at",
+    "sampled",
     "behind",
     "no_impulse",
     "restitution",
@@ -147,14 +145,5 @@ REASONS = (
     "possibly_several",
 )
 
-#: Not a status: the run goes on in the next call, after its arrays were emptied, or elsewhere.
+#: Not a status: the run continues in the next call, after its arrays were emptied, or in another driver.
 RUNNING, FULL, HAND_OVER = -1, -2, -3
-
-
-def change(before: str, after: str) -> str:
-    """Kind of the event by which one mode follows another."""
-    closed = after.count("c") - before.count("c")
-    if closed:
-        return "contact" if closed > 0 else "release"
-    more = after.count("s") - before.count("s")
-    return "entry" if more > 0 else ("exit" if more < 0 else "crossing")

@@ -1,9 +1,8 @@
-"""Files in folders that others may have touched: read with care, written whole.
+"""Safe reading and atomic writing of files in folders that others may change.
 
-A file is read only if it is a regular one of a bounded size; a link, a device or a pipe in its place
-is as good as none. It is written under a new name, made exclusively and for its owner alone, and
-then renamed, so that it is there whole or not at all and a link in its place is replaced, not
-followed.
+Only regular files of a bounded size are read; links, devices and pipes count as missing. A file is written
+under a new name that only its owner can open, and then renamed: it is there whole or not at all, and a link
+in its place is replaced, not followed.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import stat
 import tempfile
 from pathlib import Path
 
-#: How names of files under way begin; one that a killed process left behind means nothing.
+#: Prefix of the names of unfinished files; those that a killed process left are ignored.
 PART = ".part-"
 
 _CAREFULLY = os.O_RDONLY | sum(
@@ -22,16 +21,16 @@ _CAREFULLY = os.O_RDONLY | sum(
 
 
 def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
-    """Return what a file holds, or None where there is no such file."""
+    """Return the content of a file, or None where there is no such file."""
     try:
         handle = os.open(path, _CAREFULLY)
     except (OSError, ValueError):
         return None
     try:
-        facts = os.fstat(handle)
-        if not stat.S_ISREG(facts.st_mode) or facts.st_size > most:
+        info = os.fstat(handle)
+        if not stat.S_ISREG(info.st_mode) or info.st_size > most:
             return None
-        if private and fault(facts):
+        if private and writable_by_others(info):
             return None
         with os.fdopen(handle, "rb", closefd=False) as file:
             return file.read(most)
@@ -42,7 +41,7 @@ def read(path: Path, most: int, *, private: bool = False) -> bytes | None:
 
 
 def replace(path: Path, data: bytes) -> None:
-    """Write a file at once."""
+    """Write a file, whole or not at all."""
     handle, name = tempfile.mkstemp(dir=path.parent, prefix=PART)
     try:
         with os.fdopen(handle, "wb") as file:
@@ -53,12 +52,12 @@ def replace(path: Path, data: bytes) -> None:
         raise
 
 
-def fault(facts: os.stat_result) -> str:
-    """Why a file or folder is not this user's alone to write; empty where it is."""
+def writable_by_others(info: os.stat_result) -> str:
+    """Reason why others than this user can write a file or folder; empty if only this user can."""
     if not hasattr(os, "geteuid"):  # a system without owners and modes of this kind
         return ""
-    if facts.st_uid != os.geteuid():
-        return f"it belongs to user {facts.st_uid}, not to this one, {os.geteuid()}"
-    if facts.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
-        return f"others than its owner can write it (mode {stat.S_IMODE(facts.st_mode):04o})"
+    if info.st_uid != os.geteuid():
+        return f"it belongs to user {info.st_uid}, not to this one, {os.geteuid()}"
+    if info.st_mode & (stat.S_IWGRP | stat.S_IWOTH):
+        return f"others than its owner can write it (mode {stat.S_IMODE(info.st_mode):04o})"
     return ""

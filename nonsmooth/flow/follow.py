@@ -1,7 +1,7 @@
-"""One chosen mode's smooth flow, forward or backward in time, with its event functions.
+"""The smooth flow of one mode, forward or backward in time, with its event functions.
 
-The building block for manifolds and dividing surfaces: no switching, no stopping at guards unless
-asked. Backward flows are smooth problems here because the mode is fixed.
+Manifolds and dividing surfaces are computed with it. The mode never changes, so the backward flow is a smooth
+problem too.
 """
 
 from __future__ import annotations
@@ -24,11 +24,13 @@ from ..model import (
     Parameters,
     Surfaces,
     followed,
+    motion,
     real,
     require_system,
     watched_functions,
 )
 from . import messages
+from .names import guard_name
 from .options import Options, tolerances
 from .reference.coupled_modes import CoupledModes
 from .reference.modes import Expansion, Modes, SeparateModes, powers
@@ -69,9 +71,9 @@ def follow(
         One letter per surface. With ``s`` the sliding field is followed on the level of h through
         the point.
     until : str, expression, or sequence of them, optional
-        End at a zero of these: names of the mode's own event functions (``"h0"``, ``"L_F1 h"``,
-        ``"L_F2 h"``, names of stops and resets) or expressions in states, parameters and time. A
-        zero at the start is not counted.
+        End at a zero of these: names of the mode's own event functions (``"h0"``,
+        ``"lambda0 = 1"``, ``"lambda0 = -1"``, names of stops and resets) or expressions in states,
+        parameters and time. A zero at the start is not counted.
     watch : expression or sequence of them, optional
         Further functions whose zeros are reported (named ``f0``, ``f1``, ...).
     t_start, parameters, tol, rtol, atol, max_step, max_steps : optional
@@ -121,12 +123,13 @@ def follow(
     expressions = [u for u in ends if not isinstance(u, str)] + further
     p = system.parameter_vector(parameters)
     chosen = _chosen(system, mode, expressions, p, options)
-    names = [g.name for g in chosen.guards]
+    names = [guard_name(system, g) for g in chosen.guards]
     ending = {f"f{k}" for k in range(sum(not isinstance(u, str) for u in ends))}
     for name in (u for u in ends if isinstance(u, str)):
         if name not in names:
             raise OptionError(
-                f"until: expected a name among {names} or an expression, received {name!r}."
+                f"until has {name!r}, which is no event function. Give a name among {names} or an "
+                "expression."
             )
         ending.add(name)
     x = system.extended_point(point, t_start)
@@ -139,15 +142,12 @@ def _several(value: Any) -> list[Any]:
 
 @dataclass(frozen=True)
 class _Chosen:
-    """The one mode that is followed, with its guards and the watched functions only watched."""
+    """The mode that is followed, with its guards."""
 
     mode: str
     modes: Modes
     sliding: list[int]
-
-    @property
-    def guards(self) -> tuple[Guard, ...]:
-        return self.modes.guards(self.mode)
+    guards: tuple[Guard, ...]
 
 
 def _chosen(
@@ -157,10 +157,15 @@ def _chosen(
     sliding = [i for i, sign in enumerate(signs) if sign == 0]
     if len(sliding) > 1 or any(system.nonlinear[i] for i in sliding):
         coupled = Coupled(system, watched_functions(system, watched))
-        zeros = tuple(Guard("zero", k, 0, g.name) for k, g in enumerate(coupled.guards(mode)))
-        return _Chosen(mode, CoupledModes(system, coupled, p, options, lambda m: zeros), sliding)
-    motion = followed(system, mode, watched)
-    return _Chosen(mode, SeparateModes(system, p, options, lambda s, m: motion), sliding)
+        guards = coupled.guards(mode)
+        zeros = tuple(Guard("zero", k, 0, k) for k in range(len(guards)))
+        modes: Modes = CoupledModes(system, coupled, p, options, lambda m: zeros)
+        return _Chosen(mode, modes, sliding, guards)
+    only_watched = followed(system, mode, watched)
+    further = [Guard("zero", k, 0, k) for k in range(len(watched))]
+    guards = (*motion(system, mode).guards, *further)
+    modes = SeparateModes(system, p, options, lambda s, m: only_watched)
+    return _Chosen(mode, modes, sliding, guards)
 
 
 class _Follower:
@@ -182,13 +187,13 @@ class _Follower:
         self.guards = chosen.guards
         self.stepper = Stepper(system, self.modes, options)
         self.surfaces = Surfaces(system)
-        self.unknowns = np.zeros(system.surface_count)  # multipliers of what slides
+        self.unknowns = np.zeros(system.surface_count)  # multipliers of the sliding surfaces
         self.x, self.t, self.t_end, self.ending = x, t_start, t_end, ending
         self.sign = -1.0 if t_end < t_start else 1.0
         self.levels = self.surfaces.values(x, p)[0][self.sliding]
         self.record = Record(system, p)
         self.record.point(t_start, x)
-        # functions whose zero here is not news, and how many coefficients are known to vanish
+        # functions that are zero at the start of the step, and how many coefficients vanish
         self.fresh = dict.fromkeys(range(len(self.guards)), 0)
 
     def run(self) -> Trajectory:
@@ -201,7 +206,7 @@ class _Follower:
             status = Status.NON_UNIQUE
         mode, record = self.mode, self.record
         if status is not Status.STOPPED:
-            record.event("end", self.t, self.x, mode, mode, str(status))
+            record.event("end", self.t, self.x, mode, mode, None, str(status))
         record.segments.append(Segment(mode, record.t[0], self.t, 0, len(record.starts)))
         return record.trajectory(status, message)
 
@@ -229,10 +234,10 @@ class _Follower:
             self.fresh = dict.fromkeys(found, 1)
             stopped = self._report(found)
             if stopped:
-                return Status.STOPPED, f"{stopped!r} is zero at t = {self.t:.10g}."
+                return Status.STOPPED, messages.stopped(stopped, self.t)
 
     def _blur(self) -> float:
-        """Zeros closer than this are one instant."""
+        """Largest distance in time between simultaneous zeros."""
         return 1e-14 * max(1.0, abs(self.t))
 
     def _expand(self) -> Expansion:
@@ -245,7 +250,7 @@ class _Follower:
         )
 
     def _leave_singular_point(self, e: Expansion, left: float) -> bool:
-        """Take the driver's short step where high derivatives do not exist; forward only."""
+        """Take a short step where high derivatives do not exist; forward only."""
         if self.sign < 0:
             return False
         coefficients, h = self.stepper.singular_step(e, min(left, self.options.max_step))
@@ -253,7 +258,7 @@ class _Follower:
 
     def _zeros(self, e: Expansion, h: float) -> list[Hit]:
         hits = []
-        for row, guard in enumerate(self.guards):
+        for row, guard in enumerate(self.modes.guards(self.mode)):
             c = e.guards[row]
             if not np.all(np.isfinite(c)):
                 continue
@@ -284,8 +289,8 @@ class _Follower:
     def _report(self, rows: list[int]) -> str | None:
         stopped, mode = None, self.mode
         for row in rows:
-            name = self.guards[row].name
+            name = guard_name(self.system, self.guards[row])
             kind = "stop" if name in self.ending else "zero"
             stopped = name if kind == "stop" else stopped
-            self.record.event(kind, self.t, self.x, mode, mode, name)
+            self.record.event(kind, self.t, self.x, mode, mode, self.guards[row])
         return stopped

@@ -1,4 +1,4 @@
-"""What the runs say when they end: one wording for every engine."""
+"""Messages of the ends of runs, the same for every engine."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ def two_fold(surface: int) -> str:
     """Start or arrival at a two-fold off sliding."""
     return (
         f"Both fields are tangent to h{surface} = 0: a two-fold, where the sliding field is 0/0 "
-        "and the future is not decided by Filippov's convention."
+        "and Filippov's convention does not determine the motion."
     )
 
 
@@ -41,17 +41,17 @@ def multiple_zero(surface: int) -> str:
 
 
 def indefinite(name: str) -> str:
-    """The multiplier of a set does not oppose h."""
+    """The friction matrix of a set is indefinite."""
     return (
-        f"On {name} = 0 the matrix M = -dh/dx df/dlambda has a negative direction: friction that pushes "
+        f"On {name} = 0 the matrix M = -dh/dx df/dlambda has a negative direction: an indefinite friction matrix "
         "(Painleve's paradox, or a negative load), for which several motions can follow."
     )
 
 
 def undetermined(names: Sequence[str]) -> str:
-    """No one multiplier of a set holds or lets go."""
+    """No unique multiplier of a set."""
     return (
-        f"On {' and '.join(names)} = 0 no one multiplier follows: the matrix M = -dh/dx df/dlambda is "
+        f"On {' and '.join(names)} = 0 the multiplier is not unique: the matrix M = -dh/dx df/dlambda is "
         "singular there, or close to it (friction that does not act in some direction)."
     )
 
@@ -75,22 +75,22 @@ def possibly_several(surfaces: Sequence[int]) -> str:
     """A complementarity problem without a proof of uniqueness."""
     return (
         f"On {' and '.join(f'h{i}' for i in surfaces)} = 0 more than one set of multipliers may hold: "
-        "the matrix dh/dx df/dlambda is not known to be of the kind for which there is one."
+        "the matrix dh/dx df/dlambda is not known to be a P-matrix, for which there is one."
     )
 
 
 def wrong_start(asked: str, actual: str) -> str:
-    """The mode asked for does not hold at the start."""
-    return f"start_mode {asked!r} does not hold at the start, where the mode is {actual!r}."
+    """The start mode is not admissible."""
+    return f"start_mode {asked!r} is not admissible at the start, where the mode is {actual!r}."
 
 
 def impossible_start(asked: str) -> str:
-    """The mode asked for cannot leave the start."""
+    """The start mode cannot leave the start."""
     return f"start_mode {asked!r} cannot continue from the start: its field points elsewhere."
 
 
 def start_solutions(asked: str, count: int) -> str:
-    """The mode asked for has no multipliers, or several sets."""
+    """The start mode has no multipliers, or several sets."""
     return f"start_mode {asked!r} has {count} sliding solutions here."
 
 
@@ -120,13 +120,13 @@ def reached_end(t_end: float) -> str:
 
 
 def stopped(name: str, t: float) -> str:
-    """A stopping surface was met."""
+    """A stop fired."""
     return f"{name!r} at t = {t:.10g}."
 
 
-def looked_at(count: int, t: float) -> str:
-    """The last hit of the section asked for."""
-    return f"Hit {count} of the section at t = {t:.10g}."
+def sampled(count: int, t: float) -> str:
+    """The last sample of a section."""
+    return f"Sample {count} of the section at t = {t:.10g}."
 
 
 def accumulation(events: int, limit: float) -> str:
@@ -163,7 +163,7 @@ def pressed(name: str, t: float) -> str:
 
 
 def two_sided(name: str) -> str:
-    """A start on the zero of a reset that could be met from either side."""
+    """A start on the zero of a reset without a direction."""
     return (
         f"The run is on the zero of reset {name!r}, which has no direction and would turn the motion "
         "round: it may be a floor or a ceiling. Give it a direction: -1 where its function falls to "
@@ -172,7 +172,7 @@ def two_sided(name: str) -> str:
 
 
 def too_many(what: str, count: int) -> str:
-    """A limit of the run was met."""
+    """A limit of the run was reached."""
     return f"{count} {what}."
 
 

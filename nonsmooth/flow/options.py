@@ -1,4 +1,4 @@
-"""Options of a run, checked once."""
+"""Tolerances and limits of a run."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import sys
 from dataclasses import dataclass
 from typing import NamedTuple
 
-from ..model import OptionError, explain, real, whole
+from ..model import OptionError, real, whole
 from .constants import SAFETY
 from .section import Hits
 
@@ -26,7 +26,7 @@ def tolerances(tol: float, rtol: float | None = None, atol: float | None = None)
 
 @dataclass(frozen=True)
 class Options:
-    """Tolerances and limits of a run."""
+    """Tolerances and limits of a run, checked."""
 
     t_end: float
     t_start: float = 0.0
@@ -60,13 +60,8 @@ class Options:
         self._set("atol", atol)
         if not self.t_end >= self.t_start:
             raise OptionError(
-                explain(
-                    "t_end",
-                    expected=f"a time not before t_start = {self.t_start}",
-                    received=repr(self.t_end),
-                    advice="Backward motion is not unique in Filippov systems; "
-                    "nonsmooth.flow.follow runs one smooth mode backward.",
-                )
+                f"t_end = {self.t_end} is before t_start = {self.t_start}. Give a later time: backward "
+                "motion is not unique in Filippov systems; nonsmooth.flow.follow runs one mode backward."
             )
         if self.max_step != math.inf:
             low = math.nextafter(0.0, 1.0)
@@ -79,7 +74,7 @@ class Options:
     def order(self) -> int:
         """Order of the Taylor method for the relative tolerance."""
         # A fifth above the optimum of Jorba & Zou (2005, eq. 3-7; 0.5 there), which counts the work of
-        # the series only: guards, roots and step size cost as much, and are paid by the step.
+        # the series only: the guards, roots and step size of each step cost as much.
         return max(6, math.ceil(-0.6 * math.log(SAFETY * self.rtol)) + 1)
 
     @property
@@ -88,5 +83,5 @@ class Options:
         return self.atol / self.rtol
 
     def _set(self, name: str, value: float) -> None:
-        """Keep the checked number, whatever type it came in."""
+        """Replace an option by its checked value."""
         object.__setattr__(self, name, value)

@@ -1,10 +1,10 @@
-"""What many runs return: arrays of their ends, chunk by chunk and together."""
+"""Results of many runs: arrays of their ends, by chunk and for the whole ensemble."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,21 +22,20 @@ _LARGE = 1 << 25
 
 
 class Stopped(Exception):
-    """The work was told to stop before it was done."""
+    """The computation was interrupted."""
 
 
 def kinds_of(system: FilippovSystem) -> tuple[str, ...]:
-    """Kinds of events that a system can have: what cannot happen is not counted."""
+    """Kinds of events that a system can have."""
     if system.resets or system.impacts:
         return KINDS
     return (*KINDS[: SIMPLE_KINDS - 1], KINDS[-1])
 
 
 def _block(arrays: Mapping[str, tuple[tuple[int, ...], type]]) -> dict[str, Any]:
-    """Arrays of some shapes and types, large numbers first, in one piece of memory unless they
-    are large."""
-    # The C library gives free memory back to the system when it is twice its largest piece, and pages that
-    # were given back take long to get again.
+    """Arrays of some shapes and types, in one block of memory unless they are large."""
+    # The C library returns free memory to the system when it is twice its largest block, and it takes long
+    # to get returned pages again. Types with large items come first, for alignment.
     sizes = [math.prod(shape) * np.dtype(kind).itemsize for shape, kind in arrays.values()]
     if sum(sizes) > _LARGE:
         return {name: np.empty(shape, kind) for name, (shape, kind) in arrays.items()}
@@ -49,11 +48,10 @@ def _block(arrays: Mapping[str, tuple[tuple[int, ...], type]]) -> dict[str, Any]
 
 @dataclass
 class Chunk:
-    """Results of some trajectories; itineraries as numbers into ``words``, which are sorted.
+    """Results of some trajectories; ``itinerary`` indexes ``words``, the sorted itineraries."""
 
-    ``kinds`` are events by kind, a column for each of ``kinds_of``; ``totals``: steps, events and
-    trajectories handed over by the lanes.
-    """
+    # kinds: number of events, a column for each of ``kinds_of``. totals: steps, events, and trajectories for
+    # which the lanes fell back to the scalar driver.
 
     x: Array
     t: Array
@@ -94,22 +92,11 @@ class Chunk:
 
     def part(self, first: int, last: int) -> Chunk:
         """Return the arrays of the trajectories first to last - 1, to be written in place."""
-        cut = slice(first, last)
-        return Chunk(
-            x=self.x[cut],
-            t=self.t[cut],
-            status=self.status[cut],
-            itinerary=self.itinerary[cut],
-            words=[],
-            kinds=self.kinds[cut],
-            at_x=None if self.at_x is None else self.at_x[cut],
-            at_t=None if self.at_t is None else self.at_t[cut],
-            sample_t=None if self.sample_t is None else self.sample_t[cut],
-            sample_x=None if self.sample_x is None else self.sample_x[cut],
-        )
+        arrays: dict[str, Any] = {name: a[first:last] for name, a in self.arrays().items()}
+        return replace(self, words=[], totals=np.zeros(4, np.int64), **arrays)
 
     def forget(self) -> None:
-        """Empty the arrays of what may not happen."""
+        """Fill the arrays of events and samples with NaN."""
         for array in (self.at_x, self.at_t, self.sample_t, self.sample_x):
             if array is not None:
                 array[:] = np.nan
@@ -123,7 +110,7 @@ class Chunk:
         return {name: a for name in names if (a := getattr(self, name)) is not None}
 
     def replace(self, rows: NDArray[np.intp], chunk: Chunk) -> None:
-        """Put the results of another chunk, and its steps and events, in the place of some rows."""
+        """Replace some rows by the results of another chunk, and add its steps and events."""
         for name, array in chunk.arrays().items():
             self.arrays()[name][rows] = array
         self.itinerary[rows] += len(self.words)
@@ -133,7 +120,7 @@ class Chunk:
         self.totals[:2] += chunk.totals[:2]
 
     def rename(self, words: Mapping[int, str]) -> None:
-        """Number the itineraries in the order of their words, those in use only."""
+        """Number the itineraries that are in use in sorted order."""
         self.words = sorted(set(words.values()))
         number = {word: k for k, word in enumerate(self.words)}
         table = np.zeros(max(words, default=0) + 1, np.int32)
@@ -172,9 +159,9 @@ class Ensemble(
     events : dict of str to ndarray of int32 (...)
         Number of events by kind: crossing, entry, exit, stop, reset, end.
     event_x, event_t : ndarray (..., n), (...) or None
-        State and time of the event asked for with ``at_event``; NaN where it did not happen.
+        State and time of the event given by ``at_event``; NaN where it did not happen.
     sample_x, sample_t : ndarray (..., K, n), (..., K) or None
-        States and times asked for with ``t_eval`` or ``at``; NaN where they did not happen.
+        States and times of the samples by ``t_eval`` or ``at``; NaN where there are none.
     state_names : tuple of str
         Names of the states, in their order on the last axis.
     """
@@ -198,7 +185,7 @@ class Ensemble(
 
     @property
     def complete(self) -> NDArray[np.bool_]:
-        """Where the run did what was asked: reached its end or a stop."""
+        """Whether each run reached its end or a stop."""
         return (self.status == Status.REACHED_END) | (self.status == Status.STOPPED)
 
     def to_pandas(self) -> Any:
@@ -225,7 +212,7 @@ class Ensemble(
         return tables.ensemble_set(self)
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the runs: how many, and how they ended."""
+        """Notebook representation: number of runs and their ends."""
         shape = " x ".join(map(str, self.t.shape))
         rows = (
             ("runs", shape),
@@ -242,7 +229,7 @@ class Ensemble(
         )
 
     def _ends(self) -> str:
-        """How many runs ended in which status, counted in pieces."""
+        """Number of runs by status."""
         flat, size = self.status.reshape(-1), 1 << 22
         pieces = [flat[k : k + size] for k in range(0, len(flat), size)]
         number = {s: sum(int(np.count_nonzero(piece == s)) for piece in pieces) for s in Status}
@@ -281,28 +268,27 @@ class Collected:
     def ensemble(self, codes: NDArray[np.int32] | None = None) -> Ensemble:
         """Return the results, with the itineraries sorted and their numbers in ``codes``."""
         words, every = sorted(self._words), self.all
-        place = np.empty(len(words), np.int32)
+        position = np.empty(len(words), np.int32)
         for k, word in enumerate(words):
-            place[self._words[word]] = k
+            position[self._words[word]] = k
         code = every.itinerary if codes is None else codes
         for first, last, numbers in self._parts:
-            code[first:last] = place[numbers].take(every.itinerary[first:last])
-        n, shape = every.x.shape[1], self.shape
+            code[first:last] = position[numbers].take(every.itinerary[first:last])
+
+        def shaped(a: Any) -> Any:
+            return None if a is None else a.reshape((*self.shape, *a.shape[1:]))
+
         return Ensemble(
-            x=every.x.reshape(*shape, n),
-            t=every.t.reshape(shape),
-            status=every.status.reshape(shape),
+            x=shaped(every.x),
+            t=shaped(every.t),
+            status=shaped(every.status),
             itineraries=tuple(words),
-            itinerary_code=code.reshape(shape),
+            itinerary_code=shaped(code),
             events=self._events(),
-            event_x=None if every.at_x is None else every.at_x.reshape(*shape, n),
-            event_t=None if every.at_t is None else every.at_t.reshape(shape),
-            sample_x=None
-            if every.sample_x is None
-            else every.sample_x.reshape(*shape, *every.sample_x.shape[1:]),
-            sample_t=None
-            if every.sample_t is None
-            else every.sample_t.reshape(*shape, *every.sample_t.shape[1:]),
+            event_x=shaped(every.at_x),
+            event_t=shaped(every.at_t),
+            sample_x=shaped(every.sample_x),
+            sample_t=shaped(every.sample_t),
             state_names=self.system.state_names,
         )
 

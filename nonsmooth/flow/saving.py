@@ -1,8 +1,8 @@
-"""Results in files, whole and exact: one file holds a result and the system that it belongs to.
+"""Saving of results, exact to the last bit, in files that also hold their systems.
 
-A file is an archive of NumPy arrays, one for each type of number, and of a tree in JSON that says
-which part of them is what. No pickle is in it. A result is made of values that this module knows:
-numbers, texts, arrays, sequences, mappings, systems, statuses and the classes registered here.
+A file is an archive of NumPy arrays, one for each type of number, and of a tree in JSON that refers to parts
+of them. It has no pickle. A result consists of numbers, texts, arrays, sequences, mappings, systems, statuses
+and the classes registered here.
 """
 
 from __future__ import annotations
@@ -68,8 +68,7 @@ class Savable:
             files.replace(Path(path), data)
         except (OSError, TypeError, ValueError) as error:
             raise OptionError(
-                f"path: expected a file that can be written, received {path!r} "
-                f"({error}). Choose another folder."
+                f"path {path!r} cannot be written ({error}). Choose another folder."
             ) from error
 
     @classmethod
@@ -83,8 +82,8 @@ class Savable:
         result = load(path)
         if not isinstance(result, cls):
             raise OptionError(
-                f"path: expected a saved {cls.__name__}, received a {type(result).__name__}. "
-                "nonsmooth.load reads every type."
+                f"path has a {type(result).__name__}, not a {cls.__name__}. Use nonsmooth.load, which "
+                "reads every type."
             )
         return result
 
@@ -120,16 +119,16 @@ def load(path: str | os.PathLike[str]) -> Any:
     (Trajectory(t = 0 .. 2, 3 points, 2 events, itinerary '+ s', REACHED_END), True)
     """
     if not isinstance(path, (str, bytes, os.PathLike)):
-        raise OptionError(f"path: expected a path, received {path!r} ({type(path).__name__}).")
+        raise OptionError(
+            f"path is {path!r} ({type(path).__name__}). Give a text or a pathlib.Path."
+        )
     try:
         return _read(path)
-    except (
-        Exception
-    ) as error:  # whatever a damaged file drives the readers of zip, NumPy and JSON to
+    except Exception as error:  # whatever a damaged file raises in the readers of its formats
         reason = error
     raise OptionError(
-        f"path: expected a file written by save, received {path!r} "
-        f"({type(reason).__name__}: {reason}). Save the result again."
+        f"path {path!r} is no file written by save ({type(reason).__name__}: {reason}). "
+        "Save the result again."
     ) from reason
 
 
@@ -137,7 +136,7 @@ def load(path: str | os.PathLike[str]) -> Any:
 
 
 class _Writer:
-    """Values as a tree; arrays end to end, one row of numbers for each type."""
+    """Conversion of values to a tree; arrays go end to end into one row for each type."""
 
     def __init__(self) -> None:
         self.rows: dict[str, list[NDArray[Any]]] = {}
@@ -145,7 +144,7 @@ class _Writer:
         self.systems: list[FilippovSystem] = []
 
     def tree(self, value: Any) -> Any:
-        """Return a value in terms that JSON has."""
+        """Return a value as JSON can represent it."""
         if value is None or isinstance(value, (bool, str)):
             return value
         if isinstance(value, Status):
@@ -169,11 +168,13 @@ class _Writer:
                 "of": name,
                 "fields": {f.name: self.tree(getattr(value, f.name)) for f in fields},
             }
-        raise OptionError(f"save: expected a result of numbers and systems, received {value!r}.")
+        raise OptionError(f"save cannot write {value!r}. Save a result of numbers and systems.")
 
     def _array(self, value: NDArray[Any]) -> Any:
         if value.dtype.kind not in "biufc":
-            raise OptionError(f"save: expected arrays of numbers, received {value.dtype}.")
+            raise OptionError(
+                f"save cannot write an array of {value.dtype}. Save arrays of numbers."
+            )
         kind = value.dtype.name
         start = self.sizes.get(kind, 0)
         self.rows.setdefault(kind, []).append(np.ascontiguousarray(value).ravel())

@@ -1,4 +1,4 @@
-"""Which engine runs: the compiled one where it can, the reference driver where it must."""
+"""Choice of the engine: the compiled one, or the reference driver where nothing compiles."""
 
 from __future__ import annotations
 
@@ -6,18 +6,15 @@ from collections.abc import Callable
 from typing import TypeVar
 from weakref import WeakSet
 
-from ..model import OptionError, explain
+from ..model import OptionError
 from .compiled.building.compilers import ADVICE, CompilerError, find_compiler
-from .warn import CompilerWarning, warn_once
-
-__all__ = ["ENGINES", "CompilerWarning", "compiled_or_none", "use_compiled"]
+from .warn import warn_once
 
 ENGINES = ("auto", "reference", "compiled")
 
-
 T = TypeVar("T")
 
-#: What could not be compiled; it is not tried again unless the compiled engine is asked for by name.
+#: Programs that could not be compiled; they are tried again only with engine="compiled".
 _GIVEN_UP: WeakSet[object] = WeakSet()
 
 _SLOWLY = "The slow reference driver is used."
@@ -26,16 +23,14 @@ _SLOWLY = "The slow reference driver is used."
 def use_compiled(engine: str, supported: bool = True) -> bool:
     """Whether to run the compiled engine."""
     if engine not in ENGINES:
-        raise OptionError(
-            explain("engine", expected=f"one of {ENGINES}", received=repr(engine), advice="")
-        )
+        raise OptionError(f"engine is {engine!r}. Give one of {ENGINES}.")
     if engine == "reference":
         return False
     if not supported:
         if engine == "compiled":
             raise OptionError(
-                "engine: expected 'auto' or 'reference' for a system whose multipliers do not enter "
-                "linearly, received 'compiled'. Only the reference driver serves it."
+                "engine is 'compiled', but the multipliers of the system do not enter linearly. Give "
+                "'auto' or 'reference': only the reference driver runs such a system."
             )
         return False
     try:
@@ -47,13 +42,13 @@ def use_compiled(engine: str, supported: bool = True) -> bool:
         warn_once(f"{error} {_SLOWLY}")
         return False
     if engine == "compiled":
-        raise CompilerError(f"compiler: expected a C compiler, found none. {ADVICE}")
+        raise CompilerError(f"No C compiler was found. {ADVICE}")
     warn_once(f"No C compiler was found. {_SLOWLY} {ADVICE}")
     return False
 
 
 def compiled_or_none(engine: str, of: object, work: Callable[[], T]) -> T | None:
-    """Return what work with the compiled engine returns, or None where it cannot be compiled."""
+    """Return the result of ``work``, or None where its program cannot be compiled."""
     if engine == "compiled":
         return work()
     if of in _GIVEN_UP:
@@ -62,6 +57,6 @@ def compiled_or_none(engine: str, of: object, work: Callable[[], T]) -> T | None
         return work()
     except CompilerError as error:
         _GIVEN_UP.add(of)
-        told = f"{error.brief} {_SLOWLY} {ADVICE}" if error.brief else f"{error} {_SLOWLY}"
-        warn_once(told)
+        message = f"{error.brief} {_SLOWLY} {ADVICE}" if error.brief else f"{error} {_SLOWLY}"
+        warn_once(message)
         return None

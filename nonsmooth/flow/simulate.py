@@ -1,4 +1,4 @@
-"""The verb ``simulate``: from a start to an end, through every switch."""
+"""Integration of one trajectory through crossings, sliding, stops and resets."""
 
 from __future__ import annotations
 
@@ -17,10 +17,9 @@ from .constants import HAND_OVER
 from .ensembles.starts import require_start_mode
 from .options import Options, tolerances
 from .reference.driver import Driver
-from .section import Section, Times
+from .section import Section, Times, read_sampling, sampled, sectioned
 from .select import compiled_or_none, use_compiled
 from .trajectory import Trajectory
-from .view import read_view, sampled, sectioned
 
 
 def simulate(
@@ -73,10 +72,10 @@ def simulate(
         Keep the states at a section: at a surface, stop, reset or impact of that name, at a kind of
         event, or after each period. See :class:`Section`.
     engine : {"auto", "reference", "compiled"}
-        Which driver runs. ``"auto"`` takes the driver in C, which is compiled once on a machine and
-        serves every system at once; long runs go on, with the same bits, in a program that a compiler
-        makes for the system meanwhile. ``"compiled"`` waits for that program. Without a compiler
-        ``"auto"`` says so, once, and takes the reference driver in Python.
+        The driver. ``"auto"`` is the driver in C, which is compiled once on a machine and
+        runs every system without delay; long runs continue, with the same bits, in a program that is
+        compiled for the system meanwhile. ``"compiled"`` waits for that program. Without a compiler
+        ``"auto"`` warns once and uses the reference driver in Python.
 
     Returns
     -------
@@ -128,15 +127,15 @@ def simulate(
     x = system.extended_point(x0, options.t_start)
     p = system.parameter_vector(parameters)
     require_start_mode(system, x, p, options)
-    view = read_view(system, t_eval, at, options, p)
-    options, times = view.options, view.times
+    sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
+    options, times = replace(options, hits=sampling.hits), sampling.times
     if isinstance(at, Section) and at.count is not None and times is not None:
         options = replace(options, t_end=float(times.of(p)[-1]))
-    return _looked_at(_run(system, x, p, options, engine), options, times, p)
+    return _with_samples(_run(system, x, p, options, engine), options, times, p)
 
 
-def _looked_at(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
-    """Give a run its samples."""
+def _with_samples(run: Trajectory, options: Options, times: Times | None, p: Array) -> Trajectory:
+    """Add the samples to a run."""
     if times is not None:
         t, x = sampled(run, times.of(p))
         return replace(run, sample_t=t, sample_x=x)
@@ -165,7 +164,7 @@ def _run(system: FilippovSystem, x: Array, p: Array, options: Options, engine: s
 def _converted(
     system: FilippovSystem, x: Array, p: Array, options: Options, run: Run | None
 ) -> Trajectory:
-    """Return the trajectory of a compiled run; the reference driver repeats what is rare."""
+    """Return the trajectory of a compiled run; rare cases fall back to the reference driver."""
     if run is None or run.status == HAND_OVER:
         return Driver(system, x, p, options).run()
     return trajectory(system, p, options, run)

@@ -1,4 +1,4 @@
-"""How a run ends: a named status, and the sentence of advice that goes with it."""
+"""Status of a run, and advice for each status."""
 
 from __future__ import annotations
 
@@ -8,11 +8,11 @@ from enum import IntEnum
 class Status(IntEnum):
     """Why a run ended.
 
-    It reached its end (REACHED_END) or a stop (STOPPED); its future is not unique (NON_UNIQUE); events
+    It reached its end (REACHED_END) or a stop (STOPPED); the motion is not unique (NON_UNIQUE); events
     accumulate (ACCUMULATION); several surfaces meet where no motion is stable (INTERSECTION); steps
     became too short (STEP_TOO_SMALL); a value is not finite (NOT_FINITE); a limit on events or steps was
     reached (TOO_MANY_EVENTS, TOO_MANY_STEPS); a constraint cannot hold (INCONSISTENT). The message of a
-    run says more. The values are stable: ensembles store them in arrays and checkpoints.
+    run says more. The values are stable: ensembles store them in arrays and files.
     """
 
     REACHED_END = 0
@@ -31,23 +31,23 @@ class Status(IntEnum):
 
     @property
     def complete(self) -> bool:
-        """Whether the run did what was asked (reached its end or a stop)."""
+        """Whether the run reached its end or a stop."""
         return self in (Status.REACHED_END, Status.STOPPED)
 
 
 ADVICE: dict[Status, str] = {
     Status.REACHED_END: "The run reached t_end.",
-    Status.STOPPED: "The run met a stopping surface or the last hit of its section.",
-    Status.NON_UNIQUE: "The future is not unique from here; continue from the last state with "
-    "start_mode= the mode you mean.",
+    Status.STOPPED: "The run reached a stop or the last event of its section.",
+    Status.NON_UNIQUE: "The motion is not unique from here; continue from the last state with "
+    "start_mode= and the mode that you want.",
     Status.ACCUMULATION: "Events accumulate in finite time (Zeno); continue from the limit with "
     "the motion that holds there.",
     Status.INTERSECTION: "At this intersection of surfaces Filippov's convention with independent "
-    "multipliers has no stable motion; look at the fields around the last state.",
+    "multipliers has no stable motion; check the fields around the last state.",
     Status.INCONSISTENT: "A constraint cannot hold here: the state is behind it, or no reaction (or "
-    "more than one) keeps the contact (Painleve's paradox); look at the gaps and at friction.",
+    "more than one) keeps the contact (Painleve's paradox); check the gaps and the friction.",
     Status.STEP_TOO_SMALL: "The solution has a singularity here, or the tolerance is below "
-    "rounding: loosen tol (atol alone where states are large) or look at the fields near the last "
+    "rounding: loosen tol (atol alone where states are large) or check the fields near the last "
     "state.",
     Status.NOT_FINITE: "A field or a switching function is not a finite number here: check "
     "logarithms, roots and divisions at the last state.",

@@ -1,4 +1,4 @@
-"""Results as tables of pandas and as data sets of xarray, which are asked for only on use."""
+"""Results as DataFrames of pandas and Datasets of xarray, which are imported on use."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def library(name: str, what: str) -> Any:
         return importlib.import_module(name)
     except ImportError as error:
         raise OptionError(
-            f"{what}: expected {name} to be installed, received {error}. Install it with "
+            f"{what} needs {name}, which cannot be imported ({error}). Install it with "
             "python -m pip install 'nonsmooth-dynamics[tables]'."
         ) from error
 
@@ -34,23 +34,18 @@ def trajectory_table(run: Trajectory, what: str) -> Any:
         frame = pandas.DataFrame(run.x, columns=names, index=pandas.Index(run.t, name="t"))
     elif what == "samples":
         if run.sample_t is None or run.sample_x is None:
-            raise OptionError(
-                "to_pandas: expected a run with samples, received one without. Simulate with "
-                "t_eval= or at=."
-            )
+            raise OptionError("to_pandas: the run has no samples. Simulate with t_eval= or at=.")
         index = pandas.Index(run.sample_t, name="t")
         frame = pandas.DataFrame(run.sample_x, columns=names, index=index)
     elif what == "events":
-        columns = ("t", "kind", "name", "mode_before", "mode_after")
+        columns = ("t", "kind", "name", "element", "side", "mode_before", "mode_after")
         frame = pandas.DataFrame({c: [getattr(e, c) for e in run.events] for c in columns})
         for suffix, attribute in (("", "x"), ("_after", "x_after")):
             states = np.array([getattr(e, attribute) for e in run.events]).reshape(-1, len(names))
             for i, name in enumerate(names):
                 frame[name + suffix] = states[:, i]
     else:
-        raise OptionError(
-            f"to_pandas: expected 'points', 'events' or 'samples', received {what!r}."
-        )
+        raise OptionError(f"to_pandas: what is {what!r}. Give 'points', 'events' or 'samples'.")
     frame.attrs.update(_attributes(run))
     return frame
 

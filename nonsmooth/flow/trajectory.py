@@ -1,4 +1,4 @@
-"""What a run returns: steps with their Taylor polynomials, events, itinerary, status."""
+"""Trajectory of a run: Taylor polynomials of its steps, events, itinerary, status."""
 
 from __future__ import annotations
 
@@ -33,9 +33,17 @@ class Event:
         Equal at a stop, a zero and the end. After a reset the mode that starts there, also where
         the jump went through a surface.
     name : str
-        Of the surface (``h0``, ``h1``, ...), stop, reset or function.
+        Of the surface (``h0``, ``h1``, ...), the limit of a multiplier at which sliding ends
+        (``lambda0 = 1``, ``lambda0 = -1``, ``|lambda0| = 1`` of a set), the stop, reset, impact or
+        function.
     x_after : ndarray (n,)
         State after a reset, ``x`` otherwise.
+    element : int
+        What it belongs to: position of the surface, set or contact among the letters of the modes;
+        number of the stop or reset, clocks counted after the resets; -1 for none.
+    side : int
+        Of a crossing or entry the side, +1 or -1, from which the motion comes; of the end of sliding
+        the one to which it goes; of a stop or reset its direction; of an impact 1; otherwise 0.
     """
 
     kind: str
@@ -45,6 +53,8 @@ class Event:
     mode_after: str
     name: str = ""
     x_after: Array = None  # type: ignore[assignment]  # x unless given
+    element: int = -1
+    side: int = 0
 
     def __post_init__(self) -> None:
         if self.x_after is None:
@@ -152,7 +162,7 @@ class Trajectory(
     steps : Steps
         Accepted steps with their Taylor polynomials.
     sample_t, sample_x : ndarray (K,), (K, n) or None
-        Times and states asked for with ``t_eval`` (NaN after an early end) or ``at``.
+        Times and states of the samples by ``t_eval`` (NaN after an early end) or ``at``.
     """
 
     system: FilippovSystem
@@ -180,8 +190,8 @@ class Trajectory(
         slack = 1e-12 * max(1.0, abs(low), abs(high))
         if times.size and not (low - slack <= times.min() and times.max() <= high + slack):
             raise PointError(
-                f"time: expected values in [{low}, {high}], received values from {times.min()} to "
-                f"{times.max()}. The run ended with status {self.status}: {self.message}"
+                f"time has values from {times.min()} to {times.max()}. Give times in [{low}, {high}]: "
+                f"the run ended with status {self.status}. {self.message}"
             )
         n = self.x.shape[1]
         if not len(self.steps):
@@ -196,7 +206,8 @@ class Trajectory(
         ----------
         what : {"points", "events", "samples"}, optional
             ``points`` and ``samples`` have the time as index and a column for each state; ``events``
-            has time, kind, name, modes, and the states before and after (``x_after``, ...).
+            has time, kind, name, element, side, modes, and the states before and after
+            (``x_after``, ...).
 
         Returns
         -------
@@ -226,7 +237,7 @@ class Trajectory(
         return tables.trajectory_set(self)
 
     def _repr_html_(self) -> str:
-        """How a notebook shows the run: why it ended, its modes, its states over time."""
+        """Notebook representation: status, itinerary, states over time."""
         rows = (
             ("time", f"{self.t[0]:g} to {self.t[-1]:g}, {len(self.events)} events"),
             ("itinerary", _shorten(self.itinerary)),

@@ -1,4 +1,4 @@
-"""What a user is told without an error: once in a process, at the line that asked."""
+"""Warnings, once in a process, about the line of the caller."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _HERE = str(Path(__file__).parents[1])
 
 
 class CompilerWarning(UserWarning):
-    """The compiled engine, or the cache of compiled engines, is not used; the message says why."""
+    """The compiled engine, or the cache of compiled engines, is not used."""
 
 
 @lru_cache(maxsize=64)

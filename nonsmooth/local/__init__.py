@@ -1,12 +1,10 @@
-"""WHAT HAPPENS at a point of a surface, without time stepping: regions, folds, two-folds."""
+"""Analysis at points of surfaces, without time stepping: regions, folds, two-folds, equilibria."""
 
 from ..model import mode_field
 from . import two_folds
-from .classify import classify
-from .local_object import LocalObject
+from .classify import LocalObject, classify
 from .point.higher_codimension import LimitDirection, limit_directions
-from .point.intersection_range import intersection_range
-from .point.intersections import Continuation, Intersection, intersection
+from .point.intersections import Continuation, Intersection, intersection, intersection_range
 from .point.regions import Region, alpha, region, sliding_field
 from .point.sliding_branches import SlidingBranch, sliding_branches
 from .searches.boundary_equilibria import (
@@ -16,12 +14,11 @@ from .searches.boundary_equilibria import (
     find_boundary_equilibrium,
 )
 from .searches.equilibria import Equilibrium, find_equilibrium
-from .searches.find_two_fold import find_two_fold, two_fold
+from .searches.find_two_fold import TwoFold, find_two_fold, two_fold
 from .searches.fold_folds import FoldFold, fold_fold
 from .searches.folds import Fold, find_fold, fold
 from .searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from .searches.search import find_all
-from .searches.two_fold import TwoFold
 
 __all__ = [
     "BoundaryBifurcation",

@@ -1,8 +1,8 @@
-"""Checks and margins that the questions of this floor share."""
+"""Checks and margins that the functions of ``local`` share."""
 
 from __future__ import annotations
 
-from ..model import DefinitionError, FilippovSystem, explain, require_system
+from ..model import DefinitionError, FilippovSystem, require_system
 
 #: A class that is closer than this to a change is not named.
 MARGIN = 1e-6
@@ -12,55 +12,39 @@ def require_surface(system: FilippovSystem) -> None:
     """Refuse a smooth system."""
     if not system.surface_count:
         raise DefinitionError(
-            explain(
-                "system",
-                expected="at least one switching surface",
-                received="a smooth system",
-                advice="Give surface= with above= and below=, or surfaces= with multipliers=.",
-            )
+            "system: expected at least one switching surface, received a smooth system. Give "
+            "surface= with above= and below=, or surfaces= with multipliers=."
         )
 
 
 def require_autonomous(system: FilippovSystem, what: str) -> None:
-    """Refuse explicit time: what stays at one place does so for all time."""
+    """Refuse explicit time."""
     require_system(system)
     if system.time_dependent:
         raise DefinitionError(
-            explain(
-                what,
-                expected="a system without explicit time",
-                received=f"one that depends on {system.extended_states[-1]}",
-                advice="Make the time a state, or freeze it at a value.",
-            )
+            f"{what}: expected a system without explicit time, received one that depends on "
+            f"{system.extended_states[-1]}. Make the time a state, or freeze it at a value."
         )
 
 
 def require_linear(system: FilippovSystem, surface: int, what: str) -> None:
-    """Refuse a multiplier that enters nonlinearly: alpha would not be Filippov's."""
+    """Refuse a multiplier that enters nonlinearly, for which alpha is not Filippov's weight."""
     if system.nonlinear[surface]:
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"multiplier {surface} to enter the field linearly",
-                received="hidden dynamics",
-                advice="The sliding field is then not a convex combination of two fields; follow "
-                "it with simulate.",
-            )
+            f"{what}: expected multiplier {surface} to enter the field linearly, received hidden "
+            "dynamics. The sliding field is then not a convex combination of two fields; follow "
+            "it with simulate."
         )
 
 
 def parameter_index(
     system: FilippovSystem, name: str, what: str = "parameter", advice: str = "Give its name."
 ) -> int:
-    """Return which of its parameters a system calls by a name."""
+    """Index of a parameter by its name."""
     if name not in system.parameter_names:
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"a parameter among {list(system.parameter_names)}",
-                received=repr(name),
-                advice=advice,
-            )
+            f"{what}: expected a parameter among {list(system.parameter_names)}, received "
+            f"{name!r}. {advice}"
         )
     return system.parameter_names.index(name)
 

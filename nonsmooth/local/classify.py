@@ -1,13 +1,14 @@
-"""The one question about any point: which local object of the theory is it, and how clearly?
+"""Classification of a point: which local object of the theory it is, with distances to other classes.
 
 Each object is a set of equations (h = 0, L1 = 0, F1 = 0, ...) and inequalities. Equations hold
-within ``tol``; inequalities must hold by ``margin``. A point in between, or where an inequality
-fails by less than the margin, is called degenerate, with the distance; it is never guessed. All
+within ``tol``, inequalities by ``margin``. A point in between is degenerate, with the distance. All
 distances are dimensionless and unchanged when h or a field is multiplied by a positive number.
 """
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -19,18 +20,14 @@ from ..model import (
     FilippovSystem,
     Parameters,
     PointError,
-    explain,
     layer_of,
     require_system,
 )
 from ..model.checks import positive
 from .checks import MARGIN, require_linear
-from .local_object import LocalObject, spectrum
 from .point.intersections import Intersection, Meeting
-from .point.lie_derivatives import Numbers
 from .point.regions import region_of
-from .point.sides import SIDES
-from .point.surface_point import Place, place
+from .point.surface_point import FIELDS, SIDES, Numbers, Place, place
 from .read_only import ReadOnly
 from .searches.boundary_equilibria import boundary_equilibrium_of
 from .searches.equilibria import equilibrium_distance, kind_of
@@ -47,7 +44,368 @@ from .searches.pseudo_equilibria import (
 from .searches.search import Found
 from .two_folds import classify_two_fold
 
-# ``classify`` where several surfaces meet: what goes on there, and how clearly.
+
+@dataclass(frozen=True, eq=False)
+class LocalObject:
+    """The class of a point, with its distance from other classes.
+
+    Attributes
+    ----------
+    kind : str
+        ``"crossing"``, ``"sliding"``, ``"fold"``, ``"cusp"``, ``"fold-fold"`` (plane),
+        ``"two-fold"``, ``"equilibrium"``, ``"pseudo-equilibrium"``, ``"boundary equilibrium"``,
+        ``"intersection"`` (of surfaces, where no mode or several can go on) or ``"degenerate"``.
+    label : str
+        Its class: ``"crossing up"``, ``"attracting sliding"``, ``"visible"``, ``"II2"``,
+        ``"VV-C1"``, ``"stable focus"``, ``"pseudo-saddle"``, ``"BF3"``, ``"crossing to +-"``, ...
+    side : {"+", "-", ""}
+        The field to which a fold, cusp, equilibrium or boundary equilibrium belongs.
+    point : ndarray (n,)
+        The point, in the order of the states.
+    distance : float
+        To the nearest degenerate case; below the margin the kind is ``"degenerate"``.
+    nearest : str
+        Which condition that is, e.g. ``"L1 = 0"``.
+    margins : mapping
+        Distance from each condition that was checked.
+    evidence : mapping
+        Numbers: ``h``, ``L1``, ``L2``, and what decided the class.
+    detail : object
+        The Fold, TwoFold, FoldFold, BoundaryEquilibrium, PseudoEquilibrium or Intersection, if there is
+        one.
+    """
+
+    kind: str
+    label: str
+    side: str
+    point: Array
+    distance: float
+    nearest: str
+    margins: Mapping[str, float]
+    evidence: Mapping[str, float]
+    detail: Any = None
+
+    def __str__(self) -> str:
+        field = f" of {FIELDS[self.side]}" if self.side else ""
+        name = self.label if self.label == self.kind else f"{self.kind}: {self.label}"
+        numbers = ", ".join(f"{k} = {v:.6g}" for k, v in self.evidence.items())
+        away = f"{self.distance:.3g} from {self.nearest}" if self.nearest else "nothing is near"
+        return f"{name}{field} at {self.point.tolist()} ({away}). {numbers}"
+
+
+def spectrum(eigenvalues: NDArray[Any]) -> dict[str, float]:
+    """Eigenvalues as numbers: real parts, and imaginary parts where they are not zero."""
+    values: dict[str, float] = {}
+    for i, v in enumerate(eigenvalues, 1):
+        values[f"Re lambda{i}"] = float(v.real)
+        if v.imag:
+            values[f"Im lambda{i}"] = float(v.imag)
+    return values
+
+
+def classify(
+    system: FilippovSystem,
+    point: ArrayLike,
+    *,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+    surface: int = 0,
+    mode: str | None = None,
+    tol: float = 1e-9,
+    margin: float = MARGIN,
+) -> LocalObject:
+    """Say which local object a point is: of a surface, or an equilibrium off it.
+
+    Parameters
+    ----------
+    system, point, parameters, t, surface, mode
+        As in :func:`region`. A point on several surfaces is classified as their intersection, unless
+        ``mode`` chooses sides; a mode with several ``s`` says which surfaces meet.
+    tol : float, optional
+        An equation holds if its dimensionless distance is at most this.
+    margin : float, optional
+        A point closer than this to a change of class is degenerate.
+
+    Returns
+    -------
+    LocalObject
+        The class of the point, with its margins and the numbers that decide it.
+
+    Raises
+    ------
+    PointError
+        Off the surface and no equilibrium; a wrong shape; not finite.
+    DefinitionError
+        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; no
+        surface; a ``mode`` or ``surface`` that the system does not have.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    OptionError
+        ``tol`` or ``margin`` is not positive.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[1, x], below=[-2, 1 + x])
+    >>> for x0 in (1.0, 0.0, -0.5, -1 / 3, 1e-8):
+    ...     found = classify(s, [x0, 0.0])
+    ...     print(found.kind, "-", found.label)
+    crossing - crossing up
+    fold - visible
+    sliding - attracting sliding
+    pseudo-equilibrium - pseudo-saddle
+    degenerate - near L1 = 0
+    """
+    positive(tol, "tol"), positive(margin, "margin")
+    meeting = meeting_at(system, point, parameters, t, mode, tol)
+    if meeting is not None:
+        return classify_intersection(meeting, tol, margin)
+    where, x = place(system, point, parameters, t, surface, mode)
+    require_linear(system, surface, "classify")
+    numbers = where.finite_at(x)
+    if not np.any(numbers.gradient):
+        raise PointError(
+            f"point {x}: expected a regular point of surface {surface}, received grad h = 0. Write "
+            "h with a nonzero gradient."
+        )
+    classifier = _Classifier(where, numbers, tol, margin)
+    away = numbers.distance / (1 + float(np.linalg.norm(x)))
+    if away > tol:
+        return classifier.off_surface(away)
+    return classifier.on_surface()
+
+
+class _Classifier:
+    """One point with the numbers, tolerances and margins that its classification uses."""
+
+    def __init__(self, where: Place, numbers: Numbers, tol: float, margin: float):
+        self.where, self.numbers, self.tol, self.margin = where, numbers, tol, margin
+        self.n = where.system.dimension
+        self.derivatives = where.jacobians(numbers.x)
+        self.margins: dict[str, float] = {}
+        lie = dict(zip(("L1", "L2"), map(float, numbers.lie), strict=True))
+        self.evidence: dict[str, float] = {"h": float(numbers.h), **lie}
+        self.to_zero = [float("inf"), float("inf")]  # distance to a zero of F1, F2
+        if not where.system.time_dependent:
+            pairs = zip(numbers.fields, self.derivatives, strict=True)
+            self.to_zero = [equilibrium_distance(f, d, numbers.x) for f, d in pairs]
+
+    # the result -----------------------------------------------------------------------------------
+
+    def result(self, kind: str, label: str, side: str = "", detail: Any = None) -> LocalObject:
+        """Name the object unless a margin forbids it."""
+        finite = {name: v for name, v in self.margins.items() if np.isfinite(v)}
+        distance, nearest = min(((v, k) for k, v in finite.items()), default=(float("inf"), ""))
+        if distance < self.margin:
+            kind, label = "degenerate", f"near {nearest}" if distance > self.tol else nearest
+        return LocalObject(
+            kind,
+            label,
+            side,
+            self.numbers.x[: self.n],
+            distance,
+            nearest,
+            ReadOnly(self.margins),
+            ReadOnly(self.evidence),
+            detail,
+        )
+
+    def is_zero(self, value: float, name: str) -> bool:
+        """Whether an equation holds; if not, its distance becomes a margin."""
+        if value <= self.tol:
+            return True
+        self.margins[name] = value
+        return False
+
+    # off the surface ---------------------------------------------------------------------------
+
+    def off_surface(self, away: float) -> LocalObject:
+        """An equilibrium of the field that acts there, or of the other one (virtual)."""
+        self.margins["h = 0"] = away
+        own = 0 if self.numbers.h > 0 else 1
+        for k in (own, 1 - own):
+            if self.to_zero[k] <= self.margin:
+                self.is_zero(self.to_zero[k], f"F{k + 1} = 0")
+                status = "real" if k == own else "virtual"
+                return self._equilibrium(k, status)
+        x, gradient = self.numbers.x, self.numbers.gradient
+        foot = x - self.numbers.h * gradient / (gradient @ gradient)
+        raise PointError(
+            f"point {x}: expected a point of the surface h = 0, or an equilibrium of a field, "
+            f"received h = {self.numbers.h:.6g} (about {self.numbers.distance:.3g} away), F1 = "
+            f"{self.numbers.fields[0].tolist()}, F2 = {self.numbers.fields[1].tolist()}. The "
+            f"nearest point of the surface is about {foot.tolist()}."
+        )
+
+    def _equilibrium(self, k: int, status: str) -> LocalObject:
+        eigenvalues = np.linalg.eigvals(self.derivatives[k])
+        scale = float(np.max(np.abs(eigenvalues)))
+        kind, hyperbolic = kind_of(eigenvalues, scale)
+        self.margins["an eigenvalue without real part"] = hyperbolic
+        self._gaps(eigenvalues, scale, kind)
+        self.evidence.update(spectrum(eigenvalues))
+        name = kind if status == "real" else f"virtual {kind}"
+        return self.result("equilibrium", name, SIDES[k])
+
+    def _gaps(self, eigenvalues: NDArray[Any], scale: float, kind: str) -> None:
+        """Add the distance from equal eigenvalues, where a node turns into a focus."""
+        if eigenvalues.size < 2 or not kind.endswith(("node", "focus")):
+            return
+        i, j = np.triu_indices(eigenvalues.size, 1)
+        gaps = np.abs(eigenvalues[i] - eigenvalues[j]) / scale
+        # the gap is the square root of the discriminant, which is the distance
+        self.margins["equal eigenvalues"] = float(np.min(gaps)) ** 2
+
+    # on the surface ----------------------------------------------------------------------------
+
+    def on_surface(self) -> LocalObject:
+        """Zero of a field, tangency of both or one, sliding or crossing, in this order."""
+        vanish = [self.is_zero(self.to_zero[k], f"F{k + 1} = 0") for k in (0, 1)]
+        if all(vanish):
+            self.margins["F1 = F2 = 0"] = 0.0
+            return self.result("degenerate", "")
+        if any(vanish):
+            return self._boundary_equilibrium(vanish.index(True))
+        angles = np.abs(self.numbers.angles)
+        tangent = [self.is_zero(float(angles[k]), f"L{k + 1} = 0") for k in (0, 1)]
+        if all(tangent):
+            return self._fold_fold() if self._planar else self._two_fold()
+        if any(tangent):
+            return self._tangency(tangent.index(True))
+        region = region_of(self.numbers, self.tol)
+        if not region.sliding:
+            return self.result("crossing", str(region))
+        return self._sliding(str(region))
+
+    @property
+    def _planar(self) -> bool:
+        return self.where.system.extended_dimension == 2
+
+    def _boundary_equilibrium(self, k: int) -> LocalObject:
+        numbers = self.numbers
+        found = boundary_equilibrium_of(
+            numbers.x, k, numbers.gradient, numbers.fields[1 - k], self.derivatives[k], 1e-300
+        )
+        self.margins.update(found.margins)
+        self.evidence.update(found.numbers, **spectrum(found.eigenvalues))
+        return self.result("boundary equilibrium", found.label, SIDES[k], found)
+
+    def _fold_fold(self) -> LocalObject:
+        found = fold_fold_of(self.where, self.numbers, 1e-300)
+        self.margins.update(found.margins)
+        self.evidence.update(found.numbers)
+        return self.result("fold-fold", found.label, "", found)
+
+    def _two_fold(self) -> LocalObject:
+        numbers = self.numbers
+        self.evidence.update(numbers.second)
+        for k in (0, 1):
+            name = f"L{k + 1}{k + 1}"
+            self.margins[f"{name} = 0"] = bend(numbers, k, numbers.second[name])
+        self.margins["dependent grad h, grad L1, grad L2"] = independence(numbers)
+        if min(self.margins.values()) < self.margin:
+            return self.result("degenerate", "")
+        x = numbers.x
+        try:
+            found = two_fold(
+                self.where.system,
+                x[: self.n],
+                parameters=self.where.values,
+                t=float(x[-1]) if self.where.system.time_dependent else 0.0,
+                surface=self.where.surface,
+                mode=self.where.mode,
+                tol=1.0,  # tangency was decided above
+            )
+        except DegenerateError:
+            self.margins["the two-fold's normal form"] = 0.0
+            return self.result("degenerate", "")
+        c = classify_two_fold(found.sigma, found.nu, tol=self.margin)
+        undecided = any(not boundary.harmless for boundary in c.boundaries)
+        if undecided or not c.nearest.startswith("nu"):
+            self.margins[c.nearest or "no boundary"] = c.margin
+        self.evidence.update(nu1=found.nu[0], nu2=found.nu[1])
+        return self.result("two-fold", found.label, "", found)
+
+    def _tangency(self, k: int) -> LocalObject:
+        numbers, name = self.numbers, f"L{k + 1}{k + 1}"
+        second = numbers.second[name]
+        self.evidence[name] = second
+        if self.is_zero(bend(numbers, k, second), f"{name} = 0"):
+            return self._cusp(k)
+        visible = (second > 0) == (k == 0)
+        label = "visible" if visible else "invisible"
+        return self.result("fold", label, SIDES[k], self._fold(k))
+
+    def _cusp(self, k: int) -> LocalObject:
+        numbers = self.numbers
+        value = 6.0 * float(self.where.orbit(numbers.x, SIDES[k], 3)[1][3])
+        name = f"L{k + 1}" + 2 * f"{k + 1}"
+        self.evidence[name] = value
+        speed = float(np.linalg.norm(numbers.fields[k]))
+        length = 1 + float(np.linalg.norm(numbers.x))
+        size = speed**3 * float(np.linalg.norm(numbers.gradient))
+        self.margins[f"{name} = 0"] = abs(value) / size * length**2
+        return self.result("cusp", "cusp", SIDES[k], self._fold(k))
+
+    def _fold(self, k: int) -> Fold:
+        where, x = self.where, self.numbers.x
+        return fold(
+            where.system,
+            x[: self.n],
+            side=SIDES[k],
+            parameters=where.values,
+            t=float(x[-1]) if where.system.time_dependent else 0.0,
+            surface=where.surface,
+            mode=where.mode,
+            tol=self.tol,
+        )
+
+    def _sliding(self, region: str) -> LocalObject:
+        numbers = self.numbers
+        l1, l2 = numbers.lie
+        self.evidence["alpha"] = float(l1 / (l1 - l2))
+        if self.where.system.time_dependent:
+            return self.result("sliding", region)
+        speed = (l2 * numbers.fields[0] - l1 * numbers.fields[1]) / (l2 - l1)
+        matrix, basis = sliding_matrix(numbers, self.derivatives)
+        along = basis.T @ speed
+        away = equilibrium_distance(along, matrix, numbers.x) if along.size else 0.0
+        still = self._speed_ratio(along)
+        if not self.is_zero(min(away, still), "a pseudo-equilibrium"):
+            return self.result("sliding", region)
+        return self._pseudo_equilibrium()
+
+    def _speed_ratio(self, along: Array) -> float:
+        """Sliding speed relative to the fields if within ``tol``, else inf; for zeros with g' = 0."""
+        slow = min(float(np.linalg.norm(f)) for f in self.numbers.fields)
+        ratio = float(np.linalg.norm(along)) / slow
+        return ratio if ratio <= self.tol else float("inf")
+
+    def _pseudo_equilibrium(self) -> LocalObject:
+        numbers = self.numbers
+        found = pseudo_equilibrium_at(self.where, Found(numbers.x, residual=numbers.distance))
+        self.evidence.update(spectrum(found.eigenvalues))
+        if found.eigenvalues.size == 0:
+            return self.result("pseudo-equilibrium", found.kind, "", found)
+        scale = float(max(np.linalg.norm(d, 2) for d in self.derivatives)) or 1.0
+        slowest = float(np.min(np.abs(found.eigenvalues.real))) / scale
+        if not self.is_zero(slowest, "pseudo-saddle-node"):
+            largest = float(np.max(np.abs(found.eigenvalues)))
+            self._gaps(found.eigenvalues, largest, found.kind)
+            return self.result("pseudo-equilibrium", found.kind, "", found)
+        if not self._planar:
+            self.margins["a sliding eigenvalue without real part"] = 0.0
+            return self.result("degenerate", "")
+        _, second = sliding_expansion(self.where, numbers)
+        self.evidence["second derivative of g"] = 2 * second
+        self.margins["second derivative of g = 0"] = (
+            abs(second) * (1 + float(np.linalg.norm(numbers.x))) / scale
+        )
+        return self.result("pseudo-equilibrium", "pseudo-saddle-node", "", found)
+
+
+# where several surfaces meet ---------------------------------------------------------------------
 
 
 def meeting_at(
@@ -58,26 +416,26 @@ def meeting_at(
     mode: str | None,
     tol: float,
 ) -> Meeting | None:
-    """The intersection that a question is about, or None if it is about one surface."""
+    """The intersection at a point, or None if only one surface is to be classified."""
     require_system(system)
     if system.surface_count < 2:
         return None
-    asked = None
+    chosen = None
     if mode is not None:
-        asked = [i for i, sign in enumerate(system.parse_mode(mode)) if sign == 0]
-        if len(asked) < 2:
+        chosen = [i for i, sign in enumerate(system.parse_mode(mode)) if sign == 0]
+        if len(chosen) < 2:
             return None
     x, p = system.extended_point(point, t), system.parameter_vector(parameters)
-    if asked is None:
+    if chosen is None:
         at = layer_of(system).at(x, np.zeros(system.surface_count), p)
         lengths = np.linalg.norm(at.h_x, axis=1) * (1.0 + np.linalg.norm(x))
         if np.count_nonzero(np.abs(at.h) <= tol * lengths) < 2:
             return None
-    return Meeting.at_point(system, x, p, asked, tol)
+    return Meeting.at_point(system, x, p, chosen, tol)
 
 
 def classify_intersection(meeting: Meeting, tol: float, margin: float) -> LocalObject:
-    """Name what goes on where several surfaces meet."""
+    """Classify a point where several surfaces meet."""
     found = meeting.intersection()
     margins = {"a change of the modes that can go on": found.distance}
     whole = found.sliding
@@ -136,311 +494,3 @@ def _named(found: Intersection) -> tuple[str, str]:
     if not modes:
         return "intersection", "no mode can go on"
     return "intersection", f"several modes can go on: {', '.join(modes)}"
-
-
-Margins = dict[str, float]
-
-
-def classify(
-    system: FilippovSystem,
-    point: ArrayLike,
-    *,
-    parameters: Parameters | None = None,
-    t: float = 0.0,
-    surface: int = 0,
-    mode: str | None = None,
-    tol: float = 1e-9,
-    margin: float = MARGIN,
-) -> LocalObject:
-    """Say which local object a point is: of a surface, or an equilibrium off it.
-
-    Parameters
-    ----------
-    system, point, parameters, t, surface, mode
-        As in :func:`region`. A point on several surfaces is looked at as their intersection, unless
-        ``mode`` chooses sides; a mode with several ``s`` says which surfaces meet.
-    tol : float, optional
-        An equation holds if its dimensionless distance is at most this.
-    margin : float, optional
-        What is closer than this to a change of class is called degenerate.
-
-    Returns
-    -------
-    LocalObject
-        What the point is, with what is known of such points.
-
-    Raises
-    ------
-    PointError
-        Off the surface and no equilibrium; a wrong shape; not finite.
-    DefinitionError
-        Hidden dynamics; a fold-fold of a planar system with explicit time; vector multipliers; no
-        surface; a ``mode`` or ``surface`` that the system does not have.
-    ParameterError
-        An unknown parameter, one without a value, or a value that is not a finite number.
-    OptionError
-        ``tol`` or ``margin`` is not positive.
-
-    Examples
-    --------
-    >>> import casadi as ca, nonsmooth as ns
-    >>> x, y = ca.SX.sym("x"), ca.SX.sym("y")
-    >>> s = ns.FilippovSystem([x, y], surface=y, above=[1, x], below=[-2, 1 + x])
-    >>> for x0 in (1.0, 0.0, -0.5, -1 / 3, 1e-8):
-    ...     found = classify(s, [x0, 0.0])
-    ...     print(found.kind, "-", found.label)
-    crossing - crossing up
-    fold - visible
-    sliding - attracting sliding
-    pseudo-equilibrium - pseudo-saddle
-    degenerate - near L1 = 0
-    """
-    positive(tol, "tol"), positive(margin, "margin")
-    meeting = meeting_at(system, point, parameters, t, mode, tol)
-    if meeting is not None:
-        return classify_intersection(meeting, tol, margin)
-    where, x = place(system, point, parameters, t, surface, mode)
-    require_linear(system, surface, "classify")
-    numbers = where.finite_at(x)
-    if not np.any(numbers.gradient):
-        raise PointError(
-            f"point {x}: expected a regular point of surface {surface}, received grad h = 0. Write "
-            "h with a nonzero gradient."
-        )
-    asked = _Question(where, numbers, tol, margin)
-    away = numbers.distance / (1 + float(np.linalg.norm(x)))
-    if away > tol:
-        return asked.off_surface(away)
-    return asked.on_surface()
-
-
-class _Question:
-    """One point with the numbers, tolerances and margins that its classification uses."""
-
-    def __init__(self, where: Place, numbers: Numbers, tol: float, margin: float):
-        self.where, self.numbers, self.tol, self.margin = where, numbers, tol, margin
-        self.n = where.system.dimension
-        self.derivatives = where.jacobians(numbers.x)
-        self.margins: Margins = {}
-        lie = dict(zip(("L1", "L2"), map(float, numbers.lie), strict=True))
-        self.evidence: dict[str, float] = {"h": float(numbers.h), **lie}
-        self.to_zero = [float("inf"), float("inf")]  # distance to a zero of F1, F2
-        if not where.system.time_dependent:
-            pairs = zip(numbers.fields, self.derivatives, strict=True)
-            self.to_zero = [equilibrium_distance(f, d, numbers.x) for f, d in pairs]
-
-    # answers -----------------------------------------------------------------------------------
-
-    def answer(self, kind: str, label: str, side: str = "", detail: Any = None) -> LocalObject:
-        """Name the object unless a margin forbids it."""
-        finite = {name: v for name, v in self.margins.items() if np.isfinite(v)}
-        distance, nearest = min(((v, k) for k, v in finite.items()), default=(float("inf"), ""))
-        if distance < self.margin:
-            kind, label = "degenerate", f"near {nearest}" if distance > self.tol else nearest
-        return LocalObject(
-            kind,
-            label,
-            side,
-            self.numbers.x[: self.n],
-            distance,
-            nearest,
-            ReadOnly(self.margins),
-            ReadOnly(self.evidence),
-            detail,
-        )
-
-    def is_zero(self, value: float, name: str) -> bool:
-        """Whether an equation holds; if not, its distance becomes a margin."""
-        if value <= self.tol:
-            return True
-        self.margins[name] = value
-        return False
-
-    # off the surface ---------------------------------------------------------------------------
-
-    def off_surface(self, away: float) -> LocalObject:
-        """An equilibrium of the field that acts there, or of the other one (virtual)."""
-        self.margins["h = 0"] = away
-        own = 0 if self.numbers.h > 0 else 1
-        for k in (own, 1 - own):
-            if self.to_zero[k] <= self.margin:
-                self.is_zero(self.to_zero[k], f"F{k + 1} = 0")
-                status = "real" if k == own else "virtual"
-                return self._equilibrium(k, status)
-        x, gradient = self.numbers.x, self.numbers.gradient
-        foot = x - self.numbers.h * gradient / (gradient @ gradient)
-        raise PointError(
-            explain(
-                f"point {x}",
-                expected="a point of the surface h = 0, or an equilibrium of a field",
-                received=f"h = {self.numbers.h:.6g} (about {self.numbers.distance:.3g} away), "
-                f"F1 = {self.numbers.fields[0].tolist()}, F2 = {self.numbers.fields[1].tolist()}",
-                advice=f"The nearest point of the surface is about {foot.tolist()}.",
-            )
-        )
-
-    def _equilibrium(self, k: int, status: str) -> LocalObject:
-        eigenvalues = np.linalg.eigvals(self.derivatives[k])
-        scale = float(np.max(np.abs(eigenvalues)))
-        kind, hyperbolic = kind_of(eigenvalues, scale)
-        self.margins["an eigenvalue without real part"] = hyperbolic
-        self._gaps(eigenvalues, scale, kind)
-        self.evidence.update(spectrum(eigenvalues))
-        name = kind if status == "real" else f"virtual {kind}"
-        return self.answer("equilibrium", name, SIDES[k])
-
-    def _gaps(self, eigenvalues: NDArray[Any], scale: float, kind: str) -> None:
-        """Where two real eigenvalues meet, a node turns into a focus."""
-        if eigenvalues.size < 2 or not kind.endswith(("node", "focus")):
-            return
-        i, j = np.triu_indices(eigenvalues.size, 1)
-        gaps = np.abs(eigenvalues[i] - eigenvalues[j]) / scale
-        # the gap is the square root of the discriminant, which is the distance
-        self.margins["equal eigenvalues"] = float(np.min(gaps)) ** 2
-
-    # on the surface ----------------------------------------------------------------------------
-
-    def on_surface(self) -> LocalObject:
-        """Zero of a field, tangency of both or one, sliding or crossing, in this order."""
-        vanish = [self.is_zero(self.to_zero[k], f"F{k + 1} = 0") for k in (0, 1)]
-        if all(vanish):
-            self.margins["F1 = F2 = 0"] = 0.0
-            return self.answer("degenerate", "")
-        if any(vanish):
-            return self._boundary_equilibrium(vanish.index(True))
-        angles = np.abs(self.numbers.angles)
-        tangent = [self.is_zero(float(angles[k]), f"L{k + 1} = 0") for k in (0, 1)]
-        if all(tangent):
-            return self._fold_fold() if self._planar else self._two_fold()
-        if any(tangent):
-            return self._tangency(tangent.index(True))
-        region = region_of(self.numbers, self.tol)
-        if not region.sliding:
-            return self.answer("crossing", str(region))
-        return self._sliding(str(region))
-
-    @property
-    def _planar(self) -> bool:
-        return self.where.system.extended_dimension == 2
-
-    def _boundary_equilibrium(self, k: int) -> LocalObject:
-        numbers = self.numbers
-        found = boundary_equilibrium_of(
-            numbers.x, k, numbers.gradient, numbers.fields[1 - k], self.derivatives[k], 1e-300
-        )
-        self.margins.update(found.margins)
-        self.evidence.update(found.numbers, **spectrum(found.eigenvalues))
-        return self.answer("boundary equilibrium", found.label, SIDES[k], found)
-
-    def _fold_fold(self) -> LocalObject:
-        found = fold_fold_of(self.where, self.numbers, 1e-300)
-        self.margins.update(found.margins)
-        self.evidence.update(found.numbers)
-        return self.answer("fold-fold", found.label, "", found)
-
-    def _two_fold(self) -> LocalObject:
-        numbers = self.numbers
-        self.evidence.update(numbers.second)
-        for k in (0, 1):
-            name = f"L{k + 1}{k + 1}"
-            self.margins[f"{name} = 0"] = bend(numbers, k, numbers.second[name])
-        self.margins["dependent grad h, grad L1, grad L2"] = independence(numbers)
-        if min(self.margins.values()) < self.margin:
-            return self.answer("degenerate", "")
-        x = numbers.x
-        try:
-            found = two_fold(
-                self.where.system,
-                x[: self.n],
-                parameters=self.where.values,
-                t=float(x[-1]) if self.where.system.time_dependent else 0.0,
-                surface=self.where.surface,
-                mode=self.where.mode,
-                tol=1.0,  # tangency was decided above
-            )
-        except DegenerateError:
-            self.margins["the two-fold's normal form"] = 0.0
-            return self.answer("degenerate", "")
-        c = classify_two_fold(found.sigma, found.nu, tol=self.margin)
-        undecided = any(not boundary.harmless for boundary in c.boundaries)
-        if undecided or not c.nearest.startswith("nu"):
-            self.margins[c.nearest or "no boundary"] = c.margin
-        self.evidence.update(nu1=found.nu[0], nu2=found.nu[1])
-        return self.answer("two-fold", found.label, "", found)
-
-    def _tangency(self, k: int) -> LocalObject:
-        numbers, name = self.numbers, f"L{k + 1}{k + 1}"
-        second = numbers.second[name]
-        self.evidence[name] = second
-        if self.is_zero(bend(numbers, k, second), f"{name} = 0"):
-            return self._cusp(k)
-        visible = (second > 0) == (k == 0)
-        label = "visible" if visible else "invisible"
-        return self.answer("fold", label, SIDES[k], self._fold(k))
-
-    def _cusp(self, k: int) -> LocalObject:
-        numbers = self.numbers
-        value = 6.0 * float(self.where.orbit(numbers.x, SIDES[k], 3)[1][3])
-        name = f"L{k + 1}" + 2 * f"{k + 1}"
-        self.evidence[name] = value
-        speed = float(np.linalg.norm(numbers.fields[k]))
-        length = 1 + float(np.linalg.norm(numbers.x))
-        size = speed**3 * float(np.linalg.norm(numbers.gradient))
-        self.margins[f"{name} = 0"] = abs(value) / size * length**2
-        return self.answer("cusp", "cusp", SIDES[k], self._fold(k))
-
-    def _fold(self, k: int) -> Fold:
-        where, x = self.where, self.numbers.x
-        return fold(
-            where.system,
-            x[: self.n],
-            side=SIDES[k],
-            parameters=where.values,
-            t=float(x[-1]) if where.system.time_dependent else 0.0,
-            surface=where.surface,
-            mode=where.mode,
-            tol=self.tol,
-        )
-
-    def _sliding(self, region: str) -> LocalObject:
-        numbers = self.numbers
-        l1, l2 = numbers.lie
-        self.evidence["alpha"] = float(l1 / (l1 - l2))
-        if self.where.system.time_dependent:
-            return self.answer("sliding", region)
-        speed = (l2 * numbers.fields[0] - l1 * numbers.fields[1]) / (l2 - l1)
-        matrix, basis = sliding_matrix(numbers, self.derivatives)
-        along = basis.T @ speed
-        away = equilibrium_distance(along, matrix, numbers.x) if along.size else 0.0
-        still = self._speed_ratio(along)
-        if not self.is_zero(min(away, still), "a pseudo-equilibrium"):
-            return self.answer("sliding", region)
-        return self._pseudo_equilibrium()
-
-    def _speed_ratio(self, along: Array) -> float:
-        """Sliding speed relative to the fields: zero where no linearisation says so (g' = 0)."""
-        slow = min(float(np.linalg.norm(f)) for f in self.numbers.fields)
-        ratio = float(np.linalg.norm(along)) / slow
-        return ratio if ratio <= self.tol else float("inf")
-
-    def _pseudo_equilibrium(self) -> LocalObject:
-        numbers = self.numbers
-        found = pseudo_equilibrium_at(self.where, Found(numbers.x, residual=numbers.distance))
-        self.evidence.update(spectrum(found.eigenvalues))
-        if found.eigenvalues.size == 0:
-            return self.answer("pseudo-equilibrium", found.kind, "", found)
-        scale = float(max(np.linalg.norm(d, 2) for d in self.derivatives)) or 1.0
-        slowest = float(np.min(np.abs(found.eigenvalues.real))) / scale
-        if not self.is_zero(slowest, "pseudo-saddle-node"):
-            largest = float(np.max(np.abs(found.eigenvalues)))
-            self._gaps(found.eigenvalues, largest, found.kind)
-            return self.answer("pseudo-equilibrium", found.kind, "", found)
-        if not self._planar:
-            self.margins["a sliding eigenvalue without real part"] = 0.0
-            return self.answer("degenerate", "")
-        _, second = sliding_expansion(self.where, numbers)
-        self.evidence["second derivative of g"] = 2 * second
-        self.margins["second derivative of g = 0"] = (
-            abs(second) * (1 + float(np.linalg.norm(numbers.x))) / scale
-        )
-        return self.answer("pseudo-equilibrium", "pseudo-saddle-node", "", found)

@@ -1,4 +1,4 @@
-"""Numbers by name that a result hands out: a mapping that nobody can change."""
+"""A mapping of names to values without assignment, for results."""
 
 from __future__ import annotations
 

@@ -1,18 +1,15 @@
-"""WHAT a nonsmooth system is: definition, Lie derivatives, jets. The only floor on CasADi."""
+"""Nonsmooth systems: definition, Lie derivatives, Taylor series; the only layer that uses CasADi."""
 
 from .calls import call
 from .checks import is_real, real, real_array, whole
 from .definition import instruction_form
-from .definition.clock import Clock
-from .definition.events import Impact, Reset, Stop
-from .definition.found_switches import LiftedSwitch
+from .definition.derived_systems import SECTION, reversed_system, surface_of, with_section
+from .definition.events import Clock, Impact, Reset, Stop
+from .definition.lift import LiftedSwitch
 from .definition.parse_definition import read_function
-from .definition.periods import is_function, periods, read_period
 from .definition.regularise import regularise
-from .definition.reversal import reversed_system
-from .definition.system import FilippovSystem, require_system
-from .definition.vectors import multiplier_enters
-from .derivatives.sections import SECTION, surface_of, with_section
+from .definition.system import FilippovSystem, multiplier_enters, require_system
+from .derivatives.forcing import is_function, periods, read_period
 from .derivatives.start_maps import StartMap
 from .errors import (
     ConvergenceError,

@@ -1,4 +1,4 @@
-"""What was built for a system and may be needed again: the last so many things, by their content."""
+"""A cache of what was built for a system, by content; the least recently used entry goes first."""
 
 from __future__ import annotations
 
@@ -15,30 +15,28 @@ CAPACITY = 256
 
 
 class Cache:
-    """A mapping from keys to what they stand for; the least recently used leaves first."""
-
-    # Two threads may use it at once: at worst both build the same thing.
+    """A mapping from keys to values; two threads may build the same value at once."""
 
     def __init__(self, capacity: int = CAPACITY):
         self._capacity = capacity
-        self._things: OrderedDict[Hashable, Any] = OrderedDict()
+        self._values: OrderedDict[Hashable, Any] = OrderedDict()
 
     def get(self, key: Hashable, build: Callable[[], T]) -> T:
-        """Return what a key stands for, built when it is not (any more) there."""
+        """Return the value of a key, built if it is not there."""
         try:
-            thing: T = self._things[key]
-            self._things.move_to_end(key)
+            value: T = self._values[key]
+            self._values.move_to_end(key)
         except KeyError:
-            thing = self._things[key] = build()
-            while len(self._things) > self._capacity:
-                self._things.popitem(last=False)
-        return thing
+            value = self._values[key] = build()
+            while len(self._values) > self._capacity:
+                self._values.popitem(last=False)
+        return value
 
     def __contains__(self, key: Hashable) -> bool:
-        return key in self._things
+        return key in self._values
 
     def __len__(self) -> int:
-        return len(self._things)
+        return len(self._values)
 
 
 class Content:

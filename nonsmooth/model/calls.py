@@ -1,8 +1,7 @@
-"""CasADi functions called with numbers, at one point or at many, so that Ctrl-C is heard.
+"""Evaluation of CasADi functions at one point or many, without losing an interrupt.
 
-CasADi turns a NumPy array into a matrix of its own by Python code that it calls from C++. An interrupt
-that arrives there is lost, or comes out as another error. Lists of lists and memory that is shared
-need no such code.
+CasADi converts NumPy arrays by Python code that it calls from C++, where a KeyboardInterrupt is lost.
+Lists of lists and shared memory need no such conversion.
 """
 
 from __future__ import annotations

@@ -1,7 +1,6 @@
-"""Reading what a user gave: real numbers, whole numbers, arrays of them, a system.
+"""Checks of arguments that are numbers: real, whole, positive, arrays.
 
-A bool, a string, a complex number or an array where one number is meant is an accident more often
-than an intention, so it is refused even where Python or NumPy would convert it.
+Booleans, strings and complex numbers are refused, also where Python or NumPy would convert them.
 """
 
 from __future__ import annotations
@@ -14,7 +13,7 @@ import casadi as ca
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import NonsmoothError, OptionError, PointError, explain
+from .errors import NonsmoothError, OptionError, PointError
 
 _NO_NUMBER = (str, bytes, bool, np.bool_, complex, np.complexfloating)
 
@@ -49,7 +48,7 @@ def real(
 ) -> float:
     """Return a finite number from ``low`` to ``high`` or raise."""
     if not is_real(value) or not low <= float(value) <= high:
-        raise error(explain(what, expected=expected, received=repr(value), advice=advice).rstrip())
+        raise error(f"{what}: expected {expected}, received {value!r}. {advice}".rstrip())
     return float(value)
 
 
@@ -58,9 +57,7 @@ def whole(value: Any, what: str, *, least: int = 1, advice: str = "") -> int:
     exact = isinstance(value, int)  # one beyond 2**53 may be no float
     if not is_real(value) or not (exact or float(value) == int(value)) or value < least:
         expected = "a positive whole number" if least == 1 else f"a whole number >= {least}"
-        raise OptionError(
-            explain(what, expected=expected, received=repr(value), advice=advice).rstrip()
-        )
+        raise OptionError(f"{what}: expected {expected}, received {value!r}. {advice}".rstrip())
     return int(value)
 
 
@@ -72,7 +69,7 @@ def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArra
     if isinstance(values, ca.DM) and 1 in values.shape:
         return np.array(values, dtype=float).ravel()
     if values is None:
-        return np.array(np.nan)  # no axis: the caller says which shape is expected
+        return np.array(np.nan)  # a wrong shape, which the caller refuses
     try:
         array = np.asarray(values)
         fits = array.dtype.kind in "iuf" and not _is_masked(values)
@@ -83,18 +80,13 @@ def real_array(values: Any, what: str, expected: str = "real numbers") -> NDArra
     except (TypeError, ValueError, NotImplementedError, RuntimeError):
         pass
     raise PointError(
-        explain(
-            what,
-            expected=expected,
-            received=repr(values),
-            advice="States must be real numbers: no strings, booleans, complex numbers, symbols "
-            "or missing values.",
-        )
+        f"{what}: expected {expected}, received {values!r}. States must be real numbers: no "
+        "strings, booleans, complex numbers, symbols or missing values."
     )
 
 
 def _is_masked(values: Any) -> bool:
-    """Whether some numbers are missing. Who has such arrays has loaded numpy.ma, a third of the first run's time."""
+    """Whether some numbers are masked; numpy.ma, slow to import, is loaded only by its users."""
     ma = sys.modules.get("numpy.ma")
     return ma is not None and bool(ma.is_masked(values))
 

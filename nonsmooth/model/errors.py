@@ -1,4 +1,4 @@
-"""Every exception of the library: what was expected, what came, and what to do about it."""
+"""The exceptions of the library."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class ParameterError(NonsmoothError, ValueError):
 
 
 class PointError(NonsmoothError, ValueError):
-    """A state has the wrong shape, is not finite, or is not where the question makes sense."""
+    """A state has the wrong shape, is not finite, or is not a point that the function applies to."""
 
 
 class OptionError(NonsmoothError, ValueError):
@@ -53,11 +53,5 @@ class MissingError(NonsmoothError, ImportError):
 
 
 def explain(what: str, *, expected: object, received: object, advice: str) -> str:
-    """Compose a message in the one form that the library uses.
-
-    Examples
-    --------
-    >>> print(explain("the start", expected="2 numbers", received="3", advice="Drop one."))
-    the start: expected 2 numbers, received 3. Drop one.
-    """
+    """Compose a message from what was expected, what was received, and advice."""
     return f"{what}: expected {expected}, received {received}. {advice}"

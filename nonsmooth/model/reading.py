@@ -1,21 +1,22 @@
-"""Reading expressions that a user gave: scalars, columns, symbols; what is foreign is refused."""
+"""Reading of expressions that a user gave: scalars, columns, matrices, symbols."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
-from typing import Any
+from itertools import chain, islice
+from typing import Any, NoReturn
 
 import casadi as ca
 import numpy as np
 
-from .errors import DefinitionError, explain
+from .errors import DefinitionError
 
 Expression = Any  # a CasADi SX scalar, a number, or (for vectors) a sequence of these
 Parameters = Mapping[Any, float | None]
 
 
-#: Advice where a function was given.
+#: Advice where a function was given instead of an expression.
 _CALL = (
     " Call it with the symbols and give what it returns, field=f(x, v). Inside, symbols have no truth "
     "value: write casadi.if_else(x > 0, a, b) and use FilippovSystem.from_expression, not 'if'."
@@ -23,7 +24,7 @@ _CALL = (
 
 
 def listed(value: Any) -> list[Any]:
-    """Return a sequence of what a user gave: one thing, a vector, a sequence, or None for nothing."""
+    """Return a list of what a user gave: one item, a vector, a sequence, or None for an empty one."""
     if value is None:
         return []
     if isinstance(value, (ca.SX, ca.DM)):
@@ -35,6 +36,10 @@ def listed(value: Any) -> list[Any]:
 
 def scalar(value: Any, what: str) -> ca.SX:
     """Read a scalar expression or number."""
+    return _without_calls(_scalar(value, what), what)
+
+
+def _scalar(value: Any, what: str) -> ca.SX:
     if isinstance(value, ca.MX):
         raise DefinitionError(
             f"{what}: expected CasADi SX expressions, received MX. Make the symbols with "
@@ -58,7 +63,7 @@ def matrix(value: Any) -> ca.SX:
         return (
             ca.densify(ca.SX(value))
             if isinstance(value, (ca.SX, ca.DM))
-            else scalar(value, "expression")
+            else _scalar(value, "expression")
         )
     return ca.densify(ca.vertcat(*[matrix(v).T for v in value]))
 
@@ -76,17 +81,74 @@ def column(values: Any, what: str, length: int) -> ca.SX:
         )
     items = listed(values)
     if len(items) != length:
+        expected = "one expression" if length == 1 else f"{length} expressions, one for each state"
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"{length} expressions, one for each state"
-                if length != 1
-                else "one expression",
-                received=str(len(items)),
-                advice="The order is that of the states.",
-            )
+            f"{what}: expected {expected}, received {len(items)}. The order is that of the states."
         )
-    return ca.vertcat(*[scalar(v, f"{what}[{i}]") for i, v in enumerate(items)])
+    entries = [_scalar(v, f"{what}[{i}]") for i, v in enumerate(items)]
+    if _calls(ca.vertcat(*entries)):
+        entries = [_without_calls(e, f"{what}[{i}]") for i, e in enumerate(entries)]
+    return ca.vertcat(*entries)
+
+
+def _without_calls(expression: ca.SX, what: str) -> ca.SX:
+    """Write out the Functions that an expression calls; refuse those that are not SX operations."""
+    if not _calls(expression):
+        return expression
+    inputs = ca.symvar(expression)
+    function = ca.Function("expression", inputs, [expression])
+    (entries,) = _outputs_of(function, [[s] for s in inputs], what)
+    return ca.SX(expression.sparsity(), ca.vertcat(*entries))
+
+
+def refuse_call(function: ca.Function, what: str) -> NoReturn:
+    """Refuse a Function that is no graph of SX operations."""
+    advice = (
+        "Make it of SX symbols, or without never_inline=True."
+        if function.class_name() == "MXFunction"
+        else "Write it with SX operations; a table in a right-hand side is casadi.pw_lin(x, xs, ys), "
+        "or casadi.if_else of polynomials, in FilippovSystem.from_expression."
+    )
+    raise DefinitionError(
+        f"{what}: the expression calls the CasADi Function {function.name()!r} "
+        f"({function.class_name()}), whose operations cannot be read. {advice}"
+    )
+
+
+def _calls(expression: ca.SX) -> bool:
+    """Whether an expression calls Functions that CasADi has not inlined (tables, never_inline)."""
+    if expression.is_constant():
+        return False
+    function = ca.Function("expression", [], [expression], {"allow_free": True})
+    return bool(function.find_functions())
+
+
+def _outputs_of(
+    function: ca.Function, inputs: Sequence[Sequence[ca.SX]], what: str
+) -> list[list[ca.SX]]:
+    """Nonzeros of the outputs of a Function, with the Functions it calls written out."""
+    if function.class_name() != "SXFunction":
+        refuse_call(function, what)
+    nodes, register = ca.vertsplit(function.instructions_sx()), dict[int, ca.SX]()
+    outputs = [[ca.SX(0)] * function.nnz_out(k) for k in range(function.n_out())]
+    for k, node in enumerate(nodes):
+        op = function.instruction_id(k)
+        source, target = function.instruction_input(k), function.instruction_output(k)
+        if op == ca.OP_CONST:
+            register[target[0]] = ca.SX(function.instruction_constant(k))
+        elif op == ca.OP_INPUT:
+            register[target[0]] = inputs[source[0]][source[1]]
+        elif op == ca.OP_OUTPUT:
+            outputs[target[0]][target[1]] = register[source[0]]
+        elif op == ca.OP_CALL:
+            called, rest = node.which_function(), iter([register[a] for a in source])
+            given = [list(islice(rest, called.nnz_in(i))) for i in range(called.n_in())]
+            results = chain.from_iterable(_outputs_of(called, given, what))
+            register.update(zip(target, results, strict=True))
+        else:
+            args = [register[a] for a in source]
+            register[target[0]] = (ca.SX.unary if len(args) == 1 else ca.SX.binary)(op, *args)
+    return outputs
 
 
 def symbols(values: Any, what: str) -> ca.SX:
@@ -95,12 +157,8 @@ def symbols(values: Any, what: str) -> ca.SX:
     for i, item in enumerate(items):
         if not (isinstance(item, ca.SX) and item.is_scalar() and item.is_symbolic()):
             raise DefinitionError(
-                explain(
-                    f"{what}[{i}]",
-                    expected="a scalar symbol made by casadi.SX.sym",
-                    received=f"{item!r} ({type(item).__name__})",
-                    advice="MX symbols, expressions and strings are not symbols.",
-                )
+                f"{what}[{i}]: expected a scalar symbol made by casadi.SX.sym, received {item!r} "
+                f"({type(item).__name__}). MX symbols, expressions and strings are not symbols."
             )
     return ca.vertcat(*items) if items else ca.SX(0, 1)
 
@@ -134,12 +192,8 @@ def require_known(
             else "Add it to states=, parameters= or time=, or give it a number."
         )
         raise DefinitionError(
-            explain(
-                what,
-                expected=f"the states {list(states)} and parameters {list(parameters)}",
-                received=f"also {[str(s) for s in foreign]}",
-                advice=cause,
-            )
+            f"{what}: it contains {[str(s) for s in foreign]}, but the states are {list(states)} and "
+            f"the parameters {list(parameters)}. {cause}"
         )
 
 

@@ -1,4 +1,4 @@
-"""Numbers for the symbols of a system: points and parameters, checked."""
+"""Checked values of the states and parameters of a system."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from .checks import real, real_array
-from .errors import ParameterError, PointError, explain
+from .errors import ParameterError, PointError
 from .reading import Parameters
 
 Array = NDArray[np.float64]
@@ -22,12 +22,8 @@ def parameter_values(
     values, given = dict(defaults), dict[str, Any]()
     if parameters is not None and not isinstance(parameters, Mapping):
         raise ParameterError(
-            explain(
-                "parameters",
-                expected="a mapping from names or symbols to numbers",
-                received=f"{parameters!r} ({type(parameters).__name__})",
-                advice=f"The names are {list(names)}.",
-            )
+            "parameters: expected a mapping from names or symbols to numbers, received "
+            f"{parameters!r} ({type(parameters).__name__}). The names are {list(names)}."
         )
     for key, value in (parameters or {}).items():
         name = key if isinstance(key, str) else str(key)
@@ -39,12 +35,8 @@ def parameter_values(
         given[name] = value
         if name not in values:
             raise ParameterError(
-                explain(
-                    "parameters",
-                    expected=f"names among {list(names)}",
-                    received=repr(name),
-                    advice="Declare it in the system's parameters=, or correct the name.",
-                )
+                f"parameters: expected names among {list(names)}, received {name!r}. Declare it "
+                "in the system's parameters=, or correct the name."
             )
         values[name] = value
     missing = [name for name, value in values.items() if value is None]
@@ -61,20 +53,12 @@ def state_values(names: Sequence[str], point: ArrayLike) -> Array:
     values = real_array(point, "point", f"{len(names)} numbers")
     if values.shape != (len(names),):
         raise PointError(
-            explain(
-                "point",
-                expected=f"shape ({len(names)},) for the states {tuple(names)}",
-                received=f"shape {values.shape}",
-                advice="Give one number for each state.",
-            )
+            f"point: expected shape ({len(names)},) for the states {tuple(names)}, received shape "
+            f"{values.shape}. Give one number for each state."
         )
     if not np.isfinite(values).all():
         raise PointError(
-            explain(
-                "point",
-                expected="finite numbers",
-                received=str(values),
-                advice="NaN or inf often comes from an earlier division by zero.",
-            )
+            f"point: expected finite numbers, received {values}. NaN or inf often comes from an "
+            "earlier division by zero."
         )
     return values

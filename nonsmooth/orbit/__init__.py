@@ -1,20 +1,26 @@
-"""What needs a place and a motion: derivatives of runs, periodic orbits, branches, basins, futures."""
+"""Derivatives of runs, periodic and homoclinic orbits, their branches, manifolds and basins."""
 
 from ..solvers import continuation
 from .basins import Basins, basins
 from .branches.bifurcation_curves import BifurcationCurve, CodimensionTwo, continue_bifurcation
 from .branches.branch import Branch, BranchEnd, BranchEvent, FarSide
-from .branches.follow_equilibria import continue_equilibrium
-from .branches.follow_orbits import continue_orbit
+from .branches.equilibrium_branches import continue_equilibrium
+from .branches.orbit_branches import continue_orbit
 from .branches.two_fold_curves import TraceError, trace_two_folds
 from .homoclinic.homoclinic_orbits import Connection, find_homoclinic
 from .manifolds.canards import Path, Slider, paths_from
-from .manifolds.dividing import DividingCurves
-from .manifolds.dividing_arcs import DividingArc, DividingTracer, Passage, StartCurve, joint_root
-from .manifolds.dividing_passages import ComputedStarts, EventPassages
+from .manifolds.dividing_surfaces import (
+    ComputedStarts,
+    DividingArc,
+    DividingCurves,
+    DividingTracer,
+    EventPassages,
+    Passage,
+    StartCurve,
+    joint_root,
+)
 from .manifolds.forward_reachable_set import Departure, Funnel, funnel
-from .manifolds.manifold import manifold
-from .manifolds.manifold_growth import Manifold
+from .manifolds.invariant_manifolds import Manifold, manifold
 from .periodic.find_periodic import VirtualOrbitError, periodic_orbit
 from .periodic.orbit import PeriodicOrbit
 from .runs.itinerary import Arrival, FixedItinerary

@@ -1,7 +1,7 @@
-"""Pictures (matplotlib): two-folds, trajectories, phase portraits, basins. Imported only on use.
+"""Pictures (matplotlib): two-folds, trajectories, phase portraits, branches, basins.
 
 Every function that draws returns a matplotlib Figure and leaves matplotlib's global settings alone.
-What they share of colours, dashes and arrows is in ``style``, for pictures of one's own.
+Colours, dashes and arrows are in ``style``, also for your own pictures.
 ``two_fold_explorer`` is a page for the browser, and ``offline_page`` puts such pages together.
 """
 
@@ -15,12 +15,12 @@ from .portraits.manifolds import manifold
 from .portraits.phase_portrait import phase_portrait
 from .portraits.sliding_portrait import sliding_portrait
 from .portraits.trajectory import trajectory
-from .proven_ranges import proof_map
+from .proof_map import proof_map
 from .two_folds.atlas import two_fold_atlas, two_fold_atlas_pages
 from .two_folds.class_map import two_fold_map
 from .two_folds.explorer import two_fold_explorer
 from .two_folds.flow_in_space import two_fold_3d
-from .two_folds.sliding_portrait import two_fold
+from .two_folds.sliding_flow import two_fold
 
 __all__ = [
     "basins",

@@ -16,11 +16,9 @@ from . import style
 from .labels import Labels
 from .legends import beside
 
-#: Of attractors, in turn: told apart by deuteranopes too, light enough for dark marks.
+#: Colours of attractors in turn: distinct for deuteranopes too, light enough for dark marks.
 COLORS = ("#9ecae1", "#fdd0a2", "#9fdf5f", "#7f7fff", "#df7f7f", "#5f9fdf", "#ffdf3f", "#7f9f3f")
-_LISTED = (
-    4  # attractors in a legend, beside what else may become of a start; more are named on the map
-)
+_LISTED = 4  # attractors in a legend, beside other outcomes; more are named on the map
 _ENTRIES = 6  # of a legend
 _OTHERS = {0: "#ffffff", -1: "#252525", -2: "#737373", -3: "#bdbdbd", -4: "#969696"}
 
@@ -59,7 +57,7 @@ def basins(
     Raises
     ------
     OptionError
-        A grid that is none of two axes.
+        The grid does not have two axes.
 
     Examples
     --------
@@ -73,8 +71,8 @@ def basins(
     """
     if not isinstance(found, Basins) or len(found.axes) != 2:
         raise OptionError(
-            "found: expected Basins of a grid with two axes, received "
-            f"{found!r}. Give the grid as a mapping: two states with axes, numbers for the others."
+            f"found is {found!r}, not Basins of a grid with two axes. Give the grid as a mapping: two "
+            "states with axes, numbers for the others."
         )
     with style.settings():
         figure, axes = style.axes_for(ax, size)
@@ -146,7 +144,7 @@ def _legend(axes: Axes, found: Basins) -> None:
 
 
 def _names(axes: Axes, found: Basins) -> None:
-    """Names of the attractors inside their basins, those of the largest."""
+    """Name the attractors of the largest basins inside these."""
     labels, parts = Labels(axes), found.fractions
     x, y = found.axes.values()
     for k in sorted((k for k in parts if k > 0), key=lambda k: -parts[k])[: len(COLORS)]:
@@ -156,7 +154,7 @@ def _names(axes: Axes, found: Basins) -> None:
 
 
 def _core(cells: Any) -> Any:
-    """The cells of a region (m, n) that are farthest from others, so that what is there is in it."""
+    """The cells of a region (m, n) that are farthest from others."""
     while True:
         padded = np.pad(cells, 1, mode="edge")
         near = [padded[2:, 1:-1], padded[:-2, 1:-1], padded[1:-1, 2:], padded[1:-1, :-2]]

@@ -12,126 +12,13 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..local import Equilibrium
-from ..model import Array, DefinitionError, NonsmoothError, OptionError, explain
+from ..model import Array, DefinitionError, NonsmoothError, OptionError
 from ..orbit import BifurcationCurve, Branch, BranchEvent, Connection, PeriodicOrbit
 from . import style
+from .arguments import results, same
 from .labels import Labels
 
-# A branch as a line: between its nodes it is solved for again where a chord would show as a corner.
-
-_TURN = np.radians(3.0)  # between neighbouring chords, at which a reader sees a corner
-_SHORT = 0.004  # of the width of the picture: chords that are not divided further
-_MOST = 240  # points between the nodes of a branch
-_DETOUR = 0.3  # by which the way over an event may be longer than its chord
-
-
-@dataclass
-class Sample:
-    """A point of a line."""
-
-    value: float
-    height: float
-    solution: Any
-    curve: Any = None
-    u: Any = None
-
-
-def line_of(
-    one: Branch, measure: Callable[[Any], float], shape: tuple[float, float] = (1.0, 1.0)
-) -> list[Sample]:
-    """The samples of a branch in their order."""
-    nodes = [
-        Sample(float(value), measure(solution), solution, curve, point.u)
-        for value, solution, (curve, point) in zip(
-            one.values, one.solutions, one.nodes, strict=True
-        )
-    ]
-    after: dict[int, list[tuple[float, Sample]]] = {}
-    for event in one.events:
-        if event.point is None or isinstance(event.solution, Connection):
-            continue
-        if any(event.point is point for _, point in one.nodes):
-            continue  # the line has a node on either side of it, in the same place
-        found = _between(nodes, np.asarray(event.point.u, dtype=float))
-        if found is not None:
-            k, share = found
-            height, curve = measure(event.solution), nodes[k].curve
-            sample = Sample(float(event.parameter), height, None, curve, event.point.u)
-            after.setdefault(k, []).append((share, sample))
-    samples = list[Sample]()
-    for k, node in enumerate(nodes):
-        samples += [node, *(s for _, s in sorted(after.get(k, []), key=lambda pair: pair[0]))]
-    return _smooth(samples, measure, np.array(shape) / shape[0])
-
-
-def _between(nodes: list[Sample], u: Array) -> tuple[int, float] | None:
-    """The node before a point of the curve, and how far it is from there to the next node."""
-    best: tuple[float, int, float] | None = None
-    same = np.array([n.u for n in nodes if np.shape(n.u) == u.shape] or [u])
-    scale = np.maximum(np.ptp(same, axis=0), 1e-6 * (1.0 + np.abs(same).max(axis=0)))
-    for k, (a, b) in enumerate(pairwise(nodes)):
-        if a.curve is not b.curve or np.shape(a.u) != u.shape:
-            continue
-        to, on, chord = (
-            float(np.linalg.norm(step / scale)) for step in (u - a.u, b.u - u, b.u - a.u)
-        )
-        detour = (to + on) / chord - 1.0 if chord > 0 else np.inf
-        if detour < _DETOUR and (best is None or detour < best[0]):
-            best = detour, k, to / (to + on)
-    return None if best is None else best[1:]
-
-
-def _smooth(samples: list[Sample], measure: Callable[[Any], float], shape: Array) -> list[Sample]:
-    """Divide chords between which a line would seem to have a corner."""
-    points = np.array([[s.value, s.height] for s in samples])
-    size = np.ptp(points, axis=0)
-    size = np.where(size > 0, size, 1.0) / shape
-    added, given_up = 0, set[int]()
-    while added < _MOST:
-        places = np.array([[s.value, s.height] for s in samples]) / size
-        chosen = [k for k in _coarse(places) if id(samples[k]) not in given_up]
-        if not chosen:
-            break
-        for k in reversed(chosen):
-            middle = _middle(samples[k], samples[k + 1], measure)
-            if middle is None:
-                given_up.add(id(samples[k]))
-            else:
-                samples = [*samples[: k + 1], middle, *samples[k + 1 :]]
-                added += 1
-    return samples
-
-
-def _coarse(places: Array) -> list[int]:
-    """The chords beside which a polyline turns visibly, and that are long enough for it to be seen."""
-    steps = np.diff(places, axis=0)
-    length = np.linalg.norm(steps, axis=1)
-    solid = np.flatnonzero(length > 0)  # at events two nodes are in one place
-    angle = np.arctan2(*steps[solid].T[::-1])
-    turn = np.abs((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi)
-    bent = turn > _TURN
-    beside = np.concatenate([bent, [False]]) | np.concatenate([[False], bent])
-    return [int(k) for k in solid[beside] if length[k] > _SHORT]
-
-
-def _middle(a: Sample, b: Sample, measure: Callable[[Any], float]) -> Sample | None:
-    """What is half-way between two samples; None where the equations have no answer there."""
-    if a.curve is None or a.curve is not b.curve or a.value == b.value:
-        return None
-    value = (a.value + b.value) / 2
-    guess = (np.asarray(a.u, dtype=float) + np.asarray(b.u, dtype=float)) / 2
-    try:
-        solution = a.curve.solution_at(guess, value)
-        height = measure(solution)
-    except (NonsmoothError, ValueError):
-        return None
-    low, high = sorted((a.height, b.height))
-    if not low - (high - low) <= height <= high + (high - low):
-        return None  # it converged to another part of the branch
-    return Sample(value, height, solution, a.curve, guess)
-
-
-#: Marker and fill of each kind of event; shape tells them apart without colour.
+#: Marker and fill of each kind of event; shapes differ without colour.
 MARKERS = {
     "fold": ("o", "white"),
     "pseudo-saddle-node": ("o", style.GREY),
@@ -218,7 +105,9 @@ def branch(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('mu', 'x')
     """
-    several = _branches(found)
+    advice = "continue_equilibrium and continue_orbit return them."
+    several = results(found, Branch, advice, DefinitionError)
+    parameter = same(several, "parameter")
     measure, label = _measure(several[0], against)
     with style.settings():
         figure, axes = style.axes_for(ax, size)
@@ -246,15 +135,15 @@ def branch(
                 )
                 marks[event.kind] = style.marker(shape, event.kind, fill)
                 labels.append((event.kind, (event.parameter, height)))
-        axes.set(xlabel=several[0].parameter, ylabel=label, title=title or "")
+        axes.set(xlabel=parameter, ylabel=label, title=title or "")
         axes.margins(0.05)
         if legend:
             together = {**looks, **marks}
             many = len(together) > _LISTED
             axes.legend(handles=list((looks if many else together).values()), loc="best")
             names = Labels(axes)
-            for kind, place in labels if many else ():
-                names.name(kind, place)
+            for kind, point in labels if many else ():
+                names.name(kind, point)
     return figure
 
 
@@ -263,29 +152,6 @@ def _beside(one: Branch, event: BranchEvent) -> Any:
     if not isinstance(event.solution, Connection):
         return event.solution
     return one.solutions[int(np.argmin(np.abs(one.values - event.parameter)))]
-
-
-def _branches(found: Any) -> list[Branch]:
-    several = list(found) if isinstance(found, (list, tuple)) else [found]
-    if not several or not all(isinstance(one, Branch) for one in several):
-        raise DefinitionError(
-            explain(
-                "found",
-                expected="a Branch or several",
-                received=repr(found)[:60],
-                advice="continue_equilibrium and continue_orbit return them.",
-            )
-        )
-    if len({one.parameter for one in several}) > 1:
-        raise OptionError(
-            explain(
-                "found",
-                expected="branches in one parameter",
-                received=", ".join(sorted({one.parameter for one in several})),
-                advice="Draw them in figures of their own.",
-            )
-        )
-    return several
 
 
 def _measure(one: Branch, against: Measure | None) -> tuple[Callable[[Any], float], str]:
@@ -299,12 +165,8 @@ def _measure(one: Branch, against: Measure | None) -> tuple[Callable[[Any], floa
         return lambda orbit: float(orbit.period), "period"
     if against not in system.state_names:
         raise OptionError(
-            explain(
-                "against",
-                expected=f"a state {list(system.state_names)}{', period' * orbits} or a function",
-                received=repr(against),
-                advice="Leave it out for the default.",
-            )
+            f"against={against!r} is not a state {list(system.state_names)}{', period' * orbits} or a "
+            "function. Leave it out for the default."
         )
     k = system.state_names.index(against)
     if not orbits:
@@ -396,17 +258,9 @@ def bifurcation_curves(
     >>> figure.axes[0].get_xlabel(), figure.axes[0].get_ylabel()
     ('a', 'b')
     """
-    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
-    if not several or not all(isinstance(one, BifurcationCurve) for one in several):
-        raise DefinitionError(
-            "found: expected a BifurcationCurve or several, received "
-            f"{repr(found)[:60]}. continue_bifurcation returns them."
-        )
-    if len({one.parameters for one in several}) > 1:
-        raise OptionError(
-            "found: expected curves in the same two parameters, received "
-            f"{sorted({one.parameters for one in several})}. Draw them in figures of their own."
-        )
+    advice = "continue_bifurcation returns them."
+    several = results(found, BifurcationCurve, advice, DefinitionError)
+    parameters = same(several, "parameters")
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         kinds = list(dict.fromkeys(one.kind for one in several))
@@ -424,9 +278,122 @@ def bifurcation_curves(
                     *point.values, "o", color=style.BLACK, markersize=5.5, zorder=5, gid=point.kind
                 )
                 labels.name(point.kind, point.values)
-        axes.set(xlabel=several[0].parameters[0], ylabel=several[0].parameters[1])
-        axes.set_title(title or "")
+        axes.set(xlabel=parameters[0], ylabel=parameters[1], title=title or "")
         axes.margins(0.06)
         if legend and len(kinds) <= _LISTED:
             axes.legend(handles=list(handles.values()), loc="best")
     return figure
+
+
+# A branch as a smooth line: solutions are added between nodes where chords would show corners -----
+
+_TURN = np.radians(3.0)  # between neighbouring chords, at which a reader sees a corner
+_SHORT = 0.004  # of the width of the picture: chords that are not divided further
+_MOST = 240  # points between the nodes of a branch
+_DETOUR = 0.3  # by which the way over an event may be longer than its chord
+
+
+@dataclass
+class Sample:
+    """A point of a line."""
+
+    value: float
+    height: float
+    solution: Any
+    curve: Any = None
+    u: Any = None
+
+
+def line_of(
+    one: Branch, measure: Callable[[Any], float], shape: tuple[float, float] = (1.0, 1.0)
+) -> list[Sample]:
+    """The samples of a branch in their order."""
+    nodes = [
+        Sample(float(value), measure(solution), solution, curve, point.u)
+        for value, solution, (curve, point) in zip(
+            one.values, one.solutions, one.nodes, strict=True
+        )
+    ]
+    after: dict[int, list[tuple[float, Sample]]] = {}
+    for event in one.events:
+        if event.point is None or isinstance(event.solution, Connection):
+            continue
+        if any(event.point is point for _, point in one.nodes):
+            continue  # nodes at the same point are on either side of it
+        found = _between(nodes, np.asarray(event.point.u, dtype=float))
+        if found is not None:
+            k, share = found
+            height, curve = measure(event.solution), nodes[k].curve
+            sample = Sample(float(event.parameter), height, None, curve, event.point.u)
+            after.setdefault(k, []).append((share, sample))
+    samples = list[Sample]()
+    for k, node in enumerate(nodes):
+        samples += [node, *(s for _, s in sorted(after.get(k, []), key=lambda pair: pair[0]))]
+    return _smooth(samples, measure, np.array(shape) / shape[0])
+
+
+def _between(nodes: list[Sample], u: Array) -> tuple[int, float] | None:
+    """The node before a point of the curve, and how far it is from there to the next node."""
+    best: tuple[float, int, float] | None = None
+    same = np.array([n.u for n in nodes if np.shape(n.u) == u.shape] or [u])
+    scale = np.maximum(np.ptp(same, axis=0), 1e-6 * (1.0 + np.abs(same).max(axis=0)))
+    for k, (a, b) in enumerate(pairwise(nodes)):
+        if a.curve is not b.curve or np.shape(a.u) != u.shape:
+            continue
+        to, on, chord = (
+            float(np.linalg.norm(step / scale)) for step in (u - a.u, b.u - u, b.u - a.u)
+        )
+        detour = (to + on) / chord - 1.0 if chord > 0 else np.inf
+        if detour < _DETOUR and (best is None or detour < best[0]):
+            best = detour, k, to / (to + on)
+    return None if best is None else best[1:]
+
+
+def _smooth(samples: list[Sample], measure: Callable[[Any], float], shape: Array) -> list[Sample]:
+    """Divide chords between which a line would seem to have a corner."""
+    points = np.array([[s.value, s.height] for s in samples])
+    size = np.ptp(points, axis=0)
+    size = np.where(size > 0, size, 1.0) / shape
+    added, given_up = 0, set[int]()
+    while added < _MOST:
+        scaled = np.array([[s.value, s.height] for s in samples]) / size
+        chosen = [k for k in _coarse(scaled) if id(samples[k]) not in given_up]
+        if not chosen:
+            break
+        for k in reversed(chosen):
+            middle = _middle(samples[k], samples[k + 1], measure)
+            if middle is None:
+                given_up.add(id(samples[k]))
+            else:
+                samples = [*samples[: k + 1], middle, *samples[k + 1 :]]
+                added += 1
+    return samples
+
+
+def _coarse(scaled: Array) -> list[int]:
+    """The chords beside which a polyline turns visibly and that are long enough to be divided."""
+    steps = np.diff(scaled, axis=0)
+    length = np.linalg.norm(steps, axis=1)
+    solid = np.flatnonzero(length > 0)  # at events two nodes coincide
+    angle = np.arctan2(*steps[solid].T[::-1])
+    turn = np.abs((np.diff(angle) + np.pi) % (2 * np.pi) - np.pi)
+    bent = turn > _TURN
+    beside = np.concatenate([bent, [False]]) | np.concatenate([[False], bent])
+    return [int(k) for k in solid[beside] if length[k] > _SHORT]
+
+
+def _middle(a: Sample, b: Sample, measure: Callable[[Any], float]) -> Sample | None:
+    """The sample half-way between two; None where the equations have no solution there."""
+    if a.curve is None or a.curve is not b.curve or a.value == b.value:
+        return None
+    value = (a.value + b.value) / 2
+    guess = (np.asarray(a.u, dtype=float) + np.asarray(b.u, dtype=float)) / 2
+    try:
+        solution = a.curve.solution_at(guess, value)
+        height = measure(solution)
+    except (NonsmoothError, ValueError):
+        return None
+    low, high = sorted((a.height, b.height))
+    if not low - (high - low) <= height <= high + (high - low):
+        return None  # it converged to another part of the branch
+    return Sample(value, height, solution, a.curve, guess)

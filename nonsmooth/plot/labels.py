@@ -1,4 +1,4 @@
-"""Names beside the things they name: places are chosen so that texts lie on no other and hide little."""
+"""Placement of names beside the things they name, without overlap and hiding little."""
 
 from __future__ import annotations
 
@@ -18,15 +18,13 @@ from numpy.typing import ArrayLike
 from ..model import Array
 from . import style
 
-_CELL = 1.5  # points, of the grid on which room is looked for
+_CELL = 1.5  # points, of the grid of occupied cells
 _GAPS = (4.0, 9.0, 16.0, 25.0, 36.0)  # points, from a thing to its name
 _LEADER = 8.0  # points: over a longer gap a thin line leads to the thing
 _MARK = 3.5  # points: from the middle of a mark to where that line ends
-_ANCHORS = 24  # places along a thing that are tried
-_TEXT, _FAR = (
-    40.0,
-    0.02,
-)  # costs, in shares of a name's area: on other texts; for a point of distance
+_ANCHORS = 24  # points along a thing that are tried
+_TEXT = 40.0  # the cost of lying on other texts, in shares of a name's area
+_FAR = 0.02  # the same for a point of distance
 _APART = 5.0  # points, between names
 _HEAD = 14.0  # points: arrowheads are shorter
 _OWN = 7.5  # points: as far from the middle of a mark may be its corner
@@ -55,19 +53,19 @@ class _Name:
 
 @dataclass
 class _Spot:
-    """A place of a name, what it costs, and the ends of the line that leads to it, if one does."""
+    """A position of a name, its cost, and the ends of a leader line if it has one."""
 
     name: _Name
     cost: float = 0.0
-    place: tuple[float, float] | None = None
+    position: tuple[float, float] | None = None
     leader: Array | None = None
 
     def use(self) -> None:
-        """Put the name there; away if it has no place."""
+        """Put the name there; hide it if it has no position."""
         for part in (self.name.text, self.name.leader):
-            part.set_visible(self.place is not None)
-        if self.place is not None:
-            self.name.text.set_position(self.place)
+            part.set_visible(self.position is not None)
+        if self.position is not None:
+            self.name.text.set_position(self.position)
             self.name.leader.set_data(*([], []) if self.leader is None else self.leader.T)
 
 
@@ -141,7 +139,7 @@ class Labels(Artist):
             spot.use()
 
     def _best(self, name: _Name, room: _Room, renderer: Any) -> _Spot:
-        """Where a name is best put, which is taken from the room."""
+        """The best position of a name, which is then occupied."""
         point = room.point
         name.text.set_position((0.0, 0.0))
         box = name.text.get_window_extent(renderer)
@@ -186,14 +184,14 @@ class Labels(Artist):
         return np.asarray(gaps < _gaps(middles, own, size) - 1e-6, dtype=float)
 
     def _astray(self, middles: Array, size: Array, keep: Keep) -> Array:
-        """How much of rectangles (m, 2) is where a name may not be, of their corners and middles."""
+        """Share of corners and middles of rectangles (m, 2) where a name may not be."""
         spots = middles[:, None] + _SPOTS * size / 2
         data = self.home.transData.inverted().transform(spots.reshape(-1, 2))
         return np.mean(~np.asarray(keep(data), dtype=bool).reshape(len(middles), -1), axis=1)
 
 
 def _orders(names: list[_Name]) -> list[list[_Name]]:
-    """In which names are placed: those of points first, these one way and another."""
+    """Orders in which names are tried: names of points first, in several directions."""
     few = sorted(names, key=lambda name: len(name.anchors))
     points = [name for name in few if len(name.anchors) == 1]
     rest = few[len(points) :]
@@ -205,7 +203,7 @@ def _orders(names: list[_Name]) -> list[list[_Name]]:
 
 
 class _Room:
-    """What is drawn in axes, as numbers on a grid of cells: lines, and texts and marks."""
+    """Occupancy of axes on a grid of cells: lines, and texts and marks."""
 
     def __init__(self, ax: Axes, renderer: Any, cell: float, mine: Labels):
         box = ax.get_window_extent(renderer)
@@ -302,7 +300,7 @@ class _Room:
         )
 
     def cost(self, middles: Array, size: Array) -> Array:
-        """What rectangles (m, 2) would hide, as shares of their area; infinite outside of the axes."""
+        """Hidden share of the area of rectangles (m, 2); infinite outside of the axes."""
         low = np.round((middles - size / 2 - self.corner) / self.cell).astype(int)
         high = np.round((middles + size / 2 - self.corner) / self.cell).astype(int)
         shape = np.array(self.lines.shape)

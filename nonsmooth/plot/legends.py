@@ -1,4 +1,4 @@
-"""Legends beside what they explain, or below it where a figure is as narrow as a column of a journal."""
+"""Legends beside the axes, or below them in figures as narrow as a column of a journal."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from typing import Any
 
 from matplotlib.axes import Axes
 
-_NARROW = 4.6  # inches: beside a legend little of the picture would be left
+_NARROW = 4.6  # inches: a legend beside the axes would leave little room
 _SHORT = 20  # letters of entries of which two are side by side in a column
 
 
@@ -17,8 +17,7 @@ def is_narrow(ax: Axes) -> bool:
 
 
 def beside(ax: Axes, handles: list[Any], **options: Any) -> None:
-    """Explain what is drawn to the right of the axes, or below them where they fill a narrow
-    figure."""
+    """Draw a legend to the right of the axes, or below them in a narrow figure."""
     if is_narrow(ax):
         figure: Any = ax.get_figure(root=True)
         longest = max((len(str(handle.get_label())) for handle in handles), default=0)

@@ -1,7 +1,7 @@
-"""One HTML page from its parts: styles, scripts and data inside, nothing loaded from elsewhere.
+"""Self-contained HTML pages with styles, scripts and data inside.
 
-The parts that every such page shares (its colours, and ``controls.js`` for planes, draggable points
-and sliders) are in the folder ``web`` beside this module.
+Parts that all pages share (colours; ``controls.js`` for planes, draggable points and sliders) are in
+the folder ``web``.
 """
 
 from __future__ import annotations
@@ -13,10 +13,10 @@ from importlib import metadata
 from pathlib import Path
 from typing import Any
 
-from ..model import OptionError, explain
+from ..model import OptionError
 
 WEB = Path(__file__).parent / "web"
-#: In the page's head: a browser then refuses to load anything, also if a part asked for it.
+#: In the page's head, so that a browser loads nothing from elsewhere.
 _POLICY = "default-src 'none'; style-src 'unsafe-inline'; script-src 'unsafe-inline'; img-src data:"
 
 
@@ -59,7 +59,7 @@ def offline_page(
     """
     for name, text in (("title", title), ("body", body)):
         if not isinstance(text, str):
-            raise OptionError(f"{name}: expected a text, received {text!r}.")
+            raise OptionError(f"{name} is {text!r}, not a text.")
     sheets = "\n".join([_shared("page.css"), *styles])
     blocks = [_data(name, value) for name, value in (data or {}).items()]
     blocks += [f"<script>\n{text}</script>" for text in (_shared("controls.js"), *scripts)]
@@ -97,12 +97,8 @@ def _data(name: str, value: Any) -> str:
         text = json.dumps(value, ensure_ascii=False, allow_nan=False)
     except (TypeError, ValueError) as error:
         raise OptionError(
-            explain(
-                f"data: {name}",
-                expected="finite numbers, texts, and lists and dicts of them",
-                received=f"{type(value).__name__} {str(value)[:60]!r}",
-                advice=f"JSON cannot hold it: {error}",
-            )
+            f"data {name!r} is {type(value).__name__} {str(value)[:60]!r}, which JSON cannot hold ({error}). "
+            "Give finite numbers, texts, and lists and dicts of them."
         ) from error
     text = text.replace("<", "\\u003c")  # no end of the script inside a text
     return f'<script type="application/json" id="data-{html.escape(name)}">{text}</script>'

@@ -1,4 +1,4 @@
-"""Periodic orbits in their phase plane, and their multipliers beside the unit circle."""
+"""Periodic orbits in a phase plane, and Floquet multipliers beside the unit circle."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from ..model import DefinitionError, OptionError, explain
+from ..model import DefinitionError, OptionError
 from ..orbit import Branch, PeriodicOrbit
 from . import style
 from .labels import Labels
@@ -75,22 +75,13 @@ def periodic_orbit(
     """
     if not isinstance(orbit, PeriodicOrbit):
         raise DefinitionError(
-            explain(
-                "orbit",
-                expected="a PeriodicOrbit",
-                received=repr(orbit)[:60],
-                advice="periodic_orbit(system, guess) finds one.",
-            )
+            f"orbit is {repr(orbit)[:60]}, not a PeriodicOrbit. periodic_orbit(system, guess) finds one."
         )
     system, names = orbit.system, list(states or orbit.system.state_names[:2])
     if len(names) != 2 or not set(names) <= set(system.state_names):
         raise OptionError(
-            explain(
-                "states",
-                expected=f"two names among {list(system.state_names)}",
-                received=repr(states),
-                advice="A system of one state has no plane: draw orbit.trajectory.",
-            )
+            f"states={states!r} are not two names among {list(system.state_names)}. A system of one state "
+            "has no plane: draw orbit.trajectory."
         )
     i, j = (system.state_names.index(name) for name in names)
     run = orbit.trajectory
@@ -127,7 +118,7 @@ def periodic_orbit(
 
 
 def _words(mode: str) -> str:
-    """What a legend says of a mode."""
+    """Entry of a legend for a mode."""
     return f"mode {mode}".replace("-", "\N{MINUS SIGN}") if mode else "smooth"
 
 
@@ -180,12 +171,8 @@ def multipliers(
     orbits = [found] if isinstance(found, PeriodicOrbit) else list(getattr(found, "solutions", ()))
     if not orbits or not all(isinstance(orbit, PeriodicOrbit) for orbit in orbits):
         raise DefinitionError(
-            explain(
-                "found",
-                expected="a PeriodicOrbit or a Branch of them",
-                received=repr(found)[:60],
-                advice="periodic_orbit and continue_orbit return them.",
-            )
+            f"found is {repr(found)[:60]}, not a PeriodicOrbit or a Branch of them. periodic_orbit and "
+            "continue_orbit return them."
         )
     with style.settings():
         figure, axes = style.axes_for(ax, size)

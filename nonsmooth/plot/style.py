@@ -1,14 +1,14 @@
-"""How every picture looks: colours that colour-blind readers tell apart, lines that print in grey.
+"""Style of every picture: colours that colour-blind readers tell apart, lines that print in grey.
 
-For pictures of one's own beside those of the library. The palette is that of Okabe & Ito 2008:
+Use it for your own pictures. The palette is that of Okabe & Ito 2008:
 ``BLACK``, ``ORANGE``, ``SKY``, ``GREEN``, ``YELLOW``, ``BLUE``, ``VERMILLION``, ``PURPLE``, ``GREY``.
-By what they mean: ``ABOVE`` and ``BELOW`` for the fields F1 and F2 (``FIELDS`` has them by the letter
+By meaning: ``ABOVE`` and ``BELOW`` for the fields F1 and F2 (``FIELDS`` has them by the letter
 of the side), ``ATTRACTING`` and ``REPELLING`` for sliding orbits, ``TINT_ATTRACTING``,
 ``TINT_REPELLING`` and ``TINT_CROSSING`` for regions, ``CANARD`` and ``FAUX_CANARD``. Dashes:
 ``DASHED`` (invisible folds), ``LONG_DASH``, ``DASH_DOT``, ``DOTS``. ``CLOUD``: points of long runs.
 
 Nothing here touches matplotlib's global settings: pictures are built inside ``settings()`` on
-figures that pyplot does not know. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
+figures that pyplot does not manage. To see one in a window, pass ``ax=`` from ``pyplot.subplots()``.
 
 Examples
 --------
@@ -35,8 +35,7 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import FancyArrowPatch
 from numpy.typing import ArrayLike
 
-from ..model import Array, OptionError, explain
-from .print_figure import PrintFigure
+from ..model import Array, OptionError
 
 BLACK = "#000000"
 ORANGE = "#E69F00"
@@ -143,15 +142,42 @@ def check_size(size: object) -> tuple[float, float]:
     except (TypeError, ValueError):
         width = height = float("nan")
     if not (0 < width < np.inf and 0 < height < np.inf):
-        raise OptionError(
-            explain(
-                "size",
-                expected="a width and a height in inches",
-                received=repr(size),
-                advice="For example size=(6, 5).",
-            )
-        )
+        raise OptionError(f"size={size!r} is not a width and a height in inches, such as (6, 5).")
     return width, height
+
+
+#: TrueType fonts, which publishers take and whose text can be searched and edited; Type 3 otherwise.
+_FONTS: Any = {"pdf.fonttype": 42, "ps.fonttype": 42}
+_LAYOUTS = 5  # at most: three do so far
+
+
+class PrintFigure(Figure):
+    """A figure that saves TrueType fonts into PDF and PostScript, whatever the user's settings, and
+    whose layout has settled before it is saved."""
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Save the figure.
+
+        Parameters
+        ----------
+        fname : path or file
+            Where to.
+        **options
+            Of ``matplotlib.figure.Figure.savefig``.
+        """
+        with mpl.rc_context(_FONTS):
+            self._settle()
+            super().savefig(fname, **options)
+
+    def _settle(self) -> None:
+        """Lay out until nothing moves, as heights of titles and square axes depend on the drawing."""
+        before = list[tuple[int, ...]]()
+        for _ in range(_LAYOUTS):
+            self.draw_without_rendering()
+            after = [tuple(map(round, map(float, axes.bbox.bounds))) for axes in self.axes]
+            if after == before:
+                return
+            before = after
 
 
 def new_figure(size: object) -> Figure:
@@ -210,9 +236,8 @@ def axes_for(ax: Axes | None, size: object) -> tuple[Figure, Axes]:
         figure = new_figure(size)
         return figure, figure.add_subplot()
     if not isinstance(ax, Axes):
-        received, advice = type(ax).__name__, "For example ax=pyplot.subplots()[1]."
         raise OptionError(
-            explain("ax", expected="matplotlib axes", received=received, advice=advice)
+            f"ax is a {type(ax).__name__}, not matplotlib axes. For example ax=pyplot.subplots()[1]."
         )
     parent = ax.get_figure(root=True)
     assert parent is not None

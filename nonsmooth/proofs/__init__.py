@@ -1,9 +1,8 @@
-"""PROOFS about special points and orbits, in interval arithmetic of any precision.
+"""Proofs about special points and orbits, in interval arithmetic of any precision.
 
 A theorem here rests on the user's expressions as they are stored: gradients and Hessians are taken
-of the stored instructions (``tape``), constants are exact, and every number is an enclosure
-(``arithmetic``, by python-flint, the extra ``nonsmooth-dynamics[proofs]``). What cannot be enclosed
-is refused, never guessed. Nothing else imports this floor.
+of the stored instructions, constants are exact, and every number is an enclosure (python-flint, the
+extra ``nonsmooth-dynamics[proofs]``). Where no enclosure exists, an error is raised.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Proofs as they are handed out: in words, in decimals, and as a record that others can check."""
+"""Proofs about special points: statement, enclosures in decimals, and a record for a checker."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class UnprovenError(NonsmoothError, RuntimeError):
 
 
 class DigitsError(UnprovenError):
-    """What stood in the way does not go with more digits."""
+    """No proof was found, and more digits would not help."""
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -36,7 +36,7 @@ class Proof:
     exists : bool
         Whether existence and uniqueness are proven, also where the class is not decided.
     label : str
-        The class or kind; a boundary of classes where it was met exactly; ``""`` if undecided.
+        The class or kind; a boundary of classes where it is exactly on one; ``""`` if undecided.
     statement : str
         The theorem in words.
     point : mapping of str to Enclosure

@@ -1,4 +1,4 @@
-"""A system on a tape: its surface, both fields and their Lie derivatives, differentiated exactly."""
+"""Switching function, both fields and their Lie derivatives, as exact expression graphs."""
 
 from __future__ import annotations
 
@@ -6,77 +6,81 @@ from collections.abc import Mapping, Sequence
 from functools import cached_property
 from typing import Any
 
-from ..model import DefinitionError, FilippovSystem, ParameterError, explain
+from ..model import DefinitionError, FilippovSystem, ParameterError
 from .arithmetic.flint import arb
-from .arithmetic.instructions import Tape
-from .arithmetic.intervals import Numbers, between, enclose, exact
+from .arithmetic.instructions import ExpressionGraph
+from .arithmetic.intervals import Numbers, between, enclose, exact, exact_range
 
 #: A parameter's value, or the ends of an interval of values.
 Range = Any
 
 
-class Written:
-    """The stored expressions of a system on a tape."""
+class SystemGraph:
+    """The stored expressions of a system as a graph."""
 
     def __init__(self, system: FilippovSystem, moving: Sequence[int] = ()):
         self.system = system
-        self.tape = tape = Tape()
+        self.graph = graph = ExpressionGraph()
         d = system.definition
         n = d.states.numel()
         count = system.extended_dimension
-        self.x = [tape.symbol(0, i) for i in range(count + len(moving))]
-        self.p = [tape.symbol(1, i) for i in range(d.parameters.numel())]
+        self.x = [graph.symbol(0, i) for i in range(count + len(moving))]
+        self.p = [graph.symbol(1, i) for i in range(d.parameters.numel())]
         for k, i in enumerate(moving):
             self.p[i] = self.x[count + k]
-        self._places = [self.x[:n], self.x[n:count], self.p]
+        self._inputs = [self.x[:n], self.x[n:count], self.p]
         self._symbols = [d.states, d.time, d.parameters]
 
     def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
-        """Write expressions in states, time and parameters onto the tape."""
-        return self.tape.insert(expressions, self._symbols, self._places)
+        """Add expressions in states, time and parameters to the graph."""
+        return self.graph.insert(expressions, self._symbols, self._inputs)
 
     def inserted_at(self, expression: Any, x: Sequence[int]) -> int:
-        """Write a function of states, time and parameters with other nodes in the states' place."""
+        """Add a function of states, time and parameters, with other nodes for the states."""
         n, count = self.system.dimension, self.system.extended_dimension
-        places = [list(x[:n]), list(x[n:count]), self.p]
-        ((node,),) = self.tape.insert([expression], self._symbols, places)
+        inputs = [list(x[:n]), list(x[n:count]), self.p]
+        ((node,),) = self.graph.insert([expression], self._symbols, inputs)
         return int(node)
 
     def field(
         self, multipliers: Sequence[int], reactions: Sequence[int] | None = None
     ) -> list[int]:
-        """Rates of the extended states, for nodes of the multipliers; without reactions unless given."""
-        d, tape = self.system.definition, self.tape
-        still = [tape.constant(0)] * d.reactions.numel()
+        """Rates of the extended states, for nodes of the multipliers and of the reactions (default 0)."""
+        d, graph = self.system.definition, self.graph
+        still = [graph.constant(0)] * d.reactions.numel()
         values = [list(multipliers), still if reactions is None else list(reactions)]
-        (rows,) = tape.insert(
-            [d.field], [*self._symbols, d.multipliers, d.reactions], [*self._places, *values]
+        (rows,) = graph.insert(
+            [d.field], [*self._symbols, d.multipliers, d.reactions], [*self._inputs, *values]
         )
         more = len(self.x) - self.system.extended_dimension
-        return [*rows, *[tape.constant(1)] * d.time.numel(), *[tape.constant(0)] * more]
+        return [*rows, *[graph.constant(1)] * d.time.numel(), *[graph.constant(0)] * more]
 
     def gradient(self, k: int) -> list[int]:
         """Derivatives with respect to the extended states."""
-        return self.tape.gradient(k, self.x)
+        return self.graph.gradient(k, self.x)
 
 
-class Described:
-    """One surface of a system and what follows from its expressions."""
+class SurfaceFunctions:
+    """One surface of a system: its switching function, both fields and Lie derivatives."""
 
     def __init__(
         self,
         system: FilippovSystem,
         surface: int = 0,
         mode: str | None = None,
-        written: Written | None = None,
+        system_graph: SystemGraph | None = None,
     ):
         self.system, self.surface, self.mode = system, system.surface_index(surface), mode
-        self.written = written or Written(system)
-        self.tape, self.x, self.p = self.written.tape, self.written.x, self.written.p
-        ((self.h,),) = self.insert([system.definition.surfaces[self.surface]])
+        self.system_graph = system_graph or SystemGraph(system)
+        self.graph, self.x, self.p = (
+            self.system_graph.graph,
+            self.system_graph.x,
+            self.system_graph.p,
+        )
+        ((self.h,),) = self.system_graph.insert([system.definition.surfaces[self.surface]])
         sides = self._sides()
-        constant = self.tape.constant
-        self.fields = tuple(self.written.field([constant(m) for m in s]) for s in sides)
+        constant = self.graph.constant
+        self.fields = tuple(self.system_graph.field([constant(m) for m in s]) for s in sides)
         self.elsewhere = self._elsewhere(sides[0])
 
     def _sides(self) -> list[list[float]]:
@@ -86,21 +90,12 @@ class Described:
             signs = [float(s) for s in letters[: len(signs)]]
             if 0 in letters[len(signs) :]:
                 raise DefinitionError(
-                    explain(
-                        "mode",
-                        expected="open contacts",
-                        received=repr(self.mode),
-                        advice="Points of closed contacts are not proven.",
-                    )
+                    f"mode {self.mode!r} has closed contacts, whose points are not proven. Give a mode with open ones."
                 )
         if any(s == 0 for i, s in enumerate(signs) if i != self.surface):
             raise DefinitionError(
-                explain(
-                    "mode",
-                    expected="a side, + or -, of every other surface",
-                    received=repr(self.mode),
-                    advice="Proofs where several surfaces slide at once are not built.",
-                )
+                f"mode {self.mode!r} must give a side, + or -, of every other surface. Proofs do not cover "
+                "sliding on several surfaces at once."
             )
         return [[s if i == self.surface else t for i, t in enumerate(signs)] for s in (1.0, -1.0)]
 
@@ -108,17 +103,13 @@ class Described:
         d, found = self.system.definition, []
         for i, s in enumerate(signs):
             if i != self.surface:
-                ((h,),) = self.insert([d.surfaces[i]])
-                node = h if s > 0 else self.tape.apply("neg", [h])
+                ((h,),) = self.system_graph.insert([d.surfaces[i]])
+                node = h if s > 0 else self.graph.apply("neg", [h])
                 found.append((f"the side {'+' if s > 0 else '-'} of surface {i}", node))
         for k, name in enumerate(self.system.impacts):
-            ((gap,),) = self.insert([d.gaps[k]])
+            ((gap,),) = self.system_graph.insert([d.gaps[k]])
             found.append((f"an open gap of {name!r}", gap))
         return found
-
-    def insert(self, expressions: Sequence[Any]) -> list[list[int]]:
-        """Write expressions in states, time and parameters onto the tape."""
-        return self.written.insert(expressions)
 
     @property
     def nonlinear(self) -> bool:
@@ -127,11 +118,11 @@ class Described:
 
     def gradient(self, k: int) -> list[int]:
         """Derivatives with respect to the extended states."""
-        return self.written.gradient(k)
+        return self.system_graph.gradient(k)
 
     def lie_derivative(self, k: int, of: int) -> int:
         """Derivative of a node along field k (0: F1, 1: F2)."""
-        return self.tape.dot(self.fields[k], self.gradient(of))
+        return self.graph.dot(self.fields[k], self.gradient(of))
 
     @cached_property
     def lie(self) -> tuple[int, int]:
@@ -151,28 +142,13 @@ def parameter_ranges(
     intervals: dict[str, tuple[Any, Any]] = {}
     for key, value in (given or {}).items():
         name = key if isinstance(key, str) else str(key)
-        ends = value if isinstance(value, (tuple, list)) else (value, value)
-        if len(ends) != 2:
-            raise ParameterError(_interval(name, value))
-        low, high = (exact(v, numbers, f"parameter {name!r}") for v in ends)
-        if low > high:
-            raise ParameterError(_interval(name, value))
-        intervals[name] = low, high
+        intervals[name] = exact_range(value, numbers, f"parameter {name!r}", ParameterError)
     point = system.parameter_vector(
         {name: float((low + high) / 2) for name, (low, high) in intervals.items()}
     )
     names = system.parameter_names
     defaults = [exact(float(v), numbers) for v in point]
     return [intervals.get(k, (v, v)) for k, v in zip(names, defaults, strict=True)]
-
-
-def _interval(name: str, value: Any) -> str:
-    return explain(
-        f"parameter {name!r}",
-        expected="a number or (low, high) with low <= high",
-        received=repr(value),
-        advice="For example (0.29, 0.31).",
-    )
 
 
 def enclosed(intervals: Sequence[tuple[Any, Any]]) -> list[arb]:

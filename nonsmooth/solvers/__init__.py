@@ -1,1 +1,1 @@
-"""Newton's method and continuation of curves: mathematics that knows no nonsmooth system."""
+"""Newton's method and continuation of curves, independent of nonsmooth systems."""

@@ -5,13 +5,14 @@ so the root found is close to the start. Equations are divided by the length of 
 residuals are distances, whatever the units of the equations. A step is halved until the residual
 falls. The iteration goes on to rounding and is accepted if the residual is below ``tol``.
 
-A good guess of as many equations as unknowns needs none of this: ``converge`` takes full steps and
-stops as soon as the next one would be below ``tol``. Where derivatives are dear, ``Secant`` carries
-the Jacobian from one evaluation to the next (Broyden 1965).
+From a good guess of as many equations as unknowns ``converge`` takes full steps and stops as soon as
+the next one would be below ``tol``; ``Secant`` carries the Jacobian from one evaluation to the next
+(Broyden 1965). ``solve_many`` takes full steps from many starts at once.
 """
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
@@ -22,58 +23,22 @@ from numpy.typing import NDArray
 from ..model import Array, ConvergenceError, DefinitionError, OptionError, PointError, real_array
 from ..model.checks import positive
 
-# Newton's method of :mod:`nonsmooth.solvers.newton` for many starts at once, without damping.
-
-#: Points (k, n) and which of all starts they belong to (k,) -> values (k, m), Jacobians (k, m, n).
-ManyEquations = Callable[[Array, NDArray[np.int64]], tuple[Array, Array]]
-
-_FAR = 1e8  # a longer step has left the problem
-
-
-def solve_many(
-    equations: ManyEquations, starts: Array, *, tol: float, iterations: int = 10
-) -> tuple[Array, NDArray[np.bool_]]:
-    """Find a root close to each start."""
-    x = np.array(starts, dtype=float)
-    residual = np.full(len(x), np.inf)
-    index = np.arange(len(x))
-    for _ in range(iterations):
-        if not index.size:
-            break
-        values, jacobian = equations(x[index], index)
-        lengths = np.linalg.norm(jacobian, axis=2)
-        good = np.isfinite(values).all(1) & np.isfinite(lengths).all(1) & (lengths > 0).all(1)
-        residual[index[~good]] = np.inf
-        index, values, jacobian, lengths = index[good], values[good], jacobian[good], lengths[good]
-        residual[index] = np.max(np.abs(values) / lengths, axis=1, initial=0.0)
-        step = _least_norm(values / lengths, jacobian / lengths[..., None])
-        x[index] -= step
-        length = np.linalg.norm(step, axis=1)
-        residual[index[length >= _FAR]] = np.inf
-        small = length <= 2.0**-48 * (1 + np.linalg.norm(x[index], axis=1))
-        index = index[~small & (length < _FAR)]
-    return x, residual <= tol * (1 + np.linalg.norm(x, axis=1))
-
-
-def _least_norm(values: Array, jacobian: Array) -> Array:
-    """Shortest steps (k, n) that solve equations (k, m) with rows of length 1."""
-    if values.shape[1] == 1:
-        return values * jacobian[:, 0]
-    return (np.linalg.pinv(jacobian) @ values[..., None])[..., 0]
-
-
 Equations = Callable[[Array], tuple[Array, Array]]
 Values = Callable[[Array], Array]
 
 _HALVINGS = 40
 
-#: Changes over steps shorter than this part of the unknowns are rounding, which says nothing.
+#: After full steps below the first size, relative to the unknowns, others with the same Jacobian are tried:
+#: so many, as long as each is below this part of the one before.
+_SMALL, _CHORDS, _CONTRACTS = 1e-3, 4, 0.05
+
+#: Changes over steps shorter than this part of the unknowns are rounding.
 _SHORT = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class Root:
-    """What a search found."""
+    """The root that a search found."""
 
     x: Array
     residual: float
@@ -118,7 +83,7 @@ def _evaluate(equations: Equations, x: Array) -> _Values:
 
 
 def _damped(equations: Equations, at: _Values, step: Array) -> tuple[_Values, float] | None:
-    """Halve the step until the residual falls; None if it never does."""
+    """Halve the step until the residual falls; None if it does not."""
     factor, old = 1.0, at.residual
     for _ in range(_HALVINGS):
         trial = _evaluate(equations, at.x + factor * step)
@@ -223,7 +188,7 @@ class Secant:
         self._last: tuple[Array, Array] | None = None
 
     def forget(self) -> bool:
-        """Take fresh differences next time; whether there was anything to forget."""
+        """Discard the Jacobian; whether there was one."""
         had, self.jacobian, self._last = self.jacobian is not None, None, None
         return had
 
@@ -253,6 +218,7 @@ def converge(
     max_iterations: int = 30,
     linear: Callable[[Array, Array], Array] | None = None,
     noise: float = 1e-11,
+    values: Callable[[Array], Array | None] | None = None,
 ) -> Array | None:
     """Root of as many equations as unknowns from a good guess, or None.
 
@@ -262,8 +228,8 @@ def converge(
     Parameters
     ----------
     equations : callable
-        Takes unknowns (n,) and returns values (n,) and Jacobian (n, n); a :class:`Secant` is tried again with fresh
-        differences.
+        Takes unknowns (n,) and returns values (n,) and Jacobian (n, n); a :class:`Secant` is tried again
+        with fresh differences.
     start : ndarray (n,)
         Where the iteration starts.
     tol : float, optional
@@ -276,6 +242,9 @@ def converge(
         Solves the linear equations of a step, where their structure is known.
     noise : float, optional
         Steps below this, relative to ``scale``, that shrink no more are taken to be rounding.
+    values : callable, optional
+        Takes unknowns (n,) and returns the values alone, where that is cheaper, or None where it fails. Then
+        steps with the Jacobian of the last full one follow it as long as they shrink fast.
 
     Examples
     --------
@@ -289,10 +258,15 @@ def converge(
         )
     start = real_array(start, "start")
     carried = isinstance(equations, Secant) and equations.jacobian is not None
-    root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
+    given = tol, scale, max_iterations, linear or _dense, noise, values
+    root = _full_steps(equations, start, *given)
     if root is None and carried and isinstance(equations, Secant) and equations.forget():
-        root = _full_steps(equations, start, tol, scale, max_iterations, linear, noise)
+        root = _full_steps(equations, start, *given)
     return root
+
+
+def _dense(matrix: Array, right: Array) -> Array:
+    return np.asarray(np.linalg.solve(matrix, right), float)
 
 
 def _full_steps(
@@ -301,8 +275,9 @@ def _full_steps(
     tol: float,
     scale: float,
     most: int,
-    linear: Callable[[Array, Array], Array] | None,
+    linear: Callable[[Array, Array], Array],
     noise: float,
+    plain: Callable[[Array], Array | None] | None,
 ) -> Array | None:
     x, last = np.array(start, dtype=float), np.inf
     for _ in range(most):
@@ -310,10 +285,10 @@ def _full_steps(
         if not (np.isfinite(values).all() and np.isfinite(jacobian).all()):
             return None
         try:
-            step = -(np.linalg.solve if linear is None else linear)(jacobian, values)
+            step = -linear(jacobian, values)
         except np.linalg.LinAlgError:
             return None
-        size = float(np.linalg.norm(step)) / scale
+        size = math.sqrt(float(step @ step)) / scale
         x = x + step
         if size <= tol or (np.isfinite(last) and size * size <= tol * last):
             return x
@@ -322,4 +297,78 @@ def _full_steps(
         if not size <= 1e6:
             return None
         last = size
+        if plain is not None and size <= _SMALL:
+            solved = lambda r, matrix=jacobian: linear(matrix, r)
+            x, last, is_root = _chords(plain, solved, x, size, scale, tol)
+            if is_root:
+                return x
     return None
+
+
+# many starts -----------------------------------------------------------------------------------
+
+#: Points (k, n) and which of all starts they belong to (k,) -> values (k, m), Jacobians (k, m, n).
+ManyEquations = Callable[[Array, NDArray[np.int64]], tuple[Array, Array]]
+
+_FAR = 1e8  # a longer step has left the problem
+
+
+def solve_many(
+    equations: ManyEquations, starts: Array, *, tol: float, iterations: int = 10
+) -> tuple[Array, NDArray[np.bool_]]:
+    """Find a root close to each start."""
+    x = np.array(starts, dtype=float)
+    residual = np.full(len(x), np.inf)
+    index = np.arange(len(x))
+    for _ in range(iterations):
+        if not index.size:
+            break
+        values, jacobian = equations(x[index], index)
+        lengths = np.linalg.norm(jacobian, axis=2)
+        good = np.isfinite(values).all(1) & np.isfinite(lengths).all(1) & (lengths > 0).all(1)
+        residual[index[~good]] = np.inf
+        index, values, jacobian, lengths = index[good], values[good], jacobian[good], lengths[good]
+        residual[index] = np.max(np.abs(values) / lengths, axis=1, initial=0.0)
+        step = _least_norm(values / lengths, jacobian / lengths[..., None])
+        x[index] -= step
+        length = np.linalg.norm(step, axis=1)
+        residual[index[length >= _FAR]] = np.inf
+        small = length <= 2.0**-48 * (1 + np.linalg.norm(x[index], axis=1))
+        index = index[~small & (length < _FAR)]
+    return x, residual <= tol * (1 + np.linalg.norm(x, axis=1))
+
+
+def _least_norm(values: Array, jacobian: Array) -> Array:
+    """Shortest steps (k, n) that solve equations (k, m) with rows of length 1."""
+    if values.shape[1] == 1:
+        return values * jacobian[:, 0]
+    return (np.linalg.pinv(jacobian) @ values[..., None])[..., 0]
+
+
+def _chords(
+    values: Callable[[Array], Array | None],
+    solved: Callable[[Array], Array],
+    x: Array,
+    last: float,
+    scale: float,
+    tol: float,
+) -> tuple[Array, float, bool]:
+    """Steps with the Jacobian of the last full one: their end, the last size, whether it is the root."""
+    rate = 0.0
+    for again in range(_CHORDS):
+        found = values(x)
+        if found is None or not np.isfinite(found).all():
+            break
+        step = -solved(found)
+        size = math.sqrt(float(step @ step)) / scale
+        ratio = size / last
+        # a full step leaves the square of its size, one with the same derivatives twice as much of its own
+        rate = max(ratio, rate) if again else 2.0 * ratio
+        if not ratio <= 1.0:
+            break
+        x, last = x + step, size
+        if size <= tol or rate * size <= 0.1 * tol:
+            return x, size, True
+        if ratio > _CONTRACTS:
+            break
+    return x, last, False

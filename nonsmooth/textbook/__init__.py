@@ -1,7 +1,7 @@
-"""Named systems with known answers: problems that every method for nonsmooth systems must solve.
+"""Textbook problems: named nonsmooth systems with reference values.
 
-Each function returns a :class:`Problem`: system, parameters, start, end time, and the values known
-for it as :class:`Reference`. Tests and the manual read from them.
+Each function returns a :class:`Problem`: system, parameters, start, end time, and its reference
+values as :class:`Reference`.
 
 Examples
 --------
@@ -16,7 +16,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from types import MappingProxyType
 
-from ..model import OptionError, explain
+from ..model import OptionError
 from .friction import dry_friction, leine_stick_slip, stick_slip_exponential
 from .impacts import bouncing_ball, impact_oscillator, kelvin_voigt_bounce
 from .models import harvested_prey_predator, state_dependent_jump, welander_box
@@ -152,11 +152,7 @@ def by_name(name: str) -> Problem:
     """
     if name not in PROBLEMS:
         raise OptionError(
-            explain(
-                "name",
-                expected=f"one of {', '.join(PROBLEMS)}",
-                received=repr(name),
-                advice="`python -m nonsmooth list` prints them with their titles.",
-            )
+            f"name: expected one of {', '.join(PROBLEMS)}, received {name!r}. `python -m "
+            "nonsmooth list` prints them with their titles."
         )
     return PROBLEMS[name]()

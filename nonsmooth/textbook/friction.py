@@ -1,4 +1,4 @@
-"""Oscillators with dry friction: they stick where the surface attracts from both sides."""
+"""Oscillators with dry friction."""
 
 from __future__ import annotations
 
@@ -39,13 +39,11 @@ def dry_friction() -> Problem:
         system,
         (3.0, 0.0),
         20.0,
-        (
-            stated("turn 1 (y1, t)", how.format(1), "-2.2", "3.14159265358979323846"),
-            stated("turn 2 (y1, t)", how.format(2), "1.4", "6.28318530717958647693"),
-            stated("turn 3 (y1, t)", how.format(3), "-.6", "9.42477796076937971539"),
-            stated("rest (y1, t)", "state and time of the entry", "-.2", "12.5663706143591729539"),
-            stated("end y1", "y1 at t_end, stuck", "-.2"),
-        ),
+        stated("turn 1 (y1, t)", how.format(1), "-2.2", "3.14159265358979323846"),
+        stated("turn 2 (y1, t)", how.format(2), "1.4", "6.28318530717958647693"),
+        stated("turn 3 (y1, t)", how.format(3), "-0.6", "9.42477796076937971539"),
+        stated("rest (y1, t)", "state and time of the entry", "-0.2", "12.5663706143591729539"),
+        stated("end y1", "y1 at t_end, stuck", "-0.2"),
         title="Dry friction brings an oscillator to rest",
         source="classical; closed form",
     )
@@ -89,21 +87,19 @@ def leine_stick_slip() -> Problem:
         system,
         (1.0, 0.2),
         50.0,
-        (
-            stated("slip time", _SLIP_STICK.format("slip ('-')"), "4.2959995254801548834"),
-            stated("stick time", _SLIP_STICK.format("stick ('s')"), "7.7050317693504237635"),
-            stated("x at re-stick", "x at an entry", "-.54100635387008475271"),
-            stated(
-                "period",
-                "simulate; time between successive exits from sticking",
-                "12.001031294830578647",
-            ),
-            stated(
-                "multipliers",
-                "eigenvalues of the monodromy matrix: smooth flow, saltation at entry and exit",
-                "1",
-                "0",
-            ),
+        stated("slip time", _SLIP_STICK.format("slip ('-')"), "4.2959995254801548834"),
+        stated("stick time", _SLIP_STICK.format("stick ('s')"), "7.7050317693504237635"),
+        stated("x at re-stick", "x at an entry", "-0.54100635387008475271"),
+        stated(
+            "period",
+            "simulate; time between successive exits from sticking",
+            "12.001031294830578647",
+        ),
+        stated(
+            "multipliers",
+            "eigenvalues of the monodromy matrix: smooth flow, saltation at entry and exit",
+            "1",
+            "0",
         ),
         title="Stick-slip with friction that weakens with velocity",
         source="Leine, van Campen, de Kraker & van den Steen 1998",
@@ -142,13 +138,11 @@ def stick_slip_exponential() -> Problem:
         system,
         (1.0, 0.2),
         50.0,
-        (
-            stated("exit (x1, x2)", "state at an exit", "1", ".2"),
-            stated("slip time", _SLIP_STICK.format("slip ('-')"), "4.703364997942"),
-            stated("landing x1", "x1 at an entry", ".0945189079719"),
-            stated("period", "time between successive exits", "9.230770458083"),
-            stated("multipliers", "eigenvalues of the monodromy matrix", "1", "0"),
-        ),
+        stated("exit (x1, x2)", "state at an exit", "1", "0.2"),
+        stated("slip time", _SLIP_STICK.format("slip ('-')"), "4.703364997942"),
+        stated("landing x1", "x1 at an entry", "0.0945189079719"),
+        stated("period", "time between successive exits", "9.230770458083"),
+        stated("multipliers", "eigenvalues of the monodromy matrix", "1", "0"),
         title="Periodic stick-slip",
         source="nosnoc_py, example periodic_stick_slip",
     )

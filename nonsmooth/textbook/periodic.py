@@ -1,4 +1,4 @@
-"""Systems known for their periodic orbits and the bifurcations of these."""
+"""Systems with periodic orbits and their bifurcations."""
 
 from __future__ import annotations
 
@@ -50,13 +50,11 @@ def multi_sliding_relay() -> Problem:
         system,
         (0.0, -0.001, -0.02),
         40.0,
-        (
-            stated("period", _FROM_RUN.format("its period"), "5.961836942613702773842"),
-            stated(
-                "multiplier",
-                _FROM_RUN.format("the one that is not structural"),
-                ".001805112240591306036108",
-            ),
+        stated("period", _FROM_RUN.format("its period"), "5.961836942613702773842"),
+        stated(
+            "multiplier",
+            _FROM_RUN.format("the one that is not structural"),
+            "0.001805112240591306036108",
         ),
         title="Relay feedback with a multi-sliding orbit",
         source="di Bernardo, Johansson & Vasca 2001; parameters of the nosnoc library",
@@ -99,26 +97,24 @@ def forced_dry_friction() -> Problem:
         system,
         (1.5, 0.0),
         100.0,
-        (
-            stated("turning point", _FROM_RUN.format("largest x"), "1.550602854686835330206"),
-            stated(
-                "multiplier (re, im)",
-                _FROM_RUN.format("of the pair, im > 0"),
-                "-.2014342020122446992105",
-                ".4273523322033219195279",
-            ),
-            stated(
-                "stick time",
-                _FROM_RUN.format("duration of a sliding leg"),
-                ".3031679627151890008652",
-                at=sticks,
-            ),
-            stated(
-                "multiplier",
-                _FROM_RUN.format("the one that is not zero"),
-                ".04780783649795189025117",
-                at=sticks,
-            ),
+        stated("turning point", _FROM_RUN.format("largest x"), "1.550602854686835330206"),
+        stated(
+            "multiplier (re, im)",
+            _FROM_RUN.format("of the pair, im > 0"),
+            "-0.2014342020122446992105",
+            "0.4273523322033219195279",
+        ),
+        stated(
+            "stick time",
+            _FROM_RUN.format("duration of a sliding leg"),
+            "0.3031679627151890008652",
+            at=sticks,
+        ),
+        stated(
+            "multiplier",
+            _FROM_RUN.format("the one that is not zero"),
+            "0.04780783649795189025117",
+            at=sticks,
         ),
         title="Forced oscillator with dry friction",
         source="Den Hartog 1931; Shaw 1986; numbers derived for this library",
@@ -165,13 +161,11 @@ def belt_oscillator() -> Problem:
         system,
         (2.193338910366844980359, -0.4233606899180944085419),
         14.7,
-        (
-            stated(
-                "multipliers",
-                "periodic_orbit from the start",
-                ".8407253925431134112291",
-                ".007192336124639061603273",
-            ),
+        stated(
+            "multipliers",
+            "periodic_orbit from the start",
+            "0.8407253925431134112291",
+            "0.007192336124639061603273",
         ),
         title="Friction oscillator at its grazing-sliding",
         source="Kowalczyk & di Bernardo 2005; digits derived for this library",
@@ -222,23 +216,19 @@ def simplest_walker() -> Problem:
         system,
         (angle, speed, 2 * angle, (1 - math.cos(2 * angle)) * speed),
         3.8,
-        (
-            stated("long step", _FROM_STATE.format("its period"), "3.88246375285137413757"),
-            stated(
-                "multiplier (re, im)",
-                _FROM_STATE.format("of the pair, im > 0"),
-                "-.1900998410658881460666",
-                ".5575987766820682687652",
-            ),
-            stated(
-                "short step", _FROM_STATE.format("its period"), "3.096105868078163699902", at=short
-            ),
-            stated(
-                "multiplier of short steps",
-                _FROM_STATE.format("the largest"),
-                "4.003864358929707178753",
-                at=short,
-            ),
+        stated("long step", _FROM_STATE.format("its period"), "3.88246375285137413757"),
+        stated(
+            "multiplier (re, im)",
+            _FROM_STATE.format("of the pair, im > 0"),
+            "-0.1900998410658881460666",
+            "0.5575987766820682687652",
+        ),
+        stated("short step", _FROM_STATE.format("its period"), "3.096105868078163699902", at=short),
+        stated(
+            "multiplier of short steps",
+            _FROM_STATE.format("the largest"),
+            "4.003864358929707178753",
+            at=short,
         ),
         title="Simplest walking model",
         source="Garcia, Chatterjee, Ruina & Coleman 1998; digits derived for this library",
@@ -286,19 +276,17 @@ def buck_converter() -> Problem:
         system,
         (12.0, 0.55, 0.0),
         0.02,
-        (
-            stated(
-                "multiplier (re, im)",
-                _FROM_RUN.format("of the pair, im > 0"),
-                "-.7527983687386007668290",
-                ".3353945246294842963954",
-            ),
-            stated(
-                "multiplier at the period doubling",
-                _FROM_RUN.format("the larger one in modulus"),
-                "-1.0",
-                at={"E": 24.51657282856337870174},
-            ),
+        stated(
+            "multiplier (re, im)",
+            _FROM_RUN.format("of the pair, im > 0"),
+            "-0.7527983687386007668290",
+            "0.3353945246294842963954",
+        ),
+        stated(
+            "multiplier at the period doubling",
+            _FROM_RUN.format("the larger one in modulus"),
+            "-1.0",
+            at={"E": 24.51657282856337870174},
         ),
         title="Buck converter up to its first period doubling",
         source="Fossas & Olivar 1996; digits from closed-form flows, derived for this library",

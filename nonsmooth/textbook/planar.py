@@ -1,4 +1,4 @@
-"""Small systems on the line and in the plane: crossing, sliding, repelling, cycles."""
+"""Systems on the line and in the plane: crossing, sliding, repelling, cycles."""
 
 from __future__ import annotations
 
@@ -42,15 +42,13 @@ def spiral_oscillator() -> Problem:
         system,
         (0.36787944117144233, 0.0),
         1.5707963267948966,
-        (
-            stated("crossing time", "time of the crossing", "1"),
-            stated("crossing state", "state at the crossing", "1", "0"),
-            stated(
-                "state at pi/2",
-                "simulate to t = pi/2",
-                "-1.5974603774506981221",
-                "-.76149362060601145276",
-            ),
+        stated("crossing time", "time of the crossing", "1"),
+        stated("crossing state", "state at the crossing", "1", "0"),
+        stated(
+            "state at pi/2",
+            "simulate to t = pi/2",
+            "-1.5974603774506981221",
+            "-0.76149362060601145276",
         ),
         title="Spiral oscillator",
         source="Nurkanovic, Sperl, Albrecht & Diehl 2024",
@@ -82,11 +80,9 @@ def scalar_sliding() -> Problem:
         FilippovSystem([x], surface=x, above=[-1], below=[3]),
         (-1.0,),
         1.0,
-        (
-            stated("switch time", "time of the entry", ".33333333333333333333"),
-            stated("end", "x at t_end, sliding", "0"),
-            stated("alpha", "weight of the field below while sliding", ".25"),
-        ),
+        stated("switch time", "time of the entry", "0.33333333333333333333"),
+        stated("end", "x at t_end, sliding", "0"),
+        stated("alpha", "weight of the field below while sliding", "0.25"),
         title="Scalar system that slides at 0",
         source="classical; closed form",
     )
@@ -117,11 +113,9 @@ def scalar_repelling() -> Problem:
         FilippovSystem([x], surface=x, above=[1], below=[-1]),
         (0.0,),
         1.0,
-        (
-            stated("time of the status", "t of the run that ends with NON_UNIQUE", "0"),
-            stated("x(1) leaving up", "simulate with start_mode='+'", "1"),
-            stated("x(1) leaving down", "simulate with start_mode='-'", "-1"),
-        ),
+        stated("time of the status", "t of the run that ends with NON_UNIQUE", "0"),
+        stated("x(1) leaving up", "simulate with start_mode='+'", "1"),
+        stated("x(1) leaving down", "simulate with start_mode='-'", "-1"),
         title="Repelling start",
         source="classical; closed form",
     )
@@ -156,13 +150,11 @@ def planar_relay() -> Problem:
         system,
         (1.5, -1.5),
         2.0,
-        (
-            stated("fold of F1", "x where L1 = 0 on the surface", "-2"),
-            stated("fold of F2", "x where L2 = 0 on the surface", "2"),
-            stated("x(2)", "slide from (1.5, -1.5): 1.5 exp(-4)", ".027473458333101270441"),
-            stated("pseudo-node", "zero of the sliding field", "0", "0"),
-            stated("slope of the sliding field", "along x at the pseudo-node", "-2"),
-        ),
+        stated("fold of F1", "x where L1 = 0 on the surface", "-2"),
+        stated("fold of F2", "x where L2 = 0 on the surface", "2"),
+        stated("x(2)", "slide from (1.5, -1.5): 1.5 exp(-4)", "0.027473458333101270441"),
+        stated("pseudo-node", "zero of the sliding field", "0", "0"),
+        stated("slope of the sliding field", "along x at the pseudo-node", "-2"),
         title="Planar relay system",
         source="derived for this library; closed form",
     )
@@ -201,12 +193,10 @@ def pseudo_hopf() -> Problem:
         system,
         (-0.3, 0.0),
         20.0,
-        (
-            stated("x0", "fixed point of the return map x -> x on y = 0", ".29546573405388314165"),
-            stated("period", "time of one return, 4 x0", "1.1818629362155325666"),
-            stated("multiplier", "slope of the return map at x0", ".65350727586702943"),
-            stated("pseudo-node", "x where the sliding field is zero", "-.01488578017961046"),
-        ),
+        stated("x0", "fixed point of the return map x -> x on y = 0", "0.29546573405388314165"),
+        stated("period", "time of one return, 4 x0", "1.1818629362155325666"),
+        stated("multiplier", "slope of the return map at x0", "0.65350727586702943"),
+        stated("pseudo-node", "x where the sliding field is zero", "-0.01488578017961046"),
         title="Pseudo-Hopf bifurcation of a fused focus",
         source="after Filippov 1988 and Kuznetsov, Rinaldi & Gragnani 2003",
     )
@@ -248,13 +238,9 @@ def piecewise_cycle() -> Problem:
         system,
         (0.5, 0.0),
         20.0,
-        (
-            stated("radius", "abs(x) on the cycle", "1"),
-            stated("period", "time of one return, 5 pi/3", "5.2359877559829887308"),
-            stated(
-                "multiplier", "slope of the return map, exp(-5 pi/3)", "0.0053215654788005829731"
-            ),
-        ),
+        stated("radius", "abs(x) on the cycle", "1"),
+        stated("period", "time of one return, 5 pi/3", "5.2359877559829887308"),
+        stated("multiplier", "slope of the return map, exp(-5 pi/3)", "0.0053215654788005829731"),
         title="Piecewise-smooth planar cycle",
         source="Dankowicz & Schilder 2013 (COCO)",
     )

@@ -1,4 +1,4 @@
-"""Coulomb friction in the plane: bodies that slide in two directions and come to rest, roll, or never do."""
+"""Coulomb friction in the plane: blocks, balls and a disc that slide in two directions."""
 
 from __future__ import annotations
 
@@ -50,12 +50,8 @@ def block_on_incline() -> Problem:
         system,
         (0.0, 0.0, 0.5, 1.2),
         6.0,
-        (
-            stated("rest (t)", "time of the entry", "3.9117151021004261582"),
-            stated(
-                "rest (x1, x2)", "x1, x2 at t_end", "1.5088602745103876547", "1.4858114548629446"
-            ),
-        ),
+        stated("rest (t)", "time of the entry", "3.9117151021004261582"),
+        stated("rest (x1, x2)", "x1, x2 at t_end", "1.5088602745103876547", "1.4858114548629446"),
         title="A block slides across an incline and stops",
         source="classical; closed form",
     )
@@ -96,11 +92,9 @@ def block_on_belt() -> Problem:
         system,
         (0.0, 0.0, 0.0, 1.6),
         5.0,
-        (
-            stated("carried away (x1, x2, t)", "state and time of the entry", "2.4", "3.2", "4"),
-            stated("halfway (x1, x2)", "x1, x2 at t = 2", ".6", "2.4"),
-            stated("end (x1, x2)", "x1, x2 at t_end", "3.6", "3.2"),
-        ),
+        stated("carried away (x1, x2, t)", "state and time of the entry", "2.4", "3.2", "4"),
+        stated("halfway (x1, x2)", "x1, x2 at t = 2", "0.6", "2.4"),
+        stated("end (x1, x2)", "x1, x2 at t_end", "3.6", "3.2"),
         title="A block on a moving belt: a parabola, then a ride",
         source="classical; closed form",
     )
@@ -140,13 +134,11 @@ def block_on_disc() -> Problem:
         system,
         (0.1, 0.0, 0.1, 0.3),
         4.0,
-        (
-            stated("sticks (t)", "time of the entry", ".59032684814857328464"),
-            stated(
-                "end (x1, x2)", "x1, x2 at t_end", "-.068615334375328191576", "-.13580414257916187"
-            ),
-            stated("friction on the disc", "smallest abs(x) that slides off, spin 1", ".5"),
+        stated("sticks (t)", "time of the entry", "0.59032684814857328464"),
+        stated(
+            "end (x1, x2)", "x1, x2 at t_end", "-0.068615334375328191576", "-0.13580414257916187"
         ),
+        stated("friction on the disc", "smallest abs(x) that slides off, spin 1", "0.5"),
         title="A block rides on a disc or slides off",
         source="classical; 66 digits",
     )
@@ -187,18 +179,11 @@ def cue_ball() -> Problem:
         system,
         (0.0, 0.0, 3.0, 0.0, 1.0, 2.0),
         1.0,
-        (
-            stated("rolls (t)", "time of the entry", ".65125032110085618069"),
-            stated(
-                "rolls (x1, x2)",
-                "x1, x2 at the entry",
-                "1.581607922673507867",
-                "-.1860715203145303",
-            ),
-            stated(
-                "rolls (v1, v2)", "v1, v2 at t_end", "1.857142857142857142", "-.5714285714285714"
-            ),
+        stated("rolls (t)", "time of the entry", "0.65125032110085618069"),
+        stated(
+            "rolls (x1, x2)", "x1, x2 at the entry", "1.581607922673507867", "-0.1860715203145303"
         ),
+        stated("rolls (v1, v2)", "v1, v2 at t_end", "1.857142857142857142", "-0.5714285714285714"),
         title="A cue ball curves, then rolls",
         source="Coriolis 1835; closed form",
     )
@@ -238,14 +223,12 @@ def turntable() -> Problem:
         system,
         (0.4, 0.2, 0.3, -0.5, -0.56, 1.02),
         20.0,
-        (
-            stated("period", "time of a circle", "16.916268134714271284"),
-            stated(
-                "opposite point (x1, x2)",
-                "x1, x2 after half a period",
-                "3.0923076923076923077",
-                "1.8153846153846154",
-            ),
+        stated("period", "time of a circle", "16.916268134714271284"),
+        stated(
+            "opposite point (x1, x2)",
+            "x1, x2 after half a period",
+            "3.0923076923076923077",
+            "1.8153846153846154",
         ),
         title="A sphere rolls in circles on a turntable",
         source="Earnshaw 1844; closed form",
@@ -289,15 +272,13 @@ def pivoting_disc() -> Problem:
         system,
         (0.0, 0.0, 0.0, 0.5, 0.2, 1.3),
         6.0,
-        (
-            stated("rest (t)", "time of the entry", "4.0610305700787107825"),
-            stated(
-                "rest (x1, x2, phi)",
-                "x1, x2, phi at t_end",
-                ".88077702581641480342",
-                ".35231081032656592",
-                "2.7183921471252567",
-            ),
+        stated("rest (t)", "time of the entry", "4.0610305700787107825"),
+        stated(
+            "rest (x1, x2, phi)",
+            "x1, x2, phi at t_end",
+            "0.88077702581641480342",
+            "0.35231081032656592",
+            "2.7183921471252567",
         ),
         title="A disc stops sliding and spinning at once",
         source="Farkas, Bartels, Unger & Wolf 2003; quadrature",
@@ -341,11 +322,9 @@ def shaken_block() -> Problem:
         system,
         (0.0, 0.0, 0.0, 0.0),
         30.0,
-        (
-            stated("speed in the end", "abs(v) at t_end", ".6"),
-            stated("slip in the end", "abs(h) at t_end", ".8"),
-            stated("least friction that holds", "largest mu_g that slides for ever", "2"),
-        ),
+        stated("speed in the end", "abs(v) at t_end", "0.6"),
+        stated("slip in the end", "abs(h) at t_end", "0.8"),
+        stated("least friction that holds", "largest mu_g that slides for ever", "2"),
         title="A block on a plate that is shaken in circles",
         source="classical; closed form",
     )

@@ -1,4 +1,4 @@
-"""A textbook problem and its reference values: what a test or a page of the manual reads."""
+"""A textbook problem and its reference values."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..flow import Trajectory, simulate
-from ..model import Array, FilippovSystem, OptionError, explain
+from ..model import Array, FilippovSystem, OptionError
 
 #: Values are compared to nine digits, or to their own if they have fewer.
 RELATIVE = 1e-9
@@ -31,7 +31,7 @@ class Reference:
     quantity : str
         Unique within its problem.
     value : float or tuple of float
-        The answer, known from outside the code.
+        The reference solution, known independently of this library.
     tolerance : float
         Largest error relative to each value; absolute where the value is 0.
     how : str
@@ -63,12 +63,8 @@ class Reference:
         found = np.atleast_1d(np.asarray(computed, dtype=float))
         if found.shape != known.shape:
             raise OptionError(
-                explain(
-                    self.quantity,
-                    expected=f"shape {known.shape}",
-                    received=f"shape {found.shape}",
-                    advice="Compare like with like; `how` says what the value is.",
-                )
+                f"{self.quantity}: expected shape {known.shape}, received shape {found.shape}. "
+                "Compare like with like; `how` says what the value is."
             )
         scale = np.where(known == 0.0, 1.0, np.abs(known))
         return float(np.max(np.abs(found - known) / scale))
@@ -98,7 +94,7 @@ class Reference:
 def stated(
     quantity: str, how: str, *digits: str, at: Mapping[str, float] | None = None
 ) -> Reference:
-    """Reference from decimal digits; few digits make the tolerance wider than 1e-9."""
+    """Reference from decimal digits; the tolerance is 1e-9, or wider for few digits."""
     numbers = [Decimal(d) for d in digits]
     tolerance = RELATIVE
     for text, number in zip(digits, numbers, strict=True):
@@ -125,7 +121,7 @@ class Problem:
     name : str
         Of the function that makes it.
     title : str
-        What the problem is, in a few words.
+        A short description.
     source : str
         Where it comes from.
     system : FilippovSystem
@@ -137,9 +133,9 @@ class Problem:
     t_end : float
         When its standard run ends.
     references : tuple of Reference
-        Answers that are known from outside the code.
+        Values known independently of this library.
     note : str
-        What is special or uncertain, e.g. parameters quoted from memory.
+        A remark, e.g. on parameters quoted from memory.
     """
 
     name: str
@@ -216,8 +212,7 @@ def problem(
     system: FilippovSystem,
     start: tuple[float, ...],
     t_end: float,
-    references: tuple[Reference, ...],
-    *,
+    *references: Reference,
     title: str,
     source: str,
     note: str = "",

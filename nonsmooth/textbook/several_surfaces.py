@@ -1,4 +1,4 @@
-"""Systems with more than one surface, and what Filippov's convention leaves open there."""
+"""Systems with several surfaces, and choices that Filippov's convention leaves open."""
 
 from __future__ import annotations
 
@@ -38,17 +38,15 @@ def two_relay_spiral() -> Problem:
         system,
         (1.0, 0.5),
         2.0,
-        (
-            stated(
-                "switch times 1 to 4",
-                "times of the first four crossings: 1/6, 5/9, 37/54, 59/81",
-                ".16666666666666666667",
-                ".55555555555555555556",
-                ".68518518518518518519",
-                ".72839506172839506173",
-            ),
-            stated("accumulation time", "Trajectory.accumulation_time", ".75"),
+        stated(
+            "switch times 1 to 4",
+            "times of the first four crossings: 1/6, 5/9, 37/54, 59/81",
+            "0.16666666666666666667",
+            "0.55555555555555555556",
+            "0.68518518518518518519",
+            "0.72839506172839506173",
         ),
+        stated("accumulation time", "Trajectory.accumulation_time", "0.75"),
         title="Filippov's spiral of two relays",
         source="Filippov 1988; closed form",
     )
@@ -95,20 +93,18 @@ def glass_loop() -> Problem:
         system,
         (0.75, 0.75),
         3.0,
-        (
-            stated(
-                "crossing times 1 to 4",
-                "times of the first four crossings: log(3/2), log(5/2), log(7/2), log(9/2)",
-                ".40546510810816438198",
-                ".91629073187415506518",
-                "1.25276296849536799569",
-                "1.50407739677627407337",
-            ),
-            stated(
-                "distance at crossing 4",
-                "abs(x - 1/2) + abs(y - 1/2) there: 1/9",
-                ".11111111111111111111",
-            ),
+        stated(
+            "crossing times 1 to 4",
+            "times of the first four crossings: log(3/2), log(5/2), log(7/2), log(9/2)",
+            "0.40546510810816438198",
+            "0.91629073187415506518",
+            "1.25276296849536799569",
+            "1.50407739677627407337",
+        ),
+        stated(
+            "distance at crossing 4",
+            "abs(x - 1/2) + abs(y - 1/2) there: 1/9",
+            "0.11111111111111111111",
         ),
         title="A negative loop of two genes",
         source="Glass & Pasternack 1978; closed form",
@@ -151,18 +147,16 @@ def ambiguous_exit() -> Problem:
         system,
         (0.0, 0.0, 0.0),
         3.0,
-        (
-            stated(
-                "exit time, bilinear",
-                "time at which x1 = 0 is left: 4 atan(1/2)",
-                "1.85459043600322446",
-            ),
-            stated(
-                "exit times allowed",
-                "over the convex hull: 8 log(6/5) and (8/3) log(5/2)",
-                "1.45857245435163701",
-                "2.44344195166441351",
-            ),
+        stated(
+            "exit time, bilinear",
+            "time at which x1 = 0 is left: 4 atan(1/2)",
+            "1.85459043600322446",
+        ),
+        stated(
+            "exit times allowed",
+            "over the convex hull: 8 log(6/5) and (8/3) log(5/2)",
+            "1.45857245435163701",
+            "2.44344195166441351",
         ),
         title="Exit of codimension two that is ambiguous",
         source="derived for this library; bilinear law after Jeffrey 2014",
@@ -215,11 +209,9 @@ def hidden_dynamics(*, nonlinear: bool = True) -> Problem:
         system,
         (0.0, 0.0),
         1.0,
-        (
-            stated("x2' off the surface", "second component of either field", "1"),
-            stated("x2' sliding, nonlinear", "x2(1) of a run; 2 lam^2 - 1 at lam = b", "-.92"),
-            stated("x2' sliding, linear", "x2(1) of a run with nonlinear=False", "1"),
-        ),
+        stated("x2' off the surface", "second component of either field", "1"),
+        stated("x2' sliding, nonlinear", "x2(1) of a run; 2 lam^2 - 1 at lam = b", "-0.92"),
+        stated("x2' sliding, linear", "x2(1) of a run with nonlinear=False", "1"),
         title="Hidden dynamics",
         source="Jeffrey 2018",
     )

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import casadi as ca
 import numpy as np
 
-from ..model import FilippovSystem, OptionError, explain
+from ..model import FilippovSystem, OptionError
 from .problem import RELATIVE, Problem, Reference, problem
 
 #: One example (sigma, nu) of each class of the decision table.
@@ -100,7 +100,7 @@ def two_fold(
         system,
         (0.0, 1.0, 0.6),
         2.0,
-        references,
+        *references,
         title=f"Normal form of the two-fold, {name}",
         source="Filippov 1988; Teixeira 1990; Colombo & Jeffrey 2011",
     )
@@ -111,17 +111,13 @@ def _by_label(
 ) -> tuple[tuple[int, int], tuple[float, float]]:
     if label not in TWO_FOLDS:
         raise OptionError(
-            explain(
-                "label",
-                expected=f"one of {', '.join(TWO_FOLDS)}, or two signs with nu=",
-                received=repr(label),
-                advice="The labels are the classes of the two-fold's decision table.",
-            )
+            f"label: expected one of {', '.join(TWO_FOLDS)}, or two signs with nu=, received "
+            f"{label!r}. The labels are the classes of the two-fold's decision table."
         )
     if nu is not None:
         raise OptionError(
-            f"nu: expected none with the label {label!r}, received {nu!r}. A label stands for one "
-            "example; give the signs sigma to choose nu."
+            f"nu: received {nu!r}, but the label {label!r} already fixes nu. Give the signs sigma to "
+            "choose nu."
         )
     return TWO_FOLDS[label]
 

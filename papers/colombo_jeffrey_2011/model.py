@@ -63,7 +63,7 @@ def arrivals(numbers: Numbers) -> int:
 @cache
 def repelling_arrivals(numbers: Numbers) -> int:
     """How many of the opposite ring, in repelling sliding, end there if they stay in the surface."""
-    system, folds = normal_form(numbers), ["L_F1 h", "L_F2 h"]
+    system, folds = normal_form(numbers), ["lambda0 = 1", "lambda0 = -1"]
     runs = [
         ns.flow.follow(system, [0.0, *-p], 20.0, mode="s", until=folds, tol=1e-9) for p in ring()
     ]

@@ -12,14 +12,14 @@ import pytest
 import bounce
 import nonsmooth as ns
 from benchmarks import (
-    chain,
-    orbits,
-    ours,
+    bounces_in_space,
+    burridge_knopoff,
+    library,
+    periodic_orbits,
     problems,
-    proofs,
+    proof_checks,
+    proof_times,
     reference,
-    space,
-    theorems,
     two_folds,
 )
 from benchmarks.peers import (
@@ -47,7 +47,7 @@ def test_peers_and_library_get_the_same_fields(name):
 def test_mpmath_scipy_and_the_library_agree(name):
     starts = problems.random_starts(2, seed=7)
     truth = reference.solve(name, starts)
-    for solve in (ours.reference_driver(name, 1e-13), scipy_dop853.make(name, 1e-11)):
+    for solve in (library.reference_driver(name, 1e-13), scipy_dop853.make(name, 1e-11)):
         ends = solve(starts)
         assert reference.error(ends, truth).max() < 1e-9
         assert (ends.itinerary == truth.itinerary).all()
@@ -83,43 +83,43 @@ def test_the_script_by_hand_gives_the_same_classes():
 
 
 def test_what_is_timed_is_proven():
-    assert len(proofs.zeros(2)().zeros) == 4 and proofs.two_fold()().proven
+    assert len(proof_times.zeros(2)().zeros) == 4 and proof_times.two_fold()().proven
 
 
 def test_theorems_have_judges_of_their_own():
-    found = theorems.lists(seed=1, systems=2, starts=10)
+    found = proof_checks.lists(seed=1, systems=2, starts=10)
     assert found.sound and found.starts == 20
 
 
 def test_a_chain_is_the_same_for_siconos_and_us(monkeypatch):
     """Its matrices give the field."""
     count, given = 3, []
-    system, x = chain.chain(count), np.arange(6.0)
+    system, x = burridge_knopoff.chain(count), np.arange(6.0)
 
     def peer(*_, **options):
         given.append(json.loads(options["input"]))
         return subprocess.CompletedProcess([], 0, '{"rows": []}', "")
 
-    monkeypatch.setattr(chain.subprocess, "run", peer)
-    chain.siconos("python", count, 1.0, [1e-2])
+    monkeypatch.setattr(subprocess, "run", peer)
+    burridge_knopoff.siconos("python", count, 1.0, [1e-2])
     p = given[0]
     for mode, lam in (("+++", 1.0), ("---", -1.0)):
         ours = np.ravel(system.evaluate(system.field(mode), x))
         push = np.array(p["push"]) @ np.full(count, -lam)  # Siconos' relay acts against the slip
         theirs = np.array(p["matrix"]) @ x + p["offset"] + push
         np.testing.assert_allclose(ours, theirs, atol=1e-14)
-    monkeypatch.delenv(chain.VARIABLE, raising=False)
-    found = chain.run(True, 2, 5.0, "reference")
+    monkeypatch.delenv(burridge_knopoff.VARIABLE, raising=False)
+    found = burridge_knopoff.run(True, 2, 5.0, "reference")
     assert found["same itinerary"] and found["nonsmooth"]["rows"][0]["error"] < 1e-9
 
 
-@pytest.mark.parametrize("name", orbits.CASES)
+@pytest.mark.parametrize("name", periodic_orbits.CASES)
 def test_orbits_of_library_and_peer_are_those_of_the_reference(name):
-    case = orbits.CASES[name]()
-    ours = orbits.errors(case, *_orbit(case.solve()))
+    case = periodic_orbits.CASES[name]()
+    ours = periodic_orbits.errors(case, *_orbit(case.solve()))
     assert ours["orbit"] < 1e-14 and ours["multipliers"] < 1e-11
     if name != "R1":  # the peer takes half a second
-        theirs = orbits.errors(case, *scipy_shooting.solve(name, 1e-9, whole=False))
+        theirs = periodic_orbits.errors(case, *scipy_shooting.solve(name, 1e-9, whole=False))
         assert 1e-13 < theirs["orbit"] < 1e-7 and theirs["multipliers"] < 0.02
 
 
@@ -129,9 +129,9 @@ def _orbit(orbit):
 
 
 def test_bounces_in_space_are_those_of_the_library():
-    x = space.starts(5)
-    many = ns.ensemble(space.system("linear"), x, problems.T_MAX, tol=1e-11)
+    x = bounces_in_space.starts(5)
+    many = ns.ensemble(bounces_in_space.system("linear"), x, problems.T_MAX, tol=1e-11)
     v, w = x[:, [1, 3]], x[:, 6:] - x[:, [1, 3]]
-    same = bounce.lift_off(space.TURF.in_3d(), v, -1.0, w, tol=1e-11)
+    same = bounce.lift_off(bounces_in_space.TURF.in_3d(), v, -1.0, w, tol=1e-11)
     assert np.abs(many.x[:, [1, 3]] - same.xdot).max() < 1e-10
     assert many.itinerary.tolist() == same.itinerary.tolist()

@@ -235,9 +235,9 @@ def test_a_start_off_a_set_goes_on_from_a_surface_that_repels(engine):
     assert held.itinerary == "*s" and held.status == ns.Status.NON_UNIQUE
     assert held.x[-1] == pytest.approx(np.zeros(3), abs=1e-11)
     for mode in ("s+", "ss"):
-        with pytest.raises(ns.OptionError, match=r"start_mode.*h0"):
+        with pytest.raises(ns.OptionError, match=r"^start_mode .*h0 = \[0.6, -0.8\] \('\*'\)"):
             run(start, mode)
-    with pytest.raises(ns.OptionError, match=r"start_mode.*h1"):
+    with pytest.raises(ns.OptionError, match=r"^start_mode .*h1 = 2 \('\+'\)"):
         run([0.6, -0.8, 2.0], "*s")
     assert "start_mode '*+' has 0" in run([0.0, 0.0, 0.0], "*+").message
 

@@ -1,8 +1,7 @@
-"""Results survive files, pickles and copies to the last bit, and say the same as tables and data sets."""
+"""Results survive files, pickles and copies to the last bit."""
 
 import copy
 import pickle
-import sys
 
 import casadi as ca
 import numpy as np
@@ -80,61 +79,13 @@ def test_files_that_are_none_are_refused(tmp_path):
     run().save(tmp_path / "cut")
     (tmp_path / "cut").write_bytes((tmp_path / "cut").read_bytes()[:-200])
     for name in ("missing", "text", "other.npz", "pickled", "cut"):
-        with pytest.raises(ns.OptionError, match="path"):
+        with pytest.raises(ns.OptionError, match=r"^path"):
             ns.load(tmp_path / name)
     run().save(tmp_path / "run")
-    with pytest.raises(ns.OptionError, match=r"Ensemble.*Trajectory"):
+    with pytest.raises(ns.OptionError, match=r"^path .*Trajectory"):
         ns.Ensemble.load(tmp_path / "run")
-    with pytest.raises(ns.OptionError, match="path"):
+    with pytest.raises(ns.OptionError, match=r"^path"):
         run().save(tmp_path / "no folder" / "run")
-
-
-def test_a_run_as_tables():
-    pandas = pytest.importorskip("pandas")
-    result = run()
-    points, events = result.to_pandas(), result.to_pandas("events")
-    assert isinstance(points, pandas.DataFrame) and list(points) == ["x", "v"]
-    assert np.array_equal(points.to_numpy(), result.x) and points.index.name == "t"
-    assert points.attrs["a"] == 0.4 and points.attrs["status"] == "REACHED_END"
-    assert events.kind.tolist() == [e.kind for e in result.events]
-    bumps = events[events.name == "bumper"]
-    assert len(bumps) and np.array_equal(bumps.v_after, -bumps.v)
-    assert result.to_pandas("samples").loc[1.0].tolist() == result(1.0).tolist()
-    with pytest.raises(ns.OptionError, match="'steps'"):
-        result.to_pandas("steps")
-    with pytest.raises(ns.OptionError, match="samples"):
-        ns.simulate(BLOCK, [0.0, 0.0], 1.0).to_pandas("samples")
-
-
-def test_an_ensemble_as_a_table_and_as_a_data_set():
-    pytest.importorskip("pandas")
-    pytest.importorskip("xarray")
-    result = many()
-    table, data = result.to_pandas(), result.to_xarray()
-    assert table.loc[(1, 0), "status"] == "NOT_FINITE" and table.index.names == [
-        "start_0",
-        "start_1",
-    ]
-    assert table.itinerary.tolist() == result.itinerary.ravel().tolist()
-    assert np.array_equal(table[["x", "v"]].to_numpy(), result.x.reshape(4, 2), equal_nan=True)
-    assert table.entry_count.tolist() == result.events["entry"].ravel().tolist()
-    assert data.x.dims == ("start_0", "start_1", "state") and data.state.values.tolist() == [
-        "x",
-        "v",
-    ]
-    assert np.array_equal(data.sample_x, result.sample_x, equal_nan=True)
-    assert data.sample_x.sel(state="x").dims == ("start_0", "start_1", "sample")
-    trajectory = run().to_xarray()
-    assert np.array_equal(trajectory.x.sel(state="v"), run().x[:, 1])
-    assert trajectory.sample_t.values.tolist() == [0.0, 1.0, 12.0]
-
-
-@pytest.mark.parametrize("name", ["pandas", "xarray"])
-def test_libraries_that_are_not_there_are_asked_for(name, monkeypatch):
-    monkeypatch.setitem(sys.modules, name, None)
-    for make in MADE.values():
-        with pytest.raises(ns.OptionError, match=f"to_{name}"):
-            getattr(make(), f"to_{name}")()
 
 
 def test_a_file_of_another_format_and_what_is_no_result_are_refused(tmp_path):
@@ -147,11 +98,11 @@ def test_a_file_of_another_format_and_what_is_no_result_are_refused(tmp_path):
     head = arrays["tree"].tobytes().replace(b'"format": ', b'"format": 9')
     assert head != arrays["tree"].tobytes()
     np.savez(path, **{**arrays, "tree": np.frombuffer(head, np.uint8)})
-    with pytest.raises(ns.OptionError, match=r"path.*format 9"):
+    with pytest.raises(ns.OptionError, match=r"^path .*format 9"):
         ns.load(path)
-    with pytest.raises(ns.OptionError, match="<object"):
+    with pytest.raises(ns.OptionError, match=r"^save .*<object"):
         saving._packed(object())
-    with pytest.raises(ns.OptionError, match="<U1"):
+    with pytest.raises(ns.OptionError, match=r"^save .*<U1"):
         saving._packed([np.array(["a"])])
 
 

@@ -1,7 +1,6 @@
 """Samples at sections, periods and given times are those of closed forms, in every engine."""
 
 import math
-import pickle
 
 import casadi as ca
 import numpy as np
@@ -154,33 +153,22 @@ def test_engines_and_chunks_agree_on_hits_of_random_runs():
         assert np.array_equal(small.sample_x, every[1].sample_x, equal_nan=True)
 
 
-def test_samples_survive_a_checkpoint_and_other_requests_are_another_problem(tmp_path):
-    work = ns.Work(checkpoint=tmp_path / "saved", chunk=2, threads=1)
-    starts = [[1.0, 0.0], [2.0, 0.0], [3.0, 0.0]]
-    first = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
-    again = ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.0], work=work)
-    assert np.array_equal(first.sample_x, again.sample_x)
-    assert np.array_equal(pickle.loads(pickle.dumps(again)).sample_t, first.sample_t)
-    with pytest.raises(ns.OptionError, match="another system"):
-        ns.ensemble(FALL, starts, 5.0, t_eval=[1.0, 2.5], work=work)
-
-
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"at": "h1"}, r"\bat\b.*'h1'"),
-        ({"at": "end"}, r"\bat\b.*'end'"),
-        ({"at": -1.0}, "period"),
-        ({"at": [x]}, r"\bat\b.*Section"),
-        ({"at": 50.0}, r"\bat\b.*periods"),
-        ({"at": ns.Section("entry", direction=1)}, "direction.*'entry'"),
-        ({"at": ns.Section(1.0, after=True)}, "direction"),
-        ({"at": "h0", "t_eval": [1.0]}, "t_eval.*at"),
-        ({"t_eval": [[1.0]]}, "t_eval"),
-        ({"t_eval": [2.0, 1.0]}, "t_eval.*back"),
-        ({"t_eval": [0.0, 11.0]}, r"t_eval.*11\.0"),
-        ({"t_eval": [math.nan]}, "t_eval.*finite"),
-        ({"t_eval": "all"}, "t_eval"),
+        ({"at": "h1"}, r"^at .*\['h0'\]"),
+        ({"at": "end"}, "^at "),
+        ({"at": -1.0}, "^period"),
+        ({"at": [x]}, "^at "),
+        ({"at": 50.0}, "^at .* 1 periods"),
+        ({"at": ns.Section("entry", direction=1)}, "^direction"),
+        ({"at": ns.Section(1.0, after=True)}, "^at .*direction="),
+        ({"at": "h0", "t_eval": [1.0]}, "^t_eval and at"),
+        ({"t_eval": [[1.0]]}, r"^t_eval .*\(1, 1\)"),
+        ({"t_eval": [2.0, 1.0]}, "^t_eval .* decrease"),
+        ({"t_eval": [0.0, 11.0]}, "^t_eval .* 11.0"),
+        ({"t_eval": [math.nan]}, "^t_eval .* finite"),
+        ({"t_eval": "all"}, "^t_eval .*'all'"),
     ],
 )
 def test_bad_requests_are_refused_by_name(options, message):
@@ -192,10 +180,10 @@ def test_bad_requests_are_refused_by_name(options, message):
 @pytest.mark.parametrize(
     ("options", "message"),
     [
-        ({"direction": 2}, "direction"),
-        ({"every": 0}, "every"),
-        ({"skip": -1}, "skip"),
-        ({"count": 0.5}, "count"),
+        ({"direction": 2}, "^direction"),
+        ({"every": 0}, "^every"),
+        ({"skip": -1}, "^skip"),
+        ({"count": 0.5}, "^count"),
     ],
 )
 def test_bad_sections_are_refused(options, message):
@@ -203,7 +191,7 @@ def test_bad_sections_are_refused(options, message):
         ns.Section("h0", **options)
 
 
-def test_an_ensemble_must_know_how_many_hits_to_keep():
+def test_an_ensemble_must_know_how_many_samples_to_keep():
     with pytest.raises(ns.OptionError, match="count"):
         ns.ensemble(TWO_SPRINGS, [0.0, 1.0], 10.0, at="h0")
 
@@ -256,9 +244,9 @@ def test_sections_beside_a_set_of_codimension_two() -> None:
             assert run(at).sample_t == pytest.approx(quarters[1:2], abs=1e-9)
     many = ns.ensemble(system, [[1.0, 0.0, 1.0, 0.0]], 9.5, at=ns.Section(z, 1, count=1))
     assert many.sample_t[0] == pytest.approx(quarters[1:2], abs=1e-9)
-    with pytest.raises(ns.OptionError, match=r"\bat\b.*'h2'"):
+    with pytest.raises(ns.OptionError, match=r"^at .*\['h0', 'h1'\]"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at="h2")
-    with pytest.raises(ns.OptionError, match=r"direction.*'h0'"):
+    with pytest.raises(ns.OptionError, match=r"^direction"):
         ns.simulate(system, [1.0, 0.0, 1.0, 0.0], 9.5, at=ns.Section("h0", direction=1))
 
 

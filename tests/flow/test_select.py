@@ -25,9 +25,9 @@ def test_the_reference_is_never_compiled(monkeypatch):
 def test_another_word_and_a_system_without_an_engine_are_refused():
     x = ca.SX.sym("x")
     system = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])
-    with pytest.raises(ns.OptionError, match="engine"):
+    with pytest.raises(ns.OptionError, match=r"^engine .*'fast'"):
         ns.simulate(system, [1.0], 1.0, engine="fast")
-    with pytest.raises(ns.OptionError, match="engine"):
+    with pytest.raises(ns.OptionError, match=r"^engine .*'compiled'"):
         select.use_compiled("compiled", supported=False)
 
 
@@ -38,7 +38,7 @@ def test_without_a_compiler_auto_warns_once_and_compiled_raises(monkeypatch):
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         assert not select.use_compiled("auto")
-    with pytest.raises(CompilerError, match="compiler"):
+    with pytest.raises(CompilerError, match="No C compiler"):
         select.use_compiled("compiled")
 
 

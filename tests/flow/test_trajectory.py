@@ -54,7 +54,7 @@ def test_segments_tile_the_run():
 @pytest.mark.parametrize("time", [-0.1, 15.1])
 def test_times_outside_the_run_are_refused_with_its_status(time):
     run = ns.simulate(SYSTEM, [3.0, 0.0], 15.0)
-    with pytest.raises(ns.PointError, match=r"time.*REACHED_END"):
+    with pytest.raises(ns.PointError, match=r"^time .*\[0.0, 15.0\].*REACHED_END"):
         run(time)
 
 

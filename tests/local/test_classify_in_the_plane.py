@@ -1,4 +1,4 @@
-"""classify names every class of random planar systems built with a known answer, and never guesses.
+"""classify names every class of random planar systems built with a known answer, or says degenerate.
 
 One system with parameters serves all draws: normal forms with random higher-order terms, bent by a
 random nonlinear change of coordinates, with h and both fields multiplied by positive functions,
@@ -420,11 +420,11 @@ def test_near_a_boundary_nothing_is_guessed(name):
         size = 10.0 ** -(1 + seed % 15)
         eps = size * (-1) ** (seed // 15)
         d = Draw([seed, 77])
-        truth, on = SHIFTS[name](d, eps)
+        expected, on = SHIFTS[name](d, eps)
         found = d.classify()
-        assert found.label in (truth, on) or found.kind == "degenerate", (eps, str(found))
+        assert found.label in (expected, on) or found.kind == "degenerate", (eps, str(found))
         if size >= 1e-3:
-            assert found.label == truth
+            assert found.label == expected
         if found.label == on:
             assert size <= 1e-7
         if 1e-13 < size <= 1e-7 and found.kind == "degenerate":

@@ -1,4 +1,4 @@
-"""Points that are on a boundary of the classification say on which; corners have the names of their parts."""
+"""Points on a boundary of the classification are degenerate and name it; corners are intersections."""
 
 import casadi as ca
 import numpy as np
@@ -44,15 +44,15 @@ def test_an_intersection_that_holds_still_is_a_pseudo_equilibrium():
     rest = ns.classify(system, [0.0, 0.0, 0.0])
     assert (rest.kind, rest.label) == ("pseudo-equilibrium", "stable pseudo-node")
     np.testing.assert_allclose(rest.detail.eigenvalues, [-1.0])
-    told = str(rest.detail)
-    assert "multipliers 0, 0" in told
-    assert "along the intersection ss -1" in told
+    description = str(rest.detail)
+    assert "multipliers 0, 0" in description
+    assert "along the intersection ss -1" in description
     moving = ns.classify(system, [0.0, 0.0, 0.3])
     assert (moving.kind, moving.label) == ("sliding", "attracting sliding")
     assert moving.margins["a pseudo-equilibrium"] > 0.1
 
 
-def test_a_corner_is_looked_at_as_one_surface_where_the_mode_says_so():
+def test_mode_selects_one_surface_at_a_corner():
     system = relays([x, y], [-lam, -kap])
     one = ns.classify(system, [0.0, 0.0], mode="s+")
     assert (one.kind, one.label) == ("sliding", "attracting sliding")
@@ -71,7 +71,7 @@ def test_a_surface_is_named_by_its_number():
         ns.local.intersection_range(system, [0.0, 0.0, 0.0], z, surfaces="x")
 
 
-def test_derivatives_that_do_not_exist_are_told_with_the_order():
+def test_derivatives_that_do_not_exist_are_refused_with_the_order():
     """L1 = x^(5/2) at x = 0: the third derivative of h along the orbit is finite, the fourth is not."""
     system = ns.FilippovSystem([x, y], surface=y, above=[1, x**2.5], below=[1, 1])
     message = "point.*max_order"

@@ -1,4 +1,4 @@
-"""Every result of a question about a point survives pickling and deep copies, and is read-only."""
+"""Every result of ``local`` survives pickling and deep copies, and is read-only."""
 
 import copy
 import pickle

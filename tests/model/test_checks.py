@@ -1,4 +1,4 @@
-"""What a user gives is read strictly, and every refusal is a NonsmoothError that says what is wrong."""
+"""Arguments are read strictly, and every refusal is a NonsmoothError that names the argument."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""The systems of ``tests/data/orbits.json``, by the names of the cases."""
+"""Cases of ``tests/data/orbits.json`` by their names: reference values, parameters and systems."""
 
 from __future__ import annotations
 
@@ -10,10 +10,13 @@ import casadi as ca
 
 import nonsmooth as ns
 
-CASES: dict[str, dict[str, Any]] = {
-    case["id"]: case["values"]
-    for case in json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
-}
+_DATA = json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
+CASES: dict[str, dict[str, Any]] = {case["id"]: case["values"] for case in _DATA}
+PARAMETERS: dict[str, dict[str, Any]] = {case["id"]: case.get("parameters", {}) for case in _DATA}
+
+
+def kinds(branch: ns.orbit.Branch) -> list[str]:
+    return [event.kind for event in branch.events]
 
 
 def symbols(names: str) -> list[ca.SX]:

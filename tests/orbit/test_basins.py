@@ -1,20 +1,15 @@
 """Basins have the boundaries of closed forms; interruptions lose nothing; statuses are labels."""
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.attractors import Search
+from nonsmooth.orbit.basins import Search
+from tests.orbit.periodic_cases import CASES
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[1] / "data" / "orbits.json").read_text())
-}
 x, y, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "lam"))
 WELL = ns.FilippovSystem([x, v], surface=x, multipliers=lam, field=[v, lam - x - 0.2 * v])
 QUIET = ns.Work(threads=1, progress=False)
@@ -24,10 +19,7 @@ QUIET = ns.Work(threads=1, progress=False)
 def test_thresholds_of_the_double_well_to_rounding_by_narrowing_the_grid():
     """B2: released at rest from x0; each threshold is bracketed by labels and narrowed."""
     for threshold, low, high in zip(
-        map(float, CASES["B2"]["values"]["thresholds"]),
-        (2.2, 3.1, 4.5),
-        (2.6, 3.6, 4.9),
-        strict=True,
+        map(float, CASES["B2"]["thresholds"]), (2.2, 3.1, 4.5), (2.6, 3.6, 4.9), strict=True
     ):
         for _ in range(6):
             axis = np.linspace(low, high, 41)
@@ -61,7 +53,7 @@ def test_a_repelling_circle_divides_rest_from_a_cycle():
     assert np.array_equal(crossing.labels == crossing.labels[6, 6], inside)
 
 
-def test_forced_systems_are_looked_at_after_each_period():
+def test_forced_systems_are_sampled_after_each_period():
     pushed = ns.FilippovSystem(
         [x], surface=x, multipliers=lam, field=[lam - x + 0.5 * ca.cos(t)], time=t
     )
@@ -76,10 +68,7 @@ def test_forced_systems_are_looked_at_after_each_period():
 
 def test_statuses_are_labels():
     system = ns.FilippovSystem(
-        [x, v],
-        field=[v, -1],
-        resets=ns.Reset(x, [x, -0.5 * v], -1),
-        stops=ns.Stop(x - 4, 1),
+        [x, v], field=[v, -1], resets=ns.Reset(x, [x, -0.5 * v], -1), stops=ns.Stop(x - 4, 1)
     )
     starts = [[1.0, 0.0], [1.0, 4.0], [-1e-3, 0.0], [-2e-3, 0.0]]
     found = ns.basins(system, starts, t_end=50.0, rounds=4, work=QUIET)
@@ -87,7 +76,7 @@ def test_statuses_are_labels():
     assert "stopped 25.00%" in repr(found)
 
 
-def test_what_runs_to_infinity_in_a_finite_time_has_failed():
+def test_escape_to_infinity_in_finite_time_is_labelled_failed():
     """x' = x^2 - 1 from 2 is infinite at ln(3)/2; from 0 it comes to -1."""
     found = ns.basins(
         ns.FilippovSystem([x], field=[x**2 - 1]), [[0.0], [2.0]], t_end=40.0, work=QUIET
@@ -119,11 +108,9 @@ def test_known_attractors_come_first_and_labels_survive_a_file(tmp_path):
     assert list(again.axes) == ["x", "v"]
 
 
-def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
-    tmp_path, monkeypatch
-):
+def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_store(tmp_path, monkeypatch):
     grid = {"x": np.linspace(-3, 3, 9), "v": np.linspace(-2, 2, 6)}
-    space = Search._look.__globals__
+    space = Search._sample.__globals__
     plain, calls, last = space["ensemble"], [], 10**6
 
     def ensemble(*args, **options):
@@ -135,7 +122,7 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
     monkeypatch.setitem(space, "ensemble", ensemble)
     truth = ns.basins(WELL, grid, t_end=160.0, work=QUIET)
     last, calls = len(calls), []
-    work = ns.Work(threads=1, progress=False, checkpoint=tmp_path / "saved")
+    work = ns.Work(threads=1, progress=False, store=tmp_path / "saved")
     cut = ns.basins(WELL, grid, t_end=160.0, work=work)
     assert not cut.complete and "interrupted" in repr(cut)
     decided = cut.labels != 0
@@ -165,6 +152,6 @@ def test_an_interrupted_search_keeps_its_labels_and_goes_on_from_a_checkpoint(
         ([0.0, 0.0], {"attractors": [[1.0]]}, ns.PointError, "attractors"),
     ],
 )
-def test_bad_requests_are_refused(grid, options, error, message):
+def test_invalid_arguments_raise(grid, options, error, message):
     with pytest.raises(error, match=message):
         ns.basins(WELL, grid, **{"t_end": 10.0, **options})

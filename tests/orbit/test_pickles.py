@@ -11,19 +11,11 @@ import nonsmooth as ns
 
 x, y, v, mu, a, b = (ca.SX.sym(s) for s in ("x", "y", "v", "mu", "a", "b"))
 SPRINGS = ns.FilippovSystem(
-    [x, v],
-    surface=x,
-    above=[v, -x + mu * (1 - x**2) * v],
-    below=[v, -4 * x],
-    parameters={mu: 0.5},
+    [x, v], surface=x, above=[v, -x + mu * (1 - x**2) * v], below=[v, -4 * x], parameters={mu: 0.5}
 )
 SADDLE = ns.FilippovSystem([x, y], surface=y, above=[x + y, -1], below=[x, 1])
 TURN = ns.FilippovSystem(
-    [x, y],
-    surface=y,
-    above=[a + b * x - x**3, 1 - y],
-    below=[1, 1],
-    parameters={a: 0.0, b: 0.5},
+    [x, y], surface=y, above=[a + b * x - x**3, 1 - y], below=[1, 1], parameters={a: 0.0, b: 0.5}
 )
 
 
@@ -71,7 +63,7 @@ RESULTS = {
 
 
 @pytest.mark.parametrize("kind", RESULTS)
-def test_a_copy_says_and_computes_the_same(kind):
+def test_a_copy_has_the_same_results(kind):
     make, question = RESULTS[kind]
     result = make()
     assert type(result).__name__ == kind

@@ -2,6 +2,7 @@
 
 from itertools import combinations, pairwise
 
+import casadi as ca
 import matplotlib
 import numpy as np
 import pytest
@@ -64,35 +65,19 @@ TOGETHER = {
 }  # fmt: skip
 
 
+RING = ["S+", "S+ R S+", "S- R S+", "S- S+", "S-", "S- R S-", "S+ R S-", "S+ S-", "S+"]
+ACROSS = [("S+ R S+", "S+ R S-"), ("S- R S+", "S- R S-"), ("S+", "S+ R S-"), ("S-", "S- R S+")]
+LAW = ["I+", "II+", "III+", "III-", "II-", "I-"]
+#: Pairs of colours in one picture, and of neighbours on maps of itineraries and of a law.
+PAIRS = {name: list(combinations(colours, 2)) for name, colours in TOGETHER.items()}
+PAIRS["itineraries"] = [(COLOURS[a], COLOURS[b]) for a, b in [*pairwise(RING), *ACROSS]]
+PAIRS["law"] = [(COLOURS[a], COLOURS[b]) for a, b in pairwise(LAW)]
+
+
 @pytest.mark.parametrize("eye", [np.eye(3), DEUTERANOPIA], ids=["most", "deuteranopia"])
-@pytest.mark.parametrize("name", TOGETHER)
+@pytest.mark.parametrize("name", PAIRS)
 def test_colours_that_appear_together_are_told_apart(name, eye):
-    close = {
-        (a, b): round(apart(a, b, eye), 1)
-        for a, b in combinations(TOGETHER[name], 2)
-        if apart(a, b, eye) < 15.0
-    }
-    assert close == {}
-
-
-@pytest.mark.parametrize("eye", [np.eye(3), DEUTERANOPIA], ids=["most", "deuteranopia"])
-def test_neighbours_on_a_map_of_itineraries_are_told_apart(eye):
-    ring = ["S+", "S+ R S+", "S- R S+", "S- S+", "S-", "S- R S-", "S+ R S-", "S+ S-", "S+"]
-    across = [("S+ R S+", "S+ R S-"), ("S- R S+", "S- R S-"), ("S+", "S+ R S-"), ("S-", "S- R S+")]
-    pairs = [*pairwise(ring), *across]
-    close = {
-        pair: round(apart(COLOURS[pair[0]], COLOURS[pair[1]], eye), 1)
-        for pair in pairs
-        if apart(COLOURS[pair[0]], COLOURS[pair[1]], eye) < 15.0
-    }
-    assert close == {}
-
-
-def test_the_simulated_eye_confuses_red_and_green():
-    assert apart("#FF0000", "#00FF00", np.eye(3)) > 150
-    red, green = "#B05000", "#6A7800"  # of about one lightness
-    assert apart(red, green, DEUTERANOPIA) < apart(red, green, np.eye(3)) / 2
-    assert np.allclose(DEUTERANOPIA.sum(axis=1), 1.0, atol=1e-5)  # white stays white
+    assert {pair for pair in PAIRS[name] if apart(*pair, eye) < 15.0} == set()
 
 
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
@@ -125,7 +110,25 @@ def test_fonts_are_true_type_whatever_the_settings(name, kind, tmp_path):
     assert unwanted not in content and wanted in content
 
 
-@pytest.mark.parametrize("eye", [np.eye(3), DEUTERANOPIA], ids=["most", "deuteranopia"])
-def test_neighbours_on_a_map_of_a_law_are_told_apart(eye):
-    ring = ["I+", "II+", "III+", "III-", "II-", "I-"]
-    assert all(apart(COLOURS[a], COLOURS[b], eye) > 15.0 for a, b in pairwise(ring))
+BLOCK = ns.FilippovSystem(
+    [ca.SX.sym("x"), V := ca.SX.sym("v")], surface=V - 1, above=[V, -1 - V], below=[V, 1 - V]
+)
+FILES = {
+    "two_fold": DRAWN["two_fold"],
+    "two_fold_3d": DRAWN["two_fold_3d"],
+    "phase_portrait": lambda: ns.plot.phase_portrait(BLOCK, (-1, 1, 0.5, 1.5)),
+    "trajectory": DRAWN["trajectory"],
+}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", FILES)
+def test_files_are_written_in_every_format_and_settings_are_left_alone(name, tmp_path):
+    pyplot = pytest.importorskip("matplotlib.pyplot")
+    before, known = dict(matplotlib.rcParams), pyplot.get_fignums()
+    figure = FILES[name]()
+    assert dict(matplotlib.rcParams) == before and pyplot.get_fignums() == known
+    for suffix, start in (("png", b"\x89PNG"), ("pdf", b"%PDF-"), ("svg", b"<?xml")):
+        figure.savefig(tmp_path / f"picture.{suffix}")
+        content = (tmp_path / f"picture.{suffix}").read_bytes()
+        assert content.startswith(start) and len(content) > 5000

@@ -1,5 +1,5 @@
-"""Every function that draws gives a picture fit for print: as wide as a page at most, text of 8 points,
-none cut off or on another, and no legend of more than six entries."""
+"""Every picture is fit for print: at most as wide as a page, text of 8 points, none cut off or
+overlapping, and no legend of more than six entries."""
 
 import dataclasses
 import io
@@ -12,7 +12,7 @@ from matplotlib.image import imread
 import bounce
 import nonsmooth as ns
 from nonsmooth.orbit import Basins
-from nonsmooth.plot.print_figure import PrintFigure
+from nonsmooth.plot.style import PrintFigure
 from papers.pictures import faults
 
 x, v, mu = (ca.SX.sym(name) for name in ("x", "v", "mu"))

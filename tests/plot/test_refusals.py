@@ -1,4 +1,4 @@
-"""A picture of what it cannot show is refused with the reason; legends and titles are as asked for."""
+"""Pictures refuse systems and results that they cannot show; legends and titles follow their options."""
 
 import casadi as ca
 import pytest
@@ -8,32 +8,32 @@ import nonsmooth as ns
 x, y, z, t, lam, kap, a = (ca.SX.sym(s) for s in ("x", "y", "z", "t", "lam", "kap", "a"))
 
 
+def system(n, field=None, **more):
+    """A system of n states, with the surface x = 0 unless its definition is given."""
+    given = {"surface": x, "above": [1] * n, "below": [1] * n} if field is None else {}
+    return ns.FilippovSystem([x, y, z][:n], **given, **({"field": field} if field else {}), **more)
+
+
 @pytest.mark.parametrize(
-    ("system", "received"),
-    [
-        (1, "sliding_portrait.*int"),
-        (ns.FilippovSystem([x, y], surface=x, above=[1, 1], below=[1, 1]), "2 states"),
-        (
-            ns.FilippovSystem(
-                [x, y, z], surfaces=[x, y], multipliers=[lam, kap], field=[-lam, -kap, 1]
-            ),
-            "2 surfaces",
-        ),
-        (
-            ns.FilippovSystem([x, y, z], surface=x, above=[1, 1, t], below=[1, 1, 1], time=t),
-            "time",
-        ),
-        (
-            ns.FilippovSystem(
-                [x, y, z], surface=x, multipliers=lam, field=[lam**3, 1, 1], hidden=True
-            ),
-            "hidden",
-        ),
-    ],
+    ("draw", "n"), [(ns.plot.phase_portrait, 2), (ns.plot.sliding_portrait, 3)]
 )
-def test_a_sliding_portrait_is_of_three_autonomous_states_and_one_surface(system, received):
-    with pytest.raises(ns.DefinitionError, match=received):
-        ns.plot.sliding_portrait(system, (-1, 1, -1, 1))
+def test_portraits_are_of_autonomous_systems_with_one_surface(draw, n):
+    two = {"surfaces": [x, y], "multipliers": [lam, kap]}
+    hidden = {"surface": x, "multipliers": lam, "hidden": True}
+    rest = [1] * (n - 2)
+    timed = ns.FilippovSystem(
+        [x, y, z][:n], surface=x, above=[1, t, *rest], below=[1, 1, *rest], time=t
+    )
+    for wrong, received in (
+        (1, "FilippovSystem"),
+        (system(5 - n), f"{5 - n} states: x, y"),
+        (system(n, [y, -x, *rest]), "0 surfaces"),
+        (system(n, [-lam, -kap, *rest], **two), "2 surfaces"),
+        (timed, "explicit time"),
+        (system(n, [lam**3, 1, *rest], **hidden), "hidden dynamics"),
+    ):
+        with pytest.raises(ns.DefinitionError, match=received):
+            draw(wrong, (-1, 1, -1, 1))
 
 
 @pytest.mark.parametrize("orbits", [-1, 1.5, True])
@@ -58,7 +58,7 @@ def test_branches_of_different_parameters_are_not_drawn_in_one_picture():
     one, two = (
         ns.continue_equilibrium(system, [0.0, 1.0], name, bounds=(-0.1, 0.1)) for name in "ab"
     )
-    with pytest.raises(ns.OptionError, match=r"found.*one parameter"):
+    with pytest.raises(ns.OptionError, match=r"found.*parameter"):
         ns.plot.branch([one, two])
 
 

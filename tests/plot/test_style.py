@@ -1,4 +1,4 @@
-"""The look that pictures share can be used by others, and leaves matplotlib as it was."""
+"""The style of pictures works for other figures, and leaves matplotlib's settings alone."""
 
 import matplotlib
 import numpy as np

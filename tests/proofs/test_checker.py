@@ -1,27 +1,17 @@
-"""Saved proofs are checked by a program of its own, and altered ones are not."""
+"""The checker accepts saved proofs of special points and refuses altered ones."""
 
 import ast
 import json
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.proofs.checking import CHECKER, run
 
-CHECKER = Path(__file__).parents[2] / "checker"
 x, y, z = (ca.SX.sym(s) for s in "xyz")
-
-
-def run(path):
-    done = subprocess.run(
-        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
-    )
-    return done.returncode, done.stdout + done.stderr
 
 
 def proof_of(above, below, surface, near, **options):

@@ -1,4 +1,6 @@
-"""A proof that is interrupted keeps what was proven; what is no start, speed or range is refused."""
+"""An interrupted proof keeps its results; wrong starts, speeds and ranges raise errors."""
+
+from dataclasses import replace
 
 import casadi as ca
 import pytest
@@ -12,18 +14,22 @@ FALL = ns.FilippovSystem([x, y], surface=y, above=[1, -1], below=[1, 1])
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
 
 
-def test_a_map_of_proofs_keeps_its_decided_pieces(monkeypatch):
+@pytest.mark.parametrize("inside", [False, True])
+def test_a_map_of_proofs_keeps_its_decided_pieces(monkeypatch, inside):
+    """Also where the interrupt comes inside a proof, which then ends undecided."""
     real, calls = proven_module.certify, []
 
     def certify(*args, **options):
         calls.append(args)
+        if len(calls) == 4 and inside:
+            return replace(real(*args, **options), proven=False, why="interrupted")
         if len(calls) == 4:
             raise KeyboardInterrupt
         return real(*args, **options)
 
     monkeypatch.setattr(proven_module, "certify", certify)
     found = bounce.maps.proven_map(TURF, xdot=(0.2, 0.26), omega=(0.6, 0.7), depth=1)
-    assert found.interrupted
+    assert found.interrupted and len(calls) == 4
     sizes = (found.boxes[:, 1] - found.boxes[:, 0]) * (found.boxes[:, 3] - found.boxes[:, 2])
     assert sizes.sum() == pytest.approx(0.06 * 0.1)  # the whole range, decided or not
     assert found.area["undecided"] > 0

@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 import nonsmooth as ns
 from nonsmooth.proofs.arithmetic.enclosure import rounded
-from nonsmooth.proofs.arithmetic.instructions import Tape
+from nonsmooth.proofs.arithmetic.instructions import ExpressionGraph
 
 x, y, z, p, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "p", "a", "b"))
 BOX = [(-1, 1)] * 3
@@ -86,8 +86,8 @@ def test_a_box_is_printed_as_it_was_given():
 
 
 def test_a_fraction_is_not_read_as_the_decimal_of_the_equal_double():
-    tape = Tape()
-    assert tape.constant(0.1) != tape.constant(Fraction(0.1))
+    graph = ExpressionGraph()
+    assert graph.constant(0.1) != graph.constant(Fraction(0.1))
 
 
 def test_undecided_pieces_leave_pieces_for_the_rest():

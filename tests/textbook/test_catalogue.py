@@ -1,4 +1,4 @@
-"""The catalogue is complete and frozen, its numbers come with tolerances, and mistakes are named."""
+"""The catalogue is complete and frozen, its numbers have tolerances, and unknown names are refused."""
 
 import dataclasses
 import math

@@ -7,6 +7,7 @@ import math
 from ...model import Array, FilippovSystem
 from .. import messages
 from ..constants import KINDS, REASONS
+from ..names import guard_name
 from ..options import Options
 from ..status import ADVICE, Status
 from ..trajectory import Event, Segment, Steps, Trajectory
@@ -37,22 +38,30 @@ def trajectory(system: FilippovSystem, p: Array, options: Options, run: Run) -> 
 
 def _events(system: FilippovSystem, run: Run) -> list[Event]:
     modes, found = run.letters, []
-    for k, kind in enumerate(run.event_kinds):
-        before, after = modes[run.event_before[k]], modes[run.event_after[k]]
-        row = int(run.event_guards[k])
-        name = run.guards(before)[row].name if row >= 0 else _closed(run, before, after)
-        t = float(run.event_t[k])
+    known: dict[tuple[int, int, int], tuple[str, str, str, int, int]] = {}
+    numbers = (run.event_before, run.event_after, run.event_guards)
+    for k, key in enumerate(zip(*(a.tolist() for a in numbers), strict=True)):
+        if key not in known:
+            known[key] = _named(system, run, modes[key[0]], modes[key[1]], key[2])
+        before, after, name, *of = known[key]
+        t, kind = float(run.event_t[k]), KINDS[run.event_kinds[k]]
         states = run.event_x[k].copy(), run.event_after_x[k].copy()
-        before, after = system.spelled(before), system.spelled(after)
-        found.append(Event(KINDS[kind], t, states[0], before, after, name, states[1]))
+        found.append(Event(kind, t, states[0], before, after, name, states[1], *of))
     return found
 
 
-def _closed(run: Run, before: str, after: str) -> str:
-    """Names of the contacts that close together where impacts accumulate."""
-    closed = [g for g in run.guards(after) if g.kind == "release"]
-    opened = {g.name for g in run.guards(before) if g.kind == "release"}
-    return " and ".join(g.name for g in closed if g.name not in opened)
+def _named(
+    system: FilippovSystem, run: Run, before: str, after: str, row: int
+) -> tuple[str, str, str, int, int]:
+    """Modes, name, element and side of an event."""
+    if row >= 0:
+        own = [run.guards(before)[row]]
+    else:  # the contacts that close together where impacts accumulate
+        opened = [g for g in run.guards(before) if g.kind == "release"]
+        own = [g for g in run.guards(after) if g.kind == "release" and g not in opened]
+    name = " and ".join([guard_name(system, guard) for guard in own])
+    of = (own[0].element, own[0].side) if own else (-1, 0)
+    return system.spelled(before), system.spelled(after), name, *of
 
 
 def _segments(system: FilippovSystem, run: Run) -> list[Segment]:
@@ -73,8 +82,8 @@ def _message(system: FilippovSystem, options: Options, run: Run) -> str:
     status, t = Status(run.status), float(run.t[-1])
     if status is Status.REACHED_END:
         return messages.reached_end(options.t_end)
-    if status is Status.STOPPED and REASONS[run.reason] == "looked_at":
-        return messages.looked_at(run.where, t)
+    if status is Status.STOPPED and REASONS[run.reason] == "sampled":
+        return messages.sampled(run.where, t)
     if status is Status.STOPPED:
         return messages.stopped(system.stops[run.where][0], t)
     if status is Status.ACCUMULATION and REASONS[run.reason] == "pressed":

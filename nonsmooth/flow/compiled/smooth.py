@@ -167,35 +167,27 @@ class LegsProgram:
         self._places, self._count, self._parameters = places, count, parameters
         pointers = (ctypes.addressof(self._pointers), ctypes.addressof(self._events))
         self._c = _Legs(count, self.width, results, *places[1:7], *pointers)
-        self.pointer, self.size = ctypes.addressof(self._c), int(places[-1])
+        self._pointer, self._size = ctypes.addressof(self._c), int(places[-1])
 
     def __call__(
         self, z: Array, p: Array, durations: Array, tol: float, most_steps: int
     ) -> FlownLegs:
         """Fly all legs from states (L, width)."""
-        memory, parts = self._given(z, p, durations)
+        memory, _ = self._given(z, p, durations)
         left = ctypes.c_double()
         failed = _library().fly_legs(
-            ctypes.byref(self._c), memory.ctypes.data, tol, most_steps, ctypes.byref(left)
+            self._pointer, memory.ctypes.data, tol, most_steps, ctypes.byref(left)
         )
-        ends = parts[1].reshape(self._count, -1).copy()
-        return FlownLegs(ends, *self.found(memory), failed, left.value)
-
-    def parts(self, memory: Array) -> list[Array]:
-        """Parameters, states, durations, fields before and after, and results in the memory of a call."""
-        at = self._places
-        return [memory[at[k] : at[k + 1]] for k in range(6)]
-
-    def found(self, memory: Array) -> tuple[Array, Array, Array]:
-        """Fields before and after (L, width), and results (L, results), copied out of the memory of a call."""
         at, count = self._places, self._count
-        copied, first = memory[at[3] : at[6]].copy(), at[3]
-        before, after, results = (copied[at[k] - first : at[k + 1] - first] for k in (3, 4, 5))
-        return before.reshape(count, -1), after.reshape(count, -1), results.reshape(count, -1)
+        kept = memory[at[1] : at[6]].copy()  # the room for work is many times as large
+        ends, before, after, results = (
+            kept[at[k] - at[1] : at[k + 1] - at[1]].reshape(count, -1) for k in (1, 3, 4, 5)
+        )
+        return FlownLegs(ends, before, after, results, failed, left.value)
 
     def _given(self, z: Array, p: Array, durations: Array) -> tuple[Array, list[Array]]:
-        memory = np.empty(self.size)
-        parts = self.parts(memory)
+        memory, at = np.empty(self._size), self._places
+        parts = [memory[at[k] : at[k + 1]] for k in range(6)]
         parts[0][: self._parameters] = p
         parts[1][:] = z.ravel()
         parts[2][:] = durations
@@ -208,7 +200,7 @@ class LegsProgram:
         memory, parts = self._given(z, p, durations)
         left, rest = ctypes.c_double(), np.empty(len(parts[5]))
         failed = _library().fly_legs_extended(
-            ctypes.byref(self._c),
+            self._pointer,
             memory.ctypes.data,
             tol,
             most_steps,

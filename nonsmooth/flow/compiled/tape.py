@@ -5,14 +5,14 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import fields, replace
+from dataclasses import fields
 from functools import lru_cache
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, Coupled, FilippovSystem, Guard, coupled_of
+from ...model import Array, Coupled, FilippovSystem, coupled_of
 from ...model.printing.tape import Entries, Series, Tape, Values, tape_of
 from ..constants import FULL, RUNNING
 from ..options import Options
@@ -61,6 +61,8 @@ _FIRST = {"step": 64, "point": 128, "event": 64}
 
 #: How rooms grow: pages that are not written cost nothing, so by much as long as they are small (bytes).
 _SMALL, _MUCH, _LITTLE = 1 << 26, 16, 2
+#: Rows that are copied at once.
+_COPIED = 1 << 16
 
 #: Rooms of all kinds that C asks for before a step.
 _NEEDED = {"step": 2, "point": 4, "event": 4}
@@ -123,7 +125,8 @@ class Output:
             self._rooms[kind] = room * (_MUCH if small else _LITTLE)
             self._blocks[kind] = self._block(kind)
             for name, array in self._of(kind, size).items():
-                array[:] = written[name]
+                for k in range(0, size, _COPIED):  # Ctrl-C is heard between the pieces
+                    array[k : k + _COPIED] = written[name][k : k + _COPIED]
         self._point_to(counts)
 
     def filled(self, counts: Sequence[int]) -> dict[str, NDArray[Any]]:
@@ -289,7 +292,7 @@ class TapeEngine:
         self.system, self.order = system, order
         self.coupled = coupled_of(system)
         tape = system.cached("tape", lambda: tape_of(self.coupled))
-        self.guards = lru_cache(maxsize=4096)(self._guards)
+        self.guards = lru_cache(maxsize=4096)(self.coupled.guards)
         self._kept: list[NDArray[Any]] = []  # arrays that C points to
         self._c = self._structure(self.coupled, tape)
         self._steps, self._special, self._rooms = 0, None, rooms_of((0, 0, 0))
@@ -369,14 +372,6 @@ class TapeEngine:
 
     def _entries(self, e: Entries) -> _Entries:
         return _Entries(len(e.row), 0, self._at(e.row), self._at(e.column))
-
-    def _guards(self, mode: str) -> tuple[Guard, ...]:
-        """Guards of a mode, with the names that the reference driver gives them."""
-        found = self.coupled.guards(mode)
-        if self.system.coupled:
-            return found
-        names = {1: "L_F1 h", -1: "L_F2 h"}
-        return tuple(replace(g, name=names[g.side]) if g.kind == "exit" else g for g in found)
 
     # one trajectory ----------------------------------------------------------------------------
 

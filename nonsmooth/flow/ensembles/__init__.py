@@ -1,1 +1,1 @@
-"""Ensembles: many starts and parameters, in chunks, on several workers, in memory or in files."""
+"""Ensembles: many starts and parameters, run in chunks by several workers, in memory or on disk."""

@@ -1,4 +1,4 @@
-"""The work of an ensemble, one chunk of trajectories at a time, in this process or another."""
+"""Integration of one chunk of trajectories, in this process or another."""
 
 from __future__ import annotations
 
@@ -17,32 +17,28 @@ from ..constants import HAND_OVER, KINDS
 from ..options import Options
 from ..reference.driver import Driver
 from ..results import Chunk, Stopped, kinds_of
-from ..section import Times
+from ..section import Times, sampled
 from ..status import Status
-from ..view import sampled
 from .starts import Cut
 
 #: The reference driver's functions are built and evaluated by one thread at a time.
 _REFERENCE = threading.Lock()
 
 
-ENGINES = ("reference", "tape", "lanes")
-
-
 @dataclass(frozen=True)
 class Job:
-    """What every chunk of an ensemble has in common; small, and the same for all of them."""
+    """System and options that all chunks of an ensemble share."""
 
     system: FilippovSystem | bytes
     options: Options
     at: tuple[int, int] | None
     times: Times | None
     room: int | None
-    engine: str
+    engine: str  # reference, tape or lanes
 
 
 def shipped(job: Job) -> Job:
-    """Return the job in a form that other processes read, once each."""
+    """Return the job with its system pickled, which every other process reads once."""
     return job if isinstance(job.system, bytes) else replace(job, system=pickle.dumps(job.system))
 
 
@@ -59,8 +55,7 @@ def run_chunk(
     stop: Callable[[], bool] = lambda: False,
 ) -> Chunk:
     """Run the trajectories from extended starts x (m, N) with parameters p (np,) or (m, np)."""
-    # ``out`` has the arrays for the results, which are made unless given; ``stop`` is asked now and
-    # then whether to raise Stopped.
+    # Results go to ``out``, or to new arrays; where ``stop()`` returns true, Stopped is raised.
     system = _unpickled(job.system) if isinstance(job.system, bytes) else job.system
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(len(x), bool)
     start = np.where(bad[:, None], np.nan, x) if bad.any() else x
@@ -84,8 +79,8 @@ def run_chunk(
     return chunk
 
 
-def run_away(job: Job, cut: Cut) -> Chunk:
-    """Run the trajectories of a chunk that came from another process."""
+def run_cut(job: Job, cut: Cut) -> Chunk:
+    """Run the trajectories of a chunk that another process sent."""
     return run_chunk(job, *cut.rows())
 
 
@@ -109,7 +104,7 @@ def _run_compiled(
 
 
 def _refuse(chunk: Chunk, system: FilippovSystem, x: Array, options: Options) -> None:
-    """Give starts that are not finite their results, and leave the others to be run."""
+    """Write the results of starts that are not finite; mark the others to be run."""
     bad = ~np.all(np.isfinite(x), axis=1)
     chunk.x[bad], chunk.t[bad] = x[bad, : system.dimension], options.t_start
     chunk.status[:] = np.where(bad, Status.NOT_FINITE, HAND_OVER)
@@ -129,7 +124,7 @@ def _run_reference(
     job: Job,
     times: Array | None,
 ) -> str:
-    """Put the results of the reference driver into row i, which has the itinerary returned."""
+    """Write the results of the reference driver to row i and return its itinerary."""
     with _REFERENCE:
         run = Driver(system, x.copy(), p[i] if p.ndim > 1 else p, job.options).run()
     chunk.x[i], chunk.t[i], chunk.status[i] = run.x[-1], run.t[-1], run.status

@@ -1,39 +1,38 @@
-"""The verb ``ensemble``: many starts, many parameters, one result for each."""
+"""Integration of many trajectories, from arrays of starts and parameters."""
 
 from __future__ import annotations
 
 import hashlib
 import math
 from collections.abc import Mapping
-from contextlib import nullcontext
+from dataclasses import replace
 from typing import Any
 
 from numpy.typing import ArrayLike
 
-from ...model import FilippovSystem, OptionError, explain, require_system
+from ...model import FilippovSystem, OptionError, require_system
 from ..compiled.lanes.engine import lanes_for
 from ..compiled.tape import library, tape_for
 from ..constants import KINDS
 from ..options import Options, tolerances
 from ..results import Chunk, Collected, Ensemble
-from ..section import KINDS_OF_SECTIONS
+from ..section import KINDS_OF_SECTIONS, read_sampling, sectioned
 from ..select import compiled_or_none, use_compiled
-from ..view import read_view, sectioned
 from .chunks import Job
-from .lazy_starts import Drawn
-from .on_device import CHUNK, require_device, run_there
+from .lazy_starts import LazyStarts
+from .on_device import CHUNK, require_device, run_on_device
 from .starts import Starts
-from .stored import Stored
+from .store import Store
 from .work import Work, checked_work, run_all, size_of_chunk
 
-#: Fewer trajectories than this are not worth compiling the engine that runs several in step; nor those of
-#: systems with a set, which takes longer, unless it is asked for.
+#: Below so many trajectories the engine that runs several in step is not compiled; the second number is for
+#: systems with a set, which take longer to compile, with engine="auto".
 _FEW, _FEW_WITH_SETS = 64, 4000
 
 
 def ensemble(
     system: FilippovSystem,
-    x0: ArrayLike | Drawn,
+    x0: ArrayLike | LazyStarts,
     t_end: float,
     *,
     t_start: float = 0.0,
@@ -76,11 +75,11 @@ def ensemble(
     at : Section, str, number or expression, optional
         Keep the states at a section; one at events needs a ``count``. See :class:`Section`.
     work : Work, optional
-        Threads or an executor, size of a chunk, progress bar, checkpoint; see :class:`Work`.
+        Threads or an executor, size of a chunk, progress bar, store; see :class:`Work`.
     engine : {"auto", "reference", "compiled"}
-        Which driver: ``"auto"`` takes the compiled one where there is a compiler.
+        The driver: ``"auto"`` is the compiled one where there is a compiler.
     device : {None, "cuda"}, optional
-        ``"cuda"`` runs on an NVIDIA card; what is rare still runs here, by ``engine``. Needs the packages
+        ``"cuda"`` runs on an NVIDIA card; rare cases fall back to ``engine``. It needs the packages
         of ``nonsmooth-dynamics[cuda]``, and a system of at most one surface without resets and contacts.
 
     Returns
@@ -131,16 +130,16 @@ def ensemble(
     starts = Starts(system, x0, parameters, t_start)
     number = _event_number(at_event)
     p = starts.p if at is None else starts.every_parameter()
-    view = read_view(system, t_eval, at, options, p)
-    options = view.options
-    if options.hits is not None and view.room is None:
+    sampling = read_sampling(system, t_eval, at, options.t_start, options.t_end, p)
+    options = replace(options, hits=sampling.hits)
+    if options.hits is not None and sampling.room is None:
         raise OptionError(
-            "at: expected count= with a section at events in an ensemble, received none. It says how "
-            "many hits of each run are kept: at=nonsmooth.Section(..., count=100)."
+            "at is a section at events without a count, which an ensemble needs. Give "
+            "at=nonsmooth.Section(..., count=100) to keep up to 100 states of each run."
         )
-    step = view.room is None and t_end > t_start and device is None
+    step = sampling.room is None and t_end > t_start and device is None
     chosen = engine_for(system, options, engine, starts.count, step)
-    job = Job(system, options, number, view.times, view.room, chosen)
+    job = Job(system, options, number, sampling.times, sampling.room, chosen)
     if device is not None:
         require_device(job, device, work.executor is not None)
     return _run(job, starts, work, device)
@@ -148,29 +147,33 @@ def ensemble(
 
 def _run(job: Job, starts: Starts, work: Work, device: str | None) -> Ensemble:
     system, count = starts.system, starts.count
-    there = (
-        None if device is None else lambda first, out: run_there(job, device, starts, first, out)
+    away = (
+        None
+        if device is None
+        else lambda first, out: run_on_device(job, device, starts, first, out)
     )
     none = Chunk.empty(0, system, job.at is not None, job.room)
     most = work.largest(none.row_size)
     size = lambda: (
-        work.chunk or (size_of_chunk(job, starts, work.workers, most) if there is None else CHUNK)
+        work.chunk or (size_of_chunk(job, starts, work.workers, most) if away is None else CHUNK)
     )
-    saved = work.saved(lambda: _problem(system, starts, job, device), size)
-    with saved.alone() if isinstance(saved, Stored) else nullcontext():
-        arrays, codes = None, None
-        if isinstance(saved, Stored):
-            arrays, codes = saved.arrays(none, count), saved.codes(count)
-        results = Collected(system, starts.shape, job.at is not None, job.room, arrays)
-        run_all(job, starts, results, work, size() if saved is None else saved.chunk, saved, there)
+    collected = lambda arrays: Collected(system, starts.shape, job.at is not None, job.room, arrays)
+    if work.store is None:
+        results = collected(None)
+        run_all(job, starts, results, work, size(), None, away)
+        return results.ensemble()
+    store = Store(work.store, _problem(system, starts, job, device))
+    with store.opened(size):
+        results, codes = collected(store.arrays(none, count)), store.codes(count)
+        run_all(job, starts, results, work, store.chunk, store, away)
         return results.ensemble(codes)
 
 
 def engine_for(
     system: FilippovSystem, options: Options, engine: str, count: int, step: bool
 ) -> str:
-    """Return which of ``chunks.ENGINES`` runs."""
-    # It is compiled here, so that all chunks run the same one.
+    """Return the driver of all chunks: reference, tape or lanes."""
+    # It is compiled here, so that all chunks use the same one.
     lanes, tape = lanes_for(system, options) if step else None, tape_for(system, options)
     if not use_compiled(engine, tape is not None) or tape is None:
         return "reference"
@@ -193,12 +196,8 @@ def _event_number(at_event: tuple[str, int] | None) -> tuple[int, int] | None:
     except (TypeError, ValueError):
         pass
     raise OptionError(
-        explain(
-            "at_event",
-            expected=f"(kind, k) with a kind of {KINDS_OF_SECTIONS} and k from 1",
-            received=repr(at_event),
-            advice='For example ("crossing", 1). The ends of all runs are x of the result.',
-        )
+        f"at_event is {at_event!r}. Give (kind, k) with a kind of {KINDS_OF_SECTIONS} and k from 1, for "
+        'example ("crossing", 1). The ends of all runs are x of the result.'
     )
 
 

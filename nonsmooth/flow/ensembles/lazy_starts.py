@@ -1,4 +1,4 @@
-"""Starts that are made where they are needed, so that a billion of them needs no memory."""
+"""Grids and random starts, computed from their numbers, so that a billion of them needs no memory."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from typing import Any, Protocol, runtime_checkable
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, PointError, explain
+from ...model import Array, PointError
 
 Index = NDArray[np.int64]
 
 
 @runtime_checkable
-class Drawn(Protocol):
-    """Starts by number."""
+class LazyStarts(Protocol):
+    """Starts that are computed from their numbers."""
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -34,12 +34,12 @@ class Drawn(Protocol):
         ...
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts depend on."""
+        """Everything that the starts depend on."""
         ...
 
 
 class Grid:
-    """All combinations of some values of the states, made where they are needed.
+    """All combinations of some values of the states, computed where they are needed.
 
     Parameters
     ----------
@@ -72,10 +72,10 @@ class Grid:
 
     def __init__(self, axes: Sequence[ArrayLike]):
         if not isinstance(axes, Iterable):
-            raise PointError(f"axes: expected values for each state, received {axes!r}.")
+            raise PointError(f"axes is {axes!r}. Give the values of each state.")
         self._axes = [_axis(values, i) for i, values in enumerate(axes)]
         if not self._axes:
-            raise PointError("axes: expected values for each state, received none.")
+            raise PointError("axes is empty. Give the values of each state.")
 
     @property
     def shape(self) -> tuple[int, ...]:
@@ -113,15 +113,15 @@ class Grid:
         return f"Grid(shape {self.shape}, {self.dimension} states)"
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts are made from, so that a checkpoint knows them again."""
+        """Return everything that the starts depend on, for the hash of a store."""
         return "grid", [(a.shape, a.tobytes()) for a in self._axes]
 
 
 @dataclass(frozen=True)
 class RandomStarts:
-    """Starts distributed uniformly in a box, each made from its number and the seed alone.
+    """Starts distributed uniformly in a box, each computed from its number and the seed alone.
 
-    Which process makes them, and how many at a time, changes nothing.
+    They do not depend on the process that computes them, or on how many it computes at a time.
 
     Parameters
     ----------
@@ -130,7 +130,7 @@ class RandomStarts:
     low, high : array_like (n,)
         Corners of the box; equal numbers hold a state.
     seed : int, optional
-        Which random starts: from 0 to $2^64 - 1$.
+        Seed of the generator, from 0 to $2^64 - 1$.
 
     Attributes
     ----------
@@ -146,8 +146,8 @@ class RandomStarts:
 
     Notes
     -----
-    Component j of start i is drawn from output $i n + j$ of SplitMix64 (Steele, Lea & Flood 2014, "Fast
-    splittable pseudorandom number generators", fig. 17), its upper 53 bits over $2^53$.
+    Component j of start i is output $i n + j$ of SplitMix64 (Steele, Lea & Flood 2014, "Fast
+    splittable pseudorandom number generators", fig. 17), of which the upper 53 bits are divided by $2^53$.
 
     Examples
     --------
@@ -166,23 +166,17 @@ class RandomStarts:
         low, high = _axis(self.low, "low"), _axis(self.high, "high")
         if low.ndim != 1 or low.shape != high.shape or not np.all(low <= high) or not len(low):
             raise PointError(
-                explain(
-                    "low, high",
-                    expected="shape (n,) with low <= high in each state",
-                    received=f"{self.low!r} and {self.high!r}",
-                    advice="Give one number for each state in both.",
-                )
+                f"low is {self.low!r} and high is {self.high!r}. Give one number for each state in both, "
+                "with low <= high."
             )
         if not np.all(high / 2 - low / 2 <= np.finfo(float).max / 2):
             raise PointError(
-                f"low, high: expected a finite box, received {self.low!r}, {self.high!r}."
+                f"low is {self.low!r} and high is {self.high!r}. Give a box of finite size."
             )
         for name, least, most in (("count", 0, 2**53), ("seed", 0, 2**64 - 1)):
             value = getattr(self, name)
             if isinstance(value, bool) or not isinstance(value, int) or not least <= value <= most:
-                raise PointError(
-                    f"{name}: expected an integer from {least} to {most}, received {value!r}."
-                )
+                raise PointError(f"{name} is {value!r}. Give an integer from {least} to {most}.")
         object.__setattr__(self, "low", low)
         object.__setattr__(self, "high", high)
 
@@ -215,7 +209,7 @@ class RandomStarts:
         return low + (high - low) * part
 
     def state(self) -> tuple[Any, ...]:
-        """What the starts are made from, so that a checkpoint knows them again."""
+        """Return everything that the starts depend on, for the hash of a store."""
         low, high = np.asarray(self.low), np.asarray(self.high)
         return "random", self.count, low.tobytes(), high.tobytes(), self.seed
 
@@ -234,21 +228,21 @@ def _axis(values: ArrayLike, which: int | str) -> Array:
     try:
         array = np.array(values, dtype=float)
     except (TypeError, ValueError) as error:
-        raise PointError(f"{name}: expected numbers, received {values!r}.") from error
+        raise PointError(f"{name} is {values!r}. Give numbers.") from error
     if array.ndim > 1:
-        raise PointError(f"{name}: expected a number or shape (k,), received shape {array.shape}.")
+        raise PointError(f"{name} has shape {array.shape}. Give a number or shape (k,).")
     if not np.all(np.isfinite(array)):
-        raise PointError(f"{name}: expected finite numbers, received {values!r}.")
+        raise PointError(f"{name} is {values!r}. Give finite numbers.")
     array.flags.writeable = False
     return array
 
 
-def part_of(drawn: Drawn, shape: tuple[int, ...], index: Index) -> Array:
-    """States (m, n) of starts that are broadcast to ``shape``, by the numbers there."""
-    if drawn.shape == shape:
-        return drawn.at(index)
-    own = (1,) * (len(shape) - len(drawn.shape)) + drawn.shape
+def part_of(lazy: LazyStarts, shape: tuple[int, ...], index: Index) -> Array:
+    """States (m, n) of lazy starts broadcast to ``shape``, by their numbers in that shape."""
+    if lazy.shape == shape:
+        return lazy.at(index)
+    own = (1,) * (len(shape) - len(lazy.shape)) + lazy.shape
     where = np.unravel_index(index, shape)
     stay = [np.zeros_like(w) if size == 1 else w for w, size in zip(where, own, strict=True)]
     number = np.ravel_multi_index(tuple(stay), own) if math.prod(own) else index
-    return drawn.at(np.asarray(number, np.int64))
+    return lazy.at(np.asarray(number, np.int64))

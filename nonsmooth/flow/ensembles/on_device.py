@@ -1,4 +1,4 @@
-"""Ensembles on a GPU: what it is given of the starts, and what is left for this processor."""
+"""Ensembles on a GPU: its starts, and the runs that fall back to this processor."""
 
 from __future__ import annotations
 
@@ -15,27 +15,27 @@ from .chunks import Job, run_chunk
 from .lazy_starts import Grid, RandomStarts
 from .starts import Starts
 
-#: Trajectories of one call; each needs some 150 bytes of memory here and there.
+#: Trajectories of one call; each needs some 150 bytes of memory on the host and on the device.
 CHUNK = 1 << 22
 
 
 def require_device(job: Job, device: str, executor: bool) -> None:
-    """Refuse what a GPU does not run, and a GPU that is not there."""
+    """Raise where a GPU cannot run the job, or where there is none."""
     system = job.system
     assert isinstance(system, FilippovSystem)
-    wrong = _unsupported(system, job.options) or (
+    unsupported = _unsupported(system, job.options) or (
         "t_eval or at" if job.room is not None else "an executor" if executor else ""
     )
-    if wrong:
+    if unsupported:
         raise OptionError(
-            f"device: expected runs of a system with at most one surface, without sets, resets and "
-            f"contacts, for {device!r}, received {wrong}. Leave out device=."
+            f"device is {device!r}, which does not run {unsupported}. Leave out device=: it runs systems "
+            "of at most one surface, without sets, resets and contacts."
         )
     _kernel(job, device)
 
 
 def _unsupported(system: FilippovSystem, options: Options) -> str:
-    """What of a system or its options no kernel is made for."""
+    """The first property of a system or its options that no kernel supports; empty if there is none."""
     if system.sets:
         return "a system with a set of directions"
     if not supports_lanes(system):
@@ -53,12 +53,12 @@ def _kernel(job: Job, device: str) -> Kernel:
     return system.cached(key, lambda: Kernel(system, order, machine))
 
 
-def run_there(job: Job, device: str, starts: Starts, first: int, out: Chunk) -> Chunk:
-    """Run the trajectories from ``first`` on that ``out`` has rows for; what is rare runs here."""
+def run_on_device(job: Job, device: str, starts: Starts, first: int, out: Chunk) -> Chunk:
+    """Run the trajectories of the rows of ``out``; rare cases fall back to this processor."""
     kernel, count = _kernel(job, device), len(out.t)
-    drawn = _drawn(starts)
-    if drawn is not None:
-        kernel.run(drawn, first, count, starts.p, job.options, job.at, out)
+    source = _source(starts)
+    if source is not None:
+        kernel.run(source, first, count, starts.p, job.options, job.at, out)
     else:
         own, p, x = _rows(starts, first, count)
         kernel.run(own, 0, count, p, job.options, job.at, out)
@@ -70,27 +70,27 @@ def run_there(job: Job, device: str, starts: Starts, first: int, out: Chunk) -> 
     return out
 
 
-def reduced_there(
+def reduce_on_device(
     job: Job, device: str, starts: Starts, first: int, count: int, bins: Bins
 ) -> Reduced:
-    """Run some trajectories and return what becomes of them, with the numbers of those left for here."""
-    kernel, drawn = _kernel(job, device), _drawn(starts)
-    if drawn is not None:
-        return kernel.reduced(drawn, first, count, starts.p, job.options, bins)
+    """Sums over some trajectories, and the numbers of those that fall back to this processor."""
+    kernel, source = _kernel(job, device), _source(starts)
+    if source is not None:
+        return kernel.reduced(source, first, count, starts.p, job.options, bins)
     own, p, _ = _rows(starts, first, count)
     return kernel.reduced(own, 0, count, p, job.options, bins)
 
 
 def _rows(starts: Starts, first: int, count: int) -> tuple[Source, Array, Array]:
-    """Starts one by one, their parameters, and their states as given: NaN goes where a parameter is no number."""
+    """Starts with NaN where a parameter is no number, their parameters, and their states as given."""
     n = starts.system.dimension
     x, p = starts.part(first, first + count)
     bad = ~np.all(np.isfinite(p), axis=-1) if p.ndim > 1 else np.zeros(count, bool)
     return Source.rows(np.where(bad[:, None], np.nan, x[:, :n])), p, x[:, :n]
 
 
-def _drawn(starts: Starts) -> Source | None:
-    """Starts that a GPU makes from their numbers."""
+def _source(starts: Starts) -> Source | None:
+    """Lazy starts that a GPU computes itself, or None."""
     x0 = starts.x0
     if starts.varied or isinstance(x0, np.ndarray) or x0.shape != starts.shape:
         return None

@@ -1,4 +1,4 @@
-"""The verb ``outcomes``: what becomes of many runs, counted and averaged; none is kept."""
+"""Counts, means and histograms of the ends of many runs, none of which is kept."""
 
 from __future__ import annotations
 
@@ -11,36 +11,36 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, OptionError, explain, require_system, whole
+from ...model import Array, FilippovSystem, OptionError, require_system, whole
 from ..compiled.device.kernel import Bins, Reduced
 from ..options import Options, tolerances
 from ..results import Chunk
 from ..status import Status
 from .chunks import Job, run_chunk
 from .ensemble import engine_for
-from .lazy_starts import Drawn
-from .on_device import CHUNK, reduced_there, require_device
+from .lazy_starts import LazyStarts
+from .on_device import CHUNK, reduce_on_device, require_device
 from .starts import Starts
 from .work import Work, checked_work, run_all, size_of_chunk
 
 
 @dataclass(frozen=True)
 class Outcomes:
-    """What became of many runs.
+    """Counts, means and histograms of the ends of many runs.
 
     Attributes
     ----------
     count : int
         Number of runs.
     status : dict of Status to int
-        How many ended in which way.
+        Number of runs by status.
     itineraries : dict of str to int
-        How many had which itinerary, the most frequent first.
+        Number of runs by itinerary, the most frequent first.
     mean, std : dict of str to float
         Mean and standard deviation of the states and of the time ``"t"`` at the ends of runs that reached
         their end or a stop; NaN where there are none.
     edges, histogram : dict of str to ndarray (bins + 1,), (bins,)
-        Of the same, for the names that were asked for: what lies outside is not counted.
+        Of the same, for the names in ``ranges``: values outside are not counted.
     """
 
     count: int
@@ -54,7 +54,7 @@ class Outcomes:
 
 @dataclass
 class _Sums:
-    """Sums over runs, which grow as chunks arrive."""
+    """Sums over runs, chunk by chunk."""
 
     system: FilippovSystem
     bins: Bins
@@ -68,11 +68,11 @@ class _Sums:
         self.histogram = np.zeros((self.system.dimension + 1, self.bins.count), np.int64)
 
     def part(self, first: int, last: int) -> Chunk:
-        """Return arrays for some runs, that nobody keeps."""
+        """Return arrays for some runs."""
         return Chunk.empty(last - first, self.system, False)
 
     def put(self, first: int, chunk: Chunk) -> None:
-        """Take the runs of a chunk."""
+        """Add the runs of a chunk."""
         codes, counts = np.unique(chunk.itinerary, return_counts=True)
         self.words.update({chunk.words[k]: int(m) for k, m in zip(codes, counts, strict=True)})
         ends, counts = np.unique(chunk.status, return_counts=True)
@@ -83,19 +83,19 @@ class _Sums:
             self.histogram[k] += np.bincount(self.bins.places(k, v), minlength=self.bins.count)
 
     def add(self, found: Reduced) -> None:
-        """Take what was reduced elsewhere."""
+        """Add sums from a device."""
         self.words.update(found.words)
         self.status.update(found.status)
         self.sums += found.sums
         self.histogram += found.histogram
 
-    def outcomes(self, asked: Mapping[str, Any]) -> Outcomes:
+    def outcomes(self, ranges: Mapping[str, Any]) -> Outcomes:
         """Return the sums as a result."""
         done = self.status[Status.REACHED_END] + self.status[Status.STOPPED]
         names = (*self.system.state_names, "t")
         mean, square = (self.sums / done).T if done else np.full((2, len(names)), math.nan)
         std = np.sqrt(np.maximum(square - mean * mean, 0.0)) if done else mean
-        rows = {name: k for k, name in enumerate(names) if name in asked}
+        rows = {name: k for k, name in enumerate(names) if name in ranges}
         edge = lambda k: np.linspace(self.bins.low[k], self.bins.high[k], self.bins.count + 1)
         return Outcomes(
             count=self.status.total(),
@@ -110,7 +110,7 @@ class _Sums:
 
 def outcomes(
     system: FilippovSystem,
-    x0: ArrayLike | Drawn,
+    x0: ArrayLike | LazyStarts,
     t_end: float,
     *,
     t_start: float = 0.0,
@@ -124,10 +124,10 @@ def outcomes(
     engine: str = "auto",
     device: str | None = None,
 ) -> Outcomes:
-    """Integrate many trajectories and keep what becomes of them: counts, means and histograms.
+    """Integrate many trajectories and count their ends: by status and itinerary, means and histograms.
 
-    Nothing grows with their number; with ``device="cuda"`` and starts from a :class:`Grid` or
-    :class:`RandomStarts` they are made and reduced on the card.
+    Memory does not grow with their number. With ``device="cuda"`` and starts from a :class:`Grid` or
+    :class:`RandomStarts` they are computed and reduced on the card.
 
     Parameters
     ----------
@@ -144,7 +144,7 @@ def outcomes(
     ranges : mapping of str to (low, high), optional
         States, or ``"t"``, whose values at the ends are counted in bins of equal width.
     bins : int, optional
-        How many.
+        Number of bins.
     work : Work, optional
         Threads, executor, size of a chunk, progress bar.
     engine : {"auto", "reference", "compiled"}
@@ -162,7 +162,7 @@ def outcomes(
     PointError, ParameterError, DefinitionError, CompilerError, DeviceError
         As :func:`ensemble`.
     OptionError
-        An option out of its range; ranges of what is no state, or that are empty; a checkpoint or a store.
+        An option out of its range; ranges that are empty or of no state; a store.
 
     Examples
     --------
@@ -178,10 +178,8 @@ def outcomes(
     options = Options(t_end=t_end, t_start=t_start, rtol=rtol, atol=atol)
     require_system(system, sets=True)
     work = checked_work(work)
-    if work.checkpoint is not None or work.store is not None:
-        raise OptionError(
-            "work: expected no checkpoint and no store, received one. Nothing is kept."
-        )
+    if work.store is not None:
+        raise OptionError("work has a store, but outcomes keeps no runs. Leave out store=.")
     made = _Sums(system, _bins(system, ranges or {}, bins))
     starts = Starts(system, x0, parameters, t_start)
     step = t_end > t_start and device is None
@@ -197,7 +195,7 @@ def outcomes(
         size = work.chunk or CHUNK
         for first in range(0, starts.count, size):
             count = min(size, starts.count - first)
-            found = reduced_there(job, device, starts, first, count, made.bins)
+            found = reduce_on_device(job, device, starts, first, count, made.bins)
             made.add(found)
             if found.rest.size:
                 made.put(first, run_chunk(job, *starts.rows(first + found.rest)))
@@ -216,11 +214,7 @@ def _bins(system: FilippovSystem, ranges: Mapping[str, tuple[float, float]], bin
             good = False
         if not good:
             raise OptionError(
-                explain(
-                    "ranges",
-                    expected=f"names among {names}, each with finite (low, high), low < high",
-                    received=f"{name!r}: {given!r}",
-                    advice='For example ranges={"t": (0, 10)}.',
-                )
+                f"ranges has {name!r}: {given!r}. Give finite (low, high), low < high, for names among "
+                f"{names}."
             )
     return Bins(int(whole(bins, "bins")), low, high)

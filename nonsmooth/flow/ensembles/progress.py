@@ -1,4 +1,4 @@
-"""A bar that says how far a long computation is, on a terminal only."""
+"""Progress bar of a long computation, on a terminal only."""
 
 from __future__ import annotations
 
@@ -17,6 +17,6 @@ def progress_bar(total: int | None, shown: bool, unit: str = "run") -> Any:
     """Return a bar on a terminal, for work of more than a second; nothing elsewhere."""
     if not shown:
         return _NoBar()
-    from tqdm import tqdm  # here: it is not needed to import the library
+    from tqdm import tqdm  # only where a bar is shown
 
     return tqdm(total=total, disable=None, delay=1.0, unit=unit, unit_scale=True)

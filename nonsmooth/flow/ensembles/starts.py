@@ -1,4 +1,4 @@
-"""What many runs start from: states and parameters broadcast against each other."""
+"""Starts and parameters of many runs, broadcast against each other and cut into chunks."""
 
 from __future__ import annotations
 
@@ -11,21 +11,20 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces, explain
+from ...model import Array, FilippovSystem, OptionError, PointError, Surfaces
 from ..constants import ON_SURFACE
 from ..options import Options
 from ..reference.modes import rounding_scale
-from .lazy_starts import Drawn, Grid, Index, RandomStarts, part_of
+from .lazy_starts import Grid, Index, LazyStarts, RandomStarts, part_of
 
 
 @dataclass(frozen=True)
 class Cut:
-    """Starts and parameters of some trajectories on their way to another process, small where a
-    rule makes them."""
+    """Starts and parameters of some trajectories, sent to another process as a rule where there is one."""
 
     p: Array
     x: Array | None = None
-    drawn: Drawn | None = None
+    lazy: LazyStarts | None = None
     shape: tuple[int, ...] = ()
     first: int = 0
     last: int = 0
@@ -33,34 +32,30 @@ class Cut:
 
     def rows(self) -> tuple[Array, Array]:
         """Return the extended starts (m, N) and parameters."""
-        if self.x is not None or self.drawn is None:
+        if self.x is not None or self.lazy is None:
             assert self.x is not None
             return self.x, self.p
-        x = part_of(self.drawn, self.shape, np.arange(self.first, self.last))
+        x = part_of(self.lazy, self.shape, np.arange(self.first, self.last))
         return _extended(x, self.t_start), self.p
 
 
 class Starts:
-    """Starts and parameters, given out chunk by chunk."""
+    """Starts and parameters of all trajectories; any part of them is computed on request."""
 
     def __init__(
         self,
         system: FilippovSystem,
-        x0: ArrayLike | Drawn,
+        x0: ArrayLike | LazyStarts,
         parameters: Mapping[Any, ArrayLike] | None,
         t_start: float,
     ):
         self.system, self.t_start = system, t_start
-        self.x0 = x0 if isinstance(x0, Drawn) else _numbers(x0, "x0")
-        own = (*x0.shape, x0.dimension) if isinstance(x0, Drawn) else np.shape(self.x0)
+        self.x0 = x0 if isinstance(x0, LazyStarts) else _numbers(x0, "x0")
+        own = (*x0.shape, x0.dimension) if isinstance(x0, LazyStarts) else np.shape(self.x0)
         if own == () or own[-1] != system.dimension:
             raise PointError(
-                explain(
-                    "x0",
-                    expected=f"shape (..., {system.dimension}) for the states {system.state_names}",
-                    received=f"shape {own}",
-                    advice="States are on the last axis.",
-                )
+                f"x0 has shape {own}, but the system has {system.dimension} states, "
+                f"{system.state_names}. Give shape (..., {system.dimension})."
             )
         if parameters is not None and not isinstance(parameters, Mapping):
             system.parameter_vector(parameters)  # refuses what is no mapping
@@ -73,7 +68,7 @@ class Starts:
             self.shape = np.broadcast_shapes(*shapes)
         except ValueError as error:
             raise PointError(
-                f"x0 and parameters: expected shapes that broadcast, received {shapes}."
+                f"x0 and parameters have shapes {shapes}. Give shapes that broadcast."
             ) from error
         self.count = math.prod(self.shape)
 
@@ -99,7 +94,7 @@ class Starts:
         return self.rows(slice(first, last))
 
     def cut(self, first: int, last: int) -> Cut:
-        """Return the same for another process."""
+        """Starts and parameters of the trajectories first to last - 1, for another process."""
         if not isinstance(self.x0, (Grid, RandomStarts)):
             x, p = self.part(first, last)
             return Cut(p, x)
@@ -110,7 +105,7 @@ class Starts:
     def rows(self, which: slice | Index) -> tuple[Array, Array]:
         """Extended starts and parameters of some trajectories, by their numbers."""
         n = self.system.dimension
-        if not isinstance(self.x0, np.ndarray):  # asking for a protocol takes long
+        if not isinstance(self.x0, np.ndarray):  # isinstance with a protocol is slow
             x = part_of(self.x0, self.shape, _numbered(which))
         else:
             x = _rows(self.x0, self.shape, which, n)
@@ -132,29 +127,25 @@ def _extended(x: Array, t_start: float | None) -> Array:
 
 
 def require_start_mode(system: FilippovSystem, x: Array, p: Array, options: Options) -> None:
-    """Refuse a start mode with another side than the start (N,) has."""
+    """Raise OptionError where a start mode contradicts the sides of the start (N,)."""
     if options.start_mode is None or not system.surface_count:
         return
-    asked = options.start_mode
-    system.require_mode(asked)
+    mode = options.start_mode
+    system.require_mode(mode)
     h, gradient = Surfaces(system).values(x, p)
     scale = rounding_scale(np.abs(gradient), x, options.size)
     sides = np.sign(np.where(np.abs(h) <= ON_SURFACE * scale, 0.0, h))
-    said = []
+    wrong = []
     for k, members in enumerate(system.entries):
         own = list(members)
         letter = "*" if len(own) > 1 else "+" if sides[own[0]] > 0 else "-"
-        if np.any(sides[own]) and asked[k] != letter:
+        if np.any(sides[own]) and mode[k] != letter:
             value = ", ".join(f"{v:.6g}" for v in h[own])
-            said.append(f"h{k} = {value if len(own) == 1 else f'[{value}]'} ({letter!r})")
-    if said:
+            wrong.append(f"h{k} = {value if len(own) == 1 else f'[{value}]'} ({letter!r})")
+    if wrong:
         raise OptionError(
-            explain(
-                "start_mode",
-                expected=f"the sides of the start, where {', '.join(said)}",
-                received=repr(asked),
-                advice="Only on a surface or set, h = 0, is there a choice.",
-            )
+            f"start_mode is {mode!r}, but the start is where {', '.join(wrong)}. Give these letters; only "
+            "on a surface or set, h = 0, is there a choice."
         )
 
 
@@ -163,7 +154,7 @@ def _numbered(which: slice | Index) -> Index:
 
 
 def _rows(values: Array, shape: tuple[int, ...], which: slice | Index, n: int) -> Array:
-    """Some rows of values broadcast to ``(*shape, n)``, which is never made."""
+    """Some rows of values broadcast to ``(*shape, n)``, without an array of that shape."""
     if values.shape == (*shape, n):
         return values.reshape(-1, n)[which]
     index = np.unravel_index(_numbered(which), shape) if shape else ()
@@ -174,11 +165,11 @@ def _numbers(value: ArrayLike, what: str) -> Array:
     try:
         return np.asarray(value, dtype=float, order="C")
     except (TypeError, ValueError) as error:
-        raise PointError(f"{what}: expected numbers, received {value!r}.") from error
+        raise PointError(f"{what} is {value!r}. Give numbers.") from error
 
 
 def _sample(values: Array) -> float:
-    """Any finite entry: names are checked with it, entries later, one by one."""
+    """Any finite entry, to check names with; entries are checked one by one later."""
     if values.ndim == 0:
         return float(values)
     finite = values[np.isfinite(values)]

@@ -1,4 +1,4 @@
-"""How the work of an ensemble is done: chunks, threads or an executor, progress, checkpoints."""
+"""Running the chunks of an ensemble in threads or on an executor, with progress and a store."""
 
 from __future__ import annotations
 
@@ -16,28 +16,27 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from ...model import Array, OptionError, explain
+from ...model import Array, OptionError
 from ..results import Chunk
-from .checkpoint import Checkpoint
-from .chunks import Job, run_away, run_chunk, shipped
+from .chunks import Job, run_chunk, run_cut, shipped
 from .progress import progress_bar
 from .starts import Starts
-from .stored import Stored
+from .store import Store
 
-#: Chunks under way at once with an executor, and bytes of results of each: so much is on its way at most.
+#: Largest number of chunks in flight with an executor, and largest size of the results of each (bytes).
 _IN_FLIGHT, _SHIPPED = 64, 1 << 22
 
-#: How long a chunk should take, a run of several that is worth more than one chunk, and one that tells
-#: how long they take (seconds).
+#: Time of a chunk, of an ensemble that is worth several chunks, and of a probe that can be measured
+#: (seconds).
 _SECONDS, _WORTH, _PROBE = 1.0, 0.02, 0.002
 
-#: Trajectories in a chunk: at least so many where they are short, at most so many.
+#: Least number of short trajectories in a chunk, and largest number of any.
 _LEAST, _LARGEST = 256, 1 << 18
 
 
 @dataclass(frozen=True)
 class Work:
-    """How the work of an ensemble is done; the results do not depend on it.
+    """Threads, chunks and storage of an ensemble; the results do not depend on them.
 
     Parameters
     ----------
@@ -49,18 +48,16 @@ class Work:
         Trajectories in one piece of work; a few are timed to choose it unless given.
     progress : bool, optional
         A bar for runs of some seconds on a terminal; nothing in logs.
-    checkpoint : path, optional
-        A folder for finished chunks. A later call with the same problem goes on from there, with
-        bit-identical results; a checkpoint of another problem is refused.
     store : path, optional
-        A folder for the results themselves: arrays (``x.npy``, ...) that are mapped into memory,
-        written as chunks are finished. It is a checkpoint too. Results of any size need no memory;
-        starts need none as a :class:`Grid` or :class:`RandomStarts`.
+        A folder for the results: arrays (``x.npy``, ...) that are mapped into memory and filled chunk
+        by chunk, so that results of any size need no memory; starts need none as a :class:`Grid` or
+        :class:`RandomStarts`. After an interruption a call with the same problem computes the chunks
+        that are missing, with bit-identical results; the folder of another problem is refused.
 
     Raises
     ------
     OptionError
-        A number of threads or a chunk that is not positive; no executor; no path of a folder.
+        ``threads`` or ``chunk`` is not positive; ``executor`` is none; ``store`` is no path.
 
     Examples
     --------
@@ -76,89 +73,48 @@ class Work:
     executor: Executor | None = None
     chunk: int | None = None
     progress: bool = True
-    checkpoint: str | os.PathLike[str] | None = None
     store: str | os.PathLike[str] | None = None
 
     def __post_init__(self) -> None:
         _positive("chunk", 1 if self.chunk is None else self.chunk)
         _positive("threads", 1 if self.threads is None else self.threads)
-        _require_path("checkpoint", self.checkpoint)
-        _require_path("store", self.store)
-        if self.checkpoint is not None and self.store is not None:
+        if not (
+            self.store is None or (isinstance(self.store, (str, os.PathLike)) and str(self.store))
+        ):
             raise OptionError(
-                "checkpoint, store: expected one of them, received both. A store is a checkpoint too."
+                f'store is {self.store!r}. Give the path of a folder, for example store="sweep".'
             )
         if self.executor is not None and not isinstance(self.executor, Executor):
             raise OptionError(
-                explain(
-                    "executor",
-                    expected="a concurrent.futures.Executor",
-                    received=f"{self.executor!r} ({type(self.executor).__name__})",
-                    advice="ProcessPoolExecutor(), or dask.distributed.Client(...).get_executor().",
-                )
+                f"executor is {self.executor!r}, a {type(self.executor).__name__}. Give a "
+                "concurrent.futures.Executor, for example ProcessPoolExecutor() or "
+                "dask.distributed.Client(...).get_executor()."
             )
-
-    def saved(self, problem: Callable[[], str], size: Callable[[], int]) -> Checkpoint | None:
-        """Return where chunks are kept, if they are to be.
-
-        Parameters
-        ----------
-        problem : callable
-            Returns the hash of what the results depend on.
-        size : callable
-            Returns the size of a chunk, if nothing kept says it.
-
-        Raises
-        ------
-        OptionError
-            A folder that holds the results of another problem, or of another version.
-        """
-        if self.store is not None:
-            return Stored(self.store, problem(), size)
-        return None if self.checkpoint is None else Checkpoint(self.checkpoint, problem(), size)
 
     @property
     def workers(self) -> int:
-        """Number of chunks at once: the threads, or as many as an executor is given ahead."""
+        """Number of chunks in flight: the threads, or the limit for an executor."""
         return (self.threads or _processors()) if self.executor is None else _IN_FLIGHT
 
     def largest(self, row: int) -> int:
-        """Trajectories in a chunk at most, unless the user says how many.
-
-        Parameters
-        ----------
-        row : int
-            Bytes of the results of one.
-        """
+        """Largest number of trajectories in a chunk, for results of ``row`` bytes each."""
         return _LARGEST if self.executor is None else min(_LARGEST, max(1, _SHIPPED // row))
 
 
 def _positive(name: str, value: int) -> None:
     if not (isinstance(value, int) and value > 0):
-        raise OptionError(f"{name}: expected a positive integer, received {value!r}.")
-
-
-def _require_path(name: str, value: object) -> None:
-    if value is not None and not (isinstance(value, (str, os.PathLike)) and str(value)):
-        raise OptionError(
-            explain(
-                name,
-                expected="the path of a folder",
-                received=f"{value!r} ({type(value).__name__})",
-                advice=f'For example {name}="sweep".',
-            )
-        )
+        raise OptionError(f"{name} is {value!r}. Give a positive integer.")
 
 
 class Sink(Protocol):
-    """What takes finished chunks."""
+    """Collector of finished chunks."""
 
     def part(self, first: int, last: int) -> Chunk:
         """Return arrays for the results of some trajectories."""
         ...
 
     def put(self, first: int, chunk: Chunk) -> None:
-        """Take a chunk that begins with a trajectory."""
+        """Take a chunk that begins with trajectory ``first``."""
         ...
 
 
@@ -168,16 +124,16 @@ def run_all(
     results: Sink,
     work: Work,
     size: int,
-    saved: Checkpoint | None,
-    there: Callable[[int, Chunk], Chunk] | None = None,
+    store: Store | None,
+    on_device: Callable[[int, Chunk], Chunk] | None = None,
 ) -> None:
-    """Run all trajectories, chunk by chunk, except those that are kept."""
+    """Run all trajectories, chunk by chunk, except those in the store."""
     bar = progress_bar(starts.count, work.progress)
     missing = []
     for number in range(math.ceil(starts.count / size)):
         first = number * size
         like = results.part(first, min(first + size, starts.count))
-        done = saved.load(number, like) if saved is not None else None
+        done = store.load(number, like) if store is not None else None
         if done is None:
             missing.append(number)
         else:
@@ -186,29 +142,29 @@ def run_all(
     ends = ((k, k * size, min((k + 1) * size, starts.count)) for k in missing)
     workers = min(work.threads or _processors(), len(missing))
     try:
-        if there is not None:
-            chunks = ((k, there(a, results.part(a, b))) for k, a, b in ends)
+        if on_device is not None:
+            chunks = ((k, on_device(a, results.part(a, b))) for k, a, b in ends)
         else:
             chunks = _chunks(job, starts, results, ends, workers, work.executor)
         with closing(chunks) as finished:
             for number, chunk in finished:
                 results.put(number * size, chunk)
-                if saved is not None:
-                    saved.save(number, chunk)
+                if store is not None:
+                    store.save(number, chunk)
                 bar.update(len(chunk.t))
     finally:
         bar.close()
 
 
 def size_of_chunk(job: Job, starts: Starts, workers: int, most: int = _LARGEST) -> int:
-    """Trajectories that take about as long as one chunk should; a few of them are run to know."""
+    """Number of trajectories in a chunk, from the time that a few of them take."""
     count, k, spent = starts.count, 1, 0.0
     if count < 2:
         return 1  # nothing to divide
     while True:
         spent = _probe(job, starts, k)
         if _PROBE < spent < _SECONDS and 64 * k <= count:
-            spent = min(spent, _probe(job, starts, k))  # what is done once was done now
+            spent = min(spent, _probe(job, starts, k))  # without what is done only once
         if spent > _PROBE or 64 * k > count or (k >= _LEAST and 8 * spent > _PROBE):
             break
         k *= 8
@@ -229,7 +185,7 @@ def _probe(job: Job, starts: Starts, k: int) -> float:
 
 
 def _clock() -> float:
-    """Time that this thread has had a processor, however busy the machine is."""
+    """Processor time of this thread, which does not depend on the load of the machine."""
     fine = time.get_clock_info("thread_time").resolution < 1e-4
     return time.thread_time() if fine else time.perf_counter()
 
@@ -246,14 +202,14 @@ def _chunks(
     workers: int,
     executor: Executor | None,
 ) -> Generator[tuple[int, Chunk], None, None]:
-    """Finished chunks in the order in which they finish; a bounded number is under way."""
+    """Finished chunks in the order in which they finish; a bounded number is in flight."""
     if isinstance(executor, ThreadPoolExecutor):
         rows = ((k, *starts.part(a, b)) for k, a, b in pieces)
         yield from _submit(rows, lambda x, p: executor.submit(run_chunk, job, x, p), _IN_FLIGHT)
     elif executor is not None:
         job = shipped(job)
         cuts = ((k, starts.cut(a, b)) for k, a, b in pieces)
-        yield from _submit(cuts, lambda cut: executor.submit(run_away, job, cut), _IN_FLIGHT)
+        yield from _submit(cuts, lambda cut: executor.submit(run_cut, job, cut), _IN_FLIGHT)
     else:
         work = ((k, *starts.part(a, b), results.part(a, b)) for k, a, b in pieces)
         if workers < 2:
@@ -284,8 +240,8 @@ def _submit(
     work: Iterator[tuple[Any, ...]], submit: Callable[..., Future[_T]], limit: int
 ) -> Iterator[tuple[int, _T]]:
     """Results with their numbers, as they are finished."""
-    # A future is let go as soon as its result is there: a cluster keeps what a future stands for, and
-    # computes it again where the worker that had it is lost.
+    # A future is released with its result: a cluster keeps the result of every future, and computes it
+    # again where its worker is lost.
     pending: dict[int, Future[_T]] = {}
     finished: SimpleQueue[tuple[int, _T | None, BaseException | None]] = SimpleQueue()
     count = 0
@@ -301,7 +257,7 @@ def _submit(
                 try:
                     pending[item[0]] = submit(*item[1:])
                 except Exception:
-                    yield from _taken(finished)  # what is finished is saved first
+                    yield from _taken(finished)  # finished chunks are saved first
                     raise
                 count += 1
                 pending[item[0]].add_done_callback(partial(note, item[0]))
@@ -312,7 +268,7 @@ def _submit(
             if error is not None:
                 yield from _taken(finished)
                 raise error
-            yield number, result  # type: ignore[misc]  # there is one where there is no error
+            yield number, result  # type: ignore[misc]  # no error, so there is a result
             del result
     finally:
         for future in list(pending.values()):
@@ -322,7 +278,7 @@ def _submit(
 def _taken(
     finished: SimpleQueue[tuple[int, Any, BaseException | None]],
 ) -> Iterator[tuple[int, Any]]:
-    """What is there, without the errors."""
+    """Results that are finished, without errors."""
     try:
         while True:
             number, result, error = finished.get_nowait()
@@ -333,15 +289,11 @@ def _taken(
 
 
 def checked_work(work: Any) -> Work:
-    """What was given, or the default; OptionError where it is no Work."""
+    """A Work as it is, the default for None; OptionError otherwise."""
     if work is not None and not isinstance(work, Work):
         raise OptionError(
-            explain(
-                "work",
-                expected="a Work",
-                received=f"{work!r} ({type(work).__name__})",
-                advice="For example work=nonsmooth.Work(threads=2).",
-            )
+            f"work is {work!r}, a {type(work).__name__}. Give a Work, for example "
+            "nonsmooth.Work(threads=2)."
         )
     return work or Work()
 

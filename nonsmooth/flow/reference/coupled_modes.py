@@ -8,9 +8,9 @@ from collections.abc import Callable, Mapping, Sequence
 import numpy as np
 
 from ...model import Array, Coupled, FilippovSystem, Guard, Yardsticks, coupled_of
+from ...model.laws.coupled import MultiplierSeries, set_values
 from ...model.laws.frozen import Frozen, frozen
 from ...model.laws.layer import spirals_in
-from ...model.laws.multiplier_series import MultiplierSeries, set_values
 from ...model.laws.multipliers import newton_multipliers, sliding_multipliers
 from ..options import Options
 from .laws_of_sets import unknowns_of_sets

@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...model import Array, FilippovSystem
+from ...model import Array, FilippovSystem, Guard
+from ..names import guard_name
 from ..status import ADVICE, Status
 from ..trajectory import Event, Segment, Steps, Trajectory
 
@@ -42,13 +43,18 @@ class Record:
         x: Array,
         before: str,
         after: str,
-        name: str,
+        guard: Guard | None,
+        name: str = "",
         x_after: Array | None = None,
-    ) -> None:
-        """Note an event; a reset leads from ``x`` to ``x_after``."""
+    ) -> Event:
+        """Note an event of a guard, or one with a name; a reset leads from ``x`` to ``x_after``."""
         state = self._plain(x)
         following = state if x_after is None or x_after is x else self._plain(x_after)
-        self.events.append(Event(kind, t, state, before, after, name, following))
+        name = name or ("" if guard is None else guard_name(self.system, guard))
+        of = (-1, 0) if guard is None else (guard.element, guard.side)
+        event = Event(kind, t, state, before, after, name, following, *of)
+        self.events.append(event)
+        return event
 
     def trajectory(
         self, status: Status, message: str, accumulation_time: float | None = None

@@ -1,9 +1,9 @@
-"""Sets of codimension two and three at a point: regions, and the directions in which orbits come and go.
+"""Limit directions of sets of codimension two and three: the directions in which orbits come and go.
 
 Near a set h = 0 with a vector multiplier h' = a - M lambda, lambda = h/|h|. Orbits reach it or leave it
 along limit directions u, (M + s) u = a with |u| = 1; s is the rate r' of r = |h|. Where |M^-1 a| < 1 all
-rates are negative: sliding (friction holds: what slid sticks or rolls). Else one direction leads away:
-orbits cross, or pass by.
+rates are negative: sliding (friction holds, the body sticks or rolls). Otherwise one direction leads
+away: orbits cross, or pass by.
 
 Source: Antali & Stepan 2018, "Sliding and crossing dynamics in extended Filippov systems", SIAM J. Appl.
 Dyn. Syst. 17; 2019, "Nonsmooth analysis of three-dimensional slipping and rolling", Nonlinear Dyn. 97.
@@ -23,7 +23,6 @@ from ...model import (
     Parameters,
     PointError,
     coupled_of,
-    explain,
     require_system,
 )
 from ...model.checks import positive
@@ -44,7 +43,7 @@ class LimitDirection:
         $r'$ of $r = |h|$ along it: negative where orbits arrive.
     attracting : bool
         Whether nearby directions of h turn towards this one: all orbits close by that come or go do so
-        along it. Others are met by single orbits only.
+        along it. Other directions belong to single orbits.
     """
 
     direction: Array
@@ -161,12 +160,9 @@ def law_at(
     distance = float(np.linalg.norm(h[own]))
     if not distance <= tol * slope * (1.0 + float(np.linalg.norm(x))):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"a point on the set {system.surface_names[own[0]]} = 0",
-                received=f"h = {h[own].tolist()}",
-                advice="Limit directions belong to points of the set, where all components vanish.",
-            )
+            f"point {x}: expected a point on the set {system.surface_names[own[0]]} = 0, received "
+            f"h = {h[own].tolist()}. Limit directions belong to points of the set, where all "
+            "components vanish."
         )
     law = frozen(coupled, letters, x, np.zeros(coupled.count), p, own)
     if not (np.all(np.isfinite(law.a)) and np.all(np.isfinite(law.m))):
@@ -177,12 +173,8 @@ def law_at(
 def _members(system: FilippovSystem, surface: int | None) -> tuple[int, ...]:
     if not system.sets:
         raise DefinitionError(
-            explain(
-                "system",
-                expected="one with a vector multiplier, a set of codimension two or three",
-                received=repr(system),
-                advice="At a surface orbits arrive from two sides: see region.",
-            )
+            f"system: {system!r} has no vector multiplier, that is no set of codimension two or three. "
+            "At a surface orbits arrive from two sides: see region."
         )
     if surface is None:
         return system.sets[0]
@@ -209,12 +201,8 @@ def _letters(system: FilippovSystem, h: Array, members: tuple[int, ...], mode: s
         for entry in system.entries:
             if entry != members and not any(h[i] for i in entry):
                 raise PointError(
-                    explain(
-                        "point",
-                        expected=f"a side of {system.surface_names[entry[0]]}",
-                        received="a point on it too",
-                        advice="Say with mode= what the others do, one letter each.",
-                    )
+                    f"point: it is also on {system.surface_names[entry[0]]} = 0, so it has no side "
+                    "there. Give mode=, one letter for each surface and set."
                 )
     for i in members:
         letters[i] = "s"

@@ -1,12 +1,16 @@
-"""Where several surfaces meet: the modes in which the motion can go on, and whether sliding attracts.
+"""Intersections of surfaces: the modes in which the motion can go on, and whether sliding attracts.
 
 At a point of k surfaces the rates are w_i = grad h_i . f(x, lambda). A mode can go on if a surface that is
 left upward has lambda_i = +1 and w_i > 0, one that is left downward lambda_i = -1 and w_i < 0, and one that
-slides w_i = 0 with lambda_i between: a box-constrained complementarity problem. Filippov's set-valued
-field may leave more freedom than independent multipliers do (``intersection_range``).
+slides w_i = 0 with lambda_i between: a box-constrained complementarity problem.
+
+With independent multipliers (the bilinear law, which :func:`simulate` follows) the motion along an
+intersection is one of many convex combinations of the 2^k fields that stay on it;
+``intersection_range`` gives the range of all of them.
 
 Source: Filippov 1988, sec. 4 and 23; Dieci & Lopez 2011, "Sliding motion on discontinuity surfaces of high
-co-dimension", Numer. Math. 117; Jeffrey 2014 for independent multipliers.
+co-dimension", Numer. Math. 117; Jeffrey 2014, "Dynamics at a switching intersection: hierarchy,
+isonomy, and multiple sliding", SIAM J. Appl. Dyn. Syst. 13, 1082 (the canopy, here "bilinear").
 """
 
 from __future__ import annotations
@@ -14,6 +18,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -26,9 +31,9 @@ from ...model import (
     Parameters,
     PointError,
     coupled_of,
-    explain,
     layer_of,
     loop_at,
+    read_function,
     require_system,
     sliding_multipliers,
 )
@@ -37,10 +42,10 @@ from ...model.laws import complementarity
 from ..checks import require_surface
 from .surface_point import TOLERANCE
 
-#: So many surfaces are decided by trying all 3^k modes.
+#: Up to this number of surfaces all 3^k modes are tried.
 _TRIED = 5
 
-#: Growth across a layer below this, relative to its slope, is none.
+#: Growth across a layer below this, relative to its slope, counts as none.
 _NEUTRAL = 1e-9
 
 
@@ -171,41 +176,6 @@ def intersection(
     return Meeting.at_point(system, x, p, surfaces, positive(tol, "tol")).intersection()
 
 
-def _meeting(
-    system: FilippovSystem, x: Array, p: Array, surfaces: Sequence[int] | None, tol: float
-) -> list[int]:
-    """Surfaces through a point, checked."""
-    require_surface(system)
-    found = layer_of(system).at(x, np.zeros(system.surface_count), p)
-    lengths = np.linalg.norm(found.h_x, axis=1)
-    with np.errstate(divide="ignore", invalid="ignore"):
-        away = np.abs(found.h) / lengths / (1 + np.linalg.norm(x))
-    near = [i for i in range(system.surface_count) if away[i] <= tol]
-    chosen = near if surfaces is None else [system.surface_index(i) for i in surfaces]
-    if not chosen or set(chosen) - set(near):
-        raise PointError(
-            explain(
-                f"point {x}",
-                expected="a point where surfaces meet"
-                if surfaces is None
-                else f"a point of surfaces {chosen}",
-                received=f"h = {found.h.tolist()}",
-                advice="find_pseudo_equilibrium(system, near, mode=...) finds points of intersections; "
-                "raise tol if the point is rounded.",
-            )
-        )
-    if np.linalg.matrix_rank(found.h_x[chosen] / lengths[chosen, None]) < min(len(chosen), x.size):
-        raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"independent gradients of surfaces {chosen}",
-                received=f"{found.h_x[chosen].tolist()}",
-                advice="Two surfaces that touch are no intersection of this kind.",
-            )
-        )
-    return chosen
-
-
 class Meeting:
     """A point of some surfaces with its parameters."""
 
@@ -225,22 +195,38 @@ class Meeting:
 
     @classmethod
     def at_point(
-        cls,
-        system: FilippovSystem,
-        x: Array,
-        p: Array,
-        surfaces: Sequence[int] | None,
-        tol: float,
+        cls, system: FilippovSystem, x: Array, p: Array, surfaces: Sequence[int] | None, tol: float
     ) -> Meeting:
-        """The surfaces through a point, or those that are asked for."""
-        return cls(system, x, p, _meeting(system, x, p, surfaces, tol))
+        """The intersection at a point, of chosen surfaces or of all those through it."""
+        require_surface(system)
+        found = layer_of(system).at(x, np.zeros(system.surface_count), p)
+        lengths = np.linalg.norm(found.h_x, axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            away = np.abs(found.h) / lengths / (1 + np.linalg.norm(x))
+        near = [i for i in range(system.surface_count) if away[i] <= tol]
+        chosen = near if surfaces is None else [system.surface_index(i) for i in surfaces]
+        if not chosen or set(chosen) - set(near):
+            expected = "where surfaces meet" if surfaces is None else f"of surfaces {chosen}"
+            raise PointError(
+                f"point {x}: expected a point {expected}, received h = {found.h.tolist()}. "
+                "find_pseudo_equilibrium(system, near, mode=...) finds points of intersections; raise tol "
+                "if the point is rounded."
+            )
+        if np.linalg.matrix_rank(found.h_x[chosen] / lengths[chosen, None]) < min(
+            len(chosen), x.size
+        ):
+            raise PointError(
+                f"point {x}: expected independent gradients of surfaces {chosen}, received "
+                f"{found.h_x[chosen].tolist()}. Surfaces that touch are not supported."
+            )
+        return cls(system, x, p, chosen)
 
     def at(self, multipliers: Array) -> LayerNumbers:
         """Evaluate at multipliers (m,)."""
         return self.layer.at(self.x, multipliers, self.p)
 
     def intersection(self) -> Intersection:
-        """Look at all modes, or at the one that is the only one."""
+        """Find all modes that can go on."""
         candidates, complete = self._candidates()
         slacks = [(self._slack(lam, mode), mode, lam) for mode, lam in candidates]
         going = [self._continuation(mode, lam, s) for s, mode, lam in slacks if s >= 0.0]
@@ -268,13 +254,9 @@ class Meeting:
                     return [(self._mode(letters), self._with(lam))], True
         if k > _TRIED:
             raise DefinitionError(
-                explain(
-                    f"surfaces {self.surfaces}",
-                    expected=f"at most {_TRIED}, or rates whose complementarity problem is shown to have "
-                    "one solution (P-matrix)",
-                    received=f"{k} surfaces",
-                    advice="simulate says where a run goes from there.",
-                )
+                f"surfaces {self.surfaces}: {k} surfaces meet, but the modes of more than {_TRIED} are "
+                "found only if the matrix of their rates is a P-matrix. Use simulate to continue from "
+                "there."
             )
         every = list(product((1.0, -1.0, 0.0), repeat=k))
         return [pair for letters in every for pair in self._solved(np.array(letters))], True
@@ -343,8 +325,7 @@ class Meeting:
         return "unstable across" if growth > _NEUTRAL * np.abs(m).max() else "not shown"
 
     def _shrinks(self, lam: Array, m: Array, sign: float) -> bool:
-        """Whether V = sum_i d_i abs(h_i) (1 - lambda_i sgn h_i) is found that falls (sign -1) or rises
-        (+1) beside the intersection: in all regions, and sliding on fewer surfaces."""
+        """Whether V = sum_i d_i abs(h_i) (1 - lambda_i sgn h_i) falls (-1) or rises (+1) beside it."""
         if self.layer.affine and complementarity.attracts(-sign * m):
             return True
         if len(self.surfaces) > _TRIED:
@@ -369,3 +350,132 @@ class Meeting:
             bounds=[(0.0, 1.0)] * len(self.surfaces) + [(None, None)],
         )
         return found.x is not None and bool(found.x[-1] > _NEUTRAL)
+
+
+# the range of Filippov's convex set --------------------------------------------------------------
+
+
+def intersection_range(
+    system: FilippovSystem,
+    point: ArrayLike,
+    of: Any,
+    *,
+    surfaces: Sequence[int] | None = None,
+    parameters: Parameters | None = None,
+    t: float = 0.0,
+) -> tuple[float, float]:
+    """Range of d(of)/dt over all convex combinations of fields that stay on an intersection.
+
+    Parameters
+    ----------
+    system : FilippovSystem
+        With the surfaces that meet, and their multipliers.
+    point : array_like (n,)
+        A point on the surfaces.
+    of : expression
+        A function of states, parameters and time, such as one of the states.
+    surfaces : sequence of int, optional
+        Which surfaces meet; all of them by default.
+    parameters, t : optional
+        As in :func:`region`.
+
+    Returns
+    -------
+    low, high : float
+        Equal where Filippov's convention determines the motion.
+
+    Raises
+    ------
+    PointError
+        No convex combination stays on the intersection; off one of the surfaces; a wrong shape.
+    DefinitionError
+        ``of`` is no expression in states, parameters and time; a surface that the system does not
+        have, or vector multipliers.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+
+    Examples
+    --------
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, z, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b"))
+    >>> system = ns.FilippovSystem(
+    ...     [x, y, z], field=[-a, -b, 1 + a * b / 2], multipliers=[a, b], surfaces=[x, y])
+    >>> low, high = ns.local.intersection_range(system, [0, 0, 0], of=z)
+    >>> round(low, 12), round(high, 12)
+    (0.5, 1.5)
+    """
+    from scipy.optimize import linprog
+
+    require_system(system)
+    chosen = _chosen(system, surfaces)
+    of = read_function(system.definition, of, "of")
+    every = range(system.surface_count)
+    h = [system.evaluate(system.surface_function(i), point, parameters, t).item() for i in every]
+    _refuse_distance(system, point, parameters, t, {i: h[i] for i in chosen})
+    letters = ["+" if value > 0 else "-" for value in h]
+    rates, normal = [], []
+    for combination in product("+-", repeat=len(chosen)):
+        for i, letter in zip(chosen, combination, strict=True):
+            letters[i] = letter
+        mode = "".join(letters)
+        rates.append(_rate(system, mode, of, None, point, parameters, t))
+        normal.append([_rate(system, mode, None, i, point, parameters, t) for i in chosen])
+    equations = np.vstack([np.array(normal).T, np.ones(len(rates))])
+    right = np.append(np.zeros(len(chosen)), 1.0)
+    results = [linprog(s * np.array(rates), A_eq=equations, b_eq=right) for s in (1.0, -1.0)]
+    if any(r.x is None for r in results):
+        raise PointError(
+            f"point: no convex combination of the fields stays on surfaces {chosen} there (h = "
+            f"{[h[i] for i in chosen]}). The motion leaves the intersection."
+        )
+    return float(results[0].fun), float(-results[1].fun)
+
+
+def _chosen(system: FilippovSystem, surfaces: Sequence[int] | None) -> list[int]:
+    items: Any = range(system.surface_count) if surfaces is None else surfaces
+    if isinstance(items, (str, bytes)) or not isinstance(items, (Sequence, np.ndarray)):
+        items = [items]
+    chosen = [system.surface_index(i) for i in items]
+    if not chosen or len(set(chosen)) < len(chosen):
+        raise DefinitionError(
+            f"surfaces: expected different indices below {system.surface_count}, at least one, "
+            f"received {chosen}."
+        )
+    return chosen
+
+
+def _refuse_distance(
+    system: FilippovSystem,
+    point: ArrayLike,
+    parameters: Parameters | None,
+    t: float,
+    values: dict[int, float],
+) -> None:
+    for i, h in values.items():
+        slope = system.evaluate(system.gradient(system.surface_function(i)), point, parameters, t)
+        scale = float(np.linalg.norm(slope)) * (
+            1.0 + float(np.linalg.norm(np.asarray(point, float)))
+        )
+        if not abs(h) <= TOLERANCE * scale:
+            raise PointError(
+                f"point: h{i} = {h:.6g}, but the surfaces are {list(values)}. Give surfaces= those that "
+                "meet at the point."
+            )
+
+
+def _rate(
+    system: FilippovSystem,
+    mode: str,
+    of: Any,
+    surface: int | None,
+    point: ArrayLike,
+    parameters: Parameters | None,
+    t: float,
+) -> float:
+    """d(of)/dt, or dh_i/dt, along the field of a mode."""
+    derivative = (
+        system.lie_derivative([mode], of=of)
+        if surface is None
+        else system.lie_derivative([mode], surface)
+    )
+    return system.evaluate(derivative, point, parameters, t).item()

@@ -7,21 +7,11 @@ from enum import Enum
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import (
-    Array,
-    FilippovSystem,
-    Parameters,
-    PointError,
-    call,
-    explain,
-    motion,
-    require_system,
-)
+from ...model import Array, FilippovSystem, Parameters, PointError, call, motion, require_system
 from ...model.checks import positive
 from ...model.laws.frozen import Frozen
 from .higher_codimension import law_at
-from .lie_derivatives import Numbers
-from .surface_point import TOLERANCE, on_surface, place
+from .surface_point import TOLERANCE, Numbers, on_surface, place
 
 
 class Region(Enum):
@@ -40,7 +30,7 @@ class Region(Enum):
     TANGENT_ABOVE = "tangency of the field above"  # L1 = 0
     TANGENT_BELOW = "tangency of the field below"  # L2 = 0
     TWO_FOLD = "tangency of both fields"  # L1 = L2 = 0
-    MIXED = "sliding that neither attracts nor repels"  # on several surfaces, or a set where M is not positive definite
+    MIXED = "sliding that neither attracts nor repels"  # or a set where M is not positive definite
     SLIDING = "sliding"  # of a set of codimension two or three: |M^-1 a| < 1
     CROSSING = "crossing"  # |M^-1 a| > 1
     BOUNDARY = "boundary of sliding"  # |M^-1 a| = 1
@@ -159,13 +149,10 @@ def _region_of_set(law: Frozen, tol: float) -> Region:
 def _refuse_crossing(numbers: Numbers, found: Region, what: str) -> None:
     if found in (Region.CROSSING_UP, Region.CROSSING_DOWN):
         raise PointError(
-            explain(
-                what,
-                expected="a point of the sliding region or its boundary, L1 L2 <= 0",
-                received=f"{found} at {numbers.x.tolist()}, L1 = {numbers.lie[0]:.6g}, "
-                f"L2 = {numbers.lie[1]:.6g}",
-                advice="Orbits cross the surface here; no convex combination is tangent to it.",
-            )
+            f"{what}: expected a point of the sliding region or its boundary, L1 L2 <= 0, "
+            f"received {found} at {numbers.x.tolist()}, L1 = {numbers.lie[0]:.6g}, L2 = "
+            f"{numbers.lie[1]:.6g}. Orbits cross the surface here; no convex combination is "
+            "tangent to it."
         )
 
 
@@ -213,13 +200,9 @@ def alpha(
     _refuse_crossing(numbers, found, "alpha")
     if found is Region.TWO_FOLD:
         raise PointError(
-            explain(
-                "alpha",
-                expected="L1 and L2 not both zero",
-                received=f"both fields tangent at {x.tolist()}",
-                advice="alpha is 0/0 at a two-fold and its limit depends on the direction; the "
-                "sliding field itself is finite where the two fields coincide (sliding_field).",
-            )
+            "alpha: expected L1 and L2 not both zero, received both fields tangent at "
+            f"{x.tolist()}. alpha is 0/0 at a two-fold and its limit depends on the direction; "
+            "the sliding field itself is finite where the two fields coincide (sliding_field)."
         )
     if not found.sliding:
         return 0.0 if found is Region.TANGENT_ABOVE else 1.0
@@ -272,13 +255,9 @@ def sliding_field(
     _refuse_crossing(numbers, found, "sliding field")
     if found is Region.TWO_FOLD and not coincide(numbers, tol):
         raise PointError(
-            explain(
-                "sliding field",
-                expected="L1 and L2 not both zero, or F1 = F2",
-                received=f"both fields tangent and different at {x.tolist()}",
-                advice="The sliding field is 0/0 at this two-fold and its limit depends on "
-                "the direction; ask find_two_fold for the class of the point.",
-            )
+            "sliding field: expected L1 and L2 not both zero, or F1 = F2, received both fields "
+            f"tangent and different at {x.tolist()}. The sliding field is 0/0 at this two-fold "
+            "and its limit depends on the direction; find_two_fold gives the class of the point."
         )
     build = motion(system, where.mode)
     function = system.function(("sliding field", where.mode), lambda: [build.field])

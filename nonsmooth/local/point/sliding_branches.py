@@ -82,7 +82,7 @@ def sliding_branches(
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     PointError
-        A point of a wrong shape or not finite. Whether it is on the surfaces is not asked.
+        A point of a wrong shape or not finite. It need not be on the surfaces.
 
     Examples
     --------

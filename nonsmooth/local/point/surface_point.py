@@ -1,18 +1,17 @@
-"""A place to ask questions: one surface of a system with its parameters, and the numbers at a point.
+"""One surface of a system at a point: h, the two fields, their Lie derivatives, and all gradients.
 
-Everything in this floor is read from here: h, the two fields, L_i = F_i . grad h, L_ij = F_i . grad
-L_j (so L12 is F1 . grad L2), and every derivative of these, exact. Vectors have a time component
-where the system depends on time.
+L_i = F_i . grad h and L_ij = F_i . grad L_j, so L12 is F1 . grad L2. Derivatives are exact. Points
+and vectors have N coordinates: the states, then time if the system depends on it.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ...model import (
     Array,
@@ -22,34 +21,130 @@ from ...model import (
     PointError,
     call,
     evaluator,
-    explain,
     motion,
     require_system,
 )
 from ..checks import require_surface
-from .lie_derivatives import ManyNumbers, Numbers
-from .sides import SIDES
 
-#: Default of ``tol`` for questions about a given point: an angle, and a relative distance.
+#: Default of ``tol`` at a given point: an angle, and a relative distance.
 TOLERANCE = 1e-10
+
+#: A side of a surface: ``+`` (h > 0, field F1) or ``-`` (h < 0, field F2).
+Side = Literal["+", "-"]
+
+#: In the order in which fields, Lie derivatives and Jacobians are listed.
+SIDES: tuple[Side, Side] = ("+", "-")
+
+#: Names of the fields.
+FIELDS: dict[str, str] = {"+": "F1 (above)", "-": "F2 (below)"}
+
+
+def side_index(side: object) -> int:
+    """0 for ``+`` and 1 for ``-``."""
+    if side not in SIDES:
+        raise DefinitionError(
+            f"side: expected '+' (the field F1, h > 0) or '-' (F2, h < 0), received {side!r}. "
+            "Folds and equilibria belong to one of the two fields."
+        )
+    return SIDES.index(side)
+
+
+def other(side: Side) -> Side:
+    """The other side."""
+    return "-" if side == "+" else "+"
+
+
+@dataclass(frozen=True, eq=False)
+class Numbers:
+    """Values at one point."""
+
+    x: Array  # (N,)
+    h: float
+    gradient: Array  # grad h (N,)
+    fields: Array  # F1 (above) and F2 (below) (2, N)
+    lie: Array  # L1 and L2 (2,)
+    lie_gradients: Array  # (2, N)
+
+    @property
+    def second(self) -> dict[str, float]:
+        """Second Lie derivatives ``{"L11", "L12", "L21", "L22"}``."""
+        values = self.fields @ self.lie_gradients.T
+        return {f"L{i + 1}{j + 1}": float(values[i, j]) for i in (0, 1) for j in (0, 1)}
+
+    @property
+    def gradients(self) -> Array:
+        """Rows grad h, grad L1, grad L2; (3, N)."""
+        return np.vstack([self.gradient, self.lie_gradients])
+
+    @property
+    def tangents(self) -> Array:
+        """Orthonormal basis of the surface's tangent space (N, N-1); in the plane (g_y, -g_x)."""
+        g = self.gradient
+        if g.size == 2:
+            return np.array([[g[1]], [-g[0]]]) / np.linalg.norm(g)
+        return np.linalg.svd(g[None, :])[2][1:].T
+
+    @property
+    def angles(self) -> Array:
+        """Sines of the angles of F1 and F2 with the surface, 0 for a vanishing field; (2,)."""
+        lengths = np.linalg.norm(self.gradient) * np.linalg.norm(self.fields, axis=1)
+        return np.divide(self.lie, lengths, out=np.zeros(2), where=lengths > 0)
+
+    @property
+    def distance(self) -> float:
+        """Distance to the surface to first order, |h|/|grad h|."""
+        length = float(np.linalg.norm(self.gradient))
+        if not length:
+            return float("inf") if self.h else 0.0
+        return abs(self.h) / length
+
+
+@dataclass(frozen=True, eq=False)
+class ManyNumbers:
+    """Values at k points, as in ``Numbers``; NaN where a field is undefined."""
+
+    x: Array  # (k, N)
+    h: Array  # (k,)
+    gradient: Array  # (k, N)
+    fields: Array  # (k, 2, N)
+    lie: Array  # (k, 2)
+    lie_gradients: Array  # (k, 2, N)
+
+    @property
+    def values(self) -> Array:
+        """Columns h, L1, L2; (k, 3)."""
+        return np.column_stack([self.h, self.lie])
+
+    @property
+    def gradients(self) -> Array:
+        """Rows grad h, grad L1, grad L2 of each point; (k, 3, N)."""
+        return np.concatenate([self.gradient[:, None], self.lie_gradients], axis=1)
+
+    @property
+    def slides(self) -> NDArray[np.bool_]:
+        """Whether L1 L2 < 0, attracting or repelling; (k,)."""
+        return self.lie[:, 0] * self.lie[:, 1] < 0
+
+    @property
+    def numerator(self) -> Array:
+        """L2 F1 - L1 F2, along the sliding field times L2 - L1 and smooth at two-folds; (k, N)."""
+        above, below = self.fields[:, 0], self.fields[:, 1]
+        return self.lie[:, 1:] * above - self.lie[:, :1] * below
+
+    @property
+    def sliding(self) -> Array:
+        """Sliding field, meaningful where L1 L2 < 0; (k, N)."""
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return self.numerator / (self.lie[:, 1:] - self.lie[:, :1])
 
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """One surface of a system with its parameters: where questions of this floor are asked.
-
-    Attributes
-    ----------
-    system : FilippovSystem
-    surface : int
-    mode : str
-        One letter per surface, ``s`` for this one; empty for a smooth system.
-    parameters : ndarray
-    """
+    """One surface of a system with values of its parameters."""
 
     system: FilippovSystem
     surface: int
-    mode: str
+    mode: str  # one letter per surface, ``s`` for this one; empty for a smooth system
     parameters: Array
 
     def side(self, letter: str) -> str:
@@ -92,24 +187,16 @@ class Place:
         return Numbers(x, float(h[0, 0]), g, np.array([f1, f2]), lie, np.array([g1, g2]))
 
     def finite_at(self, x: Array) -> Numbers:
-        """Evaluate as ``at`` does and refuse NaN and inf.
-
-        Raises
-        ------
-        PointError
-        """
+        """Evaluate as ``at`` does and refuse NaN and inf."""
         numbers = self.at(x)
         if not all(np.all(np.isfinite(v)) for v in (numbers.h, numbers.fields, numbers.gradients)):
             raise PointError(
-                explain(
-                    f"point {x}",
-                    expected="a state where the fields and the derivatives of h, L1 and L2 are "
-                    "finite",
-                    received=f"h={numbers.h}, F1={numbers.fields[0]}, F2={numbers.fields[1]}, "
-                    f"grad L1={numbers.lie_gradients[0]}, grad L2={numbers.lie_gradients[1]}",
-                    advice="A root or logarithm left its domain, or a form such as sqrt(x)*x has "
-                    "an infinite factor in its derivative: write it as one power.",
-                )
+                f"point {x}: expected a state where the fields and the derivatives of h, L1 and "
+                f"L2 are finite, received h={numbers.h}, F1={numbers.fields[0]}, "
+                f"F2={numbers.fields[1]}, grad L1={numbers.lie_gradients[0]}, grad "
+                f"L2={numbers.lie_gradients[1]}. A root or logarithm left its domain, or a form "
+                "such as sqrt(x)*x has an infinite factor in its derivative: write it as one "
+                "power."
             )
         return numbers
 
@@ -143,7 +230,7 @@ class Place:
 
     @property
     def others(self) -> tuple[int, ...]:
-        """The surfaces that are not looked at."""
+        """The other surfaces."""
         return tuple(j for j in range(self.system.surface_count) if j != self.surface)
 
     # derivatives -------------------------------------------------------------------------------
@@ -192,10 +279,7 @@ class Place:
         return self._rows("lie parameters", build, x)
 
     def orbit(self, x: Array, letter: str, order: int) -> tuple[Array, Array]:
-        """Taylor coefficients of the orbit of F1 or F2 (N, order + 1) and of h on it (order + 1,).
-
-        Coefficient k of h is its Lie derivative L^k h over k!.
-        """
+        """Taylor coefficients of an orbit (N, order + 1) and of h on it, L^k h/k! (order + 1,)."""
         jet = motion(self.system, self.side(letter)).jet_function(order)
         states, guards = call(jet, x, self.parameters)
         # the guard of a side is h there, and positive
@@ -212,36 +296,28 @@ def place(
     *,
     smooth: bool = False,
 ) -> tuple[Place, Array]:
-    """Check the arguments that every function of this floor shares."""
+    """Check the arguments of a function at a point; ``smooth`` allows a system without surfaces."""
     require_system(system)
     x = system.extended_point(point, t)
     p = system.parameter_vector(parameters)
     if system.surface_count == 0 and smooth:
         if surface or mode:
             raise DefinitionError(
-                explain(
-                    "surface and mode",
-                    expected="none, as the system has no surface",
-                    received=f"surface {surface!r}, mode {mode!r}",
-                    advice="Leave them out.",
-                )
+                f"surface and mode: received {surface!r} and {mode!r}, but the system has no surface. "
+                "Leave them out."
             )
         return Place(system, 0, "", p), x
     require_surface(system)
-    system.surface_function(surface)  # refuses what is no index or out of range
+    system.surface_function(surface)  # refuses a wrong index
     letters = list(_signs(system, x, p, surface) if mode is None else mode)
     if mode is not None:
         system.require_mode(mode)
     letters[surface] = "s"
     if letters.count("s") > 1:
         raise DefinitionError(
-            explain(
-                f"mode {''.join(letters)!r}",
-                expected="one sliding surface",
-                received=str(letters.count("s")),
-                advice="This floor looks at one surface: give + or - to the others. For several "
-                "that slide at once see sliding_branches and intersection_range.",
-            )
+            f"mode {''.join(letters)!r}: expected one sliding surface, received "
+            f"{letters.count('s')}. Give + or - to the others; for several sliding surfaces use "
+            "sliding_branches or intersection_range."
         )
     return Place(system, int(surface), "".join(letters), p), x
 
@@ -253,12 +329,8 @@ def _signs(system: FilippovSystem, x: Array, p: Array, surface: int) -> str:
     for i, value in enumerate(values):
         if i != surface and value == 0:
             raise PointError(
-                explain(
-                    f"point {x}",
-                    expected=f"a side of surface {i}",
-                    received=f"a point on surfaces {surface} and {i}",
-                    advice="Choose the side with mode=, one letter per surface.",
-                )
+                f"point {x}: expected a side of surface {i}, received a point on surfaces "
+                f"{surface} and {i}. Choose the side with mode=, one letter per surface."
             )
     return "".join("+" if value > 0 else "-" for value in values)
 
@@ -274,27 +346,19 @@ def _switches(system: FilippovSystem, x: Array, p: Array) -> Array:
 
 
 def on_surface(where: Place, x: Array, tol: float) -> Numbers:
-    """Evaluate at a point of the surface."""
-    # The point counts as on the surface when its distance is at most ``tol (1 + |x|)``.
+    """Evaluate at a point whose distance from the surface is at most ``tol (1 + |x|)``."""
     numbers = where.finite_at(x)
     if not np.any(numbers.gradient):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"a regular point of surface {where.surface}",
-                received="grad h = 0",
-                advice="The zero set of h is not a surface there; write h with a nonzero gradient.",
-            )
+            f"point {x}: expected a regular point of surface {where.surface}, received grad h = "
+            "0. The zero set of h is not a surface there; write h with a nonzero gradient."
         )
     if numbers.distance > tol * (1 + np.linalg.norm(x)):
         foot = x - numbers.h * numbers.gradient / (numbers.gradient @ numbers.gradient)
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"a point on surface {where.surface}, h = 0",
-                received=f"h = {numbers.h:.6g} (about {numbers.distance:.3g} away)",
-                advice=f"The nearest point of the surface is about {foot.tolist()} (one Newton "
-                "step along grad h; repeat it where the surface is curved), or raise tol.",
-            )
+            f"point {x}: expected a point on surface {where.surface}, h = 0, received h = "
+            f"{numbers.h:.6g} (about {numbers.distance:.3g} away). The nearest point of the "
+            f"surface is about {foot.tolist()} (one Newton step along grad h; repeat it where the "
+            "surface is curved), or raise tol."
         )
     return numbers

@@ -1,7 +1,7 @@
-"""Everything special of a planar system in a box: its surface in pieces, folds and equilibria.
+"""Scan of a planar system in a box: pieces of its surface, folds, equilibria, pseudo-equilibria.
 
-Found by sign changes on a grid and then solved for, so two of a kind closer than the grid (1/160 of
-the box) can be missed: a scan is no proof. Names follow Kuznetsov, Rinaldi & Gragnani 2003.
+Points are found by sign changes on a grid and then solved for. Two of a kind closer than the grid
+(1/160 of the box) can be missed. Names follow Kuznetsov, Rinaldi & Gragnani 2003.
 """
 
 from __future__ import annotations
@@ -17,15 +17,12 @@ from numpy.typing import NDArray
 
 from ...model import Array, FilippovSystem
 from ...solvers.newton import solve_many
-from ..point.lie_derivatives import ManyNumbers
-from ..point.sides import SIDES, Side
-from ..point.surface_point import Place
+from ..point.surface_point import SIDES, ManyNumbers, Place, Side
 from ..searches.equilibria import Equilibrium, find_equilibrium
 from ..searches.folds import Fold, find_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all
-from .box import Box
-from .contours import inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
+from .box import Box, inserted, middle_of_sign_changes, refined, sign_changes, zero_lines
 
 _GRID = 161  # for the surface
 _CELLS = 61  # for equilibria
@@ -86,7 +83,7 @@ class PlaneScan:
     def _from_curves(
         self, what: Callable[[ManyNumbers], Array], look: Callable[[Array], Any]
     ) -> list[Any]:
-        """Look from where a function changes sign along the surface; no result twice."""
+        """Search from where a function changes sign along the surface; no result twice."""
         starts = [np.empty((0, 2))]
         for curve in self.curves:
             values = what(self.at(curve))
@@ -112,9 +109,8 @@ class PlaneScan:
 
     @cached_property
     def boundary_equilibria(self) -> list[Equilibrium]:
-        """Equilibria of a field on the surface, or too close to it for a picture of the box."""
-        # There the field is not only tangent but zero: it has no visible or invisible fold, and no
-        # pseudo-equilibrium beside it.
+        """Equilibria of a field on the surface, or closer to it than a picture of the box shows."""
+        # The field is zero there, not only tangent: no fold, and no pseudo-equilibrium beside it.
         found = list[Equilibrium]()
         for fold in self.tangencies:
             for at in find_all(partial(self._equilibrium, side=fold.side), fold.point[None, :]):

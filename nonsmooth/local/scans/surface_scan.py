@@ -1,8 +1,7 @@
-"""Everything special on a switching surface of three states: regions, fold curves, cusps, two-folds.
+"""Scan of a switching surface of three states: regions, fold curves, cusps, two-folds.
 
-The surface is taken as a graph over two of the states. Special points are found by sign changes on
-a grid and then solved for, so two of a kind closer than the grid (1/200 of the box) can be missed:
-a scan is no proof.
+The surface is a graph over two of the states. Points are found by sign changes on a grid and then
+solved for. Two of a kind closer than the grid (1/200 of the box) can be missed.
 """
 
 from __future__ import annotations
@@ -16,18 +15,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model import Array, DefinitionError, FilippovSystem, NonsmoothError, evaluator, explain
+from ...model import Array, DefinitionError, FilippovSystem, NonsmoothError, evaluator
 from ...solvers.newton import solve_many
-from ..point.lie_derivatives import ManyNumbers
 from ..point.regions import Region
-from ..point.sides import FIELDS, SIDES, Side, side_index
-from ..point.surface_point import Place
-from ..searches.find_two_fold import find_two_fold
+from ..point.surface_point import FIELDS, SIDES, ManyNumbers, Place, Side, side_index
+from ..searches.find_two_fold import TwoFold, find_two_fold
 from ..searches.pseudo_equilibria import PseudoEquilibrium, find_pseudo_equilibrium
 from ..searches.search import find_all, search
-from ..searches.two_fold import TwoFold
-from .box import Box
-from .contours import middle_of_sign_changes, refined, zero_lines
+from .box import Box, middle_of_sign_changes, refined, zero_lines
 
 _GRID = 201
 _MOST = 50  # starts of one search
@@ -72,12 +67,8 @@ class SurfaceScan:
             chosen = [str(name) for name in coordinates]
             if len(chosen) != 2 or len(set(chosen)) != 2 or not set(chosen) <= set(names):
                 raise DefinitionError(
-                    explain(
-                        "coordinates",
-                        expected=f"two of the states {names}",
-                        received=repr(coordinates),
-                        advice="Leave it out to draw over the two along which the surface is flattest.",
-                    )
+                    f"coordinates: expected two of the states {names}, received {coordinates!r}. "
+                    "Leave it out to draw over the two along which the surface is flattest."
                 )
             pairs = [(names.index(chosen[0]), names.index(chosen[1]))]
         where = Place(system, 0, "s", system.parameter_vector(parameters))
@@ -85,12 +76,9 @@ class SurfaceScan:
         best = max(scans, key=lambda scan: scan._steepness())
         if not best._steepness() > 0:
             raise DefinitionError(
-                explain(
-                    "surface",
-                    expected="one over the box, h = 0 solvable for the remaining state",
-                    received=f"none over {[names[i] for i in best.shown]} in {box.limits}",
-                    advice="Choose other coordinates=, another box or guess=.",
-                )
+                "surface: h = 0 cannot be solved for the remaining state over "
+                f"{[names[i] for i in best.shown]} in {box.limits}. Choose other coordinates=, another "
+                "box or guess=."
             )
         return best
 

@@ -1,11 +1,11 @@
-"""Boundary equilibria: a zero of one field on the surface, the bifurcation it is, and its search.
+"""Boundary equilibria: zeros of one field on the surface, their search and their bifurcation.
 
 F1 = A x + ... vanishes on h = 0 where F2 = E. With C = grad h, d = C.E and s = C A^-1 E, s < 0 is
 persistence and s > 0 a nonsmooth fold (di Bernardo, Budd, Champneys & Kowalczyk 2008, ch. 5, in any
 dimension). In the plane the equilibrium's type splits these into BF1 to BF5 (focus), BN1, BN2
 (stable node), BS1 to BS3 (saddle) after Kuznetsov, Rinaldi & Gragnani 2003, and UN1, UN2 (unstable
 node, Hogan, Homer, Jeffrey & Szalai 2016). The table is for d > 0; d < 0 is its time reversal
-(A, E -> -A, -E). Every class has margins: dimensionless distances from where it changes.
+(A, E -> -A, -E). The margins of a class are dimensionless distances from where it changes.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ...model import Array, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
 from ..checks import (
     MARGIN,
@@ -27,8 +27,7 @@ from ..checks import (
     require_autonomous,
     require_linear,
 )
-from ..point.sides import FIELDS, SIDES, Side, side_index
-from ..point.surface_point import Place, on_surface, place
+from ..point.surface_point import FIELDS, SIDES, Place, Side, on_surface, place, side_index
 from ..read_only import ReadOnly
 from .equilibria import equilibrium_distance
 from .search import search
@@ -180,13 +179,10 @@ def boundary_equilibrium(
     k = int(np.argmin(found)) if side is None else side_index(side)
     if found[k] > tol:
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"an equilibrium of a field (to {tol:.1e})",
-                received=f"F1 = {numbers.fields[0].tolist()}, F2 = {numbers.fields[1].tolist()}; "
-                f"the nearest zero is about {found[k]:.3g} away",
-                advice="find_boundary_equilibrium(system, near, vary=parameter) finds one.",
-            )
+            f"point {x}: expected an equilibrium of a field (to {tol:.1e}), received F1 = "
+            f"{numbers.fields[0].tolist()}, F2 = {numbers.fields[1].tolist()}; the nearest zero "
+            f"is about {found[k]:.3g} away. find_boundary_equilibrium(system, near, "
+            "vary=parameter) finds one."
         )
     return boundary_equilibrium_of(
         x, k, numbers.gradient, numbers.fields[1 - k], derivatives[k], margin
@@ -248,13 +244,14 @@ def _planar_class(
         (np.linalg.norm(ca) * np.linalg.norm(c)) or 1.0
     )
     numbers = {"trace": trace, "determinant": det, "pseudo": -d / s if s else math.nan}
+    beside = d / s if s else math.inf
     if det < 0:
         if s < 0:
             return "BS3", numbers
         unstable = 0.5 * (trace + math.sqrt(disc))
         numbers["unstable"] = -unstable
-        margins["W^u meets the pseudo-node"] = relative_difference(d / s, unstable)
-        return ("BS1" if d / s < unstable else "BS2"), numbers
+        margins["W^u meets the pseudo-node"] = _apart(beside, unstable)
+        return ("BS1" if beside < unstable else "BS2"), numbers
     margins["trace"] = abs(trace) / size
     margins["focus or node"] = abs(disc) / (trace**2 + 4 * det)
     if disc > 0:
@@ -266,8 +263,13 @@ def _planar_class(
         return "BF1", numbers
     landing = fold_orbit_landing(0.5 * trace, 0.5 * math.sqrt(-disc))
     numbers["landing"] = landing
-    margins["fold orbit meets the pseudo-saddle"] = relative_difference(d / s, -landing)
-    return ("BF2" if -landing < d / s else "BF3"), numbers
+    margins["fold orbit meets the pseudo-saddle"] = _apart(beside, -landing)
+    return ("BF2" if -landing < beside else "BF3"), numbers
+
+
+def _apart(u: float, v: float) -> float:
+    """Relative difference; of an infinite number from a finite one it is 1."""
+    return relative_difference(u, v) if math.isfinite(u) else 1.0
 
 
 def fold_orbit_landing(rho: float, omega: float) -> float:

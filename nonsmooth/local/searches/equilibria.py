@@ -1,4 +1,4 @@
-"""Equilibria of the two fields, found by Newton's method in R^n and named by their eigenvalues."""
+"""Equilibria of the two fields: their search by Newton's method, and their kind by eigenvalues."""
 
 from __future__ import annotations
 
@@ -10,8 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, FilippovSystem, OptionError, Parameters
 from ..checks import require_autonomous
-from ..point.sides import FIELDS, Side, side_index
-from ..point.surface_point import TOLERANCE, Place, place
+from ..point.surface_point import FIELDS, TOLERANCE, Place, Side, place, side_index
 from .search import Found, search
 
 #: Eigenvalues whose real part is below this, relative to the largest, decide nothing.
@@ -72,8 +71,7 @@ class Equilibrium:
 
 
 def equilibrium_distance(field: Array, derivative: Array, x: Array) -> float:
-    """How far the next zero of a field is, to first order, relative to $1 + |x|$."""
-    # Infinite where the linearised equations have no solution.
+    """Distance of the next zero of a field to first order over 1 + |x|; inf if there is none."""
     length, size = 1 + float(np.linalg.norm(x)), float(np.linalg.norm(derivative, 2))
     norm = float(np.linalg.norm(field))
     if norm <= TOLERANCE * size * length or norm == 0.0:

@@ -2,7 +2,7 @@
 
 F1 = (a1, b1 x), F2 = (a2, b2 x) in a tangent coordinate x: VV1, VV2, VI1 to VI3, II1, II2 by
 visibility and directions; only VI with opposite directions needs the sizes (Kuznetsov, Rinaldi &
-Gragnani 2003). Every class has margins: dimensionless distances from where it changes.
+Gragnani 2003). The margins of a class are dimensionless distances from where it changes.
 """
 
 from __future__ import annotations
@@ -13,19 +13,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import (
-    Array,
-    DefinitionError,
-    FilippovSystem,
-    Parameters,
-    PointError,
-    explain,
-    require_system,
-)
+from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, require_system
 from ...model.checks import positive
 from ..checks import MARGIN, relative_difference
-from ..point.lie_derivatives import Numbers
-from ..point.surface_point import Place, on_surface, place
+from ..point.surface_point import Numbers, Place, on_surface, place
 from ..read_only import ReadOnly
 from .folds import bend
 
@@ -119,12 +110,9 @@ def fold_fold(
     numbers = on_surface(where, x, tol)
     if np.any(np.abs(numbers.angles) > tol):
         raise PointError(
-            explain(
-                f"point {x}",
-                expected="a fold-fold, L1 = L2 = 0",
-                received=f"L1 = {numbers.lie[0]:.6g}, L2 = {numbers.lie[1]:.6g}",
-                advice="In the plane fold-folds happen at isolated values of a parameter.",
-            )
+            f"point {x}: expected a fold-fold, L1 = L2 = 0, received L1 = {numbers.lie[0]:.6g}, "
+            f"L2 = {numbers.lie[1]:.6g}. In the plane fold-folds happen at isolated values of a "
+            "parameter."
         )
     return fold_fold_of(where, numbers, margin)
 
@@ -162,12 +150,8 @@ def require_planar(system: FilippovSystem, what: str) -> None:
     if system.extended_dimension != 2:
         size = f"{system.dimension} states{' and time' if system.time_dependent else ''}"
         raise DefinitionError(
-            explain(
-                what,
-                expected="a planar system without explicit time",
-                received=size,
-                advice="In three and more dimensions two folds meet in a two-fold: find_two_fold.",
-            )
+            f"{what}: expected a planar system without explicit time, received {size}. In three "
+            "and more dimensions two folds meet in a two-fold: find_two_fold."
         )
 
 

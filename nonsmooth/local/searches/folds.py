@@ -13,11 +13,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError
 from ...model.checks import positive
-from ..point.lie_derivatives import Numbers
-from ..point.sides import FIELDS, Side, side_index
-from ..point.surface_point import TOLERANCE, Place, on_surface, place
+from ..point.surface_point import (
+    FIELDS,
+    TOLERANCE,
+    Numbers,
+    Place,
+    Side,
+    on_surface,
+    place,
+    side_index,
+)
 from .search import Found, search, unknowns
 
 
@@ -32,11 +39,11 @@ class Fold:
     side : {"+", "-"}
         Of the field $F1$ above the surface or $F2$ below it.
     order : int or None
-        First k with $L^k h != 0$; None if there is none up to the order that was looked at.
+        First k with $L^k h != 0$; None if there is none up to the order that was computed.
     kind : {"visible", "invisible", "cusp", "degenerate"}
         A fold (order 2) is visible if the orbit of its field through the point stays on the
         field's side; order 3 is a cusp; anything higher is degenerate.
-    lie : ndarray (order looked at + 1,)
+    lie : ndarray (max_order + 1,)
         $L^k h$ for k from 0.
     other : float
         First Lie derivative of h along the other field: attracting or repelling sliding begins
@@ -155,7 +162,7 @@ def fold(
     side : {"+", "-"}
         Whose field: ``"+"`` is $F1$ (above), ``"-"`` is $F2$ (below).
     max_order : int, optional
-        Highest order of contact to look at, at least 2.
+        Highest order of contact to compute, at least 2.
 
     Returns
     -------
@@ -185,12 +192,9 @@ def fold(
     numbers = on_surface(where, x, positive(tol, "tol"))
     if abs(numbers.angles[k]) > tol:
         raise PointError(
-            explain(
-                f"point {x}",
-                expected=f"L{k + 1} = 0, the field {FIELDS[side]} tangent to the surface",
-                received=f"L{k + 1} = {numbers.lie[k]:.6g}",
-                advice="find_fold(system, near=point) goes to the nearest fold.",
-            )
+            f"point {x}: expected L{k + 1} = 0, the field {FIELDS[side]} tangent to the surface, "
+            f"received L{k + 1} = {numbers.lie[k]:.6g}. find_fold(system, near=point) goes to the "
+            "nearest fold."
         )
     length = float(np.linalg.norm(numbers.lie_gradients[k])) or 1.0
     residual = max(numbers.distance, abs(float(numbers.lie[k])) / length)
@@ -228,7 +232,7 @@ def find_fold(
     hold : sequence of str, optional
         Names of states that keep their value.
     max_order : int, optional
-        Highest order of contact to look at.
+        Highest order of contact to compute.
     tol : float, optional
         Accepted residual (a distance), relative to $1 + |x|$; the search itself goes to rounding.
     max_iterations : int, optional

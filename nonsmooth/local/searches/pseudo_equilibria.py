@@ -3,8 +3,7 @@
 There h = 0 and (1 - alpha) F1 + alpha F2 = 0 with 0 < alpha < 1, so F1 and F2 point in opposite
 directions. Stability along the surface is that of the n - 1 eigenvalues of Dg on the tangent space;
 across the surface it is that of the sliding region (Filippov 1988, sec. 17-19; Kuznetsov, Rinaldi &
-Gragnani 2003). On k surfaces that meet f(x, lambda) = 0 with one multiplier each
-(``intersection_equilibria``).
+Gragnani 2003). Where k surfaces meet, f(x, lambda) = 0 with one multiplier for each.
 """
 
 from __future__ import annotations
@@ -22,19 +21,15 @@ from ...model import (
     LayerNumbers,
     Parameters,
     PointError,
-    explain,
     layer_of,
     require_system,
 )
 from ..checks import require_autonomous, require_linear
 from ..point.intersections import Meeting
-from ..point.lie_derivatives import Numbers
 from ..point.regions import Region, region_of
-from ..point.surface_point import TOLERANCE, Place, place
+from ..point.surface_point import TOLERANCE, Numbers, Place, place
 from .equilibria import by_real_part, kind_of
 from .search import Found, search
-
-# A pseudo-equilibrium, a zero of the sliding flow: what the searches for one return.
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,13 +83,13 @@ class PseudoEquilibrium:
 
     def __str__(self) -> str:
         values = ", ".join(f"{v:.6g}" for v in self.eigenvalues) or "none"
-        weights, place = f"alpha = {self.alpha:.6g}", "the surface"
+        weights, surface = f"alpha = {self.alpha:.6g}", "the surface"
         if self.multipliers.size > 1:
             weights = f"multipliers {', '.join(f'{v:.6g}' for v in self.multipliers)}"
-            place = f"the intersection {self.mode}"
+            surface = f"the intersection {self.mode}"
         return (
             f"{self.status} {self.kind} at {self.point.tolist()} in {self.region}, "
-            f"{weights}, eigenvalues along {place} {values}."
+            f"{weights}, eigenvalues along {surface} {values}."
         )
 
 
@@ -209,13 +204,9 @@ def pseudo_equilibrium_at(where: Place, found: Found) -> PseudoEquilibrium:
     l1, l2 = numbers.lie
     if l1 == l2:
         raise PointError(
-            explain(
-                f"pseudo-equilibrium at {x.tolist()}",
-                expected="L1 != L2",
-                received=f"L1 = L2 = {l1:.6g}",
-                advice="The sliding field is not defined there (a fold-fold or a boundary "
-                "equilibrium): classify(system, point) names it.",
-            )
+            f"pseudo-equilibrium at {x.tolist()}: expected L1 != L2, received L1 = L2 = {l1:.6g}. "
+            "The sliding field is not defined there (a fold-fold or a boundary equilibrium): "
+            "classify(system, point) names it."
         )
     alpha = float(l1 / (l1 - l2))
     matrix, _ = sliding_matrix(numbers, derivatives)
@@ -245,8 +236,7 @@ def pseudo_equilibrium_at(where: Place, found: Found) -> PseudoEquilibrium:
 
 
 def sliding_matrix(numbers: Numbers, derivatives: Array) -> tuple[Array, Array]:
-    """Dg on the tangent space at a pseudo-equilibrium (n-1, n-1), and an orthonormal basis (n,
-    n-1)."""
+    """Dg on the tangent space at a pseudo-equilibrium (n-1, n-1), and its basis (n, n-1)."""
     # Dg = (L2 DF1 - L1 DF2 + F1 (grad L2)^T - F2 (grad L1)^T)/(L2 - L1), where g = 0.
     (f1, f2), (l1, l2) = numbers.fields, numbers.lie
     (g1, g2), (d1, d2) = numbers.lie_gradients, derivatives
@@ -275,7 +265,7 @@ def sliding_expansion(where: Place, numbers: Numbers) -> tuple[float, float]:
     return c1, float(0.5 * second / (l2 - l1) - c1 * drift)
 
 
-# Pseudo-equilibria where several surfaces meet: f(x, lambda) = 0 with a multiplier for each of them.
+# where several surfaces meet ---------------------------------------------------------------------
 
 #: What sliding does across the intersection, as one surface would name it.
 _REGIONS = {
@@ -306,12 +296,8 @@ def find_on_intersection(
     chosen, n = np.flatnonzero(letters == 0.0), x.size
     if chosen.size > n:
         raise DefinitionError(
-            explain(
-                f"mode {mode!r}",
-                expected=f"at most {n} surfaces that meet in a space of {n} states",
-                received=f"{chosen.size}",
-                advice="Give + or - to the others.",
-            )
+            f"mode {mode!r}: expected at most {n} surfaces that meet in a space of {n} states, "
+            f"received {chosen.size}. Give + or - to the others."
         )
     layer = layer_of(system)
 
@@ -334,18 +320,18 @@ def find_on_intersection(
     start = np.concatenate([x, guess])
     found = search(equations, start, tol=tol, max_iterations=max_iterations, what=what)
     away = float(np.linalg.norm(found.x[:n] - x))
-    place = Meeting(system, found.x[:n], p, chosen.tolist(), letters)
-    return equilibrium_of(place, found.x[n:], replace(found, x=found.x[:n], distance=away))
+    meeting = Meeting(system, found.x[:n], p, chosen.tolist(), letters)
+    return equilibrium_of(meeting, found.x[n:], replace(found, x=found.x[:n], distance=away))
 
 
-def equilibrium_of(place: Meeting, multipliers: Array, found: Found) -> PseudoEquilibrium:
+def equilibrium_of(meeting: Meeting, multipliers: Array, found: Found) -> PseudoEquilibrium:
     """Describe the pseudo-equilibrium at a point of an intersection where the sliding flow vanishes."""
-    chosen = place.surfaces
-    lam = place.held.copy()
+    chosen = meeting.surfaces
+    lam = meeting.held.copy()
     lam[chosen] = multipliers
-    at = place.at(lam)
+    at = meeting.at(lam)
     eigenvalues = by_real_part(along_intersection(at, chosen)[0])
-    across = place.attraction(lam)
+    across = meeting.attraction(lam)
     region = _REGIONS.get(across, Region.MIXED)
     scale = float(np.linalg.norm(at.field_x, 2)) or 1.0
     layer = np.linalg.eigvals(at.rates_l[np.ix_(chosen, chosen)])
@@ -371,7 +357,7 @@ def equilibrium_of(place: Meeting, multipliers: Array, found: Found) -> PseudoEq
 def _kind(
     eigenvalues: NDArray[Any], layer: NDArray[Any], region: Region, scale: float
 ) -> tuple[str, float]:
-    """Name by the eigenvalues along the intersection; where there are none, by what is across."""
+    """Kind by the eigenvalues along the intersection, or by the layer if there are none."""
     if eigenvalues.size:
         along, margin = kind_of(eigenvalues, scale)
         return pseudo_kind(along, region), margin
@@ -381,8 +367,7 @@ def _kind(
 
 
 def along_intersection(at: LayerNumbers, surfaces: list[int]) -> tuple[Array, Array]:
-    """D(f(x, lambda(x))) on the tangent space (N - k, N - k), where f = 0, and its basis (N, N -
-    k)."""
+    """D(f(x, lambda(x))) on the tangent space (N-k, N-k), where f = 0, and its basis (N, N-k)."""
     # lambda_x = -(dG/dlambda)^-1 dG/dx, with G the rates of the surfaces.
     gradient = at.h_x[surfaces]
     basis = np.linalg.svd(gradient)[2][len(surfaces) :].T
@@ -391,12 +376,9 @@ def along_intersection(at: LayerNumbers, surfaces: list[int]) -> tuple[Array, Ar
     slope = at.rates_l[np.ix_(surfaces, surfaces)]
     if np.linalg.cond(slope) * TOLERANCE > 1.0:
         raise PointError(
-            explain(
-                "pseudo-equilibrium on an intersection",
-                expected="multipliers that are determined by the rates of the surfaces",
-                received=f"d(rates)/d(multipliers) = {slope.tolist()}, singular",
-                advice="The sliding flow is not defined there.",
-            )
+            "pseudo-equilibrium on an intersection: expected multipliers that are determined by "
+            f"the rates of the surfaces, received d(rates)/d(multipliers) = {slope.tolist()}, "
+            "singular. The sliding flow is not defined there."
         )
     drift = np.linalg.solve(slope, at.rates_x[surfaces])
     whole = at.field_x - at.field_l[:, surfaces] @ drift

@@ -1,8 +1,4 @@
-"""One search for every special point: equations on some of the states, the others held.
-
-Folds, two-folds, equilibria and pseudo-equilibria differ in their equations only; the iteration is
-that of :mod:`nonsmooth.solvers.newton`.
-"""
+"""The search for special points: Newton's method on equations in some of the states, others held."""
 
 from __future__ import annotations
 
@@ -20,7 +16,6 @@ from ...model import (
     FilippovSystem,
     NonsmoothError,
     OptionError,
-    explain,
     real_array,
 )
 from ...solvers.newton import Equations, solve
@@ -74,25 +69,20 @@ def unknowns(system: FilippovSystem, hold: Sequence[str], equations: int, what: 
     unknown = [name for name in names if name not in system.state_names]
     if unknown:
         raise DefinitionError(
-            explain(
-                "hold",
-                expected=f"names of states among {list(system.state_names)}",
-                received=str(unknown),
-                advice="Parameters keep their value anyway.",
-            )
+            f"hold: expected names of states among {list(system.state_names)}, received "
+            f"{unknown}. Parameters keep their value anyway."
         )
     free = [i for i, name in enumerate(system.state_names) if name not in names]
     if len(free) < equations:
-        raise DefinitionError(
-            explain(
-                what,
-                expected=f"at least {equations} free states, one for each equation",
-                received=f"{len(free)} ({system.dimension} states, {len(names)} held)",
-                advice="In the plane a two-fold (fold-fold) happens at isolated values of a "
-                "parameter: make that parameter a state with derivative 0 to find it."
-                if equations == 3 and system.dimension < 3
-                else "Hold fewer states.",
+        advice = "Hold fewer states."
+        if equations == 3 and system.dimension < 3:
+            advice = (
+                "In the plane a two-fold (fold-fold) happens at isolated values of a parameter: make "
+                "that parameter a state with derivative 0 to find it."
             )
+        raise DefinitionError(
+            f"{what}: expected at least {equations} free states, one for each equation, received "
+            f"{len(free)} ({system.dimension} states, {len(names)} held). {advice}"
         )
     return free
 
@@ -130,12 +120,8 @@ def find_all(search: Any, starts: ArrayLike, *, apart: float = 1e-6) -> list[Any
     found: list[Any] = []
     if not callable(search):
         raise OptionError(
-            explain(
-                "search",
-                expected="a function of a start",
-                received=repr(search),
-                advice="For example lambda x: nonsmooth.find_fold(system, x).",
-            )
+            f"search: expected a function of a start, received {search!r}. For example lambda x: "
+            "nonsmooth.find_fold(system, x)."
         )
     for start in np.atleast_2d(real_array(starts, "starts")):
         try:

@@ -1,4 +1,4 @@
-"""The algebra of generic two-folds: what follows from two signs and two numbers, without a system.
+"""The algebra of generic two-folds from two signs and two numbers, without a system.
 
 At a two-fold of a system these are ``fold.sigma`` and ``fold.nu`` of :func:`nonsmooth.find_two_fold`.
 

@@ -1,4 +1,4 @@
-"""The classes of generic two-folds: one decision table, its boundaries, and what each class means.
+"""The classes of generic two-folds: a decision table, its boundaries, and the meaning of each class.
 
 Da is attracting sliding, Dr repelling, s the two-fold. An orbit Da -> s -> Dr along an eigenline
 with kappa < 0 is a canard; along one with kappa > 0 it runs Dr -> s -> Da, a faux canard. The
@@ -26,15 +26,12 @@ MIXED = ("VI", "IV")
 class Row:
     """One class of the table."""
 
-    # ``into`` says which orbits of Da reach s, ``out_of`` which orbits of Da come from s (and, along
-    # the same lines, which orbits of Dr reach s): none, one, all or a sector.
-
     label: str
     folds: tuple[str, ...]
     condition: str
     holds: Callable[[ReducedFlow], bool]
-    into: str
-    out_of: str
+    into: str  # which orbits of Da reach s: none, one, all or a sector
+    out_of: str  # which orbits of Da come from s, and along the same lines those of Dr that reach s
     determinism: str
 
 
@@ -165,7 +162,7 @@ class Slopes:
         slope : float
             $m = z3/z2$.
         tol : float, optional
-            A single slope is met within this relative distance.
+            Relative distance within which a single slope counts as equal.
         """
         if self.kind == "one":
             return abs(slope - self.low) <= tol * (1 + abs(self.low))
@@ -185,7 +182,7 @@ class Boundary:
     name : str
         For example ``"Delta=0"``.
     meaning : str
-        What happens on the boundary, in words.
+        What happens on the boundary.
     between : tuple of str
         Classes on its two sides; one class if the boundary leaves the sliding portrait unchanged.
     """
@@ -218,7 +215,7 @@ class Classification:
         Orbits of Da that reach s (with its mirror image in Dr: that leave s), and orbits of Da
         that come from s (in Dr: that reach s).
     determinism : str
-        What it means for uniqueness, in words.
+        What it means for uniqueness.
     boundaries : tuple of Boundary
         The degenerate boundaries on which $(sigma, nu)$ lies within the tolerance.
     margin : float
@@ -302,7 +299,7 @@ def classify_two_fold(
     nu : (float, float)
         The two numbers $(nu1, nu2)$ of the two-fold.
     tol : float, optional
-        A boundary counts as met within this relative distance: $|Delta|$ against $max(1, |nu1 nu2|)$,
+        Relative distance within which a point is on a boundary: $|Delta|$ against $max(1, |nu1 nu2|)$,
         $|g - 2|$ and $nu_i$ against the larger of 1, $|nu1|$ and $|nu2|$.
 
     Returns
@@ -372,7 +369,7 @@ def _undecided(
     if flow.folds in MIXED and len(changing) == 2:  # g = 2 and T = Delta = 0: all four meet
         labels = dict.fromkeys(("mix-0", "mix-S", "mix-C", "mix-F"))
     names = ", ".join(b.name for b in changing)
-    words = (
+    determinism = (
         f"Degenerate: {names} ({'; '.join(b.meaning for b in changing)}). The classes "
         f"{', '.join(labels)} meet here and leading order does not decide between them; higher "
         "derivatives do."
@@ -380,4 +377,4 @@ def _undecided(
     none = Slopes("undecided")
     label = f"boundary {names}: {'|'.join(labels)}"
     nan = math.nan
-    return Classification(label, flow.kind, nan, nan, none, none, words, on, margin, nearest)
+    return Classification(label, flow.kind, nan, nan, none, none, determinism, on, margin, nearest)

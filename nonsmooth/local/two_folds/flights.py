@@ -156,8 +156,7 @@ def max_flights(sigma: tuple[int, int], nu: Nu) -> float:
 
 
 def has_diabolo(flow: ReducedFlow) -> bool:
-    """Whether the return map of an invisible two-fold has invariant lines in the crossing
-    region."""
+    """Whether the return map of an invisible two-fold has invariant lines where orbits cross."""
     n1, n2 = flow.nu
     return flow.folds == "II" and n1 < 0 and n2 < 0 and n1 * n2 > 1 + 1e-12
 

@@ -20,7 +20,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...model import OptionError, explain, real
+from ...model import OptionError, real
 from .reduced_flow import ReducedFlow
 
 
@@ -76,11 +76,7 @@ def _entries(lie: Mapping[str, float]) -> list[float]:
     names = ("L11", "L12", "L21", "L22")
     if not isinstance(lie, Mapping) or any(name not in lie for name in names):
         raise OptionError(
-            explain(
-                "lie",
-                expected=f"a mapping with {', '.join(names)}",
-                received=repr(lie),
-                advice="L_ij = F_i . grad L_j, the second Lie derivatives at the two-fold.",
-            )
+            f"lie: expected a mapping with {', '.join(names)}, received {lie!r}. L_ij = F_i . "
+            "grad L_j, the second Lie derivatives at the two-fold."
         )
     return [real(lie[name], name) for name in names]

@@ -1,15 +1,11 @@
-"""Orbits of the normal form off the surface: parabolas, exact.
-
-The fields (-z2, -sigma1, nu1) for z1 > 0 and (z3, nu2, sigma2) for z1 < 0 are linear in time, so
-z1 is quadratic in it and no step is taken.
-"""
+"""Orbits of the normal form off the surface, in closed form: z1 is quadratic in time."""
 
 from __future__ import annotations
 
 import numpy as np
 
 from ...model import Array
-from ..point.sides import Side
+from ..point.surface_point import Side
 from .reduced_flow import ReducedFlow
 
 _POINTS = 61
@@ -25,8 +21,7 @@ def arc(flow: ReducedFlow, side: Side, centre: float, half: float, height: float
 
 
 def flight(flow: ReducedFlow, z: Array, side: Side) -> Array:
-    """Return the flight (61, 3) from (z2, z3) in a crossing region over (under) an invisible
-    fold."""
+    """Return the flight (61, 3) from (z2, z3) over or under an invisible fold."""
     if side == "+":
         return arc(flow, "+", z[1] - flow.nu[0] * z[0], -z[0], z[0] ** 2 / 2)
     return arc(flow, "-", z[0] - flow.nu[1] * z[1], -z[1], -(z[1] ** 2) / 2)

@@ -1,9 +1,9 @@
-"""The sliding flow of the normal form of a two-fold: classified by a matrix, its orbits exact.
+"""The sliding flow of the normal form of a two-fold, with its orbits in closed form.
 
 The sliding flow is z' = M z/(z2 + z3): its orbits are those of the linear flow dz/dr = M z, in the
 direction of real time where z2 + z3 > 0 (Da) and against it in Dr, which is the mirror image
-z -> -z with time reversed. So an orbit is a matrix exponential, here in closed form for 2 x 2, and
-the ends of its stay in a quadrant are inverse tangents; no step is taken.
+z -> -z with time reversed. An orbit is the exponential of a 2 x 2 matrix, and the times at which it
+leaves a quadrant are inverse tangents.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ...model import Array, DegenerateError, OptionError
 
-#: An orbit that has come so close to s, relative to its start, counts as reaching it.
+#: An orbit this close to s, relative to its start, counts as reaching it.
 _SMALL = 2e-3
 _LARGE = 30.0
 
@@ -140,8 +140,7 @@ def exponential(matrix: ArrayLike, r: ArrayLike) -> Array:
 
 
 def leaving(matrix: ArrayLike, z: ArrayLike) -> tuple[float, int]:
-    """Return the time r > 0 at which exp(M r) z leaves the open first quadrant, and through
-    what."""
+    """Time r > 0 at which exp(M r) z leaves the open first quadrant, and the component; inf, -1."""
     m, z = np.asarray(matrix, dtype=float), np.asarray(z, dtype=float)
     half = np.trace(m) / 2
     rest = m - half * np.eye(2)
@@ -188,7 +187,7 @@ def orbit(flow: ReducedFlow, z: ArrayLike, count: int = 250) -> Orbit:
 
 
 def _end(matrix: Array, z: Array) -> tuple[Array, str]:
-    """Times from 0 to the end of the stay in Da, and what is there."""
+    """Times from 0 to the end of the stay in Da, and the name of the end."""
     last, component = leaving(matrix, z)
     if component >= 0:
         times = np.linspace(0.0, last, 1500)

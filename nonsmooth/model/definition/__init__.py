@@ -1,1 +1,1 @@
-"""Definitions of nonsmooth systems: states, fields, surfaces, events, and how they are read and checked."""
+"""Definitions of nonsmooth systems: states, fields, surfaces, events; reading and checking them."""

@@ -19,11 +19,9 @@ from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import Node, evaluate, instructions, operation
 from ..reading import listed
 from ..values import Array
-from .consistency import require_consistent
-from .form import Definition
-from .found_switches import LiftedSwitch
+from .lift import LiftedSwitch
+from .parse_definition import LARGEST, Definition, require_consistent
 from .system import FilippovSystem
-from .vectors import LARGEST
 
 #: Operations of an instruction list; a list names those that it uses.
 _OPERATIONS = ("const", "input", *UNARY, *BINARY)
@@ -42,11 +40,6 @@ def written(system: FilippovSystem) -> dict[str, Any]:
     inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, _OUTPUTS))
     nodes, rows = instructions(inputs, outputs, merged=False)
     operations = sorted({node.op for node in nodes})
-    if unknown := sorted({*operations} - {*_OPERATIONS}):
-        raise DefinitionError(
-            f"system: {unknown[0]!r} is an operation of CasADi that files do not have. Write the "
-            "expression with elementary functions."
-        )
     size, depth = max(len(nodes), sum(map(len, rows))), _depth(nodes)
     if size > MOST or depth > DEEPEST:
         raise DefinitionError(
@@ -59,7 +52,7 @@ def written(system: FilippovSystem) -> dict[str, Any]:
         if node.op == "const":
             args[k, 0], used = used, used + 1
         else:
-            own = node.place if node.op == "input" else node.args
+            own = node.source if node.op == "input" else node.args
             args[k, : len(own)] = own
     return {
         "operations": operations,

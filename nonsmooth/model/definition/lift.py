@@ -11,7 +11,7 @@ smooth switching function h, with one multiplier lam = sgn h for all switches on
     copysign(a, b) fabs(a) sign(b)
 
 ``not``, ``and``, ``or`` act on conditions. Two functions that differ by a constant factor are one
-surface; the first one met is used, and a negative factor turns the sign of the multiplier.
+surface; the first one found is used, and a negative factor turns the sign of the multiplier.
 
 A switch inside a switch, such as fmax(fmin(x, 1), -1), is expanded over the sides of the inner one:
 sgn h(x, lam) = sum over lam = +1, -1 of its weight times sgn h(x, +-1). This is exact off the
@@ -22,27 +22,123 @@ The result is affine in each multiplier: Filippov's convention (Filippov 1988, s
 only the values beside a surface count. Where a multiplier enters in another way, as in sign(x)**2
 or exp(sign(x)), it is replaced by the affine function with the same values at +1 and -1; this too
 is exact off the surfaces. On the surface the expression as written could be read as Jeffrey's
-hidden dynamics instead (Jeffrey 2018), with another sliding field: ``LiftedSwitch.hidden`` says
-so, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are continuous and bring no such choice: fabs(h) = 0 on h = 0.
+hidden dynamics instead (Jeffrey 2018), with another sliding field: ``LiftedSwitch.hidden`` is
+true then, and ``hidden=True`` keeps the expression. fabs(h), fmin and fmax are
+continuous and leave no such choice: fabs(h) = 0 on h = 0.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, field
 from itertools import product
 
 import casadi as ca
 
-from ..errors import DefinitionError, NotSmoothError, explain
+from ..errors import DefinitionError, NotSmoothError
+from ..expressions.cancel import Sum, normal_forms, simple_zeros
 from ..expressions.graph import NOT_SMOOTH, evaluate, instructions, operation
-from .found_switches import LiftedSwitch, Switches
+
+_ROUNDING = 16 * 2.220446049250313e-16
+
+
+@dataclass(frozen=True)
+class LiftedSwitch:
+    """A surface that was found in an expression."""
+
+    surface: str
+    multiplier: str
+    function: str
+    origins: tuple[str, ...]
+    hidden: bool = False
+
+    def __str__(self) -> str:
+        note = "; other readings on the surface: hidden dynamics" if self.hidden else ""
+        return f"{self.surface} = {self.function} ({', '.join(self.origins)}){note}"
+
+
+@dataclass
+class Switch:
+    """A surface under construction."""
+
+    h: ca.SX
+    lam: ca.SX
+    even: ca.SX  # the multiplier inside continuous switches, which becomes ``lam`` at the end
+    origins: list[str] = field(default_factory=list)
+    hidden: bool = False
+
+
+class Switches:
+    """Surfaces with their multipliers, in the order in which they are found."""
+
+    def __init__(self, states: ca.SX, inputs: list[ca.SX]):
+        self.states, self.inputs = states, inputs
+        self.all: list[Switch] = []
+        names = {str(s) for s in ca.vertsplit(ca.vertcat(*inputs))}
+        self.prefix = next(p for p in _prefixes() if not any(n.startswith(p) for n in names))
+
+    def __getitem__(self, number: int) -> Switch:
+        return self.all[number]
+
+    def find(self, h: ca.SX, origin: str) -> tuple[int | None, int]:
+        """Number of the surface h = 0 and the sign of h over its function; None, sgn h if constant."""
+        h = simple_zeros(h, *self.inputs)
+        forms = self._forms([h, *(s.h for s in self.all)])
+        if all(monomial == () for monomial in forms[0]):
+            c = forms[0].get((), 0.0)
+            return None, int(c > 0) - int(c < 0)
+        for i, form in enumerate(forms[1:]):
+            ratio = _ratio([forms[0], form])
+            if ratio:
+                if origin not in self.all[i].origins:
+                    self.all[i].origins.append(origin)
+                return i, 1 if ratio > 0 else -1
+        if not ca.depends_on(h, self.states):
+            raise DefinitionError(
+                f"a switch: {origin} of {h} does not depend on the states. Make the clock a state with "
+                "derivative 1, and switch on that."
+            )
+        k = len(self.all)
+        lam, even = ca.SX.sym(f"{self.prefix}{k}"), ca.SX.sym(f"{self.prefix}{k}_even")
+        self.all.append(Switch(h, lam, even, [origin]))
+        return k, 1
+
+    def _forms(self, expressions: list[ca.SX]) -> list[Sum]:
+        return [row[0] for row in normal_forms(self.inputs, expressions)[1]]
+
+    def report(self, f: ca.SX) -> tuple[list[Switch], tuple[LiftedSwitch, ...]]:
+        """Return the switches of a field in the order of their states, and their descriptions."""
+        kept = [s for s in self.all if ca.depends_on(f, s.lam)]
+        kept.sort(key=lambda s: self._states_of(s.h))
+        described = tuple(
+            LiftedSwitch(f"h{i}", str(s.lam), str(s.h), tuple(sorted(s.origins)), s.hidden)
+            for i, s in enumerate(kept)
+        )
+        return kept, described
+
+    def _states_of(self, h: ca.SX) -> tuple[int, ...]:
+        return tuple(i for i in range(self.states.numel()) if ca.depends_on(h, self.states[i]))
+
+
+def _prefixes() -> Iterator[str]:
+    return ("lam" + "_" * k for k in range(100))
+
+
+def _ratio(forms: Sequence[Sum]) -> float:
+    """Return c with forms[0] = c forms[1], or 0 if they are not proportional."""
+    first, second = forms
+    if first.keys() != second.keys():
+        return 0.0
+    ratios = [first[monomial] / second[monomial] for monomial in first]
+    c = ratios[0]
+    return c if all(abs(r - c) <= _ROUNDING * abs(c) for r in ratios) else 0.0
+
 
 #: A switch that depends on more switches than this is refused: 2^n copies of it would be needed.
 _MOST_NESTED = 6
 
 _INFINITELY_MANY = (
-    "It switches on infinitely many surfaces. Declare those that the motion can meet, each as "
+    "It switches on infinitely many surfaces. Declare those that the motion can reach, each as "
     "sign(x - c) or as a surface with its multiplier; a jump of a state is a Reset."
 )
 _EQUALITY = (
@@ -85,7 +181,7 @@ def lift(
 
 
 class _Lifter:
-    """One expression graph on its way to a field with multipliers."""
+    """The algebra in which evaluating a graph replaces its switches by multipliers."""
 
     def __init__(self, rhs: ca.SX, states: ca.SX, time: ca.SX, parameters: ca.SX, hidden: bool):
         self.hidden = hidden
@@ -101,23 +197,20 @@ class _Lifter:
         return self._finish(ca.vertcat(*entries))
 
     def _finish(self, f: ca.SX) -> Lifting:
-        kept, told = self.switches.report(f)
+        kept, described = self.switches.report(f)
         lam = ca.vertcat(*[s.lam for s in kept]) if kept else ca.SX(0, 1)
         h = ca.vertcat(*[s.h for s in kept]) if kept else ca.SX(0, 1)
-        return Lifting(f, lam, h, told)
+        return Lifting(f, lam, h, described)
 
-    # one node ----------------------------------------------------------------------------------
+    # the algebra of the graph's evaluation -----------------------------------------------------
 
     def constant(self, value: float) -> _Value:
-        """Part of the graph's evaluation."""
         return self._counted(_Value(ca.SX(value)))
 
     def symbol(self, vector: int, position: int) -> _Value:
-        """Part of the graph's evaluation."""
         return self._counted(_Value(self.inputs[vector][position]))
 
     def apply(self, op: str, args: Sequence[_Value]) -> _Value:
-        """Part of the graph's evaluation."""
         try:
             return self._counted(self._operation(op, args))
         except (NotSmoothError, DefinitionError) as error:
@@ -139,22 +232,15 @@ class _Lifter:
         return _Value(operation(op, [a.e for a in args]), inside)
 
     def _over_sides(
-        self,
-        args: list[_Value],
-        inside: frozenset[int],
-        build: Callable[[list[_Value]], _Value],
+        self, args: list[_Value], inside: frozenset[int], build: Callable[[list[_Value]], _Value]
     ) -> _Value:
         """Sum ``build`` over the sides of the switches ``inside``, with their weights."""
         if not inside:
             return build(args)
         if len(inside) > _MOST_NESTED:
             raise DefinitionError(
-                explain(
-                    "a switch inside a switch",
-                    expected=f"one that depends on at most {_MOST_NESTED} others",
-                    received=str(len(inside)),
-                    advice="Write the cases out as a field with multipliers=.",
-                )
+                f"a switch inside a switch: it depends on {len(inside)} others, but at most "
+                f"{_MOST_NESTED} can be lifted. Write the cases out as a field with multipliers=."
             )
         numbers, found = sorted(inside), set(inside)
         weights, values = [], []
@@ -170,7 +256,7 @@ class _Lifter:
         return _Value(_weighted(weights, values), frozenset(found))
 
     def _symbol(self, i: int, args: list[_Value]) -> ca.SX:
-        """Multiplier of a switch for a function of arguments that may all be continuous there."""
+        """Multiplier of a switch; ``even`` if all arguments are continuous on its surface."""
         s = self.switches[i]
         return s.lam if any(ca.depends_on(a.e, s.lam) for a in args) else s.even
 
@@ -184,7 +270,7 @@ class _Lifter:
     # the switches, of smooth arguments ---------------------------------------------------------
 
     def _if_else(self, condition: _Value, value: _Value) -> _Value:
-        """Only the condition decides; the value is looked at on each of its sides if it must."""
+        """Expand the condition over its sides, and the value too if it has the same switches."""
         if condition.inside & value.inside:
             return self._over_sides([condition, value], condition.inside, self._if_else_zero)
         one = _Value(ca.SX(1))
@@ -194,7 +280,9 @@ class _Lifter:
     def _if_else_zero(self, args: list[_Value]) -> _Value:
         condition, value = args
         if ca.depends_on(condition.e, self.moving):
-            raise _cannot("if_else", "a condition that is not a comparison", condition.e, _EQUALITY)
+            raise _cannot(
+                "if_else", condition.e, "Its condition must be a comparison. " + _EQUALITY
+            )
         return _Value(operation("if_else_zero", [condition.e, value.e]), value.inside)
 
     def _switch(self, op: str, args: list[_Value]) -> _Value:
@@ -216,8 +304,8 @@ class _Lifter:
         if op == "copysign":
             size, side = self._choice(e[0], e[0], -e[0], op), self._sign(e[1], op, of_zero=1)
             return _Value(size.e * side.e, size.inside | side.inside)
-        advice = _REFUSED.get(op, "A number that moves is no condition: compare it with another.")
-        raise _cannot(NOT_SMOOTH[op], "one of the states", operation(op, e), advice)
+        advice = _REFUSED.get(op, "Logic acts on conditions: compare the argument with a number.")
+        raise _cannot(NOT_SMOOTH[op], operation(op, e), advice)
 
     def _sign(self, h: ca.SX, origin: str, of_zero: int = 0) -> _Value:
         number, side = self.switches.find(h, origin)
@@ -277,13 +365,8 @@ def _weighted(weights: list[ca.SX], values: list[ca.SX]) -> ca.SX:
     return sum(terms[1:], terms[0])
 
 
-def _cannot(op: str, received: str, e: ca.SX, advice: str) -> NotSmoothError:
+def _cannot(op: str, e: ca.SX, advice: str) -> NotSmoothError:
     return NotSmoothError(
-        explain(
-            f"{op}",
-            expected="a switch that can be lifted (sign, fabs, fmin, fmax, copysign, if_else, "
-            "comparisons, and logic on these)",
-            received=f"{received}: {e}",
-            advice=advice,
-        )
+        f"{op}: {e} cannot be lifted. Switches that can are sign, fabs, fmin, fmax, copysign, if_else, "
+        f"comparisons, and logic on these. {advice}"
     )

@@ -1,25 +1,112 @@
-"""Reading the definition of a system: what a user wrote, checked, as symbols and expressions.
+"""Read and check the definition of a system: one form for all ways in which it can be written.
 
-Both ways in, two fields of one surface or a field with multipliers, end in one form: a field in
-states, time, parameters and multipliers, and functions of the first three.
+The form is a field in states, time, parameters and multipliers, with functions of the first three.
+A vector h of k switching functions with a vector of k multipliers is a set h = 0 of codimension k:
+the multiplier is h/|h| off the set and at most 1 in length on it. Coulomb friction in the plane has
+k = 2, with drilling friction k = 3. With k = 1 the set is a surface.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from typing import Any
 
 import casadi as ca
 
 from ..checks import real
-from ..errors import DefinitionError, ParameterError, explain
+from ..errors import DefinitionError, ParameterError
+from ..expressions.cancel import powers
 from ..expressions.graph import require_smooth
-from ..reading import Expression, Parameters, column, listed, require_known, scalar, symbols
-from .consistency import require_consistent
+from ..reading import (
+    Expression,
+    Parameters,
+    column,
+    listed,
+    require_finite,
+    require_known,
+    require_unique,
+    scalar,
+    symbols,
+)
+from ..values import Array, parameter_values
 from .events import Impact, Reset, Stop
-from .form import Definition
-from .vectors import read_entry, require_alike
+
+
+@dataclass(frozen=True)
+class Definition:
+    """A system as symbols and expressions."""
+
+    states: ca.SX
+    time: ca.SX
+    parameters: ca.SX
+    multipliers: ca.SX
+    field: ca.SX
+    surfaces: ca.SX
+    guards: ca.SX
+    maps: ca.SX
+    reactions: ca.SX
+    gaps: ca.SX
+    restitutions: ca.SX
+    stops: tuple[tuple[str, int], ...]
+    resets: tuple[tuple[str, int], ...]
+    impacts: tuple[str, ...]
+    defaults: dict[str, float | None]
+    hidden: bool
+    sizes: tuple[int, ...] = ()
+    renamed: tuple[tuple[str, str], ...] = ()
+
+    @property
+    def extended_states(self) -> ca.SX:
+        """The states, followed by the time where the system depends on it."""
+        return ca.vertcat(self.states, self.time)
+
+    @property
+    def gap_rates(self) -> ca.SX:
+        """Rates of the gaps (c,), in states, parameters and time."""
+        x = self.extended_states
+        free = ca.vertcat(self.field, ca.SX.ones(self.time.numel(), 1))
+        rates = ca.jtimes(self.gaps, x, free) if self.gaps.numel() else ca.SX(0, 1)
+        return ca.densify(rates)
+
+    @property
+    def names(self) -> dict[str, list[str]]:
+        """Names of the states and of the parameters."""
+        return {
+            "states": [s.name() for s in listed(self.states)],
+            "parameters": [s.name() for s in listed(self.parameters)],
+        }
+
+    def state(self) -> dict[str, Any]:
+        """Plain values from which ``from_state`` makes an equal definition."""
+        inputs = [self.states, self.time, self.parameters, self.multipliers, self.reactions]
+        outputs = [self.field, self.surfaces, self.guards, self.maps, self.gaps, self.restitutions]
+        some: dict[str, Any] = {"sizes": self.sizes, "renamed": self.renamed}
+        return {
+            **{name: value for name, value in some.items() if value},
+            "definition": ca.Function("definition", inputs, outputs).serialize(),
+            "names": [[str(s) for s in listed(v)] for v in inputs],
+            "defaults": self.defaults,
+            "stops": self.stops,
+            "resets": self.resets,
+            "impacts": self.impacts,
+            "hidden": self.hidden,
+        }
+
+    @classmethod
+    def from_state(cls, state: Mapping[str, Any]) -> Definition:
+        """Make the definition that ``state`` was taken from, over new symbols."""
+        function = ca.Function.deserialize(state["definition"])
+        vectors = [ca.vertcat(*map(ca.SX.sym, names)) for names in state["names"]]
+        vectors = [v if v.numel() else ca.SX(0, 1) for v in vectors]
+        expressions = [ca.SX(e) for e in function.call(vectors)]
+        inputs = ("states", "time", "parameters", "multipliers", "reactions")
+        outputs = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
+        rest = {k: state[k] for k in ("stops", "resets", "impacts", "defaults", "hidden")}
+        parts = dict(zip((*inputs, *outputs), (*vectors, *expressions), strict=True))
+        sizes, renamed = tuple(state.get("sizes", ())), tuple(state.get("renamed", ()))
+        return cls(**parts, **rest, sizes=sizes, renamed=renamed)
+
 
 _DIRECTIONS = (-1, 0, 1)
 
@@ -40,7 +127,7 @@ def read_definition(
     impacts: Any,
     hidden: bool,
 ) -> Definition:
-    """Read what a user gave to FilippovSystem, whose docstring says what each is."""
+    """Read and check the arguments of FilippovSystem."""
     x = symbols(states, "states")
     if x.numel() == 0:
         raise DefinitionError("states: expected at least one symbol, received none.")
@@ -50,12 +137,12 @@ def read_definition(
     if above is not None or below is not None:
         lam, f = _two_fields(above, below, field, multipliers, h, x.numel())
     else:
-        require_alike(sizes, multipliers)
+        _require_alike(sizes, multipliers)
         lam = symbols([s for entry in listed(multipliers) for s in listed(entry)], "multipliers")
         f = column(field, "field", x.numel())
     _one_multiplier_each(lam, h)
     kinds = [(stops, Stop, "stops"), (resets, Reset, "resets"), (impacts, Impact, "impacts")]
-    (stops, resets, impacts), renamed = _told_apart([_items(*k) for k in kinds], _own_names(sizes))
+    (stops, resets, impacts), renamed = _distinct([_items(*k) for k in kinds], _own_names(sizes))
     guards = [column([s.function], f"stop {s.name!r}", 1) for s in stops]
     guards += [column([r.function], f"reset {r.name!r}", 1) for r in resets]
     maps = [column(r.map, f"map of reset {r.name!r}", x.numel()) for r in resets]
@@ -89,12 +176,8 @@ def read_definition(
 def _one_multiplier_each(lam: ca.SX, h: ca.SX) -> None:
     if lam.numel() != h.numel():
         raise DefinitionError(
-            explain(
-                "multipliers",
-                expected=f"one for each of the {h.numel()} surfaces",
-                received=str(lam.numel()),
-                advice="Surface i switches multiplier i.",
-            )
+            f"multipliers: expected one for each of the {h.numel()} surfaces, received "
+            f"{lam.numel()}. Surface i switches multiplier i."
         )
 
 
@@ -107,7 +190,7 @@ def read_function(definition: Definition, value: Any, what: str) -> ca.SX:
     return expression
 
 
-# Pieces of a definition --------------------------------------------------------------------------
+# parts of a definition ---------------------------------------------------------------------------
 
 
 def _parameters(
@@ -136,7 +219,7 @@ def _surfaces(
             "function goes to surface=, several to surfaces=."
         )
     given = [surface] if surface is not None else listed(surfaces)
-    entries = [read_entry(v, f"surface {i}") for i, v in enumerate(given)]
+    entries = [_read_entry(v, f"surface {i}") for i, v in enumerate(given)]
     expressions = [e for entry in entries for e in entry]
     sizes = tuple(len(entry) for entry in entries)
     return ca.vertcat(*expressions) if expressions else ca.SX(0, 1), sizes
@@ -148,12 +231,9 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
     for i, item in enumerate(items):
         if not isinstance(item, kind):
             raise DefinitionError(
-                explain(
-                    f"{what}[{i}]",
-                    expected=f"a {kind.__name__}",
-                    received=f"{item!r} ({type(item).__name__})",
-                    advice=f"Write {what}=[nonsmooth.{kind.__name__}(function, ...)].",
-                )
+                f"{what}[{i}]: expected a {kind.__name__}, received {item!r} "
+                f"({type(item).__name__}). Write {what}=[nonsmooth.{kind.__name__}(function, "
+                "...)]."
             )
         if kind is Impact:
             continue
@@ -166,16 +246,16 @@ def _items(values: Any, kind: type[Any], what: str) -> list[Any]:
 
 
 def _own_names(sizes: Sequence[int]) -> set[str]:
-    """Names that guards of a system have by themselves: of surfaces and sets, and of the ends of sliding."""
-    of_each = {f"{what}{k}" for k in range(len(sizes)) for what in ("h", "lambda")}
-    return of_each | ({"L_F1 h", "L_F2 h", "stability of sliding"} if sizes else set())
+    """Names reserved for guards of surfaces and sets and for the ends of sliding (``flow/names.py``)."""
+    of_each = ("h{}", "lambda{} = 1", "lambda{} = -1", "|lambda{}| = 1")
+    names = {name.format(k) for k in range(len(sizes)) for name in of_each}
+    return names | ({"stability of sliding"} if sizes else set())
 
 
-def _told_apart(
+def _distinct(
     kinds: Sequence[list[Any]], own: set[str]
 ) -> tuple[list[list[Any]], tuple[tuple[str, str], ...]]:
-    """Events with names of their own."""
-    # Events are found again by their names, so that two of one name would have the derivatives of the first.
+    """Events with different names, by which they are found again; and which were renamed."""
     taken, used = {item.name for items in kinds for item in items} | own, set(own)
     found, renamed = list[list[Any]](), list[tuple[str, str]]()
     for items in kinds:
@@ -198,16 +278,10 @@ def _two_fields(
     above: Any, below: Any, field: Any, multipliers: Any, h: ca.SX, n: int
 ) -> tuple[ca.SX, ca.SX]:
     if field is not None or multipliers is not None or h.numel() != 1:
+        received = "a mixture of the two forms" if h.numel() == 1 else f"{h.numel()} surfaces"
         raise DefinitionError(
-            explain(
-                "definition",
-                expected="above= and below= with one surface=, or field= with multipliers= and "
-                "surfaces=",
-                received="a mixture of the two forms"
-                if h.numel() == 1
-                else f"{h.numel()} surfaces",
-                advice="Two fields belong to exactly one surface.",
-            )
+            "definition: expected above= and below= with one surface=, or field= with multipliers= "
+            f"and surfaces=, received {received}. Two fields belong to exactly one surface."
         )
     f1, f2 = column(above, "above", n), column(below, "below", n)
     lam = ca.SX.sym("lambda")
@@ -226,13 +300,9 @@ def _direction(impact: Impact, gap: ca.SX, rate: ca.SX, x: ca.SX) -> ca.SX:
     velocities = [i for i in range(x.numel()) if not positions[i] and not push[i].is_zero()]
     if velocities and not ca.is_linear(rate, ca.vertcat(*[x[i] for i in velocities])):
         raise DefinitionError(
-            explain(
-                f"reaction of {impact.name!r}",
-                expected="reaction=, a symbol in the field",
-                received=f"none, and the rate {rate} of the gap, which is not linear in the states that "
-                "are not in the gap",
-                advice="The direction in which the contact pushes cannot be seen from it.",
-            )
+            f"reaction of {impact.name!r}: the rate {rate} of the gap is not linear in the states "
+            "that are not in the gap, so it does not give the direction of the reaction. Give "
+            "reaction=, a symbol in the field."
         )
     return ca.vertcat(*[push[i] if i in velocities else 0 for i in range(x.numel())])
 
@@ -254,3 +324,178 @@ def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> t
         given.append(ca.SX.sym(f"reaction{j}"))
         field = field + given[-1] * _direction(impact, gap, rate, x)
     return ca.vertcat(*given) if given else ca.SX(0, 1), field
+
+
+# sets of codimension two and three --------------------------------------------------------------
+
+#: Largest codimension of a set: slip has two components, three with drilling.
+LARGEST = 3
+
+
+def _read_entry(value: Any, what: str) -> list[ca.SX]:
+    """Read a surface (a scalar) or a set (a vector of two or three) as a list of expressions."""
+    if not isinstance(value, (list, tuple)) and not (
+        isinstance(value, (ca.SX, ca.DM)) and ca.SX(value).numel() > 1
+    ):
+        return [scalar(value, what)]
+    entries = listed(value)
+    if isinstance(value, (ca.SX, ca.DM)) and 1 not in value.shape:
+        raise DefinitionError(
+            f"{what}: expected a scalar or a column, received a matrix of shape {value.shape}."
+        )
+    if not 1 <= len(entries) <= LARGEST:
+        raise DefinitionError(
+            f"{what}: expected a scalar or a vector of at most {LARGEST} switching functions, "
+            f"received {len(entries)} of them. A vector is one set, on which all its components "
+            "vanish; give surfaces that do not belong together as separate entries."
+        )
+    return [scalar(e, f"{what}[{i}]") for i, e in enumerate(entries)]
+
+
+def _require_alike(sizes: Sequence[int], multipliers: Any) -> None:
+    """Refuse multipliers whose shapes differ from those of the surfaces."""
+    entries = [len(listed(entry)) for entry in listed(multipliers)]
+    if max((*sizes, *entries), default=1) == 1 or list(sizes) == entries:
+        return
+    raise DefinitionError(
+        f"multipliers: they have {entries} components, but the surfaces have {list(sizes)}. "
+        "surfaces=[casadi.vertcat(h1, h2)] goes with multipliers=[casadi.vertcat(l1, l2)]."
+    )
+
+
+def _require_linear_sets(d: Definition) -> None:
+    """Refuse sets whose multipliers enter nonlinearly or are multiplied by a reaction."""
+    first = 0
+    for i, size in enumerate(d.sizes):
+        lam = d.multipliers[first : first + size]
+        first += size
+        if size == 1:
+            continue
+        if not ca.is_linear(d.field, lam):
+            raise DefinitionError(
+                f"multiplier {lam}: expected a field linear in all of its components together, "
+                "received a nonlinear one. Hidden dynamics has one multiplier for each surface."
+            )
+        if d.reactions.numel() and ca.depends_on(ca.jacobian(d.field, lam), d.reactions):
+            raise DefinitionError(
+                f"multiplier {lam} of surface {i}: it is multiplied by the reaction of an impact, "
+                "and impulses with friction in the plane are not implemented. Give the contact a "
+                "compliance, whose force is the load, or friction in one direction."
+            )
+
+
+# checks of the whole definition ------------------------------------------------------------------
+
+
+def require_consistent(d: Definition, given: bool = True) -> None:
+    """Refuse unknown symbols, functions that are not smooth, and multipliers that do not fit."""
+    # Sections of derived systems may have multiple zeros; only ``given`` guards must have simple ones.
+    guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
+    named = [("field", d.field, True)]
+    named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
+    named += [(name, d.guards[i], False) for i, name in enumerate(guards)]
+    named += [(f"map of reset {n!r}", d.maps[:, j], False) for j, (n, _) in enumerate(d.resets)]
+    for j, name in enumerate(d.impacts):
+        named += [(f"gap of {name!r}", d.gaps[j], False)]
+        named += [(f"restitution of {name!r}", d.restitutions[j], False)]
+    known = ca.vertcat(d.extended_states, d.parameters, d.multipliers, d.reactions)
+    require_unique(known)
+    moving = ca.vertcat(d.extended_states, d.multipliers, d.reactions)
+    for what, expression, multipliers in named:
+        require_known(expression, known, what, **d.names)
+        if not multipliers and ca.depends_on(expression, ca.vertcat(d.multipliers, d.reactions)):
+            raise DefinitionError(
+                f"{what}: expected an expression in states, time and parameters, received one "
+                "with a multiplier. Only the field may contain multipliers."
+            )
+        require_finite(expression, known, what)
+        require_smooth(expression, moving, d.parameters, what)
+    for i, name in enumerate(guards):
+        _require_states(name, d.guards[i], d.extended_states, d)
+        if given:
+            _require_simple(name, d.guards[i], d)
+    for i, h in enumerate(listed(d.surfaces)):
+        _require_states(f"surface {i}", h, d.states, d)
+        _require_simple(f"surface {i}", h, d)
+    for j in range(len(d.impacts)):
+        _check_impact(d, j)
+    if not d.hidden:
+        _require_linear(d)
+    _require_linear_sets(d)
+
+
+def _check_impact(d: Definition, j: int) -> None:
+    what, gap, rate = f"gap of {d.impacts[j]!r}", d.gaps[j], d.gap_rates[j]
+    _require_states(what, gap, d.states, d)
+    _require_simple(what, gap, d)
+    if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
+        raise DefinitionError(
+            f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a "
+            "gap is a function of positions and time."
+        )
+    effect = ca.mtimes(ca.jacobian(rate, d.states), ca.jacobian(d.field, d.reactions[j]))
+    if effect.is_zero() or not ca.is_linear(d.field, d.reactions[j]):
+        fault = "does not change the gap's rate" if effect.is_zero() else "enters nonlinearly"
+        raise DefinitionError(
+            f"reaction of {d.impacts[j]!r}: {d.reactions[j]} {fault}. Write the force that opens the "
+            "contact as reaction times its direction."
+        )
+    e = d.restitutions[j]
+    if e.is_constant() and not 0.0 <= float(e) <= 1.0:
+        raise DefinitionError(
+            f"restitution of {d.impacts[j]!r}: expected a number from 0 to 1, received {float(e):g}."
+        )
+
+
+def consistent_parameters(
+    d: Definition, names: Sequence[str], parameters: Parameters | None
+) -> Array:
+    """Numbers for all parameters; a restitution that depends on nothing else must be one."""
+    p = parameter_values(names, d.defaults, parameters)
+    for j, name in enumerate(d.impacts):
+        e = d.restitutions[j]
+        if e.is_constant() or ca.depends_on(e, d.extended_states):
+            continue
+        value = float(ca.evalf(ca.substitute(e, d.parameters, ca.DM(p))))
+        if not 0.0 <= value <= 1.0:
+            raise ParameterError(
+                f"restitution of {name!r}: expected a number from 0 to 1, received {value:g} (= {e})."
+            )
+    return p
+
+
+def _require_linear(d: Definition) -> None:
+    for lam in listed(d.multipliers):
+        if not ca.is_linear(d.field, lam):
+            raise DefinitionError(
+                f"multiplier {lam}: expected a field linear in it (Filippov's convex "
+                "combination), received a nonlinear one. Nonlinear multipliers are hidden "
+                "dynamics (Jeffrey 2018): say hidden=True if they are meant. Products of "
+                "different multipliers are fine."
+            )
+
+
+def _require_states(what: str, function: ca.SX, states: ca.SX, d: Definition) -> None:
+    """Refuse a function that does not depend on the states."""
+    if not ca.depends_on(function, states):
+        received = f"the constant {function}"
+        advice = "A surface is the zero set of a function of the states."
+        if d.time.numel() and ca.depends_on(function, d.time):
+            received = f"the function {function} of time alone"
+            advice = "Make a clock a state, c' = 1, and the surface a function of c."
+        raise DefinitionError(
+            f"{what}: expected a function of the states {tuple(d.names['states'])}, received "
+            f"{received}. {advice}"
+        )
+
+
+def _require_simple(what: str, function: ca.SX, d: Definition) -> None:
+    """Refuse a function with a visible multiple zero."""
+    x = d.extended_states
+    for factor, power in powers(function, x, d.parameters):
+        if power > 1 and ca.depends_on(factor, x) and ca.is_linear(factor, x):
+            raise DefinitionError(
+                f"{what}: {function} has the factor {factor} {power} times, so its gradient "
+                "vanishes on the surface, which cannot be located to rounding. Use the factor once "
+                "if the power is odd; an even power does not change the sign."
+            )

@@ -1,4 +1,4 @@
-"""Regularisation: the multiplier becomes a steep smooth function of the switching function.
+"""Regularisation: each multiplier becomes a steep smooth function of its switching function.
 
 lambda_i = phi(h_i / eps) with phi from -1 to +1 (Sotomayor & Teixeira 1996). As eps -> 0 the smooth
 system tends to the Filippov system where the latter's future is unique: attracting sliding becomes
@@ -17,9 +17,9 @@ jets there; tanh and erf come closest. The error at crossing and in sliding is O
 O(eps log(1/eps)). A tail 1 - phi ~ s^-p leaves a visible fold O(eps^(2p/(2p+1))) late, from
 h ~ xi^2 and xi ~ (eps/h)^p at the distance xi from it: 2/3 for arctan, 4/5 for algebraic.
 
-A step-size control far from a thin layer sees a field without one and would step over it. So each
-layer has edges, resets that change nothing, on which a step must end: one where phi is +-1 to
-rounding or to usual tolerances, and nearer ones for coarse tolerances.
+A step-size control far from a thin layer would step over it. So each layer has edges, resets that do
+not change the state, on which a step must end: one where phi is +-1 to rounding or to usual
+tolerances, and nearer ones for coarse tolerances.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from dataclasses import dataclass
 import casadi as ca
 
 from ..checks import real
-from ..errors import DefinitionError, OptionError, explain
+from ..errors import DefinitionError, OptionError
 from ..reading import scalar
 from .events import Reset, Stop
 from .system import FilippovSystem, require_system
@@ -78,8 +78,8 @@ def regularise(
     name : str, optional
         Name of the parameter.
     edges : bool, optional
-        Whether the layer has edges: resets ``"edge of h0"`` (and ``"edge of h0 2"``, ...) that do not change the state, where a
-        step ends so that none passes over the layer.
+        Whether the layer has edges: resets ``"edge of h0"`` (and ``"edge of h0 2"``, ...) that do not
+        change the state, where a step ends so that none passes over the layer.
 
     Returns
     -------
@@ -126,12 +126,8 @@ def regularise(
         taken.add(str(system.extended_states[system.dimension]))
     if not isinstance(name, str) or not name or name in taken:
         raise DefinitionError(
-            explain(
-                "name",
-                expected="one that the system does not use",
-                received=repr(name),
-                advice="Give the width of the layer another one, such as name='width'.",
-            )
+            f"name: expected a name that the system does not use, received {name!r}. Choose another "
+            "one, such as name='width'."
         )
     chosen = _chosen(transition)
     width = ca.SX.sym(name)
@@ -173,25 +169,18 @@ def _chosen(transition: str | Callable[[ca.SX], ca.SX]) -> Transition:
         if abs(low + 1.0) < 1e-6 and abs(high - 1.0) < 1e-6:
             return Transition(transition)
         raise OptionError(
-            explain(
-                "transition",
-                expected="a function from -1 to +1",
-                received=f"one from {low:g} to {high:g}",
-                advice="lambda is -1 far below the surface and +1 far above it.",
-            )
+            f"transition: it goes from {low:g} to {high:g}, but lambda is -1 far below the surface and "
+            "+1 far above it. Give a function with these limits."
         )
     raise OptionError(
-        explain(
-            "transition",
-            expected=f"one of {sorted(TRANSITIONS)} or a function of an SX scalar",
-            received=repr(transition),
-            advice="All have slope 1 at 0; 'tanh' reaches +-1 fast, 'arctan' slowly.",
-        )
+        f"transition: expected one of {sorted(TRANSITIONS)} or a function of an SX scalar, "
+        f"received {transition!r}. All have slope 1 at 0; 'tanh' reaches +-1 fast, 'arctan' "
+        "slowly."
     )
 
 
 def _edges(system: FilippovSystem, surfaces: list[ca.SX], far: ca.SX) -> list[Reset]:
-    """Resets that change nothing at the distance ``far`` on both sides of each surface."""
+    """Resets that do not change the state, at the distance ``far`` from each surface."""
     same = ca.vertsplit(system.extended_states)[: system.dimension]
     return [
         Reset(h - side * far, same, 0, f"edge of h{i}")

@@ -1,36 +1,34 @@
-"""WHAT a nonsmooth system is: states, parameters, fields, switching surfaces, stops and resets.
+"""A Filippov system: states, parameters, fields, switching surfaces and events.
 
-Where it depends on time, the state carries that as a last component, in Lie derivatives and jets too.
+If the system depends on time, time is the last component of the state, in Lie derivatives and jets too.
 """
 
 from __future__ import annotations
 
 import hashlib
 from collections.abc import Callable, Hashable, Sequence
+from functools import cached_property
 from typing import Any, TypeVar
 
 import casadi as ca
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...notebook import card
 from ..cache import Cache, Content
 from ..calls import call
 from ..checks import real
-from ..errors import DefinitionError, PointError, explain
-from ..reading import Expression, Parameters, column, listed, matrix, require_known
+from ..errors import DefinitionError, PointError
+from ..reading import Expression, Parameters, column, listed, matrix, require_known, scalar
 from ..values import Array, state_values
-from .clock import Clock, with_clocks
-from .consistency import consistent_parameters
-from .events import Impact, Reset, Stop
-from .form import Definition
-from .lift import lift
-from .parse_definition import read_definition
-from .structure import Structure
+from .events import Clock, Impact, Reset, Stop, with_clocks
+from .lift import LiftedSwitch, lift
+from .parse_definition import Definition, consistent_parameters, read_definition
 
 T = TypeVar("T")
 
 
-class FilippovSystem(Structure):
+class FilippovSystem:
     """A system $x' = f(x, lambda; p)$ with $lambda_i in Sgn(h_i(x))$.
 
     Give either the two fields of one surface, or a field with multipliers. ``lambda = +1`` where
@@ -71,7 +69,8 @@ class FilippovSystem(Structure):
     Raises
     ------
     DefinitionError
-        Shapes, foreign symbols, a constant surface, a multiplier that enters nonlinearly.
+        Shapes, foreign symbols, a constant surface, a multiplier that enters nonlinearly, a CasADi
+        Function that is no graph of SX operations (``interpolant``, ``rootfinder``, external ones).
     NotSmoothError
         sign, fabs, fmin, fmax, if_else or a comparison of the states in an expression.
 
@@ -86,6 +85,9 @@ class FilippovSystem(Structure):
     >>> ns.FilippovSystem([x, v], surfaces=[v - 0.3], multipliers=[lam], field=[v, -x - 0.4 * lam])
     FilippovSystem(2 states: x, v; 1 surface)
     """
+
+    #: What ``from_expression`` found, one for each surface; empty for other systems.
+    lifted: tuple[LiftedSwitch, ...] = ()
 
     def __init__(
         self,
@@ -177,7 +179,7 @@ class FilippovSystem(Structure):
         >>> system.field("+"), system.field("-")
         (SX([v, (-(x+0.4))]), SX([v, (-(x+-0.3))]))
         """
-        column(rhs, "rhs", len(listed(states)))  # refuses what is no field of the states
+        column(rhs, "rhs", len(listed(states)))  # before clocks are added
         widened = with_clocks(clocks, {"states": states, "rhs": rhs, "resets": resets})
         states, rhs, resets = widened["states"], widened["rhs"], widened["resets"]
         n = len(listed(states))
@@ -202,7 +204,16 @@ class FilippovSystem(Structure):
         return system
 
     def _adopt(self, definition: Definition) -> None:
-        super()._adopt(definition)
+        self.definition = definition
+        self.stops, self.resets = definition.stops, definition.resets
+        self.impacts = definition.impacts
+        self.hidden = definition.hidden
+        field, multipliers = definition.field, listed(definition.multipliers)
+        self.nonlinear = tuple(not ca.is_linear(field, lam) for lam in multipliers)
+        names = definition.names
+        self.state_names = tuple(names["states"])
+        self.parameter_names = tuple(names["parameters"])
+        self._extended_states = definition.extended_states
         self._cache = Cache()
 
     def __getstate__(self) -> dict[str, Any]:
@@ -228,6 +239,251 @@ class FilippovSystem(Structure):
 
     def __hash__(self) -> int:
         return hash(self.content_hash())
+
+    # notebook and print ------------------------------------------------------------------------
+
+    def _repr_html_(self) -> str:
+        """How a notebook shows the system: states, fields of one surface, surfaces, parameters."""
+        rows: list[tuple[str, object]] = [("states", ", ".join(self.state_names))]
+        single = len(self.entries) == 1 and not self.sets
+        for mode, where in (("+", "above"), ("-", "below")) if single else ():
+            rows.append((f"field {where}", self.field(mode)))
+        surfaces = listed(self.definition.surfaces)
+        rows += [(f"surface h{k}", function) for k, function in enumerate(surfaces)]
+        rows += [("parameters", ", ".join(self.parameter_names))]
+        rows += [("stops", ", ".join(n for n, _ in self.stops))]
+        rows += [("resets", ", ".join(n for n, _ in self.resets))]
+        rows += [("impacts", ", ".join(self.impacts))]
+        return card("FilippovSystem", rows)
+
+    def __repr__(self) -> str:
+        parts = [
+            f"{self.dimension} state{'s' * (self.dimension > 1)}: {', '.join(self.state_names)}"
+        ]
+        names = f": {', '.join(s.function for s in self.lifted)}" if self.lifted else ""
+        surfaces = len(self.entries) - len(self.sets)
+        if surfaces or not self.sets:
+            parts.append(f"{surfaces} surface{'s' * (surfaces != 1)}{names}")
+        parts += [f"set of codimension {len(members)}" for members in self.sets]
+        if self.parameter_names:
+            parts.append(f"parameters: {', '.join(self.parameter_names)}")
+        if self.time_dependent:
+            parts.append(f"time {self.definition.time}")
+        parts += [f"stop {n!r}" for n, _ in self.stops] + [f"reset {n!r}" for n, _ in self.resets]
+        parts += [f"impact {n!r}" for n in self.impacts]
+        return f"FilippovSystem({'; '.join(parts)})"
+
+    # shape -------------------------------------------------------------------------------------
+
+    @cached_property
+    def dimension(self) -> int:
+        """Number n of states."""
+        return int(self.definition.states.numel())
+
+    @cached_property
+    def surface_count(self) -> int:
+        """Number of switching functions: one for each surface, k for a set of codimension k."""
+        return int(self.definition.surfaces.numel())
+
+    @cached_property
+    def entries(self) -> tuple[tuple[int, ...], ...]:
+        """Switching functions of each surface or set, in the order in which they were given."""
+        sizes = self.definition.sizes or (1,) * self.surface_count
+        firsts = [sum(sizes[:i]) for i in range(len(sizes))]
+        return tuple(tuple(range(f, f + k)) for f, k in zip(firsts, sizes, strict=True))
+
+    @cached_property
+    def sets(self) -> tuple[tuple[int, ...], ...]:
+        """Switching functions of each set of codimension two or more."""
+        return tuple(members for members in self.entries if len(members) > 1)
+
+    @cached_property
+    def set_of(self) -> dict[int, tuple[int, ...]]:
+        """The set to which a switching function belongs; surfaces are not in it."""
+        return {i: members for members in self.sets for i in members}
+
+    @cached_property
+    def surface_names(self) -> tuple[str, ...]:
+        """Names in events of each switching function: ``h0``, ``h1``, ... by surface or set."""
+        return tuple(f"h{k}" for k, members in enumerate(self.entries) for _ in members)
+
+    def entry_of(self, function: int) -> int:
+        """Number, in names and modes, of the surface or set of a switching ``function`` (index)."""
+        return next(k for k, members in enumerate(self.entries) if function in members)
+
+    @cached_property
+    def coupled(self) -> bool:
+        """Whether multipliers are solved for together: several, a nonlinear one, or reactions."""
+        return self.surface_count > 1 or any(self.nonlinear) or bool(self.impacts)
+
+    def spelled(self, mode: str) -> str:
+        """Shorten a ``mode`` to one letter for each surface, set and impact."""
+        if not self.sets:
+            return mode
+        letters = [mode[members[0]] for members in self.entries]
+        shown = ["*" if letter in "*bli" else letter for letter in letters]
+        return "".join(shown) + mode[self.surface_count :]
+
+    def widened(self, mode: str) -> str:
+        """Widen a ``mode`` to one letter for each switching function and impact."""
+        if not self.sets or not isinstance(mode, str):
+            return mode
+        if len(mode) not in (len(self.entries), len(self.entries) + len(self.impacts)):
+            return mode
+        pairs = zip(mode, self.entries, strict=False)
+        wide = "".join(letter * len(members) for letter, members in pairs)
+        return wide + mode[len(self.entries) :]
+
+    @cached_property
+    def time_dependent(self) -> bool:
+        """Whether the system depends on time explicitly."""
+        return bool(self.definition.time.numel())
+
+    @cached_property
+    def extended_dimension(self) -> int:
+        """Number of states, plus one if the system depends on time."""
+        return int(self.definition.states.numel() + self.definition.time.numel())
+
+    @property
+    def extended_states(self) -> ca.SX:
+        """The states, followed by the time where the system depends on it (SX column)."""
+        return self._extended_states
+
+    @property
+    def parameter_symbols(self) -> ca.SX:
+        """The parameters as an SX column, in the order of ``parameter_names``."""
+        return self.definition.parameters
+
+    @property
+    def modes(self) -> tuple[str, ...]:
+        """The modes of one letter per surface in which at most one surface slides."""
+        result = [""]
+        for members in self.entries:
+            letters = "+-s" if len(members) == 1 else "*s"
+            result = [m + c for m in result for c in letters if not (c == "s" and "s" in m)]
+        return tuple(result)
+
+    def parse_mode(self, mode: str) -> tuple[int, ...]:
+        """Turn the letters of the surfaces in a ``mode`` into signs: ``+`` 1, ``-`` -1, ``s`` 0.
+
+        The letters of a set, ``*`` and ``s``, stand for each of its switching functions: 2 and 0.
+
+        Raises
+        ------
+        DefinitionError
+            A wrong number of letters or another letter.
+        """
+        return self.parse_letters(mode)[: self.surface_count]
+
+    def parse_letters(self, mode: str) -> tuple[int, ...]:
+        """Turn the letters of surfaces and impacts in a ``mode`` into signs.
+
+        ``+`` and ``o`` are 1, ``-`` is -1, ``s`` and ``c`` are 0. Impacts without a letter are open.
+
+        Raises
+        ------
+        DefinitionError
+            A wrong number of letters or another letter.
+        """
+        # In a run "b" is "*" close to a set that was left, "l" the instant of leaving it, "i" a set
+        # whose multiplier does not enter the field.
+        letters = {"+": 1, "-": -1, "s": 0, "o": 1, "c": 0, **dict.fromkeys("*bli", 2)}
+        m, c, wide = self.surface_count, len(self.impacts), self.widened(mode)
+        whole = wide + "o" * c if isinstance(wide, str) and len(wide) == m else wide
+        fits = isinstance(whole, str) and len(whole) == m + c and not set(whole[m:]) - set("oc")
+        if not fits or any(
+            letter not in ("*sbli" if i in self.set_of else "+-s")
+            for i, letter in enumerate(whole[:m])
+        ):
+            raise DefinitionError(self._letters_expected(mode))
+        return tuple(letters[letter] for letter in whole)
+
+    def require_mode(self, mode: object) -> None:
+        """Refuse a ``mode`` without one letter for each surface and set, or with letters of runs."""
+        known = ["*s" if len(members) > 1 else "+-s" for members in self.entries]
+        whole = [*known, *["oc"] * len(self.impacts)]
+        fits = isinstance(mode, str) and len(mode) in (len(known), len(whole))
+        if not fits or any(a not in b for a, b in zip(str(mode), whole, strict=False)):
+            raise DefinitionError(self._letters_expected(mode))
+
+    def _letters_expected(self, mode: object) -> str:
+        m, c, k = len(self.entries), len(self.impacts), len(self.sets)
+        kinds = "each of + - s, one per surface"
+        if k:
+            kinds = "+ - s for a surface and * s for a set, in their order"
+        contacts = f", and {c}, each of o c, one per impact" if c else ""
+        set_letter = ", '*' is off a set" if k else ""
+        contact_letters = "; 'o' is an open contact, 'c' a closed one" if c else ""
+        return (
+            f"mode: expected {m} letter(s), {kinds}{contacts}, received {mode!r}. '+' is h > 0, '-' is "
+            f"h < 0, 's' is sliding{set_letter}{contact_letters}."
+        )
+
+    def surface_index(self, surface: int) -> int:
+        """Check the number of a ``surface``."""
+        if isinstance(surface, bool) or not isinstance(surface, (int, np.integer)):
+            raise DefinitionError(f"surface: expected an index (int), received {surface!r}.")
+        if not 0 <= surface < self.surface_count:
+            raise DefinitionError(
+                f"surface: expected an index below {self.surface_count}, received {surface}."
+            )
+        return int(surface)
+
+    # expressions -----------------------------------------------------------------------------
+
+    def surface_function(self, surface: int = 0) -> ca.SX:
+        """Return the switching function h of a ``surface`` (SX scalar)."""
+        return self.definition.surfaces[self.surface_index(surface)]
+
+    def field(self, mode: str) -> ca.SX:
+        """Right-hand side of a mode without sliding, time row included (SX, extended dimension).
+
+        Parameters
+        ----------
+        mode : str
+            One letter, ``+`` or ``-``, for each surface.
+        """
+        signs = self.parse_mode(mode)
+        if 0 in signs or 2 in signs:
+            raise DefinitionError(f"field: expected a mode of + and -, received {mode!r}.")
+        return self.field_with(ca.DM(list(signs)))
+
+    def field_with(self, multipliers: Any, reactions: Any = None) -> ca.SX:
+        """Right-hand side for ``multipliers`` (values or expressions), time row included.
+
+        The ``reactions`` of impacts are zero unless given.
+        """
+        d, f = self.definition, self.definition.field
+        if self.surface_count:
+            f = ca.substitute(f, d.multipliers, multipliers)
+        if self.impacts:
+            f = ca.substitute(f, d.reactions, 0 if reactions is None else reactions)
+        return ca.vertcat(f, ca.SX.ones(d.time.numel(), 1))
+
+    def gradient(self, expression: Expression) -> ca.SX:
+        """Derivatives of a scalar ``expression`` with respect to the states, then time (SX row).
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
+        >>> ns.FilippovSystem([x, v], surface=v, above=[v, -x - 1], below=[v, 1 - x]).gradient(x * v)
+        SX([[v, x]])
+        """
+        return ca.densify(ca.jacobian(scalar(expression, "expression"), self.extended_states))
+
+    def parameter_gradient(self, expression: Expression) -> ca.SX:
+        """Derivatives of a scalar ``expression`` with respect to the parameters (SX row).
+
+        Examples
+        --------
+        >>> import casadi as ca, nonsmooth as ns
+        >>> x, a, b = ca.SX.sym("x"), ca.SX.sym("a"), ca.SX.sym("b")
+        >>> system = ns.FilippovSystem([x], field=[a * x], parameters=[a, b])
+        >>> system.parameter_gradient(a * x + b)
+        SX([[x, 1]])
+        """
+        return ca.densify(ca.jacobian(scalar(expression, "expression"), self.parameter_symbols))
 
     # symbolic ----------------------------------------------------------------------------------
 
@@ -273,13 +529,13 @@ class FilippovSystem(Structure):
     # numeric -----------------------------------------------------------------------------------
 
     def cached(self, key: Hashable, build: Callable[[], T]) -> T:
-        """Return what is kept for ``key``, or what ``build`` makes; the last 256 things are kept."""
+        """Return the cached value of ``key``, made by ``build`` if it is not among the last 256."""
         return self._cache.get(key, build)
 
     def function(
         self, key: Hashable, build: Callable[[], Sequence[ca.SX]], states: ca.SX | None = None
     ) -> ca.Function:
-        """Return the function of ``states`` and parameters that ``build`` makes; it is kept for ``key``."""
+        """Return the function of ``states`` and parameters that ``build`` gives, cached by ``key``."""
 
         def made() -> ca.Function:
             outputs = [ca.densify(ca.SX(e)) for e in build()]
@@ -365,26 +621,25 @@ class FilippovSystem(Structure):
 
 
 def require_system(value: Any, sets: bool = False) -> None:
-    """Raise DefinitionError unless a value is a FilippovSystem."""
-    # ``sets`` says whether it may have sets of codimension two or more, where multipliers are vectors.
-
+    """Refuse all but a FilippovSystem; ``sets`` allows vector multipliers."""
     if not isinstance(value, FilippovSystem):
         raise DefinitionError(
-            explain(
-                "system",
-                expected="a FilippovSystem",
-                received=f"{value!r} ({type(value).__name__})",
-                advice="Make one with FilippovSystem(states, ...) or "
-                "FilippovSystem.from_expression(states, rhs).",
-            )
+            f"system: expected a FilippovSystem, received {value!r} ({type(value).__name__}). "
+            "Make one with FilippovSystem(states, ...) or FilippovSystem.from_expression(states, "
+            "rhs)."
         )
     if value.sets and not sets:
         raise DefinitionError(
-            explain(
-                "system",
-                expected="one whose multipliers are scalars, here",
-                received=repr(value),
-                advice="Vector multipliers, sets of codimension two and three, are known to simulate, "
-                "ensemble, sensitivity, region and limit_directions.",
-            )
+            f"system: {value!r} has vector multipliers, which this function does not support. Sets of "
+            "codimension two and three work in simulate, ensemble, sensitivity, region and "
+            "limit_directions."
         )
+
+
+def multiplier_enters(system: FilippovSystem, members: Sequence[int], p: Array) -> bool:
+    """Whether the multiplier of a set enters the field with given parameters."""
+    d = system.definition
+    columns = ca.jacobian(d.field, d.multipliers[list(members)])
+    if d.parameters.numel():
+        columns = ca.substitute(columns, d.parameters, ca.SX(p.tolist()))
+    return not ca.densify(columns).is_zero()

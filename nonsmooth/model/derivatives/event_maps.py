@@ -1,7 +1,6 @@
-"""What an event does to the state, with exact derivatives.
+"""Maps of events: the function e(x, p) of an event and the state g(x, p) after it, with gradients.
 
-At the end of a leg an event e(x, p) = 0 happens and the state goes through a reset g(x, p), the identity
-if there is none. Both are read off the definition of the system, and come with their gradients.
+g is the identity if the event does not reset the state.
 """
 
 from __future__ import annotations
@@ -16,7 +15,7 @@ from ..definition.system import FilippovSystem
 from ..errors import DegenerateError
 from ..laws.coupled import coupled_of
 from ..laws.evaluators import Evaluator
-from ..laws.explicit import explicit, guard_named, solved
+from ..laws.explicit import explicit, solved
 from ..laws.switches import Guard
 from ..printing.tape import Values, values_of
 from ..values import Array
@@ -24,32 +23,13 @@ from ..values import Array
 
 @dataclass(frozen=True, eq=False)
 class PlainMap:
-    """An event's state after it and function, without derivatives.
-
-    Attributes
-    ----------
-    values : Values
-    """
+    """g and e without derivatives."""
 
     values: Values
 
 
 class EventMap:
-    """What happens at the end of a leg: the event's function e, and the state g after it.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    states, event, after : SX
-        States of the leg (multipliers included), e (a scalar), g (N,).
-    guard : Guard
-        What the event is.
-
-    Attributes
-    ----------
-    smooth : bool
-        Whether g is the identity.
-    """
+    """The event at the end of a leg: e and g in its states; ``smooth`` where g is the identity."""
 
     def __init__(
         self,
@@ -88,72 +68,55 @@ class EventMap:
 
 @dataclass(frozen=True)
 class AtEvent:
-    """An event's function and the state after it, with their derivatives.
+    """Numbers of an event map at a point, for N states, k multipliers and q parameters."""
 
-    Attributes
-    ----------
-    after : ndarray (N,)
-        g.
-    after_state, after_parameters : ndarray (N, N + k), (N, all parameters)
-    value : float
-        e.
-    gradient, by_parameters : ndarray (N + k,), (all parameters,)
-        Of e.
-    """
-
-    after: Array
-    after_state: Array
-    after_parameters: Array
-    value: float
-    gradient: Array
-    by_parameters: Array
+    after: Array  # g (N,)
+    after_state: Array  # (N, N + k)
+    after_parameters: Array  # (N, q)
+    value: float  # e
+    gradient: Array  # of e by states and multipliers (N + k,)
+    by_parameters: Array  # of e (q,)
 
 
 def event_map(
-    system: FilippovSystem, mode: str, name: str, side: int = 0, letters: str = ""
+    system: FilippovSystem, mode: str, kind: str, element: int, side: int, letters: str = ""
 ) -> EventMap:
-    """The map of an event of a mode, by the name of its guard; built once."""
+    """The map of an event of a mode; built once."""
 
     def build() -> EventMap:
         of_mode = explicit(system, mode)
-        found = guard_named(of_mode, name, side)
-        if found is None:
-            names = sorted({g.name for g in of_mode.guards})
-            raise DegenerateError(
-                f"leg in mode {mode!r}: expected an event among {names}, received {name!r}. "
-                "What is no zero of a function, as a branch of hidden sliding that ends, has no "
-                "derivative."
-            )
-        guard, function = found
-        return EventMap(
-            system, of_mode.states, function, guard, _after(system, mode, guard, letters)
+        for row, guard in enumerate(of_mode.guards):
+            if guard.ends(kind, element, side):
+                after = _after(system, mode, guard, letters)
+                return EventMap(system, of_mode.states, of_mode.functions[row], guard, after)
+        raise DegenerateError(
+            f"leg in mode {mode!r}: its {kind} is no zero of a function, as where a branch of hidden "
+            "sliding ends, and has no derivative. End the run before it."
         )
 
-    return system.cached(("event map", mode, name, side, letters), build)
+    return system.cached(("event map", mode, kind, element, side, letters), build)
 
 
 def instant_map(
-    system: FilippovSystem, mode: str, kind: str, name: str, letters: str = ""
+    system: FilippovSystem, mode: str, kind: str, element: int, letters: str = ""
 ) -> EventMap:
     """The map of a crossing, entry, stop, reset or impact as one of the extended states alone."""
 
     def build() -> EventMap:
-        d = system.definition
+        d, i = system.definition, element
         if kind in ("stop", "reset"):
-            own = [n for n, _ in (system.stops if kind == "stop" else system.resets)]
-            i = own.index(name)
             function = d.guards[i if kind == "stop" else len(system.stops) + i]
         elif kind == "impact":
-            i = system.impacts.index(name)
+            i -= len(system.entries)
             function = d.gaps[i]
         else:
-            i = system.entries[int(name.removeprefix("h"))][0]
+            i = system.entries[element][0]
             function = d.surfaces[i]
-        guard = Guard("surface" if kind in ("crossing", "entry") else kind, i, 0, name)
+        guard = Guard("surface" if kind in ("crossing", "entry") else kind, i, 0, element)
         after = _after(system, mode, guard, letters)
         return EventMap(system, system.extended_states, function, guard, after)
 
-    return system.cached(("instant map", mode, kind, name, letters), build)
+    return system.cached(("instant map", mode, kind, element, letters), build)
 
 
 def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap:
@@ -161,7 +124,7 @@ def function_map(system: FilippovSystem, mode: str, function: ca.SX) -> EventMap
     symbols = [system.extended_states, system.parameter_symbols]
 
     def build() -> EventMap:
-        guard = Guard("zero", 0, 0, str(function)[:40])
+        guard = Guard("zero", 0, 0, 0)
         return EventMap(system, explicit(system, mode).states, function, guard)
 
     return system.cached(("function map", mode, Content(symbols, function)), build)
@@ -204,7 +167,7 @@ def surface_map(system: FilippovSystem, surface: int) -> EventMap:
     """A switching function as a map on the extended states, with its gradients."""
 
     def build() -> EventMap:
-        guard = Guard("zero", surface, 0, f"h{surface}")
+        guard = Guard("zero", surface, 0, surface)
         return EventMap(system, system.extended_states, system.surface_function(surface), guard)
 
     return system.cached(("surface map", surface), build)

@@ -1,76 +1,77 @@
-"""The period of a forced system, as a function of its parameters."""
+"""Periods of a forced system: positive numbers, or functions of its parameters."""
 
 from __future__ import annotations
 
-from functools import cached_property
 from typing import Any
 
 import casadi as ca
 import numpy as np
 
 from ..checks import is_real
-from ..definition.periods import read_period
 from ..definition.system import FilippovSystem
-from ..errors import OptionError, explain
+from ..errors import OptionError
 from ..laws.evaluators import Evaluator
-from ..printing.tape import Values, values_of
 from ..values import Array
 
 
+def is_function(value: Any) -> bool:
+    """Whether a value is one scalar expression."""
+    return isinstance(value, ca.SX) and bool(value.is_scalar())
+
+
+def read_period(system: FilippovSystem, value: Any) -> float | str | None:
+    """Read a number, or an expression in parameters as a serialised function."""
+    if is_real(value):
+        return float(periods(float(value), np.zeros(0)))
+    if not is_function(value):
+        return None
+    try:
+        return str(ca.Function("period", [system.parameter_symbols], [value]).serialize())
+    except RuntimeError:  # of other symbols
+        return None
+
+
+def periods(period: float | str, p: Array) -> Array:
+    """Periods () or (m,) of parameters (np,) or (m, np); NaN where a parameter is."""
+    values: Array = np.asarray(period if isinstance(period, float) else np.nan)
+    if isinstance(period, str):
+        found = np.array(ca.Function.deserialize(period)(p.T), float)
+        values = found.reshape(p.shape[:-1])
+    bad = values[np.isinf(values) | (values <= 0.0)]
+    if bad.size:
+        raise OptionError(f"period: expected a positive number, received {bad.flat[0]}.")
+    return values
+
+
 class Forcing:
-    """The period of a forced system as a function of its parameters.
-
-    Parameters
-    ----------
-    system : FilippovSystem
-    period : SX or float
-    found : bool, optional
-        Whether it was read off the system, which then has it.
-
-    Attributes
-    ----------
-    expression : SX
-    found : bool
-
-    Raises
-    ------
-    OptionError
-        Neither a number nor an expression in the parameters.
-    """
+    """The period of a system as a function of its parameters; ``found`` if the system gave it."""
 
     def __init__(self, system: FilippovSystem, period: ca.SX | float, found: bool = False):
         self.found, self._system = found, system
         if not is_real(period) and read_period(system, period) is None:
             raise OptionError(
-                explain(
-                    "period",
-                    expected="a number, or an expression in the parameters "
-                    f"{list(system.parameter_names)}",
-                    received=repr(period),
-                    advice="Give period=2*pi/w.",
-                )
+                "period: expected a number, or an expression in the parameters "
+                f"{list(system.parameter_names)}, received {period!r}. Give period=2*pi/w."
             )
         self.expression = ca.SX(period)
         p = system.parameter_symbols
         slope = ca.jacobian(self.expression, p)
-        self._outputs = [ca.densify(e) for e in (self.expression, slope)]
-        self._inputs = [ca.SX(0, 1), p]
-        self._function = Evaluator(ca.Function("period", self._inputs, self._outputs))
+        self._constant = bool(slope.nnz() == 0)
+        self._last: tuple[float, Array] | None = None
+        outputs = [ca.densify(e) for e in (self.expression, slope)]
+        self._function = Evaluator(ca.Function("period", [ca.SX(0, 1), p], outputs))
 
     def __reduce__(self) -> tuple[Any, ...]:
         """Pickled with its system, as a function of the parameters."""
         function = ca.Function("period", [self._system.parameter_symbols], [self.expression])
         return _restored, (self._system, function.serialize(), self.found)
 
-    @cached_property
-    def values(self) -> Values:
-        """The period and its derivatives as a graph."""
-        return values_of(self._inputs, self._outputs)
-
     def __call__(self, p: Array) -> tuple[float, Array]:
         """The period, and its derivatives by all parameters."""
-        value, slope = self._function.copied(np.zeros(0), p)
-        return float(value[0, 0]), slope[0]
+        if self._last is None or not self._constant:
+            value, slope = self._function.copied(np.zeros(0), p)
+            self._last = float(value[0, 0]), slope[0]
+        return self._last
 
 
 def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:
@@ -79,8 +80,7 @@ def _restored(system: FilippovSystem, text: str, found: bool) -> Forcing:
 
 
 def frequencies(system: FilippovSystem) -> list[ca.SX]:
-    """Rates of the arguments of sines and cosines that are linear in the time, without
-    repetition."""
+    """Frequencies of the sines and cosines of the time, each once."""
     if not system.time_dependent:
         return []
     d = system.definition

@@ -1,4 +1,4 @@
-"""Second and third derivatives of fields and functions along them, as normal forms and touches need them."""
+"""Second and third derivatives of fields and guards, for normal forms and tangencies."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ import casadi as ca
 from ..definition.system import FilippovSystem
 from ..laws.evaluators import Evaluator, evaluator
 from ..laws.motion import mode_field
+from ..laws.switches import Guard
 from .variational import guarded_field
 
 
 def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
-    """(x, u), p -> A, B(u, .), C(u, u, .) of the field of a mode, and gradient and Hessian of
-    the function of the surface on which it slides (zero without)."""
+    """(x, u), p -> A, B(u, .), C(u, u, .) of a mode's field; h_x, h_xx of the sliding surface or 0."""
 
     def build() -> Evaluator:
         f, x, p = mode_field(system, mode), system.extended_states, system.parameter_symbols
@@ -29,8 +29,7 @@ def field_expansion(system: FilippovSystem, mode: str) -> Evaluator:
 
 
 def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int) -> Evaluator:
-    """x, p -> the field of a mode, the field across one of its surfaces, and the gradient of L_F
-    h of the first along that surface's function."""
+    """x, p -> the field F of a mode, the field across one of its surfaces, and grad L_F h."""
 
     def build() -> list[ca.SX]:
         turned = mode[:surface] + ("-" if side > 0 else "+") + mode[surface + 1 :]
@@ -41,15 +40,15 @@ def contact_expansion(system: FilippovSystem, mode: str, surface: int, side: int
     return evaluator(system, ("contact", mode, surface, side), build)
 
 
-def guard_rate_gradient(system: FilippovSystem, mode: str, name: str) -> Evaluator:
+def guard_rate_gradient(system: FilippovSystem, mode: str, guard: Guard) -> Evaluator:
     """x, p -> the gradient of the rate of a guard along the field of its mode."""
     motion = guarded_field(system, mode).motion
 
     def build() -> Evaluator:
-        k = next(k for k, g in enumerate(motion.guards) if g.name == name)
+        k = motion.guards.index(guard)
         rate = ca.mtimes(ca.jacobian(motion.functions[k], motion.states), motion.field)
         row = ca.densify(ca.jacobian(rate, motion.states))
         inputs = [motion.states, system.parameter_symbols]
         return Evaluator(ca.Function("rate", inputs, [row], {"cse": True}))
 
-    return system.cached(("rate of a guard", mode, name), build)
+    return system.cached(("rate of a guard", mode, guard), build)

@@ -1,4 +1,4 @@
-"""Planes of starts: states as functions of two coordinates, with their derivatives."""
+"""Planes of starts: states as functions of two coordinates, with derivatives."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from ..calls import call
 from ..definition.system import FilippovSystem
-from ..errors import NonsmoothError, OptionError, explain
+from ..errors import NonsmoothError, OptionError
 from ..reading import column
 from ..values import Array
 
@@ -29,19 +29,15 @@ class StartMap:
                 states = ca.SX(rows[0]) + ca.mtimes(ca.SX(rows[1:].T), u)
         except (TypeError, ValueError, NonsmoothError) as error:
             raise OptionError(
-                explain(
-                    "starts",
-                    expected=f"three finite rows of {n} states (a point and two directions), or a "
-                    f"function of two coordinates that returns {n} expressions",
-                    received=f"{starts!r} ({error})",
-                    advice="For example lambda a, b: [a, 0, b, 1].",
-                )
+                f"starts: expected three finite rows of {n} states (a point and two directions), "
+                f"or a function of two coordinates that returns {n} expressions, received "
+                f"{starts!r} ({error}). For example lambda a, b: [a, 0, b, 1]."
             ) from error
         extra = [s for s in ca.symvar(states) if not ca.depends_on(u, s)]
         if extra:
             raise OptionError(
-                f"starts: expected expressions of the two coordinates alone, received ones of {extra}. "
-                "Give numbers for them."
+                f"starts: the expressions contain {[str(s) for s in extra]} besides the two coordinates. Give numbers for "
+                "them."
             )
         self._function = ca.Function("starts", [u], [states, ca.jacobian(states, u)])
 

@@ -1,8 +1,7 @@
-"""The variational equations of a mode, with exact derivatives.
+"""The variational equations of a mode: X' = Df X and P' = Df P + f_p beside the state.
 
-Beside the state of a leg travel X' = Df X and P' = Df P + f_p: derivatives by the start and by
-parameters. Together they are one smooth field, given as expressions; entries of X and P that cannot
-move are left out of its state (structural zeros, the row of time).
+X and P are the derivatives by the start and by parameters. Together with the state they form one
+smooth field, without the entries that are constant (structural zeros, the row of time).
 """
 
 from __future__ import annotations
@@ -31,7 +30,7 @@ ORDER = 20
 
 @dataclass(frozen=True)
 class Blocks:
-    """Where the entries of x, X and P are in the state of a variational field."""
+    """The pattern of the entries of x, X and P in the state of a variational field."""
 
     states: int
     starts: int
@@ -50,34 +49,53 @@ class Blocks:
         return whole.T
 
 
-class VariationalField:
-    """One mode's flow with derivatives by its start and by parameters, as one smooth field.
+class PlainField:
+    """One mode's flow as a smooth field, with all multipliers solved for (``explicit``)."""
 
-    Parameters
-    ----------
-    of_mode : Motion
-        With all multipliers solved for (``explicit``).
-    chosen : tuple of int
-        Parameters by which one differentiates.
+    def __init__(self, of_mode: Motion):
+        self.motion, self.states, self.field = of_mode, of_mode.states, of_mode.field
 
-    Attributes
-    ----------
-    states, field : SX
-        Of the whole field; the first entries are the states of the mode, time last where the
-        system depends on it.
-    blocks : Blocks
+    @property
+    def parameters(self) -> ca.SX:
+        """Symbols of the parameters."""
+        return self.motion.system.parameter_symbols
 
-    Examples
-    --------
-    >>> x, v, k = (ca.SX.sym(s) for s in "xvk")
-    >>> system = FilippovSystem([x, v], field=[v, -k * x], parameters={k: 1.0})
-    >>> whole = VariationalField(explicit(system, ""), (0,))
-    >>> whole.states.numel(), whole.blocks.moving.shape
-    (8, (2, 4))
-    """
+    @property
+    def entries(self) -> int:
+        """Number of states."""
+        return int(self.states.numel())
+
+    @cached_property
+    def groups(self) -> tuple[NDArray[np.intp], ...]:
+        """Entries whose errors are measured together; the time is exact."""
+        moving = np.arange(self.entries)
+        system = self.motion.system
+        return (np.delete(moving, system.dimension) if system.time_dependent else moving,)
+
+    @cached_property
+    def jets(self) -> Evaluator:
+        """(y, p) -> Taylor coefficients (entries, ORDER + 1) of the flow."""
+        jet, _ = taylor(self.field, ca.SX(0, 1), self.states, self.parameters, ORDER)
+        inputs = [self.states, self.parameters]
+        return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
+
+    @cached_property
+    def series(self) -> Series:
+        """The Taylor rules of the field."""
+        return series_of([self.states, self.parameters], [self.field])
+
+
+def plain_field(system: FilippovSystem, mode: str) -> PlainField:
+    """Return the field of a mode without guards, built once per system."""
+    return system.cached(("plain field", mode), lambda: PlainField(explicit(system, mode)))
+
+
+class VariationalField(PlainField):
+    """The flow of an explicit mode with derivatives by its start and by ``chosen`` parameters."""
 
     def __init__(self, of_mode: Motion, chosen: tuple[int, ...] = ()):
-        self.motion, self.chosen = of_mode, chosen
+        super().__init__(of_mode)
+        self.chosen = chosen
         system = of_mode.system
         y, f, p = of_mode.states, of_mode.field, system.parameter_symbols
         size, n, q = y.numel(), system.extended_dimension, len(chosen)
@@ -108,34 +126,9 @@ class VariationalField:
                     kept.append(symbols[j][i])
         self.states, self.field = ca.vertcat(*kept), ca.vertcat(*chosen_rates)
 
-    @property
-    def parameters(self) -> ca.SX:
-        """Symbols of the parameters."""
-        return self.motion.system.parameter_symbols
-
-    @cached_property
-    def jets(self) -> Evaluator:
-        """(z, p) -> Taylor coefficients (m, ORDER + 1) of the whole field's flow."""
-        jet, _ = taylor(self.field, ca.SX(0, 1), self.states, self.parameters, ORDER)
-        inputs = [self.states, self.parameters]
-        return Evaluator(ca.Function("jets", inputs, [ca.densify(jet)], {"cse": True}))
-
-    @property
-    def entries(self) -> int:
-        """Number of entries of z."""
-        return int(self.states.numel())
-
-    @cached_property
-    def series(self) -> Series:
-        """The Taylor rules of the whole field."""
-        return series_of([self.states, self.parameters], [self.field])
-
     @cached_property
     def groups(self) -> tuple[NDArray[np.intp], ...]:
-        """Entries of z whose errors are measured together: states, those of X, those of P.
-
-        The time, which is exact, is in none.
-        """
+        """Entries of z whose errors are measured together: of x without time, of X, of P."""
         of_column = np.repeat(
             np.arange(self.blocks.moving.shape[1]), self.blocks.moving.sum(axis=0)
         )
@@ -176,20 +169,7 @@ class VariationalField:
         return Evaluator(ca.Function("multipliers", [self.motion.states, p], outputs))
 
     def start(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
-        """The state z at the start of a leg: X = 1, P = 0.
-
-        Parameters
-        ----------
-        x : ndarray (N,)
-        p : ndarray
-        unknowns : ndarray (k,), optional
-            Multipliers near which those that are states are looked for.
-
-        Raises
-        ------
-        DegenerateError
-            No multipliers, or more than one set of them, keep the sliding.
-        """
+        """The state z at the start of a leg, X = 1 and P = 0; ``unknowns`` is a guess of multipliers."""
         return self.blocks.pack(self.initial(x, p, unknowns))
 
     def initial(self, x: Array, p: Array, unknowns: Array | None = None) -> Array:
@@ -209,7 +189,7 @@ class VariationalField:
         return matrix
 
     def states_at(self, x: Array, p: Array) -> Array:
-        """The states (N + k,) of the leg at extended states (N,): with the multipliers that are states."""
+        """Extended states (N,) and the multipliers that are states of the leg; (N + k,)."""
         if self.blocks.states == self.blocks.starts:
             return x
         return np.concatenate([x, self._unknowns(x, p, None)])
@@ -265,51 +245,13 @@ def variational_field(
     return system.cached(key, lambda: VariationalField(explicit(system, mode), chosen))
 
 
-class PlainField:
-    """One mode's flow as a smooth field."""
-
-    def __init__(self, of_mode: Motion):
-        self.motion = of_mode
-        system = of_mode.system
-        moving = np.arange(of_mode.states.numel())
-        if system.time_dependent:
-            moving = np.delete(moving, system.dimension)
-        #: Entries whose errors are measured together; the time is exact.
-        self.groups: tuple[NDArray[np.intp], ...] = (moving,)
-
-    @property
-    def entries(self) -> int:
-        """Number of states."""
-        return int(self.motion.states.numel())
-
-    @cached_property
-    def jets(self) -> Evaluator:
-        """(y, p) -> Taylor coefficients (N + k, ORDER + 1) of the flow."""
-        m, p = self.motion, self.motion.system.parameter_symbols
-        jet, _ = taylor(m.field, ca.SX(0, 1), m.states, p, ORDER)
-        return Evaluator(ca.Function("jets", [m.states, p], [ca.densify(jet)], {"cse": True}))
-
-    @cached_property
-    def series(self) -> Series:
-        """The Taylor rules of the field."""
-        m = self.motion
-        return series_of([m.states, m.system.parameter_symbols], [m.field])
-
-
-def plain_field(system: FilippovSystem, mode: str) -> PlainField:
-    """Return the field of a mode without guards, built once per system."""
-    return system.cached(("plain field", mode), lambda: PlainField(explicit(system, mode)))
-
-
 class GuardedField(PlainField):
-    """One mode's flow with its guards along it, as a smooth field to be stepped through."""
+    """One mode's flow with its guards along it."""
 
     @cached_property
     def series(self) -> Series:
         """The Taylor rules of the field and of the guards."""
-        m = self.motion
-        inputs = [m.states, m.system.parameter_symbols]
-        return series_of(inputs, [m.field, m.functions])
+        return series_of([self.states, self.parameters], [self.field, self.motion.functions])
 
     @cached_property
     def jets(self) -> Evaluator:

@@ -1,4 +1,4 @@
-"""Cancel what two expressions have in common, so that a removable 0/0 never reaches a number.
+"""Cancellation of common factors, so that a removable 0/0 is not evaluated.
 
 While sliding, lambda = -a/b with L_F h = a + b lambda, and the field is F0 - (a/b) G. Where
 F1 - F2 = n(x) g(x) both G and b carry the factor n; with it cancelled the sliding field is smooth
@@ -150,8 +150,7 @@ class _Normal:
 def normal_forms(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
 ) -> tuple[Forms, list[list[Sum]]]:
-    """Sums of coefficient times monomial for each entry of each output, and what they are made
-    of."""
+    """Sums of coefficients times monomials for each entry of each output, and their atoms."""
     nodes, rows = instructions(inputs, outputs)
     algebra = _Normal(inputs)
     values = evaluate(nodes, algebra)
@@ -179,7 +178,7 @@ def _combine(forms: Forms, op: str, args: list[Sum], expression: ca.SX) -> Sum:
 
 
 def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.SX, int]]:
-    """Factors of a scalar expression, with their powers, as far as they are in sight."""
+    """Visible factors of a scalar expression, with their powers."""
     forms, rows = normal_forms([variables, others], [expression])
     if not rows[0][0]:
         return []
@@ -188,7 +187,7 @@ def powers(expression: ca.SX, variables: ca.SX, others: ca.SX) -> list[tuple[ca.
 
 
 def simple_zeros(expression: ca.SX, variables: ca.SX, others: ca.SX) -> ca.SX:
-    """Return an expression of the same sign without the powers that are in sight."""
+    """Return an expression of the same sign without its visible powers."""
     forms, rows = normal_forms([variables, others], [expression])
     if not rows[0][0]:
         return expression

@@ -1,7 +1,7 @@
-"""Which functions are combinations of others and of an affine function: they show nothing new.
+"""Functions that are linear combinations of the rows of a field and of an affine function.
 
-A polynomial that agrees with a field agrees with every such function too, so a step need not be
-checked with it (normal forces and Lie derivatives are combinations of the rows of the field).
+A step whose field was checked need not be checked with them; normal forces and Lie derivatives are
+such combinations.
 """
 
 from __future__ import annotations
@@ -21,8 +21,8 @@ _LEFT = 1e-9
 def in_span(
     functions: Sequence[ca.SX], rows: Sequence[ca.SX], variables: ca.SX, others: ca.SX
 ) -> list[bool]:
-    """Whether each function is a combination of rows and of an affine function of the variables."""
-    # The coefficients may depend on ``others``, smoothly. False where it is not seen.
+    """Whether each function is found to be a combination of rows and an affine function."""
+    # The coefficients may depend on ``others``, smoothly.
     nodes, _ = instructions([variables, others], [ca.vertcat(*rows, *functions)])
     if any(node.op in NOT_SMOOTH for node in nodes):
         return [False for _ in functions]  # other values of ``others`` have other combinations

@@ -1,4 +1,4 @@
-"""The arithmetic of doubles in Python, in which nothing raises: what is not a number is NaN."""
+"""The arithmetic of doubles in Python, in which an undefined value is NaN and no error."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import casadi as ca
 
 
 def _erfinv(y: float) -> float:
-    """CasADi's is off by up to 2e-6 below zero: two Newton steps."""
+    """CasADi's erfinv, off by up to 2e-6 below zero, and two Newton steps."""
     w = float(ca.erfinv(y))
     for _ in range(2 if math.isfinite(w) else 0):
         w -= (math.erf(w) - y) * 0.5 * math.sqrt(math.pi) * math.exp(w * w)
@@ -62,13 +62,7 @@ BINARY: dict[str, Callable[[float, float], float]] = {
 
 
 class Numbers:
-    """Doubles as coefficients of series (see ``jets.Arithmetic``).
-
-    Examples
-    --------
-    >>> Numbers().apply("sqrt", [2.25]), Numbers().divide(1.0, None), Numbers().apply("log", [-1.0])
-    (1.5, inf, nan)
-    """
+    """Doubles as coefficients of series (see ``jets.Arithmetic``)."""
 
     def number(self, value: float) -> float | None:
         """Return a constant, None for 0."""
@@ -93,12 +87,12 @@ class Numbers:
         return math.nan if a == 0.0 or a != a else math.copysign(math.inf, a)
 
     def apply(self, op: str, args: Sequence[float | None]) -> float:
-        """Return an operation of values, with 0 for None; NaN where it has no value."""
+        """Return an operation of values, with 0 for None; NaN where it is undefined."""
         values = [0.0 if a is None else a for a in args]
         try:
             if len(values) == 1:
                 return UNARY[op](values[0])
             return BINARY[op](values[0], values[1])
-        except (OverflowError, ZeroDivisionError, ValueError):  # infinite, or none
+        except (OverflowError, ZeroDivisionError, ValueError):  # infinite or undefined
             code, given = getattr(ca, "OP_" + op.upper()), map(ca.DM, values)
             return float((ca.DM.unary if len(values) == 1 else ca.DM.binary)(code, *given))

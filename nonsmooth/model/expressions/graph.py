@@ -1,8 +1,7 @@
-"""CasADi expressions as value-numbered instruction lists, and the refusal of what is not smooth.
+"""CasADi expressions as value-numbered lists of instructions, and the check that they are smooth.
 
-Everything that walks an expression graph (Taylor recurrences, cancellation of common factors,
-the smoothness check) reads it through :func:`instructions`, so CasADi's numbering of operations
-is known here only.
+Everything that reads an expression graph does so through :func:`instructions`; CasADi's operation
+codes are used here only.
 """
 
 from __future__ import annotations
@@ -13,7 +12,9 @@ from typing import Protocol, TypeVar, cast
 
 import casadi as ca
 
-from ..errors import NotSmoothError
+from ..errors import DefinitionError, NotSmoothError
+from ..reading import refuse_call
+from .float_arithmetic import BINARY, UNARY
 
 #: CasADi's operation codes by number, e.g. ``OPERATIONS[4] == "mul"``.
 OPERATIONS: dict[int, str] = {
@@ -53,14 +54,12 @@ _BESIDE_ZERO: dict[str, str] = {
 class Node:
     """One operation: its name, its arguments (node numbers) and a payload."""
 
-    # The payload is the value of a ``const`` node and ``(input, position)`` of an ``input`` node.
-
     op: str
     args: tuple[int, ...]
-    payload: Hashable = None
+    payload: Hashable = None  # the value of a ``const``, (input, position) of an ``input``
 
     @property
-    def place(self) -> tuple[int, int]:
+    def source(self) -> tuple[int, int]:
         """Input vector and position of an ``input`` node."""
         return cast("tuple[int, int]", self.payload)
 
@@ -68,8 +67,8 @@ class Node:
 def instructions(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], merged: bool = True
 ) -> tuple[list[Node], list[list[int]]]:
-    """Value-number the graph of dense ``outputs`` over ``inputs``; keep it as it is unless ``merged``."""
-    function = ca.Function("graph", list(inputs), [ca.densify(ca.SX(o)) for o in outputs])
+    """Value-number the graph of dense ``outputs`` over ``inputs``, unless not ``merged``."""
+    function = ca.Function("graph", list(inputs), [_dense(o) for o in outputs])
     nodes: list[Node] = []
     known: dict[Node, int] = {}
     register: dict[int, int] = {}
@@ -90,16 +89,31 @@ def instructions(
             register[target[0]] = number(Node(op, (), (source[0], source[1])))
         elif op == "output":
             rows[target[0]][target[1]] = register[source[0]]
+        elif op == "call":
+            refuse_call(function.instructions_sx()[k].which_function(), "expression")
+        elif op == "printme":  # prints its second argument where CasADi evaluates it
+            register[target[0]] = register[source[0]]
+        elif op not in UNARY and op not in BINARY:
+            raise DefinitionError(
+                f"expression: CasADi's operation {op!r} is not supported. Write it with "
+                f"arithmetic and elementary functions: {', '.join((*UNARY, *BINARY))}."
+            )
         else:
             register[target[0]] = number(Node(op, tuple(register[a] for a in source)))
     return nodes, rows
+
+
+def _dense(output: ca.SX) -> ca.SX:
+    """A dense output; CasADi's conversions lose Ctrl-C, so only what needs one has one."""
+    dense = isinstance(output, ca.SX) and output.is_dense()
+    return output if dense else ca.densify(ca.SX(output))
 
 
 V = TypeVar("V")
 
 
 class Algebra(Protocol[V]):
-    """What a graph can be evaluated in: expressions, numbers, enclosures, normal forms."""
+    """An algebra in which a graph is evaluated: expressions, numbers, enclosures, normal forms."""
 
     def constant(self, value: float) -> V:
         """Return a constant of the graph."""
@@ -121,7 +135,7 @@ def evaluate(nodes: Sequence[Node], algebra: Algebra[V]) -> list[V]:
         if node.op == "const":
             values.append(algebra.constant(cast("float", node.payload)))
         elif node.op == "input":
-            values.append(algebra.symbol(*node.place))
+            values.append(algebra.symbol(*node.source))
         else:
             values.append(algebra.apply(node.op, [values[k] for k in node.args]))
     return values
@@ -138,15 +152,14 @@ def depends_on(nodes: Sequence[Node], variable: Sequence[bool]) -> list[bool]:
     result: list[bool] = []
     for node in nodes:
         if node.op == "input":
-            result.append(variable[node.place[0]])
+            result.append(variable[node.source[0]])
         else:
             result.append(any(result[a] for a in node.args))
     return result
 
 
 def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str) -> None:
-    """Raise NotSmoothError if ``expression`` is not smooth in ``variables``."""
-    # A non-smooth operation on ``others`` alone (parameters) is harmless: it is a constant.
+    """Refuse an expression that is not smooth in ``variables``; in ``others`` it need not be."""
     nodes, _ = instructions([variables, others], [expression])
     moving = depends_on(nodes, [True, False])
     for node, moves in zip(nodes, moving, strict=True):
@@ -164,6 +177,6 @@ def require_smooth(expression: ca.SX, variables: ca.SX, others: ca.SX, what: str
 
 
 def _beside_zero(node: Node, nodes: Sequence[Node]) -> str | None:
-    """Name an operation of something and zero that is not smooth."""
+    """Name an operation that is not smooth because one of its arguments is zero."""
     zero = any(nodes[a].op == "const" and nodes[a].payload == 0.0 for a in node.args)
     return _BESIDE_ZERO.get(node.op) if zero else None

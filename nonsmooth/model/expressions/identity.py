@@ -1,10 +1,9 @@
-"""Whether expressions vanish on a surface, decided exactly: by arithmetic modulo a prime.
+"""Whether expressions vanish on a surface, decided by exact arithmetic modulo a prime.
 
-An expression made of sums, products, quotients and functions of such is zero if it is zero for
-random values of its symbols in the integers modulo a prime, where nothing is rounded and nothing is
-small: a function other than zero passes one trial with a chance of 2^-60 or so. Elementary functions
-are random functions of their argument there, so identities between them (exp(a) exp(b) = exp(a + b))
-are not seen; roots are roots. Numbers are the exact values of the doubles.
+A nonzero expression vanishes at random integers modulo the prime with a probability of about 2^-60.
+Elementary functions are random functions of their argument there, so identities between them
+(exp(a) exp(b) = exp(a + b)) are not found; square roots are. Constants are the exact values of the
+doubles.
 
 Source: Schwartz 1980, "Fast probabilistic algorithms for verification of polynomial identities".
 """

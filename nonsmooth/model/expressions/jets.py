@@ -1,10 +1,9 @@
 """Jets: exact Taylor coefficients in time of a flow and of functions along it.
 
 The solution of x' = f(x) is expanded order by order: from the coefficients 0..k of x follow those
-of f(x), and x_{k+1} = f_k/(k+1). Each rule (``rules``) has one recurrence, below, the only place in
-Python that knows how to differentiate along a flow. The recurrences act on any arithmetic: on CasADi
-scalars, so that a jet is itself a CasADi expression, evaluated by CasADi's virtual machine or printed
-as C; or on numbers. Structural zeros (constants, polynomials) disappear on the way.
+of f(x), and x_{k+1} = f_k/(k+1). Each rule of ``taylor_rules`` has one recurrence, below. They act on
+any arithmetic: on CasADi scalars, so that a jet is itself a CasADi expression, or on numbers.
+Structural zeros (constants, polynomials) are left out.
 
 Sources: Moore 1966; Jorba & Zou 2005, "A software package for the numerical integration of ODEs by
 means of high-order Taylor methods", Prop. 2.1. Declined: repeated CasADi ``jtimes`` (exponential
@@ -19,7 +18,7 @@ from typing import Any, Protocol, TypeAlias
 import casadi as ca
 
 from .graph import depends_on, instructions, operation
-from .simplification import economise
+from .simplification import simplified
 from .taylor_rules import Rule, entered, lower
 
 Coefficient: TypeAlias = "ca.SX | None"  # None is a structural zero
@@ -33,7 +32,7 @@ class Arithmetic(Protocol):
         ...
 
     def clean(self, a: Any) -> Any:
-        """Return None for what is zero and known to be."""
+        """Return None for a value that is known to be zero."""
         ...
 
     def inner(self, u: Sequence[Any], v: Sequence[Any]) -> Any:
@@ -99,12 +98,11 @@ def taylor(
 
 
 def expansion_of(outputs: Sequence[ca.SX], states: ca.SX, others: ca.SX) -> Expansion:
-    """Return the expansion of expressions in ``states`` and ``others``, which do not move."""
-    # The expressions are rewritten first so that their jets need fewer products.
+    """Return the expansion of expressions, simplified first; ``others`` are constant in time."""
     inputs = [states, others]
-    nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
-    rules, place = lower(nodes, depends_on(nodes, [True, False]))
-    rows = [[place[j] for j in row] for row in rows]
+    nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
+    rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+    rows = [[rule_of[j] for j in row] for row in rows]
     still = [others[i] for i in range(others.numel())]
     return Expansion(rules, rows, still, Expressions())
 
@@ -151,7 +149,7 @@ class Expansion:
         self._recurrences = [self._recurrence(j, rule) for j, rule in enumerate(rules)]
 
     def restart(self, still: Sequence[Any]) -> None:
-        """Forget all coefficients; vector 1 has new values."""
+        """Discard all coefficients; vector 1 has new values."""
         self._still = still
         for c in self.series:
             c.clear()
@@ -219,7 +217,7 @@ class Expansion:
         return lambda k: None if k else value
 
     def _input(self, rule: Rule, _: list[Any]) -> Callable[[int], Any]:
-        vector, position = rule.place
+        vector, position = rule.source
         if vector == 0:
             return lambda k: self._moving[position]
         return lambda k: None if k else self._still[position]

@@ -1,9 +1,8 @@
-"""Where the first coefficients of a system's series tell all others, so that no step needs to be checked.
+"""Parts of a system that are affine in its states, sines of the time added; their steps need no check.
 
-That is where it is affine in its states with sines of the time added: those are states of a larger system,
-u' = omega v and v' = -omega u, that is affine. Two coefficients in a row of a sine are not both small, so
-that no part of it hides from the step size. A product of sines, or a sine of a state, is no such part:
-cos(t)^40 rests for a while and comes back.
+The first Taylor coefficients then determine all others: a sine is a state of a larger affine system,
+u' = omega v, v' = -omega u, and two successive coefficients of it are not both small. A product of
+sines, such as cos(t)^40, or a sine of a state is not affine in this sense.
 """
 
 from __future__ import annotations
@@ -21,7 +20,7 @@ _NO_TIME = ca.SX(0, 1)
 
 @dataclass(frozen=True)
 class Linearity:
-    """What of a system is affine."""
+    """Which parts of a system are affine, and which rows and guards are not (bent)."""
 
     everywhere: bool
     free: bool
@@ -40,7 +39,7 @@ def linearity(
     smooth: bool = True,
     time: ca.SX = _NO_TIME,
 ) -> Linearity:
-    """Return what is affine."""
+    """Determine which parts of a system are affine."""
     every = ca.vertcat(x, unknowns)
     bent_rows, bent_guards = bent(field, every, time), bent(guards, x, time)
     bent_free_rows = bent(field, x, time)
@@ -55,7 +54,7 @@ def linearity(
 
 
 class _Kind(IntEnum):
-    """What an expression is; sums are the larger of their terms."""
+    """Kinds of expressions; the kind of a sum is the largest of its terms."""
 
     CONSTANT = 0
     LINE = 1  # affine in the time
@@ -94,9 +93,9 @@ def bent(expressions: ca.SX, x: ca.SX, time: ca.SX = _NO_TIME) -> list[bool]:
     found = [not ca.is_linear(e, x) for e in ca.vertsplit(ca.vec(ca.densify(expressions)))]
     if not time.numel() or not any(found):
         return found
-    places = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
-    place = places.get(time.element_hash())
-    others = [s for s in ca.symvar(expressions) if s.element_hash() not in places]
+    positions = {s.element_hash(): i for i, s in enumerate(ca.vertsplit(x))}
+    position = positions.get(time.element_hash())
+    others = [s for s in ca.symvar(expressions) if s.element_hash() not in positions]
     nodes, rows = instructions([x, ca.vertcat(*others)], [expressions])
-    kinds = evaluate(nodes, _Kinds(place))
+    kinds = evaluate(nodes, _Kinds(position))
     return [kinds[j] is _Kind.BENT for j in rows[0]]

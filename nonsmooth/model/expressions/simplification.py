@@ -1,10 +1,10 @@
-"""Rewrite expressions so that their jets need fewer products of functions of the state.
+"""Simplification of expressions so that their jets need fewer products of functions of the state.
 
 In a jet a product of two such functions is a convolution at every order, while a sum or a product
 with a constant is one operation. So constant coefficients are collected, terms that several sums
 have in common are added once, and what products in a sum have in common is taken out:
-a b + a c = a (b + c) is one convolution instead of two. What is used several times stays shared,
-and no product is multiplied out.
+a b + a c = a (b + c) is one convolution instead of two. Terms that are used several times stay
+shared, and no product is multiplied out.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ _LEAST = 1e-100  # coefficients smaller than this, or larger than its inverse, s
 _DEPTH = 12  # coefficients count as equal when their expressions are, to this depth
 
 
-def economise(
+def simplified(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], variable: Sequence[bool]
 ) -> list[ca.SX]:
     """Rewrite ``outputs`` with fewer products of functions of the variables."""
@@ -82,7 +82,7 @@ class _Reader:
         if node.op == "const":
             return ca.SX(node.payload)
         if node.op == "input":
-            vector, position = node.place
+            vector, position = node.source
             return self._inputs[vector][position]
         return operation(node.op, args)
 
@@ -196,18 +196,18 @@ class _Writer:
             self._factors[j] = _Factor(factor.node, sums)
 
     def _group(self) -> None:
-        """Add terms once that are found together, up to a sign, in the same several sums."""
-        places: dict[Product, list[int]] = {}
+        """Add terms once that occur together, up to a sign, in the same sums."""
+        where: dict[Product, list[int]] = {}
         for k, terms in enumerate(self._sums):
             for product in terms:
-                places.setdefault(product, []).append(k)
+                where.setdefault(product, []).append(k)
         together: dict[tuple[tuple[int, ...], tuple[int, ...]], list[Product]] = {}
-        for product, found in places.items():
+        for product, found in where.items():
             if len(found) > 1 and 0 not in (signs := self._signs(product, found)):
                 together.setdefault((tuple(found), signs), []).append(product)
-        for (where, signs), products in together.items():
+        for (sums, signs), products in together.items():
             if len(products) > 1:
-                self._replace(products, where, signs)
+                self._replace(products, sums, signs)
 
     def _signs(self, product: Product, where: Sequence[int]) -> tuple[int, ...]:
         """Signs of a term's coefficients beside the first; 0 for one of another size."""

@@ -1,9 +1,8 @@
-"""Graphs as lists of Taylor rules: what has to be known to expand each operation in a power series.
+"""Graphs as lists of Taylor rules, by which each operation is expanded in a power series.
 
-Most operations need one rule. Others need series of their own beside them: sin the cosine, tan its
-square plus one, a whole power the squares that lead to it. A rule's arguments are numbers of rules;
-a sine and a cosine refer to each other. The recurrences behind the rules are in ``jets`` (on any
-arithmetic) and in ``flow/compiled/interpreter/programs.h``.
+Most operations need one rule. Others need further series: sin the cosine, tan its square plus one. A
+rule's arguments are numbers of rules; a sine and a cosine refer to each other. The recurrences of the
+rules are in ``jets`` (on any arithmetic) and in ``flow/compiled/interpreter/programs.h``.
 """
 
 from __future__ import annotations
@@ -46,7 +45,7 @@ class Rule:
     args: tuple[int, ...] = ()
     operation: str = ""
     numbers: tuple[float, ...] = ()
-    place: tuple[int, int] = (-1, -1)
+    source: tuple[int, int] = (-1, -1)
 
 
 def lower(nodes: Sequence[Node], moving: Sequence[bool]) -> tuple[list[Rule], list[int]]:
@@ -54,7 +53,7 @@ def lower(nodes: Sequence[Node], moving: Sequence[bool]) -> tuple[list[Rule], li
     lowering = _Lowering()
     for node, moves in zip(nodes, moving, strict=True):
         lowering.add(node, moves, moving)
-    return lowering.rules, lowering.place
+    return lowering.rules, lowering.rule_of
 
 
 class _Lowering:
@@ -62,15 +61,15 @@ class _Lowering:
 
     def __init__(self) -> None:
         self.rules: list[Rule] = []
-        self.place: list[int] = []
+        self.rule_of: list[int] = []
         self._pairs: dict[tuple[str, int], int] = {}
 
     def add(self, node: Node, moves: bool, moving: Sequence[bool]) -> None:
-        args = tuple(self.place[a] for a in node.args)
+        args = tuple(self.rule_of[a] for a in node.args)
         if node.op == "const":
             number = self._new("constant", numbers=(cast("float", node.payload),))
         elif node.op == "input":
-            number = self._new("input", place=node.place)
+            number = self._new("input", source=node.source)
         elif not moves:
             number = self._new("apply", *args, operation=node.op)
         elif node.op in ("pow", "constpow"):
@@ -79,12 +78,12 @@ class _Lowering:
             rule = _EXPANSIONS.get(node.op)
             if rule is None:
                 raise NotSmoothError(
-                    f"CasADi's operation {node.op!r}: expected one with a Taylor recurrence "
-                    "(arithmetic, powers, sqrt, exp, log, trigonometric and hyperbolic functions "
-                    "and their inverses, atan2, erf), received another. Write it with these."
+                    f"CasADi's operation {node.op!r} has no Taylor recurrence. Write it with "
+                    "arithmetic, powers, sqrt, exp, log, trigonometric and hyperbolic functions and "
+                    "their inverses, atan2 and erf."
                 )
             number = rule(self, *args)
-        self.place.append(number)
+        self.rule_of.append(number)
 
     def _new(self, rule: str, *args: int, **more: object) -> int:
         self.rules.append(Rule(rule, args, **more))  # type: ignore[arg-type]
@@ -200,15 +199,15 @@ _EXPANSIONS: dict[str, Callable[..., int]] = {
 
 
 def touched(rules: Sequence[Rule], states: int) -> list[int]:
-    """Return the rules that inputs of the moving vector enter that come after the states."""
+    """Return the rules that depend on inputs of the moving vector after the states."""
     return [j for j, yes in enumerate(entered(rules, lambda k: k >= states)) if yes]
 
 
 def entered(rules: Sequence[Rule], wanted: Callable[[int], bool]) -> list[bool]:
-    """Return whether each rule is entered by some of the inputs of the moving vector."""
+    """Return whether each rule depends on some of the inputs of the moving vector."""
     found = [False] * len(rules)
     for _ in range(2):  # a sine and its cosine refer to each other
         for j, rule in enumerate(rules):
-            own = rule.place[0] == 0 and wanted(rule.place[1])
+            own = rule.source[0] == 0 and wanted(rule.source[1])
             found[j] = found[j] or own or any(found[a] for a in rule.args)
     return found

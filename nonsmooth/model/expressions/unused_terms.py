@@ -1,9 +1,8 @@
-"""Terms that a mode multiplies by an exact zero are not looked at: their functions may have no value there.
+"""Drop terms whose multiplier is zero in a mode, so that log or sqrt is not evaluated off its domain.
 
-One program serves all modes, with the multipliers as numbers: a field log(1 - x) of one side stands in it as
-(1 - lambda)/2 log(1 - x), and 0 times what has no value would be none. So a product that vanishes at a
-value at which some mode holds a multiplier, and whose other factor may have no value, is made zero where
-the first factor is.
+One program serves all modes, with the multipliers as numbers: a field log(1 - x) of one side is in it as
+(1 - lambda)/2 log(1 - x), and 0 times NaN would be NaN. So a product that vanishes for a value at which
+some mode holds a multiplier is zero where that factor is, if the other factor may be undefined.
 """
 
 from __future__ import annotations
@@ -31,12 +30,12 @@ _VALUES: dict[str, Callable[..., float]] = {
     "mul": lambda a, b: a * b,
 }
 
-Side = tuple[int, float]  # place of a multiplier and its value
+Side = tuple[int, float]  # index of a multiplier and its value
 
 
 @dataclass(frozen=True)
 class _Term:
-    """An expression, whether it may have no value, and its values where a multiplier is held."""
+    """An expression, whether it may be undefined, and its values where a multiplier is held."""
 
     e: ca.SX
     partial: bool = False
@@ -47,11 +46,10 @@ class _Term:
         return self.at.get(side, self.always)
 
 
-def awake(
+def without_unused_terms(
     inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], held: Mapping[int, Sequence[float]]
 ) -> list[ca.SX]:
-    """Return expressions in which terms that a mode leaves out are zero whatever their functions
-    are."""
+    """Return expressions whose unused terms are zero even where their functions are undefined."""
     if not held:
         return list(outputs)
     nodes, rows = instructions(inputs, outputs)
@@ -71,7 +69,7 @@ def awake(
 
 
 class _Sides:
-    """Expressions with what they are where a multiplier is held."""
+    """The algebra of expressions with their values where a multiplier is held."""
 
     def __init__(self, inputs: Sequence[ca.SX], held: Mapping[int, Sequence[float]]):
         self._inputs, self._held = inputs, held
@@ -107,7 +105,7 @@ class _Sides:
         return found
 
     def _guarded(self, op: str, e: ca.SX, args: Sequence[_Term]) -> ca.SX:
-        """A product or quotient that is zero where one of its factors is and the other may have no value."""
+        """A product or quotient that is zero where one factor is and the other may be undefined."""
         pairs = [(args[0], args[1]), (args[1], args[0])]
         for weight, other in pairs[: 2 if op == "mul" else 1]:
             unsafe = other.partial or (op == "div" and not other.always)

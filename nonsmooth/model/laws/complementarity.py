@@ -1,9 +1,9 @@
-"""Which surfaces are left and along which the motion slides: box-constrained complementarity.
+"""The mode at a point of several surfaces, as a box-constrained complementarity problem.
 
 At a point of several surfaces the rates are w = a + M lambda. A surface is left upward with
 lambda_i = +1 and w_i >= 0, downward with lambda_i = -1 and w_i <= 0, and it slides with w_i = 0 and
 lambda_i between. A contact is open with reaction 0 and closed with a positive one and no acceleration:
-the same with the bounds 0 and infinity, and the sign of its row turned. If -M is a P-matrix (all
+the same with the bounds 0 and infinity and the opposite sign of its row. If -M is a P-matrix (all
 principal minors positive) there is exactly one solution, and exchanging letters finds it at the cost of
 a few factorisations.
 

@@ -1,4 +1,4 @@
-"""A mode as one smooth field of the states, with the multipliers of what slides solved for.
+"""A mode as one smooth field of the states, with its multipliers solved for.
 
 ``motion`` eliminates the multiplier of one surface. Of several surfaces, closed contacts and friction
 on them the multipliers solve grad h_i . f(x, lambda) = 0, rates of gaps included: linear equations
@@ -13,7 +13,7 @@ import casadi as ca
 from ..definition.system import FilippovSystem, require_system
 from .coupled import coupled_of
 from .motion import Motion, motion
-from .switches import Guard, Guarded
+from .switches import Guarded
 
 #: Determinants of more unknowns than these are not written out.
 _WRITTEN_OUT = 3
@@ -104,11 +104,3 @@ def explicit(system: FilippovSystem, mode: str) -> Motion:
         return Motion(system, mode, law, law.guarded(), "explicit")
 
     return system.cached(("explicit", mode), build)
-
-
-def guard_named(of_mode: Motion, name: str, side: int = 0) -> tuple[Guard, ca.SX] | None:
-    """A guard of a mode by its name, and its function; ``side`` tells two exits apart."""
-    for k, guard in enumerate(of_mode.guards):
-        if guard.name == name and (guard.kind != "exit" or side in (0, guard.side)):
-            return guard, of_mode.functions[k]
-    return None

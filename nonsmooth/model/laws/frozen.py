@@ -1,4 +1,4 @@
-"""A set of codimension two or more seen from close by: h' = a - M lambda with a and M frozen."""
+"""The law h' = a - M lambda close to a set of codimension two or more, with a and M frozen."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..values import Array
-from .coupled import Coupled
-from .multiplier_series import unit
+from .coupled import Coupled, unit
 
 
 @dataclass(frozen=True)

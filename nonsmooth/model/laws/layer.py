@@ -1,4 +1,4 @@
-"""Field and rates of the surfaces at given multipliers, with their derivatives: the layer of a point.
+"""Field and rates of the surfaces at given multipliers, with their derivatives.
 
 Where several surfaces meet, G_i(x, lambda) = grad h_i . f(x, lambda) are the rates at which they are left.
 Sliding keeps those of its surfaces at zero; the layer problem eps lambda_i' = G_i says whether it attracts.

@@ -1,9 +1,9 @@
-"""Where orbits reach or leave a set h = 0 of codimension k: h' = a - M u with u = h/|h|, a and M frozen.
+"""Directions u = h/|h| in which orbits reach or leave a set h = 0 of codimension k: h' = a - M u.
 
 With h = r u the motion r' = u . (a - M u) leaves the set along directions with (M + s) u = a, |u| = 1 and
 s = r' > 0, and reaches it along those with s < 0. They are the roots of |(M + s)^-1 a| = 1, Antali and
-Stepan's limit directions. With M symmetric and positive definite all are negative if |M^-1 a| < 1, and
-else exactly one is positive.
+Stepan's limit directions. With M symmetric and positive definite all s are negative if |M^-1 a| < 1;
+otherwise exactly one is positive.
 
 Source: Antali & Stepan 2018, "Sliding and crossing dynamics in extended Filippov systems", SIAM J. Appl.
 Dyn. Syst. 17.

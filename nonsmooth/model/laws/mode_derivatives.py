@@ -1,8 +1,7 @@
-"""Field, heights, rates and factors of all modes of a system, with their derivatives, at numbers.
+"""Values and derivatives of the field, functions, rates and factors of all modes of a system.
 
-Everything is a function of the extended states x, of what acts a (multipliers of the switching functions,
-reactions of the contacts, and the unknowns nu that take a multiplier's place where it has a factor,
-``factors``), and of the parameters p.
+They are functions of the extended states x, of a (multipliers, reactions, and the unknowns nu that
+replace a multiplier with a factor, ``factors``), and of the parameters p.
 """
 
 from __future__ import annotations

@@ -1,11 +1,11 @@
-"""The smooth motion of one mode: its field, its guards, and their jets as fast functions.
+"""The smooth motion of one mode: its field, its guards, and their jets.
 
 A guard is a function that is positive inside the mode; the mode ends where it falls through zero:
 
 - ``surface``: s_i h_i for a surface that does not slide (s_i = +1 or -1);
-- ``exit``: what its kind of sliding says (``switches``).
+- ``exit``: the end of its kind of sliding (``switches``).
 
-Stops and resets follow the guards as they were given; their direction is the driver's business.
+Stops and resets follow the guards as they were given; the driver checks their direction.
 """
 
 from __future__ import annotations
@@ -107,13 +107,8 @@ def followed(system: FilippovSystem, mode: str, watched: Sequence[ca.SX] = ()) -
     def build() -> Motion:
         of_mode = motion(system, mode)
         functions = [of_mode.functions[k] for k in range(len(of_mode.guards))]
-        names = [guard.name for guard in of_mode.guards] + [f"f{k}" for k in range(len(watched))]
-        guarded = [
-            (Guard("zero", k, 0, name), function)
-            for k, (name, function) in enumerate(
-                zip(names, [*functions, *expressions], strict=True)
-            )
-        ]
+        functions += expressions
+        guarded = [(Guard("zero", k, 0, k), function) for k, function in enumerate(functions)]
         return Motion(system, mode, of_mode.law, guarded, ("followed", key) if expressions else ())
 
     return system.cached(("followed", mode, key), build)

@@ -1,4 +1,4 @@
-"""How a mode moves on its surfaces: the kinds of sliding, each with its field, exits and letters.
+"""The kinds of sliding of a mode, each with its field, exits and letters.
 
 ``Free`` has no sliding surface. ``Affine`` slides on one surface whose multiplier enters linearly:
 the multiplier is eliminated symbolically. ``Implicit`` slides on several surfaces, or on one whose
@@ -7,7 +7,6 @@ multiplier enters nonlinearly: the multipliers are further states.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
@@ -24,19 +23,28 @@ class Guard:
 
     Attributes
     ----------
-    kind : {"surface", "exit", "stop", "reset", "branch", "zero"}
+    kind : {"surface", "exit", "near", "slip", "branch", "impact", "release", "stop", "reset", "zero"}
     index : int
-        Of the surface, stop or reset.
+        Of the switching function, gap, stop or reset in the definition.
     side : int
-        For an exit the side, +1 or -1, to which the motion leaves; for a surface the side on which
-        the motion is; for stops and resets the direction.
-    name : str
+        For an exit the side, +1 or -1, to which the motion leaves; for a surface or an open contact
+        the side on which the motion is; for stops and resets the direction; else 0.
+    element : int
+        Of the surface, set or contact among the letters of a mode; ``index`` for others.
     """
 
     kind: str
     index: int
     side: int
-    name: str
+    element: int
+
+    def ends(self, kind: str, element: int, side: int) -> bool:
+        """Whether its zero is the event of a kind, of an element, to a side (of an exit)."""
+        given = kind if kind in ("stop", "reset") else ""
+        own = self.kind if self.kind in ("stop", "reset", "branch", "zero") else ""
+        return (own, self.element) == (given, element) and (
+            self.kind != "exit" or self.side == side
+        )
 
 
 Guarded = list[tuple[Guard, ca.SX]]
@@ -124,7 +132,7 @@ class Affine:
         }
         return [
             (
-                Guard("exit", surface, side, "L_F1 h" if side > 0 else "L_F2 h"),
+                Guard("exit", surface, side, surface),
                 -side * self.system.lie_derivative([sides[side]], surface),
             )
             for side in (1, -1)
@@ -179,9 +187,7 @@ class Implicit:
     def exits(self, surface: int) -> Guarded:
         """Return 1 - lambda and 1 + lambda."""
         lam = self.multipliers[self.surfaces.index(surface)]
-        return [
-            (Guard("exit", surface, side, f"lambda{surface}"), 1 - side * lam) for side in (1, -1)
-        ]
+        return [(Guard("exit", surface, side, surface), 1 - side * lam) for side in (1, -1)]
 
     def stability(self) -> Guarded:
         """Return the signed determinant and the trace of the layer problem's slope."""
@@ -190,9 +196,8 @@ class Implicit:
         functions = [(-1.0) ** k * ca.det(self.slope)]
         if k > 1:
             functions.append(-ca.trace(self.slope))
-        return [
-            (Guard("branch", self.surfaces[0], 0, "stability of sliding"), f) for f in functions
-        ]
+        first = self.surfaces[0]
+        return [(Guard("branch", first, 0, first), f) for f in functions]
 
 
 def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
@@ -200,14 +205,15 @@ def guards_of(system: FilippovSystem, mode: str, law: Sliding) -> Guarded:
     result: Guarded = []
     for i, sign in enumerate(system.parse_mode(mode)):
         if sign:
-            result.append((Guard("surface", i, sign, f"h{i}"), sign * system.surface_function(i)))
+            result.append((Guard("surface", i, sign, i), sign * system.surface_function(i)))
         else:
             result += law.exits(i)
     functions = system.definition.guards
-    items: Sequence[tuple[str, int, str, int]] = [
-        *(("stop", j, *stop) for j, stop in enumerate(system.stops)),
-        *(("reset", j, *reset) for j, reset in enumerate(system.resets)),
-    ]
-    for row, (kind, j, name, direction) in enumerate(items):
-        result.append((Guard(kind, j, direction, name), functions[row]))
-    return [*result, *law.stability()]
+    of_events = zip(event_guards(system), ca.vertsplit(functions)[: functions.numel()], strict=True)
+    return [*result, *of_events, *law.stability()]
+
+
+def event_guards(system: FilippovSystem) -> list[Guard]:
+    """Guards of stops and resets, the same in all modes."""
+    kinds = (("stop", system.stops), ("reset", system.resets))
+    return [Guard(kind, j, d, j) for kind, own in kinds for j, (_, d) in enumerate(own)]

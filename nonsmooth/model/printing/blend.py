@@ -1,4 +1,4 @@
-"""The jet of all modes of one surface at once, for trajectories that move in step (lanes).
+"""The jet of all modes of one surface at once, for trajectories that take steps together (lanes).
 
 Lanes of a vector may be in different modes. Instead of expanding every mode and choosing at the
 end, the expansion is shared: subexpressions common to the modes are expanded once, and at every

@@ -3,8 +3,7 @@
 A :class:`Program` collects named functions of one system (jets of its modes, guards, surfaces,
 maps) in one graph, so that equal subexpressions are found once. What depends on parameters alone is
 moved to a function ``prepare`` that runs once per trajectory and fills an array ``q``; what remains
-is printed on a type ``T`` that is ``double`` or a vector of doubles. Which driver includes the
-text, and how it is compiled, is not known here.
+is printed on a type ``T`` that is ``double`` or a vector of doubles.
 """
 
 from __future__ import annotations

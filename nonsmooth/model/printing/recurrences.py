@@ -1,6 +1,6 @@
-"""The recurrences of power series as C, statement by statement: the interpreter's, in its order.
+"""The recurrences of power series as C statements, in the order of the interpreter.
 
-Beside each stands a rule of ``series_rules`` in ``flow/compiled/interpreter/programs.h``, with the same four
+Each corresponds to a rule of ``series_rules`` in ``flow/compiled/interpreter/programs.h``, with the same four
 chains of sums and the same fused products (MULADD); a test compares the bits.
 """
 

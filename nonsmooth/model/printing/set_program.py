@@ -1,10 +1,9 @@
-"""The functions of a system with one set that lanes call, as a C program: a jet for each of its modes.
+"""The functions of a system with one set, for lanes, as a C program: a jet for each of its modes.
 
 Off the set lambda = h/|h|; on it the unknowns nu = factor lambda keep h' = G at zero; where it is left h = r u
 with |u| = 1 and u = lambda (``multiplier_series``). Each is written out order by order.
 
-Towards a set that is reached, and away from one that was left, series in time converge up to the branch point
-there only, a part of the way that does not grow with the order. With dt = (1 - w s/3)^2 ds, 1/w the time to
+Near a set that is reached or was left, series in time converge up to the branch point there only. With dt = (1 - w s/3)^2 ds, 1/w the time to
 it (negative: since it), that point is at s = 3/w, and a step of a part f of the way in s is one of
 1 - (1 - f)^3 in time.
 """
@@ -19,7 +18,7 @@ import casadi as ca
 from ..definition.system import FilippovSystem
 from ..expressions.graph import depends_on, instructions
 from ..expressions.jets import Coefficient, Expansion, Expressions, scaled, value_of
-from ..expressions.simplification import economise
+from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import lower, touched
 from ..laws.coupled import Coupled
 from .ccode import Program
@@ -137,9 +136,9 @@ class _Writer:
         """The series of some outputs in states and unknowns, and the rules that unknowns enter."""
         inputs = [ca.vertcat(self.x, unknowns), self.p]
         outputs = [ca.densify(e) for e in outputs]
-        nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
-        rules, place = lower(nodes, depends_on(nodes, [True, False]))
-        rows = [[place[j] for j in row] for row in rows]
+        nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
+        rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+        rows = [[rule_of[j] for j in row] for row in rows]
         still = [self.p[i] for i in range(self.p.numel())]
         return Expansion(rules, rows, still, Expressions()), touched(rules, self.n)
 

@@ -1,7 +1,7 @@
-"""The programs of a tape as C for one system: the interpreter's operations in its order, written out.
+"""The programs of one system as C: the operations of the interpreter, in its order, without loops.
 
-What ``flow/compiled/interpreter`` does in loops over lists of instructions and orders stands here statement
-by statement, so that it gives the same bits, faster.
+The results have the same bits as those of ``flow/compiled/interpreter``, which loops over instructions
+and orders.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
-"""A system as lists of instructions, which the interpreter in C runs at once: nothing is compiled.
+"""A system as lists of instructions, which the interpreter in C runs without compilation.
 
-``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Tape`` all that a driver needs of
-a system, in any mode (``model.coupled``). Generation is linear in the graph.
+``Values`` is a graph node by node, ``Series`` one by its Taylor rules, ``Tape`` all functions of a system
+that a driver calls, in any mode (``model.coupled``).
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..expressions.float_arithmetic import BINARY, UNARY
 from ..expressions.graph import depends_on, instructions
-from ..expressions.simplification import economise
+from ..expressions.simplification import simplified
 from ..expressions.taylor_rules import RULES, Rule, entered, lower
 from ..laws.coupled import Coupled
 from ..values import Array
@@ -171,7 +171,7 @@ def values_of(
         if node.op == "const":
             constant[j] = cast("float", node.payload)
         elif node.op == "input":
-            args[j] = node.place
+            args[j] = node.source
         else:
             args[j, : len(node.args)] = node.args
     return Values(
@@ -211,9 +211,9 @@ def _rules_of(
 ) -> tuple[list[Rule], list[list[int]]]:
     """Rules of expressions, and the numbers of those of each output."""
     outputs = [ca.densify(o) for o in outputs]
-    nodes, rows = instructions(inputs, economise(inputs, outputs, [True, False]))
-    rules, place = lower(nodes, depends_on(nodes, [True, False]))
-    return rules, [[place[j] for j in row] for row in rows]
+    nodes, rows = instructions(inputs, simplified(inputs, outputs, [True, False]))
+    rules, rule_of = lower(nodes, depends_on(nodes, [True, False]))
+    return rules, [[rule_of[j] for j in row] for row in rows]
 
 
 def _series(
@@ -281,7 +281,7 @@ def _reached(
 
 
 def _is_still(rule: Rule) -> bool:
-    return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.place[0] == 1)
+    return rule.rule in ("constant", "apply") or (rule.rule == "input" and rule.source[0] == 1)
 
 
 def _lines(rules: Sequence[Rule], still: Sequence[bool], time: int | None) -> list[bool]:
@@ -291,7 +291,7 @@ def _lines(rules: Sequence[Rule], still: Sequence[bool], time: int | None) -> li
         sums = rule.rule in ("add", "sub", "neg", "twice", "affine")
         scaled = rule.rule == "mul" and any(still[a] for a in rule.args)
         scaled |= rule.rule == "div" and still[rule.args[1]]
-        own = rule.rule == "input" and rule.place == (0, time)
+        own = rule.rule == "input" and rule.source == (0, time)
         found.append(still[j] or own or ((sums or scaled) and all(found[a] for a in rule.args)))
     return found
 
@@ -309,7 +309,7 @@ _SPECIAL = {
 def _specialised(rule: Rule, moving: Sequence[bool]) -> tuple[str, tuple[int, ...]]:
     """Name and arguments of a rule: with what does not move nothing is convolved."""
     if rule.rule == "input":
-        return rule.rule, rule.place
+        return rule.rule, rule.source
     for k, (name, turned) in enumerate(_SPECIAL.get(rule.rule, ())):
         if not moving[rule.args[k]] and moving[rule.args[1 - k]]:
             return name, rule.args[::-1] if turned else rule.args

@@ -1,10 +1,9 @@
-"""Bifurcations as two parameters vary: curves of events, and the points of codimension two on them.
+"""Curves of bifurcations in two parameters, and the points of codimension two on them.
 
-To the equations of what was continued one more is added, the test whose zero the event is, and a
-second parameter is free. A fold is where the Jacobian without the parameters is singular, which a
-bordered system measures (Griewank & Reddien 1984; Kuznetsov 2004, sec. 10.2). The row of the test
-in the Jacobian is carried along the curve by secants (Broyden 1965): it steers Newton's method, and
-the accuracy is that of the test itself.
+The test of the event is added to the equations of the branch, and a second parameter is free. At a fold
+the Jacobian without the parameters is singular, which a bordered system measures (Griewank & Reddien 1984;
+Kuznetsov 2004, sec. 10.2). The row of the test in the Jacobian is updated along the curve by secants
+(Broyden 1965): it only guides Newton's method, and the accuracy is that of the test.
 """
 
 from __future__ import annotations
@@ -15,12 +14,12 @@ from typing import Any
 
 import numpy as np
 
-from ...model import Array, ConvergenceError, DefinitionError, OptionError, explain, whole
+from ...flow.ensembles.progress import progress_bar
+from ...model import Array, ConvergenceError, DefinitionError, OptionError, whole
 from ...model.checks import positive
 from ...solvers.continuation import Arc, Curve, Point, Secant, Zero, directions, trace
 from ..homoclinic.homoclinic_orbits import Connection
-from .branch import BranchEnd, BranchEvent
-from .branch_curves import BranchCurve, check_bounds, end_of, progress_bar
+from .branch import BranchCurve, BranchEnd, BranchEvent, check_bounds, end_of
 from .homoclinic_curves import ConnectionCurve, event_of
 
 _NAMES = {
@@ -50,9 +49,9 @@ class CodimensionTwo:
     Attributes
     ----------
     kind : str
-        What it is, such as ``"cusp"``, or both events that happen at once.
+        Its name, such as ``"cusp"``, or the names of both events.
     values : ndarray (2,)
-        Of the two parameters.
+        Values of the two parameters.
     solution
         The equilibrium or orbit there.
     """
@@ -72,7 +71,7 @@ class BifurcationCurve:
     Attributes
     ----------
     kind : str
-        Of the bifurcation, as in ``BranchEvent.kind``.
+        Kind of the bifurcation, as in ``BranchEvent.kind``.
     parameters : tuple of two str
         Names of the two parameters.
     values : ndarray (k, 2)
@@ -80,7 +79,7 @@ class BifurcationCurve:
     points : tuple of k ndarray
         Unknowns of the equations at each point.
     special : tuple of CodimensionTwo
-        Points of codimension two that were passed.
+        Points of codimension two on the curve.
     ends : tuple of two BranchEnd
         Why the curve ends at its two ends.
     curve : Curve
@@ -120,18 +119,10 @@ class BifurcationCurve:
 
 
 class EventCurve(Curve):
-    """The equations of a branch with two free parameters, and the test of an event.
-
-    Parameters
-    ----------
-    base : BranchCurve
-    name : str
-        Of the test.
-    start : ndarray (N,)
-    """
+    """The equations of a branch with two free parameters, and the test of an event."""
 
     exact = False
-    tol = 1e-15  # the last step of a secant method tells less of the next one
+    tol = 1e-15  # steps of a secant method shrink less regularly than Newton's
 
     def __init__(self, base: BranchCurve, name: str, start: Array):
         self.base, self.name, self.scale = base, name, base.scale
@@ -140,7 +131,7 @@ class EventCurve(Curve):
             left, _, right = np.linalg.svd(self._square(start))
             self.border = left[:, -1], right[-1]
         self.unit = abs(self.test(start + 1e-3 * base.scale * self._probe())) or 1.0
-        # what vanishes with the event, as at the twin of it in a symmetric orbit
+        # tests that vanish with the event, as at its image in a symmetric orbit
         tests = self.base.tests(Point(start, np.zeros(len(start))))
         self.twins = {k for k, v in tests.items() if abs(v) <= 1e-8 and k != name}
         self.secant = Secant(self._scaled_test, 1.0)
@@ -149,15 +140,15 @@ class EventCurve(Curve):
         return np.array([self.test(v * self.scale) / self.unit])
 
     def _probe(self) -> Array:
-        """A direction in which no test is stationary by chance."""
+        """A generic direction."""
         return np.cos(1.0 + np.arange(self.columns + 2))
 
     def _square(self, u: Array) -> Array:
-        """Jacobian by everything but the parameters, in scaled unknowns."""
+        """Jacobian by the unknowns without the parameters, scaled."""
         return self.base.scaled(u / self.scale)[1][:, : self.columns]
 
     def test(self, u: Array) -> float:
-        """What vanishes on the curve."""
+        """The function that vanishes on the curve."""
         if self.name == "fold":
             return self._bordered(u)[0]
         return float(self.base.tests(Point(u, np.zeros(u.size)))[self.name])
@@ -188,7 +179,7 @@ class EventCurve(Curve):
         return self.base.ends_curve(name)
 
     def tests(self, point: Point) -> Mapping[str, float]:
-        """Other events that happen at the same time, and what degenerates."""
+        """Functions that vanish at other events and at degenerate ones."""
         u = point.u
         omitted = {self.name, *self.twins}
         found = {k: v for k, v in self.base.tests(point).items() if k not in omitted}
@@ -230,19 +221,19 @@ def continue_bifurcation(
     parameters : two str
         Names; others keep their values at the event.
     bounds : two (low, high)
-        Where the curve ends.
+        Bounds of the parameters at which the curve ends.
     step : float, optional
         Largest step where the curve bends, relative to the widths of the bounds.
     max_points : int, optional
-        Limit of the points to each side of the event.
+        Largest number of points on each side of the event.
     progress : bool, optional
-        Whether to show a bar that counts points. An interrupt (Ctrl-C) returns what was computed.
+        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
 
     Returns
     -------
     BifurcationCurve
         With the points of codimension two on it: a second event at the same time, cusps of folds,
-        what changes the class of a boundary equilibrium, neutral saddles of homoclinic orbits.
+        changes of the class of a boundary equilibrium, neutral saddles of homoclinic orbits.
 
     Raises
     ------
@@ -278,12 +269,12 @@ def continue_bifurcation(
     free = tuple(system.parameter_names.index(name) for name in names)
     assert event.point is not None
     base, start = event.curve.freed(event.point.u, free, widths)
-    connected = isinstance(base, ConnectionCurve)  # the equations of which are codimension one
+    connected = isinstance(base, ConnectionCurve)  # its equations are of codimension one
     curve = base if connected else EventCurve(base, event.test, start)
     k = start.size - 2
     start = _on_curve(curve, start, event.kind)
     halves: list[Arc] = []
-    tangent, bar = directions(curve, start)[0], progress_bar(progress)
+    tangent, bar = directions(curve, start)[0], progress_bar(None, progress, " points")
     for way in (-tangent, tangent):
         if halves and halves[0].end in ("closed", "interrupted"):
             break
@@ -298,11 +289,10 @@ def continue_bifurcation(
                 step=step,
                 most=max_points,
                 bounds=ends,
-                report=None if bar is None else lambda _: bar.update(),
+                report=lambda _: bar.update(),
             )
         )
-    if bar is not None:
-        bar.close()
+    bar.close()
     points = [*reversed(halves[0].rows), *(halves[1].rows[1:] if len(halves) > 1 else ())]
     zeros = [*reversed(halves[0].zeros), *(halves[1].zeros if len(halves) > 1 else ())]
     for u in (points[0], points[-1]):
@@ -323,27 +313,20 @@ def _checked(
 ) -> tuple[tuple[str, str], Array, list[tuple[float, float]]]:
     if not isinstance(event, BranchEvent) or event.curve is None or not event.test:
         raise DefinitionError(
-            explain(
-                "event",
-                expected="an entry of Branch.events that two parameters unfold",
-                received=repr(event),
-                advice="Continue an equilibrium or an orbit first.",
-            )
+            f"event={event!r} is no entry of Branch.events that two parameters unfold. Continue an "
+            "equilibrium or an orbit first."
         )
     known = event.curve.system.parameter_names
     given = [parameters] if isinstance(parameters, str) else parameters
     names = [str(name) for name in given] if isinstance(given, Iterable) else []
     if len(names) != 2 or len(set(names)) != 2 or not set(names) <= set(known):
         raise DefinitionError(
-            explain(
-                "parameters",
-                expected=f"two names among {list(known)}",
-                received=repr(parameters),
-                advice="Parameters that do not vary keep their value at the event.",
-            )
+            f"parameters={parameters!r} are not two names of the system's. Give two among {list(known)}."
         )
     if not isinstance(bounds, (Sequence, np.ndarray)) or len(bounds) != 2:
-        raise OptionError(f"bounds: expected two pairs of numbers, received {bounds!r}.")
+        raise OptionError(
+            f"bounds={bounds!r} are not two pairs. Give (low, high) for each parameter."
+        )
     assert event.point is not None
     values = event.curve.parameters_at(event.point.u)
     limits = [
@@ -359,13 +342,8 @@ def _on_curve(curve: Curve, start: Array, kind: str) -> Array:
     found = curve.correct(start, np.linalg.svd(jacobian)[2][-1])
     if found is None:
         raise ConvergenceError(
-            explain(
-                kind,
-                expected="a regular point of a curve in two parameters",
-                received="no convergence at the event",
-                advice="Perhaps the event is of codimension two itself, or the second parameter "
-                "does not unfold it.",
-            ),
+            f"event: Newton's method for the curve does not converge at the {kind}. It may be of "
+            "codimension two itself, or the second parameter does not unfold it: choose others.",
             point=start,
         )
     return found

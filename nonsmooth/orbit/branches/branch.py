@@ -1,4 +1,8 @@
-"""Branches of solutions as one parameter varies: what is returned."""
+"""Branches of solutions as one parameter varies, and their continuation.
+
+Each piece is continued by :mod:`nonsmooth.continuation` with equations of its own; where one ends at an
+event the next one begins among the solutions beyond.
+"""
 
 from __future__ import annotations
 
@@ -7,19 +11,30 @@ from dataclasses import dataclass, field
 from enum import Enum
 from typing import Any
 
+import numpy as np
+
+from ...flow.ensembles.progress import progress_bar
 from ...local.read_only import ReadOnly
-from ...model import Array, NonsmoothError, PointError, explain, real
+from ...model import (
+    Array,
+    ConvergenceError,
+    FilippovSystem,
+    NonsmoothError,
+    OptionError,
+    PointError,
+    real,
+)
 from ...notebook import card
-from ...solvers.continuation import Point
+from ...solvers.continuation import Arc, Curve, Departure, Point, Zero, pieces, trace
 
 
 class BranchEnd(Enum):
     """Why a branch ends.
 
-    It reached a bound of the parameter (REACHED_BOUND), closed (CLOSED), met an event that nothing
-    continues (EVENT), has a period that diverges (PERIOD_DIVERGES), needs shorter steps than there are
-    (STEP_TOO_SMALL), has the number of points asked for (TOO_MANY_POINTS), or was interrupted
-    (INTERRUPTED).
+    REACHED_BOUND: the parameter reached a bound. CLOSED: the branch is a closed curve. EVENT: nothing
+    continues it beyond an event. PERIOD_DIVERGES: the period grows without bound. STEP_TOO_SMALL: no
+    solution was found at the shortest step. TOO_MANY_POINTS: it has ``max_points`` points. INTERRUPTED:
+    Ctrl-C.
     """
 
     REACHED_BOUND = "bound"
@@ -46,7 +61,7 @@ _ADVICE = {
     BranchEnd.PERIOD_DIVERGES: "The period grows without bound: a homoclinic orbit is near.",
     BranchEnd.STEP_TOO_SMALL: "Steps became too short: the solutions end here, or the equations do.",
     BranchEnd.TOO_MANY_POINTS: "Raise max_points to go on.",
-    BranchEnd.INTERRUPTED: "Interrupted; what was computed is here.",
+    BranchEnd.INTERRUPTED: "Interrupted; the branch has the points computed so far.",
 }
 
 
@@ -59,9 +74,9 @@ class FarSide:
     itinerary : str
         Or the kind of solution; empty if nothing continues the branch.
     verdict : str
-        What becomes of the solutions there, in words.
+        What becomes of the solutions there.
     numbers : mapping of str to float
-        What the verdict rests on.
+        The numbers that decide the verdict.
     """
 
     itinerary: str = ""
@@ -82,16 +97,16 @@ class BranchEvent:
     kind : str
         ``"fold"``, ``"Hopf"``, ``"period doubling"``, ``"grazing-sliding"``, ...
     parameter : float
-        Where the branch parameter is.
+        Value of the parameter.
     solution
-        What is continued, there: an equilibrium or a periodic orbit.
+        The equilibrium or periodic orbit there.
     far_side : FarSide
-        What continues the branch beyond the event.
+        The unfolding: what continues the branch beyond the event.
     coefficients : mapping of str to float
-        Of normal forms and conditions.
+        Coefficients of normal forms and conditions.
     curve, point, test
-        The equations that were continued, the point on them and the test that vanishes there, from
-        which ``continue_bifurcation`` and branch switching start.
+        The equations, the point on their curve and the test that vanishes there, from which
+        ``continue_bifurcation`` and branch switching start.
     """
 
     kind: str
@@ -113,7 +128,7 @@ class BranchEvent:
 
 
 def _beside(choices: Sequence[tuple[Any, Point]], wanted: float) -> list[Any]:
-    """The solution next to an event, in the first itinerary that holds there."""
+    """The solution next to an event, in the first itinerary that is admissible there."""
     for (curve, point), (_, far) in zip(choices, reversed(choices), strict=True):
         try:
             guess = curve.toward(point.u, wanted, float(far.u[-1]))
@@ -134,11 +149,11 @@ class Branch:
     parameter : str
         Name of the parameter that varies.
     values : ndarray (k,)
-        Of the parameter; a branch that turns back has values more than once.
+        Values of the parameter; a branch that turns back has values more than once.
     solutions : tuple of k solutions
         Equilibria or periodic orbits.
     events : tuple of BranchEvent
-        In their order along the branch.
+        Events in their order along the branch.
     ends : tuple of two BranchEnd
         Why it ends at its first and its last point.
     nodes : tuple of (curve, Point)
@@ -166,7 +181,7 @@ class Branch:
         Parameters
         ----------
         value : float
-            Of the parameter.
+            Value of the parameter.
 
         Returns
         -------
@@ -189,7 +204,7 @@ class Branch:
             va, vb = curve.value(a.u), other.value(b.u)
             if not min(va, vb) <= wanted <= max(va, vb) or va == vb:
                 continue
-            if curve is not other:  # beside an event, in the itinerary on whose side it is not
+            if curve is not other:  # beside an event: first in the itinerary beyond it
                 before = any(event.point is b for event in self.events)
                 ways = [(curve, a), (other, b)] if before else [(other, b), (curve, a)]
                 found += [] if wanted in (va, vb) else _beside(ways, wanted)
@@ -200,13 +215,8 @@ class Branch:
             found.append(curve.solution_at(guess, wanted))
         if not found:
             raise PointError(
-                explain(
-                    f"{self.parameter} = {wanted:.10g}",
-                    expected=f"a value that the branch reaches, in [{self.values.min():.10g}, "
-                    f"{self.values.max():.10g}]",
-                    received="one at which it has no solution",
-                    advice="Widen the bounds of the continuation.",
-                )
+                f"value: the branch has no solution at {self.parameter} = {wanted:.10g}. It reaches "
+                f"[{self.values.min():.10g}, {self.values.max():.10g}]: widen the bounds of the continuation."
             )
         return found
 
@@ -240,3 +250,277 @@ class Branch:
     def __repr__(self) -> str:
         kinds = ", ".join(f"{e.kind} {e.parameter:.6g}" for e in self.events)
         return f"Branch({self.parameter!r}, {len(self)} points; {kinds or 'no events'})"
+
+
+# Continuation -------------------------------------------------------------------------------------
+
+
+class BranchCurve(Curve):
+    """A curve of solutions with the parameter as last unknown; subclasses describe its points."""
+
+    parameter: int | None = -1
+    branching = True
+    scale: Array
+    system: FilippovSystem
+    free: tuple[int, ...]
+
+    def value(self, u: Array) -> float:
+        """The parameter at a point of the curve."""
+        return float(u[-1])
+
+    def parameters_at(self, u: Array) -> Array:
+        """All parameters of the system at a point of the curve."""
+        raise NotImplementedError
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        """The same equations with other free parameters of the scales ``widths``, and the point there."""
+        raise NotImplementedError
+
+    def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
+        """The event at the end of a branch, if one can be named."""
+        return None
+
+    def restart(self, u: Array) -> None:
+        """Prepare to be followed from a point of it."""
+
+    def turned(self, u: Array, tangent: Array) -> Array | None:
+        """Change the equations at a point, if need be; the tangent of the new ones."""
+        return None
+
+    def renewed(self, point: Point) -> Point | None:
+        tangent = self.turned(point.u, point.tangent)
+        return None if tangent is None else self.point(point.u, tangent, tangent, point.arclength)
+
+    def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
+        """Further functions whose zeros on a curve of events are of codimension two."""
+        return {}
+
+    def ends_curve(self, name: str) -> bool:
+        """Whether a curve of events ends at a point of codimension two."""
+        return False
+
+    def test_row(self, test: str, u: Array) -> tuple[float, Array] | None:
+        """A test and its derivatives by the unknowns, where known in closed form; else None."""
+        return None
+
+    def named(self, test: str, u: Array) -> str:
+        """The bifurcation at a zero of a test."""
+        return test
+
+    def double_zero(self, u: Array) -> bool:
+        """Whether two eigenvalues vanish together at a point."""
+        return False
+
+    def require_valid(self, u: Array) -> None:
+        """Raise if an assumption of the equations does not hold at a point."""
+
+    def describe(self, u: Array) -> Any:
+        """The solution at a point of the curve."""
+        raise NotImplementedError
+
+    def event(self, zero: Zero) -> BranchEvent | None:
+        """The event at a located zero; None if there is none."""
+        raise NotImplementedError
+
+    def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
+        """The start of the branch beyond an event that ends this curve."""
+        return None
+
+    def unknowns_at(self, guess: Array, value: float) -> Array | None:
+        """The unknowns near a guess at a value of the parameter; None if there are none."""
+        start, axis = np.array(guess), np.zeros(len(guess))
+        start[-1], axis[-1] = value, 1.0
+        return self.correct(start, axis)
+
+    def toward(self, guess: Array, value: float, end: float) -> Array:
+        """A guess at a value near an event at ``end``, where a leg vanishes like a square root."""
+        u = guess
+        while abs(value - end) < 0.25 * abs(self.value(u) - end):
+            closer = self.unknowns_at(u, end + 0.25 * (self.value(u) - end))
+            if closer is None:
+                break
+            u = closer
+        return u
+
+    def solution_at(self, guess: Array, value: float) -> Any:
+        """The solution near a guess at a value of the parameter."""
+        u = self.unknowns_at(guess, value)
+        if u is None:
+            raise ConvergenceError(
+                f"the branch at {value:.10g}: no solution was found between its neighbours. Continue with a "
+                "smaller step."
+            )
+        u[-1] = value
+        return self.describe(u)
+
+
+def check_bounds(bounds: Sequence[float], value: float, name: str) -> tuple[float, float]:
+    """Check bounds of a parameter around its value."""
+    try:
+        low, high = (float(b) for b in bounds)
+    except (TypeError, ValueError):
+        low, high = np.nan, np.nan
+    if not low <= value <= high or not np.isfinite(high - low) or low == high:
+        raise OptionError(
+            f"bounds={bounds!r} are not two numbers around {name} = {value:.10g}. Give (low, high)."
+        )
+    return low, high
+
+
+def follow_branch(
+    curve: BranchCurve,
+    start: Array,
+    *,
+    name: str,
+    bounds: tuple[float, float],
+    step: float,
+    max_points: int,
+    through: bool,
+    progress: bool = False,
+    away: Departure | None = None,
+) -> Branch:
+    """Continue a solution both ways to the bounds of the parameter, or one way ``away`` from an event."""
+    if not isinstance(through, (bool, np.bool_)):
+        raise OptionError(f"through={through!r} is no truth value. Give True or False.")
+    bar = progress_bar(None, progress, " points")
+
+    def report(point: Point) -> None:
+        if progress:
+            bar.set_postfix_str(f"{name} = {point.u[-1]:.6g}", refresh=False)
+        bar.update()
+
+    forward = np.zeros(start.size)
+    forward[-1] = 1.0
+    step = min(step, 1.0)  # a step is no longer than the bounds are wide
+    options: dict[str, Any] = dict(step=step, max_points=max_points, report=report, bounds=bounds)
+    ways = [Departure(curve, [start], sign * forward) for sign in (-1.0, 1.0)]
+    halves = [] if away is None else [_Half()]
+    for way in ways if away is None else [away]:
+        if halves and halves[0].end in (BranchEnd.CLOSED, BranchEnd.INTERRUPTED):
+            halves.append(_Half(end=halves[0].end))
+            continue
+        halves.append(_half(way, through, options))
+    bar.close()
+    branch = _joined(name, *halves)
+    for at, point in (branch.nodes[0], branch.nodes[-1]):
+        assert isinstance(at, BranchCurve)
+        at.require_valid(point.u)
+    return branch
+
+
+@dataclass
+class _Half:
+    """One way along a branch."""
+
+    nodes: list[tuple[BranchCurve, Point]] = field(default_factory=list)
+    events: list[BranchEvent] = field(default_factory=list)
+    end: BranchEnd = BranchEnd.EVENT
+
+
+def _half(first: Departure, through: bool, options: Mapping[str, Any]) -> _Half:
+    half, (low, high) = _Half(), options["bounds"]
+    known: dict[int, BranchEvent | None] = {}  # by the identity of the zero, kept in its arc
+
+    def follow(departure: Departure) -> Arc:
+        curve = departure.curve
+        assert isinstance(curve, BranchCurve)
+        curve.restart(departure.rows[-1])
+        arc = trace(
+            curve,
+            departure.rows,
+            departure.tangent,
+            step=options["step"],
+            most=options["max_points"],
+            bounds=[(len(departure.rows[-1]) - 1, low, high)],
+            report=options["report"],
+        )
+        _drop_turning(arc)
+        known.update(dict.fromkeys(map(id, arc.zeros)))
+        try:
+            for zero in arc.zeros:
+                known[id(zero)] = curve.event(zero)
+        except KeyboardInterrupt:
+            arc.end = "interrupted"
+        return arc
+
+    def following(departure: Departure, arc: Arc) -> Departure | None:
+        event = known[id(arc.zeros[-1])] if through and arc.zeros else None
+        if event is None or arc.zeros[-1].name != arc.end:
+            return None
+        assert isinstance(departure.curve, BranchCurve)
+        try:
+            return departure.curve.onward(event, arc.zeros[-1])
+        except NonsmoothError:  # the itinerary beyond has no orbit
+            return None
+        except KeyboardInterrupt:
+            half.end = BranchEnd.INTERRUPTED
+            return None
+
+    whole = ("bound", "closed", "interrupted", "points")
+    for departure, arc in pieces(
+        first, follow, following, last=lambda arc: arc.end in whole, apart=0.0
+    ):
+        at = departure.curve
+        assert isinstance(at, BranchCurve)
+        points = arc.points[1:] if half.nodes else arc.points  # pieces share their ends
+        half.nodes += [(at, point) for point in points]
+        last = known[id(arc.zeros[-1])] if arc.zeros and arc.zeros[-1].name == arc.end else None
+        if last is not None and last.point is not None and _elsewhere(last, at):
+            half.nodes[-1] = (last.curve, last.point)  # regular in the other itinerary
+        found = [known[id(zero)] for zero in arc.zeros]
+        half.events += [event for event in found if event is not None]
+        half.end = end_of(arc)
+        if half.end in (BranchEnd.PERIOD_DIVERGES, BranchEnd.STEP_TOO_SMALL):
+            last = at.ending(arc.points[-1].u, half.end)
+            if last is not None:
+                half.events.append(last)
+                diverges = last.kind == "homoclinic"
+                half.end = BranchEnd.PERIOD_DIVERGES if diverges else BranchEnd.EVENT
+    return half
+
+
+def _elsewhere(event: BranchEvent, curve: BranchCurve) -> bool:
+    """Whether an event is a point of another curve of the same kind of solutions."""
+    return event.curve is not curve and type(event.curve) is type(curve)
+
+
+def _drop_turning(arc: Arc) -> None:
+    """Drop turning and branch points that coincide with the event at the end of an arc."""
+    # Where a new leg grows like a square root the branch is tangent to a constant parameter. Where it grows
+    # like a cube root, and at a Hopf point, the equations are singular.
+    if not arc.zeros or arc.zeros[-1].name != arc.end:
+        return
+    end = arc.zeros[-1].point.arclength
+    near = 1e-6 * max(1.0, end)
+    if arc.zeros[-1].name == "Hopf":  # where the equilibrium has any period
+        near = max(near, end - arc.points[-2].arclength)
+    arc.zeros[:] = [
+        zero
+        for zero in arc.zeros
+        if zero.name not in ("fold", "branch point")
+        or end - zero.point.arclength > near
+        or zero is arc.zeros[-1]
+    ]
+
+
+def end_of(arc: Arc) -> BranchEnd:
+    """Name the end of an arc."""
+    if arc.end in ("lost", "step too small"):
+        return BranchEnd.STEP_TOO_SMALL
+    if arc.end == "period diverges":
+        return BranchEnd.PERIOD_DIVERGES
+    known = {end.value: end for end in BranchEnd}
+    return known.get(arc.end, BranchEnd.EVENT)
+
+
+def _joined(name: str, backward: _Half, forward: _Half) -> Branch:
+    nodes = [*reversed(backward.nodes), *forward.nodes[1 if backward.nodes else 0 :]]
+    events = [*reversed(backward.events), *forward.events]
+    return Branch(
+        parameter=name,
+        values=np.array([curve.value(point.u) for curve, point in nodes]),
+        solutions=tuple(curve.describe(point.u) for curve, point in nodes),
+        events=tuple(events),
+        ends=(backward.end, forward.end),
+        nodes=tuple(nodes),
+    )

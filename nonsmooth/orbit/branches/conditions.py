@@ -10,6 +10,7 @@ Each test is a smooth function along the branch, which goes on, virtual, beyond 
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property, lru_cache
@@ -50,7 +51,8 @@ class Condition:
     @cached_property
     def name(self) -> str:
         """A name that is the same along the branch."""
-        of = f" {self.guard.name} {self.guard.side}" if self.guard is not None else ""
+        g = self.guard
+        of = "" if g is None else f" {g.kind} {g.element} {g.side}"
         return f"{self.what} {self.leg}{of}"
 
 
@@ -69,9 +71,9 @@ def conditions_of(
     for condition, value in tests(at, p):
         name = condition.name
         known.setdefault(name, condition)
-        if np.isfinite(value):
+        if math.isfinite(value):
             found[name] = value
-    found.update((name, v) for name, v in smooth_tests(problem, at).items() if np.isfinite(v))
+    found.update((name, v) for name, v in smooth_tests(problem, at).items() if math.isfinite(v))
     return found
 
 
@@ -178,9 +180,9 @@ def _order(system: FilippovSystem, guard: Guard, before: Leg) -> int | None:
         return None
     if before.kind in ("reset", "impact") and guard.kind != "surface":
         return None  # the rate after it is that before it, the transversality of the event
-    if guard.kind == "surface" and surface_of(system, before) == guard.index:
+    if guard.kind == "surface" and surface_of(system, before) == guard.element:
         return 1 if before.kind == "crossing" else None
-    if guard.kind == "impact" and before.name == guard.name:
+    if guard.kind == "impact" and guard.ends(before.kind, before.element, before.side):
         return None
     return 0
 
@@ -189,7 +191,7 @@ def _ending(
     i: int, leg: Leg, guards: Sequence[Guard]
 ) -> tuple[Condition | None, int, list[tuple[int, Condition]]]:
     """How fast a leg's event is met, with the sign of that; guards of sliding that end together with it."""
-    own = [g for g in guards if g.name == leg.name and leg.side in (0, g.side)]
+    own = [g for g in guards if g.ends(leg.kind, leg.element, leg.side)]
     if not own:
         return None, 0, []
     sign = own[0].side if own[0].kind in ("stop", "reset") and own[0].side else -1

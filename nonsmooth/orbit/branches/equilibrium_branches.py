@@ -15,30 +15,34 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from ...local.point.sides import SIDES, Side, side_index
-from ...local.point.surface_point import Place
+from ...local.checks import parameter_index, require_autonomous, require_linear
+from ...local.point.surface_point import SIDES, Place, Side, place, side_index
 from ...local.read_only import ReadOnly
 from ...local.searches.boundary_equilibria import boundary_equilibrium_of
-from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at
-from ...local.searches.pseudo_equilibria import pseudo_equilibrium_at, sliding_matrix
+from ...local.searches.equilibria import Equilibrium, by_real_part, equilibrium_at, find_equilibrium
+from ...local.searches.pseudo_equilibria import (
+    find_pseudo_equilibrium,
+    pseudo_equilibrium_at,
+    sliding_matrix,
+)
 from ...local.searches.search import Found
-from ...model import Array, NonsmoothError
+from ...model import Array, FilippovSystem, NonsmoothError, Parameters, require_system, whole
+from ...model.checks import positive
 from ...solvers.continuation import Departure, Point, Zero, depart
-from .branch import BranchEvent, FarSide
-from .branch_curves import BranchCurve
+from .branch import Branch, BranchCurve, BranchEvent, FarSide, check_bounds, follow_branch
 from .normal_forms import hopf_coefficient
 
-#: Angle with the surface, or weight, at which a boundary equilibrium is met to rounding.
+#: Length of the first step from a boundary equilibrium.
 _START = 1e-4
 
-#: A state is known to this part of its size.
-_BESIDE = 1e-13
+#: Relative error of a state.
+_ROUNDING = 1e-13
 
 
 class Equilibria(BranchCurve):
-    """What curves of equilibria and pseudo-equilibria share."""
+    """Equations and events common to equilibria and pseudo-equilibria."""
 
     def __init__(self, where: Place, free: tuple[int, ...], scale: Array):
         self.where, self.free, self.scale = where, free, scale
@@ -76,17 +80,15 @@ class Equilibria(BranchCurve):
             return float("nan")
 
     def _vague(self, u: Array, frequency: float, value: float) -> float:
-        """By how much the first Lyapunov coefficient differs where the state does by its rounding."""
+        """Error of the first Lyapunov coefficient, by a state that differs by rounding."""
         beside = u.copy()
-        beside[: self.n] += _BESIDE * self.scale[: self.n] * np.cos(np.arange(self.n))
+        beside[: self.n] += _ROUNDING * self.scale[: self.n] * np.cos(np.arange(self.n))
         return abs(self.lyapunov(beside, frequency) - value)
 
     def bautin(self, u: Array) -> Mapping[str, float]:
         """The first Lyapunov coefficient, which vanishes at a Bautin point on a curve of Hopf points."""
         values = self.eigenvalues(u)
-        k, l = np.triu_indices(values.size, 1)
-        near = int(np.argmin(np.abs(values[k] + values[l])))
-        frequency = float(abs(values[k[near]].imag))
+        frequency = float(abs(values[_critical_pair(values)[0]].imag))
         value = self.lyapunov(u, frequency) if frequency else np.nan
         return {"Bautin": value} if np.isfinite(value) else {}
 
@@ -121,24 +123,23 @@ class Equilibria(BranchCurve):
         if zero.name == "branch point":
             return self.described(zero, "branch point", far_side=FarSide("", "branches cross"))
         values = self.eigenvalues(u)
-        k, l = np.triu_indices(values.size, 1)
-        nearest = int(np.argmin(np.abs(values[k] + values[l])))
-        frequency = float(abs(values[k[nearest]].imag))
+        pair = _critical_pair(values)
+        frequency = float(abs(values[pair[0]].imag))
         if frequency == 0.0:
             return None  # a neutral saddle
         numbers = {"frequency": frequency}
         value = self.lyapunov(u, frequency)
-        words = "a pair of eigenvalues crosses the imaginary axis"
+        verdict = "a pair of eigenvalues crosses the imaginary axis"
         if np.isfinite(value):
             numbers["first Lyapunov coefficient"] = value
-            rest = np.delete(values, [k[nearest], l[nearest]])
+            rest = np.delete(values, pair)
             stable = value < 0.0 and bool(np.all(rest.real < 0.0))
             kind = "supercritical" if value < 0.0 else "subcritical"
             if abs(value) <= 10.0 * self._vague(u, frequency, value):
-                words += ": degenerate to rounding"
+                verdict += ": degenerate to rounding"
             else:
-                words += f": orbits branch off ({kind}{', stable' if stable else ''})"
-        side = FarSide("", words, ReadOnly(numbers))
+                verdict += f": orbits branch off ({kind}{', stable' if stable else ''})"
+        side = FarSide("", verdict, ReadOnly(numbers))
         return self.described(zero, "Hopf", far_side=side, coefficients=ReadOnly(numbers))
 
     def boundary(self, zero: Zero, k: int) -> BranchEvent:
@@ -152,13 +153,15 @@ class Equilibria(BranchCurve):
             "persistence": "persistence: one continues the other",
             "nonsmooth fold": "nonsmooth fold: equilibrium and pseudo-equilibrium annihilate",
         }.get(found.unfolding, "degenerate")
-        onward = "equilibrium" if isinstance(self, PseudoEquilibriumCurve) else "pseudo-equilibrium"
+        onward = (
+            "equilibrium" if isinstance(self, _PseudoEquilibriumCurve) else "pseudo-equilibrium"
+        )
         side = FarSide(onward, verdict, found.numbers)
         event = self.described(zero, "boundary equilibrium", far_side=side)
         return replace(event, solution=found)
 
     def boundary_numbers(self, u: Array, k: int) -> Mapping[str, float]:
-        """What changes the class of a boundary equilibrium of F1 (k = 0) or F2 (k = 1)."""
+        """Functions that vanish where a boundary equilibrium of F1 (k = 0) or F2 (k = 1) changes class."""
         x, here = u[: self.n], self.place_at(u)
         numbers, a = here.finite_at(x), here.jacobians(x)[k]
         other, sign = numbers.fields[1 - k], 1.0 - 2.0 * k
@@ -212,7 +215,7 @@ class EquilibriumCurve(Equilibria):
         return own if surface == self.where.surface else f"{own} of surface {surface}"
 
     def _on(self, name: str) -> EquilibriumCurve:
-        """The same curve seen from the surface that a test is about."""
+        """The same curve with respect to the surface of a test."""
         j = next((j for j in self.where.others if self._boundary_of(j) == name), None)
         if j is None:
             return self
@@ -239,11 +242,15 @@ class EquilibriumCurve(Equilibria):
         """Pseudo-equilibria with 0 < alpha < 1."""
         x, value, near = zero.point.u[: self.n], zero.point.u[-1], self._on(zero.name)
         scale = np.append(self.scale[: self.n], [1.0, self.scale[-1]])
-        curve = PseudoEquilibriumCurve(near.where, self.free, scale)
+        curve = _PseudoEquilibriumCurve(near.where, self.free, scale)
         return _leave(curve, np.concatenate([x, [float(near.k), value]]), 1.0 - 2.0 * near.k)
 
 
-class PseudoEquilibriumCurve(Equilibria):
+#: Tests at which the weight of one field vanishes, and the weight alpha of F2 there.
+_ALPHA = {"alpha = 0": 0, "alpha = 1": 1}
+
+
+class _PseudoEquilibriumCurve(Equilibria):
     """h = 0 and (1 - alpha) F1 + alpha F2 = 0 in the unknowns (x, alpha, p), for continuation."""
 
     def mode_at(self, u: Array) -> str:
@@ -270,7 +277,7 @@ class PseudoEquilibriumCurve(Equilibria):
         numbers = self.place_at(u).at(u[: self.n])
         found = {"alpha = 0": u[self.n], "alpha = 1": 1 - u[self.n]}
         switches = self.place_at(u).switches(u[: self.n])
-        found.update({f"intersection {j}": float(switches[j]) for j in self.where.others})
+        found.update({name: float(switches[j]) for name, j in self._met.items()})
         found["two-fold"] = float(numbers.lie[1] - numbers.lie[0])
         if self.n > 2 and found["two-fold"] != 0:
             found["Hopf"] = self.hopf(u)
@@ -279,22 +286,27 @@ class PseudoEquilibriumCurve(Equilibria):
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
         if name == "Hopf":
             return self.bautin(u)
-        return self.boundary_numbers(u, int(name[-1])) if name.startswith("alpha") else {}
+        return self.boundary_numbers(u, _ALPHA[name]) if name in _ALPHA else {}
+
+    @property
+    def _met(self) -> dict[str, int]:
+        """Other surfaces by the names of their tests."""
+        return {f"intersection {j}": j for j in self.where.others}
 
     def ends(self, name: str) -> bool:
-        return name.startswith(("alpha", "intersection"))
+        return name in _ALPHA or name in self._met
 
     def describe(self, u: Array) -> Any:
         return pseudo_equilibrium_at(self.place_at(u), Found(u[: self.n]))
 
     def event(self, zero: Zero) -> BranchEvent | None:
-        if zero.name.startswith("alpha"):
-            return self.boundary(zero, int(zero.name[-1]))
-        if zero.name.startswith("intersection"):
-            words = (
-                f"it reaches surface {zero.name.split()[-1]}: not followed onto the intersection"
+        if zero.name in _ALPHA:
+            return self.boundary(zero, _ALPHA[zero.name])
+        if zero.name in self._met:
+            verdict = (
+                f"it reaches surface {self._met[zero.name]}: not followed onto the intersection"
             )
-            return self.described(zero, "intersection", far_side=FarSide("", words))
+            return self.described(zero, "intersection", far_side=FarSide("", verdict))
         if zero.name == "two-fold":
             numbers = self.place_at(zero.point.u).at(zero.point.u[: self.n])
             side = FarSide("", "sliding changes between attracting and repelling")
@@ -304,9 +316,9 @@ class PseudoEquilibriumCurve(Equilibria):
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """Equilibria of the field whose weight is one, on that field's own side."""
-        if not zero.name.startswith("alpha"):
+        if zero.name not in _ALPHA:
             return None
-        k, u = int(zero.name[-1]), zero.point.u
+        k, u = _ALPHA[zero.name], zero.point.u
         scale = np.append(self.scale[: self.n], self.scale[-1])
         curve = EquilibriumCurve(self.where, self.free, scale, SIDES[k])
         start = np.append(u[: self.n], u[-1])
@@ -315,9 +327,15 @@ class PseudoEquilibriumCurve(Equilibria):
         return _leave(curve, start, np.append((1.0 - 2.0 * k) * gradient, (1.0 - 2.0 * k) * dh))
 
 
+def _critical_pair(values: NDArray[Any]) -> list[int]:
+    """Indices of the two eigenvalues whose sum is nearest to zero."""
+    k, l = np.triu_indices(values.size, 1)
+    near = int(np.argmin(np.abs(values[k] + values[l])))
+    return [int(k[near]), int(l[near])]
+
+
 def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | None:
-    """Leave a boundary equilibrium into the region where the new solutions are real."""
-    # ``inward`` is a gradient that must grow, or the sign with which alpha must.
+    """Leave a boundary equilibrium to real solutions: along a gradient ``inward``, or its sign of alpha."""
     _, jacobian = curve.scaled(u / curve.scale)
     tangent = np.linalg.svd(jacobian)[2][-1]
     if isinstance(inward, float):
@@ -326,3 +344,119 @@ def _leave(curve: Equilibria, u: Array, inward: float | Array) -> Departure | No
         growth = float((inward * curve.scale) @ tangent)
     direction = tangent if growth > 0 else -tangent
     return depart(curve, u, direction, _START, direction)
+
+
+def continue_equilibrium(
+    system: FilippovSystem,
+    near: ArrayLike,
+    parameter: str,
+    *,
+    bounds: tuple[float, float],
+    side: Side | None = "+",
+    parameters: Parameters | None = None,
+    surface: int = 0,
+    mode: str | None = None,
+    step: float = 0.02,
+    max_points: int = 2000,
+    through: bool = True,
+    progress: bool = False,
+) -> Branch:
+    """Follow an equilibrium or pseudo-equilibrium as a parameter varies.
+
+    Pseudo-arclength continuation both ways from the value in ``parameters``, round turning points,
+    with stability at each point.
+
+    Parameters
+    ----------
+    system, parameters, surface, mode
+        As in :func:`region`; a smooth system has neither surface nor mode.
+    near : array_like (n,)
+        Guess of the first one.
+    parameter : str
+        Name of the parameter that varies.
+    bounds : (float, float)
+        Bounds of the parameter at which the branch ends.
+    side : {"+", "-"} or None, optional
+        Of the field $F1$ or $F2$; None for a pseudo-equilibrium; ``"+"`` for the one field of a smooth system.
+    step : float, optional
+        Largest step where the branch bends, relative to the width of the bounds and to the size of
+        the states.
+    max_points : int, optional
+        Largest number of points of each piece.
+    through : bool, optional
+        Whether to go on beyond a boundary equilibrium with the pseudo-equilibria, or equilibria,
+        that end there too.
+    progress : bool, optional
+        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
+
+    Returns
+    -------
+    Branch
+        Its ``solutions`` are Equilibrium and PseudoEquilibrium. Events: ``"fold"``, ``"Hopf"`` (with
+        its first Lyapunov coefficient, for an eigenvector of length one), ``"branch point"``,
+        ``"pseudo-saddle-node"``, ``"boundary equilibrium"`` of any surface (persistence or nonsmooth
+        fold, in its ``far_side``), ``"two-fold"`` (sliding changes its stability), ``"intersection"``
+        (a pseudo-equilibrium meets another surface, where its branch ends).
+
+    Raises
+    ------
+    ConvergenceError
+        No equilibrium is found near the start.
+    DefinitionError
+        Explicit time or vector multipliers; a ``parameter``, ``mode``, ``surface`` or ``side`` that the
+        system does not have.
+    OptionError
+        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range.
+    ParameterError
+        An unknown parameter, one without a value, or a value that is not a finite number.
+    PointError
+        A start of a wrong shape or not finite.
+
+    Examples
+    --------
+    A pseudo-saddle-node of the sliding flow $x' = mu - x^2$ on $y = 0$:
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, y, mu = (ca.SX.sym(s) for s in ("x", "y", "mu"))
+    >>> s = ns.FilippovSystem([x, y], surface=y, above=[mu - x**2, -1], below=[mu - x**2, 1],
+    ...                       parameters={mu: 1.0})
+    >>> branch = continue_equilibrium(s, [1.0, 0.0], "mu", bounds=(-1, 2), side=None)
+    >>> [(event.kind, abs(round(event.parameter, 12))) for event in branch.events]
+    [('pseudo-saddle-node', 0.0)]
+    >>> [found.kind for found in branch.at(1.0)]
+    ['pseudo-saddle', 'stable pseudo-node']
+    """
+    require_system(system)
+    require_autonomous(system, "continuation of equilibria")
+    positive(step, "step")
+    whole(max_points, "max_points", least=2)
+    index = parameter_index(system, parameter)
+    where, _ = place(system, near, parameters, 0.0, surface, mode, smooth=side is not None)
+    value = float(where.parameters[index])
+    low, high = check_bounds(bounds, value, parameter)
+    given: dict[str, Any] = dict(parameters=parameters, surface=surface, mode=mode)
+    curve: Equilibria
+    if side is None:
+        require_linear(system, surface, "pseudo-equilibrium")
+        pseudo = find_pseudo_equilibrium(system, near, **given)
+        size = max(1.0, float(np.abs(pseudo.point).max()))
+        scale = np.append(np.full(system.dimension, size), [1.0, high - low])
+        curve = _PseudoEquilibriumCurve(where, (index,), scale)
+        start = np.append(pseudo.point, [pseudo.alpha, value])
+    else:
+        found = find_equilibrium(system, near, side=side, **given)
+        size = max(1.0, float(np.abs(found.point).max()))
+        curve = EquilibriumCurve(
+            where, (index,), np.append(np.full(system.dimension, size), high - low), side
+        )
+        start = np.append(found.point, value)
+    return follow_branch(
+        curve,
+        start,
+        name=parameter,
+        bounds=(low, high),
+        step=step,
+        max_points=max_points,
+        through=through,
+        progress=progress,
+    )

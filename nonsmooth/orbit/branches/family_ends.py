@@ -1,8 +1,9 @@
-"""Where a family of periodic orbits shrinks to a point of a surface: a boundary equilibrium or a two-fold.
+"""Points to which a family of periodic orbits shrinks: Hopf points, boundary equilibria and two-folds.
 
-Its size is proportional to the distance of the parameter from that of a boundary equilibrium, or to its
-root at a two-fold. All tests of its itinerary vanish with it, so none of them names the end; the
-equations of the point are regular there, and give its parameter to rounding.
+The size of the orbits is proportional to the distance of the parameter from that of a boundary equilibrium,
+or to its square root at a Hopf point or a two-fold. On a surface all tests of the itinerary vanish with the
+size, so none of them names the end. The equations of the point are regular there, and give its parameter to
+rounding.
 
 Source: Kuznetsov, Rinaldi & Gragnani 2003 (Int. J. Bifurcation Chaos 13, 2157), boundary focus and
 fused focus; di Bernardo et al. 2008, ch. 5.
@@ -15,8 +16,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...local.point.sides import SIDES, Side
-from ...local.point.surface_point import Place, place
+from ...local.point.surface_point import SIDES, Place, Side, place
 from ...local.searches.boundary_equilibria import find_boundary_equilibrium
 from ...model import Array, FilippovSystem, NonsmoothError
 from ...model.derivatives.variational import variational_field
@@ -28,10 +28,8 @@ from ..runs.legs import fly, surface_of
 from .branch import BranchEvent, FarSide
 from .equilibrium_branches import EquilibriumCurve
 
-# Where a family of periodic orbits shrinks to an equilibrium: the Hopf point, from an orbit close to it.
-
-#: The equilibrium is looked for within so many sizes of the small orbit, or of the step to it.
-_NEAR = 0.1
+#: Largest distance of a Hopf point from a small orbit, in scaled unknowns.
+_NEAR_HOPF = 0.1
 
 
 def hopf_point(
@@ -64,14 +62,14 @@ def hopf_point(
         root = converge(Secant(equations, 1.0), start / size)
     except (NonsmoothError, np.linalg.LinAlgError):
         return None
-    if root is None or not np.abs(root - start / size).max() < _NEAR:
+    if root is None or not np.abs(root - start / size).max() < _NEAR_HOPF:
         return None
     u = root * size
     return u[:n], float(u[-1]), pair(u).imag
 
 
-#: The point is looked for within so many sizes of the small orbit, and within this part of the first
-#: one: the last orbit may have shrunk to a point beside it.
+#: Largest distance of the point of a surface from the small orbit, relative to that orbit, and to the first
+#: orbit of the family: rounding may shrink the last one to a point beside it.
 _NEAR, _BESIDE = 30.0, 1e-6
 
 
@@ -90,11 +88,11 @@ def extent(problem: BoundaryProblem, u: Array, p: Array) -> float:
 def surface_end(
     orbit: PeriodicOrbit, parameter: str, size: float, first: float
 ) -> BranchEvent | None:
-    """The point of a surface that a small orbit is about to shrink to; None if there is none."""
+    """The point of a surface near a small orbit; None if there is none."""
     reach = max(_NEAR * size, _BESIDE * first)
     problem, system = orbit.problem, orbit.system
     x = problem.split(orbit.unknowns)[0][:, : system.dimension].mean(axis=0)
-    for surface, mode in _met(problem):
+    for surface, mode in _surfaces(problem):
         for side in SIDES:
             found = _equilibrium(orbit, x, parameter, (surface, mode), side, reach)
             if found is not None:
@@ -106,8 +104,8 @@ def surface_end(
     return None
 
 
-def _met(problem: BoundaryProblem) -> Iterator[tuple[int, str | None]]:
-    """Surfaces on which legs end, with a mode that says where the other ones are."""
+def _surfaces(problem: BoundaryProblem) -> Iterator[tuple[int, str | None]]:
+    """Surfaces on which legs end, with the mode of sliding on each."""
     seen = set[int]()
     for leg in problem.legs:
         surface = surface_of(problem.system, leg)
@@ -148,15 +146,15 @@ def _equilibrium(
     except (NonsmoothError, np.linalg.LinAlgError):
         return None
     label, verdict = event.solution.label, event.far_side.verdict
-    words = f"the orbit shrinks to a boundary equilibrium of F{curve.k + 1} ({label}; {verdict})"
-    side_of = FarSide("", words, event.far_side.numbers)
+    verdict = f"the orbit shrinks to a boundary equilibrium of F{curve.k + 1} ({label}; {verdict})"
+    side_of = FarSide("", verdict, event.far_side.numbers)
     return replace(event, solution=orbit, far_side=side_of, coefficients=side_of.numbers)
 
 
 def _two_fold(
     orbit: PeriodicOrbit, x: Array, parameter: str, at: tuple[int, str | None], reach: float
 ) -> BranchEvent | None:
-    """A two-fold of a planar system, which is one at a value of the parameter."""
+    """The two-fold of a planar system at an isolated value of the parameter."""
     system, (surface, mode) = orbit.system, at
     index = system.parameter_names.index(parameter)
 
@@ -175,5 +173,5 @@ def _two_fold(
         return None
     if root is None or not np.abs(root[:-1] - x).max() < reach:
         return None
-    words = "the orbit shrinks to a two-fold, at which sliding changes its stability"
-    return BranchEvent("two-fold", float(root[-1]), orbit, FarSide("", words))
+    verdict = "the orbit shrinks to a two-fold, at which sliding changes its stability"
+    return BranchEvent("two-fold", float(root[-1]), orbit, FarSide("", verdict))

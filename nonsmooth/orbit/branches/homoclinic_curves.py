@@ -1,4 +1,4 @@
-"""Homoclinic orbits as two parameters vary, and those in which branches of periodic orbits end."""
+"""Homoclinic orbits as two parameters vary, and at the ends of branches of periodic orbits."""
 
 from __future__ import annotations
 
@@ -15,22 +15,14 @@ from ..homoclinic.homoclinic_orbits import Connection, connection_of, find_homoc
 from ..homoclinic.loops import Loop
 from ..periodic.orbit import PeriodicOrbit
 from ..runs.legs import fly
-from .branch import BranchEvent, FarSide
-from .branch_curves import BranchCurve
+from .branch import BranchCurve, BranchEvent, FarSide
 
-#: A connection is that of an orbit if their parameters differ by no more than this part of the bounds.
+#: Largest distance of the parameters of a periodic and a homoclinic orbit, relative to the bounds.
 _SAME = 0.05
 
 
 class ConnectionCurve(BranchCurve):
-    """A homoclinic orbit with one free parameter, or a curve of them with two.
-
-    Parameters
-    ----------
-    loop : Loop
-    u : ndarray
-        A solution.
-    """
+    """A homoclinic orbit with one free parameter, or a curve of them with two."""
 
     parameter = None
     branching = False
@@ -57,7 +49,7 @@ class ConnectionCurve(BranchCurve):
         return curve, start
 
     def equations(self, u: Array) -> tuple[Array, Array]:
-        with np.errstate(all="ignore"):  # a trial may fly too far
+        with np.errstate(all="ignore"):  # a trial may diverge
             return self.loop.equations(u)
 
     def tests(self, point: Point) -> Mapping[str, float]:
@@ -72,15 +64,15 @@ def event_of(connection: Connection) -> BranchEvent:
     u = connection.unknowns
     curve = ConnectionCurve(connection.loop, u)
     quantity = connection.saddle_quantity
-    words = "the period diverges"
+    verdict = "the period diverges"
     if np.isfinite(quantity):
-        words += f"; saddle quantity {quantity:.4g}"
+        verdict += f"; saddle quantity {quantity:.4g}"
     point = Point(u, np.zeros(u.size))
     return BranchEvent(
         "homoclinic",
         connection.value,
         connection,
-        FarSide("", words),
+        FarSide("", verdict),
         curve=curve,
         point=point,
         test="homoclinic",
@@ -107,7 +99,7 @@ def homoclinic_end(orbit: PeriodicOrbit, parameter: str, width: float) -> Branch
 
 
 def _slowest(orbit: PeriodicOrbit) -> tuple[str, Array]:
-    """Mode and state where an orbit moves slowest."""
+    """Mode and state at the slowest point of an orbit."""
     p, n, best = orbit.parameter_vector, orbit.system.dimension, (np.inf, "", orbit.start)
     for leg, x, duration in zip(
         orbit.problem.legs, orbit.evaluation.starts, orbit.evaluation.durations, strict=True

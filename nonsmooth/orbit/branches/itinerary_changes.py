@@ -23,8 +23,13 @@ import numpy as np
 
 from ...model import Array, Guard
 from ...model.derivatives.variational import guarded_field
-from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation
-from ..periodic.symmetry import TURNED, mirrored, neighbours
+from ..periodic.boundary_value_problem import (
+    TURNED,
+    BoundaryProblem,
+    Evaluation,
+    mirrored,
+    neighbours,
+)
 from ..runs.itinerary import leg_between
 from ..runs.legs import Leg, fly, surface_of
 from .conditions import Condition, touching
@@ -72,7 +77,7 @@ def swapped(chain: Chain, i: int) -> Edited | None:
 def round_corner(chain: Chain, i: int, guard: Guard, p: Array) -> Edited | None:
     """A second surface is crossed before the crossing that leads to leg ``i``, and back after it."""
     system, k = chain.problem.system, (i - 1) % len(chain.legs)
-    before, far = chain.legs[k], guard.index
+    before, far = chain.legs[k], guard.element
     if guard.kind != "surface" or before.kind != "crossing":
         return None
     flown = fly(system, before, chain.starts[k], chain.durations[k], p)
@@ -107,7 +112,7 @@ def cut_corner(before: Edited, i: int, p: Array) -> Edited | None:
     chain.remove(2)
     chain.remove(1)
     guards = guarded_field(system, mode_after(last)).motion.guards
-    guard = next(g for g in guards if g.kind == "surface" and g.index == far)
+    guard = next(g for g in guards if g.kind == "surface" and g.element == far)
     return chain.done(test=Condition("start", 1, guard))
 
 
@@ -160,14 +165,9 @@ def mode_after(leg: Leg) -> str:
     """The mode that follows the event of a leg, where its letters tell it; else empty."""
     if leg.kind not in ("crossing", "entry", "exit"):
         return ""
-    if leg.name.startswith("L_"):
-        k = leg.mode.index("s")
-        letter = "+" if leg.name == "L_F1 h" else "-"
-    else:
-        k = int(leg.name.removeprefix("lambda").removeprefix("h"))
-        turned = leg.mode[k].translate(TURNED)
-        letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
-    return leg.mode[:k] + letter + leg.mode[k + 1 :]
+    turned = leg.mode[leg.element].translate(TURNED)
+    letter = {"crossing": turned, "entry": "s"}.get(leg.kind, "+" if leg.side > 0 else "-")
+    return with_letter(leg.mode, leg.element, letter)
 
 
 def with_letter(mode: str, surface: int, letter: str) -> str:
@@ -202,7 +202,7 @@ def kind_of(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
         return _grazed(problem, leg, guard, test, at, p)
     if test.what == "start":
         assert guard is not None
-        if before.kind == "crossing" and surface_of(problem.system, before) == guard.index:
+        if before.kind == "crossing" and surface_of(problem.system, before) == guard.element:
             return "crossing-sliding"
         return "switching-sliding" if guard.kind == "exit" and before.kind == "entry" else "corner"
     if test.what == "end":
@@ -237,7 +237,9 @@ def _grazed(
         return "release"
     t = touching(problem.system, leg, guard, at.starts[test.leg], float(at.durations[test.leg]), p)
     y = fly(problem.system, leg, at.starts[test.leg], t, p).end[: problem.dimension]
-    other = leg.mode[: guard.index] + ("-" if guard.side > 0 else "+") + leg.mode[guard.index + 1 :]
+    other = (
+        leg.mode[: guard.element] + ("-" if guard.side > 0 else "+") + leg.mode[guard.element + 1 :]
+    )
     field = leg_between(problem.system, leg.mode, other).map(problem.system)
     assert field is not None
     gradient = field(y, p).gradient[: problem.dimension]
@@ -284,9 +286,9 @@ def _longer(before: Edited, kind: str, at: Condition, p: Array) -> Edited | None
     if added is None:
         return None
     between, states = added
-    if not leg.name and problem.phase is not None:  # a smooth orbit: it now begins where it touches
-        legs = [replace(leg, name=between[0].name, kind=between[0].kind), *between[1:]]
-        whole = replace(problem, legs=tuple(legs), phase=None, reference=None)
+    if leg.timed and problem.phase is not None:  # a smooth orbit: it now begins where it touches
+        legs = tuple(between)
+        whole = replace(problem, legs=legs, phase=None, reference=None)
         times = [duration, *[0.0] * (len(legs) - 1)]
         shift = np.zeros(problem.dimension)
         shift[-1] = problem.advance(p)[0] if problem.forcing is not None else 0.0
@@ -325,13 +327,13 @@ def _added(
     """Legs that come before the rest of a leg that is touched, and the starts after the first."""
     system = problem.system
     if kind == "grazing-sliding":
-        slide = with_letter(leg.mode, guard.index, "s")
+        slide = with_letter(leg.mode, guard.element, "s")
         return [leg_between(system, leg.mode, slide), leg_between(system, slide, leg.mode)], [y, y]
     if kind == "adding-sliding":
-        free = with_letter(leg.mode, guard.index, "+" if guard.side > 0 else "-")
+        free = with_letter(leg.mode, guard.element, "+" if guard.side > 0 else "-")
         return [leg_between(system, leg.mode, free), leg_between(system, free, leg.mode)], [y, y]
     if guard.kind in ("impact", "reset"):
-        hit = Leg(leg.mode, guard.name, guard.kind)
+        hit = Leg(leg.mode, guard.kind, guard.element, guard.side)
         return [hit], [hit.at_end(system, y, p).after]
     return None
 
@@ -416,9 +418,9 @@ def _start_guard(problem: BoundaryProblem, legs: Sequence[Leg], i: int) -> Guard
     mode = after.mode if i + 1 < len(legs) else mode_after(removed)
     surface = surface_of(problem.system, removed)
     for guard in guarded_field(problem.system, mode).motion.guards:
-        if guard.kind == "surface" and guard.index == surface and removed.kind == "exit":
+        if guard.kind == "surface" and guard.element == surface and removed.kind == "exit":
             return guard
-        if guard.kind == "exit" and removed.kind == "entry" and guard.index == surface:
+        if guard.kind == "exit" and removed.kind == "entry" and guard.element == surface:
             if guard.side == (1 if removed.mode[surface] == "+" else -1):
                 return guard
     return _guard(problem, legs[i - 1])

@@ -9,14 +9,15 @@ field whose derivative is A (Kuznetsov 2004, sections 3.5, 5.4 and 10.2; p is th
                                            + B(q*, (e^(2 i theta)-A)^-1 B(q,q))]/2
     Hopf            l1 = Re p.[C(q,q,q*) - 2 B(q, A^-1 B(q,q*)) + B(q*, (2 i w-A)^-1 B(q,q))]/(2 w)
 
-What branches off is stable in these directions (supercritical) where c > 0, a < 0, l1 < 0. B(q, .) and
-C(q, q*, .) are matrices, the only ones that are needed.
+What branches off is stable in these directions (supercritical) where c > 0, a < 0, l1 < 0. Only the matrices
+B(q, .) and C(q, q*, .) are needed.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -31,7 +32,7 @@ Complex = NDArray[np.complex128]
 
 @dataclass(frozen=True)
 class Expansion:
-    """Derivatives of a map or field at a fixed point, as far as one eigenvector needs them."""
+    """Derivatives of a map or field at a fixed point, along one eigenvector."""
 
     a: Array
     q: Complex
@@ -41,8 +42,7 @@ class Expansion:
 
 
 def eigenvectors(a: Array, value: complex) -> tuple[Complex, Complex]:
-    """Right eigenvector q with |q| = 1 and left one p with p.q = 1, of the eigenvalue next to a
-    value."""
+    """Right and left eigenvectors of the eigenvalue next to a value, |q| = 1 and p.q = 1."""
 
     def of(matrix: Array) -> Complex:
         values, vectors = np.linalg.eig(matrix)
@@ -71,8 +71,7 @@ def torus_coefficient(at: Expansion, turn: complex) -> float:
 def hopf_coefficient(
     system: FilippovSystem, mode: str, x: Array, p: Array, frequency: float
 ) -> float:
-    """The first Lyapunov coefficient l1 of an equilibrium of one mode, on its surface if that
-    slides."""
+    """The first Lyapunov coefficient l1 of an equilibrium of one mode, which may slide."""
     forms = field_expansion(system, mode)
     a = forms.copied(np.append(x, np.zeros(x.size)), p)[0]
     q, left = eigenvectors(a, 1j * frequency)
@@ -90,33 +89,31 @@ def hopf_coefficient(
     return float((left @ inner).real / (2.0 * frequency))
 
 
-# Second and third derivatives of the return map of a periodic orbit along one direction.
+# Return maps --------------------------------------------------------------------------------------
 
-#: Distances of the differences, relative to the orbit: of two that agree the shorter one is taken.
+#: Steps of differences, relative to the orbit; the first that agrees with the last one is used.
 _STEPS = (4e-3, 2e-3, 5e-4, 1.25e-4, 3e-5)
 
-#: They agree to this part.
+#: Relative difference at which two steps agree.
 _AGREE = 1e-5
 
-#: Newton's method for the flight from a start beside the orbit.
+#: Newton's method for the return from a start beside the orbit.
 _ITERATIONS, _TOLERANCE = 12, 1e-13
 
 
 def normal_form(
     problem: BoundaryProblem, at: Evaluation, p: Array, kind: str
 ) -> Mapping[str, float]:
-    """The coefficient of a period doubling or pitchfork (c), or of a Neimark-Sacker point (a)."""
-    # In states (and time) as they are, with an eigenvector of length one where the first leg starts, and
-    # the error of the differences.
+    """The coefficient c of a period doubling or pitchfork, or a of a Neimark-Sacker point, and its error."""
+    # In unscaled states (and time), for an eigenvector of length one at the start of the first leg.
     n = problem.dimension
     units = problem.scales(problem.pack(at.starts, at.durations), p)[:n]
     a = return_map(problem, at) * (units / units[:, None])
     value, name = -1.0 + 0j, "cubic coefficient"
     if kind == "Neimark-Sacker":
         values = np.linalg.eigvals(a)
-        k, l = np.triu_indices(n, 1)
-        pair = values[k[int(np.argmin(np.abs(values[k] * values[l] - 1.0)))]]
-        value, name = pair / abs(pair), "first Lyapunov coefficient"
+        one = values[torus_pair(values)[0]]
+        value, name = one / abs(one), "first Lyapunov coefficient"
     q, left = eigenvectors(a, value)
     turning, best, before = kind == "Neimark-Sacker", (0.0, np.inf), np.nan
     for size in _STEPS:
@@ -127,7 +124,7 @@ def normal_form(
         except (NonsmoothError, np.linalg.LinAlgError):
             before = np.nan
             continue
-        if abs(now - before) < best[1]:  # of fourth order: the shorter one is better by far
+        if abs(now - before) < best[1]:  # of fourth order: the shorter one is far better
             best = now, abs(now - before)
         if best[1] < _AGREE * abs(now):
             break
@@ -136,6 +133,13 @@ def normal_form(
         return {}
     length = float(np.linalg.norm(units * q)) ** 2
     return {name: best[0] / length, "its error": best[1] / length}
+
+
+def torus_pair(values: NDArray[Any]) -> list[int]:
+    """Indices of the two multipliers whose product is nearest to one."""
+    k, l = np.triu_indices(values.size, 1)
+    near = int(np.argmin(np.abs(values[k] * values[l] - 1.0)))
+    return [int(k[near]), int(l[near])]
 
 
 class _Around:
@@ -183,7 +187,7 @@ class _Around:
         return return_map(problem, at) * (self.units / self.units[:, None])
 
     def _returning(self, at: Evaluation) -> tuple[Array, Array]:
-        """Of an orbit without events: when it is back on its plane."""
+        """The condition, for an orbit without events, of its return to its plane, and the derivative."""
         problem, flown = self.problem, at.flown[0]
         assert problem.phase is not None and problem.reference is not None
         back = problem.wrap @ flown.end[: problem.dimension] - problem.reference

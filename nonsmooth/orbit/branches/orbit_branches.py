@@ -1,9 +1,19 @@
-"""Periodic orbits as a parameter varies, through the bifurcations that change their itineraries.
+"""Branches of periodic orbits as a parameter varies, with their bifurcations.
 
-The boundary value problem of a fixed itinerary is continued by :mod:`nonsmooth.continuation`. What
-ends an itinerary is a zero of one of its tests (``conditions``). Of the two itineraries that meet
-there the one with fewer legs is regular, so the event is located in it; then the branch goes on in
-the other one (``edits``).
+The boundary value problem of a fixed itinerary is continued by :mod:`nonsmooth.continuation`. An itinerary
+ends at a zero of one of its tests (``conditions``). Of the two itineraries that meet there the one with
+fewer legs is regular, so the event is located in it, and the branch goes on in the other one
+(``itinerary_changes``).
+
+On curves of bifurcations in two parameters, points of codimension two are zeros of further tests. On a curve
+of grazing-sliding the touching is of higher order (L11 = 0), or at a two-fold (L2 = 0), or a multiplier with
+contact is 1 or -1, or the orbit touches a second time; on one of crossing- or switching-sliding L11 = 0 turns
+one into the other. On a curve of Neimark-Sacker points the angle is resonant; where the pair meets at 1 or -1
+the curve ends, as the numbers beyond are a neutral saddle's. There and on curves of period doublings the cubic
+coefficient of the normal form may vanish.
+
+Source: Kowalczyk, di Bernardo, Champneys et al. 2006 (Int. J. Bifurcation Chaos 16, 601); Kuznetsov 2004,
+ch. 9.
 """
 
 from __future__ import annotations
@@ -14,51 +24,133 @@ from dataclasses import replace
 
 import numpy as np
 
+from ...local import Equilibrium, PseudoEquilibrium
+from ...local.checks import parameter_index
 from ...local.read_only import ReadOnly
-from ...model import Array, ConvergenceError, NonsmoothError
-from ...solvers.continuation import Departure, Point, Zero
+from ...model import Array, ConvergenceError, DefinitionError, NonsmoothError, whole
+from ...model.checks import positive
+from ...model.derivatives.event_maps import surface_map
+from ...model.derivatives.variational import guarded_field, variational_field
+from ...solvers.continuation import Departure, Point, Zero, other_direction
 from ...solvers.newton import converge
-from ..periodic.boundary_value_problem import BoundaryProblem
+from ..periodic.boundary_value_problem import BoundaryProblem, Evaluation, eliminated
+from ..periodic.multipliers import leg_maps, return_map
 from ..periodic.orbit import PeriodicOrbit, faults_of, named
-from ..periodic.symmetry import require_symmetric
-from ..runs.legs import fly
-from .branch import BranchEnd, BranchEvent, FarSide
-from .branch_curves import BranchCurve
-from .codimension_two import ENDS, degenerate
-from .conditions import Condition, condition_row, conditions_of, is_smooth
+from ..periodic.symmetry import halves, mirrored, once_round, require_symmetric
+from ..runs.legs import Leg, fly
+from .branch import (
+    Branch,
+    BranchCurve,
+    BranchEnd,
+    BranchEvent,
+    FarSide,
+    check_bounds,
+    follow_branch,
+)
+from .conditions import Condition, condition_row, conditions_of, is_smooth, minima
 from .family_ends import extent, hopf_point, surface_end
 from .homoclinic_curves import homoclinic_end
 from .itinerary_changes import Edited, edited, grown, kind_of
-from .orbit_equations import OrbitEquations
-from .smooth_events import as_doubling, as_pitchfork, smooth_side
-from .unfoldings import far_side
+from .normal_forms import normal_form, torus_pair
+from .unfoldings import contact_at, contact_numbers, far_side, touched
 
-#: Durations, or distances along the branch, at which it leaves an event; relative to the orbit.
+# Equations of periodic orbits with free parameters ----------------------------------------------------
+
+
+class OrbitEquations(BranchCurve):
+    """Periodic orbits of one itinerary in the unknowns (starts, durations, parameters)."""
+
+    def __init__(
+        self,
+        problem: BoundaryProblem,
+        p: Array,
+        free: tuple[int, ...],
+        widths: Array,
+        u: Array,
+        longest: float,
+    ):
+        self.problem, self.p, self.free, self.longest = problem, p, free, longest
+        self.begin = np.append(u[: problem.size], p[list(free)])
+        self.system, self.widths = problem.system, widths
+        self.scale = np.append(problem.scales(u, p), widths)
+        self.known: dict[str, Condition] = {}
+        self._found, self._last = dict[bytes, Evaluation](), b""  # of points, and the last untested
+
+    # equations ----------------------------------------------------------------------------------
+
+    def parameters_at(self, u: Array) -> Array:
+        p = self.p.copy()
+        p[list(self.free)] = u[-len(self.free) :]
+        return p
+
+    def freed(self, u: Array, free: tuple[int, ...], widths: Array) -> tuple[BranchCurve, Array]:
+        p, unknowns = self.parameters_at(u), u[: self.problem.size]
+        curve = type(self)(self.problem, p, free, widths, unknowns, self.longest)
+        curve.known = self.known
+        return curve, np.append(unknowns, p[list(free)])
+
+    def evaluation(self, u: Array) -> Evaluation:
+        """The equations at a point, computed once."""
+        key = u.tobytes()
+        if key not in self._found:
+            p, unknowns = self.parameters_at(u), u[: self.problem.size]
+            at = self.problem.evaluate(unknowns, p, self.free)
+            self._found.pop(self._last, None)
+            self._found[key], self._last = at, key
+        return self._found[key]
+
+    def equations(self, u: Array) -> tuple[Array, Array]:
+        at = self.evaluation(u)
+        return at.residual, at.whole
+
+    def values(self, u: Array) -> Array | None:
+        return self.problem.residual(u[: self.problem.size], self.parameters_at(u))
+
+    def solve(self, matrix: Array, right: Array) -> Array:
+        return self.problem.solve(matrix, right)
+
+    def along(self, jacobian: Array, before: Array) -> tuple[Array, float]:
+        if not self.problem.has_many:
+            return super().along(jacobian, before)
+        target = np.zeros(before.size)
+        target[-1] = 1.0
+        small = eliminated(self.problem, np.vstack([jacobian, before]), target)
+        tangent = small.solution()
+        length = float(np.linalg.norm(tangent))
+        return tangent / length, small.determinant() * length
+
+    def determinant(self, matrix: Array) -> float:
+        if not self.problem.has_many:
+            return super().determinant(matrix)
+        return eliminated(self.problem, matrix, np.zeros(len(matrix))).determinant()
+
+
+#: Durations of new legs, or distances along the branch, with which it leaves an event, relative to the orbit.
 _STARTS = (1e-4, 1e-3, 1e-2, 1e-5)
 
-#: Relative growth of a long period, over a change of the parameter by its bounds, that diverges.
+#: Relative growth of a long period, over a change of the parameter by its bounds, at which it diverges.
 _STEEP = 30.0
 
-#: An orbit that shrank to the first of these parts of its size where its itinerary ends, or to the second
-#: where it is lost, may be about to shrink to a point of a surface.
+#: Relative sizes below which an orbit may shrink to a point of a surface: where its itinerary ends, and where
+#: the branch is lost.
 _TINY, _SMALL = 1e-4, 1e-2
 
-#: A solution of a branch that takes less than this part of the guess is no orbit but a point.
+#: Period relative to that of the guess below which a solution is a point.
 _COLLAPSED = 1e-6
 
-#: Share of the way to an event at which the orbits before it are looked at.
+#: Share of the way to an event at which the orbit before it is checked.
 _JUST = 0.99
 
-#: What names an event of which several conditions vanish.
+#: Order of the conditions that name an event at which several vanish.
 _PRIORITY = ("duration", "start", "end", "interior", "transversality")
 
 #: Cosines of the angle between the flow and the normal of the plane on which an orbit without events
-#: starts: below the first it gets a new plane, below the second a step was too long.
+#: starts, below which the plane is renewed, and below which a step was too long.
 _OBLIQUE, _LEFT = 0.9, 0.5
 
 
 class OrbitCurve(OrbitEquations):
-    """Periodic orbits of one itinerary, with what is watched along them and what happens where it ends."""
+    """Periodic orbits of one itinerary, with their tests and events."""
 
     def with_problem(self, problem: BoundaryProblem, u: Array) -> OrbitCurve:
         """The same parameters with another itinerary."""
@@ -85,13 +177,13 @@ class OrbitCurve(OrbitEquations):
         return name == "Hopf" or not is_smooth(name)
 
     def ends_at(self, zero: Zero) -> bool:
-        """As by name; and where doubled orbits become one, as beyond are the same, a round later."""
-        doubled = zero.name == "branch point" and as_doubling(self, zero) is not None
+        """As by name; also at a period doubling of doubled orbits, beyond which they repeat."""
+        doubled = zero.name == "branch point" and _as_doubling(self, zero) is not None
         return doubled or self.ends(zero.name)
 
     def passed(self, last: Point, new: Point, ending: Zero | None) -> bool:
-        """Whether an extremum of a guard was born in a step and has passed zero already."""
-        # Then either no motion is left at the end of the step, or none just before another event in it.
+        """Whether an extremum of a guard appeared in a step and has passed zero already."""
+        # Then the orbit is virtual at the end of the step, or just before another event in it.
         born = new.tests.keys() - last.tests.keys()
         if any(new.tests[k] < 0.0 and self._inside(k) for k in born) and ending is None:
             return True
@@ -118,18 +210,18 @@ class OrbitCurve(OrbitEquations):
         return float(self.problem.phase @ rate) / (float(np.linalg.norm(rate)) or 1.0)
 
     def point(self, u: Array, before: Array, chord: Array, arclength: float) -> Point | None:
-        """As of any curve; none where an orbit without events has nearly left its plane."""
+        """The point; None where an orbit without events is nearly tangent to its plane."""
         found = super().point(u, before, chord, arclength)
         lost = found is not None and self._on_plane and abs(self._across(u)) < _LEFT
         return None if lost else found
 
     def turned(self, u: Array, tangent: Array) -> Array | None:
-        """Take a plane across the flow at the start, where that of an orbit without events is oblique."""
+        """Renew the plane of an orbit without events where it is oblique to the flow."""
         if not self._on_plane or self._across(u) > _OBLIQUE:
             return None
         rate = self.evaluation(u).flown[0].rate[: self.problem.dimension]
         self.restart(u)
-        ahead = tangent * self.scale  # the same way, less what only moves along the orbit
+        ahead = tangent * self.scale  # without the component along the orbit
         ahead[: rate.size] -= float(rate @ ahead[: rate.size]) / float(rate @ rate) * rate
         ahead = ahead / self.scale
         return np.asarray(ahead / np.linalg.norm(ahead))
@@ -144,27 +236,26 @@ class OrbitCurve(OrbitEquations):
         durations = self.problem.split(guess[: self.problem.size])[1]
         if found.evaluation.durations.sum() < _COLLAPSED * durations.sum():
             raise ConvergenceError(
-                f"the branch at {value:.10g}: expected an orbit near its neighbours, received one that "
-                f"shrank to the point {found.start.tolist()}. Continue with a smaller step."
+                f"the branch at {value:.10g}: the solution is no orbit, but the point "
+                f"{found.start.tolist()}. Continue with a smaller step."
             )
         p = found.parameter_vector
         return replace(found, faults=tuple(faults_of(found.problem, found.evaluation, p)))
 
     def out(self, u: Array) -> str:
-        """The period diverges where it is long and grows without the parameter changing."""
+        """``"period diverges"`` where it is long and grows at a constant parameter; else empty."""
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         return "period diverges" if u[durations].sum() > self.longest and self._steep(u) else ""
 
     def _steep(self, u: Array) -> bool:
-        """Whether the period grows by far more than it would over the bounds of the parameter."""
+        """Whether the period grows steeply with the parameter."""
         durations = slice(self.problem.size - len(self.problem.legs), self.problem.size)
         tangent = np.linalg.svd(self.equations(u)[1] * self.scale)[2][-1] * self.scale
         growth = abs(float(tangent[durations].sum())) * float(self.widths[-1])
         return bool(growth > _STEEP * float(u[durations].sum()) * abs(float(tangent[-1])))
 
     def ending(self, u: Array, end: BranchEnd) -> BranchEvent | None:
-        """The point to which the orbit shrinks, or the homoclinic orbit where the period diverges, or would
-        if rounding allowed it."""
+        """The point to which the orbit shrinks, or the homoclinic orbit at which its period diverges."""
         shrunk = self._shrunk(u, _SMALL)
         if shrunk is not None:
             return shrunk
@@ -174,7 +265,7 @@ class OrbitCurve(OrbitEquations):
         return homoclinic_end(self.describe(u), name, float(self.widths[-1]))
 
     def _shrunk(self, u: Array, part: float) -> BranchEvent | None:
-        """The point of a surface to which an orbit shrinks that is no larger than a part of the first one."""
+        """The point of a surface to which an orbit shrinks, if it is small relative to the first one."""
         if self.system.time_dependent or self.system.coupled or not self.system.surface_count:
             return None
         first = extent(
@@ -187,16 +278,14 @@ class OrbitCurve(OrbitEquations):
         return surface_end(self.describe(u), name, size, first)
 
     def faults(self, u: Array) -> list[str]:
-        """What the guards contradict."""
+        """Violated guards."""
         return faults_of(self.problem, self.evaluation(u), self.parameters_at(u))
 
     def require_valid(self, u: Array) -> None:
-        """Refuse half orbits of a system whose symmetry the parameter breaks."""
+        """Raise for half orbits of a system whose symmetry the parameter breaks."""
         if self.problem.symmetry is not None:
             virtual = tuple(self.faults(u))
             require_symmetric(replace(self.describe(u), faults=virtual))
-
-    # results ------------------------------------------------------------------------------------
 
     def describe(self, u: Array) -> PeriodicOrbit:
         p, unknowns = self.parameters_at(u), np.array(u[: self.problem.size])
@@ -213,10 +302,10 @@ class OrbitCurve(OrbitEquations):
 
     def codimension_two(self, name: str, u: Array) -> Mapping[str, float]:
         at, p = self.evaluation(u), self.parameters_at(u)
-        return degenerate(self.problem, self.known.get(name), name, at, p)
+        return _degenerate(self.problem, self.known.get(name), name, at, p)
 
     def ends_curve(self, name: str) -> bool:
-        return name in ENDS
+        return name in _ENDS
 
     def named(self, test: str, u: Array) -> str:
         if is_smooth(test) or test not in self.known:
@@ -236,24 +325,25 @@ class OrbitCurve(OrbitEquations):
         kind = kind_of(self.problem, conditions[0], at, p)
         beyond = self._edited(kind, conditions, u, p)
         if beyond is None or not beyond.test:
-            word = "" if beyond is None else _word(beyond.problem)
-            side = far_side(self.problem, kind, conditions[0], at, p, word, beyond)
+            itinerary = "" if beyond is None else _itinerary(beyond.problem)
+            side = far_side(self.problem, kind, conditions[0], at, p, itinerary, beyond)
             return self._event(kind, self, zero.point, conditions[0].name, side)
-        word, curve = _word(beyond.problem), self.with_problem(beyond.problem, beyond.u)
+        itinerary = _itinerary(beyond.problem)
+        curve = self.with_problem(beyond.problem, beyond.u)
         point = curve.located(np.append(beyond.u, u[-len(self.free) :]), beyond.test)
         if point is None:
-            side = FarSide(word, "not located on the side with fewer legs")
+            side = FarSide(itinerary, "not located on the side with fewer legs")
             return self._event(kind, self, zero.point, conditions[0].name, side)
         at, p = curve.evaluation(point.u), curve.parameters_at(point.u)
         test = curve.known[beyond.test]
         back = curve._edited(kind, [test], point.u, p) if kind == "corner" else None
-        side = far_side(curve.problem, kind, test, at, p, word, back)
+        side = far_side(curve.problem, kind, test, at, p, itinerary, back)
         return self._event(kind, curve, point, beyond.test, side)
 
     def _vanishing(self, zero: Zero) -> list[Condition]:
-        """Conditions that vanish together at a zero, those that name the event."""
-        # Where a leg vanishes the events beside it are tangent too; an orbit that is symmetric has
-        # each event several times.
+        """Conditions that vanish together at a zero, of the kind that names the event."""
+        # Where a leg vanishes its neighbours end tangentially too; a symmetric orbit has each event several
+        # times.
         small = [self.known[zero.name]]
         small += [self.known[n] for n in zero.together if n != zero.name and not is_smooth(n)]
         first = min(small, key=lambda c: _PRIORITY.index(c.what))
@@ -279,22 +369,22 @@ class OrbitCurve(OrbitEquations):
             return self._hopf(zero)
         at, p = self.evaluation(zero.point.u), self.parameters_at(zero.point.u)
         if zero.name == "branch point":
-            parting = as_doubling(self, zero) or as_pitchfork(self, zero)
-            if parting is not None:
-                return self._event(*parting)
-        side = smooth_side(self.problem, at, p, zero.name)
+            shorter = _as_doubling(self, zero) or _as_pitchfork(self, zero)
+            if shorter is not None:
+                return self._event(*shorter)
+        side = _smooth_side(self.problem, at, p, zero.name)
         return None if side is None else self._event(zero.name, self, zero.point, zero.name, side)
 
     def _hopf(self, zero: Zero) -> BranchEvent:
-        """The orbit shrinks: where its equilibrium has two imaginary eigenvalues."""
+        """The Hopf point of the equilibrium to which the orbit shrinks."""
         u, leg = zero.point.u, self.problem.legs[0]
         p, (starts, durations) = self.parameters_at(u), self.problem.split(u)
         opposite = fly(self.system, leg, starts[0], 0.5 * float(durations[0]), p).end
         n = self.system.dimension
         middle = 0.5 * (starts[0] + opposite[: self.problem.dimension])[:n]
         found = hopf_point(self.system, leg.mode, middle, p, self.free[-1])
-        words = "the orbit shrinks to an equilibrium"
-        event = self._event("Hopf", self, zero.point, "", FarSide("", words))
+        verdict = "the orbit shrinks to an equilibrium"
+        event = self._event("Hopf", self, zero.point, "", FarSide("", verdict))
         if found is None:
             return event
         numbers = ReadOnly({"frequency": found[2]})
@@ -304,12 +394,12 @@ class OrbitCurve(OrbitEquations):
         try:
             return edited(self.problem, kind, conditions, u[: self.problem.size], p)
         except NonsmoothError:
-            return None  # the letters fit no event there
+            return None  # no itinerary with such modes
 
     def located(self, guess: Array, name: str) -> Point | None:
         """The orbit at which a test of this itinerary vanishes, near a guess."""
         scale = self.scale
-        self.tests(Point(guess, np.zeros(guess.size)))  # what the conditions are
+        self.tests(Point(guess, np.zeros(guess.size)))  # sets the known conditions
         if name not in self.known or self.test_row(name, guess) is None:
             return None
 
@@ -330,8 +420,6 @@ class OrbitCurve(OrbitEquations):
         except (NonsmoothError, np.linalg.LinAlgError):
             return None
         return point
-
-    # beyond an event ----------------------------------------------------------------------------
 
     def onward(self, event: BranchEvent, zero: Zero) -> Departure | None:
         """The branch in the other itinerary."""
@@ -372,5 +460,411 @@ class OrbitCurve(OrbitEquations):
         return None
 
 
-def _word(problem: BoundaryProblem) -> str:
+def _itinerary(problem: BoundaryProblem) -> str:
     return " ".join(leg.mode or "o" for leg in problem.legs)
+
+
+# Smooth bifurcations ------------------------------------------------------------------------------
+
+_VERDICTS = {
+    "fold": "two orbits meet and vanish",
+    "branch point": "branches cross",
+    "period doubling": "an orbit of twice the period branches off",
+    "pitchfork": "two orbits without the symmetry branch off",
+    "Neimark-Sacker": "an invariant torus is born",
+}
+
+#: Distance of an angle from a strong resonance within which the normal form does not hold.
+_RESONANT = 1e-4
+
+
+def _smooth_side(problem: BoundaryProblem, at: Evaluation, p: Array, kind: str) -> FarSide | None:
+    """Classify a smooth bifurcation."""
+    verdict, numbers = _VERDICTS[kind], dict[str, float]()
+    if kind in ("fold", "branch point"):
+        return FarSide("", verdict)
+    values = np.linalg.eigvals(return_map(problem, at))
+    critical = [int(np.argmin(np.abs(values + 1.0)))]
+    if kind == "Neimark-Sacker":
+        critical = torus_pair(values)
+        one = values[critical[0]]
+        if abs(one.imag) < 1e-9:
+            return None  # a neutral saddle: two real multipliers with the product 1
+        numbers["angle"] = angle = float(abs(np.angle(one)))
+        if min(abs(3.0 * angle - 2.0 * np.pi), abs(4.0 * angle - 2.0 * np.pi)) < _RESONANT:
+            return FarSide("", f"{verdict}; not classified: a strong resonance", ReadOnly(numbers))
+    found = normal_form(problem, at, p, kind)
+    if not found:
+        return FarSide("", f"{verdict}; not classified: no orbits beside it", ReadOnly(numbers))
+    value, error = found.values()
+    numbers |= found
+    if abs(value) <= 10.0 * error:
+        return FarSide("", f"{verdict}; degenerate to rounding", ReadOnly(numbers))
+    grows = (value < 0.0) if kind == "Neimark-Sacker" else (value > 0.0)
+    rest = np.delete(values, critical)
+    stable = grows and bool(np.all(np.abs(rest) < 1.0))
+    what = "supercritical" if grows else "subcritical"
+    return FarSide("", f"{verdict} ({what}{', stable' if stable else ''})", ReadOnly(numbers))
+
+
+#: Error of the multiplier -1 at a branch point, which is located to about the square root of rounding.
+_PARTS = 1e-3
+
+#: Kind of an event, its curve, point and test, and its unfolding.
+Located = tuple[str, OrbitCurve, Point, str, FarSide]
+
+
+def _as_doubling(curve: OrbitCurve, zero: Zero) -> Located | None:
+    """Recognise a branch point as the period doubling of an orbit of half the period."""
+    u, p = zero.point.u, curve.parameters_at(zero.point.u)
+    problem, once = once_round(curve.problem, u[: curve.problem.size], p)
+    whole = float(curve.problem.split(u)[1].sum())
+    if round(whole / float(problem.split(once)[1].sum())) != 2:
+        return None
+    return _part(curve, problem, once, zero, "period doubling")
+
+
+def _as_pitchfork(curve: OrbitCurve, zero: Zero) -> Located | None:
+    """Recognise a branch point as the pitchfork of an orbit that is symmetric under a reflection."""
+    u, p = zero.point.u, curve.parameters_at(zero.point.u)
+    for problem, half in halves(curve.problem, u[: curve.problem.size], p):
+        found = _part(curve, problem, half, zero, "pitchfork")
+        if found is not None:
+            return found
+    return None
+
+
+def _part(
+    curve: OrbitCurve, problem: BoundaryProblem, part: Array, zero: Zero, kind: str
+) -> Located | None:
+    """The event of a part of the orbit, if its return map has the multiplier -1."""
+    made = curve.with_problem(problem, part)
+    u = np.append(part, zero.point.u[-len(curve.free) :])
+    try:
+        tangent = np.linalg.svd(made.scaled(u / made.scale)[1])[2][-1]
+        point, at = made.point(u, tangent, tangent, 0.0), made.evaluation(u)
+        values = np.linalg.eigvals(return_map(problem, at))
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return None
+    if point is None or not float(np.abs(values + 1.0).min()) < _PARTS:
+        return None
+    side = _smooth_side(problem, at, made.parameters_at(u), kind)
+    return None if side is None else (kind, made, point, kind, side)
+
+
+# Points of codimension two ------------------------------------------------------------------------
+
+#: Cosines of the angles of resonances.
+_RESONANCES = {"1:1": 1.0, "1:2": -1.0, "1:3": -0.5, "1:4": 0.0}
+
+#: Points at which a curve ends.
+_ENDS = ("1:1 resonance", "1:2 resonance")
+
+
+def _degenerate(
+    problem: BoundaryProblem, condition: Condition | None, name: str, at: Evaluation, p: Array
+) -> dict[str, float]:
+    """Functions that vanish at points of codimension two on the curve of one event."""
+    if name == "Neimark-Sacker":
+        return _resonances(problem, at) | _cubic(problem, at, p, name)
+    if name in ("period doubling", "pitchfork"):
+        return _cubic(problem, at, p, name)
+    if condition is None or condition.guard is None:
+        return {}
+    if condition.what == "interior":
+        return _touches(problem, condition, at, p)
+    return _beginnings(problem, condition, at, p) if condition.what == "start" else {}
+
+
+def _cubic(problem: BoundaryProblem, at: Evaluation, p: Array, name: str) -> dict[str, float]:
+    """The coefficient of the normal form, at whose zeros a curve of folds begins."""
+    kind = "Chenciner" if name == "Neimark-Sacker" else f"degenerate {name}"
+    try:
+        found = normal_form(problem, at, p, name)
+    except np.linalg.LinAlgError:  # another multiplier is 1
+        return {}
+    return {kind: next(iter(found.values()))} if found else {}
+
+
+def _resonances(problem: BoundaryProblem, at: Evaluation) -> dict[str, float]:
+    values = np.linalg.eigvals(return_map(problem, at))
+    pair = torus_pair(values)
+    cosine = float((values[pair[0]] + values[pair[1]]).real) / 2.0
+    found = {f"{ratio} resonance": cosine - value for ratio, value in _RESONANCES.items()}
+    others = np.delete(values, pair)  # the pair itself passes 1 and -1 at the ends of the curve
+    found["fold"] = float(np.prod(1.0 - others[np.abs(others) > 1e-9]).real)
+    found["period doubling"] = float(np.prod(1.0 + others[np.abs(others) > 1e-9]).real)
+    return found
+
+
+def _touches(
+    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
+) -> dict[str, float]:
+    i, guard = condition.leg, condition.guard
+    assert guard is not None
+    leg, x, duration = problem.legs[i], at.starts[i], float(at.durations[i])
+    found: dict[str, float] = {}
+    values = sorted(minima(problem.system, leg, condition, x, duration, p), key=abs)
+    if len(values) > 1:
+        found["a second touch"] = min(values[1:])
+    if guard.kind != "surface":
+        return found
+    y = touched(problem, condition, at, p)
+    try:
+        _, other, second = contact_at(problem, leg, guard.element, guard.side, y, p)
+    except NonsmoothError:
+        return found  # the leg slides elsewhere
+    normal = guard.side * surface_map(problem.system, guard.element)(y, p).gradient
+    found["two-fold"] = float(normal[: other.size] @ other)
+    found["touch of higher order"] = guard.side * float(second["L11"])
+    with np.errstate(all="ignore"):  # at the two-fold itself the map has a pole
+        try:
+            numbers = contact_numbers(problem, condition, at, p)
+        except np.linalg.LinAlgError:
+            return found
+    found["fold with contact"] = numbers["det(I - A_i)"]
+    found["period doubling with contact"] = numbers["det(I + A_i)"]
+    return {key: value for key, value in found.items() if np.isfinite(value)}
+
+
+def _beginnings(
+    problem: BoundaryProblem, condition: Condition, at: Evaluation, p: Array
+) -> dict[str, float]:
+    i, guard, system = condition.leg, condition.guard, problem.system
+    field = guarded_field(system, problem.legs[i].mode)
+    k = field.motion.guards.index(guard)
+    y = variational_field(system, problem.legs[i].mode).states_at(at.starts[i], p)
+    order = 2 if problem.legs[i - 1].kind == "crossing" else 1
+    before = at.events[i - 1]
+    rate = at.flown[i - 1].rate[: before.gradient.size]
+    return {
+        "cusp with the other sliding bifurcation": float(field.jets(y, p)[1][k, order]),
+        "two-fold": float(before.gradient @ rate),
+    }
+
+
+# Branch switching ---------------------------------------------------------------------------------
+
+#: Distances from the event at which the new branch is searched, relative to the orbit.
+_AWAY = (1e-3, 1e-2, 3e-2)
+
+#: Period, relative to that of the first orbit, beyond which a branch may approach a homoclinic orbit.
+_LONG = 10.0
+
+
+def switched(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
+    """The branch that crosses or begins at an event: its curve, and a point near the event."""
+    # At a period doubling the event comes first, as the other half of the branch repeats the same orbits.
+    if event.kind == "Hopf" and isinstance(event.solution, (Equilibrium, PseudoEquilibrium)):
+        return _around(event, free)
+    if event.kind not in ("period doubling", "pitchfork", "branch point"):
+        raise DefinitionError(
+            f"orbit={event!r} is no event at which to switch branches: a period doubling, pitchfork, branch "
+            "point or Hopf point of equilibria. Continue event.orbit, or continue_bifurcation the event."
+        )
+    base: OrbitCurve = event.curve
+    assert event.point is not None
+    curve, u = base.freed(event.point.u, free, np.ones(1))
+    assert isinstance(curve, OrbitCurve)
+    if event.kind == "branch point":
+        way = other_direction(event.point)
+    else:
+        curve, u, way = _twice(curve, u)
+    for away in _AWAY:
+        found = curve.correct(u + away * way * curve.scale, way)
+        if found is not None and np.abs((found - u) / curve.scale).max() < 10 * away:
+            return curve, [u, found] if event.kind == "period doubling" else [found]
+    raise ConvergenceError(
+        f"orbit: no orbit of the other branch was found near the {event.kind}. That branch may be vertical, "
+        "or the event degenerate: give an orbit of it."
+    )
+
+
+def _around(event: BranchEvent, free: tuple[int, ...]) -> tuple[OrbitCurve, list[Array]]:
+    """The small orbits around an equilibrium at its Hopf point."""
+    assert event.point is not None
+    system, at, n = event.curve.system, event.solution, event.curve.n
+    p, mode = event.curve.parameters_at(event.point.u), at.mode
+    slope = np.asarray(variational_field(system, mode).linear.copied(at.point, p)[1], float)
+    values, vectors = np.linalg.eig(slope)
+    turning = np.flatnonzero(values.imag > 1e-6 * np.abs(values).max())
+    if not turning.size:
+        raise DefinitionError(
+            f"orbit={event!r} is a neutral saddle, from which no orbits start. Give a Hopf point."
+        )
+    k = turning[np.argmin(np.abs(values[turning].real))]
+    across, period = vectors[:, k].real, 2 * np.pi / float(values[k].imag)
+    across = across / np.linalg.norm(across)
+    phase = slope @ across
+    problem = BoundaryProblem(
+        system, (Leg(mode),), phase=phase / np.linalg.norm(phase), reference=at.point.copy()
+    )
+    u = np.concatenate([at.point, [period], p[list(free)]])
+    curve = OrbitCurve(problem, p, free, np.ones(1), u[: n + 1], np.inf)
+    size = event.curve.scale[:n]
+    curve.scale[: n + 1] = np.append(size, period)
+    way = np.concatenate([across / np.linalg.norm(across), np.zeros(2)])
+    for away in _AWAY:
+        found = curve.correct(u + away * way * curve.scale, way)
+        first = curve.correct(u + 0.01 * away * way * curve.scale, way)
+        if found is None or first is None:
+            continue
+        if np.abs((found - u) / curve.scale).max() < 10 * away:
+            curve.longest = _LONG * period
+            return curve, [first, found]  # the tangent at the Hopf point itself is not defined
+    raise ConvergenceError(
+        f"orbit: no small orbit was found around the Hopf point {at.point.tolist()}. It may be degenerate, "
+        "with a pair of eigenvalues that does not cross the axis: give an orbit."
+    )
+
+
+def _twice(curve: OrbitCurve, u: Array) -> tuple[OrbitCurve, Array, Array]:
+    """Twice the legs, and the direction in which the doubled orbit leaves the single one."""
+    problem = curve.problem
+    starts, durations = problem.split(u)
+    p = curve.parameters_at(u)
+    changes, times = _alternating(curve, u)
+    if problem.phase is not None:  # no event ends the first turn
+        double = replace(problem, symmetry=None, periods=2 * problem.periods)
+        unknowns, way = double.pack(starts, 2.0 * durations), np.append(changes.ravel(), 0.0)
+    else:
+        shift = np.zeros(problem.dimension)
+        if problem.forcing is not None:
+            shift[-1] = problem.advance(p)[0]
+        back = np.linalg.inv(problem.wrap)
+        second = np.array([back @ (x + shift) for x in starts]).reshape(starts.shape)
+        turned = np.array([back @ -d for d in changes]).reshape(starts.shape)
+        legs = (*problem.legs, *(mirrored(problem, leg) for leg in problem.legs))
+        double = replace(problem, legs=legs, symmetry=None, periods=2 * problem.periods)
+        unknowns = double.pack(np.concatenate([starts, second]), np.concatenate([durations] * 2))
+        way = double.pack(np.concatenate([changes, turned]), np.concatenate([times, -times]))
+    new = curve.with_problem(double, unknowns)
+    way = np.append(way, np.zeros(len(curve.free))) / new.scale
+    return new, np.append(unknowns, p[list(curve.free)]), way / np.linalg.norm(way)
+
+
+def _alternating(curve: OrbitCurve, u: Array) -> tuple[Array, Array]:
+    """Changes of starts and durations along the eigenvector of the multiplier -1."""
+    problem, at = curve.problem, curve.evaluation(u)
+    maps = leg_maps(problem, at)
+    whole = np.eye(problem.dimension)
+    for step in maps:
+        whole = step @ whole
+    values, vectors = np.linalg.eig(whole)
+    d = vectors[:, int(np.argmin(np.abs(values + 1.0)))].real
+    changes, times = [], []
+    for step, flown, event in zip(maps, at.flown, at.events, strict=True):
+        changes.append(d)
+        times.append(
+            -float(event.gradient @ flown.by_start @ d) / float(event.gradient @ flown.rate)
+        )
+        d = step @ d
+    return np.array(changes), np.array(times)
+
+
+def continue_orbit(
+    orbit: PeriodicOrbit | BranchEvent,
+    parameter: str,
+    *,
+    bounds: tuple[float, float],
+    step: float = 0.05,
+    max_points: int = 1000,
+    through: bool = True,
+    progress: bool = False,
+) -> Branch:
+    """Follow a periodic orbit as a parameter varies.
+
+    Pseudo-arclength continuation both ways to the bounds, with multipliers at each point. The itinerary
+    is kept as long as it is admissible; the event at its end is located in the itinerary with fewer
+    legs, where it is regular, and named.
+
+    Parameters
+    ----------
+    orbit : PeriodicOrbit or BranchEvent
+        Where to start; at a period doubling, pitchfork or branch point the other branch is followed
+        (from a period doubling one way only, as the other half repeats its orbits), at a Hopf point of
+        equilibria the orbits around it.
+    parameter : str
+        Name of the parameter that varies.
+    bounds : (float, float)
+        Bounds of the parameter at which the branch ends.
+    step : float, optional
+        Largest step where the branch bends, relative to the width of the bounds and to the size of
+        the orbit.
+    max_points : int, optional
+        Largest number of points of each piece.
+    through : bool, optional
+        Whether to change the itinerary and go on beyond events that end it.
+    progress : bool, optional
+        Whether to show a bar that counts points. After Ctrl-C the points computed so far are returned.
+
+    Returns
+    -------
+    Branch
+        Its ``solutions`` (or ``orbits``) are PeriodicOrbits. Events: ``"fold"``, ``"period
+        doubling"``, ``"Neimark-Sacker"``, ``"pitchfork"`` (of symmetric orbits), ``"branch
+        point"``, ``"grazing-sliding"``, ``"crossing-sliding"``, ``"switching-sliding"``,
+        ``"adding-sliding"``, ``"impact grazing"``, ``"grazing, escaping"``, ``"corner"``,
+        ``"two-fold"``; ``"Hopf"`` where orbits without events shrink to an equilibrium,
+        ``"boundary equilibrium"`` (with its class) or ``"two-fold"`` where others shrink to a point of a
+        surface.
+
+    Raises
+    ------
+    ConvergenceError
+        The orbit at the start does not solve its equations, or a branch cannot be entered.
+    DefinitionError
+        Neither an orbit nor an event from which orbits start; a parameter that the system does not have.
+    OptionError
+        Bounds in the wrong order, or without the start; ``step`` or ``max_points`` out of its range; a
+        parameter that breaks the symmetry by which half of the orbit is solved for.
+
+    Examples
+    --------
+    A forced relay, $x' = A cos t - sgn x$: crossing orbits begin to slide below
+    $A = sqrt(1 + pi^2/4)$.
+
+    >>> import casadi as ca, nonsmooth as ns
+    >>> x, t, a = (ca.SX.sym(s) for s in ("x", "t", "a"))
+    >>> relay = ns.FilippovSystem([x], surface=x, time=t, parameters={a: 2.5},
+    ...                           above=[a * ca.cos(t) - 1], below=[a * ca.cos(t) + 1])
+    >>> orbit = ns.periodic_orbit(relay, [0.5])
+    >>> branch = ns.continue_orbit(orbit, "a", bounds=(1.5, 3.0))
+    >>> [(e.kind, round(e.parameter, 12)) for e in branch.events]
+    [('crossing-sliding', 1.862095889119)]
+    """
+    positive(step, "step")
+    whole(max_points, "max_points", least=2)
+    curve, rows = _begin(orbit, parameter)
+    start = rows[-1]
+    low, high = check_bounds(bounds, float(start[-1]), parameter)
+    curve.widths = np.array([high - low])
+    curve.scale = np.append(curve.scale[:-1], high - low)
+    away = Departure(curve, rows, (start - rows[0]) / curve.scale) if len(rows) > 1 else None
+    return follow_branch(
+        curve,
+        start,
+        name=parameter,
+        bounds=(low, high),
+        step=step,
+        max_points=max_points,
+        through=through,
+        progress=progress,
+        away=away,
+    )
+
+
+def _begin(orbit: PeriodicOrbit | BranchEvent, parameter: str) -> tuple[OrbitCurve, list[Array]]:
+    """The curve and its first point; from a period doubling or Hopf point with the one before."""
+    if not isinstance(orbit, (PeriodicOrbit, BranchEvent)):
+        raise DefinitionError(
+            f"orbit={orbit!r} is no PeriodicOrbit or event of a branch. Find one with periodic_orbit."
+        )
+    system = orbit.system if isinstance(orbit, PeriodicOrbit) else orbit.curve.system
+    free = (parameter_index(system, parameter),)
+    if isinstance(orbit, BranchEvent):
+        return switched(orbit, free)
+    p, u = orbit.parameter_vector, orbit.unknowns
+    longest = _LONG * float(orbit.evaluation.durations.sum())
+    curve = OrbitCurve(orbit.problem, p, free, np.ones(1), u, longest)
+    return curve, [np.append(u, p[list(free)])]

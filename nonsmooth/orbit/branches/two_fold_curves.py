@@ -1,6 +1,6 @@
-"""Two-folds followed while a parameter or a state takes given values.
+"""Curves of two-folds at given values of a parameter or a state.
 
-For n states two-folds form a set of dimension n - 3, and a curve of them as a parameter varies.
+For n states two-folds form a set of dimension n - 3, of dimension n - 2 with a parameter.
 """
 
 from __future__ import annotations
@@ -14,9 +14,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...local.point.surface_point import Place, place
-from ...local.searches.find_two_fold import search_two_fold
+from ...local.searches.find_two_fold import TwoFold, search_two_fold
 from ...local.searches.search import unknowns
-from ...local.searches.two_fold import TwoFold
 from ...model import (
     Array,
     ConvergenceError,
@@ -25,7 +24,6 @@ from ...model import (
     FilippovSystem,
     Parameters,
     PointError,
-    explain,
     require_system,
 )
 from ...solvers.continuation import Curve, trace
@@ -37,9 +35,9 @@ class TraceError(ConvergenceError):
     Attributes
     ----------
     value : float
-        Of the parameter or state, at which no two-fold was found.
+        Value of the parameter or state at which no two-fold was found.
     folds : list of TwoFold
-        Those found before.
+        Two-folds at the values before.
     residual, point
         As in ConvergenceError.
     """
@@ -76,12 +74,12 @@ def trace_two_folds(
     system, parameters, t, surface, mode, hold, tol, max_iterations
         As in :func:`find_two_fold`.
     near : array_like (n,)
-        Start of the first search.
+        Guess of the first two-fold.
     over : str or SX symbol
         Name of a parameter, or of a state (for $n > 3$, where two-folds form a set of dimension
         n - 3).
     values : array_like (k,)
-        In the order in which they are visited.
+        Values in their order along the curve.
 
     Returns
     -------
@@ -112,13 +110,8 @@ def trace_two_folds(
     state = name in system.state_names
     if not state and name not in system.parameter_names:
         raise DefinitionError(
-            explain(
-                "over",
-                expected=f"a parameter {list(system.parameter_names)} or a state "
-                f"{list(system.state_names)}",
-                received=repr(name),
-                advice="Give its name or its symbol.",
-            )
+            f"over={name!r} is unknown. Give the name or symbol of a parameter "
+            f"{list(system.parameter_names)} or a state {list(system.state_names)}."
         )
     start = system.extended_point(near, t)[: system.dimension]
     held = [hold] if isinstance(hold, str) else [str(h) for h in hold]
@@ -138,9 +131,9 @@ def trace_two_folds(
             folds.append(search_two_fold(where, x, free, tol, max_iterations))
         except (ConvergenceError, DegenerateError, PointError) as error:
             raise TraceError(
-                f"trace over {name!r}: expected a two-fold at {name} = {value:.6g}, received after "
-                f"{len(folds)} of {len(numbers)} values: {error} The two-folds before are in the "
-                "exception's folds; take smaller steps in the values, or another coordinate.",
+                f"values: no two-fold was found at {name} = {value:.6g}, after {len(folds)} of "
+                f"{len(numbers)} values: {error} Take smaller steps in the values, or another coordinate; "
+                "the exception's folds has the two-folds before.",
                 value=value,
                 folds=folds,
                 residual=error.residual if isinstance(error, ConvergenceError) else math.nan,
@@ -155,7 +148,7 @@ def _values(values: ArrayLike) -> list[float]:
     except (TypeError, ValueError):
         numbers = np.array(math.nan)
     if numbers.ndim != 1 or numbers.size == 0 or not np.all(np.isfinite(numbers)):
-        raise DefinitionError(f"values: expected a list of finite numbers, received {values!r}.")
+        raise DefinitionError(f"values={values!r} are no finite numbers. Give a list of them.")
     return [float(v) for v in numbers]
 
 
@@ -198,7 +191,7 @@ class TwoFoldCurve(Curve):
 
 
 def _ahead(curve: TwoFoldCurve, last: Array, before: float, value: float) -> Array:
-    """Start of a search at the next value: the point where the curve reaches it, if it does."""
+    """Guess at the next value: the point at which the curve reaches it, or the last one."""
     start = np.append(last[curve.free], before)
     if value == before:
         return curve.point_at(start)

@@ -1,4 +1,4 @@
-"""What is beyond an event that changes the itinerary of a periodic orbit.
+"""Unfoldings of events that change the itinerary of a periodic orbit.
 
 At a grazing-sliding the derivative of the return map jumps from A_o to A_i = A_o C with
 C = I - [F2 - (L21/L11) F1] n/L2, at a corner with the order of its two events. Whether the orbit persists, and
@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from ...flow.names import guard_name
 from ...local.read_only import ReadOnly
 from ...model import Array, DegenerateError, NonsmoothError
 from ...model.derivatives.event_maps import surface_map
@@ -25,7 +26,7 @@ from .branch import FarSide
 from .conditions import Condition, touching
 from .itinerary_changes import Edited
 
-#: Sine of the angle below which an event is grazed.
+#: Sine of the angle between orbit and surface below which an event is a grazing.
 _TANGENT = 1e-6
 
 _SMOOTH = "persistence: the derivative of the return map is continuous"
@@ -49,42 +50,45 @@ def far_side(
     test: Condition,
     at: Evaluation,
     p: Array,
-    word: str,
+    itinerary: str,
     beyond: Edited | None = None,
 ) -> FarSide:
     """Classify an event."""
     try:
         if kind == "grazing-sliding" and test.what == "interior":
             numbers = contact_numbers(problem, test, at, p)
-            return FarSide(word, _verdict(numbers, "with and without sliding"), ReadOnly(numbers))
+            return FarSide(
+                itinerary, _verdict(numbers, "with and without sliding"), ReadOnly(numbers)
+            )
         if kind in ("impact grazing", "grazing of a reset") and test.what == "interior":
-            return _root(problem, kind, test, at, p, word)
+            return _root(problem, kind, test, at, p, itinerary)
         if kind == "corner" and beyond is not None:
             numbers = _orders(problem, at, beyond, p)
-            return FarSide(word, _verdict(numbers, "with either order"), ReadOnly(numbers))
+            return FarSide(itinerary, _verdict(numbers, "with either order"), ReadOnly(numbers))
     except (NonsmoothError, np.linalg.LinAlgError) as error:
-        return FarSide(word, f"not classified: {error}")
+        return FarSide(itinerary, f"not classified: {error}")
     verdict = _VERDICTS.get(kind, "")
     if kind == "corner":
         i = test.leg
-        other = problem.legs[i].name if test.guard is None else test.guard.name
-        verdict = verdict.format(one=problem.legs[i - 1].name, other=other)
-    return FarSide(word, verdict)
+        of, guard = problem.system, test.guard
+        other = problem.legs[i].name(of) if guard is None else guard_name(of, guard)
+        verdict = verdict.format(one=problem.legs[i - 1].name(of), other=other)
+    return FarSide(itinerary, verdict)
 
 
 def _root(
-    problem: BoundaryProblem, kind: str, test: Condition, at: Evaluation, p: Array, word: str
+    problem: BoundaryProblem, kind: str, test: Condition, at: Evaluation, p: Array, itinerary: str
 ) -> FarSide:
     """The square root of a grazed impact, or of a reset that is one."""
     numbers = impact_numbers(problem, test, at, p)
     if "n.A.w" not in numbers:
-        return FarSide(word, _VERDICTS[kind], ReadOnly(numbers))
+        return FarSide(itinerary, _VERDICTS[kind], ReadOnly(numbers))
     if numbers["n.(I - A)^-1.A.w"] > 0.0:
         verdict = "nonsmooth fold: the orbits with and without the impact meet and vanish"
     else:
         verdict = "persistence of an orbit that becomes unstable"
     verdict += "; the return map has a square root: stability is lost at once"
-    return FarSide(word, verdict, ReadOnly(numbers))
+    return FarSide(itinerary, verdict, ReadOnly(numbers))
 
 
 def contact_numbers(
@@ -115,10 +119,10 @@ def contact_maps(
     _require_one_touch(at)
     y = touched(problem, test, at, p)
     own, other, second = contact_at(
-        problem, problem.legs[test.leg], test.guard.index, test.guard.side, y, p
+        problem, problem.legs[test.leg], test.guard.element, test.guard.side, y, p
     )
     outside = _around(problem, test, at, p, own, second["gradient of L1"])
-    normal = surface_map(problem.system, test.guard.index)(y, p).gradient
+    normal = surface_map(problem.system, test.guard.element)(y, p).gradient
     ratio = second["L21"] / second["L11"]
     contact = np.eye(problem.dimension)
     contact -= np.outer(other - ratio * own, normal) / float(normal @ other)
@@ -128,26 +132,27 @@ def contact_maps(
 def impact_numbers(
     problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array
 ) -> dict[str, float]:
-    """The map x -> A (x - s w) of orbits that touch an impact or reset, s the speed of the
-    impact."""
+    """Numbers of the map x -> A (x - s w) at a grazing of an impact or reset with the speed s."""
     system, n, leg, guard = problem.system, problem.dimension, problem.legs[test.leg], test.guard
     assert guard is not None
     _require_one_touch(at)
     values = np.linalg.eigvals(return_map(problem, at))
     leading = complex(values[np.argmax(np.abs(values))])
-    # by it the bifurcations beyond are ordered
+    # it decides the order of the bifurcations beyond
     numbers = {"leading multiplier": abs(leading), "its angle": float(np.angle(leading))}
     y = touched(problem, test, at, p)
     own = leg.field(system).rate.copied(leg.field(system).states_at(y, p), p)[0][:n, 0]
-    hit = Leg(leg.mode, guard.name, guard.kind).at_end(system, y, p)
-    if y.size != hit.gradient.size or np.abs(hit.after - y).max() > 1e-6 * (1 + np.abs(y).max()):
+    event = Leg(leg.mode, guard.kind, guard.element, guard.side).at_end(system, y, p)
+    if y.size != event.gradient.size or np.abs(event.after - y).max() > 1e-6 * (
+        1 + np.abs(y).max()
+    ):
         return numbers
     sign = -guard.side if guard.kind == "reset" else 1
-    normal = (sign or 1) * hit.gradient
-    found = guard_rate_gradient(system, leg.mode, guard.name).copied(y, p)[0]
+    normal = (sign or 1) * event.gradient
+    found = guard_rate_gradient(system, leg.mode, guard).copied(y, p)[0]
     rate = found.ravel() * (sign or 1)
     bend = float(rate @ own)
-    jump = (hit.after_state @ own - own) / bend
+    jump = (event.after_state @ own - own) / bend
     push = jump - own * float(rate @ jump) / bend
     outside = _around(problem, test, at, p, own, rate)
     after = outside @ push
@@ -157,7 +162,7 @@ def impact_numbers(
 
 
 def _require_one_touch(at: Evaluation) -> None:
-    """Refuse an orbit that grazes at an event too, as one does that touches two places by symmetry."""
+    """Raise if an event is grazed too, as where a symmetric orbit touches two points."""
     for event, flown in zip(at.events, at.flown, strict=True):
         speed = abs(float(event.gradient @ flown.rate))
         size = float(np.linalg.norm(event.gradient) * np.linalg.norm(flown.rate))
@@ -166,7 +171,7 @@ def _require_one_touch(at: Evaluation) -> None:
 
 
 def touched(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array) -> Array:
-    """Where a leg comes nearest to a guard, (N,)."""
+    """The state (N,) of a leg nearest to a guard."""
     i, guard = test.leg, test.guard
     assert guard is not None
     x, duration = at.starts[i], float(at.durations[i])
@@ -175,14 +180,14 @@ def touched(problem: BoundaryProblem, test: Condition, at: Evaluation, p: Array)
 
 
 def _orders(problem: BoundaryProblem, at: Evaluation, beyond: Edited, p: Array) -> dict[str, float]:
-    """What decides at a corner: o with the order of events before it, i with the other one."""
+    """Determinants at a corner: o with the order of events before it, i with the other one."""
     maps, first = leg_maps(problem, at), beyond.origin[0]
     outside, n = np.eye(problem.dimension), problem.dimension
     for k in range(len(maps)):
         outside = maps[(first + k) % len(maps)] @ outside
     inside = return_map(beyond.problem, beyond.problem.evaluate(beyond.u, p))
     numbers = _determinants(outside, inside)
-    if problem.symmetry is not None and first:  # begun on the other half: another section
+    if problem.symmetry is not None and first:  # on another section, of the other half
         del numbers["radius of A_o A_i"]
     if n != len(inside) or not np.isfinite(list(numbers.values())).all():
         raise DegenerateError("its events are not crossed in the other order")
@@ -201,14 +206,14 @@ def _around(
     across = np.eye(n) - np.outer(own, section) / float(section @ own)
     maps = leg_maps(problem, at)
     rest = fly(system, leg, first.end[:n], duration - t, p)
-    if leg.name:
+    if not leg.timed:
         event = at.events[i]
         speed = float(event.gradient @ rest.rate)
         closing = event.after_state @ (
             rest.by_start - np.outer(rest.rate, event.gradient @ rest.by_start) / speed
         )
     else:
-        closing = rest.by_start[:n]  # an orbit without events is cut nowhere else
+        closing = rest.by_start[:n]  # an orbit without events has no other section
     if i + 1 == len(maps):
         closing = problem.wrap @ closing
     product = closing
@@ -235,12 +240,12 @@ def _verdict(numbers: dict[str, float], which: str) -> str:
     """Persistence or nonsmooth fold, and what happens to stability (Feigin's classification)."""
     if numbers["det(I - A_o)"] * numbers["det(I - A_i)"] < 0:
         return f"nonsmooth fold: the orbits {which} meet and vanish"
-    words = "persistence"
+    verdict = "persistence"
     if numbers["radius of A_i"] > 1 and numbers["radius of A_o"] < 1:
-        words += " of an orbit that becomes unstable"
+        verdict += " of an orbit that becomes unstable"
     if numbers["det(I + A_o)"] * numbers["det(I + A_i)"] < 0:
         stable = numbers.get("radius of A_o A_i", np.inf) < 1
-        words += f", with {'a stable' if stable else 'an unstable'} orbit of twice the period"
+        verdict += f", with {'a stable' if stable else 'an unstable'} orbit of twice the period"
         if not stable and numbers["radius of A_i"] > 1:
-            words += "; chaos of size linear in the parameter may follow"
-    return words
+            verdict += "; chaos of size linear in the parameter may follow"
+    return verdict

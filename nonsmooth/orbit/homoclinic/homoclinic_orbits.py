@@ -1,8 +1,9 @@
-"""Homoclinic orbits: the verb that finds them, and what it returns."""
+"""Homoclinic orbits to saddles and pseudo-saddles."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -10,31 +11,269 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...flow.ensembles.progress import progress_bar
+from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
 from ...local import Equilibrium, PseudoEquilibrium
+from ...local.searches.equilibria import find_equilibrium, kind_of
+from ...local.searches.folds import find_fold
+from ...local.searches.pseudo_equilibria import find_pseudo_equilibrium
 from ...model import (
     Array,
     ConvergenceError,
+    DegenerateError,
     FilippovSystem,
     NonsmoothError,
     OptionError,
     ParameterError,
     Parameters,
-    explain,
+    PointError,
+    Surfaces,
+    real_array,
     require_system,
 )
 from ...solvers.newton import Equations, converge, solve
 from ..periodic.orbit import OrbitLeg, named
 from ..periodic.orbit_run import orbit_run
-from .guesses import Departure, departures, saddle_at
-from .loops import Loop
-from .pseudo_saddle_loops import PseudoSaddleLoop, flight_to
-from .saddle_loops import SaddleLoop
+from ..runs.legs import Leg, Stretch, stretches
+from .loops import NEAR, Loop, PseudoSaddleLoop, SaddleLoop, Spectrum, equilibrium_of, spectrum_of
 
-#: By so much the end of an orbit comes closer to the saddle at a time, and at least.
+# Guesses: orbits of an unstable manifold that return near the saddle -------------------------------
+
+#: Largest distance from the saddle at which a guess returns, relative to its size.
+_CLOSE = 0.5
+
+#: Multiples of the estimated time of return that are simulated, and the number of directions tried in
+#: an unstable eigenspace of two dimensions.
+_LONGER, _AROUND = (1.0, 3.0, 10.0), 64
+
+#: Steps after which an orbit counts as unbounded.
+_STEPS = 4000
+
+#: Exponent by which neighbours separate over a part of a leg.
+_GROWTH = 1.5
+
+
+@dataclass(frozen=True, eq=False)
+class Departure:
+    """An orbit that leaves a saddle and returns near it."""
+
+    saddle: Array
+    legs: tuple[Leg, ...]
+    starts: Array
+    durations: Array
+    held: tuple[float | None, ...]  # durations of parts of legs, as in Loop
+    miss: float  # distance from the saddle at the end
+    size: float  # largest distance from the saddle
+
+
+def _saddle_at(
+    system: FilippovSystem, saddle: object, p: Array
+) -> tuple[str, Equilibrium | PseudoEquilibrium]:
+    """The saddle nearest to a given one or a point, and its mode."""
+    found = list[tuple[str, Equilibrium | PseudoEquilibrium]]()
+    if isinstance(saddle, (Equilibrium, PseudoEquilibrium)):
+        near = np.asarray(saddle.point, float)
+    else:
+        near = real_array(saddle, "saddle")
+        if near.shape != (system.dimension,):
+            raise PointError(
+                f"saddle has shape {near.shape}, but the system has {system.dimension} states. Give one "
+                "number for each."
+            )
+    given, reasons = named(system, p), list[str]()
+    if system.surface_count == 0:
+        found.append(("", _smooth(system, equilibrium_of(system, "", near, p), p)))
+    elif not isinstance(saddle, Equilibrium):
+        try:
+            pseudo = find_pseudo_equilibrium(system, near, parameters=given)
+            found.append(("s", pseudo))
+        except NonsmoothError as error:
+            reasons.append(str(error))
+    if system.surface_count == 1 and not isinstance(saddle, PseudoEquilibrium):
+        for side in "+-":
+            try:
+                at_side = find_equilibrium(system, near, side=side, parameters=given)  # type: ignore[arg-type]
+                found.append((side, at_side))
+            except NonsmoothError as error:
+                reasons.append(str(error))
+    if not found:
+        raise DegenerateError(
+            f"saddle: no equilibrium was found near {near.tolist()} ({'; '.join(reasons)}). Give a "
+            "closer point."
+        )
+    mode, at = min(found, key=lambda pair: float(np.linalg.norm(pair[1].point - near)))
+    if not _is_saddle(at):
+        raise DegenerateError(
+            f"saddle: the equilibrium found is no real saddle or pseudo-saddle: {at} Choose another point "
+            "or parameter."
+        )
+    return mode, at
+
+
+def _is_saddle(at: Equilibrium | PseudoEquilibrium) -> bool:
+    if at.status != "real":
+        return False
+    values = np.real(at.eigenvalues)
+    if isinstance(at, PseudoEquilibrium) and at.kind == "pseudo-saddle" and values.size == 1:
+        return True
+    return bool(values.min() < 0.0 < values.max())
+
+
+def _smooth(system: FilippovSystem, at: Array, p: Array) -> Equilibrium:
+    values = spectrum_of(system, "", at, p).values
+    order = np.argsort(values.real)
+    kind, margin = kind_of(values[order], float(np.abs(values).max()))
+    return Equilibrium(at, "+", "real", kind, values[order], np.inf, margin, 0.0, 0.0, 0, "")
+
+
+def departures(system: FilippovSystem, mode: str, x: Array, p: Array) -> Iterator[Departure]:
+    """Orbits of the unstable manifold that return near the saddle, the nearest first."""
+    here = spectrum_of(system, mode, x, p)
+    size = max(float(np.abs(here.point).max()), 1e-3)
+    found = []
+    for direction in _directions(here):
+        start = here.point + NEAR * size * direction
+        held = [k for k, c in enumerate(mode) if c == "s"]
+        if held:
+            start = Surfaces(system).project(start, p, held)
+        back = _comes_back(system, mode, here, start, p)
+        if back is not None:
+            found.append(back)
+    yield from sorted(found, key=lambda d: d.miss / d.size)
+
+
+def _directions(here: Spectrum) -> list[Array]:
+    basis = here.unstable
+    if basis.shape[1] == 1:
+        return [basis[:, 0], -basis[:, 0]]
+    if basis.shape[1] == 2:
+        angles = 2 * np.pi * np.arange(_AROUND) / _AROUND
+        return [basis @ np.array([np.cos(a), np.sin(a)]) for a in angles]
+    raise DegenerateError(
+        f"saddle has an unstable manifold of dimension {basis.shape[1]}, but only 1 and 2 are searched. "
+        "Reverse time: reversed_system(system) exchanges stable and unstable."
+    )
+
+
+def _comes_back(
+    system: FilippovSystem, mode: str, here: Spectrum, start: Array, p: Array
+) -> Departure | None:
+    unit = -np.log(NEAR) * (1.0 / here.leading(False) - 1.0 / here.leading(True))
+    for times in _LONGER:
+        try:
+            run = simulate(
+                system,
+                start,
+                times * unit,
+                parameters=named(system, p),
+                start_mode=mode or None,
+                tol=1e-12,
+                max_events=500,
+                max_steps=_STEPS,
+            )
+            found = _nearest(run, mode, here)
+        except NonsmoothError:
+            return None
+        if found is not None:
+            return found
+    return None
+
+
+def _nearest(run: Trajectory, mode: str, here: Spectrum) -> Departure | None:
+    """The first return of a run to the neighbourhood of the saddle, in its mode."""
+    parts = [part for part in stretches(run) if part.duration > 0.0]
+    peak, chain = 0.0, list[Stretch]()
+    for part in parts:
+        chain.append(part)
+        times = part.t + part.duration * np.linspace(0.0, 1.0, 201)[1:-1]
+        with np.errstate(over="ignore"):
+            away = np.linalg.norm(run(times) - here.point, axis=1)
+        for k in range(1, len(times) - 1):
+            peak = max(peak, float(away[k]))
+            back = away[k] < _CLOSE * peak and away[k - 1] >= away[k] <= away[k + 1]
+            if back and part.leg.mode == mode:
+                first = int(np.argmax(away[:k]))
+                wanted = np.sqrt(away[first] * away[k])  # on the way back, before it turns away
+                k = first + int(np.argmin(np.abs(away[first : k + 1] - wanted)))
+                chain[-1] = replace(part, leg=Leg(mode), duration=float(times[k]) - part.t)
+                return _in_parts(run, chain, here, float(away[k]), peak)
+    return None
+
+
+def _in_parts(
+    run: Trajectory, chain: list[Stretch], here: Spectrum, miss: float, size: float
+) -> Departure:
+    """Legs divided into parts over which neighbours separate by a bounded factor."""
+    growth, n = float(here.values.real.max()), run.system.dimension
+    legs, starts, durations = list[Leg](), list[Array](), list[float]()
+    held: list[float | None] = []
+    for part in chain:
+        count = max(1, round(part.duration * growth / _GROWTH))
+        step = part.duration / count
+        for k in range(count):
+            legs.append(part.leg)
+            starts.append(part.start[:n] if not k else run(part.t + k * step))
+            durations.append(step)
+            inside = step if part.leg.timed else 0.0
+            held.append(inside if k + 1 < count else None)
+    return Departure(
+        here.point, tuple(legs), np.array(starts), np.array(durations), tuple(held), miss, size
+    )
+
+
+def _flight_to(
+    system: FilippovSystem, saddle: PseudoEquilibrium, p: Array
+) -> tuple[str, list[Leg], list[Array], list[float]]:
+    """The orbit from a visible fold that lands nearest to a pseudo-saddle of the plane."""
+    values, best = named(system, p), None
+    reasons: list[str] = []
+    for side in "+-":
+        try:
+            fold = find_fold(system, saddle.point, side=side, parameters=values)  # type: ignore[arg-type]
+        except NonsmoothError as error:
+            reasons.append(f"side {side!r}: {error}")
+            continue
+        if fold.kind != "visible":
+            reasons.append(f"side {side!r}: its fold at {fold.point.tolist()} is not visible")
+            continue
+        size = float(np.linalg.norm(fold.point - saddle.point)) or 1.0
+        for k in range(9):
+            run = simulate(
+                system, fold.point, 4.0**k, parameters=values, start_mode=side, tol=1e-12
+            )
+            if any(e.kind == "entry" for e in run.events):
+                break
+        legs = []
+        for part in stretches(run):
+            legs.append(part)
+            if part.leg.kind == "entry":
+                break
+        if legs[-1].leg.kind != "entry":
+            reasons.append(f"side {side!r}: the orbit of the fold does not land")
+            continue
+        miss = float(np.linalg.norm(legs[-1].end - saddle.point)) / size
+        if miss > _CLOSE:
+            reasons.append(
+                f"side {side!r}: the orbit lands {miss:.2g} of the distance to the fold away"
+            )
+        elif best is None or miss < best[0]:
+            starts, times = [part.start for part in legs], [part.duration for part in legs]
+            best = (miss, side, [part.leg for part in legs], starts, times)
+    if best is None:
+        raise ConvergenceError(
+            f"homoclinic orbit: no orbit of a visible fold lands near the pseudo-saddle "
+            f"{saddle.point.tolist()} ({'; '.join(reasons)}). Give a better guess of the parameter.",
+            point=saddle.point,
+        )
+    return best[1:]
+
+
+# The search ----------------------------------------------------------------------------------------
+
+#: Factor by which the end of an orbit approaches the saddle in one step, and its least value.
 _CLOSER, _SLOWLY = 4.0, 1.2
 
-#: An orbit that ends within this part of its size from the saddle will do where it comes no closer.
+#: Distance from the saddle, relative to the size of the orbit, that suffices where no step succeeds.
 _ENOUGH = 1e-3
 
 
@@ -45,7 +284,7 @@ class Connection:
     Attributes
     ----------
     system : FilippovSystem
-        Whose orbit it is.
+        The system of the orbit.
     parameter : str
         Name of the parameter that was varied.
     value : float
@@ -55,17 +294,17 @@ class Connection:
     saddle : Equilibrium or PseudoEquilibrium
         The saddle at that value.
     legs : tuple of OrbitLeg
-        Those of the orbit. One that approaches the saddle for ever begins and ends close to it.
+        Legs of the orbit, which begins and ends close to a saddle that it approaches asymptotically.
     iterations : int
         Evaluations of the equations.
     residual : float
         Largest entry of the equations.
     faults : tuple of str
-        What its guards contradict; empty unless it is virtual.
+        Guards that it violates; empty unless it is virtual.
     loop : Loop
         Its equations.
     unknowns : ndarray
-        What solves them; from these ``continue_bifurcation`` starts.
+        Their solution, from which ``continue_bifurcation`` starts.
     complete : bool
         False if the search was interrupted: the orbit ends farther from the saddle than it could.
     """
@@ -89,22 +328,25 @@ class Connection:
         return " ".join(leg.mode or "o" for leg in self.legs)
 
     @property
+    def _free(self) -> int:
+        """Number of the first leg that does not slide; 0 if all slide."""
+        return next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
+
+    @property
     def fold(self) -> Array | None:
         """Where the orbit first leaves the surface; None if it does not slide before."""
-        first = next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
         finite = isinstance(self.loop, PseudoSaddleLoop)
-        return self.legs[first].start if first or finite else None
+        return self.legs[self._free].start if self._free or finite else None
 
     @property
     def side(self) -> str:
         """Mode of the first leg that does not slide."""
-        return next((leg.mode for leg in self.legs if "s" not in leg.mode), self.legs[0].mode)
+        return self.legs[self._free].mode
 
     @property
     def flight(self) -> float:
         """Time from where it leaves the surface, or the neighbourhood of the saddle, to its end."""
-        first = next((k for k, leg in enumerate(self.legs) if "s" not in leg.mode), 0)
-        return float(sum(leg.duration for leg in self.legs[first:]))
+        return float(sum(leg.duration for leg in self.legs[self._free :]))
 
     @property
     def eigenvalue(self) -> float:
@@ -114,8 +356,11 @@ class Connection:
 
     @property
     def saddle_quantity(self) -> float:
-        """Sum of the leading stable and unstable eigenvalues; where negative the orbit that is born is
-        stable. Minus infinity where the orbit comes to the saddle in finite time."""
+        """Sum of the leading stable and unstable eigenvalues.
+
+        The periodic orbit that is born is stable where it is negative. It is minus infinity where the
+        orbit reaches the saddle in finite time.
+        """
         real = np.real(self.saddle.eigenvalues)
         stable = real[real < 0]
         return self.eigenvalue + float(stable.max()) if stable.size else -np.inf
@@ -157,7 +402,7 @@ def find_homoclinic(
     Parameters
     ----------
     system : FilippovSystem
-        Without explicit time. The orbit may cross, slide and be reset on its way.
+        Without explicit time. The orbit may cross, slide and be reset.
     saddle : Equilibrium, PseudoEquilibrium or array_like (n,)
         At the guess, or a point near it. A saddle of one mode, on the surface or off it; of a planar
         pseudo-saddle the surface is the unstable manifold.
@@ -176,19 +421,19 @@ def find_homoclinic(
     Returns
     -------
     Connection
-        Of codimension one. ``continue_bifurcation`` follows it as two parameters vary. Ctrl-C ends the
-        search with the orbit that there is, which ends farther from the saddle: ``complete`` is false.
+        Of codimension one. ``continue_bifurcation`` follows it as two parameters vary. After Ctrl-C the
+        orbit ends farther from the saddle, and ``complete`` is False.
 
     Raises
     ------
     ConvergenceError
-        No orbit that comes back, or Newton's method fails.
+        No orbit returns, or Newton's method fails.
     DegenerateError
         The point is no saddle.
     OptionError
         A system with explicit time or hidden dynamics.
     DefinitionError
-        ``system`` is none, or has vector multipliers.
+        ``system`` is not a FilippovSystem, or has vector multipliers.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     PointError
@@ -223,25 +468,19 @@ def find_homoclinic(
     require_system(system)
     if system.coupled or system.time_dependent:
         raise OptionError(
-            explain(
-                "system",
-                expected="an autonomous one with linear multipliers",
-                received=repr(system),
-                advice="The saddle of a system that depends on time is a periodic orbit.",
-            )
+            f"system {system!r} depends on time or has hidden dynamics. Give an autonomous one that is "
+            "linear in its multipliers."
         )
     names = system.parameter_names
     if parameter not in names:
-        raise ParameterError(
-            f"parameter: expected a name among {list(names)}, received {parameter!r}."
-        )
+        raise ParameterError(f"parameter {parameter!r} is unknown. The system has {list(names)}.")
     given = {str(k): v for k, v in (parameters or {}).items()}
     if guess is not None:
         given[parameter] = guess
     p, index = system.parameter_vector(given), names.index(parameter)
-    mode, at = saddle_at(system, saddle, p)
+    mode, at = _saddle_at(system, saddle, p)
     if isinstance(at, PseudoEquilibrium) and system.dimension == 2:
-        side, legs, starts, durations = flight_to(system, at, p)
+        side, legs, starts, durations = _flight_to(system, at, p)
         loop = PseudoSaddleLoop(system, legs, (index,), p, side)
         u = _solved(loop, loop.pack(starts, durations, at), parameter, max_iterations)
         return connection_of(loop, u, parameter)
@@ -252,9 +491,8 @@ def find_homoclinic(
         except ConvergenceError as error:
             reasons.append(str(error))
     raise ConvergenceError(
-        f"homoclinic orbit: expected an orbit of the unstable manifold of {at.point.tolist()} that "
-        f"comes back to it, received none ({reasons[0] if reasons else 'none comes near'}). Give a "
-        "better guess of the parameter.",
+        f"homoclinic orbit: no orbit of the unstable manifold of {at.point.tolist()} returns to it "
+        f"({reasons[0] if reasons else 'none comes near'}). Give a better guess of the parameter.",
         point=at.point,
     )
 
@@ -268,7 +506,7 @@ def _by_projections(
     max_iterations: int,
     progress: bool,
 ) -> Connection:
-    """The orbit that ends where the guess comes nearest, then closer and closer to the saddle."""
+    """Solve for the orbit that ends where the guess does, then move its end to the saddle."""
     far, near = start.miss, float(np.linalg.norm(start.starts[0] - start.saddle))
     parameter = system.parameter_names[index]
     loop = SaddleLoop(system, start.legs, (index,), p, mode, start.saddle, near, far, start.held)
@@ -299,7 +537,7 @@ def _by_projections(
 
 
 def _guarded(equations: Equations) -> Equations:
-    """Equations that are not finite where an orbit cannot be flown."""
+    """Equations that are NaN where a leg cannot be integrated."""
 
     def guarded(v: Array) -> tuple[Array, Array]:
         try:
@@ -316,7 +554,7 @@ def _solved(
     scales = loop.scales(u)
 
     def equations(v: Array) -> tuple[Array, Array]:
-        with np.errstate(all="ignore"):  # a trial may fly too far
+        with np.errstate(all="ignore"):  # a trial may diverge
             values, jacobian = loop.equations(v * scales)
         return values, jacobian * scales
 
@@ -333,15 +571,15 @@ def _solved(
             reason = f" {error}"
     if root is None or not np.abs(root - u / scales).max() < 10.0:
         raise ConvergenceError(
-            f"homoclinic orbit: expected Newton's method to converge in {parameter!r}, received none "
-            f"after {loop.iterations} steps.{reason} Give a better guess.",
+            f"homoclinic orbit: Newton's method in {parameter!r} did not converge in {loop.iterations} "
+            f"steps.{reason} Give a better guess.",
             point=u,
         )
     return np.asarray(root * scales)
 
 
 def connection_of(loop: Loop, u: Array, parameter: str) -> Connection:
-    """What a solution of the equations is."""
+    """The homoclinic orbit of a solution of the equations."""
     legs, faults = loop.described(u)
     p = loop.parameters_at(u)
     return Connection(

@@ -1,1 +1,1 @@
-"""Invariant manifolds, dividing surfaces, canards and forward-reachable sets."""
+"""Invariant manifolds, dividing surfaces, canards, forward-reachable sets and orbits for portraits."""

@@ -5,8 +5,8 @@ the time since s. With dt = (L2 - L1) dtau the sliding field becomes x' = L2 F1 
 zero at s, and to first order (a, b)' = A (a, b) with A = [[L12, L22], [-L11, -L21]]. Its real
 eigenlines that lie in sliding regions are the canards (outgoing where a + b > 0 with L1 > 0 > L2)
 and faux canards (with L1 < 0 < L2). Where both eigenvalues have the sign of the outgoing direction
-s is a node of the sliding flow, and a whole sector of orbits leaves it; they are found backward,
-because forward they all run together with the weak eigenline.
+s is a node of the sliding flow, and a whole sector of orbits leaves it. They are computed backward,
+because forward they all approach the weak eigenline.
 
 Source: Filippov 1988, sec. 19; Colombo & Jeffrey 2011; the coordinates (a, b) hold in R^n and where
 the system depends on time.
@@ -22,31 +22,31 @@ import numpy as np
 
 from ...flow.concatenation import forward, join, straight
 from ...flow.follow import follow
+from ...flow.names import guard_name
 from ...flow.options import Tolerances
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
-from ...local.point.lie_derivatives import Numbers
 from ...local.point.regions import coincide
-from ...local.point.surface_point import Place
-from ...model import Array, OptionError, Surfaces
+from ...local.point.surface_point import Numbers, Place
+from ...model import Array, OptionError, Surfaces, motion
 
-#: Where a path along an eigenline begins, and where one of a node is taken to be at s: times, and
-#: values of L2 - L1, relative to those of the problem. Errors are of second order in it.
+#: Relative time at which a path along an eigenline begins, and relative L2 - L1 at which one of a node
+#: has reached s. The error is of second order in it.
 _NEAR = 1e-5
 
-#: How far from s the orbits of a node are spread over their sector, in turn, relative to the time
-#: left: nearer to s they are close to the weak eigenline, farther they have left the sector.
+#: Distances from s at which orbits of a node are chosen in their sector, in turn, relative to the time
+#: left: nearer they are close to the weak eigenline, farther they have left the sector.
 _DISTANCES = (0.25, 0.08, 0.16)
 
 
 @dataclass(frozen=True)
 class Path:
-    """A sliding orbit from a point where the future is not unique.
+    """A sliding orbit from a point at which forward uniqueness fails.
 
     Attributes
     ----------
     run : Trajectory
-        The sliding, from that point on.
+        The sliding motion from that point.
     repelling : bool
         Whether it can be left at any time.
     """
@@ -77,8 +77,7 @@ class Slider:
     def follow(self, x: Array, t: float, t_end: float, delta: float) -> Trajectory:
         """Follow until a fold, another surface, a stop, or abs(L1 - L2) = ``delta`` (if not 0)."""
         system, i = self.where.system, self.where.surface
-        others = [f"h{j}" for j in range(system.surface_count) if j != i]
-        names = ["L_F1 h", "L_F2 h", *others, *(n for n, _ in system.stops + system.resets)]
+        names = [guard_name(system, g) for g in motion(system, self.where.mode).guards]
         l1, l2 = (system.lie_derivative([self.where.side(c)], i) for c in "+-")
         near = [(l1 - l2) ** 2 - delta**2] if delta else []
         return follow(
@@ -107,18 +106,20 @@ def paths_from(s: Array, t: float, slider: Slider, samples: int) -> list[Path]:
     s : ndarray (N,)
         The two-fold (extended state).
     t : float
-        When the motion is there.
+        Time there.
     slider : Slider
     samples : int
-        How many members the funnel shall have. Where a sector of orbits leaves s, as many of them
-        are taken, or, if each can be left at many times, about the square root of half as many.
+        Number of members of the funnel. Where a sector of orbits leaves s, as many of them are
+        computed, or, if each can be left at many times, about the square root of half as many.
 
     Returns
     -------
     list of Path
     """
     if not isinstance(slider, Slider):
-        raise OptionError(f"slider: expected a Slider, received {slider!r}.")
+        raise OptionError(
+            f"slider={slider!r} is no Slider. Give one of the surface of the two-fold."
+        )
     numbers = slider.where.at(s)
     if coincide(numbers, 1e-9):
         return _through(slider, s, t, numbers)
@@ -147,7 +148,7 @@ def paths_from(s: Array, t: float, slider: Slider, samples: int) -> list[Path]:
 
 
 def _outgoing(v: Array, lie: Array) -> Array | None:
-    """Return an eigenvector as times that add up to 1, if it lies in a sliding region."""
+    """An eigenvector scaled to times with the sum 1; None outside sliding regions."""
     l1, l2 = lie @ v
     return v / v.sum() if l1 * l2 < 0.0 and v.sum() != 0.0 else None
 
@@ -175,7 +176,7 @@ def _cross(v: Array, w: Array) -> float:
 
 
 def _scale(slider: Slider, s: Array, t: float, v: Array) -> float:
-    """A time in which the motion along v does not go far."""
+    """The time in which the motion along v goes as far as the size of the state."""
     n = slider.where.system.dimension
     speed = float(np.linalg.norm(v[:n]))
     return min(slider.t_end - t, (1.0 + float(np.linalg.norm(s[:n]))) / max(speed, 1e-300))
@@ -186,7 +187,7 @@ def _repelling(numbers: Numbers) -> bool:
 
 
 def _through(slider: Slider, s: Array, t: float, numbers: Numbers) -> list[Path]:
-    """Where the fields coincide the sliding field is regular at s, in the direction of both."""
+    """The sliding orbit through a two-fold at which the fields coincide and sliding is regular."""
     step = _NEAR * _scale(slider, s, t, numbers.fields[0])
     ahead = slider.where.at(slider.on(s + step * numbers.fields[0]))
     if ahead.lie[0] * ahead.lie[1] >= 0.0:
@@ -195,7 +196,7 @@ def _through(slider: Slider, s: Array, t: float, numbers: Numbers) -> list[Path]
 
 
 def _planar(slider: Slider, s: Array, t: float, numbers: Numbers) -> list[Path]:
-    """In the plane both fields are along the surface: look at the sliding beside s, on both sides."""
+    """The sliding orbits that leave a planar two-fold, on both sides of it."""
     tangent = np.array([-numbers.gradient[1], numbers.gradient[0]])
     tangent /= np.linalg.norm(tangent)
     step = _NEAR * (1.0 + float(np.linalg.norm(s)))
@@ -214,7 +215,7 @@ def _planar(slider: Slider, s: Array, t: float, numbers: Numbers) -> list[Path]:
 
 
 def _along(slider: Slider, s: Array, t: float, numbers: Numbers, ab: Array) -> Path:
-    """Start near s on an eigenline; what is off it decays."""
+    """The sliding orbit from a start near s on an eigenline; deviations from it decay."""
     v = ab @ numbers.fields
     step = _NEAR * _scale(slider, s, t, v)
     x = slider.on(s + step * v)
@@ -226,9 +227,9 @@ def _along(slider: Slider, s: Array, t: float, numbers: Numbers, ab: Array) -> P
 def _of_node(
     slider: Slider, s: Array, t: float, numbers: Numbers, ab: Array, distance: float
 ) -> Path | None:
-    """Find the orbit from s through the point at ``distance`` along ``ab``, backward from there."""
-    # The point is moved until the orbit comes from s and not from a two-fold beside it, which matters
-    # with more than three states or explicit time.
+    """The orbit from s through the point at ``distance`` along ``ab``, computed backward."""
+    # With more than three states or explicit time other two-folds are near: the point is moved until the
+    # orbit comes from s.
     n, v = slider.where.system.dimension, ab @ numbers.fields
     distance *= _scale(slider, s, t, v)
     for _ in range(10):
@@ -257,7 +258,7 @@ def _of_node(
 def _backward(
     slider: Slider, x: Array, t: float, t_low: float
 ) -> tuple[Trajectory, Array, float] | None:
-    """Follow backward to near a two-fold; return the run, the two-fold and when it was left."""
+    """Follow backward to near a two-fold; return the run, the two-fold and the time there."""
     lie = slider.where.at(x).lie
     delta = _NEAR * float(abs(lie[0] - lie[1]))
     back = slider.follow(x, t, t_low, delta)
@@ -273,7 +274,7 @@ def _backward(
 
 
 def _moved(run: Trajectory, by: float) -> Trajectory:
-    """The same curve at other times, for a system that does not depend on time."""
+    """The same curve at other times, for an autonomous system."""
     return replace(run, t=run.t + by, steps=replace(run.steps, starts=run.steps.starts + by))
 
 

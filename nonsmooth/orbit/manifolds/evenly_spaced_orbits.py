@@ -1,10 +1,9 @@
-"""Orbits that fill a box evenly: none starts close to another, and each goes on to where it ends.
+"""Evenly spaced orbits in a box, for portraits.
 
-After Jobard & Lefer 1997, "Creating evenly-spaced streamlines of arbitrary density", with cells of a
-grid for distances. Their streamlines end where they come close to another; here that would be short of
-the equilibrium or the surface at which they meet, so an orbit goes on until it touches the other or comes
-to rest. Where it would go beside the other for too long it is left, and drawn thinner and thinner there,
-as they do.
+Source: Jobard & Lefer 1997, "Creating evenly-spaced streamlines of arbitrary density", with cells of a
+grid for distances. Their streamlines end where they come close to another. Here an orbit goes on until it
+touches the other or comes to rest, so that it ends at the equilibrium or surface where both meet. Where it
+would stay beside the other for too long it ends with a tapered line, as theirs do.
 """
 
 from __future__ import annotations
@@ -18,17 +17,18 @@ from ...flow import Trajectory
 from ...local.scans.box import Box
 from ...model import Array
 
-_CELLS = 34  # across the box, for 12 orbits: one that enters a cell of another ends
-_APART = 0.55  # from a start to the next orbit, in units of the box over the number of orbits
-_AGAIN = 8  # a curve that has left a cell for so many others and comes back has closed
-_FINE = 12  # cells across one of those: curves in one of them are one line to the eye
-_BESIDE = 0.7  # how far a curve goes on beside another, in units of the box
-_ON = 0.1  # how much of that is drawn, thinner and thinner, in units of the box
-_AT_REST = 4e-3  # of an equilibrium that a curve has come to, in units of the box
+# Lengths are in units of the box.
+_CELLS = 34  # across the box, for 12 orbits; an orbit is close to another in a cell of it
+_APART = 0.55  # from a start to the next orbit, times the number of orbits
+_AGAIN = 8  # cells between two visits to a cell after which a curve is closed
+_FINE = 12  # fine cells across a cell; curves in one of them coincide to the eye
+_BESIDE = 0.7  # largest length of a curve close to another
+_ON = 0.1  # part of it that is drawn, tapered
+_AT_REST = 4e-3  # distance from an equilibrium at which a curve ends
 
-#: Part of a curve (m, 2) that is wanted.
+#: Shortens a curve (m, 2).
 Cut = Callable[[Array], Array]
-#: From a start (2,), forward in time or backward, to where the cut says: the curve (m, 2).
+#: The orbit (m, 2) from a start (2,), forward or backward in time, to where the cut shortens it.
 Follow = Callable[[Array, bool, Cut], Array]
 
 
@@ -43,7 +43,7 @@ class SpacedOrbit(NamedTuple):
 def polyline(
     run: Trajectory, scale: Array, step: float = 1 / 90, until: tuple[float, Array] | None = None
 ) -> Array:
-    """Points (m, n) of a run so close that straight lines between them draw its polynomials."""
+    """Points (m, n) of a run, dense enough to draw it by straight lines."""
     ends, last = run.t, run.x[-1]
     if until is not None:
         ends, last = np.append(run.t[run.t < until[0]], until[0]), until[1]
@@ -62,7 +62,7 @@ def polyline(
 
 
 def until_rest(curve: Array, rests: Sequence[Array], size: Array) -> Array | None:
-    """Part of a curve to the equilibrium that it comes to, if it does; not the one it starts in."""
+    """Part of a curve up to the equilibrium that it reaches, other than its start; None if none."""
     found = None
     for rest in rests:
         near = np.linalg.norm((curve - rest) / size, axis=1) < _AT_REST
@@ -73,7 +73,7 @@ def until_rest(curve: Array, rests: Sequence[Array], size: Array) -> Array | Non
 
 
 class Spacing:
-    """Where orbits have been, and what else no orbit shall start close to."""
+    """Cells of the box that orbits occupy, and points to which no start may be close."""
 
     def __init__(
         self, box: Box, count: int, avoid: Sequence[Array] = (), rests: Sequence[Array] = ()
@@ -100,7 +100,7 @@ class Spacing:
         return all(np.min(np.linalg.norm(p - at, axis=1)) >= apart for p in self._points)
 
     def _fine(self, curve: Array) -> tuple[list[tuple[int, int]], list[int]]:
-        """Fine cells that a curve passes, and after which of its points."""
+        """Fine cells that a curve passes, and the indices of its points before them."""
         across = _FINE * self._cells_across
         at = self._unit(curve) * across
         parts = np.ceil(2.0 * np.linalg.norm(np.diff(at, axis=0), axis=1))
@@ -112,7 +112,7 @@ class Spacing:
         return cells, [*index.tolist(), len(at) - 1]
 
     def until_met(self, curve: Array) -> Array:
-        """Part of a curve until it rests or touches another or itself; where that is far, a little on."""
+        """Part of a curve until it rests or touches another or itself, or a little beside another."""
         self.thins = False
         first: dict[tuple[int, int], int] = {}
         distinct, close = 0, len(curve)
@@ -141,7 +141,7 @@ class Spacing:
         return kept[: close + 1 + int(np.searchsorted(lengths, _ON))] if self.thins else kept
 
     def add(self, curve: Array) -> None:
-        """Keep other orbits away from a curve."""
+        """Mark the cells of a curve as occupied."""
         self._taken.update(self._cells(curve))
         self._lines.update(self._fine(curve)[0])
         self._points.append(self._unit(curve))
@@ -156,7 +156,7 @@ def evenly_spaced(
     avoid: Sequence[Array] = (),
     rests: Sequence[Array] = (),
 ) -> Iterator[SpacedOrbit]:
-    """Follow orbits both ways from middles of count x count cells that are still free."""
+    """Follow orbits both ways from the middles of those of count x count cells that are free."""
     spacing = Spacing(box, count, avoid, rests)
 
     def along(start: Array, ahead: bool) -> tuple[Array, bool]:

@@ -1,7 +1,7 @@
-"""The set of futures from a point where there is more than one.
+"""Forward-reachable sets of points at which solutions are not unique.
 
 In repelling sliding a motion can leave to either side at once, or slide on and leave later; at a
-two-fold it can do the same along the canards that go on into repelling sliding. Each choice is one
+two-fold it can do the same along the canards that continue into repelling sliding. Each choice is one
 solution in Filippov's sense. A funnel samples them.
 """
 
@@ -19,8 +19,7 @@ from ...flow.simulate import simulate
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local import TwoFold, find_two_fold
-from ...local.point.lie_derivatives import Numbers
-from ...local.point.surface_point import Place, place
+from ...local.point.surface_point import Numbers, Place, place
 from ...model import (
     Array,
     FilippovSystem,
@@ -28,28 +27,25 @@ from ...model import (
     Parameters,
     PointError,
     Surfaces,
-    explain,
     real,
     real_array,
     require_system,
 )
 from .canards import Path, Slider, paths_from
 
-# Sampled futures of one point: what a funnel is, once its members are known.
-
 
 @dataclass(frozen=True)
 class Departure:
-    """How one member of a funnel goes.
+    """How one member of a funnel leaves sliding.
 
     Attributes
     ----------
     side : {"+", "-", "s"}
-        Where it leaves to; ``s`` slides as long as the sliding region lasts.
+        The side to which it leaves; ``s`` slides to the end of the sliding region.
     t : float
-        When it leaves.
+        The time at which it leaves.
     path : int
-        Which sliding orbit it was on until then; -1 for none.
+        Number of the sliding orbit that it leaves; -1 for none.
     """
 
     side: str
@@ -65,25 +61,25 @@ class Departure:
 
 @dataclass(frozen=True, repr=False)
 class Funnel:
-    """Futures of one point: call it with a time to get the set of states there.
+    """Samples of a forward-reachable set: call it with a time to get the set of states there.
 
     Attributes
     ----------
     system : FilippovSystem
-        The system whose future is not unique.
+        The system.
     t : float
-        When the future stops being unique.
+        Time at which forward uniqueness fails.
     point : ndarray (n,)
-        The state at which it stops being unique.
+        State at which it fails.
     cause : str
-        Why it stops being unique, such as ``"repelling sliding of h0"``.
+        Why it fails, such as ``"repelling sliding of h0"``.
     two_fold : TwoFold or None
-        The two-fold that the set begins at, if it does at one.
+        The two-fold at which the set begins, if any.
     trajectories : tuple of Trajectory
-        From ``point`` on. One that meets another point without a unique future ends there, with
+        Members, from ``point``. One that reaches another point of non-uniqueness ends there, with
         status NON_UNIQUE.
     departures : tuple of Departure
-        How each of them goes.
+        How each of them leaves sliding.
     past : Trajectory or None
         The motion up to ``point``.
     """
@@ -108,8 +104,7 @@ class Funnel:
         if before.any():
             if self.past is None:
                 raise PointError(
-                    f"time: expected values from {self.t:g} on, received {times.min():g}. The "
-                    "funnel starts there."
+                    f"time {times.min():g} is before the start of the funnel. Give times from {self.t:g} on."
                 )
             result[:, before] = self.past(np.minimum(times[before], self.past.t[-1]))
         for row, run in zip(result, self.trajectories, strict=True):
@@ -158,7 +153,7 @@ def funnel(
     rtol: float | None = None,
     atol: float | None = None,
 ) -> Funnel:
-    """Sample the futures of a point where forward uniqueness fails.
+    """Sample the forward-reachable set of a point where uniqueness fails.
 
     Parameters
     ----------
@@ -170,21 +165,21 @@ def funnel(
     t_end : float
         Final time of all members.
     samples : int, optional
-        About how many members, at least 3. Times of leaving are spread evenly over each sliding
+        Approximate number of members, at least 3. Times of leaving are spread evenly over each sliding
         orbit; where a sector of sliding orbits leaves a two-fold, directions within it too.
     t_start, parameters, tol, rtol, atol : optional
-        As in :func:`simulate`. A trajectory brings its own time and parameters.
+        As in :func:`simulate`. A trajectory has its own time and parameters.
 
     Returns
     -------
     Funnel
-        Sampled futures, and how each of them departs.
+        Sampled motions, and how each of them leaves.
 
     Raises
     ------
     PointError
-        The future is unique until ``t_end``, or the point is not one of those above: on several
-        surfaces, or with hidden dynamics.
+        The motion is unique until ``t_end``, or the point is on several surfaces or has hidden
+        dynamics.
     DegenerateError
         A two-fold that is not generic.
     OptionError
@@ -205,23 +200,23 @@ def funnel(
 
     Examples
     --------
-    An orbit of $x' = sgn x$ from 0 can be anywhere in $abs(x) <= t$:
+    Orbits of $x' = sgn x$ from 0 fill $abs(x) <= t$:
 
     >>> import casadi as ca, nonsmooth as ns
     >>> x = ca.SX.sym("x")
     >>> system = ns.FilippovSystem([x], surface=x, above=[1], below=[-1])
-    >>> futures = ns.orbit.funnel(system, [0.0], 2.0, samples=5)
-    >>> futures
+    >>> reached = ns.orbit.funnel(system, [0.0], 2.0, samples=5)
+    >>> reached
     Funnel(repelling sliding of h0 at t = 0, 5 members: 2 +, 2 -, 1 s)
-    >>> futures(1.5)[:, 0]
+    >>> reached(1.5)[:, 0]
     array([ 1.5,  0.5, -1.5, -0.5,  0. ])
-    >>> print(futures.departures[1])
+    >>> print(reached.departures[1])
     leaves to + from path 0 at t = 1
     """
     if isinstance(samples, bool) or not isinstance(samples, (int, np.integer)) or samples < 3:
         raise OptionError(
-            f"samples: expected an integer of at least 3, received {samples!r}. One leaves up, one "
-            "down, one slides."
+            f"samples={samples!r} is no integer of at least 3. Give one for each way to leave: up, down, "
+            "sliding."
         )
     chosen = tolerances(tol, rtol, atol)
     past = _past(start, point, t_end, t_start, parameters, chosen)
@@ -237,27 +232,28 @@ def _past(
     parameters: Parameters | None,
     tolerances: Tolerances,
 ) -> Trajectory:
-    """Return the run up to the point where the future is not unique."""
+    """The run up to the point at which uniqueness fails."""
     if t_end is None:
-        raise OptionError("t_end: expected the final time of the funnel, received none.")
+        raise OptionError("t_end is missing. Give the final time of the funnel.")
     t_end = real(t_end, "t_end")
     if isinstance(start, Trajectory):
         if point is not None or parameters is not None:
             raise OptionError(
-                "point, parameters: expected none with a trajectory, received some. The funnel "
-                "starts where the trajectory ends, with its parameters."
+                "point and parameters do not go with a trajectory, which has its own. Drop them."
             )
         if not t_end > start.t[-1]:
             raise OptionError(
-                f"t_end: expected a time after {start.t[-1]:g}, received {t_end!r}. The funnel "
-                "starts where the trajectory ends."
+                f"t_end = {t_end!r} is not after the end of the trajectory. Give a time after "
+                f"{start.t[-1]:g}."
             )
         past = start
         require_system(past.system)
     else:
         require_system(start)
         if point is None:
-            raise OptionError("point: expected a start, received none.")
+            raise OptionError(
+                "point is missing. Give a start, or a trajectory that ended NON_UNIQUE."
+            )
         past = simulate(
             start,
             point,
@@ -269,20 +265,14 @@ def _past(
         )
     if past.status is not Status.NON_UNIQUE:
         raise PointError(
-            explain(
-                "funnel",
-                expected="a motion that meets a point where its future is not unique",
-                received=f"a unique one until t = {past.t[-1]:g}, {past.status}, itinerary "
-                f"{past.itinerary!r}",
-                advice="Start in repelling sliding or at a two-fold, or raise t_end if the motion "
-                "gets there later.",
-            )
+            f"funnel: the motion is unique until t = {past.t[-1]:g} ({past.status}, itinerary "
+            f"{past.itinerary!r}). Start in repelling sliding or at a two-fold, or raise t_end."
         )
     return past
 
 
 class _Sampler:
-    """Builds one funnel."""
+    """Computes the members of one funnel."""
 
     def __init__(self, past: Trajectory, t_end: float, samples: int, tolerances: Tolerances):
         self.system, self.past = past.system, past
@@ -312,13 +302,8 @@ class _Sampler:
             self._leave_paths([path], self.samples, at_once=True)
         if not self.members:
             raise PointError(
-                explain(
-                    "funnel",
-                    expected="a continuation from the point",
-                    received=f"none that can be sampled from the {cause} at {self.x.tolist()}",
-                    advice="From an invisible two-fold without canards the motion goes on by "
-                    "flights from side to side.",
-                )
+                f"funnel: no motion from the {cause} at {self.x.tolist()} can be sampled. From an invisible "
+                "two-fold without canards it crosses from side to side: simulate from beside it."
             )
         return Funnel(
             system=self.system,
@@ -331,10 +316,8 @@ class _Sampler:
             past=self.past if len(self.past.t) > 1 else None,
         )
 
-    # where -------------------------------------------------------------------------------------
-
     def _place(self) -> Place:
-        """Return the one surface through the point."""
+        """The one surface through the point."""
         parameters = self.past.parameters
         p = self.system.parameter_vector(parameters)
         h, gradient = self.surfaces.values(self.x, p)
@@ -347,12 +330,7 @@ class _Sampler:
                 else f"{len(active)} surfaces through it ({', '.join(f'h{i}' for i in active)})"
             )
             raise PointError(
-                explain(
-                    f"point {self.x.tolist()}",
-                    expected="a point of one surface, with a field linear in its multiplier",
-                    received=kind,
-                    advice="Continuations there are chosen by hand: simulate(start_mode=...).",
-                )
+                f"point {self.x.tolist()} has {kind}. Choose a continuation with simulate(start_mode=...)."
             )
         n = self.system.dimension
         where, _ = place(self.system, self.x[:n], parameters, self.t, int(active[0]))
@@ -373,19 +351,13 @@ class _Sampler:
         above, below = numbers.angles
         if not (above >= -_ANGLE and below <= _ANGLE):
             raise PointError(
-                explain(
-                    f"point {self.x.tolist()}",
-                    expected="repelling sliding or a generic two-fold",
-                    received=f"L1 = {numbers.lie[0]:.6g}, L2 = {numbers.lie[1]:.6g}; the run said: "
-                    f"{self.past.message}",
-                    advice="Continue with simulate(start_mode=...) in the mode that is meant.",
-                )
+                f"point {self.x.tolist()} has L1 = {numbers.lie[0]:.6g} and L2 = {numbers.lie[1]:.6g}: "
+                f"neither repelling sliding nor a generic two-fold ({self.past.message}) Choose a "
+                "continuation with simulate(start_mode=...)."
             )
 
-    # members -----------------------------------------------------------------------------------
-
     def _leave_two_fold(self, second: dict[str, float]) -> None:
-        """At once on visible sides, and from every sliding orbit that goes out."""
+        """Add members that leave at once to visible sides, and from every outgoing sliding orbit."""
         for side, visible in (("+", second["L11"] > 0.0), ("-", second["L22"] < 0.0)):
             if visible:
                 self._add([], self.x, self.t, side, -1)
@@ -419,7 +391,9 @@ class _Sampler:
     def _may_go_on(self, run: Trajectory) -> bool:
         """Whether the path ended at a fold or another surface, not at a stop, reset or failure."""
         name = run.events[-1].name if run.events else ""
-        return run.status is Status.STOPPED and (name.startswith(("L_F", "h")) or name == "f0")
+        return run.status is Status.STOPPED and name not in dict(
+            run.system.stops + run.system.resets
+        )
 
     def _add(self, before: list[Trajectory], x: Array, t: float, side: str, number: int) -> None:
         run = self._simulate(x, t, self.where.side(side))
@@ -440,7 +414,7 @@ class _Sampler:
 
 
 def _times(run: Trajectory, count: int, at_once: bool) -> Iterator[float]:
-    """Times of leaving, the end of the path excluded and its start only if it may be left there."""
+    """Times of leaving, without the end of the path and with its start only if ``at_once``."""
     start, end = float(run.t[0]), float(run.t[-1])
     for k in range(count):
         part = k / count if at_once else (k + 1) / (count + 1)

@@ -1,4 +1,4 @@
-"""Orbits of a planar system in a box: evenly spaced ones, and those that separate the others."""
+"""Orbits of a planar system in a box: evenly spaced orbits and separatrices."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 
 from ...flow import Status, Trajectory, simulate
 from ...local.point.regions import Region
-from ...local.point.sides import SIDES
+from ...local.point.surface_point import SIDES
 from ...local.scans.plane_scan import PlaneScan
 from ...model import Array, FilippovSystem, Stop
 from .evenly_spaced_orbits import Cut, SpacedOrbit, evenly_spaced, polyline, until_rest
 
-_TOLERANCE = 1e-8  # far below what a picture resolves
-_CHUNK, _LONGEST = 12, 600  # steps between looks at an orbit, and of all of it
+_TOLERANCE = 1e-8  # far below the resolution of a picture
+_CHUNK, _LONGEST = 12, 600  # steps after which an orbit is cut, and the most steps
 _EVENTS = 200
-_PASSES = 40.0  # of the box by a typical orbit, in the longest time
-_NEAR = 1e-4  # in units of the box: of a saddle's manifolds at their start, of an orbit that closed
+_PASSES = 40.0  # passages of the box by a typical orbit in the longest time
+_NEAR = 1e-4  # in units of the box: starts from a saddle, and the gap of a closed orbit
 
 
 class PlaneOrbits:
@@ -78,22 +78,19 @@ class PlaneOrbits:
         return curve
 
     def _closed(self, events: list[Array]) -> bool:
-        """Whether the last event is where an earlier one was: a cycle, drawn once."""
+        """Whether the last event is at the state of an earlier one: a cycle, drawn once."""
         if len(events) < 3:
             return False
         gaps = (np.array(events[:-2]) - events[-1]) / self.scan.box.size
         return bool(np.min(np.linalg.norm(gaps, axis=1)) < _NEAR)
 
     def spaced(self, count: int = 12, avoid: Sequence[Array] = ()) -> Iterator[SpacedOrbit]:
-        """Orbits in the direction of time, about evenly spaced; none starts beside ``avoid``."""
-        # They go from where they begin to where they end, if that is in the box: sliding or rest.
+        """Orbits in the direction of time, evenly spaced, up to sliding or rest; none starts beside ``avoid``."""
         follow = partial(self.follow, landing=True)
         return evenly_spaced(self.scan.box, count, follow, avoid=avoid, rests=self.rests)
 
     def separatrices(self) -> Iterator[tuple[str, Array]]:
-        """Names and curves (m, 2), in the direction of time."""
-        # ``"fold orbit"`` through visible folds, ``"separatrix"`` for the invariant manifolds of
-        # saddles and for the orbits that end in, or leave, pseudo-saddles.
+        """Orbits through visible folds and manifolds of saddles and pseudo-saddles, with names."""
         for fold in self.scan.folds:
             if fold.kind == "visible":
                 for ahead in (False, True):
@@ -112,7 +109,7 @@ class PlaneOrbits:
                     yield "separatrix", self._from(rest.point, ahead, side)
 
     def _from(self, start: Array, ahead: bool, mode: str | None = None) -> Array:
-        """An orbit to where it ends, a focus that it winds into too, in the direction of time."""
+        """An orbit up to its end, which may be a focus, in the direction of time."""
         curve = self.follow(start, ahead, self._to_rest, mode=mode)
         return curve[:: 1 if ahead else -1]
 
@@ -122,7 +119,7 @@ class PlaneOrbits:
 
 
 def _mode_at_end(run: Trajectory) -> str | None:
-    """Mode in which a run goes on, where its last state does not say it: on the surface."""
+    """Mode in which a run goes on, where its last state is on the surface; else None."""
     mode, on_event = run.events[-1].mode_after, False
     if len(run.events) > 1:
         on_event = run.events[-2].t == run.t[-1]
@@ -130,7 +127,7 @@ def _mode_at_end(run: Trajectory) -> str | None:
 
 
 def _bounded(scan: PlaneScan, direction: int) -> FilippovSystem:
-    """Return the system, or its time reversal, with stops a little outside the box."""
+    """The system, or its time reversal, with stops a little outside the box."""
     system, box = scan.where.system, scan.box
     x, y = system.extended_states[0], system.extended_states[1]
     dx, dy = 0.03 * box.size

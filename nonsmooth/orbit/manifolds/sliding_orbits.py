@@ -1,8 +1,7 @@
-"""Sliding orbits on a surface of three states, to the folds, and the special ones among them.
+"""Sliding orbits on a surface of three states: evenly spaced ones, separatrices and canards.
 
-They are followed in the flow of L2 F1 - L1 F2, whose orbits are the same and which is smooth at
-two-folds, where the sliding field is 0/0; the sign of L2 - L1 gives the direction of time. A
-two-fold is an equilibrium of that flow.
+They are orbits of L2 F1 - L1 F2, which is smooth at two-folds, where the sliding field is 0/0, and zero
+there; the sign of L2 - L1 gives the direction of time.
 """
 
 from __future__ import annotations
@@ -13,22 +12,22 @@ from functools import cached_property
 import numpy as np
 
 from ...flow import Status, follow
-from ...local.point.sides import SIDES
-from ...local.point.surface_point import place
+from ...local.point.surface_point import SIDES, place
 from ...local.scans.surface_scan import SurfaceScan
+from ...local.searches.find_two_fold import TwoFold
 from ...local.searches.pseudo_equilibria import PseudoEquilibrium, sliding_matrix
-from ...local.searches.two_fold import TwoFold
 from ...model import Array, FilippovSystem, Stop
 from .evenly_spaced_orbits import Cut, SpacedOrbit, evenly_spaced, polyline
 
 _TOLERANCE = 1e-8
-_CHUNK, _LONGEST = 10, 300  # steps between looks at an orbit, and of all of it
-_LENGTH = 3.0  # of an orbit, in units of the box
-_STILL = 1e-4  # a stretch shorter than this comes to rest: at a two-fold or a pseudo-equilibrium
+_CHUNK, _LONGEST = 10, 300  # steps after which an orbit is cut, and the most steps
+# Lengths are in units of the box.
+_LENGTH = 3.0  # of an orbit
+_STILL = 1e-4  # of a chunk that has come to rest: at a two-fold or a pseudo-equilibrium
 _SHORTEST = 0.06
-_ASIDE = 2e-3  # of manifolds from their pseudo-saddle, in units of the box
-#: Of canards from their two-fold, where the eigenline takes their place. Away from a node the other
-#: direction grows faster, so this is not smaller, and rounding alone is tolerated.
+_ASIDE = 2e-3  # from a pseudo-saddle to starts on its manifolds
+#: Distance from a two-fold to starts on its canards, and tolerance. Away from a node the other direction
+#: grows faster, so that the distance is not smaller and the tolerance is that of rounding.
 _FROM_TWO_FOLD, _FINEST = 2e-2, 1e-13
 
 
@@ -66,13 +65,9 @@ class SlidingOrbits:
         return 100.0 / float(np.quantile(speed, 0.1)) if speed.size else 1.0
 
     def follow(
-        self,
-        start: Array,
-        ahead: bool = True,
-        cut: Cut | None = None,
-        tol: float = _TOLERANCE,
+        self, start: Array, ahead: bool = True, cut: Cut | None = None, tol: float = _TOLERANCE
     ) -> Array:
-        """Follow the sliding orbit through a state to the fold, the frame or its rest."""
+        """Follow the sliding orbit from a state to a fold, the edge of the box or rest."""
         scan, x = self.scan, start
         if not np.all(np.isfinite(start)):
             return np.empty((0, 2))
@@ -98,8 +93,7 @@ class SlidingOrbits:
     def spaced(
         self, count: int = 12, avoid: Sequence[Array] = ()
     ) -> Iterator[tuple[SpacedOrbit, bool]]:
-        """Orbits in the direction of time, about evenly spaced, and whether they attract."""
-        # None starts beside the curves ``avoid``.
+        """Evenly spaced orbits, and whether they attract; none starts beside the curves ``avoid``."""
         scan = self.scan
 
         def orbit(flat: Array, ahead: bool, cut: Cut) -> Array:
@@ -113,8 +107,7 @@ class SlidingOrbits:
             yield one, bool(l1 < l2)
 
     def manifolds(self, found: PseudoEquilibrium) -> Iterator[Array]:
-        """Manifolds (m, 2) of a saddle of the sliding flow, in the direction of time."""
-        # None where the pseudo-saddle is one across the surface only.
+        """Manifolds (m, 2) of a saddle of the sliding flow, in the direction of time; else nothing."""
         scan = self.scan
         where, x = place(scan.where.system, found.point, scan.where.values)
         matrix, basis = sliding_matrix(where.at(x), where.jacobians(x))
@@ -130,8 +123,7 @@ class SlidingOrbits:
                 yield self.follow(start, bool(value > 0))[:: 1 if value > 0 else -1]
 
     def eigenlines(self, fold: TwoFold) -> Iterator[tuple[str, Array]]:
-        """Orbits (m, 2) along the sliding eigenlines of a two-fold, in the direction of time."""
-        # ``"canard"`` for Da -> s -> Dr, ``"faux canard"`` for Dr -> s -> Da; one half each.
+        """Halves (m, 2) of the canards and faux canards of a two-fold, with names, in the direction of time."""
         if fold.discriminant < 0:
             return
         tangents = self.scan.flat(fold.tangents()[:, 1:].T) / self.scan.box.size

@@ -1,15 +1,15 @@
-"""The sheet of orbits that slide into two-folds, as seen from a point of the surface beside it.
+"""The sheet of orbits that slide into two-folds, and the distance of a point of the surface from it.
 
 In n states two-folds h = L1 = L2 = 0 form a set of dimension n - 3, and into each of them slides one orbit
 where it is a saddle of the sliding flow in its own time, x' = L2 F1 - L1 F2. Together these orbits are
-a sheet of dimension n - 2 in the surface, which has n - 1. Forward orbits beside it part, so it
-is built backward: from a two-fold q along the eigenvector e(q) of the rate that leads into it,
+a sheet of dimension n - 2 in the surface, which has n - 1. Forward orbits beside it diverge, so it
+is computed backward: from a two-fold q along the eigenvector e(q) of the rate that leads into it,
 
     e = -(m F1 - F2)/rate,   L11 m^2 - (L12 + L21) m + L22 = 0,   rate = m L11 - L21 < 0,   m < 0,
 
-with L_ij = F_i . grad L_j, L2 = m L1 and L1 = -1 along e; by then errors shrink. A point y of the surface meets
-it with a gap: the distance along a direction d across the sheet from y to a point of it. The gap is a
-smooth function of y, with its derivative from the same linear equations.
+with L_ij = F_i . grad L_j, L2 = m L1 and L1 = -1 along e; backward errors shrink. The gap of a point y of
+the surface is its distance from the sheet along a direction d across it: a smooth function of y, whose
+derivative follows from the same linear equations.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from typing import Any
 import numpy as np
 
 from ...flow.follow import follow
+from ...flow.names import event_name
 from ...flow.status import Status
 from ...local.point.surface_point import place
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem, Parameters, evaluator
 from ..runs.legs import Leg, fly
 
-#: Sliding orbits begin at this distance from their two-fold, relative to the size of the problem; what
-#: this neglects is of second order.
+#: Distance from the two-fold at which sliding orbits begin, relative to the size of the problem; the
+#: error is of second order.
 _NEAR = 1e-7
 
-#: Whether an orbit really slides to the two-fold is asked of points so close to the sheet, relative to
-#: the size, and only signs are looked at.
+#: Largest gap, relative to the size, at which guards of sliding are checked, and the tolerance of that.
 _CLOSE, _COARSE = 1e-6, 1e-8
 
 _STEPS = 40
-_LAST = 1e-14  # a step below this, relative to the size, is the last one
-_NOISE = 1e-9  # steps below this that shrink no more are rounding
+_LAST = 1e-14  # relative size of the last step of Newton's method
+_NOISE = 1e-9  # relative size below which steps that do not shrink are rounding
 
 
 @dataclass(frozen=True, eq=False)
 class Meeting:
-    """How a point of the surface meets the sheet."""
+    """The point of the sheet next to a point of the surface."""
 
     fold: Array
     duration: float
@@ -66,8 +66,6 @@ class TwoFoldSheet:
         direction, _ = self._direction(fold)
         self.distance = _NEAR * size / float(np.linalg.norm(direction))
 
-    # the eigenvector ----------------------------------------------------------------------------
-
     def _slopes(self, x: Array) -> list[tuple[float, float]]:
         """Both slopes m = L2/L1 of the eigenvectors, with their rates; the smaller slope first."""
         second = self.where.at(x).second
@@ -79,15 +77,15 @@ class TwoFoldSheet:
         return [(float(m), float(m * a - second["L21"])) for m in roots]
 
     def _root(self, x: Array) -> int:
-        """Which root of the quadratic leads into the two-fold from attracting sliding: -1 or 1."""
+        """The root of the quadratic that leads into the two-fold from attracting sliding: -1 or 1."""
         found = self._slopes(x)
         inward = [k for k, (m, rate) in enumerate(found) if m < 0.0 > rate]
         strong = [k for k in inward if found[1 - k][1] > found[k][1]]
         if len(inward) != 1 or not strong:
             many = "infinitely many" if inward else "none"
             raise DegenerateError(
-                "of: expected a two-fold with one canard into it through attracting sliding, received "
-                f"{many} at {x.tolist()}. Nothing divides the orbits beside it."
+                f"of: the two-fold at {x.tolist()} has {many} of the canards into it through attracting "
+                "sliding. Give one with exactly one, which divides the orbits beside it."
             )
         return (-1, 1)[inward[0]]
 
@@ -96,7 +94,7 @@ class TwoFoldSheet:
         system, root = self.system, self.root
 
         def build() -> Sequence[Any]:
-            lie = {word: system.lie_derivative(word) for word in ("++", "+-", "-+", "--")}
+            lie = {sides: system.lie_derivative(sides) for sides in ("++", "+-", "-+", "--")}
             a, b, c = lie["++"], lie["+-"] + lie["-+"], lie["--"]
             m = (b + root * (b * b - 4 * a * c) ** 0.5) / (2 * a)
             e = (system.field("-") - m * system.field("+")) / (m * a - lie["-+"])
@@ -107,10 +105,8 @@ class TwoFoldSheet:
         )
         return vector.ravel(), np.array([row.ravel() for row in rows])
 
-    # the sheet ----------------------------------------------------------------------------------
-
     def _back(self, fold: Array, duration: float) -> tuple[Array, Array, Array]:
-        """The point of the sheet so long before a two-fold; derivatives by the fold and the duration."""
+        """The point of the sheet a duration before a two-fold; derivatives by both."""
         e, by_fold = self._direction(fold)
         start = fold + self.distance * e
         flown = fly(self.system, Leg("s"), start, -duration, self.parameters)
@@ -118,7 +114,7 @@ class TwoFoldSheet:
         return flown.end, flown.by_start @ turn, -flown.rate
 
     def guess(self, point: Array, leaves: Array, duration: float) -> Meeting:
-        """A meeting to begin with: an orbit slides from a point and leaves close to a two-fold."""
+        """A first meeting, from an orbit that slides from a point and leaves close to a two-fold."""
         fold = self.nearest(leaves)
         return Meeting(
             fold, duration, 0.0, 0.0, self._across(point, fold, duration), 0.0 * fold, ""
@@ -145,7 +141,7 @@ class TwoFoldSheet:
         return np.asarray(np.linalg.svd(columns)[0][:, -1])
 
     def meet(self, point: Array, near: Meeting | None) -> Meeting:
-        """How a point of the surface meets the sheet."""
+        """The meeting of a point of the surface, by Newton's method from another one."""
         if near is None:
             near = self.guess(point, self.fold, self._time_to(point))
         n, across = point.size, near.across
@@ -163,9 +159,9 @@ class TwoFoldSheet:
                 break
             step = -np.linalg.solve(matrix, values)
             shrink = 1.0
-            if duration + step[n] <= 0.0:  # not beyond the two-fold
+            if duration + step[n] <= 0.0:  # stay before the two-fold
                 shrink = -0.7 * duration / step[n]
-            fold = self.nearest(fold + shrink * step[:n])  # beside them nothing slides as it should
+            fold = self.nearest(fold + shrink * step[:n])  # sliding orbits end only in two-folds
             duration += shrink * float(step[n])
             gap, lift = gap + shrink * float(step[n + 1]), lift + shrink * float(step[n + 2])
             length = float(np.linalg.norm(np.append(step[:n], step[n + 1]))) / self.size
@@ -173,19 +169,13 @@ class TwoFoldSheet:
                 return self._met(point, fold, duration, gap, across, matrix)
             last = length
         raise ConvergenceError(
-            f"two-fold: expected an orbit that slides into one near {self.fold.tolist()} beside "
-            f"{np.array2string(point, precision=6)}, received none by Newton's method.",
+            f"two-fold: Newton's method found no orbit from {np.array2string(point, precision=6)} that "
+            f"slides into a two-fold near {self.fold.tolist()}. Give a smaller box.",
             point=point,
         )
 
     def _met(
-        self,
-        point: Array,
-        fold: Array,
-        duration: float,
-        gap: float,
-        across: Array,
-        matrix: Array,
+        self, point: Array, fold: Array, duration: float, gap: float, across: Array, matrix: Array
     ) -> Meeting:
         n = point.size
         target = np.zeros(n + 3)
@@ -200,7 +190,7 @@ class TwoFoldSheet:
         return Meeting(fold, duration, left, gap, turned, slope, fault)
 
     def _fault(self, fold: Array, duration: float) -> str:
-        """What the guards of sliding contradict on the way to a two-fold."""
+        """The guard of sliding that fails on the way to a two-fold; empty if none does."""
         e, _ = self._direction(fold)
         run = follow(
             self.system,
@@ -212,7 +202,8 @@ class TwoFoldSheet:
         )
         if run.status is not Status.REACHED_END:
             return f"the sliding orbit into the two-fold ends before: {run.message}"
-        names = {"L_F1 h": "L1 <= 0", "L_F2 h": "L2 >= 0"}
+        ends = {1: "L1 <= 0", -1: "L2 >= 0"}
+        names = {event_name(self.system, "s", "exit", 0, side): ends[side] for side in ends}
         near = 1e-5 * duration
         for event in run.events:
             if event.name in names and event.t > near - duration:
@@ -223,7 +214,7 @@ class TwoFoldSheet:
         return ""
 
     def _time_to(self, point: Array) -> float:
-        """A first guess of how long it takes to slide to the two-fold."""
+        """A first guess of the time of sliding to the two-fold."""
         at = self.where.at(point)
         jump = float(at.lie[1] - at.lie[0])
         if not jump > 0.0:

@@ -25,81 +25,48 @@ from weakref import WeakKeyDictionary
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.shooting import Demands, SolvedOrbit
-from ...flow.fixed import MOST_STEPS, TOLERANCE, values_program
+from ...flow.fixed import TOLERANCE
 from ...model import Array, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from ...model.derivatives.forcing import Forcing
-from ..runs.flight import EXTENDED, Flight, Flights, flights_of
-from ..runs.legs import Flown, Leg, fly
-
-# Where the parts of the equations of an orbit are in their Jacobian.
+from ..runs.flight import Flight, Flights, flights_of
+from ..runs.legs import Flown, Leg, fly, surface_of
 
 
 class Places(NamedTuple):
-    """Where entries of the Jacobian are in it, row after row."""
+    """Where the equations of legs are in their matrix (m, m + q), row after row.
 
-    blocks: NDArray[Any]
+    Attributes
+    ----------
+    own : ndarray (L, n + 1, n + 1 + q)
+        States and event of each leg, by its start, its duration and parameters.
+    following : ndarray (L, n)
+        The states by the start of the next leg.
+    next_leg : ndarray (L,)
+    """
+
+    own: NDArray[Any]
     following: NDArray[Any]
-    by_duration: NDArray[Any]
-    event_rows: NDArray[Any]
-    event_durations: NDArray[Any]
     next_leg: NDArray[Any]
 
 
 @lru_cache(maxsize=256)
-def places_of(count: int, n: int) -> Places:
-    """The places for so many legs of n states."""
+def places_of(count: int, n: int, q: int = 0) -> Places:
+    """The places for so many legs of n states, with q parameters."""
     size = count * (n + 1)
-    places = np.arange(size * size).reshape(size, size)
+    places = np.arange(size * (size + q)).reshape(size, size + q)
     rows = np.arange(count * n).reshape(count, n)
-    times = np.arange(count * n, size)
+    times = np.arange(count * n, size)[:, None]
+    more = np.broadcast_to(np.arange(size, size + q), (count, q))
+    own, columns = np.hstack([rows, times]), np.hstack([rows, times, more])
+    next_leg = np.roll(np.arange(count), -1)
     return Places(
-        places[rows[:, :, None], rows[:, None, :]].ravel(),
-        places[rows, np.roll(rows, -1, axis=0)].ravel(),
-        places[rows, times[:, None]].ravel(),
-        places[times[:, None], rows].ravel(),
-        places[times, times].ravel(),
-        np.roll(np.arange(count), -1),
+        places[own[:, :, None], columns[:, None, :]], places[rows, rows[next_leg]], next_leg
     )
 
 
-# What is asked of Newton's method where the equations of a whole orbit are solved in one call.
-
-#: Newton's method ends when the next step would be below this, relative to the orbit.
-CLOSE = 1e-10
-
-#: Steps below this, relative to the orbit, are rounding.
-ROUNDING = 1e-14
-
-#: Legs far from the orbit are flown with local errors up to this.
-COARSE = 1e-8
-
-#: Steps below this, relative to the orbit, change its derivatives by rounding.
-FINAL = 1e-13
-
-#: Steps below this that do not shrink are rounding of the equations.
-NOISE = 1e-11
-
-
-def demands_of(
-    forcing: Forcing | None,
-    periods: float,
-    *,
-    tol: float = CLOSE,
-    noise: float = NOISE,
-    longest: float = 0.0,
-    most: int = 1,
-    most_steps: int = MOST_STEPS,
-) -> Demands:
-    """Demands on an orbit."""
-    period = None if forcing is None else values_program(forcing).pointer
-    local = (TOLERANCE, COARSE, EXTENDED, FINAL, ROUNDING)
-    return Demands(tol, noise, *local, longest, periods, period, most, most_steps)
-
-
-#: Up to so many unknowns a dense solution is faster than elimination in Python.
-_DENSE = 60
+#: Up to so many unknowns a dense solution is faster than elimination from leg to leg.
+_DENSE = 80
 
 #: Up to so many legs the states where they start do not tell the size of the orbit.
 _FEW = 4
@@ -187,12 +154,17 @@ class BoundaryProblem:
         ]
         object.__setattr__(self, "kept", tuple(sliding))
 
-    @property
+    @cached_property
     def dimension(self) -> int:
         """States of a leg's start, the time included."""
         return self.system.extended_dimension
 
-    @property
+    @cached_property
+    def has_many(self) -> bool:
+        """Whether equations are solved from leg to leg: many legs, each with an event, and no more."""
+        return self.size > _DENSE and not self.kept and not any(leg.timed for leg in self.legs)
+
+    @cached_property
     def size(self) -> int:
         """Number of unknowns."""
         return len(self.legs) * (self.dimension + 1)
@@ -242,80 +214,68 @@ class BoundaryProblem:
         ConvergenceError, DegenerateError
             A leg cannot be flown.
         """
-        columns = list(chosen)
-        if self.is_direct:
-            free = np.concatenate([u[: self.size], p[columns]])
-            wrap = None if self.symmetry is None else self.wrap
-            demands = demands_of(self.forcing, self.periods)
-            found = self.flights(chosen).evaluated(free, p, wrap, tol, demands)
-            if found is not None:
-                return self.evaluation(*found)
         starts, durations = self.split(u)
         with np.errstate(over="ignore", invalid="ignore"):  # what is not finite is refused later
-            return self._assembled(self.flights(chosen)(starts, durations, p, tol), u, p, columns)
+            flight = self.flights(chosen)(starts, durations, p, tol)
+            return self._assembled(flight, starts, durations, p, list(chosen))
 
-    def _assembled(self, flight: Flight, u: Array, p: Array, columns: list[int]) -> Evaluation:
-        starts, durations = self.split(u)
-        count, n, size = len(self.legs), self.dimension, self.size
-        after, by_end = flight.after, flight.after_state
-        by_p = by_end @ flight.by_parameters + flight.after_parameters[:, :, columns]
+    def _assembled(
+        self, flight: Flight, starts: Array, durations: Array, p: Array, chosen: list[int]
+    ) -> Evaluation:
+        (count, n), q, size = starts.shape, len(chosen), self.size
+        at, residual, whole = places_of(count, n, q), np.empty(size), np.zeros((size, size + q))
+        moved = [flight.by_start, flight.rate[:, :, None], flight.by_parameters]
+        ends = np.concatenate(moved if q else moved[:2], axis=2)
+        after = flight.after
+        entries = np.empty((count, n + 1, n + 1 + q))
+        np.matmul(flight.after_state, ends, out=entries[:, :n])
+        np.matmul(flight.gradient[:, None, :], ends, out=entries[:, n:])
+        if q:
+            entries[:, :n, n + 1 :] += flight.after_parameters[:, :, chosen]
+            entries[:, n, n + 1 :] += flight.value_parameters[:, chosen]
         if self.symmetry is not None:
-            after, by_end, by_p = after.copy(), by_end.copy(), by_p
-            after[-1], by_end[-1] = self.wrap @ after[-1], self.wrap @ by_end[-1]
-            by_p[-1] = self.wrap @ by_p[-1]
-        at, flat = places_of(count, n), np.zeros(size * size)
-        residual, by_parameters = np.empty(size), np.empty((size, len(columns)))
-        residual[: count * n] = (after - starts[at.next_leg]).ravel()
-        residual[count * n :] = flight.value
-        flat[at.blocks] = (by_end @ flight.by_start).ravel()
+            after = after.copy()
+            after[-1], entries[-1, :n] = self.wrap @ after[-1], self.wrap @ entries[-1, :n]
+        flat = whole.reshape(-1)
+        flat[at.own] = entries
         flat[at.following] -= 1.0
-        rate = flight.rate[:, :, None]
-        flat[at.by_duration] = (by_end @ rate).ravel()
-        gradient = flight.gradient[:, None, :]
-        flat[at.event_rows] = (gradient @ flight.by_start).ravel()
-        flat[at.event_durations] = (gradient @ rate).ravel()
-        by_parameters[: count * n] = by_p.reshape(count * n, -1)
-        by_parameters[count * n :] = (gradient @ flight.by_parameters)[:, 0]
-        by_parameters[count * n :] += flight.value_parameters[:, columns]
-        jacobian = flat.reshape(size, size)
-        self._advance(residual, by_parameters, slice((count - 1) * n, count * n), p, columns)
+        residual[: count * n] = (after - starts[at.next_leg]).reshape(-1)
+        residual[count * n :] = flight.value
+        jacobian, by_parameters = whole[:, :size], whole[:, size:]
+        if self.forcing is not None:
+            value, slope = self.advance(p)
+            residual[count * n - 1] -= value
+            by_parameters[count * n - 1] -= slope[chosen]
         if self.phase is not None:
             self._phased(residual, jacobian, by_parameters, flight, starts[0])
         if self.kept:
-            self._keep(residual, jacobian, by_parameters, starts[0], p, columns)
-        whole = np.hstack([jacobian, by_parameters])
+            self._keep(residual, jacobian, by_parameters, starts[0], p, chosen)
         return Evaluation(residual, whole, flight, starts, durations)
 
-    @cached_property
-    def is_direct(self) -> bool:
-        """Whether the equations can be had in one call."""
-        return self.phase is None and not self.kept and self.flights().is_direct
-
-    def evaluation(self, solved: SolvedOrbit, flight: Flight) -> Evaluation:
-        """The equations as one call gives them."""
-        starts, durations = self.split(solved.unknowns)
-        return Evaluation(solved.residual, solved.jacobian, flight, starts, durations)
-
-    def exact_residual(self, u: Array, p: Array) -> Array | None:
-        """Residual with errors far below those of doubles; None where there is no such one.
+    def residual(self, u: Array, p: Array, extended: bool = False) -> Array | None:
+        """Residual without derivatives, if wanted in extended precision; None where legs do not allow it.
 
         Parameters
         ----------
         u : ndarray (m,)
         p : ndarray
+        extended : bool, optional
         """
         starts, durations = self.split(u)
         if self.phase is not None or self.kept:
             return None
-        found = self.flights(()).exact(starts, durations, p)
+        found = self.flights(()).ends(starts, durations, p, extended)
         if found is None:
             return None
         after, rest, value = found
-        if self.symmetry is not None:
-            after[-1], rest[-1] = self.wrap @ after[-1], self.wrap @ rest[-1]
-        gap = after - starts[places_of(*starts.shape).next_leg]
-        gap[-1, -1] -= self.advance(p)[0]
-        gap += rest
+        with np.errstate(over="ignore", invalid="ignore"):
+            for part in (after, rest) if self.symmetry is not None else ():
+                if part is not None:
+                    part[-1] = self.wrap @ part[-1]
+            gap = after - starts[places_of(*starts.shape).next_leg]
+            gap[-1, -1] -= self.advance(p)[0]
+            if rest is not None:
+                gap += rest
         return np.concatenate([gap.ravel(), value])
 
     def flights(self, chosen: tuple[int, ...] = ()) -> Flights:
@@ -337,15 +297,6 @@ class BoundaryProblem:
         jacobian[n, :n] = self.phase
         by_parameters[n] = 0.0
         flight.gradient[0, :n] = self.phase @ self.wrap
-
-    def _advance(
-        self, residual: Array, by_parameters: Array, own: slice, p: Array, columns: Sequence[int]
-    ) -> None:
-        if self.forcing is None:
-            return
-        value, slope = self.advance(p)
-        residual[own.stop - 1] -= value
-        by_parameters[own.stop - 1] -= slope[list(columns)]
 
     def _keep(
         self,
@@ -386,44 +337,16 @@ class BoundaryProblem:
             return self
         return replace(self, phase=rate / speed, reference=start.copy())
 
-    def solve(self, jacobian: Array, right: Array) -> Array:
-        """Solve equations with the Jacobian of this problem, by elimination from leg to leg.
-
-        Durations are eliminated first, then the starts of all legs but the first: n^3 operations for
-        each leg (few legs are solved as a dense system). The columns may be scaled.
+    def solve(self, matrix: Array, right: Array) -> Array:
+        """Solve these equations, with rows of a border below; by elimination where legs are many.
 
         Raises
         ------
         numpy.linalg.LinAlgError
         """
-        count, n = len(self.legs), self.dimension
-        if self.size <= _DENSE or self.kept or not all(leg.name for leg in self.legs):
-            return np.asarray(np.linalg.solve(jacobian, right), float)
-        steps, shifts, slopes, times = [], [], [], []
-        for i in range(count):
-            own, time = slice(i * n, (i + 1) * n), count * n + i
-            following = slice(0, n) if i + 1 == count else slice((i + 1) * n, (i + 2) * n)
-            if jacobian[time, time] == 0.0:
-                raise np.linalg.LinAlgError(f"leg {i + 1}: its event is grazed")
-            slope = jacobian[time, own] / jacobian[time, time]
-            level = right[time] / jacobian[time, time]
-            ahead = -np.diag(jacobian[own, following])  # a diagonal block, but for one leg
-            steps.append(
-                (jacobian[own, own] - np.outer(jacobian[own, time], slope)) / ahead[:, None]
-            )
-            shifts.append((jacobian[own, time] * level - right[own]) / ahead)
-            slopes.append(slope)
-            times.append(level)
-        whole, shift = np.eye(n), np.zeros(n)
-        for step, more in zip(steps, shifts, strict=True):
-            whole, shift = step @ whole, step @ shift + more
-        x = np.linalg.solve(np.eye(n) - whole, shift)
-        result = np.zeros(self.size)
-        for i in range(count):
-            result[i * n : (i + 1) * n] = x
-            result[count * n + i] = times[i] - slopes[i] @ x
-            x = steps[i] @ x + shifts[i]
-        return result
+        if self.has_many:
+            return eliminated(self, matrix, right).solution()
+        return np.asarray(np.linalg.solve(matrix, right), float)
 
     def scales(self, u: Array, p: Array | None = None) -> Array:
         """Sizes of the unknowns: states by their range over the legs, times by the duration.
@@ -451,3 +374,111 @@ class BoundaryProblem:
 
 #: Legs of a problem ready to be flown, by the chosen parameters.
 _FLIGHTS: WeakKeyDictionary[BoundaryProblem, dict[tuple[int, ...], Flights]] = WeakKeyDictionary()
+
+
+# Legs as the symmetry of an orbit maps them: the other half of one that is solved for as a half.
+
+TURNED = str.maketrans("+-", "-+")
+
+
+def neighbours(problem: BoundaryProblem, i: int) -> tuple[Leg, Leg]:
+    """The legs before and after leg ``i``; beyond the ends of a half those of the other half."""
+    legs, last = problem.legs, len(problem.legs) - 1
+    before = legs[i - 1] if i else mirrored(problem, legs[last])
+    after = legs[i + 1] if i < last else mirrored(problem, legs[0])
+    return before, after
+
+
+def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
+    """A leg as the symmetry of the problem maps it; surfaces whose function changes its sign turn."""
+    if problem.symmetry is None:
+        return leg
+    turned = _turning(problem)
+    mode = "".join(
+        c.translate(TURNED) if k < len(turned) and turned[k] else c for k, c in enumerate(leg.mode)
+    )
+    surface = surface_of(problem.system, leg)
+    side = -leg.side if surface >= 0 and turned[surface] else leg.side
+    return replace(leg, mode=mode, side=side)
+
+
+def _turning(problem: BoundaryProblem) -> list[bool]:
+    """Which switching functions the symmetry maps to their negatives."""
+    system = problem.system
+    x = np.cos(1.0 + np.arange(system.dimension))
+    back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
+    result = []
+    for k in range(system.surface_count):
+        h = system.surface_function(k)
+        a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
+        result.append(a * b < 0.0)
+    return result
+
+
+@dataclass(frozen=True, eq=False)
+class Small:
+    """What elimination leaves of bordered equations.
+
+    Attributes
+    ----------
+    matrix, right : ndarray (n + k, n + k), (n + k,)
+        For the first start and the k unknowns of no leg.
+    starts, durations : ndarray (L, n, n + k + 1), (L, n + k + 1)
+        Those of all legs by these, and the constant part.
+    pivots : float
+    """
+
+    matrix: Array
+    right: Array
+    starts: Array
+    durations: Array
+    pivots: float
+
+    def determinant(self) -> float:
+        """Of all equations, up to a factor that keeps its sign."""
+        return float(np.linalg.det(self.matrix)) * self.pivots
+
+    def solution(self) -> Array:
+        """All unknowns."""
+        few = np.append(np.linalg.solve(self.matrix, self.right), 1.0)
+        n = self.starts.shape[1]
+        return np.concatenate([(self.starts @ few).ravel(), self.durations @ few, few[n:-1]])
+
+
+def eliminated(problem: BoundaryProblem, matrix: Array, right: Array) -> Small:
+    """Reduce equations (m + k, m + k): those of an orbit, then k rows of a border."""
+    # Durations first, then the starts of all legs but the first: n^3 operations for each leg.
+    # Columns and rows may be scaled. The last columns of blocks are their constant parts.
+    count, n, m = len(problem.legs), problem.dimension, problem.size
+    few = n + len(matrix) - m
+    rows = np.arange(count * n).reshape(count, n)
+    own, pivot = matrix[count * n : m], np.diagonal(matrix)[count * n : m]
+    if not pivot.all():
+        i = int(np.argmin(np.abs(pivot)))  # the leg's event is grazed
+        raise np.linalg.LinAlgError(f"leg {i + 1}: its event does not determine its duration")
+    legs = np.arange(count)
+    slope = -own.reshape(count, -1)[legs[:, None], rows] / pivot[:, None]
+    by_rest = np.hstack([-own[:, m:], right[count * n : m, None]]) / pivot[:, None]
+    by_time = matrix[rows, count * n + legs[:, None]][:, :, None]
+    steps = matrix[rows[:, :, None], rows[:, None, :]] + by_time * slope[:, None, :]
+    rest = np.dstack([matrix[rows, m:], -right[rows]]) + by_time * by_rest[:, None, :]
+    ahead = -matrix[rows[:-1], rows[1:]][:, :, None]  # a diagonal block
+    steps[:-1] /= ahead
+    rest[:-1] /= ahead
+    starts = np.zeros((count, n, few + 1))
+    starts[:, :, n:] = np.concatenate([np.zeros((1, n, few + 1 - n)), rest[:-1]])
+    starts[0, :, :n] = np.eye(n)
+    for i in range(count - 1):
+        starts[i + 1] += steps[i] @ starts[i]
+    durations = (slope[:, None, :] @ starts)[:, 0]
+    durations[:, n:] += by_rest
+    small = np.zeros((few, few + 1))
+    small[:n] = steps[-1] @ starts[-1]
+    small[:n, n:] += rest[-1]
+    if count > 1:
+        small[:n, :n] += matrix[rows[-1], :n]
+    small[n:] = matrix[m:, : count * n] @ starts.reshape(count * n, -1)
+    small[n:] += matrix[m:, count * n : m] @ durations
+    small[n:, n:] += np.hstack([matrix[m:, m:], -right[m:, None]])
+    pivots = float(np.prod(pivot / np.linalg.norm(own, axis=1)))
+    return Small(small[:, :-1], -small[:, -1], starts, durations, pivots)

@@ -24,13 +24,10 @@ from ...model import (
 )
 from ...solvers.newton import Equations, converge, solve
 from ..runs.itinerary import Itinerary
-from ..runs.legs import Leg, leg_name
-from .boundary_value_problem import CLOSE, COARSE, FINAL, ROUNDING, BoundaryProblem, Evaluation
-from .forcing import about_of
-from .guess import Start, start_of
+from ..runs.legs import leg_name
+from .boundary_value_problem import BoundaryProblem, Evaluation
+from .guess import Start, about_of, is_about, start_of
 from .orbit import PeriodicOrbit, faults_of, named
-from .recurrence import is_about
-from .shooting import shot
 from .symmetry import mirror_of, once_round, require_symmetric
 
 # What a solution of the equations of an orbit must be to count as one.
@@ -57,7 +54,7 @@ def require_motion(problem: BoundaryProblem, at: Evaluation, start: Start) -> No
     period, x = float(np.abs(at.durations).sum()), at.starts[0, :n]
     _require_resolved(problem, at)
     way = float(np.abs(at.flight.rate[0]).max()) * period
-    rests = not problem.legs[-1].name and not problem.system.time_dependent
+    rests = problem.legs[-1].timed and not problem.system.time_dependent
     shrunk = period <= _SHRUNK * guess and _singular(problem, at)
     if period > _POINT * guess and not shrunk:
         guessed = float(np.abs(start.problem.split(start.unknowns)[0][:, :n]).max())
@@ -114,15 +111,14 @@ def require_simple(orbit: PeriodicOrbit) -> None:
     for i, leg in enumerate(orbit.problem.legs):
         if leg.kind != "exit" or system.coupled:
             continue
-        other = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}[leg.name]
         flight = orbit.evaluation.flight
         end = flight.end[i, : flight.sizes[i]]
-        at = Leg(leg.mode, other, "exit").at_end(system, end, p)
+        at = replace(leg, side=-leg.side).at_end(system, end, p)
         size = float(np.linalg.norm(at.gradient) * np.linalg.norm(end)) or 1.0
         if abs(at.value) <= 1e-9 * size:
             raise DegenerateError(
                 f"periodic orbit: expected legs that end on one fold, received leg {i + 1} "
-                f"{leg_name(leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
+                f"{leg_name(system, leg)} that ends where L_F1 h and L_F2 h both vanish: a two-fold, at "
                 f"{end[: system.dimension].tolist()}. The orbit is not unique there: vary a parameter."
             )
     orbit.floquet  # noqa: B018  # DegenerateError where an event is grazed
@@ -229,7 +225,7 @@ def periodic_orbit(
     mirror = mirror_of(system, symmetry)
     start = start_of(system, guess, itinerary, period, mirror, parameters, t_start)
     begun, guessed = start.problem, start.unknowns
-    if begun.legs[-1].name:
+    if not begun.legs[-1].timed:
         begun, guessed = once_round(begun, guessed, start.p)
     solver = _Solver(begun, start.p)
     u, at = solver.solve(guessed, max_iterations)
@@ -246,6 +242,18 @@ def periodic_orbit(
         raise _virtual(orbit)
     return orbit
 
+
+#: Steps below this, relative to the orbit, that do not shrink are rounding of the equations.
+_CLOSE = 1e-10
+
+#: Steps below this, relative to the orbit, are rounding.
+_ROUNDING = 1e-14
+
+#: Legs far from the orbit are flown with local errors up to this.
+_COARSE = 1e-8
+
+#: Steps below this, relative to the orbit, change its derivatives by rounding: Newton's method ends.
+_FINAL = 1e-13
 
 #: Larger steps from an orbit of a family, relative to the orbit, are rounding that is magnified along it.
 _POLISH = 1e-3
@@ -270,27 +278,29 @@ class _Solver:
     def solve(self, u: Array, max_iterations: int) -> tuple[Array, Evaluation]:
         """The orbit, to rounding."""
         longest = _LONGEST * float(np.abs(self.problem.split(u)[1]).sum())
-        found = shot(self.problem, u, self.p, longest, max_iterations)
-        if found is not None:
-            self.iterations += found[2]
-            return found[:2]
         scales = self.problem.scales(u)
         last: list[Array] = []
+        first: list[tuple[Array, Evaluation]] = []
 
         def equations(v: Array) -> tuple[Array, Array]:
+            if first and np.array_equal(v, first[0][0]):  # the guess, again
+                self.last = first[0][0] * scales, first[0][1]
+                return first[0][1].residual, first[0][1].jacobian * scales
             u = v * scales
             self.last = u, None
             durations = self.problem.split(u)[1]
             if not max(-float(durations.min()), float(durations.max())) <= longest:
                 i = int(np.argmax(np.abs(durations)))
                 raise ConvergenceError(
-                    f"Leg {i + 1} {leg_name(self.problem.legs[i])} grew to the duration "
+                    f"Leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} grew to the duration "
                     f"{durations[i]:.3g}."
                 )
-            size = float(np.abs(v - last[-1]).max()) if last else 1e-2
+            size = float(np.abs(v - last[-1]).max()) if last else 0.0
             # after a step of this size the next one is its square, and what it leaves its fourth power
-            tol = min(max(1e-3 * size**4, TOLERANCE), COARSE)
+            tol = min(max(1e-3 * size**4, TOLERANCE), _COARSE)
             at = self.problem.evaluate(u, self.p, tol=tol)
+            if not last:
+                first.append((v, at))
             last.append(v)
             self.last = u, at
             self.iterations += 1
@@ -302,9 +312,11 @@ class _Solver:
             root = converge(
                 equations,
                 u / scales,
-                tol=CLOSE,
+                tol=_FINAL,
                 max_iterations=max_iterations,
                 linear=self.problem.solve,
+                noise=_CLOSE,
+                values=lambda v: self.problem.residual(v * scales, self.p),
             )
         except (ConvergenceError, DegenerateError) as error:
             root, reason = None, str(error)
@@ -387,12 +399,12 @@ class _Solver:
         """Two more steps at most, as long as they shrink and are not too large: to rounding."""
         at, scales = self.problem.evaluate(u, self.p), self.problem.scales(u)
         for _ in range(2):
-            exact = self.problem.exact_residual(u, self.p)
+            exact = self.problem.residual(u, self.p, extended=True)
             step = self._step(at.jacobian, at.residual if exact is None else exact)
             size = float(np.abs(step / scales).max())
-            if exact is not None and size <= FINAL:  # the derivatives are those of the orbit
+            if exact is not None and size <= _FINAL:  # the derivatives are those of the orbit
                 return self._moved(u, step, at, exact)
-            if size <= ROUNDING or size > largest:
+            if size <= _ROUNDING or size > largest:
                 break
             try:
                 there = self.problem.evaluate(u + step, self.p)
@@ -426,9 +438,7 @@ class _Solver:
         ends = np.abs(at.residual[count * n :])
         i = int(np.argmax(np.maximum(sizes, ends)))
         what = "does not end on its event" if ends[i] > sizes[i] else "does not meet the next one"
-        return (
-            f"leg {i + 1} {leg_name(self.problem.legs[i])} {what} (by {max(sizes[i], ends[i]):.2g})"
-        )
+        return f"leg {i + 1} {leg_name(self.problem.system, self.problem.legs[i])} {what} (by {max(sizes[i], ends[i]):.2g})"
 
     def _failure(self, reason: str) -> ConvergenceError:
         u, at = self.last
@@ -436,7 +446,7 @@ class _Solver:
         legs = self.problem.legs
         size = float(np.abs(at.residual).max()) if at is not None else math.nan
         backward = [
-            f"leg {i + 1} {leg_name(leg)} has the duration {d:.3g}"
+            f"leg {i + 1} {leg_name(self.problem.system, leg)} has the duration {d:.3g}"
             for i, (leg, d) in enumerate(zip(legs, durations, strict=True))
             if not d > 0.0
         ]

@@ -1,4 +1,9 @@
-"""From a guess to the equations of a periodic orbit and a start for Newton's method."""
+"""Equations and starts for Newton's method from a guess of a periodic orbit.
+
+A guess is a state, a run or an orbit. From a run the itinerary is that of the legs between two events at
+nearly the same state. Distances are relative to the range of each state in the run; in a forced system the
+time between the events must be a whole number of periods, or half a number with a symmetry.
+"""
 
 from __future__ import annotations
 
@@ -22,37 +27,284 @@ from ...model import (
     OptionError,
     Parameters,
     Surfaces,
-    explain,
     real_array,
 )
-from ...model.derivatives.forcing import Forcing
+from ...model.derivatives.forcing import Forcing, frequencies
 from ...model.derivatives.variational import plain_field
-from ..runs.flight import flights_of
 from ..runs.guards import march
 from ..runs.itinerary import Itinerary, lone_leg, word_legs
-from ..runs.legs import Leg, fly, leg_name
+from ..runs.legs import Leg, Stretch, fly, leg_name, stretches
 from .boundary_value_problem import BoundaryProblem
-from .forcing import about_of, forcing_of, span_of
 from .orbit import PeriodicOrbit, named
-from .recurrence import CLOSE, Recurrence, recurrence, refused, require_steady
 
-# What is said of a guess must not contradict it: its system, its forcing, its symmetry.
+# Forcing ------------------------------------------------------------------------------------------
 
-#: Fields that differ by this part after a period have another one.
+
+def _forcing_of(system: FilippovSystem, period: Any) -> Forcing | None:
+    """The period of the forcing as a function of the parameters, given or from the system; or None."""
+    if not system.time_dependent:
+        return None
+    if period is None:
+        found = system.cached("frequencies", lambda: frequencies(system))
+        if len(found) != 1:
+            raise OptionError(
+                f"period is missing, and the system has {len(found)} frequencies {found} in sines and "
+                "cosines. Give the period of the forcing, such as period=2*pi/w."
+            )
+        return system.cached("forcing", lambda: Forcing(system, 2.0 * math.pi / found[0], True))
+    return Forcing(system, period)
+
+
+def _span_of(forcing: Forcing | None, p: Array) -> float | None:
+    """The period of the forcing at some parameters; None for autonomous systems."""
+    return None if forcing is None else _positive(forcing(p)[0])
+
+
+def about_of(system: FilippovSystem, period: Any, p: Array) -> float | None:
+    """The given approximate period of an orbit of an autonomous system; else None."""
+    if period is None or system.time_dependent:
+        return None
+    return _positive(Forcing(system, period)(p)[0])
+
+
+def _positive(span: float) -> float:
+    if not (math.isfinite(span) and span > 0.0):
+        raise OptionError(
+            f"period = {span:.6g} is not positive. Give the period of the forcing, or the approximate "
+            "period of an orbit of an autonomous system."
+        )
+    return span
+
+
+# Itineraries of runs ------------------------------------------------------------------------------
+
+#: Largest relative distance of two states of a run between which there may be a periodic orbit.
+_CLOSE = 0.25
+
+#: Factor within which a period agrees with the given one.
+_ABOUT = 1.5
+
+#: Ratio of the times between events at the end and in the middle of a run below which they go on falling.
+_FALLING = 0.7
+
+#: Relative range of the states of a part of a run below which it rests.
+_REST = 1e-6
+
+#: Share of the time of a run after its last event from which it may have reached an orbit without events.
+_QUIET = 0.75
+
+#: Size of states whose squares overflow.
+_HUGE = 1e150
+
+#: Number of events from which a run is checked for chattering.
+_MANY = 1000
+
+
+def is_about(duration: float, about: float) -> bool:
+    """Whether a time is from two thirds to one and a half times another one."""
+    return about / _ABOUT <= duration <= about * _ABOUT
+
+
+@dataclass(frozen=True, eq=False)
+class _Recurrence:
+    """A stretch of a run that nearly closes."""
+
+    parts: tuple[Stretch, ...]
+    periods: float
+    distance: float
+
+
+def recurrence(
+    run: Trajectory,
+    *,
+    symmetry: Array | None,
+    period: float | None,
+    first: bool,
+    about: float | None = None,
+) -> _Recurrence | None:
+    """The legs of a run that nearly close; None if there are none."""
+    parts = [part for part in stretches(run) if part.duration > 0.0]
+    if len(parts) > 1 and parts[-1].leg.timed:
+        if parts[-1].duration > _QUIET * sum(part.duration for part in parts):
+            found = _without_events(run, parts[-1:], symmetry, period, first, about)
+            if found is not None and found.distance <= _CLOSE and _moves(run, found.parts[0]):
+                return found
+    closed = [k for k, part in enumerate(parts) if part.leg.kind not in ("end", "stop")]
+    # legs between two events: start k is after the event that ends part k - 1
+    starts = [k + 1 for k in closed if k + 1 < len(parts)]
+    if len(starts) < 2:
+        return _without_events(run, parts, symmetry, period, first, about)
+    scale = _scales(run)
+    anchor = starts[0] if first else starts[-1]
+    others = [k for k in starts if (k > anchor if first else k < anchor)]
+    if symmetry is None:
+        others = [k for k in others if _key(parts, k) == _key(parts, anchor)]
+    if about is not None:
+        others = [k for k in others if is_about(abs(parts[k].t - parts[anchor].t), about)]
+    if not others:
+        return None
+    distances, periods = _distances(run, parts, anchor, others, scale, symmetry, period)
+    best = min(distances)  # of those that close about as well as the best the shortest
+    good = [i for i, apart in enumerate(distances) if apart <= max(3.0 * best, 1e-9)]
+    i = min(good, key=lambda i: abs(others[i] - anchor))
+    low, high = sorted((anchor, others[i]))
+    return _Recurrence(tuple(parts[low:high]), periods[i], distances[i])
+
+
+def _moves(run: Trajectory, part: Stretch) -> bool:
+    """Whether a run moves in a part of it."""
+    way = np.ptp(run(part.t + part.duration * np.linspace(0.0, 1.0, 9)), axis=0)
+    return bool(np.max(way) > _REST * np.ptp(run.x, axis=0).max())
+
+
+def _key(parts: Sequence[Stretch], k: int) -> tuple[object, ...]:
+    """Mode of a leg, and the guard that ended the one before it."""
+    leg = parts[k - 1].leg
+    own = leg.kind if leg.kind in ("stop", "reset") else leg.mode[leg.element :][:1] == "s"
+    return parts[k].leg.mode, own, leg.element, leg.side if own is True else 0
+
+
+def _scales(run: Trajectory) -> Array:
+    span = np.asarray(np.ptp(run.x[len(run.x) // 2 :], axis=0))
+    return np.where(span > 1e-12 * max(float(span.max()), 1e-300), span, max(span.max(), 1e-300))
+
+
+def _distances(
+    run: Trajectory,
+    parts: Sequence[Stretch],
+    anchor: int,
+    others: Sequence[int],
+    scale: Array,
+    symmetry: Array | None,
+    period: float | None,
+) -> tuple[list[float], list[float]]:
+    """Relative distances of the starts of parts, and the forcing periods between them."""
+    n, sign = run.system.dimension, 1.0 if others[0] > anchor else -1.0
+    states = np.array([parts[k].start[:n] for k in others])
+    if symmetry is not None:  # its square is 1, so either end may be mapped
+        states = states @ symmetry.T
+    apart = np.abs((states - parts[anchor].start[:n]) / scale).max(axis=1)
+    if period is None:
+        return apart.tolist(), [0.0] * len(others)
+    times = np.array([parts[k].t for k in others])
+    count = sign * (times - parts[anchor].t) / period
+    shift = 0.0 if symmetry is None else 0.5
+    whole = np.round(count - shift) + shift
+    apart = np.maximum(apart, 2.0 * np.abs(count - whole))
+    return np.where(whole > 0.0, apart, np.inf).tolist(), whole.tolist()
+
+
+def _without_events(
+    run: Trajectory,
+    parts: Sequence[Stretch],
+    symmetry: Array | None,
+    period: float | None,
+    first: bool,
+    about: float | None,
+) -> _Recurrence | None:
+    """A recurrence within one leg: after whole periods, or on a plane across the flow."""
+    if not parts:
+        return None
+    part = parts[0] if first else parts[-1]
+    start, end = part.t, part.t + part.duration
+    scale = _scales(run)
+    anchor = start if first else end
+    found = []
+    for t in _returns(run, start, end, anchor, symmetry, period):
+        low, high = sorted((anchor, t))
+        if about is not None and not is_about(high - low, about):
+            continue
+        there = run(high) if symmetry is None else symmetry @ run(high)
+        distance = float(np.abs((there - run(low)) / scale).max())
+        x = np.append(run(low), low) if run.system.time_dependent else run(low)
+        periods = (high - low) / period if period else 0.0
+        leg = type(part.leg)(part.leg.mode)
+        cut = Stretch(leg, low, high - low, x, x, x)
+        found.append(_Recurrence((cut,), round(2 * periods) / 2, distance))
+    best = min((r.distance for r in found), default=np.inf)
+    good = [r for r in found if r.distance <= max(3.0 * best, 1e-9)]
+    return min(good, key=lambda r: r.parts[0].duration) if good else None
+
+
+def _returns(
+    run: Trajectory,
+    start: float,
+    end: float,
+    anchor: float,
+    symmetry: Array | None,
+    period: float | None,
+) -> list[float]:
+    """Times at which the run may return to its state at ``anchor``."""
+    if period is not None:
+        shift = 0.0 if symmetry is None else 0.5
+        count = int((end - start) / period + 1e-9)
+        steps = [(k + 1 - shift) * period for k in range(count)]
+        sign = 1.0 if anchor == start else -1.0
+        return [anchor + sign * s for s in steps]
+    times = np.linspace(start, end, 4001)
+    states = run(times) if symmetry is None else run(times) @ symmetry.T
+    x = run(anchor)
+    if not np.abs(states).max() < _HUGE:
+        return []  # it diverges
+    i = int(np.argmin(np.abs(times - anchor)))
+    rate = (run(times[min(i + 1, 4000)]) - run(times[max(i - 1, 0)])) / 2.0
+    height = (states - x) @ rate
+    crossings = np.flatnonzero((height[:-1] < 0.0) & (height[1:] >= 0.0))
+    away = [k for k in crossings if abs(times[k] - anchor) > 3 * (times[1] - times[0])]
+
+    def above(t: float) -> float:
+        there = run(t) if symmetry is None else symmetry @ run(t)
+        return float((there - x) @ rate)
+
+    from scipy.optimize import brentq  # here: it is not needed to import the library
+
+    return [float(brentq(above, times[k], times[k + 1], xtol=1e-13 * end)) for k in away]
+
+
+def _require_steady(run: Trajectory) -> None:
+    """Raise for a run that chatters: it had too many events, and the times between them shrink."""
+    if run.status is not Status.TOO_MANY_EVENTS or len(run.events) < _MANY:
+        return
+    times = np.array([event.t for event in run.events])
+    waits = np.diff(times)
+    part = len(waits) // 10
+    parts = (waits[4 * part : 5 * part], waits[6 * part : 7 * part], waits[-part:])
+    middle, between, last = (float(w.mean()) for w in parts)  # legs of one orbit differ
+    if last >= _FALLING * middle or not last < between < middle:
+        return
+    raise ConvergenceError(
+        f"guess: the run chatters near {run.x[-1].tolist()}. It ended with {run.status} at "
+        f"t = {times[-1]:.6g} after {len(times)} events, the time between which fell from {middle:.2g} to "
+        f"{last:.2g}. Start elsewhere, or model what limits the switching, such as hysteresis or a delay.",
+        point=run.x[-1],
+    )
+
+
+def refused(run: Trajectory, found: _Recurrence | None) -> ConvergenceError:
+    """The error for a run without a recurrence."""
+    best = (
+        "has no two events of one kind"
+        if found is None
+        else f"closes only to {found.distance:.2g} of its size, after {len(found.parts)} legs"
+    )
+    return ConvergenceError(
+        f"guess: the itinerary does not close: the run to t = {run.t[-1]:.6g} ({run.status}) {best}. "
+        "Simulate longer, closer to the orbit, or give itinerary= or a symmetry."
+    )
+
+
+# Checks of a guess --------------------------------------------------------------------------------
+
+#: Relative difference of the fields after a period from which it is not that of the forcing.
 _OTHER = 1e-6
 
 
-def require_of(system: FilippovSystem, other: FilippovSystem) -> None:
-    """Refuse a guess that is of another system, by what its states and events are."""
+def _require_of(system: FilippovSystem, other: FilippovSystem) -> None:
+    """Raise for a guess that is of another system, by its states and events."""
     if other is system or _signature(other) == _signature(system):
         return
     raise DefinitionError(
-        explain(
-            "guess",
-            expected=f"a run or an orbit of {system!r}",
-            received=f"one of {other!r}",
-            advice="Give a state, or the system that it is of.",
-        )
+        f"guess is of another system, {other!r}, not of {system!r}. Give a state, or the system of the guess."
     )
 
 
@@ -61,46 +313,33 @@ def _signature(system: FilippovSystem) -> tuple[Any, ...]:
     return (system.state_names, system.parameter_names, *map(str, events))
 
 
-def require_alone(guess: Any, **given: Any) -> None:
-    """Refuse what is said of a state, where the guess is none."""
+def _require_alone(guess: Any, **given: Any) -> None:
+    """Raise for options that apply only to a state as the guess."""
     for name, value in given.items():
         if value is not None:
             raise OptionError(
-                explain(
-                    name,
-                    expected="none, as it belongs to a state as the guess",
-                    received=f"{value!r} with a {type(guess).__name__}, which has its own",
-                    advice="Leave it out, or give a state.",
-                )
+                f"{name}= applies only if guess is a state; this {type(guess).__name__} already fixes its "
+                f"{name}. Drop it."
             )
 
 
-def require_same(problem: BoundaryProblem, period: Any, mirror: Array | None, p: Array) -> None:
-    """Refuse another period of the forcing, or another symmetry, than an orbit has."""
-    own, other = problem.forcing, None if period is None else forcing_of(problem.system, period)
+def _require_same(problem: BoundaryProblem, period: Any, mirror: Array | None, p: Array) -> None:
+    """Raise for a period of the forcing or a symmetry other than that of an orbit."""
+    own, other = problem.forcing, None if period is None else _forcing_of(problem.system, period)
     if own is not None and other is not None and abs(other(p)[0] / own(p)[0] - 1.0) > _OTHER:
         raise OptionError(
-            explain(
-                "period",
-                expected=f"that of the orbit that is the guess, {own(p)[0]:.10g}",
-                received=f"{other(p)[0]:.10g}",
-                advice="Leave it out, or give a run as the guess.",
-            )
+            f"period = {other(p)[0]:.10g} differs from that of the given PeriodicOrbit, {own(p)[0]:.10g}. "
+            "Drop it, or give a run as the guess."
         )
     half = problem.symmetry
     if mirror is not None and (half is None or np.abs(half - mirror).max() > 0.0):
-        had = "has none" if half is None else "has another one"
         raise OptionError(
-            explain(
-                "symmetry",
-                expected="none, or that by which the guess was found",
-                received=f"one, and an orbit that {had}",
-                advice="Leave it out, or give orbit.trajectory as the guess.",
-            )
+            "symmetry= differs from the symmetry of the given PeriodicOrbit. Drop it, or give "
+            "orbit.trajectory as the guess."
         )
 
 
-def require_period(
+def _require_period(
     system: FilippovSystem,
     legs: Sequence[Leg],
     starts: Array,
@@ -108,8 +347,8 @@ def require_period(
     span: float,
     p: Array,
 ) -> None:
-    """Refuse a period after which the fields are not what they were."""
-    # A field may jump where a leg begins; so it counts what is within.
+    """Raise for a period after which the fields differ."""
+    # They are compared in the middle of legs, as a field may jump at their ends.
     for leg, x, duration in zip(legs, starts, durations, strict=True):
         field = leg.field(system)
         y = flow_for(plain_field(system, leg.mode), field.states_at(x, p), p, 0.5 * float(duration))
@@ -119,28 +358,26 @@ def require_period(
         miss = float(np.abs(here - there).max())
         if miss > _OTHER * float(np.abs(here).max()):
             raise OptionError(
-                explain(
-                    "period",
-                    expected="a time after which the field is the same again",
-                    received=f"{span:.10g}, after which it differs by {miss:.2g} in mode {leg.mode!r} "
-                    f"at {y[: system.dimension].tolist()}",
-                    advice="Give the period of the forcing, or leave it out.",
-                )
+                f"period = {span:.10g} is not that of the forcing: after it the field differs by {miss:.2g} "
+                f"in mode {leg.mode!r} at {y[: system.dimension].tolist()}. Give the period of the forcing, "
+                "or drop it."
             )
 
 
+# Starts -------------------------------------------------------------------------------------------
+
 _MOST_EVENTS = 2000
 
-#: A leg of a given itinerary is followed so many times the time in which the state changes.
+#: Longest duration of a leg of a given itinerary, in times in which the state changes by its size.
 _LONGEST = 200.0
 
-#: A mode alone is followed over so many periods of the forcing.
+#: Most periods of the forcing over which one mode alone is integrated.
 _MOST_PERIODS = 16
 
-#: A run that comes back as near as this, relative to its size, is not simulated further.
+#: Relative distance of a recurrence at which a run is not simulated further.
 _GOOD = 0.02
 
-#: A state that may be one after a reset is left by this part of that time.
+#: Time after which a second run begins where there are resets, in the same unit.
 _LATER = 0.05
 
 
@@ -163,25 +400,25 @@ def start_of(
     t_start: float,
 ) -> Start:
     if isinstance(guess, (PeriodicOrbit, Trajectory)):
-        require_of(system, guess.system)
+        _require_of(system, guess.system)
     if isinstance(guess, PeriodicOrbit):
-        require_alone(guess, itinerary=itinerary, t_start=t_start or None)
+        _require_alone(guess, itinerary=itinerary, t_start=t_start or None)
         return _from_orbit(system, guess, period, mirror, parameters)
     if isinstance(guess, Trajectory):
-        require_alone(guess, itinerary=itinerary, t_start=t_start or None)
+        _require_alone(guess, itinerary=itinerary, t_start=t_start or None)
         given = {**guess.parameters, **_by_name(parameters)}
         p = system.parameter_vector(given)
-        forcing, about = forcing_of(system, period), _half(about_of(system, period, p), mirror)
+        forcing, about = _forcing_of(system, period), _half(about_of(system, period, p), mirror)
         found = recurrence(
-            guess, symmetry=mirror, period=span_of(forcing, p), first=False, about=about
+            guess, symmetry=mirror, period=_span_of(forcing, p), first=False, about=about
         )
-        require_steady(guess)
-        if found is None or found.distance > CLOSE:
+        _require_steady(guess)
+        if found is None or found.distance > _CLOSE:
             raise refused(guess, found)
         return _from_recurrence(system, found, forcing, mirror, p)
     p = system.parameter_vector(parameters)
-    forcing = forcing_of(system, period)
-    span = span_of(forcing, p)
+    forcing = _forcing_of(system, period)
+    span = _span_of(forcing, p)
     x = system.extended_point(real_array(guess, "guess"), t_start)
     if itinerary is not None:
         return _from_word(system, x, itinerary, forcing, mirror, p)
@@ -192,14 +429,14 @@ def start_of(
 
 
 def _half(about: float | None, mirror: Array | None) -> float | None:
-    """The time that what is looked for takes: with a symmetry half of the orbit."""
+    """The approximate duration of the legs: of half of the orbit with a symmetry."""
     return about if about is None or mirror is None else 0.5 * about
 
 
 def _nearest(start: Start, x: Array, span: float) -> Start:
-    """Of the whole periods at which an orbit without an event may begin, the one nearest to ``x``."""
+    """Start an orbit without events at the period of the forcing at which it is nearest to ``x``."""
     problem, p = start.problem, start.p
-    if problem.legs[-1].name or problem.periods < 2:
+    if not problem.legs[-1].timed or problem.periods < 2:
         return start
     (y,), (duration,) = problem.split(start.unknowns)
     n, found = problem.system.dimension, list[Array]()
@@ -224,22 +461,22 @@ def _from_orbit(
     mirror: Array | None,
     parameters: Parameters | None,
 ) -> Start:
-    """The equations of an orbit, which say its period of the forcing and its symmetry."""
+    """The equations of an orbit, with its period of the forcing and its symmetry."""
     p = system.parameter_vector({**orbit.parameters, **_by_name(parameters)})
-    require_same(orbit.problem, period, mirror, p)
+    _require_same(orbit.problem, period, mirror, p)
     return Start(replace(orbit.problem, system=system), orbit.unknowns, p)
 
 
 def _from_recurrence(
     system: FilippovSystem,
-    found: Recurrence,
+    found: _Recurrence,
     forcing: Forcing | None,
     mirror: Array | None,
     p: Array,
 ) -> Start:
     starts = np.array([part.start for part in found.parts])
     durations = np.array([part.duration for part in found.parts])
-    if forcing is not None:  # the clock within one period keeps its size that of the orbit's
+    if forcing is not None:  # within one period, so that the time has the size of the orbit's
         span = forcing(p)[0]
         starts[:, -1] -= span * math.floor(starts[0, -1] / span)
     legs = tuple(part.leg for part in found.parts)
@@ -258,10 +495,10 @@ def _problem(
 ) -> Start:
     phase = reference = None
     if forcing is not None and not forcing.found:
-        require_period(system, legs, starts, durations, forcing(p)[0], p)
-    if not legs[-1].name:
+        _require_period(system, legs, starts, durations, forcing(p)[0], p)
+    if legs[-1].timed:
         phase = np.zeros(system.extended_dimension)
-        if system.time_dependent:  # from time 0, which is the same phase of every forcing period
+        if system.time_dependent:  # from the phase 0 of the forcing
             assert forcing is not None
             span = forcing(p)[0]
             wait = -starts[0, -1] % span
@@ -286,12 +523,11 @@ def _from_word(
     mirror: Array | None,
     p: Array,
 ) -> Start:
-    """Follow the legs of an itinerary, each to its event; one mode alone over periods of the forcing."""
+    """Integrate the legs of an itinerary to their events, or one mode over periods of the forcing."""
     if forcing is not None and mirror is None and (leg := lone_leg(system, itinerary)) is not None:
         return _from_mode(system, x, leg, forcing, p)
     legs = word_legs(system, itinerary, mirror is not None)
-    found = flights_of(system, legs).followed(x, p, _LONGEST)
-    starts, durations = found or _followed(system, legs, x, p)
+    starts, durations = _followed(system, legs, x, p)
     periods = 0.0
     if forcing is not None:
         count = float(durations.sum()) / forcing(p)[0]
@@ -300,8 +536,8 @@ def _from_word(
 
 
 def _from_mode(system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, p: Array) -> Start:
-    """Fly one mode over periods of the forcing, and take as many as close best."""
-    span, n, y, apart = span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
+    """Integrate one mode over the number of periods of the forcing after which it closes best."""
+    span, n, y, apart = _span_of(forcing, p) or 1.0, system.dimension, x, list[float]()
     for _ in range(_MOST_PERIODS):
         y = fly(system, leg, y, span, p).end[: x.size]
         apart.append(float(np.abs(y[:n] - x[:n]).max()))
@@ -313,17 +549,16 @@ def _from_mode(system: FilippovSystem, x: Array, leg: Leg, forcing: Forcing, p: 
 def _followed(
     system: FilippovSystem, legs: Sequence[Leg], x: Array, p: Array
 ) -> tuple[Array, Array]:
-    """Starts and durations of legs that are followed one after the other."""
+    """Starts and durations of legs that are integrated one after the other."""
     starts, durations, natural = list[Array](), list[float](), 0.0
-    for k, leg in enumerate(legs):  # a state near zero says little of how long a leg may take
+    for k, leg in enumerate(legs):  # the longest time so far, as a state near zero has a short one
         natural = max(natural, _natural_time(system, x, p, leg.mode))
         duration = march(system, leg, x, p, _LONGEST * natural)
         if duration is None:
             n, t = system.dimension, float(x[-1]) if system.time_dependent else sum(durations)
             raise ConvergenceError(
-                f"guess: expected leg {k + 1} {leg_name(leg)} to come to its event, received none "
-                f"from {x[:n].tolist()} at t = {t:.6g}. Start closer to the orbit, or change the "
-                "itinerary."
+                f"guess: leg {k + 1} {leg_name(system, leg)} from {x[:n].tolist()} at t = {t:.6g} does not reach "
+                "its event. Start closer to the orbit, or change the itinerary."
             )
         starts.append(x)
         durations.append(duration)
@@ -340,34 +575,34 @@ def _simulated(
     hint: float | None,
     forced: bool,
     p: Array,
-) -> Recurrence:
-    """Simulate from a state, longer and longer, until the run comes back."""
-    # Where there are resets the state may be meant as that after one, which is due again at once when a
-    # run begins there; so a state a little later is tried as well.
+) -> _Recurrence:
+    """Simulate from a state, longer and longer, until the run recurs."""
+    # With resets the state may be one just after a reset, which is due again when a run begins there. So a
+    # state a little later is tried first.
     natural = _natural_time(system, x, p)
     starts = [x]
     if system.resets:
         try:
-            later = fly(system, Leg(_letters(system, x, p)), x, _LATER * natural, p).end
+            later = fly(system, Leg(_mode(system, x, p)), x, _LATER * natural, p).end
             starts = [later[: x.size], x]
         except NonsmoothError:
             pass
-    best: Recurrence | None = None
+    best: _Recurrence | None = None
     run: Trajectory | None = None
     for start in starts:
-        run, found = _comes_back(system, start, mirror, hint or natural, hint, forced, p)
+        run, found = _recurring(system, start, mirror, hint or natural, hint, forced, p)
         if found is not None and (best is None or found.distance < best.distance):
             best = found
         if best is not None and best.distance < _GOOD:
             break
     assert run is not None
-    require_steady(run)
-    if best is None or best.distance > CLOSE:
+    _require_steady(run)
+    if best is None or best.distance > _CLOSE:
         raise refused(run, best)
     return best
 
 
-def _comes_back(
+def _recurring(
     system: FilippovSystem,
     x: Array,
     mirror: Array | None,
@@ -375,11 +610,11 @@ def _comes_back(
     hint: float | None,
     forced: bool,
     p: Array,
-) -> tuple[Trajectory, Recurrence | None]:
+) -> tuple[Trajectory, _Recurrence | None]:
     n, values = system.dimension, named(system, p)
     t = float(x[-1]) if system.time_dependent else 0.0
-    best: Recurrence | None = None
-    told = {"period": hint, "about": None} if forced else {"period": None, "about": hint}
+    best: _Recurrence | None = None
+    given = {"period": hint, "about": None} if forced else {"period": None, "about": hint}
     for span in [k + 0.6 for k in (1, 2, 4, 8, 16)] if hint else [4.0 * 2**k for k in range(11)]:
         run = simulate(
             system,
@@ -391,7 +626,7 @@ def _comes_back(
             max_events=_MOST_EVENTS,
         )
         for first in (True, False):
-            found = recurrence(run, symmetry=mirror, first=first, **told)
+            found = recurrence(run, symmetry=mirror, first=first, **given)
             if found is not None and (best is None or found.distance < 0.3 * best.distance):
                 best = found
         if (best is not None and best.distance < _GOOD) or run.status is not Status.REACHED_END:
@@ -399,7 +634,7 @@ def _comes_back(
     return run, best
 
 
-def _letters(system: FilippovSystem, x: Array, p: Array) -> str:
+def _mode(system: FilippovSystem, x: Array, p: Array) -> str:
     """The mode of a state that is on no surface."""
     h = Surfaces(system).values(x, p)[0][: system.surface_count]
     return "".join("+" if v > 0 else "-" for v in h) + "o" * len(system.impacts)
@@ -407,7 +642,7 @@ def _letters(system: FilippovSystem, x: Array, p: Array) -> str:
 
 def _natural_time(system: FilippovSystem, x: Array, p: Array, mode: str | None = None) -> float:
     """The time in which the state changes by its size."""
-    field = Leg(_letters(system, x, p) if mode is None else mode).field(system)
+    field = Leg(_mode(system, x, p) if mode is None else mode).field(system)
     rate = field.rate.copied(field.states_at(x, p), p)[0][: system.dimension, 0]
     size, speed = math.hypot(*x[: system.dimension]), math.hypot(*rate)
     return size / speed if size > 0.0 and speed > 0.0 and math.isfinite(speed) else 1.0

@@ -8,6 +8,8 @@ dimension lost are exact. The full matrix gives them with rounding, which estima
 
 from __future__ import annotations
 
+import math
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -15,13 +17,11 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.shooting import reduced_map, whole_map
-from ...flow.fixed import has_interpreter
 from ...model import Array
 from ...model.derivatives.event_maps import surface_map
 from ..runs.legs import leg_name
-from ..runs.saltation import GRAZING, saltations
-from .boundary_value_problem import BoundaryProblem, Evaluation
+from ..runs.saltation import passages, saltations
+from .boundary_value_problem import BoundaryProblem, Evaluation, places_of
 
 #: A direction of which a leg leaves no more than this part is lost.
 _LOST = 1e-12
@@ -114,10 +114,6 @@ def return_map(problem: BoundaryProblem, at: Evaluation) -> Array:
 
 def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
     """As ``return_map``; None where it is not finite, as an event is grazed."""
-    if has_interpreter():
-        flight, wrap = at.flight, None if problem.symmetry is None else problem.wrap
-        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
-        return whole_map(legs, wrap, np.ones(problem.dimension))
     with np.errstate(all="ignore"):
         found = return_map(problem, at)
     return found if np.isfinite(found).all() else None
@@ -125,18 +121,12 @@ def finite_return_map(problem: BoundaryProblem, at: Evaluation) -> Array | None:
 
 def _condensed(problem: BoundaryProblem, at: Evaluation, p: Array) -> Array:
     """The return map on perturbations across the flow, in the smallest subspace that they pass."""
-    flight = at.flight
     # in units of the orbit: what is lost is told by sizes, and states and time have units of their own
     units = _units(problem, at)
-    basis = _kept(problem, at, p, units)
-    if has_interpreter():
-        legs = flight.by_start, flight.rate, flight.gradient, flight.after_state
-        wrap = None if problem.symmetry is None else problem.wrap
-        found = reduced_map(legs, wrap, units, basis, GRAZING, _LOST)
-        if found is not None:
-            return found
-    monodromy(problem, at)  # DegenerateError where an event is grazed
-    return _passed(problem, at, units, basis)
+    passages(at.flight, *_events(problem, at))  # DegenerateError where an event is grazed
+    maps = leg_maps(problem, at) * (units / units[:, None])
+    flown = at.flight.by_start[:, : problem.dimension] * (units / units[:, None])
+    return reduced_map(maps, flown, _kept(problem, at, p, units))
 
 
 def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
@@ -152,17 +142,18 @@ def _units(problem: BoundaryProblem, at: Evaluation) -> Array:
     return units
 
 
-def _passed(problem: BoundaryProblem, at: Evaluation, units: Array, basis: Array) -> Array:
-    """The return map on what the legs leave of some directions."""
-    count, n = len(problem.legs), problem.dimension
-    maps = leg_maps(problem, at) * (units / units[:, None])
-    flown = at.flight.by_start[:, :n] * (units / units[:, None])
+def reduced_map(maps: Array, flown: Array, basis: Array) -> Array:
+    """Product of maps (L, n, n) of legs on what these leave of some directions (n, r)."""
+    # Directions are lost beside those that the legs carry, ``flown`` (L, n, n).
+    count, n = len(maps), maps.shape[1]
     bases: list[Array] = [np.eye(n)] * count
-    for _ in range(2):
-        for i in range(count):
-            size = float(np.linalg.norm(flown[i] @ basis)) if basis.size else 0.0
-            basis = _range(maps[i] @ basis, size)
-            bases[(i + 1) % count] = basis
+    for i in range(2 * count):
+        k, following = i % count, (i + 1) % count
+        size = _length(flown[k] @ basis) if basis.size else 0.0
+        basis = _range(maps[k] @ basis, size)
+        if i >= count and basis.shape[1] == bases[following].shape[1]:
+            break  # the second time round nothing more is lost
+        bases[following] = basis
     first = min(range(count), key=lambda i: bases[i].shape[1])
     product: Array = np.eye(bases[first].shape[1])
     for k in range(count):
@@ -179,25 +170,26 @@ def _kept(problem: BoundaryProblem, at: Evaluation, p: Array, units: Array) -> A
     return np.asarray(np.linalg.svd(np.array(rows) * units)[2][len(rows) :].T)
 
 
+def _length(matrix: Array) -> float:
+    return math.sqrt(float(np.vdot(matrix, matrix)))
+
+
 def _range(matrix: Array, size: float) -> Array:
     """Orthonormal basis of the range of a matrix, without what is lost beside ``size``."""
     if not matrix.shape[1]:
         return matrix
+    if matrix.shape[1] == 1:
+        length = _length(matrix)
+        return matrix / length if length > _LOST * size else matrix[:, :0]
     u, sizes, _ = np.linalg.svd(matrix, full_matrices=False)
     return np.asarray(u[:, sizes > _LOST * max(float(sizes[0]), size)])
 
 
 def monodromy(problem: BoundaryProblem, at: Evaluation) -> Array:
     """Product of state-transition and saltation matrices over the legs, (N, N)."""
-    n, flight = problem.dimension, at.flight
-    after = np.roll(flight.before[:, :n], -1, axis=0)
-    if problem.symmetry is not None:
-        after[-1] = np.linalg.solve(problem.wrap, after[-1])
-    jumps = saltations(
-        flight, after, lambda i: f"leg {i + 1} {leg_name(problem.legs[i])}", _events(problem)
-    ).matrix
-    product: Array = np.eye(n)
-    for step in jumps @ flight.by_start:
+    jumps = saltations(at.flight, *_events(problem, at)).matrix
+    product: Array = np.eye(problem.dimension)
+    for step in jumps @ at.flight.by_start:
         product = step @ product
     return np.asarray(problem.wrap @ product, float)
 
@@ -214,5 +206,14 @@ def stability(values: NDArray[np.complex128], error: float) -> str:
     return "superstable" if values.size and not np.any(sizes) else "asymptotically stable"
 
 
-def _events(problem: BoundaryProblem) -> NDArray[np.bool_]:
-    return np.array([bool(leg.name) for leg in problem.legs])
+def _events(
+    problem: BoundaryProblem, at: Evaluation
+) -> tuple[Array, Callable[[int], str], NDArray[np.bool_]]:
+    """Fields after the events of legs, their names, and which legs have one."""
+    following = places_of(len(problem.legs), problem.dimension).next_leg
+    after = at.flight.before[following, : problem.dimension]
+    if problem.symmetry is not None:
+        after[-1] = np.linalg.solve(problem.wrap, after[-1])
+    legs = problem.legs
+    named = lambda i: f"leg {i + 1} {leg_name(problem.system, legs[i])}"
+    return after, named, np.array([not leg.timed for leg in legs])

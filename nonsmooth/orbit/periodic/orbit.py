@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import NamedTuple
 
@@ -10,40 +10,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...flow.fixed import flow_for
+from ...flow.names import described
 from ...flow.trajectory import Trajectory
 from ...model import Array, FilippovSystem, ParameterError, Surfaces
 from ...model.derivatives.variational import variational_field
 from ...notebook import card, circle
-from ..runs.guards import described, faults_along, watch
-from .boundary_value_problem import BoundaryProblem, Evaluation
+from ..runs.guards import faults_along, watch
+from .boundary_value_problem import BoundaryProblem, Evaluation, mirrored
 from .multipliers import Multipliers, multipliers_of, stability
-from .orbit_run import orbit_run
-
-
-@dataclass(frozen=True, eq=False)
-class OrbitLeg:
-    """A leg of a periodic orbit.
-
-    Attributes
-    ----------
-    mode : str
-        One letter for each surface.
-    start : ndarray (n,)
-        States at its start.
-    t : float
-        Of the start: of the forcing, or since the start of the orbit.
-    duration : float
-        Time that it takes.
-    event, kind : str
-        Name of the guard that ends it and kind of the event; empty where a time ends it.
-    """
-
-    mode: str
-    start: Array
-    t: float
-    duration: float
-    event: str
-    kind: str
+from .orbit_run import OrbitLeg, orbit_leg, orbit_run
 
 
 @dataclass(frozen=True)
@@ -160,12 +135,12 @@ class PeriodicOrbit:
             for leg, x, duration in zip(
                 self.problem.legs, self.evaluation.starts, self.evaluation.durations, strict=True
             ):
-                start, mode, name = x[:n], leg.mode, leg.name
+                start = x[:n]
                 if flip is not None:
                     start = flip @ start
                     mode = mirrored_mode(self, leg.mode, x, float(duration))
-                    name = _MIRRORED.get(name, name)
-                result.append(OrbitLeg(mode, start, t, float(duration), name, leg.kind))
+                    leg = replace(mirrored(self.problem, leg), mode=mode)
+                result.append(orbit_leg(self.system, leg, start, t, float(duration)))
                 t += float(duration)
         return tuple(result)
 
@@ -299,9 +274,6 @@ class PeriodicOrbit:
         return f"PeriodicOrbit(period {self.period:.10g}, {len(self.legs)} legs, {self.stability})"
 
 
-_MIRRORED = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}
-
-
 def _number(m: complex) -> str:
     if not m.imag:
         return f"{m.real:.12g}"
@@ -340,16 +312,17 @@ def _margins(orbit: PeriodicOrbit) -> list[Margin]:
         duration, begins = float(at.durations[i]), orbit.legs[i].t
         ends = begins + duration
         verb = "slides" if "s" in leg.mode else "lasts"
-        if leg.name:
+        if not leg.timed:
             result.append(Margin(i, f"{verb} for", duration, duration / orbit.period, ends))
             gradient, rate = at.events[i].gradient[: size.size], at.flown[i].rate[: size.size]
             length = float(np.linalg.norm(gradient * size) * np.linalg.norm(rate / size)) or 1.0
+            name = leg.name(problem.system)
             angle = float(at.events[i].gradient @ at.flown[i].rate) / length
-            result.append(Margin(i, f"meets {leg.name} at the angle", angle, angle, ends))
+            result.append(Margin(i, f"meets {name} at the angle", angle, angle, ends))
         if duration <= 0.0:
             continue
         for near in watch(problem.system, leg.mode, at.starts[i], duration, p).approaches:
-            what = f"keeps {described(near.guard)} at its nearest by"
+            what = f"keeps {described(problem.system, near.guard)} at its nearest by"
             relative = near.distance / float(np.abs(size[: orbit.system.dimension]).max())
             result.append(Margin(i, what, near.distance, relative, begins + near.t))
     return result

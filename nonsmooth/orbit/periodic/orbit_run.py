@@ -1,9 +1,9 @@
-"""A periodic orbit written out as a run: its legs followed one after the other."""
+"""The legs of a periodic orbit, and the orbit as a run."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import Protocol
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -11,27 +11,51 @@ from ...flow.follow import follow
 from ...flow.status import Status
 from ...flow.trajectory import Event, Segment, Steps, Trajectory
 from ...model import Array, FilippovSystem
+from ..runs.legs import Leg
 
 
-class _Leg(Protocol):
-    @property
-    def mode(self) -> str: ...
-    @property
-    def start(self) -> Array: ...
-    @property
-    def t(self) -> float: ...
-    @property
-    def duration(self) -> float: ...
-    @property
-    def event(self) -> str: ...
-    @property
-    def kind(self) -> str: ...
+@dataclass(frozen=True, eq=False)
+class OrbitLeg:
+    """A leg of a periodic orbit.
+
+    Attributes
+    ----------
+    mode : str
+        One letter for each surface.
+    start : ndarray (n,)
+        States at its start.
+    t : float
+        Of the start: of the forcing, or since the start of the orbit.
+    duration : float
+        Time that it takes.
+    event, kind : str
+        Name of the guard that ends it and kind of the event; empty where a time ends it.
+    element, side : int
+        Of that event, as in ``Event``.
+    """
+
+    mode: str
+    start: Array
+    t: float
+    duration: float
+    event: str
+    kind: str
+    element: int = -1
+    side: int = 0
+
+
+def orbit_leg(
+    system: FilippovSystem, leg: Leg, start: Array, t: float, duration: float, ends: bool = True
+) -> OrbitLeg:
+    """A leg with numbers; without its event where it is a part before its end."""
+    own = (leg.name(system), leg.kind, leg.element, leg.side) if ends else ("", leg.kind)
+    return OrbitLeg(leg.mode, start, t, duration, *own)
 
 
 def orbit_run(
-    system: FilippovSystem, parameters: Mapping[str, float], legs: Sequence[_Leg]
+    system: FilippovSystem, parameters: Mapping[str, float], legs: Sequence[OrbitLeg]
 ) -> Trajectory:
-    """Follow each leg over its duration, and put them end to end."""
+    """Integrate each leg over its duration, and join them."""
     times, states, starts = list[Array](), list[Array](), list[float]()
     coefficients: list[Array] = []
     events: list[Event] = []
@@ -56,11 +80,9 @@ def orbit_run(
         end, following = leg.t + leg.duration, legs[(k + 1) % len(legs)]
         segments.append(Segment(leg.mode, leg.t, end, first, len(coefficients)))
         if leg.event:
-            events.append(
-                Event(
-                    leg.kind, end, run.x[-1], leg.mode, following.mode, leg.event, following.start
-                )
-            )
+            modes, of = (leg.mode, following.mode), (leg.element, leg.side)
+            after = following.start
+            events.append(Event(leg.kind, end, run.x[-1], *modes, leg.event, after, *of))
     last = states[-1][-1]
     events.append(Event("end", float(times[-1][-1]), last, legs[-1].mode, legs[-1].mode))
     return Trajectory(

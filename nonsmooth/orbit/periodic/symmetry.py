@@ -17,8 +17,8 @@ from ...flow.simulate import simulate
 from ...model import Array, FilippovSystem, NonsmoothError, OptionError, Surfaces, explain
 from ...model.checks import real_array
 from ...model.derivatives.variational import plain_field, variational_field
-from ..runs.legs import Leg, fly, surface_of
-from .boundary_value_problem import BoundaryProblem
+from ..runs.legs import fly
+from .boundary_value_problem import BoundaryProblem, mirrored
 from .orbit import PeriodicOrbit
 
 # Orbits whose legs go round several times, and the same orbits once.
@@ -41,7 +41,7 @@ def once_round(problem: BoundaryProblem, u: Array, p: Array) -> tuple[BoundaryPr
     # The half of a symmetric orbit goes round an odd number of times.
     starts, durations = problem.split(u)
     count, n = len(problem.legs), problem.system.dimension
-    if not problem.legs[-1].name:
+    if problem.legs[-1].timed:
         return _leg_once(problem, starts[0], float(durations[0]), p)
     size = problem.scales(u)[:n] if count > 1 else np.ones(n)
     whole = float(np.abs(durations).sum()) or 1.0
@@ -87,7 +87,7 @@ def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[Bound
     half."""
     # Whether the system has that symmetry too is not asked.
     n, count = problem.system.dimension, len(problem.legs)
-    single = not problem.legs[-1].name
+    single = problem.legs[-1].timed
     if problem.symmetry is not None or n > _MOST_STATES or (not single and count % 2):
         return
     starts, durations = problem.split(u)
@@ -114,48 +114,6 @@ def halves(problem: BoundaryProblem, u: Array, p: Array) -> Iterator[tuple[Bound
         ):
             continue
         yield half, half.pack(starts[:k], spans)
-
-
-# Legs as the symmetry of an orbit maps them: the other half of one that is solved for as a half.
-
-TURNED = str.maketrans("+-", "-+")
-
-
-def neighbours(problem: BoundaryProblem, i: int) -> tuple[Leg, Leg]:
-    """The legs before and after leg ``i``; beyond the ends of a half those of the other half."""
-    legs, last = problem.legs, len(problem.legs) - 1
-    before = legs[i - 1] if i else mirrored(problem, legs[last])
-    after = legs[i + 1] if i < last else mirrored(problem, legs[0])
-    return before, after
-
-
-def mirrored(problem: BoundaryProblem, leg: Leg) -> Leg:
-    """A leg as the symmetry of the problem maps it; surfaces whose function changes its sign turn."""
-    if problem.symmetry is None:
-        return leg
-    turned = _turning(problem)
-    mode = "".join(
-        c.translate(TURNED) if k < len(turned) and turned[k] else c for k, c in enumerate(leg.mode)
-    )
-    surface = surface_of(problem.system, leg)
-    name, side = leg.name, leg.side
-    if surface >= 0 and turned[surface]:
-        name = {"L_F1 h": "L_F2 h", "L_F2 h": "L_F1 h"}.get(name, name)
-        side = -side
-    return replace(leg, mode=mode, name=name, side=side)
-
-
-def _turning(problem: BoundaryProblem) -> list[bool]:
-    """Which switching functions the symmetry maps to their negatives."""
-    system = problem.system
-    x = np.cos(1.0 + np.arange(system.dimension))
-    back = np.linalg.inv(problem.symmetry) if problem.symmetry is not None else np.eye(x.size)
-    result = []
-    for k in range(system.surface_count):
-        h = system.surface_function(k)
-        a, b = (float(system.evaluate(h, v, None)[0, 0]) for v in (x, back @ x))
-        result.append(a * b < 0.0)
-    return result
 
 
 #: The other half may miss the mirror image of the first by this part of the orbit, and of what it magnifies.

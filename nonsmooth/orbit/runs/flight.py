@@ -8,27 +8,18 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
+from functools import cached_property, lru_cache
 from itertools import accumulate, pairwise
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ...flow.compiled.shooting import Demands, FollowedProgram, OrbitProgram, SolvedOrbit
 from ...flow.compiled.smooth import LegsProgram
-from ...flow.fixed import (
-    MOST_STEPS,
-    TOLERANCE,
-    followed_program,
-    has_interpreter,
-    legs_program,
-    stuck,
-)
+from ...flow.fixed import MOST_STEPS, TOLERANCE, has_interpreter, legs_program, stuck
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
-from ...model.derivatives.variational import guarded_field, plain_field
-from .guards import ending
+from ...model.derivatives.variational import plain_field
 from .legs import Flown, Leg, fly, leg_name
 
 #: Local errors of the steps in extended precision.
@@ -88,6 +79,12 @@ class Flight:
         )
 
 
+@lru_cache(maxsize=256)
+def _event_places(n: int, most: int, q: int) -> tuple[int, ...]:
+    """Where g, g_x, g_p, e, e_x and e_p begin and end."""
+    return (0, *accumulate((n, n * most, n * q, 1, most, q)))
+
+
 class Flights:
     """Legs to be flown again and again.
 
@@ -106,8 +103,8 @@ class Flights:
         self.sizes = tuple(field.blocks.states for field in self.fields)
         self._most = max(self.sizes)
         # events at one instant follow from each other: composed in Python
-        self._composed = [i for i, leg in enumerate(self.legs) if leg.name and leg.further]
-        self._plain = [i for i, leg in enumerate(self.legs) if not leg.name]
+        self._composed = [i for i, leg in enumerate(self.legs) if leg.further and not leg.timed]
+        self._plain = [i for i, leg in enumerate(self.legs) if leg.timed]
 
     @cached_property
     def _program(self) -> LegsProgram:
@@ -128,146 +125,49 @@ class Flights:
         of_legs = [fields[leg.mode] for leg in self.legs]
         return legs_program(of_legs, events, len(self.system.parameter_names))
 
-    def exact(self, starts: Array, durations: Array, p: Array) -> tuple[Array, Array, Array] | None:
-        """States after the events and the events' functions with more digits than a double has.
+    def ends(
+        self, starts: Array, durations: Array, p: Array, extended: bool
+    ) -> tuple[Array, Array | None, Array] | None:
+        """States after the events and the events' functions, without derivatives.
 
         Returns
         -------
-        after, rest, value : ndarray (L, N), (L, N), (L,)
-            States rounded, and what that leaves. None where there are no more digits to be had.
+        after, rest, value : ndarray (L, N), (L, N) or None, (L,)
+            States rounded, and in extended precision what that leaves. None where legs fail or
+            where not each is a flow of the states to one event.
         """
         program = self._plain_program if has_interpreter() else None
         if program is None:
             return None
-        found = program.extended(starts, p, durations, EXTENDED, MOST_STEPS)
-        if found is None:
+        n = starts.shape[1]
+        if extended:
+            found = program.extended(starts, p, durations, EXTENDED, MOST_STEPS)
+            if found is None:
+                return None
+            results, rest = found
+            return results[:, :n], rest[:, :n], results[:, n]
+        flown = program(starts, p, durations, TOLERANCE, MOST_STEPS)
+        if flown.failed >= 0:
             return None
-        n, (results, rest) = starts.shape[1], found
-        return results[:, :n], rest[:, :n], results[:, n]
-
-    @cached_property
-    def _orbit_program(self) -> OrbitProgram | None:
-        """Newton's method on an orbit of these legs, where each ends by one event."""
-        if len(set(self.sizes)) > 1 or not has_interpreter():
-            return None
-        if self._plain_program is None:
-            return None
-        n, q = self._most, len(self.system.parameter_names)
-        start, fixed, ours, theirs = self._template
-        legs, plain = self._program, self._plain_program
-        return OrbitProgram(legs, plain, n, q, self.chosen, ours, theirs, start, fixed)
-
-    @cached_property
-    def _followed_program(self) -> FollowedProgram | None:
-        if self._orbit_program is None:
-            return None
-        system, maps = self.system, [leg.map(self.system) for leg in self.legs]
-        events = [at for at in maps if at is not None]
-        names = len(system.parameter_names)
-        return followed_program(
-            [guarded_field(system, leg.mode) for leg in self.legs],
-            [ending(system, leg) for leg in self.legs],
-            events,
-            [event.plain for event in events],
-            (system.extended_dimension, system.dimension, names),
-        )
-
-    def followed(self, x: Array, p: Array, times: float) -> tuple[Array, Array] | None:
-        """Follow the legs from a state, each to its event, whatever other guards say.
-
-        Parameters
-        ----------
-        x : ndarray (N,)
-        p : ndarray
-        times : float
-            A leg is followed for so many of the times in which the state changes by its size.
-
-        Returns
-        -------
-        starts, durations : ndarray (L + 1, N), (L,)
-            The last start is the end. None where a leg does not come to its event, and for legs that
-            do not end by one event each.
-        """
-        program = self._followed_program
-        return None if program is None else program(x, p, times, TOLERANCE, MOST_STEPS)
-
-    def newton(
-        self, u: Array, p: Array, scales: Array, wrap: Array | None, demands: Demands
-    ) -> tuple[SolvedOrbit, Flight] | None:
-        """Solve the equations of an orbit of these legs; None where that is not to be had.
-
-        Parameters
-        ----------
-        u : ndarray (m,)
-            Starts of the legs, then durations.
-        p : ndarray
-            All parameters.
-        scales : ndarray (m,)
-            Sizes of the unknowns.
-        wrap : ndarray (N, N) or None
-            Symmetry that maps the end of the last leg.
-        demands : Demands
-        """
-        program = self._orbit_program
-        found = program.newton(u, p, scales, wrap, demands) if program is not None else None
-        return None if found is None else (found, self._flight_of(found, p.size))
-
-    def evaluated(
-        self, u: Array, p: Array, wrap: Array | None, tol: float, demands: Demands
-    ) -> tuple[SolvedOrbit, Flight] | None:
-        """Their equations at starts, durations and chosen parameters (m + k,); as ``newton``."""
-        program = self._orbit_program
-        found = program.evaluate(u, p, wrap, tol, demands) if program is not None else None
-        return None if found is None else (found, self._flight_of(found, p.size))
-
-    def corrected(
-        self,
-        u: Array,
-        p: Array,
-        scales: Array,
-        wrap: Array | None,
-        across: Array,
-        demands: Demands,
-    ) -> tuple[SolvedOrbit, Flight] | None:
-        """Their solution with one chosen parameter across a direction in units ``scales``; as ``newton``."""
-        program = self._orbit_program
-        if program is None:
-            return None
-        found = program.correct(u, p, scales, wrap, across, demands)
-        return None if found is None else (found, self._flight_of(found, p.size))
-
-    @property
-    def is_direct(self) -> bool:
-        """Whether ``newton``, ``evaluated`` and ``corrected`` are to be had."""
-        return self._orbit_program is not None
-
-    def _flight_of(self, found: SolvedOrbit, parameters: int) -> Flight:
-        n, whole = self._most, found.whole
-        return Flight(
-            self.sizes,
-            whole[:, :, 0],
-            found.before[:, :n],
-            found.after[:, :n],
-            whole[:, :, 1 : 1 + n],
-            whole[:, :, 1 + n :],
-            *self._events(found.results, n, parameters),
-        )
+        return flown.results[:, :n], None, flown.results[:, n]
 
     @cached_property
     def _template(self) -> tuple[Array, Array, NDArray[Any], NDArray[Any]]:
-        """Matrices (x, X, P) at the starts, transposed, and those of entries that do not move."""
+        """States of all legs at a start 0, and matrices (x, X, P)^T of entries that do not move."""
+        # Then places of the entries that move: in these matrices, and in the states.
         width, columns = self._program.width, self.fields[0].blocks.moving.shape[1]
         count, most = len(self.legs), self._most
-        start, fixed = np.zeros((2, count, columns, most))
+        start, fixed = np.zeros((count, width)), np.zeros((count, columns, most))
         ours, theirs = list[NDArray[Any]](), list[NDArray[Any]]()
         for i, field in enumerate(self.fields):
             b = field.blocks
-            start[i, 1 : 1 + b.starts, : b.starts] = np.eye(b.starts)
             fixed[i, :, : b.states] = b.fixed.T
             moving = np.zeros((columns, most), bool)
             moving[:, : b.states] = b.moving.T
             ours.append(np.flatnonzero(moving) + i * columns * most)
             theirs.append(i * width + np.arange(len(ours[-1])))
+            if b.states == b.starts:
+                start[i, : len(ours[-1])] = b.pack(np.eye(b.states, columns, 1))
         return start, fixed, np.concatenate(ours), np.concatenate(theirs)
 
     def __call__(self, starts: Array, durations: Array, p: Array, tol: float = TOLERANCE) -> Flight:
@@ -276,13 +176,13 @@ class Flights:
             return self._one_by_one(starts, durations, p)
         n, most = starts.shape[1], self._most
         template, fixed, ours, theirs = self._template
-        whole = template.copy()
-        whole[:, 0, :n] = starts
-        if most > n:
+        z = template.copy()
+        if most == n:
+            z[:, :n] = starts
+        else:
             for i, field in enumerate(self.fields):
-                whole[i] = field.initial(starts[i], p).T
-        z = np.zeros((len(self.legs), self._program.width))
-        z.ravel()[theirs] = whole.ravel()[ours]
+                own = field.start(starts[i], p)
+                z[i, : own.size] = own
         flown = self._program(z, p, durations, tol, MOST_STEPS)
         if flown.failed >= 0:
             i = flown.failed
@@ -306,8 +206,7 @@ class Flights:
     def _events(self, results: Array, n: int, q: int) -> tuple[Array, ...]:
         """What the events' programs give: g, g_x, g_p, e, e_x, e_p."""
         count, most = len(self.legs), self._most
-        sizes = (n, n * most, n * q, 1, most, q)
-        at = (0, *accumulate(sizes))
+        at = _event_places(n, most, q)
         if not results.shape[1]:
             results = np.zeros((count, at[-1]))
         g, gx, gp, e, ex, ep = [results[:, a:b] for a, b in pairwise(at)]
@@ -366,12 +265,12 @@ class Flights:
             flight.by_start[i, :k], flight.by_parameters[i, :k] = part.by_start, part.by_parameters
             at = field.states_at(starts[i], p)
             flight.before[i, :k] = field.rate.copied(at, p)[0][:, 0]
-            if leg.name:
+            if not leg.timed:
                 self._fill(flight, i, leg.at_end(self.system, part.end, p))
         return self._completed(flight, p)
 
     def _named(self, i: int) -> str:
-        return f"leg {i + 1} {leg_name(self.legs[i])}"
+        return f"leg {i + 1} {leg_name(self.system, self.legs[i])}"
 
 
 def flights_of(

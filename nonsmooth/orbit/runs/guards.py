@@ -13,7 +13,8 @@ from itertools import pairwise
 
 import numpy as np
 
-from ...flow.watched import LegsWatch, passing, watched
+from ...flow.fixed import LegsWatch, passing, watched
+from ...flow.names import described, guard_name
 from ...model import Array, FilippovSystem, Guard
 from ...model.derivatives.variational import GuardedField, guarded_field, variational_field
 from .legs import Leg, leg_name
@@ -95,43 +96,33 @@ def _faults_seen(field: GuardedField, rows: Array, p: Array) -> list[str]:
             slope = np.abs(field.gradients.copied(row[4:], p)[0][k])
             scale = float(slope @ np.abs(row[4:])) + math.sqrt(float(slope @ slope)) * 1e-3
         seen[k].append((t, value, scale))
-    return [f for g, values in zip(guards, seen, strict=True) for f in _faults(g, values)]
+    system = field.motion.system
+    return [f for g, values in zip(guards, seen, strict=True) for f in _faults(system, g, values)]
 
 
-def _faults(guard: Guard, values: Sequence[tuple[float, float, float]]) -> list[str]:
+def _faults(
+    system: FilippovSystem, guard: Guard, values: Sequence[tuple[float, float, float]]
+) -> list[str]:
     """What a guard's values inside a leg contradict, earliest first."""
     ordered = sorted(values)
     if guard.kind in ("stop", "reset", "zero"):
         for (_, a, _), (t, b, _) in pairwise(ordered):
             if a * b < 0.0 and guard.side in (0, 1 if b > a else -1) and guard.kind != "zero":
-                return [f"{guard.kind} {guard.name!r} is met {t:.6g} after its start"]
+                name = guard_name(system, guard)
+                return [f"{guard.kind} {name!r} is met {t:.6g} after its start"]
         return []
     low = [(t, v) for t, v, scale in ordered if v < -_NEGATIVE * scale]
     if not low:
         return []
     t, v = min(low, key=lambda entry: entry[1])
-    return [f"{described(guard)} is violated {t:.6g} after its start (by {abs(v):.3g})"]
-
-
-def described(guard: Guard) -> str:
-    """A guard's condition in words."""
-    if guard.kind == "surface":
-        return f"h{guard.index} {'>' if guard.side > 0 else '<'} 0"
-    if guard.kind == "exit":
-        condition = "<= 0" if guard.side > 0 else ">= 0"
-        if guard.name.startswith("lambda"):
-            return f"{guard.name} {'<= 1' if guard.side > 0 else '>= -1'}"
-        return f"the condition {guard.name} {condition} of sliding"
-    if guard.kind == "impact":
-        return f"the gap of {guard.name!r} >= 0"
-    return f"the reaction of {guard.name!r} >= 0" if guard.kind == "release" else guard.name
+    return [f"{described(system, guard)} is violated {t:.6g} after its start (by {abs(v):.3g})"]
 
 
 def change_fault(
     system: FilippovSystem, leg: Leg, following: str, end: Array, after: Array, p: Array
 ) -> str:
     """Why a leg cannot be followed by a mode as its event says; empty if it can."""
-    if not leg.name:
+    if leg.timed:
         return ""
     own, rate = leg.at_end(system, end, p), leg.field(system).rate.copied(end, p)[0][:, 0]
     y = variational_field(system, following).states_at(after, p)
@@ -155,9 +146,10 @@ def _change_fault(
     assert own is not None
     guard = own.guard
     if guard.kind in ("surface", "exit", "impact", "release") and speed > 0.0:
-        return f"at its end {described(guard)} is about to hold, not to fail ({leg.name})"
+        condition, name = described(system, guard), leg.name(system)
+        return f"at its end {condition} is about to hold, not to fail ({name})"
     if guard.kind in ("stop", "reset") and guard.side * speed < 0.0:
-        return f"{guard.kind} {guard.name!r} is met from the wrong side at its end"
+        return f"{guard.kind} {leg.name(system)!r} is met from the wrong side at its end"
     return _following_fault(field, begin, p)
 
 
@@ -183,7 +175,7 @@ def _negative(field: GuardedField, begin: Array, p: Array) -> str:
         for value, size in zip(rows[k].tolist(), scale.tolist(), strict=False):
             if abs(value) > _NEGATIVE * size:
                 if value < 0.0:
-                    return f"{described(guard)} fails"
+                    return f"{described(field.motion.system, guard)} fails"
                 break
     return ""
 
@@ -198,30 +190,30 @@ def faults_along(
     closes: bool,
 ) -> list[str]:
     """What the guards contradict along legs that follow each other, leg by leg."""
-    guards = LegGuards(system, legs)
+    made = lambda: LegGuards(system, legs)  # kept for an orbit, which is one of many of a family
+    guards = system.cached(("guards of legs", tuple(legs)), made) if closes else made()
     fields, (rows, begins, _) = guards.fields, guards(starts, p, durations)
     result, count = list[str](), len(legs)
     for i, leg in enumerate(legs):
         if durations[i] <= 0.0:
-            result.append(f"leg {i + 1} {leg_name(leg)} has the duration {durations[i]:.6g}")
+            result.append(
+                f"leg {i + 1} {leg_name(system, leg)} has the duration {durations[i]:.6g}"
+            )
             continue
         found, following = _faults_seen(fields[i], rows[i], p), (i + 1) % count
-        if leg.name and (closes or following):
+        if not leg.timed and (closes or following):
             field, begin = fields[following], begins[following]
             fault = _change_fault(system, leg, float(speeds[i]), field, begin, p)
             found += [fault] if fault else []
-        result += [f"leg {i + 1} {leg_name(leg)}: {fault}" for fault in found]
+        result += [f"leg {i + 1} {leg_name(system, leg)}: {fault}" for fault in found]
     return result
 
 
 def ending(system: FilippovSystem, leg: Leg) -> tuple[int, int]:
     """Number of the guard that ends a leg among those of its mode, and its direction."""
     guards = guarded_field(system, leg.mode).motion.guards
-    row = next(
-        k
-        for k, g in enumerate(guards)
-        if g.name == leg.name and (g.kind != "exit" or leg.side in (0, g.side))
-    )
+    own = leg.kind, leg.element, leg.side
+    row = next(k for k, g in enumerate(guards) if g.ends(*own))
     return row, guards[row].side if guards[row].kind in ("stop", "reset") else -1
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...flow.follow import follow
+from ...flow.names import described, guard_name
 from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...model import (
@@ -31,7 +32,8 @@ from ...model import (
 from ...model.derivatives.event_maps import event_map, function_map
 from ...model.derivatives.variational import guarded_field, variational_field
 from ...model.laws.explicit import explicit
-from .guards import change_fault, described
+from ...model.laws.switches import event_guards
+from .guards import change_fault
 from .legs import Flown, Leg, fly
 from .saltation import saltation
 
@@ -91,16 +93,15 @@ def read_word(system: FilippovSystem, word: str | Sequence[str]) -> list[str]:
 
 def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "") -> Leg:
     """The leg of a mode that another mode follows, where the letters tell by which event."""
-    resets, impacts = [n for n, _ in system.resets], list(system.impacts)
-    stops = [n for n, _ in system.stops]
-    if name in resets or name in stops or name in impacts:
-        kind = "reset" if name in resets else "stop" if name in stops else "impact"
-        if kind == "impact" and _closed(system, mode, impacts.index(name)):
-            kind = "release"
-        return Leg(mode, name, kind)
-    leg = _told(system, mode, following, [*resets, *stops, *impacts])
-    names = [*resets, *stops, *impacts, leg.name]
-    if name not in ("", leg.name):
+    events = {guard_name(system, guard): guard for guard in event_guards(system)}
+    if name in events:
+        return Leg(mode, events[name].kind, events[name].element, events[name].side)
+    if name in system.impacts:
+        return _of_contact(system, mode, system.impacts.index(name))
+    names = [*events, *system.impacts]
+    leg = _told(system, mode, following, names)
+    names.append(leg.name(system))
+    if name not in ("", names[-1]):
         raise OptionError(
             explain(
                 "itinerary",
@@ -115,10 +116,9 @@ def leg_between(system: FilippovSystem, mode: str, following: str, name: str = "
 
 def _told(system: FilippovSystem, mode: str, following: str, named: list[str]) -> Leg:
     """The leg that the letters of two modes tell."""
-    resets, impacts = [n for n, _ in system.resets], list(system.impacts)
     changed = [i for i, (a, b) in enumerate(zip(mode, following, strict=False)) if a != b]
-    if not changed and len(resets) + len(impacts) == 1:
-        return Leg(mode, (resets + impacts)[0], "reset" if resets else "impact")
+    if not changed and len(system.resets) + len(system.impacts) == 1:
+        return leg_between(system, mode, following, [*dict(system.resets), *system.impacts][0])
     if len(changed) != 1:
         raise OptionError(
             explain(
@@ -133,18 +133,14 @@ def _told(system: FilippovSystem, mode: str, following: str, named: list[str]) -
     (i,) = changed
     before, after = mode[i], following[i]
     if i >= system.surface_count:
-        contact = impacts[i - system.surface_count]
-        return Leg(mode, contact, "release" if before == "c" else "impact")
-    if before == "s":
-        side = 1 if after == "+" else -1
-        plain = not system.coupled
-        name = ("L_F1 h" if side > 0 else "L_F2 h") if plain else f"lambda{i}"
-        return Leg(mode, name, "exit", side)
-    return Leg(mode, f"h{i}", "entry" if after == "s" else "crossing")
+        return _of_contact(system, mode, i - system.surface_count)
+    kind = "exit" if before == "s" else "entry" if after == "s" else "crossing"
+    return Leg(mode, kind, i, 1 if (after if kind == "exit" else before) == "+" else -1)
 
 
-def _closed(system: FilippovSystem, mode: str, contact: int) -> bool:
-    return system.parse_letters(mode)[system.surface_count + contact] == 0
+def _of_contact(system: FilippovSystem, mode: str, contact: int) -> Leg:
+    side = system.parse_letters(mode)[system.surface_count + contact]
+    return Leg(mode, "impact" if side else "release", len(system.entries) + contact, side)
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +170,7 @@ class FixedItinerary:
     >>> import casadi as ca, nonsmooth as ns
     >>> x, v = ca.SX.sym("x"), ca.SX.sym("v")
     >>> block = ns.FilippovSystem([x, v], surface=v - 1, above=[v, -x - 1], below=[v, -x + 1])
-    >>> itinerary = FixedItinerary(block, "- s", until="L_F2 h")
+    >>> itinerary = FixedItinerary(block, "- s", until="lambda0 = -1")
     >>> arrival = itinerary.arrive([-1.0, 0.0])
     >>> arrival.x.round(12), arrival.fault
     (array([1., 1.]), '')
@@ -220,8 +216,8 @@ class FixedItinerary:
             leg = None if last else leg_between(system, mode, self.modes[k + 1])
             run = self.leg(mode, t, x, self.until if leg is None else self._ends(leg))
             name, what = run.events[-1].name, f"leg {k + 1} ({mode})"
-            if leg is not None and name != leg.name:
-                fault = fault or f"{what} ends by {name!r}, not by {leg.name!r}"
+            if leg is not None and name != leg.name(system):
+                fault = fault or f"{what} ends by {name!r}, not by {leg.name(system)!r}"
             fault = fault or self.inside(run, what)
             begin = system.extended_point(x, t)
             durations.append(float(run.t[-1]) - t)
@@ -237,9 +233,9 @@ class FixedItinerary:
 
     def _ends(self, leg: Leg) -> tuple[object, ...]:
         """Events that may end a leg: its own, its sibling, and the end of the itinerary."""
-        names = {g.name for g in explicit(self.system, leg.mode).guards}
-        exits = tuple(e for e in ("L_F1 h", "L_F2 h") if leg.kind == "exit" and e in names)
-        own = exits or (leg.name,)
+        names = {guard_name(self.system, g): g for g in explicit(self.system, leg.mode).guards}
+        exits = [name for name, g in names.items() if (g.kind, g.element) == ("exit", leg.element)]
+        own = tuple(exits) if leg.kind == "exit" and exits else (leg.name(self.system),)
         end = isinstance(self.until, str) and (self.until not in names or self.until in own)
         return own if end else (*own, self.until)
 
@@ -260,21 +256,21 @@ class FixedItinerary:
         if end <= start:
             return f"{what} has the duration {end - start:.3g}"
         of_mode = explicit(system, mode)
-        kinds = {g.name: g for g in of_mode.guards if g.kind in _NEAR}
+        kinds = {guard_name(system, g): g for g in of_mode.guards if g.kind in _NEAR}
         for event in run.events:
             guard = kinds.get(event.name)
             if guard is None or event.kind == "end":
                 continue
             near = _NEAR[guard.kind] * (end - start)
             if start + near < event.t < end - near:
-                return f"{what}: {described(guard)} fails at t = {event.t:.6g}"
+                return f"{what}: {described(system, guard)} fails at t = {event.t:.6g}"
         middle = system.extended_point(run(0.5 * (start + end)), 0.5 * (start + end))
         p = system.parameter_vector(self.parameters)
         y = variational_field(system, mode).states_at(middle, p)
         values = guarded_field(system, mode).starts(y, p)[1][:, 0]
         for guard, value in zip(of_mode.guards, values, strict=True):
             if guard.kind in _NEAR and value <= 0.0:
-                return f"{what}: {described(guard)} fails"
+                return f"{what}: {described(system, guard)} fails"
         return ""
 
     def leg(
@@ -357,13 +353,13 @@ class FixedItinerary:
 
     def _on_event(self, arrival: Arrival, flown: Flown, dx: Array, p: Array) -> Array:
         mode = arrival.legs[-1].mode
-        until = self.until
-        own = (
-            event_map(self.system, mode, until)
-            if isinstance(until, str)
-            else function_map(self.system, mode, until)
-        )
-        at = own(flown.end, p)
+        system, until = self.system, self.until
+        if isinstance(until, str):
+            guards = explicit(system, mode).guards
+            own = next(g for g in guards if guard_name(system, g) == until)
+            at = event_map(system, mode, own.kind, own.element, own.side)(flown.end, p)
+        else:
+            at = function_map(system, mode, until)(flown.end, p)
         speed = float(at.gradient @ flown.rate)
         if not math.isfinite(speed) or speed == 0.0:
             return np.full_like(dx, np.nan)

@@ -15,6 +15,7 @@ import numpy as np
 
 from ...flow.constants import TIE
 from ...flow.fixed import flow_for
+from ...flow.names import event_name
 from ...flow.trajectory import Event, Trajectory
 from ...model import Array, DegenerateError, FilippovSystem, coupled_of
 from ...model.derivatives.event_maps import AtEvent, EventMap, event_map
@@ -31,12 +32,10 @@ class Leg:
     Attributes
     ----------
     mode : str
-    name : str
-        Of the guard that ends the leg; empty for a leg that ends at a time.
     kind : str
-        Of the event: crossing, entry, exit, reset, impact, release, stop, end.
-    side : int
-        Of an exit.
+        Of the event: crossing, entry, exit, reset, impact, release, stop; end where a time ends it.
+    element, side : int
+        As of Event.
     letters : str
         Sides of the friction at an impact.
     further : tuple of Leg
@@ -44,11 +43,22 @@ class Leg:
     """
 
     mode: str
-    name: str = ""
     kind: str = "end"
+    element: int = -1
     side: int = 0
     letters: str = ""
     further: tuple[Leg, ...] = ()
+
+    @property
+    def timed(self) -> bool:
+        """Whether a time ends it, not an event."""
+        return self.kind == "end"
+
+    def name(self, system: FilippovSystem) -> str:
+        """Of its event; empty where a time ends it."""
+        if self.timed:
+            return ""
+        return event_name(system, self.mode, self.kind, self.element, self.side)
 
     def field(self, system: FilippovSystem, chosen: tuple[int, ...] = ()) -> VariationalField:
         """The variational field of the mode."""
@@ -56,9 +66,9 @@ class Leg:
 
     def map(self, system: FilippovSystem) -> EventMap | None:
         """The event's function and what it does to the state; None where a time ends the leg."""
-        if not self.name:
+        if self.timed:
             return None
-        return event_map(system, self.mode, self.name, self.side, self.letters)
+        return event_map(system, self.mode, self.kind, self.element, self.side, self.letters)
 
     def at_end(self, system: FilippovSystem, y: Array, p: Array) -> AtEvent:
         """Event function and state after the event, with derivatives; further resets included."""
@@ -72,9 +82,9 @@ class Leg:
         return at
 
 
-def leg_name(leg: Leg) -> str:
+def leg_name(system: FilippovSystem, leg: Leg) -> str:
     """A leg in words: its mode, and what ends it."""
-    end = f", ended by {leg.name}" if leg.name else ""
+    end = "" if leg.timed else f", ended by {leg.name(system)}"
     return f"({leg.mode or 'o'}{end})"
 
 
@@ -152,13 +162,13 @@ def stretches(run: Trajectory) -> list[Stretch]:
     system, p = run.system, run.system.parameter_vector(run.parameters)
     t, x = float(run.t[0]), _extended(system, run.x[0], float(run.t[0]))
     result: list[Stretch] = []
-    known: dict[tuple[str, ...], Leg] = {}
+    known: dict[tuple[object, ...], Leg] = {}
     for group in _instants(run.events):
         first, last = group[0], group[-1]
         _require_countable(group)
         x_end = _extended(system, first.x, first.t)
-        if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):  # told by its words
-            key = (first.mode_before, first.name, first.kind, first.mode_after)
+        if len(group) == 1 and first.kind in ("crossing", "entry", "exit"):
+            key = (first.mode_before, first.kind, first.element, first.side, first.mode_after)
             leg = known.get(key) or known.setdefault(key, leg_of(system, first, p))
         else:
             leg = leg_of(system, first, p)
@@ -207,13 +217,8 @@ def leg_of(system: FilippovSystem, event: Event, p: Array) -> Leg:
     if event.kind == "end":
         return Leg(event.mode_before)
     _require_one_surface(system, event)
-    side, letters = 0, ""
-    if event.name.startswith("lambda"):
-        i = int(event.name.removeprefix("lambda"))
-        side = {"+": 1, "-": -1}.get(event.mode_after[i], 0)
-    if event.kind == "impact":
-        letters = _letters(system, event, p)
-    return Leg(event.mode_before, event.name, event.kind, side, letters)
+    letters = _letters(system, event, p) if event.kind == "impact" else ""
+    return Leg(event.mode_before, event.kind, event.element, event.side, letters)
 
 
 def _require_one_surface(system: FilippovSystem, event: Event) -> None:
@@ -221,10 +226,11 @@ def _require_one_surface(system: FilippovSystem, event: Event) -> None:
     if event.kind not in ("crossing", "entry", "exit"):
         return
     letters = zip(event.mode_before, event.mode_after, strict=False)
-    met = [f"h{i}" for i, (a, b) in enumerate(letters) if a != b and a in "+-"]
-    others = [name for name in met if name != event.name]
+    met = [k for k, (a, b) in enumerate(letters) if a != b and a in "+-"]
+    others = [k for k in met if k != event.element]
     if others:
-        raise DegenerateError(corner(event.t, event.name, others[0]))
+        other = event_name(system, event.mode_before, event.kind, others[0])
+        raise DegenerateError(corner(event.t, event.name, other))
 
 
 def corner(t: float, one: str, other: str) -> str:
@@ -242,17 +248,18 @@ def _letters(system: FilippovSystem, event: Event, p: Array) -> str:
     mode = event.mode_before
     y = variational_field(system, mode).states_at(x, p)
     after = _extended(system, event.x_after, event.t)
-    choice = lambda letters: event_map(system, mode, event.name, 0, letters)(y, p)
-    return struck_letters(system, mode, event.name, choice, after)
+    own = event.kind, event.element, event.side
+    choice = lambda letters: event_map(system, mode, *own, letters)(y, p)
+    return struck_letters(system, mode, event.element, choice, after)
 
 
 def struck_letters(
-    system: FilippovSystem, mode: str, name: str, struck: Callable[[str], AtEvent], after: Array
+    system: FilippovSystem, mode: str, element: int, struck: Callable[[str], AtEvent], after: Array
 ) -> str:
     """The sides with which friction acted at an impact, of those that are possible."""
     m, coupled = system.surface_count, coupled_of(system)
     signs, mode = system.parse_letters(mode), system.widened(mode)
-    contact = system.impacts.index(name)
+    contact = element - len(system.entries)
     taking = [contact, *[j for j in range(len(system.impacts)) if not signs[m + j]]]
     carried = [i for i in range(m) if any(j in taking for j in coupled.carriers[i])]
     choices = [mode[i] + "".join(c for c in "s+-" if c != mode[i]) for i in carried]
@@ -276,7 +283,7 @@ def _caused(
         n = len(at.after)
         pulled = (other.gradient @ start[:, 1 : 1 + n]) @ at.after_state
         if not parallel(pulled, at.gradient):
-            raise DegenerateError(corner(t, leg.name, then.name))
+            raise DegenerateError(corner(t, leg.name(system), then.name(system)))
         if then.kind in ("reset", "impact"):
             kept = (*kept, then)
     return kept
@@ -290,9 +297,5 @@ def parallel(a: Array, b: Array) -> bool:
 
 def surface_of(system: FilippovSystem, leg: Leg) -> int:
     """The switching surface of a leg's event; -1 if it has none."""
-    if leg.kind == "exit" and leg.name.startswith("L_"):
-        return leg.mode.index("s")
-    if leg.kind in ("crossing", "entry", "exit"):
-        digits = leg.name.removeprefix("lambda").removeprefix("h")
-        return int(digits) if digits.isdigit() else -1
-    return -1
+    own = leg.kind in ("crossing", "entry", "exit") and leg.element < system.surface_count
+    return leg.element if own else -1

@@ -1,4 +1,4 @@
-"""Lyapunov exponents of a run through its events: QR with state-transition and saltation matrices."""
+"""Lyapunov exponents of a run by QR decompositions of state-transition and saltation matrices."""
 
 from __future__ import annotations
 
@@ -21,7 +21,6 @@ from ...model import (
     FilippovSystem,
     OptionError,
     Parameters,
-    explain,
     mode_field,
     real,
     require_system,
@@ -30,23 +29,23 @@ from ...model import (
 from .legs import Flown, Stretch, fly, stretches
 from .variation import saltation_after
 
-#: A column of an event's factor below this part of the matrix is zero: what an entry to sliding loses.
+#: Relative size of a column of R at an event below which a direction is lost, as in an entry to sliding.
 _LOST = 1e-12
 
-#: Growths of two columns on a leg differ by this factor at most, or the leg is cut: beyond, the
-#: smaller one is lost in rounding.
+#: Largest ratio of the growths of two columns on a leg; beyond it rounding spoils the smaller one, and the
+#: leg is divided.
 _RATIO = 1e6
 
-#: Logarithms of the growths at an event add up to that of its determinant to this.
+#: Tolerance of the sum of the logarithms of growths at an event, which is that of its determinant.
 _MISSED = 1e-6
 
-#: Derivatives beyond this are those of a run that diverges.
+#: Derivatives beyond which a run diverges.
 _HUGE = 1e100
 
-#: A run that ends so many times as far away as it began, or as 1, diverges.
+#: Size of the last state, relative to the first or 1, beyond which a run diverges.
 _FAR = 1e6
 
-#: Stretches of equal length from which the standard errors are taken.
+#: Blocks of equal length for the standard errors.
 _BLOCKS = 32
 
 
@@ -54,26 +53,25 @@ _BLOCKS = 32
 class LyapunovSpectrum(
     Savable, exponents="k nan", errors="k nan", blocks="b k nan", sum_check="nan"
 ):
-    """Mean rates at which neighbours of a run go apart, the largest first.
+    """Lyapunov exponents, the largest first.
 
     Attributes
     ----------
     exponents : ndarray (k,)
         Per unit time; ``-inf`` for directions that are lost (an entry to sliding, an impact without
-        rebound): neighbours are one after a finite time.
+        rebound), in which neighbours coincide after a finite time.
     errors : ndarray (k,)
-        Standard errors of the means, from ``blocks``. They do not see correlations longer than a
-        block.
+        Standard errors of the means, from ``blocks``, without correlations longer than a block.
     blocks : ndarray (b, k)
-        Exponents of stretches of equal length, one after the other.
+        Exponents of consecutive parts of equal length.
     t : float
-        Length of the run that was counted.
+        Length of the run without the transient.
     sum_check : float
-        What the sum of all finite exponents has to be, by another way: the mean of the divergence of
-        the field and of ``log abs(det)`` of the saltation matrices. NaN where directions were lost,
-        not all exponents were asked for, or the divergence is not known.
+        The sum of the exponents by another method: the mean of the divergence of the field and of
+        ``log abs(det)`` of the saltation matrices. NaN where directions were lost, ``k`` is less than
+        n, or the divergence is not known.
     complete : bool
-        False if the computation was interrupted, and counts a shorter run.
+        False if the computation was interrupted, and used a shorter run.
     """
 
     exponents: Array
@@ -95,9 +93,9 @@ class LyapunovSpectrum(
 
     def __repr__(self) -> str:
         values = zip(self.exponents, self.errors, strict=True)
-        told = ", ".join(f"{e:.6g}" + (f" +- {s:.1g}" if s else "") for e, s in values)
+        each = ", ".join(f"{e:.6g}" + (f" +- {s:.1g}" if s else "") for e, s in values)
         cut = "" if self.complete else ", interrupted"
-        return f"LyapunovSpectrum({told}; over t = {self.t:g}{cut})"
+        return f"LyapunovSpectrum({each}; over t = {self.t:g}{cut})"
 
 
 def lyapunov_spectrum(
@@ -123,29 +121,29 @@ def lyapunov_spectrum(
     x0 : array_like (n,)
         States at the start.
     t_end : float
-        The run ends here. Errors fall as the square root of the length of a chaotic run.
+        End of the run. Errors fall as the square root of the length of a chaotic run.
     transient : float, optional
-        Time that is not counted at the beginning, in which the directions turn into place; a tenth
-        of the run unless given.
+        Time at the beginning that is left out, in which the directions align; a tenth of the run by
+        default.
     k : int, optional
-        How many exponents, the largest; all n unless given.
+        Number of exponents, the largest; all n by default.
     t_start, parameters, tol, rtol, atol : optional
         As in :func:`simulate`.
     progress : bool, optional
-        A bar for runs of some seconds on a terminal.
+        Whether to show a progress bar for long runs on a terminal.
 
     Returns
     -------
     LyapunovSpectrum
-        Explicit time is no direction and has no exponent; the phase of a :class:`Clock` has its 0.
-        Ctrl-C ends with what was counted so far.
+        Explicit time has no exponent; the phase of a :class:`Clock` has the exponent 0. After Ctrl-C the
+        exponents are those of the run so far.
 
     Raises
     ------
     DegenerateError
-        The run ends before, grazes a surface, or meets two at one instant.
+        The run ends early, grazes a surface, or meets two at one instant.
     DefinitionError
-        ``system`` is none, or has vector multipliers.
+        ``system`` is not a FilippovSystem, or has vector multipliers.
     PointError
         A start of a wrong shape or not finite.
     ParameterError
@@ -155,8 +153,8 @@ def lyapunov_spectrum(
 
     Notes
     -----
-    Benettin et al. 1980; through events Mueller 1995 (Chaos, Solitons & Fractals 5, 1671). An event
-    where columns become dependent loses the last of them for good.
+    Benettin et al. 1980; through events Mueller 1995 (Chaos, Solitons & Fractals 5, 1671). At an event
+    where columns become dependent the last of them is lost.
 
     Examples
     --------
@@ -173,17 +171,12 @@ def lyapunov_spectrum(
     n = system.dimension
     count = n if k is None else whole(k, "k")
     if count > n:
-        raise OptionError(f"k: expected at most the {n} states, received {k}.")
+        raise OptionError(f"k = {k}, but the system has {n} states. Give at most that.")
     t_start, t_end = real(t_start, "t_start"), real(t_end, "t_end")
     wait = (t_end - t_start) / 10 if transient is None else real(transient, "transient", low=0.0)
     if not t_start + wait < t_end:
         raise OptionError(
-            explain(
-                "t_end",
-                expected=f"a time after t_start + transient = {t_start + wait:g}",
-                received=f"{t_end!r}",
-                advice="The run from there to t_end is counted.",
-            )
+            f"t_end = {t_end!r} is not after t_start + transient = {t_start + wait:g}. Give a later time."
         )
     rtol, atol = tolerances(tol, rtol, atol)
     run = simulate(
@@ -203,18 +196,18 @@ def lyapunov_spectrum(
 
 
 def _ended(run: Trajectory, t_end: float) -> str:
-    """Message for a run that ended before, with its last state where that is far away."""
+    """Message for a run that ended early, with its last state where it diverges."""
     size = float(np.abs(run.x[-1]).max())
     away = not size < _FAR * max(1.0, float(np.abs(run.x[0]).max()))
-    words = f"The run diverges: its last state is {run.x[-1].tolist()}. " if away else ""
+    last = f"The run diverges: its last state is {run.x[-1].tolist()}. " if away else ""
     return (
-        f"run: expected one to t_end = {t_end:g}, received one that ended at t = {run.t[-1]:.10g} with "
-        f"status {run.status}. {words}{run.message}"
+        f"t_end = {t_end:g}, but the run ended at t = {run.t[-1]:.10g} with status {run.status}. "
+        f"{last}{run.message}"
     )
 
 
 class _Frame:
-    """Orthonormal directions that travel with a run, and the growth that they saw."""
+    """Orthonormal directions along a run, and the logarithms of their growth."""
 
     def __init__(self, run: Trajectory, count: int, begin: float):
         self.run, self.system, self.n = run, run.system, run.system.dimension
@@ -226,7 +219,7 @@ class _Frame:
         self.volume, self.t = 0.0, float(run.t[0])
 
     def follow(self, progress: bool) -> LyapunovSpectrum:
-        """Travel along the run."""
+        """Follow the run and return its exponents."""
         parts = stretches(self.run)
         bar = progress_bar(len(parts), progress, "leg")
         complete = True
@@ -239,13 +232,13 @@ class _Frame:
         except KeyboardInterrupt:
             complete = False
             if self.t <= self.bounds[1]:
-                raise  # nothing was counted
+                raise  # not one block is complete
         finally:
             bar.close()
         return self._spectrum(complete)
 
     def _leg(self, part: Stretch) -> Flown:
-        """Fly a leg in pieces that end at the bounds of blocks."""
+        """Integrate a leg in pieces that end at the bounds of blocks."""
         end = part.t + part.duration
         inner = self.bounds[(self.bounds > part.t) & (self.bounds < end)].tolist()
         cuts = [*inner, end]
@@ -280,7 +273,7 @@ class _Frame:
         q, r = np.linalg.qr(matrix @ self.q)
         growth = np.abs(np.diag(r))
         kept = growth > _LOST * np.linalg.norm(matrix)
-        if not kept.all() and _regular(matrix):  # too small to be seen, but not lost
+        if not kept.all() and _regular(matrix):  # below rounding, but not lost
             q, growth = self._spread(matrix, part)
             kept = np.full(growth.shape, True)
         if self._block(self.t) >= 0:
@@ -289,7 +282,7 @@ class _Frame:
         self._count(q[:, kept], growth[kept], self.t)
 
     def _spread(self, matrix: Array, part: Stretch) -> tuple[Array, Array]:
-        """Directions and growths of an event that loses none, though QR sees them vanish."""
+        """Directions and growths at a regular event, some below the rounding of QR."""
         found = _spread(matrix, self.q)
         if found is None:
             raise self._diverging(matrix, part)
@@ -297,10 +290,9 @@ class _Frame:
 
     def _diverging(self, matrix: Array, part: Stretch) -> DegenerateError:
         return DegenerateError(
-            f"{part.leg.name!r} at t = {self.t:.10g}: expected an event that carries neighbours on with "
-            f"digits that are left, received derivatives up to {np.abs(matrix).max():.2g} that lose no "
-            "direction. The run diverges, or its states need other units: the last one is "
-            f"{part.end[: self.n].tolist()}."
+            f"{part.leg.name(self.system)!r} at t = {self.t:.10g} has derivatives up to {np.abs(matrix).max():.2g}, too "
+            f"large to resolve the other directions. The run diverges, or its states need other units: the "
+            f"last one is {part.end[: self.n].tolist()}."
         )
 
     def _count(self, q: Array, growth: Array, t: float) -> None:
@@ -310,7 +302,7 @@ class _Frame:
             self.logs[block, : len(growth)] += np.log(growth)
 
     def _block(self, t: float) -> int:
-        """Number of the block that a time belongs to, its end included; negative before the first."""
+        """Number of the block of a time, its end included; negative before the first."""
         found = np.searchsorted(self.bounds, t - AT_END * max(1.0, abs(t)), side="left")
         return min(int(found) - 1, _BLOCKS - 1)
 
@@ -354,8 +346,7 @@ class _Frame:
 
 
 def _spread(matrix: Array, q: Array) -> tuple[Array, Array] | None:
-    """Directions after a regular map and growths, also where these differ by more than rounding
-    allows."""
+    """Directions after a regular map and growths, also of a ratio below rounding; None if unresolved."""
     m, whole = q.shape[1], np.linalg.qr(q, mode="complete")[0]
     forward, r = np.linalg.qr(matrix @ whole)
     backward, s = np.linalg.qr(np.linalg.solve(matrix.T, whole)[:, ::-1])
@@ -372,7 +363,7 @@ def _spread(matrix: Array, q: Array) -> tuple[Array, Array] | None:
 
 
 def _regular(matrix: Array) -> bool:
-    """Whether a square matrix has an inverse, in whatever units its rows and columns are."""
+    """Whether a square matrix has an inverse, in any units of its rows and columns."""
     scaled = np.abs(matrix)
     signs = np.sign(matrix)
     for axis in (1, 0, 1, 0):

@@ -1,4 +1,4 @@
-"""Orbits of a Poincare map, with the exact derivative of each return."""
+"""Orbits of a Poincare map, with their exact derivatives."""
 
 from __future__ import annotations
 
@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 
 from ...flow.options import tolerances
 from ...flow.saving import Savable
-from ...flow.section import Section
+from ...flow.section import Section, sectioned
 from ...flow.simulate import simulate
 from ...flow.trajectory import Trajectory
-from ...flow.view import sectioned
 from ...model import (
     Array,
     FilippovSystem,
@@ -31,24 +30,24 @@ from .saltation import Saltation
 from .sensitivity import sensitivity
 from .variation import saltation_after
 
-#: A run without an end of its own: it ends with the last hit, or by its limits of steps or events.
+#: Duration of a run that ends at the last return, or by its limits of steps or events.
 _ENDLESS = 1e12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class PoincareOrbit(Savable, points="m n", t="m"):
-    """Successive hits of a section.
+    """Successive returns to a section.
 
     Attributes
     ----------
     points : ndarray (m, n)
-        States at the hits; fewer than asked for if the run ended before.
+        States on the section; fewer than ``count`` if the run ended early.
     t : ndarray (m,)
-        Times of the hits, the start first.
+        Their times.
     run : Trajectory
-        Its status says how it ended; STOPPED after the last hit.
+        The run, with the status STOPPED after the last return.
     section : Section
-        The section that was asked for.
+        The section.
     """
 
     points: Array
@@ -57,25 +56,25 @@ class PoincareOrbit(Savable, points="m n", t="m"):
     section: Section
 
     def jacobian(self, k: int, since: int | None = None) -> Array:
-        """Derivative of a hit by an earlier one.
+        """Derivative of a return by an earlier one.
 
         Parameters
         ----------
         k : int
-            Number of the hit, from 0.
+            Number of the return, from 0.
         since : int, optional
-            Number of the earlier one, -1 for the start of the run; the one before unless given.
+            Number of the earlier one, -1 for the start of the run; k - 1 by default.
 
         Returns
         -------
         ndarray (n, n)
-            Of the return map, extended to neighbours of the section along the flow: it has an
-            eigenvalue 0 with the flow's direction unless the section is at fixed times.
+            Derivative of the return map, extended to neighbours of the section along the flow: it has
+            an eigenvalue 0 with the flow's direction unless the section is at fixed times.
 
         Raises
         ------
         OptionError
-            Numbers of hits that the run does not have.
+            Numbers of returns that the run does not have.
         DegenerateError
             The run grazes a surface, or meets two at one instant.
         """
@@ -83,8 +82,8 @@ class PoincareOrbit(Savable, points="m n", t="m"):
         since = k - 1 if since is None else whole(since, "since", least=-1)
         if not -1 <= since < k < len(self.t):
             raise OptionError(
-                f"k: expected hits from 0 to {len(self.t) - 1}, the earlier one from -1, received "
-                f"{k!r} and {since!r}."
+                f"k = {k!r} and since = {since!r}, but returns are numbered from 0 to {len(self.t) - 1}. Give "
+                "k among them, and since from -1 to k - 1."
             )
         if is_real(self.section.at):
             return self._between_times(k, since)
@@ -109,7 +108,7 @@ class PoincareOrbit(Savable, points="m n", t="m"):
         dx = np.eye(system.extended_dimension)
         for j in range(first, last):
             flown, event = self._passage(parts, j, p)
-            if j == first and since >= 0:  # from the hit itself
+            if j == first and since >= 0:  # from the section itself
                 dx = dx if self.section.after else event.matrix[:, : len(dx)]
             else:
                 dx = event.matrix @ (flown.by_start @ dx)
@@ -121,8 +120,7 @@ class PoincareOrbit(Savable, points="m n", t="m"):
         following = parts[last + 1] if last + 1 < len(parts) else None
         if following is None:
             raise OptionError(
-                f"k: expected a hit before the last one, received {k}. The field after the last event "
-                "of the run is not known: ask for a hit more."
+                f"k = {k} is the last return, after which the field is not known. Compute one more return."
             )
         rate = fly(system, following.leg, following.start, 0.0, p).rate
         return (event.matrix @ dx + np.outer(rate, moved))[:n, :n]
@@ -132,12 +130,12 @@ class PoincareOrbit(Savable, points="m n", t="m"):
         run, part = self.run, parts[j]
         flown = fly(run.system, part.leg, part.start, part.duration, p)
         event = saltation_after(run, part, flown, parts[j + 1] if parts[j + 1 :] else None, p)
-        assert event is not None  # all legs up to a hit end with an event
+        assert event is not None  # all legs up to a return end with an event
         return flown, event
 
     def __repr__(self) -> str:
         return (
-            f"PoincareOrbit({len(self.t)} hits of {self.section.at} in t = {self.run.t[0]:g} .. "
+            f"PoincareOrbit({len(self.t)} returns to {self.section.at} in t = {self.run.t[0]:g} .. "
             f"{self.run.t[-1]:g}, {self.run.status})"
         )
 
@@ -168,13 +166,13 @@ def poincare(
         A function of states, parameters and time; a name of a surface, reset or impact, or a kind of
         event; a period. See :class:`Section`.
     x0 : array_like (n,)
-        A start on the section is no hit.
+        The start; one on the section does not count as a return.
     count : int
-        Hits to follow the run for.
+        Number of returns.
     direction : {-1, 0, 1}, optional
-        Of an expression or a surface: where it falls, either way, where it rises.
+        Whether an expression or a surface function falls, does either, or rises at a return.
     skip : int, optional
-        Hits that are passed over before.
+        Number of first returns that are left out.
     t_start, parameters, tol, rtol, atol, max_steps, max_events : optional
         As in :func:`simulate`.
 
@@ -186,13 +184,13 @@ def poincare(
     Raises
     ------
     DefinitionError
-        ``system`` is none, or has vector multipliers.
+        ``system`` is not a FilippovSystem, or has vector multipliers.
     PointError
         A start of a wrong shape or not finite.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     OptionError
-        An unknown name of a section; a direction or a number of hits out of its range.
+        An unknown name of a section; a direction or a number of returns out of its range.
     NotSmoothError
         A section with a kink or a jump.
 
@@ -214,7 +212,7 @@ def poincare(
     if isinstance(section, Section):
         wanted = replace(section, count=count, skip=section.skip + whole(skip, "skip", least=0))
     else:
-        wanted = _section(section, direction, skip, count)
+        wanted = _section(system, section, direction, skip, count)
     t_end = t_start + _ENDLESS
     period = None if isinstance(wanted.at, str) else read_period(system, wanted.at)
     if period is not None:
@@ -240,8 +238,9 @@ def poincare(
     return PoincareOrbit(run.sample_x[met], run.sample_t[met], run, wanted)
 
 
-def _section(section: Any, direction: int, skip: int, count: int) -> Section:
-    undirected = is_real(section) or (
-        isinstance(section, str) and not section.removeprefix("h").isdigit()
-    )
+def _section(
+    system: FilippovSystem, section: Any, direction: int, skip: int, count: int
+) -> Section:
+    named = isinstance(section, str) and section not in system.surface_names
+    undirected = is_real(section) or named
     return Section(section, 0 if undirected else direction, skip=skip, count=count)

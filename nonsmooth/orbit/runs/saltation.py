@@ -1,8 +1,8 @@
-"""What an event does to neighbours of an orbit: one formula for every kind of event.
+"""Saltation matrices, by one formula for every kind of event.
 
 At an event e(x, p) = 0 the field changes from f- to f+, the field of the mode after everything that
 happens at that instant, and the state jumps by a reset g (the identity if there is none). A neighbour
-x + dx meets the event at another time, so
+x + dx reaches the event at another time, so
 
     dt = -(e_x dx + e_p dp)/(e_x f-),    dx+ = g_x dx + g_p dp + (g_x f- - f+) dt,
 
@@ -27,34 +27,22 @@ from numpy.typing import NDArray
 from ...model import Array, DegenerateError
 from ...model.derivatives.event_maps import AtEvent
 
-#: An orbit that meets a surface at an angle below this grazes it.
+#: Angle between orbit and surface below which an event is a grazing.
 GRAZING = 1e-8
 
-#: Fields that differ by less than this part of them are one field.
+#: Relative difference of two fields below which they are one.
 _CONTINUOUS = 1e-10
 
 
 @dataclass(frozen=True)
 class Saltation:
-    """Derivatives through an event, or stacked through many.
+    """Derivatives through an event, or stacked through many."""
 
-    Attributes
-    ----------
-    matrix : ndarray (N, N + k)
-        S.
-    by_parameters : ndarray (N, np)
-        S_p.
-    time_by_state, time_by_parameters : ndarray (N + k,), (np,)
-        Derivatives of the time of the event.
-    angle : float or ndarray
-        ``|e_x f-|/(|e_x| |f-|)``, zero at a grazing.
-    """
-
-    matrix: Array
-    by_parameters: Array
-    time_by_state: Array
-    time_by_parameters: Array
-    angle: Any
+    matrix: Array  # S (N, N + k)
+    by_parameters: Array  # S_p (N, np)
+    time_by_state: Array  # of the event, (N + k,)
+    time_by_parameters: Array  # (np,)
+    angle: Any  # |e_x f-|/(|e_x| |f-|), zero at a grazing
 
 
 def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> Saltation:
@@ -70,18 +58,14 @@ def saltation(at: AtEvent, before: Array, after: Array, what: str = "event") -> 
 
 
 class Ended(Protocol):
-    """Ends of legs with their events, stacked; as :class:`~nonsmooth.orbit.runs.flight.Flight`."""
+    """Ends of legs with their events, stacked."""
 
     @property
     def rate(self) -> Array: ...
     @property
-    def after(self) -> Array: ...
-    @property
     def after_state(self) -> Array: ...
     @property
     def after_parameters(self) -> Array: ...
-    @property
-    def value(self) -> Array: ...
     @property
     def gradient(self) -> Array: ...
     @property
@@ -92,17 +76,52 @@ class _One(NamedTuple):
     """One event, stacked."""
 
     rate: Array
-    after: Array
     after_state: Array
     after_parameters: Array
-    value: Array
     gradient: Array
     value_parameters: Array
 
     @classmethod
     def of(cls, at: AtEvent, rate: Array) -> _One:
-        rows = (rate, at.after, at.after_state, at.after_parameters, np.array(at.value))
-        return cls(*[row[None] for row in (*rows, at.gradient, at.by_parameters)])
+        rows = (rate, at.after_state, at.after_parameters, at.gradient, at.by_parameters)
+        return cls(*[row[None] for row in rows])
+
+
+class Passed(NamedTuple):
+    """How legs pass their events: speeds across them, angles, jumps of the field, and where it has none."""
+
+    speed: Array
+    angle: Array
+    jump: Array
+    kept: NDArray[np.bool_]
+
+
+def passages(
+    ends: Ended,
+    after: Array,
+    named: Callable[[int], str],
+    events: NDArray[np.bool_] | None = None,
+) -> Passed:
+    """Passages of the events of many legs, none of which may be grazed."""
+    e, rate, g = ends.gradient, ends.rate, ends.after_state
+    speed = (e * rate).sum(axis=1)
+    carried = (g @ rate[:, :, None])[:, :, 0]
+    jump = after - carried
+    with np.errstate(over="ignore"):
+        of_e, of_rate, of_jump, of_after, of_carried = map(_norms, (e, rate, jump, after, carried))
+    size = of_e * of_rate
+    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
+    kept = of_jump <= _CONTINUOUS * np.maximum(of_after, of_carried)
+    if events is not None:
+        kept |= ~events
+    grazed = np.flatnonzero((angle < GRAZING) & ~kept)
+    if grazed.size:  # except by a clock: its phase has the rate 1
+        ticks = ((e != 0.0).sum(axis=1) == 1) & (np.abs(speed) == np.abs(e).max(axis=1))
+        grazed = grazed[~ticks[grazed]]
+    if grazed.size:
+        i = int(grazed[0])
+        raise DegenerateError(_grazing(named(i), float(angle[i]), ends, i, jump[i]))
+    return Passed(speed, angle, jump, kept)
 
 
 def saltations(
@@ -112,26 +131,11 @@ def saltations(
     events: NDArray[np.bool_] | None = None,
 ) -> Saltation:
     """Saltation matrices of the events of many legs, stacked."""
-    e, rate, g = ends.gradient, ends.rate, ends.after_state
-    speed = (e * rate).sum(axis=1)
-    size = _norms(e) * _norms(rate)
-    angle = np.abs(speed) / np.where(size > 0.0, size, np.inf)
-    carried = (g @ rate[:, :, None])[:, :, 0]
-    jump = after - carried
-    kept = _norms(jump) <= _CONTINUOUS * np.maximum(_norms(after), _norms(carried))
-    if events is not None:
-        kept |= ~events
-    grazed = np.flatnonzero((angle < GRAZING) & ~kept)
-    if grazed.size:  # not where a clock ends the leg, whose phase knows no angle: its rate is 1
-        ticks = ((e != 0.0).sum(axis=1) == 1) & (np.abs(speed) == np.abs(e).max(axis=1))
-        grazed = grazed[~ticks[grazed]]
-    if grazed.size:
-        i = int(grazed[0])
-        raise DegenerateError(grazing(named(i), float(angle[i]), ends, i, jump[i]))
+    speed, angle, jump, kept = passages(ends, after, named, events)
     with np.errstate(divide="ignore", invalid="ignore"):
-        time_x = -e / speed[:, None]
+        time_x = -ends.gradient / speed[:, None]
         time_p = -ends.value_parameters / speed[:, None]
-    matrix, by_parameters = g, ends.after_parameters
+    matrix, by_parameters = ends.after_state, ends.after_parameters
     if not kept.all():
         jump[kept] = 0.0
         x, p = np.where(kept[:, None], 0.0, time_x), np.where(kept[:, None], 0.0, time_p)
@@ -142,8 +146,7 @@ def saltations(
 
 def _norms(rows: Array) -> Array:
     """Lengths of rows, also of those whose squares overflow."""
-    with np.errstate(over="ignore"):
-        found: Array = np.sqrt((rows * rows).sum(axis=1))
+    found: Array = np.sqrt((rows * rows).sum(axis=1))
     if not np.isinf(found).any():
         return found
     largest = np.abs(rows).max(axis=1)
@@ -151,26 +154,20 @@ def _norms(rows: Array) -> Array:
     return np.asarray(largest * np.sqrt((scaled * scaled).sum(axis=1)))
 
 
-def grazing(what: str, angle: float, ends: Ended, i: int, jump: Array) -> str:
-    """Message for an event that the orbit only touches, of leg i."""
+def _grazing(what: str, angle: float, ends: Ended, i: int, jump: Array) -> str:
+    """Message for a grazing at the end of leg i."""
     n = jump.size
     moved = not np.array_equal(ends.after_state[i, :, :n], np.eye(n))
     if moved:
         kind = (
-            "a grazing of a reset or impact: neighbours that miss it and those that meet it differ "
-            "by a square root, whose derivative is infinite"
+            "a grazing of a reset or impact: the map has a square root there, whose derivative is "
+            "infinite"
         )
     elif float(ends.gradient[i, :n] @ jump) > 0.0:
-        kind = (
-            "a grazing of a sliding surface: the derivative is one matrix on the side that misses "
-            "it and another one on the side that slides"
-        )
+        kind = "a grazing of a sliding surface: the derivative jumps between neighbours that miss it and slide"
     else:
-        kind = (
-            "a grazing of a surface beyond which the field leads away: the map is discontinuous "
-            "there"
-        )
+        kind = "a grazing of a surface beyond which the field leads away: the map is discontinuous there"
     return (
-        f"{what}: expected a transversal event, received the angle {angle:.1e} between orbit and "
-        f"surface. It is {kind}. Move the start or a parameter away from the grazing."
+        f"{what}: the event is not transversal, with the angle {angle:.1e} between orbit and surface. It is "
+        f"{kind}. Move the start or a parameter away from the grazing."
     )

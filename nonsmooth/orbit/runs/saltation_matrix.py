@@ -1,4 +1,4 @@
-"""The verb ``saltation_matrix``: what one event does to neighbours, at a point where it happens."""
+"""The saltation matrix of one event at a given point."""
 
 from __future__ import annotations
 
@@ -7,14 +7,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...model import Array, FilippovSystem, Parameters, PointError, explain, require_system
+from ...model import Array, FilippovSystem, Parameters, PointError, require_system
 from ...model.derivatives.event_maps import AtEvent, surface_map
 from .guards import begin_fault, change_fault
 from .itinerary import leg_between
 from .legs import Leg
 from .saltation import saltation
 
-#: An event happens at points as near as this, relative to the largest state; as guards are judged.
+#: Distance of a point from an event, relative to the largest state, within which it is on it.
 _NEAR = 1e-9
 
 
@@ -33,13 +33,13 @@ def saltation_matrix(
     Parameters
     ----------
     system : FilippovSystem
-        The one with the event.
+        The system.
     before, after : str
-        Modes on the two sides of the event.
+        Modes before and after the event.
     point : array_like (n,)
-        Where the event happens, before a reset.
+        State at the event, before a reset.
     event : str, optional
-        Name of the event (``"h0"``, a reset, an impact), where the letters of the modes do not tell it.
+        Name of the event (``"h0"``, a reset, an impact), where the modes do not determine it.
     t : float, optional
         Time, where the system depends on it.
     parameters : mapping, optional
@@ -48,21 +48,21 @@ def saltation_matrix(
     Returns
     -------
     ndarray (n, n)
-        It maps small deviations of the state before the event to those after it.
+        It maps small perturbations of the state before the event to those after it.
 
     Raises
     ------
     DegenerateError
         The orbit grazes the surface.
     OptionError
-        The modes do not tell the event, or none of that name joins them.
+        The modes do not determine the event, or none of that name leads from one to the other.
     DefinitionError
-        ``system`` is none, or has vector multipliers; modes that it does not have.
+        ``system`` is not a FilippovSystem, or has vector multipliers; modes that it does not have.
     ParameterError
         An unknown parameter, one without a value, or a value that is not a finite number.
     PointError
-        A point of a wrong shape or not finite, where the event does not happen, or where it does not lead
-        from the one mode to the other.
+        A point of a wrong shape, not finite, or off the event, or at which the event does not lead from
+        the one mode to the other.
 
     Notes
     -----
@@ -80,45 +80,40 @@ def saltation_matrix(
     require_system(system)
     p, x = system.parameter_vector(parameters), system.extended_point(point, t)
     for mode in (before, after):
-        system.parse_letters(mode)  # refuses what is no mode
+        system.parse_letters(mode)  # raises for an invalid mode
     leg = leg_between(system, before, after, event)
+    name = leg.name(system)
     field, following = leg.field(system), Leg(after).field(system)
     y = field.initial(x, p)
     at, size, n = leg.at_end(system, y[:, 0], p), system.extended_dimension, system.dimension
     _require_near(system, leg, at, x, p)
     start = following.states_at(at.after, p)
     rates = field.rate.copied(y[:, 0], p)[0][:, 0], following.rate.copied(start, p)[0][:, 0]
-    matrix = saltation(at, rates[0], rates[1][:size], f"{leg.name!r} at {x[:n].tolist()}").matrix
+    matrix = saltation(at, rates[0], rates[1][:size], f"{name!r} at {x[:n].tolist()}").matrix
     fault = ""
-    if leg.kind != "reset":  # of which both modes are said, on a surface too
+    if leg.kind != "reset":  # a reset may lead from any mode to any other
         fault = begin_fault(system, leg, y[:, 0], p)
         fault = fault or change_fault(system, leg, after, y[:, 0], at.after, p)
     if fault:
         raise PointError(
-            explain(
-                "point",
-                expected=f"one at which {leg.name!r} leads from mode {before!r} to {after!r}",
-                received=f"{x[:n].tolist()}, where it does not: {fault}",
-                advice="Change the point, or the modes: a run through it says which they are.",
-            )
+            f"point {x[:n].tolist()}: {name!r} does not lead from mode {before!r} to {after!r} there, "
+            f"as {fault}. Change the point or the modes."
         )
     return np.asarray((matrix @ y[:, 1 : 1 + size])[:n, :n])
 
 
 def _require_near(system: FilippovSystem, leg: Leg, at: AtEvent, x: Array, p: Array) -> None:
-    """Refuse a point (N,) that is off the event, or off a surface on which the leg slides."""
+    """Raise for a point (N,) off the event, or off a surface on which the leg slides."""
     signs = system.parse_letters(leg.mode)[: system.surface_count]
-    zeros: list[tuple[str, Any]] = [(leg.name, at)]
-    zeros += [(f"h{i}", surface_map(system, i)(x, p)) for i, s in enumerate(signs) if not s]
+    own = leg.name(system)
+    zeros: list[tuple[str, Any]] = [(own if leg.kind == "exit" else f"{own} = 0", at)]
+    zeros += [(f"h{i} = 0", surface_map(system, i)(x, p)) for i, s in enumerate(signs) if not s]
     for name, zero in zeros:
         size = float(np.abs(x).max()) + 1e-3
         allowed = _NEAR * size * float(np.linalg.norm(zero.gradient))
         if not abs(zero.value) <= allowed:
             raise PointError(
-                explain(
-                    "point",
-                    expected=f"one at which {leg.name!r} happens in mode {leg.mode!r}: {name} = 0",
-                    received=f"{x[: system.dimension].tolist()}, where it is {zero.value:.6g}",
-                    advice="Take it from a run (event.x; with a smaller tol it is nearer), or solve for it.",
-                )
+                f"point {x[: system.dimension].tolist()} is not where {own!r} happens in mode {leg.mode!r}: "
+                f"{name} is violated by {zero.value:.6g}. Take event.x of a run with a small tol, or solve "
+                "for it."
             )

@@ -1,4 +1,4 @@
-"""The verbs ``sensitivity``, ``gradient`` and ``vjp``: derivatives of a run."""
+"""Derivatives of the end of a run, gradients of a cost and vector-Jacobian products."""
 
 from __future__ import annotations
 
@@ -18,7 +18,6 @@ from ...model import (
     OptionError,
     ParameterError,
     PointError,
-    explain,
     read_function,
     real_array,
 )
@@ -122,7 +121,7 @@ def gradient(
     Returns
     -------
     Gradient
-        Derivatives by directions that an entry to sliding loses are zero: that is correct.
+        Derivatives along directions that an entry to sliding loses are zero, which is correct.
 
     Raises
     ------
@@ -175,23 +174,23 @@ def _gradient_of_sets(run: Trajectory, cost: Any, names: Sequence[str]) -> Gradi
 
 
 def _finite(found: Gradient, run: Trajectory) -> Gradient:
-    """Refuse a cost that is no finite number at the end of a run, or has no finite derivatives."""
+    """Raise for a cost that is not finite at the end of a run, or has no finite derivatives."""
     if np.isfinite([found.value, *found.x0, *found.parameters.values()]).all():
         return found
     raise DegenerateError(
-        f"cost: expected a finite number with finite derivatives at the end of the run, "
-        f"{run.x[-1].tolist()}, received {found!r}. Check logarithms, roots and divisions there."
+        f"cost is not finite, or has derivatives that are not, at the end {run.x[-1].tolist()} of the run: "
+        f"{found!r}. Check logarithms, roots and divisions there."
     )
 
 
 def _cost(system: FilippovSystem, mode: str, cost: Any) -> EventMap:
-    """A cost as a function of the last leg's states, read once for the same expression object."""
+    """A cost as a function of the last leg's states, cached for the same expression object."""
     known = getattr(cost, "element_hash", None)
     if known is None or cost.numel() != 1:
         return function_map(system, mode, read_function(system.definition, cost, "cost"))
 
     def build() -> tuple[Any, EventMap]:
-        # the expression is kept, so that its hash stands for nothing else
+        # the expression is kept, so that its hash is not used again
         return cost, function_map(system, mode, read_function(system.definition, cost, "cost"))
 
     return system.cached(("cost", mode, known()), build)[1]
@@ -232,14 +231,9 @@ def vjp(
     system, n = _require_run(run).system, run.system.dimension
     row = real_array(cotangent, "cotangent")
     if row.shape != (n,) or not np.all(np.isfinite(row)):
-        received = f"shape {row.shape}" if row.shape != (n,) else str(row.tolist())
+        shown = f"has shape {row.shape}" if row.shape != (n,) else f"is {row.tolist()}"
         raise PointError(
-            explain(
-                "cotangent",
-                expected=f"{n} numbers, finite ones",
-                received=received,
-                advice="It is the derivative of something by the final state.",
-            )
+            f"cotangent {shown}, but the system has {n} states. Give one finite number for each."
         )
     if system.sets:
         found = set_sensitivity(run, _names(run, wrt))
@@ -281,41 +275,26 @@ def _pulled(
 
 def _require_run(run: Trajectory) -> Trajectory:
     if not isinstance(run, Trajectory):
-        raise OptionError(
-            explain(
-                "run",
-                expected="a Trajectory",
-                received=f"{run!r}",
-                advice="Give what ns.simulate returns.",
-            )
-        )
+        raise OptionError(f"run={run!r} is no Trajectory. Give the result of ns.simulate.")
     if not len(run.steps):
-        raise OptionError(
-            f"run: expected a motion, received one without a step ({run.message}) "
-            "Give a start from which the run moves."
-        )
+        raise OptionError(f"run has no step ({run.message}) Give a start from which it moves.")
     if run.status not in (Status.REACHED_END, Status.STOPPED):
         raise DegenerateError(
-            f"run: expected one that came to its end or to a stop, received {run.status} at "
-            f"t = {run.t[-1]:.6g}: {run.message} Its end is not a smooth function of its start: end the "
-            "run before."
+            f"run ended with {run.status} at t = {run.t[-1]:.6g}, where its end is not a smooth function of "
+            f"its start: {run.message} End it earlier."
         )
     return run
 
 
 def _names(run: Trajectory, wrt: str | Sequence[str]) -> tuple[str, ...]:
     known, names = run.system.parameter_names, list[str]()
-    if not isinstance(wrt, Iterable):
-        raise ParameterError(
-            f"wrt: expected 'x0', 'parameters' or names among {list(known)}, received {wrt!r}."
-        )
-    for name in [wrt] if isinstance(wrt, str) else list(wrt):
+    for name in [wrt] if isinstance(wrt, str) or not isinstance(wrt, Iterable) else list(wrt):
         if name == "parameters":
             names += [n for n in known if n not in names]
         elif name in known:
             names.append(name)
         elif name != "x0":
             raise ParameterError(
-                f"wrt: expected 'x0', 'parameters' or names among {list(known)}, received {name!r}."
+                f"wrt: {name!r} is unknown. Give 'x0', 'parameters' or names among {list(known)}."
             )
     return tuple(dict.fromkeys(names))

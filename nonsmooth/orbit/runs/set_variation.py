@@ -349,6 +349,9 @@ def set_sensitivity(run: Trajectory, names: Sequence[str]) -> Sensitivity:
 _NEAR = 1e-2
 
 
+#: Kinds of events of surfaces and sets.
+_CHANGES = ("crossing", "entry", "exit")
+
 #: Switching functions of a set that was held are zero at this part of what they are made of.
 _ON_SET = 1e-14
 
@@ -418,6 +421,11 @@ class _Passage:
                 "restitution of 0."
             )
         met = self._met(event)
+        if event.kind in _CHANGES and not event.side and len(met) < 2:
+            raise DegenerateError(
+                f"run: the {event.kind} at t = {event.t:.10g} is no zero of a function and has no "
+                "derivative. End the run before it."
+            )
         if event.kind == "crossing" and len(met) > 1:
             raise DegenerateError(
                 f"run: expected hits of sets and ends of sliding only, received {event.kind!r} at "
@@ -442,19 +450,18 @@ class _Passage:
         return parallel(other.gradient @ one.after_state, one.gradient)
 
     def _met(self, event: Event) -> tuple[int, ...]:
-        """Switching functions of the surface or set that an event is named after."""
-        if event.kind not in ("crossing", "entry", "exit"):
-            return ()
-        return self.system.entries[int(event.name.removeprefix("lambda").removeprefix("h"))]
+        """Switching functions of the surface or set that an event belongs to."""
+        own = event.kind in _CHANGES and 0 <= event.element < len(self.system.entries)
+        return self.system.entries[event.element] if own else ()
 
     def _at(self, mode: str, event: Event) -> AtEvent:
         """An event's function and the state after it, with derivatives."""
         x, p, letters = self._extended(event.x, event.t), self.law.p, ""
         if event.kind == "impact":
             after = self._extended(event.x_after, event.t)
-            choice = lambda w: instant_map(self.system, mode, "impact", event.name, w)(x, p)
-            letters = struck_letters(self.system, mode, event.name, choice, after)
-        return instant_map(self.system, mode, event.kind, event.name, letters)(x, p)
+            choice = lambda w: instant_map(self.system, mode, "impact", event.element, w)(x, p)
+            letters = struck_letters(self.system, mode, event.element, choice, after)
+        return instant_map(self.system, mode, event.kind, event.element, letters)(x, p)
 
     def _pass(self, mode: str, event: Event, before: Sequence[tuple[Array, Array]]) -> list[int]:
         """Carry the derivatives through an event."""
@@ -466,8 +473,8 @@ class _Passage:
             self.rows.append(self._time_of_hit(mode, met, before))
             self.y = self.law.hit(mode, met, x, self.y)
         elif _ends_sliding(event):
-            j = self.system.impacts.index(event.name) if event.kind == "release" else 0
-            which = met or (self.system.surface_count + j,)
+            contact = self.system.surface_count + event.element - len(self.system.entries)
+            which = met or (contact,)
             self.rows.append(self.law.time_of_exit(mode, which, x, self.y))
         else:
             self._jump(mode, following, event)
@@ -526,4 +533,5 @@ class _Passage:
 
 def _ends_sliding(event: Event) -> bool:
     """Whether a multiplier or reaction came to its limit, where the field is continuous."""
-    return event.kind == "release" or event.name.startswith("lambda")
+    slid = event.kind in _CHANGES and event.mode_before[event.element] == "s"
+    return event.kind == "release" or slid

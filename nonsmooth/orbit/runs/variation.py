@@ -1,9 +1,9 @@
-"""Derivatives along a run: state-transition matrices of its legs and saltation at its events.
+"""Derivatives along a run by state-transition matrices of its legs and saltation matrices of its events.
 
-A run with a fixed itinerary is a chain of smooth maps. Each leg gives its state-transition matrix X
-and its derivatives P by parameters, each event its saltation matrices (``saltation``); derivatives of
-the end are their product, and gradients of a cost are the same product from the other end (the exact
-discrete adjoint: nothing is integrated backward, which no method could do through an entry to sliding).
+A run with a fixed itinerary is a chain of smooth maps. Each leg has its state-transition matrix X and its
+derivatives P by parameters, each event its saltation matrices (``saltation``). Derivatives of the end are
+their product, and gradients of a cost are the same product from the other end: the exact discrete adjoint,
+without backward integration, which is impossible through an entry to sliding.
 """
 
 from __future__ import annotations
@@ -17,36 +17,37 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ...flow.names import described
 from ...flow.trajectory import Trajectory
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem
 from ...model.derivatives.event_maps import AtEvent
 from .flight import Flight, Flights
-from .guards import described, watch
+from .guards import watch
 from .legs import Flown, Leg, Stretch, fly, leg_name, stretches
 from .saltation import Saltation, saltation, saltations
 
-# Events that a run has only within its own error: grazes, of which it does not know that they happen.
+# Grazings within the error of a run ---------------------------------------------------------------
 
-#: Events that an orbit meets at larger angles are met deeper than runs are wrong.
+#: Angle between orbit and surface above which no event is within the error of a run.
 _STEEP = 1e-3
 
-#: A graze is known to happen where it is so many times as deep as the run is wrong.
-_KNOWN = 4.0
+#: Depth of a grazing, relative to the error of the run, above which it happens for certain.
+_CERTAIN = 4.0
 
-#: Roundings in an event's function, where the run is not wrong otherwise.
+#: Relative rounding of an event's function.
 _ROUNDING = 16.0 * float(np.finfo(float).eps)
 
-#: Part of a leg, or of the time in which the state changes, over which a speed's rate is taken.
+#: Relative step of the difference that gives the rate of a speed.
 _INSTANT = 1e-5
 
 
-def require_known(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
-    """Refuse a run with a graze that is within the run's own error."""
+def _require_certain(system: FilippovSystem, parts: Sequence[Passage], p: Array) -> None:
+    """Raise for a run with a grazing that is within its own error."""
     flat = [k for k, part in enumerate(parts) if part.event and part.event.angle < _STEEP]
     if not flat:
         return
     n = system.extended_dimension
-    error = np.zeros(n)  # of the run, against the orbit from its start
+    error = np.zeros(n)  # of the run, relative to the orbit from its start
     for k, part in enumerate(parts[: flat[-1] + 1]):
         error = part.flown.by_start @ error
         error[:n] += part.stretch.end - part.flown.end[:n]
@@ -59,11 +60,11 @@ def require_known(system: FilippovSystem, parts: Sequence[Passage], p: Array) ->
 
 
 def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array) -> None:
-    """Refuse an event that the orbit meets no deeper than the run is wrong by ``error`` (N + k,)."""
+    """Raise for a grazing that is no deeper than the error (N + k,) of the run."""
     leg, flown = part.stretch.leg, part.flown
     at = leg.at_end(system, flown.end, p)
     if part.event is None or np.array_equal(part.event.matrix, at.after_state):
-        return  # neighbours pass it as if it were not there
+        return  # it leaves the derivative continuous
     speed = _speed(at, flown.rate)
     size, length = math.hypot(*flown.end), math.hypot(*flown.rate)
     step = _INSTANT * min(part.stretch.duration, size / length if size and length else math.inf)
@@ -75,13 +76,12 @@ def _require_deep(system: FilippovSystem, part: Passage, error: Array, p: Array)
     depth = 0.5 * speed**2 / abs(turning)
     wrong = abs(float(at.gradient @ error))
     wrong += _ROUNDING * float(np.abs(at.gradient) @ np.abs(flown.end))
-    if depth > _KNOWN * wrong:
+    if depth > _CERTAIN * wrong:
         return
     raise DegenerateError(
-        f"{leg_name(leg)} at t = {part.stretch.t + part.stretch.duration:.10g}: expected an event that "
-        f"the run is sure of, received a grazing: the orbit would turn back {depth:.1e} beyond it, and "
-        f"the run's error is {wrong:.1e} there. A derivative through it means nothing. Simulate with "
-        "a smaller tol, or move the start or a parameter away from the grazing."
+        f"{leg_name(system, leg)} at t = {part.stretch.t + part.stretch.duration:.10g} is a grazing: the orbit turns "
+        f"back {depth:.1e} beyond it, with an error of {wrong:.1e}. Simulate with a smaller tol, or move the "
+        "start or a parameter away from the grazing."
     )
 
 
@@ -89,15 +89,15 @@ def _speed(at: AtEvent, rate: Array) -> float:
     return float(at.gradient @ rate)
 
 
-# Variational equations along a known run by Gauss collocation, where they have no Taylor series.
+# Legs without Taylor series at an end -------------------------------------------------------------
 
 _STAGES = 12
 
 
-def collocated(
+def _collocated(
     run: Trajectory, leg: Leg, t_start: float, t_end: float, p: Array, chosen: tuple[int, ...]
 ) -> Flown:
-    """Derivatives of a run's leg between two times, as ``legs.fly`` gives them."""
+    """Derivatives of a leg of a run between two times, by Gauss collocation."""
     field = leg.field(run.system, chosen)
     n, starts = field.blocks.starts, run.steps.starts
     first = max(int(np.searchsorted(starts, t_start, side="right")) - 1, 0)
@@ -105,7 +105,7 @@ def collocated(
     start = _polynomial(run, first, t_start, n)[0]
     initial = field.initial(start, p)
     derivatives = initial[:, 1:]
-    nodes, weights, inner = gauss(_STAGES)
+    nodes, weights, inner = _gauss(_STAGES)
     for k in range(first, last):
         low = max(float(starts[k]), t_start)
         high = min(float(starts[k + 1]) if k + 1 < len(starts) else t_end, t_end)
@@ -122,7 +122,7 @@ def collocated(
 
 
 def _polynomial(run: Trajectory, step: int, t: float, n: int) -> tuple[Array, Array]:
-    """State and its rate at a time of a step."""
+    """State and rate at a time of a step."""
     c = run.steps.coefficients[step][:n]
     degrees = np.arange(c.shape[1])
     powered = (t - float(run.steps.starts[step])) ** degrees
@@ -138,7 +138,7 @@ def _increment(a: Array, b: Array, s: Array, inner: Array, weights: Array) -> Ar
 
 
 @lru_cache(maxsize=1)
-def gauss(stages: int) -> tuple[Array, Array, Array]:
+def _gauss(stages: int) -> tuple[Array, Array, Array]:
     """Nodes and weights of Gauss on [0, 1] and the integrals a_ij of the Lagrange basis to node i."""
     legendre = np.polynomial.legendre
     x, w = legendre.leggauss(stages)
@@ -151,19 +151,11 @@ def gauss(stages: int) -> tuple[Array, Array, Array]:
 
 @dataclass(frozen=True, eq=False)
 class Passage:
-    """A leg of a run and the event that ends it, with derivatives.
-
-    Attributes
-    ----------
-    stretch : Stretch
-    flown : Flown
-    event : Saltation or None
-        None where a time ends the leg.
-    """
+    """A leg of a run and the event that ends it, with derivatives."""
 
     stretch: Stretch
     flown: Flown
-    event: Saltation | None
+    event: Saltation | None  # None where a time ends the leg
 
     def forward(self, dx: Array, dp: Array) -> tuple[Array, Array]:
         """Carry derivatives by start (N, m) and parameters (N, q) to the end of the leg's flow."""
@@ -200,33 +192,31 @@ def passages(run: Trajectory, chosen: tuple[int, ...]) -> list[Passage]:
     parts = stretches(run)
     try:
         flight = Flights(system, [part.leg for part in parts], chosen)(
-            np.array([part.start for part in parts]),
-            np.array([part.duration for part in parts]),
-            p,
+            np.array([part.start for part in parts]), np.array([part.duration for part in parts]), p
         )
     except ConvergenceError:
         found = _one_by_one(run, parts, p, chosen)
-        require_known(system, found, p)
+        _require_certain(system, found, p)
         return found
-    found = _together(parts, flight)
-    if parts[-1].leg.name and run.events[-1].kind == "end":  # the run ends at the very event
+    found = _together(system, parts, flight)
+    if not parts[-1].leg.timed and run.events[-1].kind == "end":  # the run ends at the very event
         last = found[-1]
         jump = saltation_after(run, last.stretch, last.flown, None, p)
         found[-1] = replace(last, event=jump)
-    require_known(system, found, p)
+    _require_certain(system, found, p)
     return found
 
 
-def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
-    """Legs that were flown together, with the saltation of their events."""
+def _together(system: FilippovSystem, parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
+    """Legs that were integrated together, with the saltation of their events."""
     n = flight.after.shape[1]
     after = np.roll(flight.before[:, :n], -1, axis=0)
     carried = (flight.after_state @ flight.rate[:, :, None])[:, :, 0]
     ends: NDArray[Any] = ~np.all(np.isfinite(after), axis=1)
     ends[-1] = True
     after[ends] = carried[ends]
-    events = np.array([bool(part.leg.name) for part in parts])
-    found = saltations(flight, after, lambda k: _at(parts[k]), events)
+    events = np.array([not part.leg.timed for part in parts])
+    found = saltations(flight, after, lambda k: _at(system, parts[k]), events)
     rows = zip(
         parts,
         flight.flown,
@@ -245,14 +235,14 @@ def _together(parts: Sequence[Stretch], flight: Flight) -> list[Passage]:
     ]
 
 
-def _at(part: Stretch) -> str:
-    return f"{part.leg.name!r} at t = {part.t + part.duration:.10g}"
+def _at(system: FilippovSystem, part: Stretch) -> str:
+    return f"{part.leg.name(system)!r} at t = {part.t + part.duration:.10g}"
 
 
 def _one_by_one(
     run: Trajectory, parts: Sequence[Stretch], p: Array, chosen: tuple[int, ...]
 ) -> list[Passage]:
-    """Legs of which some have no Taylor series at an end."""
+    """Legs, some of which have no Taylor series at an end."""
     result: list[Passage] = []
     for k, part in enumerate(parts):
         flown = _flown(run, part, p, chosen)
@@ -265,16 +255,16 @@ def _flown(run: Trajectory, part: Stretch, p: Array, chosen: tuple[int, ...]) ->
     try:
         return fly(run.system, part.leg, part.start, part.duration, p, chosen)
     except ConvergenceError:
-        # The field has no Taylor series at an end of the leg (a power law at zero), but a derivative.
-        return collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
+        # A field such as a power law has a derivative, but no Taylor series at zero.
+        return _collocated(run, part.leg, part.t, part.t + part.duration, p, chosen)
 
 
 def saltation_after(
     run: Trajectory, part: Stretch, flown: Flown, following: Stretch | None, p: Array
 ) -> Saltation | None:
-    """What the event that ends a leg does to neighbours; None where a time ends it."""
-    # At the end of a run that goes no further the field after it is that of the mode reached.
-    if not part.leg.name:
+    """The saltation of the event that ends a leg; None where a time ends it."""
+    # At the end of a run the field after it is that of the mode reached.
+    if part.leg.timed:
         return None
     system, n = run.system, len(part.start)
     at = part.leg.at_end(system, flown.end, p)
@@ -288,7 +278,7 @@ def saltation_after(
         after = field.rate.copied(start, p)[0][:n, 0]
         if not np.all(np.isfinite(after)):
             after = at.after_state @ flown.rate
-    return saltation(at, flown.rate, after, _at(part))
+    return saltation(at, flown.rate, after, _at(system, part))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -298,17 +288,17 @@ class Sensitivity:
     Attributes
     ----------
     dx_dx0 : ndarray (n, n)
-        Of the final state by the start.
+        Derivatives of the final state by the start.
     dx_dp : ndarray (n, q)
-        Of the final state by the parameters ``names``.
+        Derivatives of the final state by the parameters ``names``.
     event_times : ndarray (m,)
-        Times of the events that the derivatives pass.
+        Times of the events.
     dt_dx0, dt_dp : ndarray (m, n), (m, q)
-        Of the event times.
+        Derivatives of the event times.
     dt_end_dx0, dt_end_dp : ndarray (n,), (q,)
-        Of the final time: zero unless a stop ended the run.
+        Derivatives of the final time: zero unless a stop ended the run.
     names : tuple of str
-        Of the parameters.
+        Names of the parameters.
     run : Trajectory
         The run that was differentiated.
     """
@@ -327,7 +317,7 @@ class Sensitivity:
     def clearance(self) -> float:
         """Smallest distance ``h/|grad h|`` at which the run passed a guard without reaching it.
 
-        Perturbations of that size may change the itinerary, and with it the derivative. Infinite
+        Perturbations of that size may change the itinerary, and with it the derivative. It is infinite
         where the run passes none.
         """
         return self._nearest[0]
@@ -339,9 +329,7 @@ class Sensitivity:
 
     @cached_property
     def _nearest(self) -> tuple[float, str]:
-        if self.run.system.sets:  # not looked for
-            return math.inf, ""
-        return clearance(self.run)
+        return (math.inf, "") if self.run.system.sets else _clearance(self.run)
 
     def __repr__(self) -> str:
         near = f"; clearance {self.clearance:.3g} ({self.nearest})" if self.nearest else ""
@@ -351,8 +339,8 @@ class Sensitivity:
         )
 
 
-def clearance(run: Trajectory) -> tuple[float, str]:
-    """Smallest distance from a guard that a run passed without reaching it, and which and when."""
+def _clearance(run: Trajectory) -> tuple[float, str]:
+    """Smallest distance from a guard that a run passed without reaching it, with its name and time."""
     p, best = run.system.parameter_vector(run.parameters), (math.inf, "")
     for part in stretches(run):
         if part.duration <= 0.0:
@@ -360,16 +348,16 @@ def clearance(run: Trajectory) -> tuple[float, str]:
         try:
             seen = watch(run.system, part.leg.mode, part.start, part.duration, p).approaches
         except ConvergenceError:
-            continue  # no Taylor series at an end: nothing is said of this leg
+            continue  # no Taylor series at an end
         for near in seen:
             if abs(near.distance) < best[0]:
-                when = f"{described(near.guard)} at t = {part.t + near.t:.6g}"
+                when = f"{described(run.system, near.guard)} at t = {part.t + near.t:.6g}"
                 best = (abs(near.distance), when)
     return best
 
 
 def along(run: Trajectory, names: Sequence[str]) -> tuple[list[Passage], Sensitivity]:
-    """Passages of a run, and the derivatives that follow from them (without the clearance)."""
+    """Passages of a run, and the derivatives that follow from them."""
     system, n = run.system, run.system.dimension
     chosen = tuple(system.parameter_names.index(name) for name in names)
     parts = passages(run, chosen)

@@ -1,4 +1,4 @@
-"""Dividing surfaces of two-folds where a plane of starts cuts them."""
+"""Sections of the dividing surfaces of two-folds with a plane of initial states."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from matplotlib.figure import Figure
 from ...model import Array, OptionError
 from ...orbit import DividingCurves
 from .. import style
+from ..arguments import results
 from ..labels import Labels
 
-#: By the kind of an arc: what its orbits do, and dashes.
+#: Description and dashes of each kind of arc.
 _KINDS: dict[str, tuple[str, Any]] = {
     "two-fold": ("into a two-fold", "-"),
     "grazing": ("just touches", style.DASHED),
 }
 
-#: A name is beside the middle of an arc: in this share of its length.
+#: Shares of an arc's length beside which its name may be.
 _MIDDLE = np.linspace(0.3, 0.7, 9)
 
 
@@ -34,11 +35,11 @@ def dividing_curves(
     labels: bool = True,
     title: str | None = None,
 ) -> Figure:
-    """Draw the curves in which a plane of starts is cut by what divides orbits beside two-folds.
+    """Draw the curves in which a plane of starts cuts the dividing surfaces of two-folds.
 
-    Starts that slide into a two-fold are full lines, those that just touch the surface are dashed, and dots
-    are where they meet; circles are where arcs of two itineraries do that are of one kind. Beside every arc
-    is its itinerary. What comes to the two-folds is blue, what leaves them red.
+    Starts that slide into a two-fold are full lines, starts that graze the surface are dashed, and dots
+    are their common ends; circles are common ends of arcs of one kind with different itineraries. Each
+    arc has its itinerary beside it. Orbits into two-folds are blue, orbits out of them red.
 
     Parameters
     ----------
@@ -77,17 +78,12 @@ def dividing_curves(
     >>> figure.axes[0].get_xlabel()
     'y at the start'
     """
-    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
-    if not several or not all(isinstance(one, DividingCurves) for one in several):
-        raise OptionError(
-            "found: expected DividingCurves or several, received "
-            f"{repr(found)[:60]}. ns.manifold returns them with starts=."
-        )
+    several = results(found, DividingCurves, "manifold returns them with starts=.")
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         if hasattr(axes, "get_zlim"):
             raise OptionError(
-                f"ax: expected axes of a plane, received {type(axes).__name__}. Leave projection out."
+                f"ax is {type(axes).__name__}, not axes of a plane. Leave projection out."
             )
         named = Labels(axes) if labels else None
         for one in several:
@@ -103,12 +99,12 @@ def dividing_curves(
 def _draw(axes: Any, named: Labels | None, one: DividingCurves) -> None:
     color = style.BLUE if one.stable else style.VERMILLION
     for arc in one.arcs:
-        words, dashes = _KINDS[arc.kind]
+        description, dashes = _KINDS[arc.kind]
         axes.plot(*arc.points.T, color=color, linewidth=1.8, linestyle=dashes)
         if named is not None:
             back = "" if one.stable else ", backward"
             modes = arc.itinerary.replace("-", "\N{MINUS SIGN}")
-            named.name(f"{modes} {words}{back}", _middle(arc.points), color)
+            named.name(f"{modes} {description}{back}", _middle(arc.points), color)
     changes = _changes(one)
     if len(changes):
         look: Any = {"markersize": 4.5, "zorder": 5}

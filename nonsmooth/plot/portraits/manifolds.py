@@ -13,6 +13,7 @@ from mpl_toolkits.mplot3d.art3d import Poly3DCollection
 from ...model import OptionError
 from ...orbit import Manifold
 from .. import style
+from ..arguments import results
 
 _STABLE, _UNSTABLE = style.BLUE, style.VERMILLION
 
@@ -63,7 +64,7 @@ def manifold(
     >>> both = [ns.manifold(system, saddle, stable=s, length=1.0) for s in (True, False)]
     >>> figure = ns.plot.manifold(both, names=["x", "y"])
     """
-    several: list[Any] = list(found) if isinstance(found, (list, tuple)) else [found]
+    several = results(found, Manifold, "dividing_curves draws curves in a plane of starts.")
     spatial = _dimension(several) == 3
     with style.settings():
         if ax is None and spatial:
@@ -73,8 +74,8 @@ def manifold(
         figure, axes = style.axes_for(ax, size)
         if spatial != hasattr(axes, "get_zlim"):
             raise OptionError(
-                "ax: expected axes of as many dimensions as the manifolds, received "
-                f"{type(axes).__name__}. Make them with projection='3d' for three states."
+                f"ax is {type(axes).__name__}, which does not have the dimension of the manifolds. "
+                "Make them with projection='3d' for three states."
             )
         for one in several:
             _draw(axes, one)
@@ -90,15 +91,10 @@ def manifold(
 
 
 def _dimension(several: list[Manifold]) -> int:
-    sizes = {len(m.point) for m in several if isinstance(m, Manifold)}
-    if (
-        len(sizes) != 1
-        or sizes & {2, 3} == set()
-        or not all(isinstance(m, Manifold) for m in several)
-    ):
+    sizes = {len(m.point) for m in several}
+    if len(sizes) != 1 or not sizes <= {2, 3}:
         raise OptionError(
-            f"found: expected manifolds of a system with two or three states, received {several!r}. "
-            "Curves in a plane of starts are drawn by dividing_curves."
+            f"found must be manifolds of one system with two or three states, not {several!r}."
         )
     return sizes.pop()
 
@@ -129,9 +125,9 @@ def _fit(axes: Any, several: list[Manifold]) -> None:
 
 
 def _legend(axes: Any, several: list[Manifold]) -> None:
-    words = {True: "stable manifold", False: "unstable manifold"}
+    labels = {True: "stable manifold", False: "unstable manifold"}
     handles = [
-        style.Line2D([], [], color=_STABLE if s else _UNSTABLE, label=words[s])
+        style.Line2D([], [], color=_STABLE if s else _UNSTABLE, label=labels[s])
         for s in (True, False)
         if any(m.stable == s for m in several)
     ]

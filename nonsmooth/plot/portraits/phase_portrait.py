@@ -14,9 +14,10 @@ from numpy.typing import ArrayLike
 from ...local import Equilibrium, Fold, PseudoEquilibrium
 from ...local.scans.box import Box
 from ...local.scans.plane_scan import Piece, PlaneScan
-from ...model import Array, DefinitionError, FilippovSystem, Parameters, PointError, explain
+from ...model import Array, FilippovSystem, Parameters, PointError
 from ...orbit.manifolds.plane_orbits import PlaneOrbits
 from .. import style
+from ..arguments import require_one_surface
 from ..labels import Labels
 from ..legends import beside
 from .tapered_ends import draw_orbit
@@ -116,7 +117,12 @@ def phase_portrait(
     >>> figure.axes[0].get_xlabel()
     'x'
     """
-    _check(system)
+    require_one_surface(
+        system,
+        "phase_portrait",
+        2,
+        "Use two_fold for a two-fold in three states; trajectory for runs.",
+    )
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
     scan = PlaneScan.of(system, values, Box.read(box))
     with style.settings():
@@ -134,33 +140,6 @@ def phase_portrait(
     return figure
 
 
-def _check(system: object) -> None:
-    if not isinstance(system, FilippovSystem):
-        received, advice = type(system).__name__, "Give the system first, then the box."
-    elif system.dimension != 2:
-        received = f"{system.dimension} states: {', '.join(system.state_names)}"
-        advice = "For a two-fold in three states use two_fold; for runs use trajectory."
-    elif system.sets:
-        received, advice = "a set of codimension two or three", "Draw runs with trajectory."
-    elif system.surface_count != 1:
-        received = f"{system.surface_count} surfaces"
-        advice = "Its surfaces meet and cut each other; draw runs with trajectory."
-    elif system.time_dependent:
-        received, advice = "explicit time", "Its orbits cross in the plane of the states."
-    elif system.nonlinear[0]:
-        received, advice = "hidden dynamics", "Its sliding field is not a convex combination."
-    else:
-        return
-    raise DefinitionError(
-        explain(
-            "phase_portrait",
-            expected="an autonomous FilippovSystem of 2 states and 1 surface",
-            received=received,
-            advice=advice,
-        )
-    )
-
-
 def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
     try:
         points = np.asarray(starts, dtype=float)
@@ -168,18 +147,14 @@ def _points(system: FilippovSystem, starts: ArrayLike) -> Array:
         points = np.empty(0)
     if points.ndim != 2 or points.shape[1] != 2 or not np.all(np.isfinite(points)):
         raise PointError(
-            explain(
-                "starts",
-                expected="finite numbers of shape (k, 2)",
-                received=f"shape {points.shape}" if points.size else repr(starts),
-                advice=f"One row ({', '.join(system.state_names)}) for each orbit.",
-            )
+            f"starts has shape {points.shape}, but must have finite rows ({', '.join(system.state_names)}), "
+            "one for each orbit."
         )
     return points
 
 
 class _Portrait:
-    """Draws one portrait: what a scan found, and orbits."""
+    """Draws one portrait: the results of a scan, and orbits."""
 
     def __init__(self, ax: Axes, scan: PlaneScan, t_end: float | None):
         self.ax, self.scan = ax, scan
@@ -339,7 +314,7 @@ class _Portrait:
 
 
 def _together(special: list[Special], size: Array) -> dict[str, list[Array]]:
-    """Names and places of points; those that lie on one another are named together."""
+    """Points by their names; coincident ones share a name."""
     groups = list[tuple[Array, list[str]]]()
     for found in special:
         point = np.asarray(found.point, dtype=float)
@@ -356,7 +331,7 @@ def _together(special: list[Special], size: Array) -> dict[str, list[Array]]:
 
 
 def _name(found: Special) -> str:
-    """What a special point is called in the legend."""
+    """Name of a special point in the picture."""
     if isinstance(found, Fold):
         return f"{found.kind} fold" if found.order == 2 else found.kind
     name = found.kind

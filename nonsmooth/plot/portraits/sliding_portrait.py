@@ -1,4 +1,4 @@
-"""The switching surface of a system of three states: its regions, folds and sliding orbits."""
+"""Sliding portraits: regions, folds and sliding orbits on a surface of a system of three states."""
 
 from __future__ import annotations
 
@@ -16,9 +16,10 @@ from numpy.typing import NDArray
 from ...local.point.regions import Region
 from ...local.scans.box import Box
 from ...local.scans.surface_scan import REGIONS, SurfaceScan
-from ...model import Array, DefinitionError, FilippovSystem, OptionError, Parameters, explain, real
+from ...model import Array, FilippovSystem, Parameters, real, whole
 from ...orbit.manifolds.sliding_orbits import SlidingOrbits
 from .. import style
+from ..arguments import require_one_surface
 from ..labels import Labels
 from ..legends import beside
 from .tapered_ends import draw_orbit
@@ -115,9 +116,13 @@ def sliding_portrait(
     >>> figure.axes[0].get_xlabel()
     'z2'
     """
-    _check(system)
-    if isinstance(orbits, bool) or not isinstance(orbits, int) or orbits < 0:
-        raise OptionError(f"orbits: expected a whole number >= 0, received {orbits!r}.")
+    require_one_surface(
+        system,
+        "sliding_portrait",
+        3,
+        "Use phase_portrait for two states; hold states of a larger one.",
+    )
+    whole(orbits, "orbits", least=0)
     values = dict(zip(system.parameter_names, system.parameter_vector(parameters), strict=True))
     scan = SurfaceScan.of(system, values, Box.read(box), coordinates, real(guess, "guess"))
     with style.settings():
@@ -133,32 +138,6 @@ def sliding_portrait(
         if legend if labels is None else labels:
             portrait.line_names()
     return figure
-
-
-def _check(system: object) -> None:
-    if not isinstance(system, FilippovSystem):
-        received, advice = type(system).__name__, "Give the system first, then the box."
-    elif system.dimension != 3:
-        received = f"{system.dimension} states: {', '.join(system.state_names)}"
-        advice = "For two states use phase_portrait; with more, hold some of them fixed."
-    elif system.sets:
-        received, advice = "a set of codimension two or three", "Draw runs with trajectory."
-    elif system.surface_count != 1:
-        received, advice = f"{system.surface_count} surfaces", "Draw runs with trajectory."
-    elif system.time_dependent:
-        received, advice = "explicit time", "Freeze it at a value, or draw runs with trajectory."
-    elif system.nonlinear[0]:
-        received, advice = "hidden dynamics", "Its sliding field is not a convex combination."
-    else:
-        return
-    raise DefinitionError(
-        explain(
-            "sliding_portrait",
-            expected="an autonomous FilippovSystem of 3 states and 1 surface",
-            received=received,
-            advice=advice,
-        )
-    )
 
 
 class _Portrait:
@@ -249,20 +228,20 @@ class _Portrait:
             for cusp in fold.cusps:
                 self._mark(cusp, "^", style.FIELDS[fold.side], gid="cusp")
         for found in self.scan.two_folds:
-            place = self.scan.flat(found.point)
-            self._mark(place, "o", style.BLACK, gid="two-fold")
+            point = self.scan.flat(found.point)
+            self._mark(point, "o", style.BLACK, gid="two-fold")
             name = found.label.removeprefix("boundary ")
             name = name.replace("Delta", "Δ").replace("nu", "ν")
-            self.labels.name(name, place, fontsize=9)
+            self.labels.name(name, point, fontsize=9)
         for rest in self.scan.pseudo_equilibria:
             marker = _MARKERS.get(rest.kind.rpartition("-")[2], "P")
             fill = style.BLACK if rest.stable or "saddle" in rest.kind else "white"
-            place = self.scan.flat(rest.point)
-            self._mark(place, marker, fill, gid=rest.kind, markersize=8)
+            point = self.scan.flat(rest.point)
+            self._mark(point, marker, fill, gid=rest.kind, markersize=8)
 
-    def _mark(self, place: Array, marker: str, fill: str, **options: Any) -> None:
+    def _mark(self, point: Array, marker: str, fill: str, **options: Any) -> None:
         style_ = {"markersize": 6.5, "markeredgecolor": style.BLACK, "zorder": 7, **options}
-        self.ax.plot(*place, linestyle="none", marker=marker, markerfacecolor=fill, **style_)
+        self.ax.plot(*point, linestyle="none", marker=marker, markerfacecolor=fill, **style_)
 
     def _free(self) -> NDArray[np.bool_]:
         """Grid points that are not close to a mark or a separatrix."""
@@ -279,7 +258,7 @@ class _Portrait:
         return np.asarray(~binary_dilation(taken, iterations=n // 18))
 
     def names(self) -> None:
-        """Write the name of each region where there is most room."""
+        """Write the name of each region where it has most room."""
         from scipy.ndimage import distance_transform_edt, label
 
         (u, v), free = self.scan.mesh, self._free()
@@ -293,8 +272,8 @@ class _Portrait:
                 room = part & free if np.any(part & free) else part
                 deep = distance_transform_edt(np.pad(room, 1))[1:-1, 1:-1]
                 i, j = np.unravel_index(int(np.argmax(deep)), deep.shape)
-                place = (float(u[j]), float(v[i]))
-                style.write(self.ax, place, name, fontsize=13, zorder=7.5, bbox=box, gid="region")
+                point = (float(u[j]), float(v[i]))
+                style.write(self.ax, point, name, fontsize=13, zorder=7.5, bbox=box, gid="region")
 
     def legend(self) -> None:
         """Explain colours, lines and marks beside the axes."""
@@ -312,7 +291,7 @@ class _Portrait:
     def line_names(self) -> None:
         """Name folds, canards, manifolds and special points beside them."""
         for side, name in (("+", "F_1"), ("-", "F_2")):
-            for visible, word in ((True, "visible"), (False, "invisible")):
+            for visible, visibility in ((True, "visible"), (False, "invisible")):
                 pieces = [
                     piece
                     for fold in self.scan.folds
@@ -320,7 +299,7 @@ class _Portrait:
                     if fold.side == side and seen is visible
                 ]
                 if pieces:
-                    text = f"fold of ${name}$,\n{word}"
+                    text = f"fold of ${name}$,\n{visibility}"
                     self.labels.name(text, np.vstack(pieces), style.FIELDS[side])
         for name, curve in self.named.items():
             self.labels.name(name, curve, _SPECIAL[name][0])

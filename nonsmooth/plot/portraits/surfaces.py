@@ -1,6 +1,8 @@
-"""The switching surfaces of a planar system, under what else a picture shows."""
+"""Switching surfaces of a planar system, as grey lines in a picture."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -23,13 +25,5 @@ def draw_surfaces(
     for value in values:
         h = value.reshape(x.shape)
         if np.nanmin(h) < 0 < np.nanmax(h):
-            ax.contour(
-                x,
-                y,
-                h,
-                levels=[0.0],
-                colors=[style.GREY],
-                linewidths=2.2,
-                alpha=0.7,
-                zorder=1,
-            )
+            look: Any = {"colors": [style.GREY], "linewidths": 2.2, "alpha": 0.7, "zorder": 1}
+            ax.contour(x, y, h, levels=[0.0], **look)

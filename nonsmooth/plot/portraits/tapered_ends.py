@@ -1,4 +1,4 @@
-"""Orbits that go on where they are not drawn: thinner and thinner there, so that none ends in mid-air."""
+"""Orbits with ends that taper where the orbit continues beyond what is drawn."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ _FEW, _DRAWN = 4, 0.7  # parts of a dashed line, and how much of each is drawn
 def draw_orbit(
     ax: Axes, curve: Array, thins: tuple[bool, bool], box: Box, width: float, **options: Any
 ) -> None:
-    """Draw an orbit, thinner and thinner to an end that is not where the orbit ends."""
+    """Draw an orbit, tapered at ends beyond which it continues."""
     dashed = options.get("linestyle", "-") != "-"
     look = {name: value for name, value in options.items() if name != "linestyle"}
     for thin, step in zip(thins, (1, -1), strict=True):
@@ -35,7 +35,7 @@ def draw_orbit(
 
 
 def _parted(curve: Array, box: Box, count: int, dashed: bool) -> tuple[Array, list[Array]]:
-    """A curve without the length over which it thins out, and the parts (k, 2) of that, from its tip."""
+    """A curve without its tapered end, and the parts (k, 2) of that end from its tip."""
     lengths = box.lengths(curve)
     cuts = np.linspace(0.0, min(_OVER, lengths[-1] / 2), count + 1)
     begins = cuts[:-1] + (1.0 - _DRAWN) * np.diff(cuts) if dashed else cuts[:-1]

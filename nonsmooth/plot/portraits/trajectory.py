@@ -1,4 +1,4 @@
-"""Trajectories: states against time with the modes marked, and the phase plane of planar systems."""
+"""Trajectories: states over time with modes and events, and the phase plane of planar systems."""
 
 from __future__ import annotations
 
@@ -14,11 +14,11 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Patch, Rectangle
 
 from ...flow import Event, Segment, Trajectory
-from ...model import DefinitionError, OptionError, explain, whole
+from ...model import DefinitionError, OptionError, whole
 from .. import style
 from .surfaces import draw_surfaces
 
-#: Marker of each kind of event; shape tells them apart without colour.
+#: Marker of each kind of event; shapes differ without colour.
 MARKERS = {
     "crossing": ("o", "white", "crossing"),
     "entry": ("v", style.BLACK, "entry into sliding"),
@@ -99,12 +99,8 @@ def trajectory(
     plane = run.system.dimension == 2 if phase_plane is None else phase_plane
     if plane and run.system.dimension != 2:
         raise DefinitionError(
-            explain(
-                "phase_plane",
-                expected="a system of 2 states",
-                received=f"{run.system.dimension} states: {', '.join(run.system.state_names)}",
-                advice="Leave phase_plane= out to draw states against time.",
-            )
+            f"phase_plane=True needs 2 states, but the system has {run.system.dimension}: "
+            f"{', '.join(run.system.state_names)}. Leave it out to draw states against time."
         )
     return _draw(run, names, plane, whole(samples, "samples"), size, figure)
 
@@ -169,12 +165,7 @@ class _Part:
 def _checked(run: object) -> Trajectory:
     if not isinstance(run, Trajectory):
         raise DefinitionError(
-            explain(
-                "trajectory",
-                expected="a Trajectory",
-                received=type(run).__name__,
-                advice="Make one with simulate(system, x0, t_end=...).",
-            )
+            f"trajectory cannot draw a {type(run).__name__}. Make a Trajectory with simulate(system, x0, t_end)."
         )
     return run
 
@@ -184,12 +175,7 @@ def _states(run: Trajectory, states: list[str] | None) -> list[str]:
     unknown = [name for name in states or [] if name not in known]
     if unknown or states == []:
         raise OptionError(
-            explain(
-                "states",
-                expected=f"names among {known}",
-                received=repr(states),
-                advice="Leave states= out to draw all of them.",
-            )
+            f"states={states!r} are not names among {known}. Leave states= out to draw all of them."
         )
     return list(states) if states else known
 
@@ -245,7 +231,7 @@ def _time_column(
 
 
 def _strip(ax: Axes, run: Trajectory, looks: dict[str, tuple[str, Any, float, str]]) -> None:
-    """Bar with the letter of each segment's mode, where there is room for it."""
+    """Bar with the mode of each segment, if the segment is wide enough."""
     span = abs(run.t[-1] - run.t[0]) or 1.0
     letter = 0.11 * ax.get_figure(root=True).dpi / ax.bbox.width  # type: ignore[union-attr]
     for segment in run.segments:
@@ -321,7 +307,7 @@ def _phase_plane(
 
 
 def _broken(name: str, room: float, letter: float) -> str:
-    """A name in lines no longer than the room in inches, of letters as wide as that in points."""
+    """A name in lines that fit the room in inches, with letters of a width in points."""
     letters = max(int(72 * room / letter), 4)
     lines = textwrap.wrap(name.replace("_", "_ "), letters)
     return "\n".join(line.replace("_ ", "_") for line in lines) if len(name) > letters else name
@@ -337,7 +323,7 @@ def _title(run: Trajectory, figure: Figure) -> str:
 
 
 def _explain(figure: Figure, title: str, handles: list[Line2D | Patch], modes: int) -> None:
-    """A title and a legend, or where it would be long one of modes, above, and one of marks."""
+    """A title and a legend; a long legend is split into modes above and marks below."""
     columns = min(4, max(1, int(figure.get_figwidth() / 1.6)))
     if len(handles) <= _LISTED:
         figure.suptitle(title, fontsize=10, fontfamily="monospace")
@@ -366,8 +352,7 @@ def _legend(
     run: Trajectory, looks: dict[str, tuple[str, Any, float, str]], plane: bool
 ) -> list[Line2D | Patch]:
     handles: list[Line2D | Patch] = [
-        Line2D([], [], color=color, linestyle=dashes, linewidth=width, label=text)
-        for color, dashes, width, text in looks.values()
+        style.line(color, text, width, dashes) for color, dashes, width, text in looks.values()
     ]
     present = {event.kind for event in run.events}
     if len(run.events) > _MANY:

@@ -1,4 +1,4 @@
-"""Atlas of the generic two-fold: every class and boundary with its portraits, and the class maps."""
+"""Atlas of generic two-folds: portraits of every class and boundary, and the class maps."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Patch
 
-from ...model import OptionError, explain
+from ...model import OptionError, whole
 from .. import style
+from .annotation import line_names, portrait_of
 from .class_map import two_fold_map
 from .flow_in_space import two_fold_3d
-from .labels_and_lines import line_names, portrait_of
-from .sliding_portrait import two_fold
+from .sliding_flow import two_fold
 
 Numbers = tuple[tuple[int, int], tuple[float, float]]
 
@@ -79,9 +79,7 @@ def two_fold_atlas(
     4
     """
     chosen = _chosen(cases)
-    if isinstance(columns, bool) or not isinstance(columns, int) or columns < 1:
-        raise OptionError(f"columns: expected a whole number >= 1, received {columns!r}.")
-    columns = min(columns, len(chosen))
+    columns = min(whole(columns, "columns"), len(chosen))
     rows = math.ceil(len(chosen) / columns)
     with style.settings():
         below = {1: 8.6, 2: 5.2}.get(columns, 4.6)
@@ -145,12 +143,7 @@ def _chosen(cases: Sequence[str] | None) -> list[str]:
     unknown = [name for name in chosen if name not in CASES]
     if unknown or not chosen or isinstance(cases, str):
         raise OptionError(
-            explain(
-                "cases",
-                expected=f"names among {list(CASES)}",
-                received=repr(cases),
-                advice="Leave cases= out to draw all of them.",
-            )
+            f"cases={cases!r} are not names among {list(CASES)}. Leave cases= out to draw all of them."
         )
     return chosen
 
@@ -165,7 +158,7 @@ def _maps(figure: Any, narrow: bool) -> None:
 
 
 def _legend() -> list[Line2D | Patch]:
-    """What is common to all portraits."""
+    """Legend of all portraits."""
     return [
         Patch(facecolor=style.TINT_ATTRACTING, label="$D_a$: attracting sliding"),
         Patch(facecolor=style.TINT_REPELLING, label="$D_r$: repelling sliding"),

@@ -1,4 +1,4 @@
-"""Where the classes of one kind of two-fold lie, over the two numbers that decide, with every boundary."""
+"""Map of the classes of one kind of two-fold over (nu1, nu2), with every boundary."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ _TITLES = {
     "IV": "invisible-visible (IV)",
 }
 #: Tint and hatch of each class: pink for canards, green for faux canards, blue for one of each, grey
-#: for none; stronger and hatched where there are infinitely many, so that grey tells it too.
+#: for none; stronger and hatched for infinitely many, which shows in grey print too.
 FILLS = {
     "VV-C1": ("#F9E6EF", ""),
     "VV-F": ("#B7E0D0", ".."),
@@ -92,20 +92,15 @@ def two_fold_map(
     '$\\\\nu_1$'
     """
     if kind not in SIGMA:
-        raise OptionError(f"kind: expected one of {list(SIGMA)}, received {kind!r}.")
+        raise OptionError(f"kind={kind!r} is not one of {list(SIGMA)}.")
     with style.settings():
         figure, axes = style.axes_for(ax, size)
         _fill(axes, kind)
         handles = _boundaries(axes, kind)
-        for name, place in places(kind).items():
-            box = {
-                "boxstyle": "round,pad=0.1",
-                "facecolor": "white",
-                "edgecolor": "none",
-                "alpha": 0.85,
-            }
+        for name, point in label_points(kind).items():
+            box = {"boxstyle": "round,pad=0.1", "facecolor": "white", "edgecolor": "none"}
             size_ = 8 if name in ("mix-C", "mix-F") else 9  # whose areas are small
-            style.write(axes, place, name, fontsize=size_, bbox=box, zorder=6)
+            style.write(axes, point, name, fontsize=size_, bbox=box | {"alpha": 0.85}, zorder=6)
         for x, y in (([-REACH, REACH], [0, 0]), ([0, 0], [-REACH, REACH])):
             axes.plot(x, y, color=style.GREY, linewidth=0.5, zorder=1)
         axes.set(
@@ -121,8 +116,8 @@ def two_fold_map(
     return figure
 
 
-def places(kind: str) -> dict[str, tuple[float, float]]:
-    """Where the names of the classes stand in the map of a kind."""
+def label_points(kind: str) -> dict[str, tuple[float, float]]:
+    """Points of the names of the classes in the map of a kind."""
     return _NAMES[kind]
 
 
@@ -175,23 +170,11 @@ def _boundaries(ax: Axes, kind: str) -> list[Line2D]:
 
 def _hyperbolas(ax: Axes, kind: str) -> list[Line2D]:
     decisive = 1 if kind == "VV" else -1
+    rest = r"$\nu_1\nu_2=1$ ($\Delta=0$): pseudo-equilibria"
+    same = r"$\Delta=0$, same class; coincident fields"
     handles = [
-        _stroke(
-            ax,
-            _hyperbola(1.0, decisive),
-            style.BLACK,
-            2.2,
-            "-",
-            r"$\nu_1\nu_2=1$ ($\Delta=0$): pseudo-equilibria",
-        ),
-        _stroke(
-            ax,
-            _hyperbola(1.0, -decisive),
-            style.BLACK,
-            1.4,
-            (0, (5, 2)),
-            r"$\Delta=0$, same class; coincident fields",
-        ),
+        _stroke(ax, _hyperbola(1.0, decisive), style.BLACK, 2.2, "-", rest),
+        _stroke(ax, _hyperbola(1.0, -decisive), style.BLACK, 1.4, (0, (5, 2)), same),
     ]
     if kind == "II":
         for k, n in enumerate(_FLIGHTS):
@@ -221,18 +204,12 @@ def _mixed_boundaries(ax: Axes, kind: str) -> list[Line2D]:
     itinerary = np.column_stack([line, 0 * line])[:, ::swap]
     name = r"\nu_2-\nu_1" if kind == "VI" else r"\nu_1-\nu_2"
     fold = 2 if kind == "VI" else 1
+    same = r"$\Delta=0$, same class; coincident fields"
     return [
         _stroke(ax, jordan, style.BLACK, 2.2, "-", f"${name}=2$ (disc = 0)"),
         _stroke(ax, rank, style.CANARD, 2.2, "-.", r"$\nu_1\nu_2=-1$ ($\Delta=0$)"),
         _stroke(ax, outside, style.BLACK, 1.2, (0, (5, 2)), f"${name}=-2$, same class"),
-        _stroke(
-            ax,
-            harmless,
-            style.CANARD,
-            1.2,
-            (0, (5, 2)),
-            r"$\Delta=0$, same class; coincident fields",
-        ),
+        _stroke(ax, harmless, style.CANARD, 1.2, (0, (5, 2)), same),
         _stroke(ax, itinerary, style.VERMILLION, 1.2, ":", rf"$\nu_{fold}=0$: itinerary changes"),
     ]
 

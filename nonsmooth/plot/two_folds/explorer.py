@@ -1,4 +1,4 @@
-"""A page to explore two-folds in a browser: class maps, portraits and sentences follow (nu1, nu2)."""
+"""A browser page on which the class map, portrait and classification follow (nu1, nu2)."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Any
 from ...local.two_folds.classification import TABLE
 from ..offline_page import WEB, installed_version, offline_page
 from .atlas import CASES
-from .class_map import REACH, SIGMA, areas, places
+from .class_map import REACH, SIGMA, areas, label_points
 
 
 def two_fold_explorer() -> str:
@@ -44,17 +44,17 @@ def two_fold_explorer() -> str:
 
 
 def _data() -> dict[str, Any]:
-    """What the page takes from the code: the decision table, its maps, and examples."""
+    """Data of the page: the decision table, its maps, and examples."""
     kinds = {sigma: kind for kind, sigma in SIGMA.items()}
-    words = ("label", "folds", "condition", "into", "out_of", "determinism")
+    columns = ("label", "folds", "condition", "into", "out_of", "determinism")
     return dict(
         version=installed_version(),
         reach=REACH,
-        table=[{word: getattr(row, word) for word in words} for row in TABLE],
+        table=[{column: getattr(row, column) for column in columns} for row in TABLE],
         areas={
             kind: [(label, polygon.round(4).tolist()) for label, polygon in areas(kind)]
             for kind in SIGMA
         },
-        places={kind: places(kind) for kind in SIGMA},
+        places={kind: label_points(kind) for kind in SIGMA},
         cases=[(name, kinds[sigma], nu) for name, (sigma, nu) in CASES.items()],
     )

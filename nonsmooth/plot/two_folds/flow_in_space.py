@@ -1,9 +1,8 @@
-"""The flow at a two-fold in three dimensions, as the literature draws it.
+"""The flow at a two-fold in three dimensions.
 
-The two fields of the normal form are linear in time, so orbits off the surface are parabolas:
-exact, no step is taken. The picture is an orthographic projection painted from the back: what lies
-below the surface, the surface with its sliding orbits, what lies above it. That order is right for
-every view from above, and gives vector graphics without hidden-line artefacts.
+Orbits of the two fields of the normal form are parabolas, which are drawn exactly. The picture is an
+orthographic projection, painted in the order below, on and above the surface. This order is right for
+every view from above and gives vector graphics without hidden-line artefacts.
 """
 
 from __future__ import annotations
@@ -18,7 +17,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Polygon
 from numpy.typing import ArrayLike
 
-from ...local.point.sides import SIDES, Side, other
+from ...local.point.surface_point import SIDES, Side, other
 from ...local.scans.box import Box
 from ...local.two_folds import ReducedFlow, diabolo_slopes, flight_above, flight_below
 from ...local.two_folds.flights import has_diabolo
@@ -29,9 +28,7 @@ from .. import style
 from ..labels import Labels
 from ..legends import beside
 from ..portraits.tapered_ends import draw_orbit
-from .labels_and_lines import TINTS, Portrait, line_style, name_places, portrait_of, title_of
-
-# How the flow at a two-fold is seen: an orthographic projection, and where it is looked at from.
+from .annotation import TINTS, Portrait, label_points, line_style, portrait_of, title_of
 
 
 @dataclass(frozen=True)
@@ -140,8 +137,7 @@ def two_fold_3d(
     portrait = portrait_of(fold, "two_fold_3d")
     if not 5.0 <= elevation <= 85.0:
         raise OptionError(
-            f"elevation: expected degrees from 5 to 85, received {elevation!r}. The surface is "
-            "seen from above."
+            f"elevation={elevation!r} is not within 5 to 85 degrees. The surface is seen from above."
         )
     direction = azimuth_of(portrait.flow) if azimuth is None else math.radians(azimuth)
     camera = Camera(direction, math.radians(elevation), stretch_of(portrait.flow))
@@ -281,7 +277,7 @@ class _Scene:
     def names(self) -> None:
         """Regions, axes and the two-fold."""
         box = {"boxstyle": "round,pad=0.15", "facecolor": "white", "edgecolor": "none"}
-        for name, (a, b) in name_places(sectors(self.flow)).items():
+        for name, (a, b) in label_points(sectors(self.flow)).items():
             style.write(
                 self.ax,
                 self.camera([0.0, a, b]),

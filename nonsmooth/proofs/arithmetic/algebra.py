@@ -1,7 +1,7 @@
-"""Expressions as polynomials with rational coefficients: what is equal here is equal.
+"""Expressions as polynomials with rational coefficients, for exact equality and common factors.
 
-Instructions that are not polynomial (a sine, an inverse) stand for themselves as atoms. Common
-factors are found by the exact greatest common divisor over the rationals.
+Instructions that are not polynomial (a sine, an inverse) are atoms. Common factors are the exact
+greatest common divisor over the rationals.
 """
 
 from __future__ import annotations
@@ -11,29 +11,29 @@ from fractions import Fraction
 from typing import Any
 
 from .flint import fmpq, fmpq_mpoly, fmpq_mpoly_ctx
-from .instructions import Tape
+from .instructions import ExpressionGraph
 from .intervals import Numbers, exact
 
 _POLYNOMIAL = {"const", "add", "sub", "mul", "div", "neg", "sq", "twice", "power"}
 
 
 class Algebra:
-    """Nodes of a tape as polynomials in atoms."""
+    """Nodes of a graph as polynomials in atoms."""
 
-    def __init__(self, tape: Tape, roots: Sequence[int], numbers: Numbers):
-        self.tape = tape
-        chosen = tape.ancestors(roots)
+    def __init__(self, graph: ExpressionGraph, roots: Sequence[int], numbers: Numbers):
+        self.graph = graph
+        chosen = graph.ancestors(roots)
         self.atoms = [k for k in chosen if not self._is_polynomial(k)]
         # A quotient is a product with the inverse of its denominator, which is an atom.
-        below = {k: tape.nodes[k].args[1] for k in chosen if tape.nodes[k].op == "div"}
-        self._inverse = {k: tape.node("inv", b) for k, b in below.items()}
+        below = {k: graph.nodes[k].args[1] for k in chosen if graph.nodes[k].op == "div"}
+        self._inverse = {k: graph.node("inv", b) for k, b in below.items()}
         self.atoms += sorted(set(self._inverse.values()) - set(self.atoms))
         names = [f"a{k}" for k in self.atoms] or ["a"]
         self.ring = fmpq_mpoly_ctx.get(names, "lex")
         self._value: dict[int, Any] = dict(zip(self.atoms, self.ring.gens(), strict=False))
         for k in chosen:
             if k not in self._value:
-                node = tape.nodes[k]
+                node = graph.nodes[k]
                 args = [self._value[a] for a in node.args]
                 if node.op == "div":
                     self._value[k] = args[0] * self._value[self._inverse[k]]
@@ -43,7 +43,7 @@ class Algebra:
                     self._value[k] = self._combine(node.op, args, node.payload)
 
     def _is_polynomial(self, k: int) -> bool:
-        return self.tape.nodes[k].op in _POLYNOMIAL
+        return self.graph.nodes[k].op in _POLYNOMIAL
 
     def constant(self, value: Fraction) -> fmpq_mpoly:
         """A constant polynomial."""
@@ -67,15 +67,15 @@ class Algebra:
         return self._value[k]
 
     def node(self, p: fmpq_mpoly) -> int:
-        """Write a polynomial back onto the tape."""
-        tape, terms = self.tape, []
+        """Add a polynomial to the graph."""
+        graph, terms = self.graph, []
         for powers, c in p.to_dict().items():
-            term = tape.constant(Fraction(int(c.p), int(c.q)))
+            term = graph.constant(Fraction(int(c.p), int(c.q)))
             for atom, n in zip(self.atoms, powers, strict=False):
                 if n:
-                    term = tape.apply("mul", [term, tape.power(atom, int(n))])
+                    term = graph.apply("mul", [term, graph.power(atom, int(n))])
             terms.append(term)
-        return tape.add(*terms)
+        return graph.add(*terms)
 
 
 def common_divisor(polynomials: Sequence[fmpq_mpoly]) -> fmpq_mpoly | None:
@@ -94,16 +94,20 @@ class Difference:
     # F1 - (L1/b) G, smooth where g vanishes (Filippov 1988, sec. 4).
 
     def __init__(
-        self, tape: Tape, fields: Sequence[Sequence[int]], gradient: Sequence[int], numbers: Numbers
+        self,
+        graph: ExpressionGraph,
+        fields: Sequence[Sequence[int]],
+        gradient: Sequence[int],
+        numbers: Numbers,
     ):
-        self.differences = [tape.apply("sub", [a, b]) for a, b in zip(*fields, strict=True)]
-        algebra = Algebra(tape, self.differences, numbers)
+        self.differences = [graph.apply("sub", [a, b]) for a, b in zip(*fields, strict=True)]
+        algebra = Algebra(graph, self.differences, numbers)
         polynomials = [algebra[k] for k in self.differences]
         divisor = common_divisor(polynomials)
         self.identical = divisor is None
         if divisor is None or divisor.is_constant():
-            self.factor, self.direction = tape.constant(1.0), self.differences
+            self.factor, self.direction = graph.constant(1.0), self.differences
         else:  # written out only where something is cancelled
             self.factor = algebra.node(divisor)
             self.direction = [algebra.node(p / divisor) for p in polynomials]
-        self.transverse = tape.dot(gradient, self.direction)
+        self.transverse = graph.dot(gradient, self.direction)

@@ -1,4 +1,4 @@
-"""From intervals to decimals, rounded outward or inward."""
+"""Decimals around or inside of intervals."""
 
 from __future__ import annotations
 

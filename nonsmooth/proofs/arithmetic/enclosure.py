@@ -1,4 +1,4 @@
-"""Enclosures as decimal strings: what a proof shows and hands out."""
+"""Enclosures of numbers as decimal strings."""
 
 from __future__ import annotations
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ...model.errors import MissingError, explain
+from ...model.errors import MissingError
 
 try:
     from flint import (
@@ -16,12 +16,8 @@ try:
     )
 except ImportError as error:
     raise MissingError(
-        explain(
-            "proofs",
-            expected="the package python-flint",
-            received=f"no such package ({error})",
-            advice="Install it with: pip install 'nonsmooth-dynamics[proofs]'.",
-        )
+        f"proofs need the package python-flint ({error}). Install it with: "
+        "pip install 'nonsmooth-dynamics[proofs]'."
     ) from error
 
 __all__ = ["arb", "arb_mat", "arb_series", "ctx", "fmpq", "fmpq_mpoly", "fmpq_mpoly_ctx"]

@@ -1,4 +1,4 @@
-"""Many intervals at once: arrays of ends, rounded outward by one step of the doubles.
+"""Arrays of intervals with ends in doubles, rounded outward.
 
 + - * / and sqrt of doubles are correctly rounded (IEEE 754), so one step outward encloses. Other
 functions go through Arb entry by entry. What is not defined on an interval becomes the whole line.
@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from .flint import arb
 from .instructions import Program
-from .intervals import OPERATIONS, Numbers, exact, precision
+from .intervals import OPERATIONS, Numbers, exact, power_of, precision
 
 Floats = NDArray[np.float64]
 _INF = np.inf
@@ -107,15 +107,8 @@ def _square(a: Intervals) -> Intervals:
 
 
 def power(a: Intervals, n: int) -> Intervals:
-    """A natural power by squaring."""
-    result: Intervals | None = None
-    while True:
-        if n & 1:
-            result = a if result is None else result * a
-        n >>= 1
-        if not n:
-            return points(np.float64(1.0)) if result is None else result
-        a = _square(a)
+    """A natural power."""
+    return power_of(a, n, lambda: points(np.float64(1.0)), _square)
 
 
 def _sqrt(a: Intervals) -> Intervals:

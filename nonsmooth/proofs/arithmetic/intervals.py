@@ -1,7 +1,7 @@
-"""Numbers that enclose: midpoint-radius intervals of any precision, by Arb through python-flint.
+"""Midpoint-radius intervals of any precision, by Arb through python-flint.
 
 Every operation returns an enclosure of its exact results for all arguments enclosed, or something
-that is not finite. Where a function jumps, or has no value, nothing finite is returned.
+that is not finite. Where a function jumps or has no value, the result is not finite.
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from decimal import Decimal
 from fractions import Fraction
 from typing import Any, Literal
 
-from ...model import OptionError, explain
+from ...model import NonsmoothError, OptionError
 from .flint import arb, ctx, fmpq
 
 Numbers = Literal["stored", "written"]
@@ -38,12 +38,18 @@ def exact(value: Any, numbers: Numbers = "stored", what: str = "number") -> Frac
 
 
 def _no_number(what: str, value: Any) -> str:
-    return explain(
-        what,
-        expected="a finite number, or one written as a string",
-        received=repr(value),
-        advice="For example 0.3 or '0.3'.",
-    )
+    return f"{what} is {value!r}, not a finite number. Write it as 0.3 or '0.3'."
+
+
+def exact_range(
+    value: Any, numbers: Numbers, what: str, error: type[NonsmoothError] = OptionError
+) -> tuple[Fraction, Fraction]:
+    """Both ends of a range (low, high), or a number twice."""
+    ends = tuple(value) if isinstance(value, (tuple, list)) else (value, value)
+    fractions = [exact(v, numbers, what) for v in ends]
+    if len(fractions) != 2 or fractions[0] > fractions[1]:
+        raise error(f"{what} is {value!r}, not a number or (low, high) with low <= high.")
+    return fractions[0], fractions[1]
 
 
 def enclose(value: Fraction) -> arb:
@@ -80,7 +86,7 @@ def radius(a: arb) -> float:
 
 
 def sign(a: arb) -> int:
-    """The sign that all numbers enclosed have; 0 where they have not one."""
+    """The common sign of all numbers enclosed; 0 if there is none."""
     return 1 if a > 0 else -1 if a < 0 else 0
 
 
@@ -91,7 +97,7 @@ def inside(a: arb, b: arb) -> bool:
 
 @contextmanager
 def precision(bits: int) -> Iterator[None]:
-    """Compute with so many bits inside."""
+    """Set the working precision inside a ``with`` block."""
     old = ctx.prec
     ctx.prec = bits
     try:
@@ -111,16 +117,21 @@ def square(a: arb) -> arb:
     return arb(0).union(top * top)
 
 
-def power(a: arb, n: int) -> arb:
-    """A natural power by squaring."""
-    result: arb | None = None
+def power_of(a: Any, n: int, one: Callable[[], Any], square: Callable[[Any], Any]) -> Any:
+    """A natural power by squaring, in any arithmetic."""
+    result = None
     while True:
         if n & 1:
             result = a if result is None else result * a
         n >>= 1
         if not n:
-            return arb(1) if result is None else result
+            return one() if result is None else result
         a = square(a)
+
+
+def power(a: arb, n: int) -> arb:
+    """A natural power."""
+    return power_of(a, n, lambda: arb(1), square)
 
 
 def _atan2(y: arb, x: arb) -> arb:

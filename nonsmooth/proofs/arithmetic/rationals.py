@@ -1,4 +1,4 @@
-"""Exact values of programs where they are rational: whether a start lies on a surface."""
+"""Exact rational values of programs, to decide whether a start lies on a surface."""
 
 from __future__ import annotations
 

@@ -1,7 +1,7 @@
-"""Power series with enclosed coefficients: what an expression becomes along a motion.
+"""Power series with enclosed coefficients, for expressions along a motion.
 
-Coefficients come from the field itself (Picard's iteration gains one order a pass), never from the
-jets of ``nonsmooth.model``, which hold reciprocals as doubles.
+Picard's iteration of the field gains one order a pass. The jets of ``nonsmooth.model`` do not serve,
+as they hold reciprocals as doubles.
 """
 
 from __future__ import annotations
@@ -13,12 +13,12 @@ from typing import Any
 
 from .flint import arb, arb_series, ctx, fmpq
 from .instructions import Program
-from .intervals import OPERATIONS, Numbers, exact
+from .intervals import OPERATIONS, Numbers, exact, power_of
 
 
 @contextmanager
 def length(count: int) -> Iterator[None]:
-    """Compute with so many coefficients inside."""
+    """Set the length of series inside a ``with`` block."""
     old = ctx.cap
     ctx.cap = count
     try:
@@ -37,14 +37,7 @@ def _one() -> arb_series:
 
 
 def _power(a: arb_series, n: int) -> arb_series:
-    result: arb_series | None = None
-    while True:
-        if n & 1:
-            result = a if result is None else result * a
-        n >>= 1
-        if not n:
-            return _one() if result is None else result
-        a = a * a
+    return power_of(a, n, _one, lambda b: b * b)
 
 
 def _atan2(y: arb_series, x: arb_series) -> arb_series:
@@ -55,6 +48,15 @@ def _atan2(y: arb_series, x: arb_series) -> arb_series:
     if up > 0:
         return half - (x / y).atan()
     return -half - (x / y).atan() if up < 0 else arb_series([arb.nan()])
+
+
+def _erfinv(a: arb_series) -> arb_series:
+    """Each pass of w' = sqrt(pi)/2 exp(w^2) a' gains a coefficient."""
+    start = arb_series([a[0].erfinv()])
+    w, factor = start, arb.pi().sqrt() / 2
+    for _ in range(ctx.cap - 1 if len(a) > 1 else 0):
+        w = start + ((w * w).exp() * a.derivative() * factor).integral()
+    return w
 
 
 def _still(op: str) -> Callable[..., arb_series]:
@@ -73,7 +75,7 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
         op: getattr(arb_series, op)
         for op in ("sqrt", "exp", "log", "sin", "cos", "tan", "asin", "acos", "atan", "erf")
     },
-    **{op: _still(op) for op in ("fabs", "fmin", "fmax", "erfinv")},
+    **{op: _still(op) for op in ("fabs", "fmin", "fmax")},
     "add": lambda a, b: a + b,
     "sub": lambda a, b: a - b,
     "mul": lambda a, b: a * b,
@@ -93,18 +95,13 @@ _APPLY: dict[str, Callable[..., arb_series]] = {
     "pow": lambda a, b: (b * a.log()).exp(),
     "hypot": lambda a, b: (a * a + b * b).sqrt(),
     "atan2": _atan2,
+    "erfinv": _erfinv,
     "pi": lambda: arb_series([arb.pi()]),
 }
 
 
 class Series:
-    """The arithmetic of power series.
-
-    Parameters
-    ----------
-    inputs : sequence of sequence of arb_series
-    numbers : {"stored", "written"}
-    """
+    """The arithmetic of power series."""
 
     power = staticmethod(_power)
 

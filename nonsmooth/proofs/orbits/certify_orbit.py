@@ -1,4 +1,4 @@
-"""Theorems about one orbit: its itinerary, its events and its end."""
+"""Proofs of the itinerary, the events and the end of an orbit, or of all orbits from a box."""
 
 from __future__ import annotations
 
@@ -7,20 +7,20 @@ from fractions import Fraction
 from itertools import groupby
 from typing import Any, NamedTuple
 
-from ...model import FilippovSystem, OptionError, PointError, explain, require_system, whole
+from ...model import FilippovSystem, OptionError, PointError, require_system, whole
 from ..arithmetic.decimals import enclosure, given
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb, ctx
-from ..arithmetic.intervals import Numbers, exact, precision
+from ..arithmetic.intervals import Numbers, exact, exact_range, precision
 from ..proof import DigitsError, UnprovenError
 from ..surface_functions import enclosed, parameter_ranges
-from .itinerary import Journey, Met
+from .itinerary import EnclosedEvent, OrbitEnclosure
 from .modes import Modes
 from .orbit_proof import OrbitProof, ProvenEvent
 
 
-class Begin(NamedTuple):
-    """Where orbits start, and their parameters, as exact intervals."""
+class InitialSet(NamedTuple):
+    """Initial states, parameters and duration of orbits, as exact intervals."""
 
     start: list[tuple[Fraction, Fraction]]
     ranges: list[tuple[Fraction, Fraction]]
@@ -48,8 +48,7 @@ def certify_orbit(
     Parameters
     ----------
     system : FilippovSystem
-        Stops, resets and impacts without friction are served. Of several surfaces one may slide at a
-        time; sliding along an intersection, closed contacts and hidden dynamics are not proven.
+        May have stops, resets and impacts without friction. One surface at a time may slide; sliding along an intersection, closed contacts and hidden dynamics are not proven.
     x0 : sequence of n numbers, strings or pairs (low, high)
         The start; pairs make a box, and the theorem is for all orbits from it.
     t_end : number or string
@@ -75,7 +74,7 @@ def certify_orbit(
     MissingError
         python-flint is not installed.
     DefinitionError
-        ``system`` is none; hidden dynamics, vector multipliers, or contacts with friction.
+        ``system`` is no FilippovSystem; hidden dynamics, vector multipliers, or contacts with friction.
     PointError
         Not a number or a pair for each state.
     ParameterError
@@ -101,9 +100,7 @@ def certify_orbit(
     require_system(system)
     duration = exact(t_end, numbers, "t_end")
     if duration <= 0:
-        raise OptionError(
-            explain("t_end", expected="a positive time", received=repr(t_end), advice="")
-        )
+        raise OptionError(f"t_end={t_end!r} is not positive. Give the duration of the orbit.")
     whole(bits, "bits", least=32)
     whole(max_bits, "max_bits", least=32)
     whole(max_steps, "max_steps")
@@ -118,7 +115,7 @@ def certify_orbit(
     while True:
         with precision(bits):
             end = enclosed([(duration, duration)])[0]
-            result, digits = _run(modes, Begin(start, ranges, duration), end, max_steps)
+            result, digits = _run(modes, InitialSet(start, ranges, duration), end, max_steps)
         if result.proven or not (points and digits) or 2 * bits > max_bits:
             return result
         bits *= 2
@@ -131,86 +128,81 @@ def _read_start(system: FilippovSystem, x0: Sequence[Any], numbers: Numbers) -> 
         values = []
     if len(values) != system.dimension:
         raise PointError(
-            explain(
-                "x0",
-                expected=f"{system.dimension} numbers or pairs, for {', '.join(system.state_names)}",
-                received=repr(x0),
-                advice="A pair (low, high) makes a box.",
-            )
+            f"x0={x0!r} does not have {system.dimension} numbers or pairs (low, high), for "
+            f"{', '.join(system.state_names)}."
         )
-    result = []
-    for name, value in zip(system.state_names, values, strict=True):
-        ends = list(value) if isinstance(value, (tuple, list)) else [value, value]
-        fractions = [exact(v, numbers, f"start of {name!r}") for v in ends]
-        if len(fractions) != 2 or fractions[0] > fractions[1]:
-            raise PointError(
-                explain(
-                    f"start of {name!r}",
-                    expected="a number or (low, high)",
-                    received=repr(value),
-                    advice="",
-                )
-            )
-        result.append((fractions[0], fractions[1]))
-    return result
+    return [
+        exact_range(value, numbers, f"start of {name!r}", PointError)
+        for name, value in zip(system.state_names, values, strict=True)
+    ]
 
 
-def _run(modes: Modes, begin: Begin, t_end: arb, max_steps: int) -> tuple[OrbitProof, bool]:
-    """Follow until the end, a stop, or something undecided, and whether more digits may decide it."""
-    follower, why, status, digits = None, "", "", False
-    moving = [r for r in begin.ranges if r[0] < r[1]]
-    x = enclosed([*begin.start, *moving])
+def _run(modes: Modes, initial: InitialSet, t_end: arb, max_steps: int) -> tuple[OrbitProof, bool]:
+    """Integrate to the end, a stop or something undecided; whether more digits may decide it."""
+    flow, why, status, digits = None, "", "", False
+    moving = [r for r in initial.ranges if r[0] < r[1]]
+    x = enclosed([*initial.start, *moving])
     try:
         order = max(12, int(ctx.prec * 0.3))
-        exactly = [*begin.start, *moving], begin.ranges
-        follower = Journey(modes, x, enclosed(begin.ranges), order, exactly)
-        follower.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
+        exactly = [*initial.start, *moving], initial.ranges
+        flow = OrbitEnclosure(modes, x, enclosed(initial.ranges), order, exactly)
+        flow.smallest = min(1e-3, float(t_end.mid()) / (50 * max_steps))
         while not status:
-            if follower.steps >= max_steps:
+            if flow.steps >= max_steps:
                 raise DigitsError(f"more than {max_steps} steps")
-            met = follower.travel(t_end)
-            if met is not None and met.kind == "stop":
-                status = met.watch.name
-            elif met is None and not (t_end - follower.t) > 0:
+            event = flow.step_through(t_end)
+            if event is not None and event.kind == "stop":
+                status = event.function.name
+            elif event is None and not (t_end - flow.t) > 0:
                 status = "end"
     except UnprovenError as error:
         why, digits = str(error), not isinstance(error, DigitsError)
     except KeyboardInterrupt:
         why = "interrupted"
-    return _result(modes, follower, begin, x, status, why), digits
+    return _result(modes, flow, initial, x, status, why), digits
 
 
 def _result(
-    modes: Modes, follower: Journey | None, begin: Begin, x: list[arb], status: str, why: str
+    modes: Modes,
+    flow: OrbitEnclosure | None,
+    initial: InitialSet,
+    x: list[arb],
+    status: str,
+    why: str,
 ) -> OrbitProof:
     system = modes.system
     names = (*system.state_names, *(("t",) if system.time_dependent else ()))
-    # Parameters that were followed as states are left out.
+    # Parameters that vary are states of the flow, and are left out.
     named = lambda values: dict(zip(names, map(enclosure, values), strict=False))
-    events = follower.events if follower else []
-    modes_met = [events[0].before if events else follower.mode] if follower else []
-    modes_met += [e.after for e in events]
-    ranges = [given(*pair) for pair in begin.ranges]
+    events = flow.events if flow else []
+    visited = [events[0].before if events else flow.mode] if flow else []
+    visited += [e.after for e in events]
+    ranges = [given(*pair) for pair in initial.ranges]
     return OrbitProof(
         proven=bool(status),
         status=status or "undecided",
         why=why,
-        itinerary=" ".join(word or "o" for word, _ in groupby(modes_met)),
+        itinerary=" ".join(mode or "o" for mode, _ in groupby(visited)),
         events=tuple(_event(e, named) for e in events),
-        start=dict(zip(names, (given(*pair) for pair in begin.start), strict=True)),
+        start=dict(zip(names, (given(*pair) for pair in initial.start), strict=True)),
         parameters=dict(zip(system.parameter_names, ranges, strict=True)),
-        t=enclosure(follower.t) if follower else Enclosure("0", "0"),
-        end=named(follower.hull() if follower else x),
-        steps=follower.steps if follower else 0,
+        t=enclosure(flow.t) if flow else Enclosure("0", "0"),
+        end=named(flow.hull() if flow else x),
+        steps=flow.steps if flow else 0,
         bits=int(ctx.prec),
         numbers=modes.numbers,
-        first=modes_met[0] if modes_met else "",
-        duration=str(begin.duration),
+        first=visited[0] if visited else "",
+        duration=str(initial.duration),
         system=system,
     )
 
 
-def _event(met: Met, named: Any) -> ProvenEvent:
+def _event(event: EnclosedEvent, named: Any) -> ProvenEvent:
     return ProvenEvent(
-        met.kind, met.watch.name, enclosure(met.t), named(met.x), met.before, met.after
+        event.kind,
+        event.function.name,
+        enclosure(event.t),
+        named(event.x),
+        event.before,
+        event.after,
     )

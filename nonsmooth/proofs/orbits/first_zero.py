@@ -13,7 +13,7 @@ _MANY = 1500  # pieces of a step
 
 
 class UnsureError(Exception):
-    """The sign of a function is not decided from some time of the step on."""
+    """The sign of a function is undecided from some time of the step on."""
 
     def __init__(self, since: float):
         super().__init__(f"undecided since {since}")
@@ -63,7 +63,7 @@ def first_zero(f: Polynomial, h: float) -> arb | None:
 
 
 def _falling(f: Polynomial, a: float, b: float, h: float) -> arb | None:
-    """The only zero where the function falls from positive to negative, in (a, b] or a bit beyond."""
+    """The only zero at which the function falls, in (a, b] or a little beyond; None if not proven."""
     if not f.value(arb(a)) > 0:
         return None
     width = b - a

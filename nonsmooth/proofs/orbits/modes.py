@@ -1,196 +1,376 @@
-"""The smooth motions of a system and what ends them: modes with at most one surface that slides."""
+"""Enclosures of the smooth motions of a system, with at most one sliding surface, and of their events."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
 
-from ...model import DefinitionError, FilippovSystem, explain
+from ...model import DefinitionError, FilippovSystem
 from ..arithmetic.algebra import Difference
 from ..arithmetic.flint import arb, arb_mat
-from ..arithmetic.instructions import Program
+from ..arithmetic.instructions import ExpressionGraph, Program
 from ..arithmetic.intervals import Enclosures, Numbers, hull, sign
 from ..arithmetic.rationals import is_zero
+from ..arithmetic.series import along, coefficients
 from ..proof import UnprovenError
-from ..surface_functions import Described, Written
-from .jumps import jumps_of
-from .motion import Mode, Watch
+from ..surface_functions import SurfaceFunctions, SystemGraph
+
+
+@dataclass(frozen=True)
+class EventFunction:
+    """A function of the state whose zeros are events."""
+
+    kind: str
+    name: str
+    node: int
+    direction: int = 0
+    map: tuple[int, ...] = ()
+    index: int = 0
+    impulse: int | None = None
+
+    @property
+    def signed(self) -> bool:
+        """Whether it may have either sign, and only zeros in its direction are events."""
+        return self.kind in ("stop", "reset", "impact")
+
+
+class Mode:
+    """Field and event functions of a mode, evaluated in enclosures."""
+
+    def __init__(
+        self,
+        graph: ExpressionGraph,
+        field: Sequence[int],
+        event_functions: Sequence[EventFunction],
+        x: Sequence[int],
+        numbers: Numbers,
+    ):
+        self.event_functions, self.numbers, self.n = tuple(event_functions), numbers, len(x)
+        rows = [graph.gradient(f, x) for f in field]
+        nodes = [w.node for w in event_functions]
+        self._field = Program(graph, [list(field)])
+        self._jacobian = Program(graph, rows)
+        self._event_values = Program(graph, [nodes])
+        self._slopes = Program(graph, [graph.gradient(k, x) for k in nodes])
+        moving = graph.ancestors(k for row in rows for k in row)
+        inputs = [graph.nodes[k].payload for k in moving if graph.nodes[k].op == "input"]
+        self.affine = all(index[0] == 1 for index in inputs)  # type: ignore[index]
+        rows = [graph.gradient(k, x) for k in nodes]
+        self.affine_functions = [
+            all(
+                graph.nodes[a].op != "input" or graph.nodes[a].source[0] == 1
+                for a in graph.ancestors(row)
+            )
+            for row in rows
+        ]
+
+    def _values(self, program: Program, x: Sequence[arb], p: Sequence[arb]) -> list[list[arb]]:
+        return program(Enclosures([x, p, []], self.numbers))
+
+    def field(self, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
+        """Rates of the extended states."""
+        return self._values(self._field, x, p)[0]
+
+    def jacobian(self, x: Sequence[arb], p: Sequence[arb]) -> arb_mat:
+        """Derivatives of the rates."""
+        return arb_mat(self._values(self._jacobian, x, p))
+
+    def event_values(self, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
+        """Values of the event functions."""
+        return self._values(self._event_values, x, p)[0]
+
+    def slope(self, k: int, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
+        """Gradient of an event function."""
+        return self._values(self._slopes, x, p)[k]
+
+    def series(self, x: Sequence[arb], p: Sequence[arb], count: int) -> list[list[arb]]:
+        """Taylor coefficients of the motion from x, ``count`` of them for each state."""
+        if not self.affine:
+            return coefficients(self._field, x, p, count, self.numbers)
+        matrix, rate = self.jacobian(x, p), arb_mat([[f] for f in self.field(x, p)])
+        result = [[v] for v in x]
+        for k in range(1, count):
+            for i in range(self.n):
+                result[i].append(rate[i, 0] / k)
+            rate = matrix * rate / k
+        return result
+
+    def narrowed(
+        self,
+        wide: list[list[arb]],
+        middle: Sequence[arb],
+        spread: tuple[arb_mat, arb_mat],
+        p: Sequence[arb],
+    ) -> list[list[arb]]:
+        """Taylor coefficients of affine functions along an affine motion, from middle + frame r."""
+        # They are affine in the start, those of the middle plus row A^k/k! frame r, which keeps the
+        # dependence between states.
+        if not self.affine or not wide:
+            return wide
+        frame, r = spread
+        own = self.event_series(self.series(middle, p, len(wide[0])), p)
+        rows = self._values(self._slopes, middle, p)
+        matrix, power = self.jacobian(middle, p), frame
+        result = [list(c) for c in wide]
+        for k in range(len(wide[0]) - 1):  # the last one is the remainder's
+            for i, row in enumerate(rows):
+                if self.affine_functions[i]:
+                    value = own[i][k] + ((arb_mat([row]) * power) * r)[0, 0]
+                    if value.is_finite() and value.overlaps(wide[i][k]):
+                        result[i][k] = value.intersection(wide[i][k])
+            power = matrix * power / (k + 1)
+        return result
+
+    def event_series(self, c: Sequence[Sequence[arb]], p: Sequence[arb]) -> list[list[arb]]:
+        """Taylor coefficients of the event functions along a motion."""
+        return along(self._event_values, c, p, self.numbers)[0]
+
+    def variation(
+        self, c: Sequence[Sequence[arb]], p: Sequence[arb], start: arb_mat
+    ) -> list[arb_mat]:
+        """Taylor coefficients of V' = J V along a motion, V(0) = ``start``."""
+        rows, n, count = along(self._jacobian, c, p, self.numbers), self.n, len(c[0])
+        jacobians = [
+            arb_mat([[rows[i][j][k] for j in range(n)] for i in range(n)]) for k in range(count - 1)
+        ]
+        result = [start]
+        for k in range(count - 1):
+            total = jacobians[0] * result[k]
+            for i in range(1, k + 1):
+                total = total + jacobians[i] * result[k - i]
+            result.append(total / (k + 1))
+        return result
+
+
+# Stops, resets and impacts -----------------------------------------------------------------------
+
+
+def jumps_of(system_graph: SystemGraph) -> list[EventFunction]:
+    """Event functions of stops, then resets, then impacts."""
+    d, system = system_graph.system.definition, system_graph.system
+    result: list[EventFunction] = []
+    if d.guards.numel():
+        (nodes,) = system_graph.insert([d.guards])
+        for k, node in enumerate(nodes):
+            if k < len(system.stops):
+                name, direction = system.stops[k]
+                result.append(EventFunction("stop", name, node, direction, index=k))
+            else:
+                name, direction = system.resets[k - len(system.stops)]
+                (after,) = system_graph.insert([d.maps[:, k - len(system.stops)]])
+                full = (*after, *system_graph.x[len(after) :])
+                result.append(EventFunction("reset", name, node, direction, full, k))
+    count = len(result)
+    return result + [_impact(system_graph, k, count) for k in range(len(system.impacts))]
+
+
+def _impact(system_graph: SystemGraph, k: int, count: int) -> EventFunction:
+    """Newton's impact law: x + c P with P = -(1 + e) v/(grad v . c), c the reaction's column."""
+    d, graph = system_graph.system.definition, system_graph.graph
+    name = system_graph.system.impacts[k]
+    (gaps,) = system_graph.insert([d.gaps])
+    (restitutions,) = system_graph.insert([d.restitutions])
+    still = [graph.constant(0)] * d.multipliers.numel()
+    rate = graph.dot(system_graph.field(still), system_graph.gradient(gaps[k]))
+    multipliers = [graph.symbol(3, i) for i in range(len(still))]
+    reactions = [graph.constant(0)] * len(gaps)
+    reactions[k] = graph.symbol(4, 0)
+    field = system_graph.field(multipliers, reactions)
+    column = [graph.gradient(f, [reactions[k]])[0] for f in field]
+    inputs = [
+        graph.nodes[a].source for a in graph.ancestors(column) if graph.nodes[a].op == "input"
+    ]
+    if any(vector in (3, 4) for vector, _ in inputs):
+        raise DefinitionError(
+            f"A multiplier enters the impulse of {name!r} (friction), or a reaction enters nonlinearly. "
+            "certify_orbit proves impacts without friction only."
+        )
+    effect = graph.dot(system_graph.gradient(rate), column)
+    jump = graph.apply("mul", [graph.apply("add", [graph.constant(1), restitutions[k]]), rate])
+    impulse = graph.apply("neg", [graph.apply("div", [jump, effect])])
+    n = d.states.numel()
+    after = [
+        graph.apply("add", [x, graph.apply("mul", [impulse, c])])
+        for x, c in zip(system_graph.x[:n], column[:n], strict=True)
+    ]
+    return EventFunction(
+        "impact", name, gaps[k], -1, (*after, *system_graph.x[n:]), count + k, impulse
+    )
+
 
 #: Exact ends of an interval.
 Range = tuple[Fraction, Fraction]
 
 
 class Modes:
-    """Every mode of a system, built when it is entered."""
+    """The modes of a system, each built on first use."""
 
-    # A mode is a word of one letter for each surface, of which at most one is ``s``, and an ``o`` for
-    # each impact.
+    # A mode is one letter for each surface, at most one of them ``s``, and an ``o`` for each impact.
 
     def __init__(self, system: FilippovSystem, numbers: Numbers, moving: Sequence[int] = ()):
         if any(system.nonlinear):
             raise DefinitionError(
-                explain(
-                    "certify_orbit",
-                    expected="multipliers that enter linearly",
-                    received="hidden dynamics",
-                    advice="Orbits with hidden dynamics are not proven.",
-                )
+                "A multiplier enters nonlinearly (hidden dynamics). certify_orbit proves orbits of systems with "
+                "linear multipliers only."
             )
         self.system, self.numbers = system, numbers
-        self.written = Written(system, moving)
-        self.tape = self.written.tape
+        self.system_graph = SystemGraph(system, moving)
+        self.graph = self.system_graph.graph
         surfaces = system.definition.surfaces
-        (self.h,) = self.written.insert([surfaces]) if system.surface_count else ([],)
-        self.ends = jumps_of(self.written)
+        (self.h,) = self.system_graph.insert([surfaces]) if system.surface_count else ([],)
+        self.ends = jumps_of(self.system_graph)
         self._modes: dict[str, Mode] = {}
         self._programs: dict[Any, Program] = {}
 
-    def __getitem__(self, word: str) -> Mode:
-        """The mode of a word."""
-        if word not in self._modes:
-            field, watches = self._parts(word)
-            self._modes[word] = Mode(
-                self.tape, field, [*watches, *self.ends], self.written.x, self.numbers
+    def __getitem__(self, mode: str) -> Mode:
+        """A mode by its letters."""
+        if mode not in self._modes:
+            field, event_functions = self._parts(mode)
+            self._modes[mode] = Mode(
+                self.graph, field, [*event_functions, *self.ends], self.system_graph.x, self.numbers
             )
-        return self._modes[word]
+        return self._modes[mode]
 
-    def replaced(self, word: str, surface: int, letter: str) -> str:
-        """The word with another letter for one surface."""
-        return word[:surface] + letter + word[surface + 1 :]
+    def replaced(self, mode: str, surface: int, letter: str) -> str:
+        """The mode with another letter for one surface."""
+        return mode[:surface] + letter + mode[surface + 1 :]
 
-    def slides_on(self, word: str) -> int | None:
+    def slides_on(self, mode: str) -> int | None:
         """The surface that slides."""
-        return word.index("s") if "s" in word else None
+        return mode.index("s") if "s" in mode else None
 
     def name(self, surface: int) -> str:
-        """How a surface is called."""
+        """Name of a surface in messages."""
         return "surface" if self.system.surface_count == 1 else f"surface {surface}"
 
-    def described(self, surface: int, word: str) -> Described:
-        """Both fields at a surface where the others are on the sides of a word."""
-        mode = self.replaced(word, surface, "s")
-        return Described(self.system, surface, mode, self.written)
+    def functions(self, surface: int, mode: str) -> SurfaceFunctions:
+        """Both fields at a surface, with the others on the sides of a mode."""
+        mode = self.replaced(mode, surface, "s")
+        return SurfaceFunctions(self.system, surface, mode, self.system_graph)
 
-    def _parts(self, word: str) -> tuple[list[int], list[Watch]]:
-        tape, slides = self.tape, self.slides_on(word)
-        watches = [
-            Watch("surface", self.name(j), tape.apply("neg", [h]) if c == "-" else h, index=j)
-            for j, (h, c) in enumerate(zip(self.h, word, strict=False))
+    def _parts(self, mode: str) -> tuple[list[int], list[EventFunction]]:
+        graph, slides = self.graph, self.slides_on(mode)
+        event_functions = [
+            EventFunction(
+                "surface", self.name(j), graph.apply("neg", [h]) if c == "-" else h, index=j
+            )
+            for j, (h, c) in enumerate(zip(self.h, mode, strict=False))
             if c != "s"
         ]
         if slides is None:
-            signs = [tape.constant(1.0 if c == "+" else -1.0) for c in word[: len(self.h)]]
-            return self.written.field(signs), watches
-        d = self.described(slides, word)
+            signs = [graph.constant(1.0 if c == "+" else -1.0) for c in mode[: len(self.h)]]
+            return self.system_graph.field(signs), event_functions
+        d = self.functions(slides, mode)
         name = f"sliding on {self.name(slides)}"
         exits = [
-            Watch("exit", name, tape.apply("neg", [d.lie[0]]), 1, index=slides),
-            Watch("exit", name, d.lie[1], -1, index=slides),
+            EventFunction("exit", name, graph.apply("neg", [d.lie[0]]), 1, index=slides),
+            EventFunction("exit", name, d.lie[1], -1, index=slides),
         ]
-        return _sliding(self.written, d.h, d.fields, self.numbers), [*exits, *watches]
+        return _sliding(self.system_graph, d.h, d.fields, self.numbers), [*exits, *event_functions]
 
-    # places on surfaces --------------------------------------------------------------------------
+    # points on surfaces --------------------------------------------------------------------------
 
     def heights(self, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
         """The switching functions."""
         return self._values("h", lambda: [self.h], x, p)[0] if self.h else []
 
-    def rates(self, surface: int, word: str, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
-        """L1 and L2 at a surface, the others on the sides of a word."""
-        mode = self.replaced(word, surface, "s")
-        return self._values(mode, lambda: [list(self.described(surface, word).lie)], x, p)[0]
+    def rates(self, surface: int, mode: str, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
+        """L1 and L2 at a surface, with the others on the sides of a mode."""
+        mode = self.replaced(mode, surface, "s")
+        return self._values(mode, lambda: [list(self.functions(surface, mode).lie)], x, p)[0]
 
     def on_surface(self, surface: int, x: Sequence[Range], p: Sequence[Range]) -> bool:
-        """Whether h is zero at exact starts; what has a width counts as unknown."""
+        """Whether h is zero at exact starts; inputs with a width are unknown."""
         inputs = [[a if a == b else None for a, b in vector] for vector in (x, p)]
-        return is_zero(Program(self.tape, [[self.h[surface]]]), inputs, self.numbers)
+        return is_zero(Program(self.graph, [[self.h[surface]]]), inputs, self.numbers)
 
-    def across(self, surface: int, word: str, x: Sequence[arb], p: Sequence[arb]) -> str:
-        """The side that is reached where a surface is met while another slides, and goes on to."""
-        # For every multiplier of the surface that is met, sliding attracts to the other one and leads
-        # to one and the same side: then no other motion can continue.
-        slides = self.slides_on(word)
+    def across(self, surface: int, mode: str, x: Sequence[arb], p: Sequence[arb]) -> str:
+        """The side to which a surface is crossed while another slides."""
+        # If for every multiplier of the crossed surface sliding on the other one attracts and leads to
+        # the same side, no other motion can continue.
+        slides = self.slides_on(mode)
         assert slides is not None
 
         def rows() -> list[list[int]]:
-            tape, w = self.tape, self.written
-            signs = [tape.constant(1.0 if c == "+" else -1.0) for c in word[: len(self.h)]]
-            signs[surface] = tape.symbol(3, 0)
+            graph, w = self.graph, self.system_graph
+            signs = [graph.constant(1.0 if c == "+" else -1.0) for c in mode[: len(self.h)]]
+            signs[surface] = graph.symbol(3, 0)
             fields = []
             for s in (1.0, -1.0):
-                signs[slides] = tape.constant(s)
+                signs[slides] = graph.constant(s)
                 fields.append(w.field(signs))
             gradient = w.gradient(self.h[slides])
-            lie = [tape.dot(f, gradient) for f in fields]
+            lie = [graph.dot(f, gradient) for f in fields]
             field = _sliding(w, self.h[slides], fields, self.numbers)
-            return [[*lie, tape.dot(field, w.gradient(self.h[surface]))]]
+            return [[*lie, graph.dot(field, w.gradient(self.h[surface]))]]
 
-        ((l1, l2, rate),) = self._values(("across", surface, word), rows, x, p)
+        ((l1, l2, rate),) = self._values(("across", surface, mode), rows, x, p)
         if l1 < 0 and l2 > 0 and sign(rate):
             return "+" if rate > 0 else "-"
         raise UnprovenError(
-            f"{self.name(surface)} is met while sliding on {self.name(slides)}, and for the multiplier "
+            f"{self.name(surface)} is reached while sliding on {self.name(slides)}, and for the multiplier "
             f"between -1 and 1 the rates are in {l1.str(5)}, {l2.str(5)} and {rate.str(5)}: sliding on "
             "several surfaces at once is not proven here"
         )
 
     def _values(self, key: Any, rows: Any, x: Sequence[arb], p: Sequence[arb]) -> list[list[arb]]:
         if key not in self._programs:
-            self._programs[key] = Program(self.tape, rows())
+            self._programs[key] = Program(self.graph, rows())
         any_ = [hull(arb(-1), arb(1))]
         return self._programs[key](Enclosures([x, p, [], any_], self.numbers))
 
     # jumps ---------------------------------------------------------------------------------------
 
-    def jump(self, watch: Watch, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
+    def jump(self, function: EventFunction, x: Sequence[arb], p: Sequence[arb]) -> list[arb]:
         """The state after a reset or an impact."""
-        key = ("jump", watch.index)
-        return self._values(key, lambda: [list(watch.map)], x, p)[0]
+        key = ("jump", function.index)
+        return self._values(key, lambda: [list(function.map)], x, p)[0]
 
-    def jump_slopes(self, watch: Watch, x: Sequence[arb], p: Sequence[arb]) -> arb_mat:
+    def jump_slopes(self, function: EventFunction, x: Sequence[arb], p: Sequence[arb]) -> arb_mat:
         """Derivatives of the state after a reset or an impact."""
-        rows = lambda: [self.written.gradient(k) for k in watch.map]
-        return arb_mat(self._values(("slopes", watch.index), rows, x, p))
+        rows = lambda: [self.system_graph.gradient(k) for k in function.map]
+        return arb_mat(self._values(("slopes", function.index), rows, x, p))
 
-    def pushes(self, watch: Watch, x: Sequence[arb], p: Sequence[arb]) -> bool:
+    def pushes(self, function: EventFunction, x: Sequence[arb], p: Sequence[arb]) -> bool:
         """Whether the impulse of an impact is positive; resets have none."""
-        if watch.impulse is None:
+        if function.impulse is None:
             return True
-        node = watch.impulse
-        ((impulse,),) = self._values(("impulse", watch.index), lambda: [[node]], x, p)
+        node = function.impulse
+        ((impulse,),) = self._values(("impulse", function.index), lambda: [[node]], x, p)
         return bool(impulse > 0)
 
-    def guard_kept(self, watch: Watch) -> bool:
+    def guard_kept(self, function: EventFunction) -> bool:
         """Whether a jump leaves its own guard at zero, by its instructions."""
         d, count = self.system.definition, len(self.system.stops) + len(self.system.resets)
-        k = watch.index
+        k = function.index
         guard = d.guards[k] if k < count else d.gaps[k - count]
-        return self.written.inserted_at(guard, watch.map) == watch.node
+        return self.system_graph.inserted_at(guard, function.map) == function.node
 
-    def surface_kept(self, surface: int, watch: Watch) -> bool:
+    def surface_kept(self, surface: int, function: EventFunction) -> bool:
         """Whether a jump leaves a switching function as it is, by its instructions."""
         h = self.system.definition.surfaces[surface]
-        return self.written.inserted_at(h, watch.map) == self.h[surface]
+        return self.system_graph.inserted_at(h, function.map) == self.h[surface]
 
 
 def _sliding(
-    written: Written, h: int, fields: Sequence[Sequence[int]], numbers: Numbers
+    system_graph: SystemGraph, h: int, fields: Sequence[Sequence[int]], numbers: Numbers
 ) -> list[int]:
     """F1 - (L1/b) G with the exact common factor of F1 - F2 cancelled."""
-    tape, gradient = written.tape, written.gradient(h)
-    difference = Difference(tape, fields, gradient, numbers)
+    graph, gradient = system_graph.graph, system_graph.gradient(h)
+    difference = Difference(graph, fields, gradient, numbers)
     if difference.identical:
         return list(fields[0])
-    ratio = tape.apply("div", [tape.dot(fields[0], gradient), difference.transverse])
+    ratio = graph.apply("div", [graph.dot(fields[0], gradient), difference.transverse])
     return [
-        tape.apply("sub", [f, tape.apply("mul", [ratio, g])])
+        graph.apply("sub", [f, graph.apply("mul", [ratio, g])])
         for f, g in zip(fields[0], difference.direction, strict=True)
     ]
 
 
-def beyond(l1: arb, l2: arb) -> tuple[str, int] | None:
-    """The mode beyond a point of the surface, and how many coefficients of h are zero in it."""
+def mode_after(l1: arb, l2: arb) -> tuple[str, int] | None:
+    """The mode after a point of the surface, and how many coefficients of h are zero in it."""
     if l1 < 0 and l2 > 0:
         return "s", 0
     if l1 > 0 and l2 > 0:

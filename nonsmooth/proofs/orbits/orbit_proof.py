@@ -1,4 +1,4 @@
-"""What is proven about an orbit."""
+"""Proofs about orbits: statement, enclosures of events and end, and a record for a checker."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ class OrbitProof:
     Attributes
     ----------
     proven : bool
-        Whether it was followed to the end of the time or to a stop.
+        Whether the proof reaches the end of the time or a stop.
     status : str
         ``"end"``, the name of the stop, or ``"undecided"``.
     why : str
@@ -69,7 +69,7 @@ class OrbitProof:
     numbers : {"stored", "written"}
         How the constants of the system were read: as doubles or as decimals.
     first, duration : str
-        The mode at the start, and the time that was asked for, exactly.
+        The mode at the start, and the exact duration.
     system : FilippovSystem
         Whose orbit it is.
     """
@@ -98,7 +98,7 @@ class OrbitProof:
         path : str or Path
             Where to write it.
         """
-        from ..record import motion_of  # needs python-flint, which whoever has a proof has
+        from ..record import motion_of  # imported here, as it needs python-flint
 
         both = lambda values: [[v.low, v.high] for v in values.values()]
         events = [
@@ -106,8 +106,8 @@ class OrbitProof:
             | {k: getattr(e, k) for k in ("kind", "name", "before", "after")}
             for e in self.events
         ]
-        words = sorted({self.first, *(e.after for e in self.events)})
-        record = motion_of(self.system, self.numbers, words) | {  # type: ignore[arg-type]
+        modes = sorted({self.first, *(e.after for e in self.events)})
+        record = motion_of(self.system, self.numbers, modes) | {  # type: ignore[arg-type]
             "proven": self.proven,
             "status": self.status,
             "first": self.first,

@@ -1,9 +1,9 @@
-"""Validated steps along one orbit, or along all orbits from a box.
+"""Validated integration of one orbit, or of all orbits from a box.
 
-A step: an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
+A step has an a-priori enclosure B (Picard), the Taylor polynomial with the coefficient K + 1 over B as
 remainder, and the set of states as middle + frame r with an orthogonal frame (Lohner 1987). Guards
 are proven positive, or to have one simple zero; there the time is eliminated by the derivative of the
-return map, (1 - f grad g/(grad g . f)) D. What follows an event is told by ``journey``.
+return map, (1 - f grad g/(grad g . f)) D. ``itinerary`` decides what follows an event.
 """
 
 from __future__ import annotations
@@ -21,15 +21,12 @@ from ..points.equations import column, entries
 from ..points.krawczyk import identity
 from ..proof import DigitsError, UnprovenError
 from .first_zero import Polynomial, UnsureError, first_zero, narrowed
-from .modes import Modes
-from .motion import Mode
-
-# What a validated step is made of.
+from .modes import Mode, Modes
 
 
 @dataclass
 class Step:
-    """What one step is made of."""
+    """One step with its enclosures."""
 
     h: float
     natural: float  # the step without limits
@@ -59,11 +56,11 @@ def orthogonal(matrix: arb_mat) -> arb_mat:
     return arb_mat([[arb(float(v)) for v in row] for row in q.tolist()])
 
 
-#: How often a step is shortened for the sake of watched functions.
+#: How often a step is shortened so that event functions are enclosed well.
 _SHORTER = 5
 
 
-class Follower:
+class ValidatedFlow:
     """A set of states that moves in one mode."""
 
     def __init__(self, modes: Modes, x: Sequence[arb], p: Sequence[arb], order: int):
@@ -87,6 +84,8 @@ class Follower:
     def moved(self, image: list[arb], derivative: arb_mat) -> None:
         """The set becomes image + derivative (x - middle), in a new orthogonal frame."""
         product = derivative * self.frame
+        if not all(v.is_finite() for v in (*image, *entries(product))):
+            raise UnprovenError(f"the flow has no enclosure at t = {float(self.t.mid()):.9g}")
         wide = any(radius(v) > 0 for v in entries(self.r))
         frame = orthogonal(product) if wide else identity(self.n)
         inverse = frame.inv()
@@ -97,28 +96,28 @@ class Follower:
 
     @property
     def now(self) -> Mode:
-        """The mode that it is in."""
+        """The current mode."""
         return self.modes[self.mode]
 
     # steps ---------------------------------------------------------------------------------------
 
     def step(self, t_end: arb) -> int | None:
-        """One step, to an event if one comes first: the number of the function that is met."""
+        """Take one step, at most to the first event; return the index of its function or None."""
         left = math.nextafter(float((t_end - self.t).upper()), math.inf)
         limit = left
         for _ in range(40):
-            made = self._prepare(limit, t_end)
+            step = self._prepare(limit, t_end)
             try:
-                hit = self._first_event(made)
+                event = self._first_event(step)
             except UnsureError as unsure:
-                if unsure.since < 0.02 * min(made.natural, left):
+                if unsure.since < 0.02 * min(step.natural, left):
                     raise UnprovenError(
                         f"the sign of a guard is undecided at t = {float(self.t.mid()) + unsure.since:.9g} "
                         "(a tangency, or the set is too wide)"
                     ) from None
                 limit = unsure.since
                 continue
-            return self._advance(made, hit, t_end)
+            return self._advance(step, event, t_end)
         raise UnprovenError(f"no step at t = {float(self.t.mid()):.9g}")
 
     def _prepare(self, limit: float, t_end: arb) -> Step:
@@ -129,14 +128,14 @@ class Follower:
         wide = max(radius(v) for v in x)
         tolerance = max(2.0 ** (2 - ctx.prec), 1e-3 * wide)
         natural = min((tolerance / size) ** (1 / self.order), 1e6)
-        h, shorter, guards = min(natural, limit), 0, mode.watched_series(c, self.p)
+        h, shorter, guards = min(natural, limit), 0, mode.event_series(c, self.p)
         for _ in range(60):
             tube = self._tube(x, h)
             if tube is not None:
                 top = mode.series(tube, self.p, count)
                 rest = max(float(abs(v[-1]).upper()) for v in top) * h ** (self.order + 1)
                 if rest <= 8 * tolerance:
-                    tops = mode.watched_series(top, self.p)
+                    tops = mode.event_series(top, self.p)
                     if not all(v[-1].is_finite() for v in tops):
                         h /= 2
                         continue
@@ -175,138 +174,138 @@ class Follower:
             b = [v + arb(0, 0.1 * radius(v) + 1e-300) for v in new]
         return None
 
-    def _first_event(self, made: Step) -> tuple[int, arb] | None:
-        """The guard that comes first, proven, and its time."""
-        hits, unsure = [], float("inf")
-        for k in range(len(self.now.watches)):
-            f = self._polynomial(made, k)
+    def _first_event(self, step: Step) -> tuple[int, arb] | None:
+        """The guard with the first zero, proven, and its time."""
+        events, unsure = [], float("inf")
+        for k in range(len(self.now.event_functions)):
+            f = self._polynomial(step, k)
             try:
-                t = first_zero(f, made.h)
+                t = first_zero(f, step.h)
             except UnsureError as error:
                 unsure = min(unsure, error.since)
                 continue
             if t is not None:
-                hits.append((t, k))
-        hits.sort(key=lambda hit: float(hit[0].upper()))
-        if hits and float(hits[0][0].upper()) < unsure:
-            return self._earliest(made, hits)
+                events.append((t, k))
+        events.sort(key=lambda event: float(event[0].upper()))
+        if events and float(events[0][0].upper()) < unsure:
+            return self._earliest(step, events)
         if unsure < float("inf"):
             raise UnsureError(unsure)
         return None
 
-    def _earliest(self, made: Step, hits: list[tuple[arb, int]]) -> tuple[int, arb]:
-        """The first of the zeros; of zeros that may be at once only one may mean anything."""
-        time, k = hits[0]
-        together = [hits[0], *((t, j) for t, j in hits[1:] if not time < t)]
+    def _earliest(self, step: Step, events: list[tuple[arb, int]]) -> tuple[int, arb]:
+        """The first of the zeros; of those that may coincide only one may be an event."""
+        time, k = events[0]
+        together = [events[0], *((t, j) for t, j in events[1:] if not time < t)]
         if len(together) == 1:
             return k, time
-        counting = [(t, j) for t, j in together if self.counts(j)]
-        passed = [hit for hit in together if not self.counts(hit[1])]
-        if any(not self._stays_past(made, hit, together) for hit in passed):
-            counting = []  # one that is passed the other way may come back in its own direction
-        if len(counting) == 1 and self.now.watches[counting[0][1]].kind == "stop":
+        counting = [(t, j) for t, j in together if self.is_event(j)]
+        passed = [event for event in together if not self.is_event(event[1])]
+        if any(not self._stays_past(step, event, together) for event in passed):
+            counting = []  # it may come back in its own direction
+        if len(counting) == 1 and self.now.event_functions[counting[0][1]].kind == "stop":
             return counting[0][1], counting[0][0]
         for t, j in counting:
-            others = [hit for hit in together if hit[1] != j]
-            if all(self._comes_before(made, (j, t), other) for other in others):
+            others = [event for event in together if event[1] != j]
+            if all(self._comes_before(step, (j, t), other) for other in others):
                 return j, t
-        names = ", ".join(self.now.watches[j].name for _, j in together)
+        names = ", ".join(self.now.event_functions[j].name for _, j in together)
         when = float((self.t + time).mid())
         raise UnprovenError(f"which comes first is undecided: {names} at t = {when:.9g}")
 
     def _stays_past(
-        self, made: Step, hit: tuple[arb, int], together: list[tuple[arb, int]]
+        self, step: Step, event: tuple[arb, int], together: list[tuple[arb, int]]
     ) -> bool:
-        """Whether a guard that is passed has no second zero while others are met."""
-        f = self._polynomial(made, hit[1])
-        until = hit[0]
+        """Whether a guard that is passed has no second zero before the other zeros."""
+        f = self._polynomial(step, event[1])
+        until = event[0]
         for t, _ in together:
             until = hull(until, t)
         return bool(f.slope(until) < 0)
 
-    def _comes_before(self, made: Step, hit: tuple[int, arb], other: tuple[arb, int]) -> bool:
-        """Whether every orbit meets one event while another guard, which only falls, is positive."""
+    def _comes_before(self, step: Step, event: tuple[int, arb], other: tuple[arb, int]) -> bool:
+        """Whether every orbit reaches one event while another guard, which only falls, is positive."""
         t, j = other
-        f = self._polynomial(made, j)
-        if not f.slope(hull(hit[1], t)) < 0:
+        f = self._polynomial(step, j)
+        if not f.slope(hull(event[1], t)) < 0:
             return False
-        image, derivative = self._at_event(made, hit)
+        image, derivative = self._at_event(step, event)
         move = (derivative * self.frame) * self.r
         around = [v + w for v, w in zip(image, entries(move), strict=True)]
         row = self.now.slope(j, around, self.p)
-        value = self.now.watched(image, self.p)[j] + (arb_mat([row]) * move)[0, 0]
+        value = self.now.event_values(image, self.p)[j] + (arb_mat([row]) * move)[0, 0]
         tied = ((arb_mat([row]) * (derivative * self.frame)) * self.r)[0, 0]
-        value = value.intersection(self.now.watched(image, self.p)[j] + tied)
+        value = value.intersection(self.now.event_values(image, self.p)[j] + tied)
         return bool(self._turned(j) * value > 0)
 
     def _turned(self, k: int) -> int:
-        """The sign by which a watched function is positive in the mode now."""
-        watch = self.now.watches[k]
-        return self.signs[watch.index] if watch.passes else 1
+        """The sign that makes an event function positive in the current mode."""
+        function = self.now.event_functions[k]
+        return self.signs[function.index] if function.signed else 1
 
-    def counts(self, k: int) -> bool:
+    def is_event(self, k: int) -> bool:
         """Whether a zero of a guard is an event: stops and resets have a direction."""
-        watch = self.now.watches[k]
-        return not watch.passes or watch.direction * -self.signs[watch.index] >= 0
+        function = self.now.event_functions[k]
+        return not function.signed or function.direction * -self.signs[function.index] >= 0
 
-    def _polynomial(self, made: Step, k: int) -> Polynomial:
-        c, top = made.guards[k][:-1], made.guard_tops[k][-1]
+    def _polynomial(self, step: Step, k: int) -> Polynomial:
+        c, top = step.guards[k][:-1], step.guard_tops[k][-1]
         if self._turned(k) < 0:
             c, top = [-v for v in c], -top
         return Polynomial(c, top, self.zeros.get(k, 0))
 
-    def _advance(self, made: Step, hit: tuple[int, arb] | None, t_end: arb) -> int | None:
+    def _advance(self, step: Step, event: tuple[int, arb] | None, t_end: arb) -> int | None:
         mode = self.now
-        time = arb(made.h) if hit is None else hit[1]
-        if hit is not None and not self.t + time <= t_end:
-            name = mode.watches[hit[0]].name
+        time = arb(step.h) if event is None else event[1]
+        if event is not None and not self.t + time <= t_end:
+            name = mode.event_functions[event[0]].name
             raise UnprovenError(
-                f"whether {name} is met before the end is undecided: at t in {(self.t + time).str(8)}"
+                f"whether {name} is reached before the end is undecided: at t in {(self.t + time).str(8)}"
             )
-        if hit is None and (t_end - self.t) <= made.h:
+        if event is None and (t_end - self.t) <= step.h:
             time = t_end - self.t  # the end itself, also where it is no double
-        if hit is None:
+        if event is None:
             c = mode.series(self.middle, self.p, self.order + 2)
-            image, derivative = at(c, made.top, time), self._derivative(made, time)
+            image, derivative = at(c, step.top, time), self._derivative(step, time)
         else:
-            image, derivative = self._at_event(made, hit)
+            image, derivative = self._at_event(step, event)
         self.moved(image, derivative)
         self.t, self.steps, self.zeros = self.t + time, self.steps + 1, {}
-        return None if hit is None else hit[0]
+        return None if event is None else event[0]
 
-    def _at_event(self, made: Step, hit: tuple[int, arb]) -> tuple[list[arb], arb_mat]:
-        """Where the middle meets an event, and the derivative of the return map there."""
+    def _at_event(self, step: Step, event: tuple[int, arb]) -> tuple[list[arb], arb_mat]:
+        """Image of the middle at an event, and the derivative of the return map there."""
         c = self.now.series(self.middle, self.p, self.order + 2)
-        image = at(c, made.top, self._own_time(c, made, hit))
-        derivative = self._derivative(made, hit[1])
-        return image, self._return_map(made, hit[0], hit[1], derivative)
+        image = at(c, step.top, self._own_time(c, step, event))
+        derivative = self._derivative(step, event[1])
+        return image, self._return_map(step, event[0], event[1], derivative)
 
-    def _derivative(self, made: Step, time: arb) -> arb_mat:
+    def _derivative(self, step: Step, time: arb) -> arb_mat:
         """Derivatives of the flow to times in ``time``, for all states of the set."""
         mode = self.now
         if mode.affine:
-            return (mode.jacobian(made.hull, self.p) * time).exp()
-        jacobian = mode.jacobian(made.tube, self.p)
+            return (mode.jacobian(step.hull, self.p) * time).exp()
+        jacobian = mode.jacobian(step.tube, self.p)
         if not all(v.is_finite() for v in jacobian.entries()):
             raise UnprovenError(f"the field has no derivative near t = {float(self.t.mid()):.9g}")
         bound = max(
             sum(float(abs(v).upper()) for v in row) * (1 + 1e-12) for row in jacobian.tolist()
         )
-        grow = growth(bound, made.h)
+        grow = growth(bound, step.h)
         around = arb_mat([[arb(int(i == j), grow) for j in range(self.n)] for i in range(self.n)])
-        low = mode.variation(made.c, self.p, identity(self.n))
-        top = mode.variation(made.top, self.p, around)
+        low = mode.variation(step.c, self.p, identity(self.n))
+        top = mode.variation(step.top, self.p, around)
         return horner([*low[:-1], top[-1]], time)
 
-    def _own_time(self, c: list[list[arb]], made: Step, hit: tuple[int, arb]) -> arb:
+    def _own_time(self, c: list[list[arb]], step: Step, event: tuple[int, arb]) -> arb:
         """The event's time of the middle alone, narrower than that of the whole set."""
-        k, time = hit
-        g = self.now.watched_series(c, self.p)[k]
-        return narrowed(Polynomial(g[:-1], made.guard_tops[k][-1]), time)
+        k, time = event
+        g = self.now.event_series(c, self.p)[k]
+        return narrowed(Polynomial(g[:-1], step.guard_tops[k][-1]), time)
 
-    def _return_map(self, made: Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
-        """(1 - f grad g/(grad g . f)) D where the event is met."""
-        x = at(made.c, made.top, time)
+    def _return_map(self, step: Step, k: int, time: arb, derivative: arb_mat) -> arb_mat:
+        """(1 - f grad g/(grad g . f)) D at the event."""
+        x = at(step.c, step.top, time)
         f, g = self.now.field(x, self.p), self.now.slope(k, x, self.p)
         rate = sum((a * b for a, b in zip(f, g, strict=True)), arb(0))
         if rate.contains(0) or not rate.is_finite():
@@ -317,7 +316,7 @@ class Follower:
 
 
 def _coarse(guards: list[list[arb]], tops: list[list[arb]], h: float, tolerance: float) -> bool:
-    """Whether the remainder of a watched function is far larger than that of the motion."""
+    """Whether the remainder of an event function is far larger than that of the motion."""
     for c, top in zip(guards, tops, strict=True):
         size = max(float(abs(v.mid())) * h**k for k, v in enumerate(c[:-1]))
         if not float(abs(top[-1]).upper()) * h ** (len(c) - 1) <= 64 * tolerance * size:
@@ -325,5 +324,5 @@ def _coarse(guards: list[list[arb]], tops: list[list[arb]], h: float, tolerance:
     return False
 
 
-def _not_transversal(follower: Follower) -> arb_mat:
-    raise UnprovenError(f"an event at t = {follower.t.str(8)} is not proven to be transversal")
+def _not_transversal(flow: ValidatedFlow) -> arb_mat:
+    raise UnprovenError(f"an event at t = {flow.t.str(8)} is not proven to be transversal")

@@ -1,4 +1,4 @@
-"""The list of every special point in a box, complete or not."""
+"""Lists of the special points in a box, complete or not."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..proof import Proof, intervals
 
 @dataclass(frozen=True)
 class Undecided:
-    """A part of the box where it is not known what there is.
+    """A part of the box that is undecided.
 
     Attributes
     ----------
@@ -33,24 +33,24 @@ class Undecided:
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Census:
-    """Every special point of one kind in a box, or what is missing to that.
+    """The special points of one kind in a box, with the parts that are undecided.
 
     Attributes
     ----------
     kind : str
-        What was looked for: ``"two-fold"``, ``"fold"`` and so on.
+        Kind of the points: ``"two-fold"``, ``"fold"`` and so on.
     complete : bool
         Whether the list is proven to be complete.
     zeros : tuple of Proof
         Points proven to be in the box.
     edge : tuple of Proof
-        Points proven to exist, of which it is not decided on which side of the box's face they are.
+        Points proven to exist, on an undecided side of the box's face.
     undecided : tuple of Undecided
         Parts of the box where nothing is proven.
     boxes : int
-        Pieces of the box that were looked at.
+        Pieces of the box that were examined.
     statement : str
-        The theorem, or what is missing to it, in one sentence.
+        The theorem, or the part of it that is proven.
     record : mapping
         Everything that an independent program needs; see ``save``.
     """

@@ -1,4 +1,4 @@
-"""Theorems about one special point: existence, uniqueness, class; over boxes of parameters too."""
+"""Proofs of existence, uniqueness and class of one special point, also over boxes of parameters."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from fractions import Fraction
 from typing import Any
 
 from ...local import Equilibrium, Fold, PseudoEquilibrium, TwoFold
-from ...model import FilippovSystem, OptionError, explain, real, whole
+from ...model import FilippovSystem, OptionError, real, whole
 from ..arithmetic.decimals import enclosure, given, inner
 from ..arithmetic.flint import arb
 from ..arithmetic.intervals import Numbers, between, precision, radius
@@ -17,10 +17,10 @@ from ..proof import Proof, hulls, intervals, listed, paragraph
 from ..record import record_of
 from .equations import Equations
 from .krawczyk import Zero, prove_zero
-from .special_points import Verdict
-from .subject import Subject, subject_of
+from .problem_instance import ProblemInstance, instance_of
+from .special_points import Classification
 
-#: What a constant means, in words.
+#: How constants are read.
 READ = {
     "stored": "Constants are the doubles stored in the expressions.",
     "written": "Constants are the decimals that the stored doubles are written as.",
@@ -28,16 +28,9 @@ READ = {
 
 
 def check_numbers(numbers: Any) -> None:
-    """Raise OptionError unless it is said how the constants of the system are read."""
+    """Raise OptionError unless ``numbers`` is "stored" or "written"."""
     if numbers not in READ:
-        raise OptionError(
-            explain(
-                "numbers",
-                expected="'stored' or 'written'",
-                received=repr(numbers),
-                advice="See certify.",
-            )
-        )
+        raise OptionError(f"numbers={numbers!r} is not 'stored' or 'written'. See certify.")
 
 
 def certify(
@@ -62,7 +55,7 @@ def certify(
         As a search returns it. In systems with more states than equations the theorem is about the
         point on the plane through it, across the set of such points (or of held states).
     system : FilippovSystem, optional
-        Needed for points that do not know theirs: all but two-folds.
+        Needed for all points but two-folds, which carry their system.
     width : float, optional
         Largest radius of the enclosures, where the parameters are points.
     parameters : mapping, optional
@@ -109,25 +102,25 @@ def certify(
     >>> proof.proven, proof.label, str(proof.point["y"]), str(proof.values["eigenvalue_low"])
     (True, 'II-C', '0', '-2.618033988749894848204586834365... +- ...')
     """
-    subject = subject_of(found, system, hold, numbers, parameters)
+    instance = instance_of(found, system, hold, numbers, parameters)
     limit = real(width, "width", low=5e-324, expected="a positive number")
     whole(max_bits, "max_bits", least=64)
     whole(max_pieces, "max_pieces")
     check_numbers(numbers)
-    pieces = _divided(subject, limit, max_bits, max_pieces)
-    return pieces[0] if len(pieces) == 1 else _together(subject, pieces)
+    pieces = _divided(instance, limit, max_bits, max_pieces)
+    return pieces[0] if len(pieces) == 1 else _together(instance, pieces)
 
 
 # Pieces of the parameters --------------------------------------------------------------------------
 
 
-def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> list[Proof]:
-    """Proofs over pieces of the parameters' intervals, halved where one proof does not do."""
-    todo, done, failed = deque([subject]), list[Proof](), 0
+def _divided(
+    instance: ProblemInstance, width: float, max_bits: int, max_pieces: int
+) -> list[Proof]:
+    """Proofs over pieces of the parameters' intervals, which are halved where a proof fails."""
+    todo, done, failed = deque([instance]), list[Proof](), 0
     while todo:
-        one = (
-            todo.popleft()
-        )  # the largest: what is undecided does not use up the pieces of the rest
+        one = todo.popleft()  # the largest first, so that undecided ones do not use up all pieces
         proof, start = _one(one, width, max_bits)
         if (
             proof.proven
@@ -142,38 +135,40 @@ def _divided(subject: Subject, width: float, max_bits: int, max_pieces: int) -> 
     return done
 
 
-def _one(subject: Subject, width: float, max_bits: int) -> tuple[Proof, list[float]]:
+def _one(instance: ProblemInstance, width: float, max_bits: int) -> tuple[Proof, list[float]]:
     """A proof for one piece, with as many bits as its width and class need."""
     bits = 64
     while 2.0 ** (16 - bits) > width and bits < max_bits:
         bits *= 2
-    start: list[arb] = [arb(v) for v in subject.start]
-    best: tuple[Zero, Verdict, Equations] | None = None
+    start: list[arb] = [arb(v) for v in instance.start]
+    best: tuple[Zero, Classification, Equations] | None = None
     last = float("inf")
     while True:
         with precision(bits):
-            equations = subject.equations()
+            equations = instance.equations()
             zero = prove_zero(equations, start)
             if zero is not None:
-                verdict = subject.question.verdict(equations.inputs(zero.point))
-                best, start = (zero, verdict, equations), [v.mid() for v in zero.point]
+                classification = instance.problem.classification(equations.inputs(zero.point))
+                best, start = (zero, classification, equations), [v.mid() for v in zero.point]
                 size = max(map(radius, zero.point))
                 stuck = size > 0 and size > 0.5 * last  # wide parameters: more digits do not help
                 last = size
-                if (verdict.label and size <= width) or stuck:
+                if (classification.label and size <= width) or stuck:
                     break
-            if 2 * bits > max_bits or (zero is None and _wide(subject) and bits > 64):
+            if 2 * bits > max_bits or (zero is None and _wide(instance) and bits > 64):
                 break
         bits *= 2
     with precision(bits):
-        proof = _proof(subject, best, bits)
+        proof = _proof(instance, best, bits)
     return proof, [float(v) for v in start]
 
 
-def prove_subject(subject: Subject, zero: Zero, width: float, max_bits: int = 1024) -> Proof | None:
-    """A proof for a zero that is known to exist; None where it cannot be told to be that one."""
+def prove_instance(
+    instance: ProblemInstance, zero: Zero, width: float, max_bits: int = 1024
+) -> Proof | None:
+    """A proof for a zero that is known to exist; None if it may be of another zero."""
     start = [float(v.mid()) for v in zero.point]
-    proof, _ = _one(replace(subject, start=start), width, max_bits)
+    proof, _ = _one(replace(instance, start=start), width, max_bits)
     if not proof.exists:
         return None
     with precision(2 * max_bits):
@@ -190,16 +185,18 @@ def _all_in(point: Sequence[arb], box: Sequence[arb]) -> bool:
     return all(b.contains(v) for b, v in zip(box, point, strict=True))
 
 
-def _wide(subject: Subject) -> bool:
-    return any(a < b for a, b in (*subject.parameters, *subject.values))
+def _wide(instance: ProblemInstance) -> bool:
+    return any(a < b for a, b in (*instance.parameters, *instance.values))
 
 
-def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits: int) -> Proof:
-    kind, names = subject.question.kind, subject.parameter_names
-    ranges = [given(*pair) for pair in subject.parameters]
-    parameters = dict(zip(names, ranges, strict=True)) | subject.wide_held
+def _proof(
+    instance: ProblemInstance, best: tuple[Zero, Classification, Equations] | None, bits: int
+) -> Proof:
+    kind, names = instance.problem.kind, instance.parameter_names
+    ranges = [given(*pair) for pair in instance.parameters]
+    parameters = dict(zip(names, ranges, strict=True)) | instance.wide_held
     condition = f"For {intervals(parameters)}: " if parameters else ""
-    if best is None or not best[1].here:
+    if best is None or not best[1].applies:
         why = (
             "Krawczyk's operator mapped no box into itself: the zero is not simple (dependent "
             "gradients, a double zero, a curve of zeros), a field is not defined there, or the "
@@ -209,24 +206,26 @@ def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits:
         )
         statement = paragraph(
             f"{condition}No proof of a {kind} near "
-            + ", ".join(f"{k} = {v:.8g}" for k, v in zip(subject.names, subject.start, strict=True))
+            + ", ".join(
+                f"{k} = {v:.8g}" for k, v in zip(instance.names, instance.start, strict=True)
+            )
             + f" with up to {bits} bits.",
             why,
         )
         return Proof(kind, False, False, "", statement, {}, {}, {}, parameters, bits)
-    zero, verdict, equations = best
-    point = dict(zip(subject.names, map(enclosure, zero.point), strict=True))
+    zero, classification, equations = best
+    point = dict(zip(instance.names, map(enclosure, zero.point), strict=True))
     box = {
-        name: inner(b, k) for name, b, k in zip(subject.names, zero.box, zero.image, strict=True)
+        name: inner(b, k) for name, b, k in zip(instance.names, zero.box, zero.image, strict=True)
     }
-    values = {k: enclosure(v) for k, v in verdict.values.items() if v.is_finite()}
-    statement = _statement(subject, verdict, condition, point, box, values)
-    record = record_of(subject, equations, zero, verdict, bits)
+    values = {k: enclosure(v) for k, v in classification.values.items() if v.is_finite()}
+    statement = _statement(instance, classification, condition, point, box, values)
+    record = record_of(instance, equations, zero, classification, bits)
     return Proof(
         kind,
-        bool(verdict.label),
+        bool(classification.label),
         True,
-        verdict.label,
+        classification.label,
         statement,
         point,
         box,
@@ -238,57 +237,63 @@ def _proof(subject: Subject, best: tuple[Zero, Verdict, Equations] | None, bits:
 
 
 def _statement(
-    subject: Subject,
-    verdict: Verdict,
+    instance: ProblemInstance,
+    classification: Classification,
     condition: str,
     point: Mapping[str, Any],
     box: Mapping[str, Any],
     values: Mapping[str, Any],
 ) -> str:
-    kind = subject.question.kind
-    place = where(subject)
-    article = "an" if verdict.title[0] in "aeiou" else "a"
+    kind = instance.problem.kind
+    conditions = where(instance)
+    article = "an" if classification.title[0] in "aeiou" else "a"
     shown = {k: v for k, v in values.items() if not (k[0] == "L" and k[1:].isdigit())}
-    classed = f", class {verdict.label}" if kind == "two-fold" and verdict.label else ""
-    if verdict.label.startswith("boundary Delta") or verdict.label.startswith("boundary disc"):
-        classed = f", exactly on the {verdict.label}"
-    head = "Theorem" if verdict.label else "Theorem on existence, with the class undecided"
+    classed = (
+        f", class {classification.label}" if kind == "two-fold" and classification.label else ""
+    )
+    if classification.label.startswith("boundary Delta") or classification.label.startswith(
+        "boundary disc"
+    ):
+        classed = f", exactly on the {classification.label}"
+    head = "Theorem" if classification.label else "Theorem on existence, with the class undecided"
     return paragraph(
-        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{place}.",
-        f"It is {article} {verdict.title}{classed}, at {listed(point)}.",
+        f"{head}. {condition}The box {intervals(box)} contains exactly one {kind}{conditions}.",
+        f"It is {article} {classification.title}{classed}, at {listed(point)}.",
         f"{listed(shown)}." if shown else "",
-        *verdict.lines,
-        f"Not decided: {verdict.why}." if verdict.why and not verdict.label else "",
-        READ[subject.numbers],
+        *classification.lines,
+        f"Not decided: {classification.why}."
+        if classification.why and not classification.label
+        else "",
+        READ[instance.numbers],
     )
 
 
-def where(subject: Subject) -> str:
-    """What is held, the plane, and the sides of other surfaces."""
-    described = subject.question.described
-    free = {i for vector, i in subject.unknowns if vector == 0}
-    names = [*described.system.state_names, "t"]
+def where(instance: ProblemInstance) -> str:
+    """Held states, the plane and the sides of other surfaces, in words."""
+    functions = instance.problem.functions
+    free = {i for vector, i in instance.unknowns if vector == 0}
+    names = [*functions.system.state_names, "t"]
     held = [
         intervals({names[i]: given(*v)})
-        for i, v in enumerate(subject.values)
+        for i, v in enumerate(instance.values)
         if i not in free and v[0] == v[1]
     ]
     text = f" with {', '.join(held)}" if held else ""
-    if described.system.surface_count > 1:
-        text += f" in mode {described.mode!r}"
-    if subject.normals:
+    if functions.system.surface_count > 1:
+        text += f" in mode {functions.mode!r}"
+    if instance.normals:
         text += (
             f" on the plane through the given point across the set of such points (of codimension "
-            f"{len(subject.normals)})"
+            f"{len(instance.normals)})"
         )
     return text
 
 
-def _together(subject: Subject, pieces: list[Proof]) -> Proof:
+def _together(instance: ProblemInstance, pieces: list[Proof]) -> Proof:
     """One statement of all pieces."""
-    kind, names = subject.question.kind, subject.parameter_names
-    whole_range = [given(*pair) for pair in subject.parameters]
-    parameters = dict(zip(names, whole_range, strict=True)) | subject.wide_held
+    kind, names = instance.problem.kind, instance.parameter_names
+    whole_range = [given(*pair) for pair in instance.parameters]
+    parameters = dict(zip(names, whole_range, strict=True)) | instance.wide_held
     proven = all(p.proven for p in pieces)
     exists = all(p.exists for p in pieces)
     labels = list(dict.fromkeys(p.label for p in pieces if p.proven))
@@ -307,7 +312,7 @@ def _together(subject: Subject, pieces: list[Proof]) -> Proof:
         f"Over all pieces {intervals(hulls([p.point for p in pieces if p.exists]))}.",
         f"Undecided on {len(missing)} pieces." if missing else "",
         *lines,
-        READ[subject.numbers],
+        READ[instance.numbers],
     )
     points = [p.point for p in pieces if p.exists]
     values = [p.values for p in pieces if p.exists]
@@ -324,6 +329,6 @@ def _together(subject: Subject, pieces: list[Proof]) -> Proof:
         hulls(values),
         parameters,
         bits,
-        {"ranges": [[str(v) for v in pair] for pair in subject.ranges]},
+        {"ranges": [[str(v) for v in pair] for pair in instance.ranges]},
         tuple(pieces),
     )

@@ -1,4 +1,4 @@
-"""Eigenvalues in enclosures, and what their signs say about a point of rest."""
+"""Enclosures of eigenvalues, and the kind of an equilibrium by their signs."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..arithmetic.intervals import sign
 
 
 def eigenvalue_kind(jacobian: Sequence[Sequence[arb]]) -> tuple[str, str, dict[str, arb]]:
-    """Name a point of rest by the signs of its eigenvalues."""
+    """Kind of an equilibrium by the signs of its eigenvalues, why it is undecided, and eigenvalues."""
     if not jacobian:
         return "stable node", "", {}  # nothing to move along
     matrix = arb_mat([list(row) for row in jacobian])
@@ -63,8 +63,8 @@ def _eigenvalues(matrix: arb_mat) -> list[tuple[arb, arb]] | None:
         return None
     result = []
     for v in values:
-        # The mirror image of an eigenvalue is one too: where no other enclosure meets the mirrored
-        # one, it is the eigenvalue itself.
+        # The conjugate of an eigenvalue is one too: if no other enclosure overlaps it, the eigenvalue
+        # is real.
         mirrored = v.conjugate()
         own = not any(w is not v and w.overlaps(mirrored) for w in values)
         if not own and v.imag.contains(0):

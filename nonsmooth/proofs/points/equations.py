@@ -1,4 +1,4 @@
-"""Square systems of equations whose zeros are special points, with derivatives of their own."""
+"""Square systems of equations whose zeros are special points, with their Jacobians."""
 
 from __future__ import annotations
 
@@ -7,45 +7,31 @@ from fractions import Fraction
 from typing import Any
 
 from ..arithmetic.flint import arb, arb_mat
-from ..arithmetic.instructions import Program, Tape
+from ..arithmetic.instructions import ExpressionGraph, Program
 from ..arithmetic.intervals import Enclosures, Numbers
 
 
 class Equations:
-    """f(u) = 0 with as many equations as unknowns; what is not unknown is held.
-
-    Parameters
-    ----------
-    tape : Tape
-    values : sequence of int
-        Nodes of the equations.
-    unknowns : sequence of (int, int)
-        Vector and position of the unknowns among the inputs.
-    names : sequence of str
-        Of the unknowns.
-    held : list of list of arb
-        Values of all inputs; those of unknowns are replaced.
-    numbers : {"stored", "written"}
-    """
+    """f(u) = 0 with as many equations as unknowns, (vector, position) among the inputs ``held``."""
 
     def __init__(
         self,
-        tape: Tape,
+        graph: ExpressionGraph,
         values: Sequence[int],
         unknowns: Sequence[tuple[int, int]],
         names: Sequence[str],
         held: list[list[Any]],
         numbers: Numbers,
     ):
-        self.tape, self.unknowns, self.names, self.numbers = tape, list(unknowns), names, numbers
+        self.graph, self.unknowns, self.names, self.numbers = graph, list(unknowns), names, numbers
         self.nodes, self.held, self.n = list(values), held, len(unknowns)
-        inputs = [tape.symbol(*place) for place in unknowns]
-        rows = [tape.gradient(k, inputs) for k in values]
-        self._values = Program(tape, [values])
-        self._both = Program(tape, [values, *rows])
+        inputs = [graph.symbol(*index) for index in unknowns]
+        rows = [graph.gradient(k, inputs) for k in values]
+        self._values = Program(graph, [values])
+        self._both = Program(graph, [values, *rows])
 
     def inputs(self, u: Sequence[Any]) -> list[list[Any]]:
-        """All inputs with the unknowns in their places."""
+        """All inputs, with values of the unknowns."""
         vectors = [list(v) for v in self.held]
         for (vector, position), value in zip(self.unknowns, u, strict=True):
             vectors[vector][position] = value
@@ -88,11 +74,14 @@ def entries(matrix: arb_mat) -> list[arb]:
 
 
 def plane(
-    tape: Tape, inputs: Sequence[int], normals: Sequence[Sequence[Fraction]], through: Sequence[Any]
+    graph: ExpressionGraph,
+    inputs: Sequence[int],
+    normals: Sequence[Sequence[Fraction]],
+    through: Sequence[Any],
 ) -> list[int]:
     """Nodes of normal . (x - through), exactly."""
     differences = [
-        tape.apply("sub", [x, tape.constant(Fraction(c))])
+        graph.apply("sub", [x, graph.constant(Fraction(c))])
         for x, c in zip(inputs, through, strict=True)
     ]
-    return [tape.dot([tape.constant(c) for c in normal], differences) for normal in normals]
+    return [graph.dot([graph.constant(c) for c in normal], differences) for normal in normals]

@@ -1,8 +1,8 @@
-"""Exactly one zero in a box: Krawczyk's operator in enclosures.
+"""Proof of exactly one zero in a box by Krawczyk's operator.
 
 K(X) = m - C f(m) + (1 - C J(X)) (X - m) with the midpoint m and any matrix C. Where K(X) lies in the
-interior of X, every function whose values and Jacobian are enclosed has exactly one zero in X, it is
-in K(X), and its Jacobian is regular all over X (Krawczyk 1969; Moore 1977; Neumaier 1990, ch. 5).
+interior of X, every function whose values and Jacobian are enclosed has exactly one zero in X, in
+K(X), and its Jacobian is regular all over X (Krawczyk 1969; Moore 1977; Neumaier 1990, ch. 5).
 """
 
 from __future__ import annotations
@@ -17,24 +17,12 @@ from .equations import Equations, column, entries
 
 @dataclass(frozen=True)
 class Zero:
-    """One zero, proven.
+    """A proven zero."""
 
-    Attributes
-    ----------
-    point : list of arb
-        Enclosure of the zero.
-    box : list of arb
-        A box in which it is the only one; its interior contains ``image``.
-    image : list of arb
-        Krawczyk's operator of the box.
-    matrix : arb_mat
-        The exact matrix C that proves it.
-    """
-
-    point: list[arb]
-    box: list[arb]
-    image: list[arb]
-    matrix: arb_mat
+    point: list[arb]  # encloses the zero
+    box: list[arb]  # in which it is the only one; its interior contains ``image``
+    image: list[arb]  # Krawczyk's operator of the box
+    matrix: arb_mat  # C, exact
 
 
 def operator(
@@ -49,7 +37,7 @@ def operator(
             return None
     values, slopes = equations.with_jacobian(box)
     if not all(v.is_finite() for v in values.entries()):
-        return None  # where it has no finite value it may jump, its derivative being finite
+        return None  # without finite values f may jump, even if its derivative is finite
     move = column([x - m for x, m in zip(box, middle, strict=True)])
     image = (identity(equations.n) - matrix * slopes) * move - matrix * equations.values(middle)
     return [m + k for m, k in zip(middle, entries(image), strict=True)], matrix
@@ -93,7 +81,7 @@ def polish(equations: Equations, start: Sequence[arb], steps: int = 40) -> list[
 def prove_zero(
     equations: Equations, start: Sequence[arb], scales: Sequence[float] | None = None
 ) -> Zero | None:
-    """Prove that one zero is near, in as large a box as a few trials find."""
+    """Prove one zero near the start, in as large a box as a few trials find."""
     u = polish(equations, start)
     if u is None:
         return None
@@ -136,7 +124,7 @@ def _grown(equations: Equations, u: list[arb], sizes: list[float], r: float, fou
 
 
 def _narrowed(equations: Equations, u: list[arb], found: Zero) -> Zero:
-    """Contract the enclosure to the working precision; a zero met exactly has radius 0."""
+    """Contract the enclosure to the working precision; an exact zero has radius 0."""
     for guess in _exact_guesses(u):
         values = entries(equations.values(guess))
         if all(v.is_zero() for v in values) and _within(guess, found.box):

@@ -1,4 +1,4 @@
-"""Every special point in a box: a complete list, or the places that stay undecided."""
+"""Complete lists of the special points in a box, or the parts of the box that stay undecided."""
 
 from __future__ import annotations
 
@@ -8,22 +8,22 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ...local.point.sides import FIELDS, Side
-from ...model import FilippovSystem, OptionError, explain, real, require_system, whole
+from ...local.point.surface_point import FIELDS, Side
+from ...model import FilippovSystem, OptionError, real, require_system, whole
 from ..arithmetic.decimals import given
 from ..arithmetic.enclosure import Enclosure
 from ..arithmetic.flint import arb
 from ..arithmetic.interval_arrays import Floats, of_fractions
 from ..arithmetic.intervals import Numbers, enclose, exact, precision
 from ..proof import Proof, intervals, paragraph
-from ..record import asked, record_of
-from ..surface_functions import Described, parameter_ranges
+from ..record import problem_record, record_of
+from ..surface_functions import SurfaceFunctions, parameter_ranges
 from .census import Census, Undecided
-from .certify import READ, check_numbers, prove_subject, where
+from .certify import READ, check_numbers, prove_instance, where
 from .krawczyk import Zero
-from .special_points import QUESTIONS, Question, Verdict
+from .problem_instance import ProblemInstance
+from .special_points import PROBLEMS, Classification, PointProblem
 from .subdivide import Search, clusters
-from .subject import Subject
 
 Kind = Literal["two-fold", "fold", "equilibrium", "pseudo-equilibrium"]
 
@@ -51,7 +51,7 @@ def prove_all(
     Parameters
     ----------
     system : FilippovSystem
-        With scalar multipliers, and with operations that interval arithmetic knows.
+        With scalar multipliers, and with operations of interval arithmetic.
     box : sequence of n pairs (low, high)
         For each state its range; a number holds a state at that value. As many states must be left
         free as there are equations: 3 for two-folds, 2 for folds, all for points of rest.
@@ -68,7 +68,7 @@ def prove_all(
     numbers, width
         As in :func:`certify`.
     max_boxes : int, optional
-        How many pieces of the box may be looked at.
+        How many pieces of the box may be examined.
 
     Returns
     -------
@@ -104,39 +104,36 @@ def prove_all(
     (True, [...])
     """
     require_system(system)
-    if kind not in QUESTIONS:
-        raise OptionError(
-            explain("kind", expected=f"one of {list(QUESTIONS)}", received=repr(kind), advice="")
-        )
+    if kind not in PROBLEMS:
+        raise OptionError(f"kind={kind!r} is not one of {list(PROBLEMS)}.")
     limit = real(width, "width", low=5e-324, expected="a positive number")
     most = whole(max_boxes, "max_boxes")
     check_numbers(numbers)
-    question = QUESTIONS[kind](Described(system, surface, mode), numbers, side)
+    problem = PROBLEMS[kind](SurfaceFunctions(system, surface, mode), numbers, side)
     ranges = _read_box(system, box, numbers)
     ranges += [exact(t, numbers, "t")] if system.time_dependent else []
-    subject = _subject(question, ranges, parameters, numbers)
+    instance = _instance(problem, ranges, parameters, numbers)
     bounds = [v for v in ranges if isinstance(v, tuple)]
-    bounds += [(low, high) for _, low, high in question.further]
+    bounds += [(low, high) for _, low, high in problem.further]
     with precision(128):
         around = [of_fractions(*pair) for pair in bounds]
         low = np.array([float(v.low) for v in around])
         high = np.array([float(v.high) for v in around])
-        search = Search(subject.equations(), low, high, max_boxes=most)
+        search = Search(instance.equations(), low, high, max_boxes=most)
         search.run()
-    return _census(subject, search, bounds, limit)
+    return _census(instance, search, bounds, limit)
 
 
 def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> list[Any]:
     """Ranges of the states, or values of those that are held, as fractions."""
     names = system.state_names
-    expected = f"{len(names)} ranges (low, high) or numbers, for {', '.join(names)}"
     try:
         given = list(box)
     except TypeError:
         given = []
     if len(given) != len(names):
         raise OptionError(
-            explain("box", expected=expected, received=repr(box), advice="In the states' order.")
+            f"box={box!r} does not have {len(names)} ranges (low, high) or numbers, for {', '.join(names)}."
         )
     result: list[Any] = []
     for name, value in zip(names, given, strict=True):
@@ -145,12 +142,8 @@ def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> l
             ends = [exact(v, numbers, what) for v in value]
             if len(ends) != 2 or not 0 < ends[1] - ends[0] < _WIDEST:
                 raise OptionError(
-                    explain(
-                        what,
-                        expected="(low, high) with low < high, both finite, less than 1e300 apart",
-                        received=repr(value),
-                        advice="A number instead of a pair holds the state.",
-                    )
+                    f"{what} is {value!r}, but must be (low, high) with low < high, finite and less than 1e300 "
+                    "apart. A number instead of a pair holds the state."
                 )
             result.append((ends[0], ends[1]))
         else:
@@ -158,31 +151,29 @@ def _read_box(system: FilippovSystem, box: Sequence[Any], numbers: Numbers) -> l
     return result
 
 
-def _subject(
-    question: Question, ranges: list[Any], parameters: Mapping[Any, Any] | None, numbers: Numbers
-) -> Subject:
-    system = question.described.system
+def _instance(
+    problem: PointProblem, ranges: list[Any], parameters: Mapping[Any, Any] | None, numbers: Numbers
+) -> ProblemInstance:
+    system = problem.functions.system
     free = [i for i, v in enumerate(ranges) if isinstance(v, tuple)]
-    unknown = len(free) + len(question.further)
-    if unknown != len(question.nodes):
+    unknown = len(free) + len(problem.further)
+    if unknown != len(problem.nodes):
+        advice = (
+            f"Otherwise points form a set of dimension {unknown - len(problem.nodes)}: give numbers to "
+            "hold states."
+            if unknown > len(problem.nodes)
+            else "Give more states a range."
+        )
         raise OptionError(
-            explain(
-                "box",
-                expected=f"{len(question.nodes) - len(question.further)} free states for a "
-                f"{question.kind}, which has so many equations",
-                received=f"{len(free)}",
-                advice="Otherwise they are no isolated points but a set of dimension "
-                f"{unknown - len(question.nodes)}: hold states by giving a number for their range."
-                if unknown > len(question.nodes)
-                else "Give more states a range.",
-            )
+            f"box leaves {len(free)} states free, but a {problem.kind} needs "
+            f"{len(problem.nodes) - len(problem.further)}, as many as equations. {advice}"
         )
     values = [(v[0], v[0]) if isinstance(v, tuple) else (v, v) for v in ranges]
-    return Subject(
-        question,
+    return ProblemInstance(
+        problem,
         [0.0] * unknown,
-        [(0, i) for i in free] + [(2, k) for k in range(len(question.further))],
-        [system.state_names[i] for i in free] + [name for name, *_ in question.further],
+        [(0, i) for i in free] + [(2, k) for k in range(len(problem.further))],
+        [system.state_names[i] for i in free] + [name for name, *_ in problem.further],
         values,
         [],
         [Fraction(0)] * len(free),
@@ -192,35 +183,35 @@ def _subject(
 
 
 def _census(
-    subject: Subject, search: Search, bounds: list[tuple[Fraction, Fraction]], width: float
+    instance: ProblemInstance, search: Search, bounds: list[tuple[Fraction, Fraction]], width: float
 ) -> Census:
     zeros, edge, left, others = [], [], [], []
     for found in search.zeros:
-        place = _place(found.point, bounds)
-        counts = subject.question.counts(search.equations.inputs(found.point))
-        if place == "outside" or counts is False:
-            others.append(_of_another(subject, search, found))
+        position = _position(found.point, bounds)
+        qualifies = instance.problem.qualifies(search.equations.inputs(found.point))
+        if position == "outside" or qualifies is False:
+            others.append(_of_another(instance, search, found))
             continue
-        proof = prove_subject(subject, found, width)
-        if proof is None or counts is None:
+        proof = prove_instance(instance, found, width)
+        if proof is None or qualifies is None:
             why = "a zero on the surface or at the end of sliding: its status is undecided"
             left.append(Undecided(proof.point if proof else {}, why))
-        elif place == "edge":
+        elif position == "edge":
             edge.append(proof)
         else:
             zeros.append(proof)
     for low, high in clusters(search.undecided, search.size):
         box = {
             name: Enclosure(repr(float(a)), repr(float(b)))
-            for name, a, b in zip(subject.names, low, high, strict=True)
+            for name, a, b in zip(instance.names, low, high, strict=True)
         }
         left.append(Undecided(box, _reason(low, high, search)))
     complete = not left and not edge
-    statement = _words(subject, search, bounds, zeros, edge, left, complete)
-    kind = subject.question.kind
+    statement = _words(instance, search, bounds, zeros, edge, left, complete)
+    kind = instance.problem.kind
     record = {
         "complete": complete,
-        "question": asked(subject),
+        "question": problem_record(instance),
         "bounds": [[str(v) for v in pair] for pair in bounds],
         "zeros": [p.record for p in zeros],
         "others": others,
@@ -229,13 +220,13 @@ def _census(
     return Census(kind, complete, *found_all, search.boxes, statement, record)
 
 
-def _of_another(subject: Subject, search: Search, found: Zero) -> dict[str, Any]:
-    """The record of a zero that is outside the box, or of another status than was asked for."""
-    nothing = Verdict("", subject.question.kind, facts={"label": "", "coincident": False})
-    return record_of(subject, search.equations, found, nothing, 128)
+def _of_another(instance: ProblemInstance, search: Search, found: Zero) -> dict[str, Any]:
+    """The record of a zero outside the box, or with fields that do not apply there."""
+    nothing = Classification("", instance.problem.kind, claims={"label": "", "coincident": False})
+    return record_of(instance, search.equations, found, nothing, 128)
 
 
-def _place(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) -> str:
+def _position(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) -> str:
     """Whether a point is in the closed box: "inside", "outside" or "edge"."""
     result = "inside"
     with precision(256):
@@ -251,20 +242,20 @@ def _place(point: Sequence[arb], bounds: Sequence[tuple[Fraction, Fraction]]) ->
 def _reason(low: Floats, high: Floats, search: Search) -> str:
     share = float(np.max((high - low) / search.size))
     if search.stopped in ("interrupted",) or search.stopped.endswith("pieces"):
-        return f"not looked at any closer ({search.stopped})"
+        return f"not examined further ({search.stopped})"
     if share > 0.02:
         return (
             "zeros that are not isolated (a curve or a surface of them), or expressions that are "
             "not defined there"
         )
     return (
-        "a zero that is not simple (a double one, or several closer than can be told apart), or a "
+        "a zero that is not simple (a double one, or several that are too close to separate), or a "
         "branch point of an expression"
     )
 
 
 def _words(
-    subject: Subject,
+    instance: ProblemInstance,
     search: Search,
     bounds: Sequence[tuple[Fraction, Fraction]],
     zeros: list[Proof],
@@ -272,11 +263,11 @@ def _words(
     left: list[Undecided],
     complete: bool,
 ) -> str:
-    kind = subject.question.kind
-    ranges = intervals({n: given(*pair) for n, pair in zip(subject.names, bounds, strict=True)})
-    parameters = zip(subject.parameter_names, subject.parameters, strict=True)
+    kind = instance.problem.kind
+    ranges = intervals({n: given(*pair) for n, pair in zip(instance.names, bounds, strict=True)})
+    parameters = zip(instance.parameter_names, instance.parameters, strict=True)
     condition = intervals({name: given(*pair) for name, pair in parameters})
-    side = getattr(subject.question, "side", None)
+    side = getattr(instance.problem, "side", None)
     what = f"{kind} of {FIELDS[side]}" if side else kind
     count = {0: f"no {what}", 1: f"exactly one {what}"}.get(
         len(zeros), f"exactly {len(zeros)} points of kind {what}"
@@ -291,8 +282,8 @@ def _words(
     lines += [f"Undecided: {u}." for u in left[:10]]
     head = "Theorem" if complete else "Theorem in part"
     return paragraph(
-        f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{where(subject)} "
+        f"{head}. {f'For {condition}: the' if condition else 'The'} box {ranges}{where(instance)} "
         f"holds {count}.",
         *lines,
-        f"Pieces of the box that were looked at: {search.boxes}. {READ[subject.numbers]}",
+        f"Pieces of the box that were examined: {search.boxes}. {READ[instance.numbers]}",
     )

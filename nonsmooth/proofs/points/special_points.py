@@ -1,4 +1,4 @@
-"""What can be asked about a system: for each special point its equations, and what a zero means."""
+"""Special points that can be proven: the equations of each kind and the classification of a zero."""
 
 from __future__ import annotations
 
@@ -8,75 +8,75 @@ from fractions import Fraction
 from functools import cached_property
 from typing import Any
 
-from ...local.point.sides import FIELDS, Side, side_index
+from ...local.point.surface_point import FIELDS, Side, side_index
 from ...local.two_folds.classification import TABLE
-from ...model import DefinitionError, explain
+from ...model import DefinitionError
 from ..arithmetic.algebra import Difference
 from ..arithmetic.flint import arb
 from ..arithmetic.instructions import Program
 from ..arithmetic.intervals import Enclosures, Numbers, sign
-from ..surface_functions import Described
-from .classes import FOLDS, proven_class
+from ..surface_functions import SurfaceFunctions
 from .eigenvalues import eigenvalue_kind
+from .two_fold_class import FOLDS, proven_class
 
 
 @dataclass(frozen=True)
-class Verdict:
-    """What a proven zero is."""
+class Classification:
+    """The class of a proven zero."""
 
     label: str
     title: str
     why: str = ""
     lines: list[str] = field(default_factory=list)
     values: dict[str, arb] = field(default_factory=dict)
-    facts: dict[str, Any] = field(default_factory=dict)
-    here: bool = True
+    claims: dict[str, Any] = field(default_factory=dict)
+    applies: bool = True
 
 
-class Question:
-    """One kind of special point of a described system."""
+class PointProblem:
+    """The equations of one kind of special point, and its classification."""
 
     kind: str
     further: Sequence[tuple[str, Fraction, Fraction]] = ()
     dimension = 1
 
-    def __init__(self, described: Described, numbers: Numbers):
-        self.described, self.numbers = described, numbers
+    def __init__(self, functions: SurfaceFunctions, numbers: Numbers):
+        self.functions, self.numbers = functions, numbers
 
     @property
     def nodes(self) -> list[int]:
         raise NotImplementedError
 
-    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
-        """Say what the zero is, if both fields are those of the mode there."""
+    def classified(self, inputs: Sequence[Sequence[arb]]) -> Classification:
+        """Classify the zero, if both fields are those of the mode there."""
         raise NotImplementedError
 
     def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
         """Whether a zero is a point of this kind, if both fields are those of the mode there."""
         return True
 
-    def verdict(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
-        """Say what the zero enclosed in the inputs is."""
-        _, why = self._place(inputs)
-        return Verdict("", self.kind, why, here=False) if why else self.judged(inputs)
+    def classification(self, inputs: Sequence[Sequence[arb]]) -> Classification:
+        """Classify the zero enclosed in the inputs."""
+        _, why = self._in_mode(inputs)
+        return Classification("", self.kind, why, applies=False) if why else self.classified(inputs)
 
-    def counts(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
-        """Whether a zero is one of the points asked for; None where that is undecided."""
-        answers = (self._place(inputs)[0], self.own(inputs))
+    def qualifies(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
+        """Whether a zero is a point of this kind in this mode; None if undecided."""
+        answers = (self._in_mode(inputs)[0], self.own(inputs))
         return False if False in answers else None if None in answers else True
 
     @cached_property
     def _conditions(self) -> Program:
-        return Program(self.described.tape, [[node for _, node in self.described.elsewhere]])
+        return Program(self.functions.graph, [[node for _, node in self.functions.elsewhere]])
 
-    def _place(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool | None, str]:
-        """Whether the zero is where the mode's fields apply; if not surely, what is not proven."""
-        if not self.described.elsewhere:
+    def _in_mode(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool | None, str]:
+        """Whether the zero is where the mode's fields apply, and what is not proven of that."""
+        if not self.functions.elsewhere:
             return True, ""
         (values,) = self.values(self._conditions, inputs)
         open_ = [
             (v, f"that it is on {name} is not proven, its distance is in {v.str(5)}")
-            for (name, _), v in zip(self.described.elsewhere, values, strict=True)
+            for (name, _), v in zip(self.functions.elsewhere, values, strict=True)
             if not v > 0
         ]
         if not open_:
@@ -88,7 +88,7 @@ class Question:
         return program(Enclosures(inputs, self.numbers))
 
 
-class TwoFolds(Question):
+class TwoFolds(PointProblem):
     """h = L1 = L2 = 0."""
 
     kind = "two-fold"
@@ -96,23 +96,23 @@ class TwoFolds(Question):
     @cached_property
     def nodes(self) -> list[int]:
         """h, L1, L2."""
-        return [self.described.h, *self.described.lie]
+        return [self.functions.h, *self.functions.lie]
 
     @cached_property
     def _second(self) -> Program:
-        return Program(self.described.tape, [self.described.second])
+        return Program(self.functions.graph, [self.functions.second])
 
     @cached_property
     def difference(self) -> Difference:
         """F1 - F2 with its common factor."""
-        d = self.described
-        return Difference(d.tape, d.fields, d.gradient(d.h), self.numbers)
+        d = self.functions
+        return Difference(d.graph, d.fields, d.gradient(d.h), self.numbers)
 
     @cached_property
     def _transverse(self) -> Program:
-        return Program(self.described.tape, [[self.difference.transverse]])
+        return Program(self.functions.graph, [[self.difference.transverse]])
 
-    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def classified(self, inputs: Sequence[Sequence[arb]]) -> Classification:
         """Class, by enclosures of the second derivatives; exact algebra for coincident fields."""
         (second,) = self.values(self._second, inputs)
         found, coincident, reason = proven_class(second), False, ""
@@ -121,20 +121,22 @@ class TwoFolds(Question):
             if coincident:
                 found = proven_class(second, coincident=True)
         values = dict(zip(("L11", "L12", "L21", "L22"), second, strict=True)) | found.numbers
-        if self.described.nonlinear:
+        if self.functions.nonlinear:
             why = (
                 "the multiplier enters nonlinearly, and the classes are those of Filippov's sliding"
             )
-            return Verdict("", "two-fold", why, values=values)
-        facts = {"sigma": list(found.sigma), "label": found.label, "coincident": coincident}
+            return Classification("", "two-fold", why, values=values)
+        claims = {"sigma": list(found.sigma), "label": found.label, "coincident": coincident}
         if 0 in found.sigma:
-            return Verdict("", "two-fold", found.why, values=values)
+            return Classification("", "two-fold", found.why, values=values)
         folds = FOLDS[found.sigma]
         title = {"VV": "visible two-fold", "II": "invisible two-fold"}.get(
             folds, "visible-invisible two-fold"
         )
         lines = [reason] if reason else []
-        return Verdict(found.label, title, found.why, lines + _meaning(found.label), values, facts)
+        return Classification(
+            found.label, title, found.why, lines + _meaning(found.label), values, claims
+        )
 
     def _coincident(self, inputs: Sequence[Sequence[arb]]) -> tuple[bool, str]:
         difference, program = self.difference, self._transverse
@@ -154,56 +156,60 @@ def _meaning(label: str) -> list[str]:
     row = next((r for r in TABLE if r.label == label), None)
     if row is None:
         return []
-    words = {"none": "none", "one": "one", "all": "infinitely many", "sector": "infinitely many"}
+    canards = {"none": "none", "one": "one", "all": "infinitely many", "sector": "infinitely many"}
     return [
-        f"Canards (Da -> s -> Dr): {words[row.into]}; faux canards: {words[row.out_of]}.",
+        f"Canards (Da -> s -> Dr): {canards[row.into]}; faux canards: {canards[row.out_of]}.",
         row.determinism,
     ]
 
 
-class Folds(Question):
+class Folds(PointProblem):
     """h = L_i = 0."""
 
     kind = "fold"
 
-    def __init__(self, described: Described, numbers: Numbers, side: Side):
-        super().__init__(described, numbers)
+    def __init__(self, functions: SurfaceFunctions, numbers: Numbers, side: Side):
+        super().__init__(functions, numbers)
         self.side, self._k = side, side_index(side)
 
     @cached_property
     def nodes(self) -> list[int]:
         """h and L_i."""
-        return [self.described.h, self.described.lie[self._k]]
+        return [self.functions.h, self.functions.lie[self._k]]
 
     @cached_property
-    def _looked_at(self) -> Program:
-        d, k = self.described, self._k
+    def _test_functions(self) -> Program:
+        d, k = self.functions, self._k
         second = d.lie_derivative(k, d.lie[k])
-        return Program(d.tape, [[second, d.lie_derivative(k, second), d.lie[1 - k]]])
+        return Program(d.graph, [[second, d.lie_derivative(k, second), d.lie[1 - k]]])
 
-    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def classified(self, inputs: Sequence[Sequence[arb]]) -> Classification:
         """Visible, invisible, or a cusp where L_ii is zero exactly."""
-        ((second, third, other),) = self.values(self._looked_at, inputs)
-        i, d = self._k + 1, self.described
+        ((second, third, other),) = self.values(self._test_functions, inputs)
+        i, d = self._k + 1, self.functions
         values = {f"L{i}{i}": second, f"L{2 - self._k}": other}
-        facts: dict[str, Any] = {"side": self.side}
+        claims: dict[str, Any] = {"side": self.side}
         s = sign(second)
         if s:
             visible = (s > 0) == (self._k == 0)
             label = "visible" if visible else "invisible"
             title = f"{label} fold of {FIELDS[self.side]}"
             lines = [] if d.nonlinear else [_beside(other, self._k)]
-            return Verdict(label, title, "", lines, values, facts | {"label": label})
+            return Classification(label, title, "", lines, values, claims | {"label": label})
         values |= {f"L{i}{i}{i}": third}
         if second.is_zero() and sign(third):
-            facts |= {"label": "cusp"}
-            return Verdict("cusp", f"cusp of {FIELDS[self.side]}", values=values, facts=facts)
+            claims |= {"label": "cusp"}
+            return Classification(
+                "cusp", f"cusp of {FIELDS[self.side]}", values=values, claims=claims
+            )
         why = f"L{i}{i} in {second.str(5)}: its sign is undecided (a cusp?)"
-        return Verdict("", f"tangency of {FIELDS[self.side]}", why, values=values, facts=facts)
+        return Classification(
+            "", f"tangency of {FIELDS[self.side]}", why, values=values, claims=claims
+        )
 
 
 def _beside(other: arb, k: int) -> str:
-    """What begins at a fold: L of the other field decides."""
+    """The sliding that begins at a fold, by L of the other field."""
     s = sign(other)
     if s == 0:
         return "The other field's Lie derivative has no proven sign: it may be tangent too."
@@ -211,86 +217,82 @@ def _beside(other: arb, k: int) -> str:
     return f"The other field crosses the surface there; {sliding} sliding begins at the fold."
 
 
-class Equilibria(Question):
+class Equilibria(PointProblem):
     """F_i = 0."""
 
     kind = "equilibrium"
 
-    def __init__(self, described: Described, numbers: Numbers, side: Side):
-        super().__init__(described, numbers)
+    def __init__(self, functions: SurfaceFunctions, numbers: Numbers, side: Side):
+        super().__init__(functions, numbers)
         self.side, self._k = side, side_index(side)
-        _autonomous(described, self.kind)
+        _autonomous(functions, self.kind)
 
     @property
     def nodes(self) -> list[int]:
         """The field."""
-        return list(self.described.fields[self._k])
+        return list(self.functions.fields[self._k])
 
     @cached_property
-    def _looked_at(self) -> Program:
-        d = self.described
-        return Program(d.tape, [[d.h], *(d.gradient(f) for f in d.fields[self._k])])
+    def _test_functions(self) -> Program:
+        d = self.functions
+        return Program(d.graph, [[d.h], *(d.gradient(f) for f in d.fields[self._k])])
 
     def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
         """Whether it is on its field's own side."""
-        h = self.values(self._looked_at, inputs)[0][0]
+        h = self.values(self._test_functions, inputs)[0][0]
         s = sign(h)
         return None if s == 0 and not h.is_zero() else s == (1, -1)[self._k]
 
-    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def classified(self, inputs: Sequence[Sequence[arb]]) -> Classification:
         """Real or virtual, and its kind by the signs of the eigenvalues."""
-        (h,), *jacobian = self.values(self._looked_at, inputs)
+        (h,), *jacobian = self.values(self._test_functions, inputs)
         kind, why, values = eigenvalue_kind(jacobian)
         own = (1, -1)[self._k]
         status = "boundary" if h.is_zero() else {own: "real", -own: "virtual"}.get(sign(h), "")
         why = why or ("" if status else f"h in {h.str(5)}: the side is undecided")
         label = f"{status} {kind}" if status and kind else ""
         title = f"{label or 'equilibrium'} of {FIELDS[self.side]}"
-        facts = {"side": self.side, "label": label}
-        return Verdict(label, title, why, values={"h": h} | values, facts=facts)
+        claims = {"side": self.side, "label": label}
+        return Classification(label, title, why, values={"h": h} | values, claims=claims)
 
 
-class PseudoEquilibria(Question):
+class PseudoEquilibria(PointProblem):
     """h = 0 and (1 + lambda)/2 F1 + (1 - lambda)/2 F2 = 0; lambda is a further unknown."""
 
     kind = "pseudo-equilibrium"
     further = (("lambda", Fraction(-1), Fraction(1)),)
 
-    def __init__(self, described: Described, numbers: Numbers):
-        super().__init__(described, numbers)
-        _autonomous(described, self.kind)
-        if described.nonlinear:
+    def __init__(self, functions: SurfaceFunctions, numbers: Numbers):
+        super().__init__(functions, numbers)
+        _autonomous(functions, self.kind)
+        if functions.nonlinear:
             raise DefinitionError(
-                explain(
-                    "pseudo-equilibrium",
-                    expected="a multiplier that enters linearly",
-                    received="hidden dynamics",
-                    advice="Proofs follow Filippov's convex combination only.",
-                )
+                "the multiplier enters nonlinearly (hidden dynamics), but proofs of a pseudo-equilibrium follow "
+                "Filippov's convex combination. Give a field that is linear in it."
             )
 
     @cached_property
     def nodes(self) -> list[int]:
         """h and the convex combination, as mean plus lambda times half the difference."""
-        d, tape = self.described, self.described.tape
-        lam = tape.symbol(2, 0)
+        d, graph = self.functions, self.functions.graph
+        lam = graph.symbol(2, 0)
         rows = []
         for a, b in zip(*d.fields, strict=True):
-            mean = tape.apply("div", [tape.add(a, b), tape.constant(2)])
-            half = tape.apply("div", [tape.apply("sub", [a, b]), tape.constant(2)])
-            rows.append(tape.add(mean, tape.apply("mul", [lam, half])))
+            mean = graph.apply("div", [graph.add(a, b), graph.constant(2)])
+            half = graph.apply("div", [graph.apply("sub", [a, b]), graph.constant(2)])
+            rows.append(graph.add(mean, graph.apply("mul", [lam, half])))
         return [d.h, *rows]
 
     @cached_property
-    def _looked_at(self) -> Program:
-        d, tape = self.described, self.described.tape
-        ratio = tape.apply("div", [d.lie[0], tape.apply("sub", list(d.lie))])
+    def _test_functions(self) -> Program:
+        d, graph = self.functions, self.functions.graph
+        ratio = graph.apply("div", [d.lie[0], graph.apply("sub", list(d.lie))])
         field = [
-            tape.apply("sub", [a, tape.apply("mul", [ratio, tape.apply("sub", [a, b])])])
+            graph.apply("sub", [a, graph.apply("mul", [ratio, graph.apply("sub", [a, b])])])
             for a, b in zip(*d.fields, strict=True)
         ]
         gradient = d.gradient(d.h)
-        return Program(tape, [list(d.lie), gradient, *(d.gradient(f) for f in field)])
+        return Program(graph, [list(d.lie), gradient, *(d.gradient(f) for f in field)])
 
     def own(self, inputs: Sequence[Sequence[arb]]) -> bool | None:
         """Whether it slides: -1 < lambda < 1."""
@@ -299,9 +301,9 @@ class PseudoEquilibria(Question):
             return True
         return False if lam < -1 or lam > 1 or lam == 1 or lam == -1 else None
 
-    def judged(self, inputs: Sequence[Sequence[arb]]) -> Verdict:
+    def classified(self, inputs: Sequence[Sequence[arb]]) -> Classification:
         """Region, and kind along the surface."""
-        lie, gradient, *jacobian = self.values(self._looked_at, inputs)
+        lie, gradient, *jacobian = self.values(self._test_functions, inputs)
         l1, l2 = map(sign, lie)
         kind, why, values = _along_surface(gradient, jacobian)
         real = self.own(inputs)
@@ -316,7 +318,7 @@ class PseudoEquilibria(Question):
         label = f"{status} {name}" if status and region and kind else ""
         title = f"{label or 'pseudo-equilibrium'}"
         lines = [f"It lies in {region}."] if region else []
-        return Verdict(label, title, why, lines, values, {"label": label})
+        return Classification(label, title, why, lines, values, {"label": label})
 
 
 def _along_surface(
@@ -334,19 +336,15 @@ def _along_surface(
     return eigenvalue_kind(reduced)
 
 
-def _autonomous(described: Described, what: str) -> None:
-    if described.system.time_dependent:
+def _autonomous(functions: SurfaceFunctions, what: str) -> None:
+    if functions.system.time_dependent:
         raise DefinitionError(
-            explain(
-                what,
-                expected="a system that does not depend on time",
-                received=f"one that depends on {described.system.definition.time}",
-                advice="Points of rest do not stay where fields change with time.",
-            )
+            f"the system depends on {functions.system.definition.time}, the time, but a proof of a "
+            f"{what} needs an autonomous system. Hold time at a value."
         )
 
 
-QUESTIONS: Mapping[str, Callable[[Described, Numbers, Side], Question]] = {
+PROBLEMS: Mapping[str, Callable[[SurfaceFunctions, Numbers, Side], PointProblem]] = {
     "two-fold": lambda d, numbers, side: TwoFolds(d, numbers),
     "fold": Folds,
     "equilibrium": Equilibria,

@@ -1,10 +1,9 @@
-"""All zeros of a square system in a box: subdivision, with every discarded piece proven empty.
+"""All zeros of a square system in a box, by subdivision with proofs that discarded pieces are empty.
 
-A piece is dropped where an equation has no zero on it (natural interval extension or mean value
-form), where Krawczyk's operator leads out of it, or where it lies in a box that is proven to hold
-one known zero only. Where I - C J is smaller than one, a piece holds one zero at most. The rest is
-halved across the direction in which the equations change most, until it is tiny: then undecided.
-(Neumaier 1990, ch. 5; Kearfott 1996, Rigorous Global Search.)
+A piece is discarded if an equation has no zero on it (natural interval extension or mean value form),
+if Krawczyk's operator maps it outside, or if it lies in a box of uniqueness of a known zero. Where
+|I - C J| < 1, a piece has at most one zero. Other pieces are halved across the direction in which the
+equations change most; tiny ones are undecided. (Neumaier 1990, ch. 5; Kearfott 1996.)
 """
 
 from __future__ import annotations
@@ -27,7 +26,7 @@ _MANY = 4096  # pieces at once
 
 @dataclass
 class Search:
-    """A search in progress and what it found."""
+    """A search in progress, with its results."""
 
     equations: Equations
     low: Floats
@@ -49,7 +48,7 @@ class Search:
         self._held = [[of_enclosure(v) for v in vector] for vector in held]
 
     def run(self) -> None:
-        """Search until nothing is left; Ctrl-C keeps what was found."""
+        """Search until no piece is left; Ctrl-C keeps the results so far."""
         todo = [(self.low[None, :], self.high[None, :])]
         try:
             while todo:
@@ -88,7 +87,7 @@ class Search:
         (f,) = self._evaluate(values, Intervals(low, high))
         over = _stacked([f], len(low))[:, 0]
         keep = np.all(over.has_zero, axis=1)
-        # A function may jump where it has no finite value, and its derivative be finite all the same.
+        # Without finite values a function may jump, even if its derivative is finite.
         smooth = np.all(np.isfinite(over.low) & np.isfinite(over.high), axis=1)[keep]
         low, high = low[keep], high[keep]
         if not len(low):
@@ -114,7 +113,7 @@ class Search:
         return self._halved(low[~tiny], high[~tiny], slopes.size[~tiny])
 
     def _resolve(self, low: Floats, high: Floats, single: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """Which pieces are still open, after zeros were proven where they seem to be."""
+        """Which pieces are still open, after an attempt to prove a zero in each."""
         open_ = np.ones(len(low), bool)
         for a, b in self._regions:
             open_ &= ~(np.all(a <= low, axis=1) & np.all(high <= b, axis=1))
@@ -135,7 +134,7 @@ class Search:
         return open_
 
     def _known(self, low: Floats, high: Floats, single: bool) -> bool:
-        """Whether a piece holds no zero but known ones."""
+        """Whether a piece holds known zeros only."""
         if any(np.all(a <= low) and np.all(high <= b) for a, b in self._regions):
             return True
         return single and any(_holds(low, high, zero.point) for zero in self.zeros)
@@ -198,7 +197,7 @@ def _krawczyk(
     move: Intervals,
     smooth: NDArray[np.bool_],
 ) -> tuple[Floats, Floats, NDArray[np.bool_], NDArray[np.bool_]]:
-    """Pieces cut down by Krawczyk's operator; which hold one zero at most; which are left."""
+    """Pieces contracted by Krawczyk's operator; which hold one zero at most; which are not empty."""
     n = low.shape[1]
     with np.errstate(all="ignore"):
         mean = 0.5 * (slopes.low + slopes.high)

@@ -1,8 +1,8 @@
 """Following curves: N - 1 smooth equations in N unknowns, by pseudo-arclength continuation.
 
-One machine for all of the library: equilibria and periodic orbits as a parameter varies, curves of
-bifurcations in two parameters, curves of two-folds, dividing curves. A curve is a subclass of
-:class:`Curve` that gives its equations with their Jacobian and what is to be watched;
+It follows equilibria and periodic orbits as a parameter varies, curves of bifurcations in two
+parameters, curves of two-folds and dividing curves. A curve is a subclass of :class:`Curve` that
+gives its equations with their Jacobian and its test functions;
 :func:`trace` follows it: predictor, Newton corrections across the tangent, step control, turning
 points, located zeros of tests, ends that are solved for, bounds. Curves whose equations change from
 piece to piece are traced by :func:`pieces`. An interrupt (Ctrl-C) returns what was computed.
@@ -12,9 +12,8 @@ Sources: Keller 1977 (pseudo-arclength); Allgower & Georg 1990; Kuznetsov 2004, 
 
 from ..newton import Secant, Values, converge
 from .arc import Arc, ahead, trace
-from .curve import Curve, Point
+from .curve import Curve, Point, Zero
 from .pieces import Departure, changes_around, depart, directions, other_direction, pieces
-from .zeros import Zero
 
 __all__ = [
     "Arc",

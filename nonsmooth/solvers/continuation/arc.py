@@ -1,4 +1,4 @@
-"""Tracing one arc: predictor, corrector, step control, located zeros, and why it ends.
+"""Pseudo-arclength continuation of one arc: predictor, corrector, step control, zeros, ends.
 
 The predictor is the polynomial in arclength through the last points. A step that fails, bends too
 much or leads to a point that is not on the curve is halved. A step in which a test changes its sign
@@ -10,18 +10,26 @@ from __future__ import annotations
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
-from ...model import Array, PointError
-from .checks import check_trace
-from .curve import Curve, Point
-from .zeros import Zero, zeros_between
+from ...model import (
+    Array,
+    DefinitionError,
+    NonsmoothError,
+    OptionError,
+    PointError,
+    is_real,
+    real_array,
+    whole,
+)
+from .curve import Curve, Point, Zero, zeros_between
 
 #: Steps turn by no more than this, and grow where they turn by less than a third of it; rad.
 BEND = 0.3
 _ROWS = 6  # points of the predictor
-#: Steps are not shortened below this share of the largest to see what they hide.
+#: Steps are not shortened below this share of the largest to look for hidden ends.
 _SEEN = 1e-5
 
 
@@ -36,8 +44,8 @@ class Arc:
     zeros : list of Zero
         Zeros of the tests, in their order along the arc.
     end : str
-        ``"bound"``, ``"closed"``, ``"junction"``, ``"step too small"``, ``"points"`` (as many as
-        asked for), ``"interrupted"``, the name of the test that ended it, or what the curve said.
+        ``"bound"``, ``"closed"``, ``"junction"``, ``"step too small"``, ``"points"`` (``most`` of
+        them), ``"interrupted"``, the name of the test that ended it, or the text that the curve gave.
     """
 
     points: list[Point] = field(default_factory=list)
@@ -67,7 +75,7 @@ def trace(
     Parameters
     ----------
     curve : Curve
-        The curve: its equations and what is watched along it.
+        The curve: its equations and test functions.
     rows : sequence of ndarray (N,)
         At least one point of the curve; earlier ones help the predictor.
     tangent : ndarray (N,)
@@ -284,5 +292,113 @@ def ahead(rows: Sequence[Array], size: float, tangent: Array) -> Array:
 def angle(step: Array, direction: Array) -> float:
     """Angle of a step with a direction of length 1; pi for none."""
     length = math.sqrt(float(step @ step))
-    # what is not a number stays so
+    # NaN stays NaN
     return math.acos(max(min(float(step @ direction) / length, 1.0), -1.0)) if length else math.pi
+
+
+# checks of the arguments -----------------------------------------------------------------------
+
+
+def require_curve(curve: Any) -> None:
+    """Refuse all but a Curve."""
+    if not isinstance(curve, Curve):
+        raise DefinitionError(
+            "curve: expected an instance of a subclass of nonsmooth.continuation.Curve, received "
+            f"{curve!r}. Write class Mine(Curve) with equations(self, u), and give Mine()."
+        )
+
+
+def vector(values: Any, what: str, size: int | None = None) -> Array:
+    """A vector of finite numbers, of a given length."""
+    found = real_array(values, what)
+    expected = "a vector" if size is None else f"a vector ({size},)"
+    if found.ndim != 1 or (size is not None and found.size != size) or not found.size:
+        received = f"shape {found.shape}"
+    elif not np.isfinite(found).all():
+        received = str(found)
+    else:
+        return np.asarray(found, float)
+    raise PointError(
+        f"{what}: expected {expected} of finite numbers, received {received}. One for each "
+        "unknown of the curve, the parameter included."
+    )
+
+
+def check_trace(
+    curve: Any,
+    rows: Any,
+    tangent: Any,
+    lengths: dict[str, Any],
+    most: Any,
+    bounds: Any,
+    report: Callable[..., Any] | None,
+) -> tuple[list[Array], Array]:
+    """Check the arguments of ``trace``; the rows and the tangent as arrays."""
+    require_curve(curve)
+    if not isinstance(rows, (Sequence, np.ndarray)) or isinstance(rows, str) or not len(rows):
+        raise PointError(
+            f"rows: expected a list of points of the curve, at least one, received {rows!r}. "
+            "Write [np.array([...])]."
+        )
+    size = vector(rows[-1], "rows[-1]").size
+    found = [vector(row, f"rows[{i}]", size) for i, row in enumerate(rows)]
+    way = vector(tangent, "tangent", size)
+    if not way.any():
+        raise PointError("tangent: expected a direction, received zero. Give which way to go.")
+    for name, value in lengths.items():
+        if not is_real(value) or not 0.0 < float(value) < np.inf:
+            raise OptionError(f"{name}: expected a positive finite number, received {value!r}.")
+    whole(most, "most")
+    _check_bounds(bounds, size)
+    if report is not None and not callable(report):
+        raise OptionError(f"report: expected a function of a point, or None, received {report!r}.")
+    _check_curve(curve, found[-1])
+    return found, way
+
+
+def _check_bounds(bounds: Any, size: int) -> None:
+    for entry in bounds if isinstance(bounds, (Sequence, np.ndarray)) else [bounds]:
+        if isinstance(entry, (Sequence, np.ndarray)) and len(entry) == 3:
+            if all(isinstance(e, (int, float, np.number)) for e in entry):
+                k, low, high = entry
+                if k in range(-size, size) and low <= high:
+                    continue
+        raise OptionError(
+            f"bounds: expected entries (index, low, high) with an index below {size} and low <= "
+            f"high, received {entry!r}. For example bounds=[(0, -1.0, 1.0)]."
+        )
+
+
+def _check_curve(curve: Curve, u: Array) -> None:
+    """Refuse a curve whose attributes or equations do not fit its unknowns."""
+    n, scale = u.size, np.asarray(curve.scale)
+    if scale.dtype.kind not in "iuf" or scale.shape not in ((), (n,)) or not (scale > 0.0).all():
+        raise DefinitionError(
+            f"curve.scale: expected a positive number or vector ({n},), received {curve.scale!r}. It "
+            "holds the sizes of the unknowns."
+        )
+    if curve.parameter is not None and curve.parameter not in range(-n, n):
+        raise DefinitionError(
+            f"curve.parameter: expected the index of one of {n} unknowns, or None, received "
+            f"{curve.parameter!r}."
+        )
+    if type(curve).equations is Curve.equations:
+        raise DefinitionError(
+            "curve: its class does not define equations. Write equations(self, u), which returns their "
+            "values and their Jacobian."
+        )
+    if not curve.exact:
+        return  # an evaluation would change the carried Jacobian
+    try:
+        given = curve.equations(u)
+    except (NonsmoothError, np.linalg.LinAlgError):
+        return  # the arc ends there with its reason
+    try:
+        shapes = [part.shape for part in given if isinstance(part, np.ndarray)]
+    except TypeError:
+        shapes = []
+    if shapes != [(n - 1,), (n - 1, n)]:
+        raise DefinitionError(
+            f"curve.equations: expected arrays ({n - 1},) and ({n - 1}, {n}) for {n} unknowns, the "
+            f"values and their derivatives, received {given!r}. Return both as numpy arrays."
+        )

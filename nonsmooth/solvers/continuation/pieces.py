@@ -1,4 +1,4 @@
-"""Curves made of pieces: each with equations of its own, the next beginning where one ends."""
+"""Curves made of pieces, each with its own equations, and how to leave branch points."""
 
 from __future__ import annotations
 
@@ -8,8 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...model import Array, DefinitionError
-from .arc import Arc
-from .checks import require_curve, vector
+from .arc import Arc, require_curve, vector
 from .curve import Curve, Point
 
 
@@ -89,7 +88,7 @@ def depart(
     Parameters
     ----------
     curve : Curve
-        The curve: its equations and what is watched along it.
+        The curve: its equations and test functions.
     u : ndarray (N,)
         The point of the curve to leave from.
     direction : ndarray (N,)
@@ -176,7 +175,7 @@ def changes_around(
     start : float
         The way ahead; the way back is left out.
     count, leave_out, halvings : int, optional
-        Angles looked at, of them left out at either end, and bisections of an interval.
+        Angles on the circle, those left out at either end, and bisections of an interval.
 
     Yields
     ------

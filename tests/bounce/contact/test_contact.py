@@ -44,6 +44,72 @@ def test_a_model_of_ones_own():
     assert -end.y * math.sqrt(1e-9 - end.y) + 0.3 * end.y * end.ydot == pytest.approx(0, abs=1e-12)
 
 
+K = np.linspace(-3.0, 3.0, 13)
+TABLE = ca.interpolant("my_table", "linear", [K], K)
+U = ca.SX.sym("u")
+SAME = ca.Function("same", [U], [2 * U / 2], {"never_inline": True})
+
+
+def spring_of(method, function):
+    """A spring one of whose methods goes through a Function of CasADi."""
+
+    class Law(bounce.contact.Coulomb):
+        def traction(self, s, p, sign):
+            given = -sign * self.coefficient(s, p)
+            return function(given) if method == "traction" else given
+
+    class Named(Spring):
+        def normal_force(self, s, p):
+            return -p.k * s.y
+
+        def stored_energy(self, s, p):
+            return p.k * s.y**2 / 2
+
+        def tangential_force(self, s, p):
+            return -0.2 * s.x
+
+        extra_states = {"heat": 0.0}
+
+        def extra_rates(self, s, p):
+            return {"heat": s.slip}
+
+    def through(self, s, p):
+        given = original(self, s, p)
+        return {"heat": function(given["heat"])} if method == "rate of heat" else function(given)
+
+    if method != "traction":
+        name = "extra_rates" if method == "rate of heat" else method
+        original = getattr(Named, name)
+        setattr(Named, name, through)
+    return Named(friction=Law() if method == "traction" else None)
+
+
+METHODS = [
+    *("normal_force", "tangential_force", "load", "lift_off", "friction_coefficient"),
+    *("traction", "rate of heat", "stored_energy"),
+]
+LANDINGS = {"plane": (1.0, -1.0, 0.2), "space": ([1.0, 0.3], -1.0, [0.2, 0.1])}
+
+
+@pytest.mark.parametrize("landing", LANDINGS)
+@pytest.mark.parametrize("method", METHODS)
+def test_a_table_in_a_model_is_refused_by_name(method, landing):
+    with pytest.raises(bounce.ModelError, match=rf"{method}.*: .*'my_table'"):
+        bounce.simulate(spring_of(method, TABLE), *LANDINGS[landing])
+
+
+@pytest.mark.parametrize(
+    ("method", "landing"),  # a traction of one's own that takes a sign is for the plane
+    [(m, where) for m in METHODS for where in LANDINGS if (m, where) != ("traction", "space")],
+)
+def test_a_function_of_casadi_in_a_model_is_the_same_as_written_out(method, landing):
+    ends = []
+    for function in (SAME, lambda u: u):
+        end = bounce.simulate(spring_of(method, function), *LANDINGS[landing]).lift_off
+        ends.append(np.hstack([end.x, end.xdot, end.y, end.ydot, end.omega]))
+    np.testing.assert_allclose(ends[0], ends[1], rtol=1e-12)
+
+
 def test_value_semantics():
     turf = bounce.KelvinVoigt(**TURF, G=1e-4)
     assert turf == bounce.KelvinVoigt(**TURF, G=1e-4)

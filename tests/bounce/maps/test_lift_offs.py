@@ -157,7 +157,7 @@ def test_gravity_that_varies_is_in_every_load(model, default, tmp_path):
                 0.1,
                 parameters={"G": values},
                 tol=1e-12,
-                work=ns.Work(checkpoint=folder, progress=False),
+                work=ns.Work(store=folder, progress=False),
             )
             for k, g in enumerate(values):
                 shot = bounce.simulate(model.replace(G=g), 0.3, -1.0, 0.1, tol=1e-12)

@@ -1,10 +1,7 @@
 """Bounces are proven to lift off as they do: closed forms, the mirror symmetry, refusals."""
 
 import json
-import subprocess
-import sys
 from fractions import Fraction
-from pathlib import Path
 
 import mpmath
 import numpy as np
@@ -12,8 +9,8 @@ import pytest
 
 import bounce
 import nonsmooth as ns
+from tests.proofs.checking import run
 
-CHECKER = Path(__file__).parents[3] / "checker"
 TURF = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
 
 
@@ -111,12 +108,6 @@ def test_what_is_given_wrongly_is_refused():
         bounce.certify(3, 1, -1, 0)
 
 
-def run_checker(path):
-    return subprocess.run(
-        [sys.executable, "-I", str(CHECKER), str(path)], capture_output=True, text=True, check=False
-    )
-
-
 @pytest.mark.slow_cases("True-None", "True-earlier")
 @pytest.mark.parametrize("change", [None, "earlier", "other"])
 @pytest.mark.parametrize("box", [False, True])
@@ -137,9 +128,9 @@ def test_the_checker_follows_a_bounce_again(change, box, tmp_path):
     elif change == "other":
         record["events"][0]["after"] = "-"
     path.write_text(json.dumps({"orbit": record}))
-    done = run_checker(path)
-    assert done.returncode == (1 if change else 0)
-    assert ("3 events as claimed" in done.stdout) == (change is None)
+    code, output = run(path)
+    assert code == (1 if change else 0)
+    assert ("3 events as claimed" in output) == (change is None)
 
 
 @pytest.mark.slow
@@ -153,8 +144,8 @@ def test_the_checker_follows_random_boxes_of_bounces_again(tmp_path):
         proof = bounce.certify(model, (xdot, xdot + wide), -1, (omega, omega + wide))
         if proof.proven:
             proof.orbit.save(tmp_path / "bounce.json")
-            assert run_checker(tmp_path / "bounce.json").returncode == 0, proof
+            assert run(tmp_path / "bounce.json")[0] == 0, proof
     model = bounce.KelvinVoigt(mu=0.3, d1=0.1, d2=0.1, eta=0.5)
     proof = bounce.certify(model, "0.1", -1, 1, parameters={"mu": (0.295, 0.305)})
     proof.orbit.save(tmp_path / "mu.json")
-    assert run_checker(tmp_path / "mu.json").returncode == 0
+    assert run(tmp_path / "mu.json")[0] == 0

@@ -74,13 +74,6 @@ def test_a_single_point_is_a_grid_without_axes():
     assert many.t.shape == () and many.x.shape == (2,)
 
 
-def test_they_are_part_of_what_a_checkpoint_belongs_to(tmp_path):
-    work = ns.Work(checkpoint=tmp_path / "sweep", progress=False)
-    ns.ensemble(BLOCK, ns.RandomStarts(10, [0, 0], [1, 1], seed=1), 1.0, work=work)
-    with pytest.raises(ns.OptionError, match="another system"):
-        ns.ensemble(BLOCK, ns.RandomStarts(10, [0, 0], [1, 1], seed=2), 1.0, work=work)
-
-
 @pytest.mark.parametrize(
     "make",
     [
@@ -102,7 +95,7 @@ def test_they_are_part_of_what_a_checkpoint_belongs_to(tmp_path):
     ],
 )
 def test_what_is_no_start_is_refused(make):
-    with pytest.raises(ns.PointError, match="expected"):
+    with pytest.raises(ns.PointError, match=r"^(axes|low|count|seed|x0)\b"):
         make()
 
 

@@ -37,7 +37,7 @@ def falling():
     ],
 )
 def test_refusals(system, options, said):
-    with pytest.raises(ns.OptionError, match=f"device: .*{said}"):
+    with pytest.raises(ns.OptionError, match=f"^device .*{said}"):
         ns.ensemble(system, [[1.0, 1.0]], device="cuda", **{"t_end": 1.0, **options})
 
 

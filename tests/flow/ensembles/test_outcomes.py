@@ -74,12 +74,12 @@ def test_bins_hold_both_ends_and_nothing_outside():
 
 @pytest.mark.parametrize("ranges", [{"z": (0, 1)}, {"x": (1, 1)}, {"x": 3}, {"x": (0, np.inf)}])
 def test_ranges_are_refused(system, ranges):
-    with pytest.raises(ns.OptionError, match="ranges"):
+    with pytest.raises(ns.OptionError, match=r"^ranges .*\('x', 'v', 't'\)"):
         ns.outcomes(system, STARTS, 1.0, ranges=ranges)
 
 
 def test_what_keeps_nothing_has_no_store(system, tmp_path):
-    with pytest.raises(ns.OptionError, match="work"):
+    with pytest.raises(ns.OptionError, match="store"):
         ns.outcomes(system, STARTS, 1.0, work=ns.Work(store=tmp_path / "runs"))
 
 

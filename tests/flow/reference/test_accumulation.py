@@ -2,7 +2,7 @@
 
 import pytest
 
-from nonsmooth.flow.reference.bookkeeping import remaining_time
+from nonsmooth.flow.reference.driver import remaining_time
 
 
 @pytest.mark.parametrize("r", [0.3, 0.5, 0.7])

@@ -1,4 +1,4 @@
-"""A side is + or -, everywhere on this floor, and another word is refused with the two letters."""
+"""A side is + or - in all functions of ``local``; anything else is refused."""
 
 import casadi as ca
 import pytest

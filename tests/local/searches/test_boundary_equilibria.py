@@ -103,6 +103,16 @@ def test_derivatives_by_parameters_are_those_of_the_expressions():
     assert fields[1] == pytest.approx(np.array([[0.0, 0.0], [3 * 0.49, 0.0]]))
 
 
+def test_a_pseudo_equilibrium_at_infinity_is_degenerate():
+    """The other field has no part along the inverse image: s = 0 to all digits."""
+    x, v = ca.SX.sym("x"), ca.SX.sym("v")
+    above, below = [v, -x - 1 + 0.2 * v], [v, -x + 1 + 0.2 * v]
+    system = ns.FilippovSystem([x, v], surface=v, above=above, below=below)
+    found = boundary_equilibrium(system, [1.0, 0.0])
+    assert found.label == "degenerate" and found.margins["s"] == 0.0
+    assert found.margins["fold orbit meets the pseudo-saddle"] == 1.0
+
+
 def test_messages():
     with pytest.raises(ns.PointError, match=r"point.*equilibrium"):
         boundary_equilibrium(PLANE, [0.0, 0.0])

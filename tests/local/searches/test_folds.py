@@ -1,4 +1,4 @@
-"""Folds and cusps are told apart by the first nonzero derivative of h, and found by search."""
+"""Folds and cusps are distinguished by the first nonzero derivative of h, and found by search."""
 
 import math
 

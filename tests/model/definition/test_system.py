@@ -1,4 +1,4 @@
-"""A system is defined once, in either form, and every inconsistent definition is refused in words."""
+"""A system is defined in either form, and every inconsistent definition is refused."""
 
 import math
 import pickle

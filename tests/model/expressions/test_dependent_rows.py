@@ -1,4 +1,4 @@
-"""A row is left out of the checks of a step only where others show all of it, for every parameter."""
+"""A row is called dependent only if it is a combination of others for every parameter."""
 
 import casadi as ca
 import numpy as np

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from nonsmooth.model.expressions.graph import depends_on, instructions
 from nonsmooth.model.expressions.jets import taylor
-from nonsmooth.model.expressions.simplification import economise
+from nonsmooth.model.expressions.simplification import simplified
 
 x, y, z, p, q = (ca.SX.sym(s) for s in "xyzpq")
 STATES, CONSTANTS = ca.vertcat(x, y, z), ca.vertcat(p, q)
@@ -23,7 +23,7 @@ def convolutions(expressions):
 
 
 def rewrite(*expressions):
-    return economise([STATES, CONSTANTS], expressions, [True, False])
+    return simplified([STATES, CONSTANTS], expressions, [True, False])
 
 
 CASES = {
@@ -119,6 +119,6 @@ def test_coefficients_do_not_leave_the_range_of_doubles(unit, power, named):
     """(x/unit)^power near x = unit is near one, though unit^power is no double."""
     x, p = ca.SX.sym("x"), ca.SX.sym("p")
     scale = p if named else unit
-    (rewritten,) = economise([x, p], [(x / scale) ** power], [True, False])
+    (rewritten,) = simplified([x, p], [(x / scale) ** power], [True, False])
     value = ca.Function("f", [x, p], [rewritten])(1.01 * unit, unit)
     assert float(value) == pytest.approx(1.01**power, rel=1e-13)

@@ -1,4 +1,4 @@
-"""What a mode multiplies by zero is not looked at, and nothing else changes."""
+"""Terms that a mode multiplies by zero are zero, and nothing else changes."""
 
 import casadi as ca
 import numpy as np
@@ -6,7 +6,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.model import coupled_of
-from nonsmooth.model.expressions.unused_terms import awake
+from nonsmooth.model.expressions.unused_terms import without_unused_terms
 
 X, Y, LAM, MU, P = (ca.SX.sym(name) for name in ("x", "y", "lam", "mu", "p"))
 INPUTS = [ca.vertcat(X, Y, LAM, MU), P]
@@ -40,13 +40,13 @@ def at(e, x, y, lam, mu, p=2.0):
 @pytest.mark.parametrize("e", LEFT_OUT[:-1], ids=str)
 def test_what_is_left_out_is_zero(e):
     assert not at(e, -3.0, -2.0, -1.0, 0.0) == 0.0
-    (found,) = awake(INPUTS, [e], HELD)
+    (found,) = without_unused_terms(INPUTS, [e], HELD)
     assert at(found, -3.0, -2.0, -1.0, 0.0) == 0.0
 
 
 @pytest.mark.parametrize("e", LEFT_OUT[:7], ids=str)
 def test_elsewhere_nothing_changes(e):
-    (found,) = awake(INPUTS, [e], HELD)
+    (found,) = without_unused_terms(INPUTS, [e], HELD)
     for lam, mu in ((1.0, 0.4), (0.3, 0.7), (-0.9, -0.2)):
         assert at(found, 3.0, 2.0, lam, mu) == at(e, 3.0, 2.0, lam, mu)
         assert np.isnan(at(found, -3.0, -2.0, lam, mu)) == np.isnan(at(e, -3.0, -2.0, lam, mu))
@@ -54,7 +54,7 @@ def test_elsewhere_nothing_changes(e):
 
 @pytest.mark.parametrize("e", AS_THEY_WERE, ids=str)
 def test_what_is_never_left_out_stays_as_it_is(e):
-    (found,) = awake(INPUTS, [e], HELD)
+    (found,) = without_unused_terms(INPUTS, [e], HELD)
     assert found is e
 
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import impact_oscillator, table
 
 x, y, z, a, b = (ca.SX.sym(s) for s in ("x", "y", "z", "a", "b"))
@@ -146,15 +147,7 @@ def test_grazing_of_a_wall_is_a_resonance_curve_and_an_interrupt_keeps_its_part(
     (event,) = ns.continue_orbit(orbit, "F", bounds=(0.33, 0.4)).events
     curve = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)])
     F, z = curve.values.T
-    evaluate, calls = type(orbit.problem).evaluate, [0]
-
-    def interrupted(*args, **more):
-        calls[0] += 1
-        if calls[0] == 40:
-            raise KeyboardInterrupt
-        return evaluate(*args, **more)
-
-    monkeypatch.setattr(type(orbit.problem), "evaluate", interrupted)
+    interrupt(monkeypatch, type(orbit.problem), "evaluate", 39, once=True)
     cut = ns.continue_bifurcation(event, ("F", "z"), bounds=[(0.2, 1), (0.02, 0.3)], progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in cut.ends and 1 < len(cut) < len(curve)
     assert np.abs(F - np.hypot(1 - w * w, 2 * z * w)).max() < 1e-12

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.branches.orbit_equations import applies, eliminated
+from nonsmooth.orbit.periodic.boundary_value_problem import eliminated
 from tests.orbit.periodic_cases import forced_friction, relay, walker
 
 
@@ -25,7 +25,6 @@ def test_the_solution_is_that_of_a_dense_solver(borders):
     rng = np.random.default_rng(0)
     for orbit in problems():
         problem, p = orbit.problem, orbit.parameter_vector
-        assert applies(problem)
         free = tuple(range(min(borders, p.size))) if p.size >= borders else (0,)
         at = problem.evaluate(orbit.unknowns, p, free)
         k = len(free)
@@ -61,6 +60,5 @@ def test_an_event_that_is_grazed_to_all_digits_is_no_pivot():
     count, n = len(problem.legs), problem.dimension
     matrix = at.jacobian.copy()
     matrix[count * n + 3, count * n + 3] = 0.0
-    for solve in (problem.solve, lambda m, r: eliminated(problem, m, r)):
-        with pytest.raises(np.linalg.LinAlgError, match="leg 4"):
-            solve(matrix, at.residual)
+    with pytest.raises(np.linalg.LinAlgError, match="leg 4"):
+        eliminated(problem, matrix, at.residual)

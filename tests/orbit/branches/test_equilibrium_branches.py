@@ -189,7 +189,7 @@ def two_relays(value=1.5):
     )
 
 
-def test_of_several_surfaces_each_may_be_met():
+def test_boundary_equilibria_on_either_of_two_surfaces():
     branch = ns.continue_equilibrium(two_relays(), [1.5, 0.5], "mu", bounds=(-0.5, 2.5))
     assert [(e.kind, round(e.parameter, 12) + 0.0) for e in branch.events] == [
         ("boundary equilibrium", 0.0),

@@ -71,11 +71,7 @@ def test_crossing_cycles_end_at_a_two_fold(bend):
     """Folds at x = 0 and at x = mu, both invisible: one two-fold at mu = 0, around which cycles of the size
     sqrt(mu/bend) are born as sliding between the folds changes its stability (pseudo-Hopf)."""
     system = ns.FilippovSystem(
-        [X, Y],
-        surface=Y,
-        above=[1, -X + bend * X**2],
-        below=[-1, MU - X],
-        parameters={MU: 0.05},
+        [X, Y], surface=Y, above=[1, -X + bend * X**2], below=[-1, MU - X], parameters={MU: 0.05}
     )
     mu = 0.05 if bend > 0 else -0.05
     orbit = ns.periodic_orbit(system, [0.3, 0.001], parameters={"mu": mu})

@@ -6,8 +6,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.branches.itinerary_changes import mode_after
-from nonsmooth.orbit.periodic.boundary_value_problem import BoundaryProblem
-from nonsmooth.orbit.periodic.symmetry import mirrored
+from nonsmooth.orbit.periodic.boundary_value_problem import BoundaryProblem, mirrored
 from nonsmooth.orbit.runs.legs import Leg
 
 x, y, lam, kap = (ca.SX.sym(s) for s in ("x", "y", "lam", "kap"))
@@ -18,15 +17,15 @@ TWO = ns.FilippovSystem([x, y], surfaces=[x, y], multipliers=[lam, kap], field=[
 @pytest.mark.parametrize(
     ("leg", "following"),
     [
-        (Leg("+", "h0", "crossing"), "-"),
-        (Leg("-", "h0", "entry"), "s"),
-        (Leg("s", "L_F1 h", "exit"), "+"),
-        (Leg("s", "L_F2 h", "exit"), "-"),
-        (Leg("s+", "lambda0", "exit", 1), "++"),
-        (Leg("s+", "lambda0", "exit", -1), "-+"),
-        (Leg("+-", "h1", "crossing"), "++"),
-        (Leg("+-", "h1", "entry"), "+s"),
-        (Leg("", "kick", "reset"), ""),
+        (Leg("+", "crossing", 0, 1), "-"),
+        (Leg("-", "entry", 0, -1), "s"),
+        (Leg("s", "exit", 0, 1), "+"),
+        (Leg("s", "exit", 0, -1), "-"),
+        (Leg("s+", "exit", 0, 1), "++"),
+        (Leg("s+", "exit", 0, -1), "-+"),
+        (Leg("+-", "crossing", 1, -1), "++"),
+        (Leg("+-", "entry", 1, -1), "+s"),
+        (Leg("", "reset", 0), ""),
     ],
 )
 def test_the_mode_after_a_leg(leg, following):
@@ -35,9 +34,9 @@ def test_the_mode_after_a_leg(leg, following):
 
 ODD = -np.eye(2)
 LEGS = (
-    (Leg("+", "h0", "crossing"), Leg("-", "h0", "crossing")),
-    (Leg("s", "L_F1 h", "exit", 1), Leg("s", "L_F2 h", "exit", -1)),
-    (Leg("-", "h0", "entry"), Leg("+", "h0", "entry")),
+    (Leg("+", "crossing", 0, 1), Leg("-", "crossing", 0, -1)),
+    (Leg("s", "exit", 0, 1), Leg("s", "exit", 0, -1)),
+    (Leg("-", "entry", 0, -1), Leg("+", "entry", 0, 1)),
 )
 
 
@@ -56,6 +55,6 @@ def test_without_a_symmetry_or_with_one_along_the_surface_a_leg_stays(leg, symme
 
 def test_only_the_surfaces_that_are_turned_change_their_letters():
     """x -> -x, y -> y."""
-    leg = Leg("+-", "h1", "crossing")
+    leg = Leg("+-", "crossing", 1, -1)
     problem = BoundaryProblem(TWO, (leg,), symmetry=np.diag([-1.0, 1.0]))
-    assert mirrored(problem, leg) == Leg("--", "h1", "crossing")
+    assert mirrored(problem, leg) == Leg("--", "crossing", 1, -1)

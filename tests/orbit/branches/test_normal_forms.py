@@ -1,4 +1,4 @@
-"""Coefficients at Hopf, doubling and torus points are those of closed forms, and foretell the size of what
+"""Coefficients at Hopf, doubling and torus points are those of closed forms, and predict the size of what
 branches off: of continued orbits, and of iterated maps."""
 
 import casadi as ca
@@ -35,7 +35,7 @@ def test_the_logistic_map_doubles_with_the_coefficient_nine():
 
 
 def test_doubled_orbits_meet_the_doubling_of_the_single_one():
-    """From r = 3.2 down: the two rounds become one at r = 3."""
+    """From r = 3.2 down: both halves become one at r = 3."""
     system = ticking([Y], [R * Y * (1 - Y)], r=3.2)
     twice = [("", "tick"), ("", "tick")]
     orbit = ns.periodic_orbit(system, [0.513, 0.0], itinerary=twice)
@@ -64,7 +64,7 @@ def test_the_third_doubling_of_the_walker_has_its_coefficient_too():
     )  # Feigenbaum: 4.669 in the limit
 
 
-def test_a_doubling_that_is_subcritical_says_so():
+def test_a_subcritical_doubling_is_named():
     """x -> -r x - x^3: f''' = -6 at x = 0, c = -1."""
     orbit = fixed(ticking([Y], [-R * Y - Y**3], r=0.8), [0.0])
     (event,) = ns.continue_orbit(orbit, "r", bounds=(0.5, 1.3)).events
@@ -73,7 +73,7 @@ def test_a_doubling_that_is_subcritical_says_so():
     assert event.far_side.verdict.endswith("(subcritical)")
 
 
-def test_the_torus_of_the_delayed_logistic_map_has_the_radius_foretold():
+def test_the_torus_of_the_delayed_logistic_map_has_the_predicted_radius():
     """(y, z) -> (r y (1 - z), y): angle pi/3 at r = 2, |multiplier|^2 = r - 1."""
     orbit = fixed(ticking([Y, Z], [R * Y * (1 - Z), Y], r=1.8), [1 - 1 / 1.8] * 2)
     (event,) = ns.continue_orbit(orbit, "r", bounds=(1.5, 2.2)).events
@@ -88,8 +88,8 @@ def test_the_torus_of_the_delayed_logistic_map_has_the_radius_foretold():
             if k > 60_000:
                 seen.append(y)
         radius = (max(seen) - min(seen)) / 4 * np.sqrt(2)  # y = 2 Re z q, |q_y| = 1/sqrt 2
-        foretold = np.sqrt((np.sqrt(r - 1) - 1) / -value)
-        errors.append(abs(radius / foretold - 1))
+        predicted = np.sqrt((np.sqrt(r - 1) - 1) / -value)
+        errors.append(abs(radius / predicted - 1))
     assert errors[0] < 0.03 and errors[1] < 0.4 * errors[0]
 
 
@@ -101,7 +101,7 @@ def test_a_strong_resonance_has_no_such_coefficient():
 
 
 def split(event, name, bounds, value):
-    """Half the distance of the two rounds of a doubled orbit, squared, and the multiplier of the single one."""
+    """Half the distance of the two halves of a doubled orbit, squared, and the multiplier of the single one."""
     single = event.orbit
     doubled = ns.continue_orbit(event, name, bounds=bounds)[value]
     legs = len(doubled.legs) // 2
@@ -115,8 +115,8 @@ def split(event, name, bounds, value):
 @pytest.mark.parametrize(
     "case", ["ball on a table", pytest.param("buck converter", marks=pytest.mark.slow), "walker"]
 )
-def test_doubled_orbits_part_as_the_coefficient_foretells(case):
-    """The half distance e of the two rounds obeys c e^2 = -1 - (multiplier of the single orbit)."""
+def test_doubled_orbits_separate_as_the_coefficient_predicts(case):
+    """The half distance e of the two halves obeys c e^2 = -1 - (multiplier of the single orbit)."""
     if case == "ball on a table":
         name, low, high = "A", 1.0, 1.2
         orbit = ns.periodic_orbit(
@@ -150,7 +150,7 @@ def brusselator():
     )
 
 
-def test_orbits_around_a_hopf_point_grow_as_its_coefficient_foretells():
+def test_orbits_around_a_hopf_point_grow_as_its_coefficient_predicts():
     """The Brusselator with A = 1: Hopf at B = 2, frequency 1, eigenvalue (B - 2)/2 + i w."""
     branch = ns.continue_equilibrium(brusselator(), [1.0, 1.5], "r", bounds=(1.0, 3.0))
     (event,) = branch.events
@@ -255,7 +255,7 @@ def test_a_curve_of_doublings_has_the_point_where_it_becomes_subcritical():
 
 
 @pytest.mark.slow
-def test_orbits_without_the_symmetry_part_as_the_coefficient_of_the_pitchfork_foretells():
+def test_asymmetric_orbits_separate_as_the_coefficient_of_the_pitchfork_predicts():
     """Duffing's oscillator: half the distance e of a state from the mirror image of that half a period later
     obeys c e^2 = -1 - (multiplier of the half map of the symmetric orbit)."""
     t, F = symbols("t F")
@@ -273,8 +273,8 @@ def test_orbits_without_the_symmetry_part_as_the_coefficient_of_the_pitchfork_fo
         found = parted.at(event.parameter + beyond)[0].trajectory
         half = (found(found.t[0]) + found(found.t[0] + np.pi)) / 2
         smallest = branch[event.parameter + beyond].half_multipliers.real.min()
-        foretold = (-1 - smallest) / event.coefficients["cubic coefficient"]
-        errors.append(abs(half @ half / foretold - 1))
+        predicted = (-1 - smallest) / event.coefficients["cubic coefficient"]
+        errors.append(abs(half @ half / predicted - 1))
     assert errors[1] < 0.3 * errors[0] < 0.003
     # from orbits without the symmetry, and from symmetric ones that were not solved for as halves
     for near in (parted.at(event.parameter + 0.01)[0], ns.periodic_orbit(system, run)):

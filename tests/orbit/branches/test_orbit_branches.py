@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.interrupts import interrupt
 from tests.orbit.periodic_cases import (
     CASES,
     excited_oscillator,
@@ -13,6 +14,7 @@ from tests.orbit.periodic_cases import (
     friction_oscillator,
     grazing_circle,
     impact_oscillator,
+    kinds,
     relay,
     scalar_relay,
     symbols,
@@ -26,8 +28,8 @@ def number(case, name):
     return float(CASES[case][name])
 
 
-def kinds(branch):
-    return [event.kind for event in branch.events]
+def digits(case, name):
+    return pytest.approx(number(case, name), rel=1e-12, abs=0)
 
 
 @pytest.fixture(scope="module")
@@ -41,8 +43,8 @@ def forced():
 def test_crossing_sliding_and_adding_sliding_of_a_forced_relay(forced):
     assert kinds(forced) == ["adding-sliding", "crossing-sliding"]
     adding, crossing = forced.events
-    assert abs(crossing.parameter - number("F1", "A_crossing_sliding")) < 1e-12
-    assert abs(adding.parameter - number("F2", "ADDING_SLIDING_A")) < 1e-12
+    assert crossing.parameter == digits("F1", "A_crossing_sliding")
+    assert adding.parameter == digits("F2", "ADDING_SLIDING_A")
     assert [len(orbit.legs) for orbit in (crossing.orbit, adding.orbit)] == [2, 1]
     assert crossing.far_side.itinerary.split() == ["-", "s", "+", "s"]
     assert forced.ends == (ns.orbit.BranchEnd.REACHED_BOUND,) * 2
@@ -83,7 +85,7 @@ def test_grazing_sliding_of_a_circle_from_either_side(inside):
     branch = ns.continue_orbit(orbit, "d", bounds=(0.85, 1.15))
     (event,) = branch.events
     assert event.kind == "grazing-sliding"
-    assert abs(event.parameter - number("F5", "d_grazing_sliding")) < 1e-12
+    assert event.parameter == digits("F5", "d_grazing_sliding")
     assert event.far_side.verdict == "persistence"
     assert abs(event.coefficients["det(I - A_i)"] - 1) < 1e-9
     assert abs(event.coefficients["radius of A_o"] - number("F5", "multiplier_before")) < 1e-12
@@ -96,8 +98,8 @@ def test_fold_and_period_doubling_of_a_ball_on_a_table():
     branch = ns.continue_orbit(orbit, "A", bounds=(0.3, 1.2))
     assert kinds(branch) in (["fold", "period doubling"], ["period doubling", "fold"])
     found = {event.kind: event.parameter for event in branch.events}
-    assert abs(found["fold"] - number("I1", "A_fold")) < 1e-12
-    assert abs(found["period doubling"] - number("I1", "A_period_doubling")) < 1e-12
+    assert found["fold"] == digits("I1", "A_fold")
+    assert found["period doubling"] == digits("I1", "A_period_doubling")
 
 
 def test_neimark_sacker():
@@ -106,7 +108,8 @@ def test_neimark_sacker():
     )
     (event,) = ns.continue_orbit(orbit, "d", bounds=(0.02, 0.06)).events
     assert event.kind == "Neimark-Sacker"
-    assert abs(event.parameter - number("I4", "d_NS")) < 1e-12
+    assert event.parameter == digits("I4", "d_NS")
+    assert event.orbit.multipliers.sum().real == digits("I4", "trace")
     pair = CASES["I4"]["multipliers"][0]
     wanted = np.arctan2(abs(float(pair["im"])), float(pair["re"]))
     assert abs(event.coefficients["angle"] - wanted) < 1e-11
@@ -118,7 +121,11 @@ def test_grazing_sliding_that_leads_to_chaos():
     orbit = ns.periodic_orbit(friction_oscillator(), [2.19, -0.42], parameters={"nu": nu + 1e-3})
     branch = ns.continue_orbit(orbit, "nu", bounds=(nu - 1e-4, nu + 1.1e-3))
     (event,) = branch.events
-    assert event.kind == "grazing-sliding" and abs(event.parameter - nu) < 1e-12
+    assert event.kind == "grazing-sliding" and event.parameter == digits("K1", "nu_grazing")
+    for found, value in zip(event.orbit.start, CASES["K1"]["start"], strict=True):
+        assert found == pytest.approx(float(value), rel=1e-12, abs=0)
+    # the time of a minimum has half of the digits
+    assert event.orbit.margins[0].t == pytest.approx(number("K1", "graze_time"), rel=1e-12)
     outer = [float(v) for v in CASES["K2"]["A_out_eigenvalues"]]
     inner = [float(v) for v in CASES["K2"]["A_in_eigenvalues"]]
     numbers = event.coefficients
@@ -186,15 +193,7 @@ def test_impact_grazing_of_a_forced_oscillator_from_either_side(hits):
 def test_an_interrupt_returns_what_was_computed(monkeypatch, calls):
     system = scalar_relay()
     orbit = ns.periodic_orbit(system, ns.simulate(system, [0.5], 60))
-    count, evaluation = [0], type(orbit.problem).evaluation
-
-    def interrupted(*args, **more):
-        count[0] += 1
-        if count[0] == calls:
-            raise KeyboardInterrupt
-        return evaluation(*args, **more)
-
-    monkeypatch.setattr(type(orbit.problem), "evaluation", interrupted)
+    interrupt(monkeypatch, type(orbit.problem), "evaluate", calls - 1, once=True)
     branch = ns.continue_orbit(orbit, "A", bounds=(0.8, 3.0), progress=True)
     assert ns.orbit.BranchEnd.INTERRUPTED in branch.ends
     assert len(branch) >= calls // 10

@@ -7,11 +7,7 @@ import pytest
 from scipy.special import ellipk
 
 import nonsmooth as ns
-from tests.orbit.periodic_cases import symbols
-
-
-def kinds(branch):
-    return [event.kind for event in branch.events]
+from tests.orbit.periodic_cases import kinds, symbols
 
 
 def langford(**more):
@@ -99,7 +95,7 @@ def test_the_cascade_of_roessler():
     orbit = ns.periodic_orbit(system, ns.simulate(system, [1.0, 1.0, 0.0], 400.0))
     assert (
         abs(orbit.period - 5.749) < 1e-3
-    )  # once, though a run comes back as well after two rounds
+    )  # once, though a run comes back as well after two periods
     first = ns.continue_orbit(orbit, "c", bounds=(2.0, 4.5))
     assert kinds(first) == ["period doubling"]
     second = ns.continue_orbit(first.events[0], "c", bounds=(2.0, 4.5))
@@ -150,7 +146,7 @@ def test_forced_duffing_bends_back_whatever_the_phase_of_the_run():
 
 
 @pytest.mark.parametrize("symmetry", [None, "odd"])
-def test_a_run_of_many_rounds_gives_the_orbit_once(symmetry):
+def test_a_run_of_many_periods_gives_the_prime_period(symmetry):
     x, y, mu = symbols("x y mu")
     system = ns.FilippovSystem([x, y], field=[y, mu * (1 - x * x) * y - x], parameters={mu: 1.0})
     orbit = ns.periodic_orbit(system, ns.simulate(system, [2.0, 0.0], 60.0), symmetry=symmetry)

@@ -6,6 +6,7 @@ import pytest
 
 import nonsmooth as ns
 from nonsmooth.orbit.manifolds.two_fold_sheet import TwoFoldSheet
+from tests.orbit.interrupts import interrupt
 
 X, Y, Z, W = (ca.SX.sym(name) for name in "XYZW")
 
@@ -281,7 +282,7 @@ def test_a_curve_is_followed_from_points_of_it():
     assert found.arcs[1].points[-1] == pytest.approx([1.0, -0.75], abs=1e-13)
 
 
-def test_ends_at_an_event_that_does_not_fit_are_refused():
+def test_invalid_events_of_dividing_surfaces_raise():
     system, fold = opening()
     good = dict(starts=lambda a, b: [a, b, 0.0], box=[(-1, 1), (-2, 2)], duration=5.0)
     with pytest.raises(ns.OptionError, match="until"):
@@ -315,15 +316,7 @@ def test_an_interrupted_curve_keeps_its_points(monkeypatch, calls):
     given = dict(
         starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)], duration=6.0, spacing=0.2
     )
-    meet, count = TwoFoldSheet.meet, []
-
-    def interrupted(*args):
-        count.append(1)
-        if len(count) > calls:
-            raise KeyboardInterrupt
-        return meet(*args)
-
-    monkeypatch.setattr(TwoFoldSheet, "meet", interrupted)
+    interrupt(monkeypatch, TwoFoldSheet, "meet", calls)
     found = ns.manifold(system, fold, **given)
     assert not found.complete and "interrupted" in repr(found)
     assert sum(len(arc.points) for arc in found.arcs) > 3
@@ -349,7 +342,7 @@ def test_curves_are_saved(tmp_path):
     assert np.array_equal(again.arcs[0].points, found.arcs[0].points)
 
 
-def test_what_cannot_be_cut_is_refused():
+def test_invalid_planes_of_starts_raise():
     system, fold = plain()
     good = dict(starts=lambda a, b: [0.3, a, b], box=[(-2, -0.5), (-1, 1)], duration=6.0)
     with pytest.raises(ns.OptionError, match="starts"):

@@ -42,7 +42,7 @@ def test_a_curve_ends_where_it_has_been_itself():
 
 
 @pytest.mark.parametrize("count", [4, 8, 16])
-def test_straight_orbits_are_as_many_as_asked_and_apart(count):
+def test_straight_orbits_have_the_given_number_and_distance(count):
     def follow(start, ahead, cut):
         end = 2.0 if ahead else 0.0
         x = np.linspace(start[0], end, 100)
@@ -56,7 +56,7 @@ def test_straight_orbits_are_as_many_as_asked_and_apart(count):
         assert curve[0, 0] == 0.0 and curve[-1, 0] == 2.0
 
 
-def test_what_is_avoided_is_met_but_nothing_starts_beside_it():
+def test_no_orbit_starts_beside_an_avoided_curve():
     line = np.column_stack([np.linspace(0, 2, 200), np.full(200, 1 / 16)])
 
     def follow(start, ahead, cut):
@@ -106,7 +106,7 @@ def test_a_curve_that_stays_beside_another_thins_out_there():
     assert not spacing.thins and meets[-1, 1] == pytest.approx(1.0, abs=0.01)
 
 
-def test_orbits_say_at_which_end_they_thin_out():
+def test_orbits_are_tapered_at_the_right_end():
     box = Box(0.0, 4.0, 0.0, 2.0)
 
     def follow(start, ahead, cut):

@@ -271,10 +271,7 @@ def test_explicit_time():
 def test_coincident_fields_slide_through():
     """F1 = F2 at s: sliding is smooth there, and beyond it leaving is possible at any time."""
     system = ns.FilippovSystem(
-        [x, y, z],
-        field=[(z - y) / 2 - lam * (y + z) / 2, -2, -0.5],
-        multipliers=lam,
-        surface=x,
+        [x, y, z], field=[(z - y) / 2 - lam * (y + z) / 2, -2, -0.5], multipliers=lam, surface=x
     )
     futures = ns.orbit.funnel(system, [0.0, 1.0, 0.25], 1.5, samples=9)
     assert futures.t == pytest.approx(0.5)
@@ -312,7 +309,7 @@ def test_cut_and_joined_it_is_the_same():
 # refusals --------------------------------------------------------------------------------------
 
 
-def test_a_unique_future_is_said_to_be_one():
+def test_a_unique_motion_raises():
     with pytest.raises(ns.PointError, match=r"unique.*REACHED_END"):
         ns.orbit.funnel(SGN, [0.5], 1.0)
     stable = ns.FilippovSystem([x], surface=x, above=[-1], below=[1])
@@ -320,14 +317,14 @@ def test_a_unique_future_is_said_to_be_one():
         ns.orbit.funnel(ns.simulate(stable, [0.0], 1.0), t_end=2.0)
 
 
-def test_intersections_are_refused():
+def test_intersections_raise():
     l1, l2 = ca.SX.sym("l1"), ca.SX.sym("l2")
     system = ns.FilippovSystem([x, y], surfaces=[x, y], multipliers=[l1, l2], field=[l1, l2])
     with pytest.raises(ns.PointError, match=r"point.*\(h0, h1\)"):
         ns.orbit.funnel(system, [0.0, 0.0], 1.0)
 
 
-def test_degenerate_two_folds_are_refused_by_name():
+def test_degenerate_two_folds_raise():
     cusp = ns.FilippovSystem([x, y, z], surface=x, above=[-y, z, 1], below=[z, 0.5, -1])
     with pytest.raises(ns.DegenerateError):
         ns.orbit.funnel(cusp, [0.0, 0.0, 0.0], 1.0)
@@ -344,12 +341,12 @@ def test_degenerate_two_folds_are_refused_by_name():
         ((ns.simulate(SGN, [0.0], 1.0),), {"t_end": 0.0}, "t_end"),
     ],
 )
-def test_wrong_requests_are_refused(arguments, options, message):
+def test_invalid_options_raise(arguments, options, message):
     with pytest.raises(ns.OptionError, match=message):
         ns.orbit.funnel(*arguments, **options)
 
 
-def test_times_before_the_start_are_refused():
+def test_times_before_the_start_raise():
     with pytest.raises(ns.PointError, match="time"):
         ns.orbit.funnel(SGN, [0.0], 1.0)(-0.1)
 

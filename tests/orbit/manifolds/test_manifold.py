@@ -1,20 +1,16 @@
 """Manifolds are those of closed forms: separatrices through switches, thresholds, surfaces."""
 
-import json
 import sys
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.orbit.manifolds.arcs import Follower
+from nonsmooth.orbit.manifolds.invariant_manifolds import Follower
+from tests.orbit.interrupts import interrupt
+from tests.orbit.periodic_cases import CASES, PARAMETERS
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
-}
 x, y, z, v, t, lam = (ca.SX.sym(s) for s in ("x", "y", "z", "v", "t", "lam"))
 
 
@@ -49,14 +45,14 @@ def test_thresholds_of_the_double_well_are_on_the_orbits_through_its_fold():
             # close to v = 0 the curve is a parabola in v
             near = slice(k - 3, k + 5)
             thresholds.append(np.polyval(np.polyfit(w[near], p[near], 4), 0.0))
-    truth = [float(value) for value in CASES["B2"]["values"]["thresholds"]]
+    truth = [float(value) for value in CASES["B2"]["thresholds"]]
     assert sorted(thresholds)[:3] == pytest.approx(truth, abs=1e-9)
 
 
 def test_the_homoclinic_orbit_leaves_by_the_fold_and_ends_at_the_pseudo_saddle():
     """H1: at the homoclinic parameter the stable manifold begins at the visible fold."""
-    values = {k: float(s) for k, s in CASES["H1"]["values"].items()}
-    rho, c = float(CASES["H1"]["parameters"]["rho"]), values["c_homoclinic"]
+    values = {k: float(s) for k, s in CASES["H1"].items()}
+    rho, c = float(PARAMETERS["H1"]["rho"]), values["c_homoclinic"]
     system = ns.FilippovSystem(
         [x, y], surface=y, above=[rho * x - (y - 1), x + rho * (y - 1)], below=[c, 1]
     )
@@ -115,41 +111,23 @@ def test_an_interrupted_surface_keeps_its_orbits(monkeypatch):
     system = ns.FilippovSystem(
         [x, y, z], surface=x + 9, above=[-x, -y, z], below=[-x, -y, z + 0 * x]
     )
-    saddle, plain, calls = ns.find_equilibrium(system, [0.1, 0.1, 0.1]), Follower.arc, []
-
-    def arc(*args):
-        calls.append(1)
-        if len(calls) > 9:
-            raise KeyboardInterrupt
-        return plain(*args)
-
-    monkeypatch.setattr(Follower, "arc", arc)
+    saddle = ns.find_equilibrium(system, [0.1, 0.1, 0.1])
+    interrupt(monkeypatch, Follower, "arc", 9)
     found = ns.manifold(system, saddle, length=0.5, spacing=0.1)
     assert not found.complete and len(found.arcs) == 9 and "interrupted" in repr(found)
     assert np.abs(found.points[:, 2]).max() < 1e-12
-
-
-def interrupt_after(monkeypatch, count):
-    plain, calls = Follower.arc, []
-
-    def arc(*args):
-        calls.append(1)
-        if len(calls) > count:
-            raise KeyboardInterrupt
-        return plain(*args)
-
-    monkeypatch.setattr(Follower, "arc", arc)
 
 
 def test_an_interrupted_curve_keeps_its_other_half(monkeypatch):
     system = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
     saddle = ns.find_equilibrium(system, [0.1, 0.1])
     whole = ns.manifold(system, saddle, length=1.0)
-    interrupt_after(monkeypatch, 1)
+    interrupt(monkeypatch, Follower, "arc", 1)
     found = ns.manifold(system, saddle, length=1.0)
     assert not found.complete and found.dimension == 1 and len(found.arcs) == 1
     assert np.array_equal(found.arcs[0].points, whole.arcs[0].points) and whole.complete
-    interrupt_after(monkeypatch, 0)
+    monkeypatch.undo()
+    interrupt(monkeypatch, Follower, "arc", 0)
     with pytest.raises(KeyboardInterrupt):
         ns.manifold(system, saddle, length=1.0)
 
@@ -161,16 +139,7 @@ def test_an_interrupted_first_curve_is_kept_as_far_as_it_was_followed(monkeypatc
     )
     saddle = ns.find_equilibrium(system, [0.1, 0.1], side="+")
     whole = ns.manifold(system, saddle, length=30.0, spacing=0.1)
-    module, calls = sys.modules[Follower.__module__], []
-    plain = module.simulate
-
-    def simulate(*args, **given):
-        calls.append(1)
-        if len(calls) > 2:
-            raise KeyboardInterrupt
-        return plain(*args, **given)
-
-    monkeypatch.setattr(module, "simulate", simulate)
+    interrupt(monkeypatch, sys.modules[Follower.__module__], "simulate", 2)
     found = ns.manifold(system, saddle, length=30.0, spacing=0.1)
     assert not found.complete and len(found.arcs) == 1
     (arc,) = found.arcs
@@ -188,7 +157,7 @@ def test_an_interrupted_second_sheet_leaves_the_first_one(monkeypatch, more):
     saddle = ns.find_pseudo_equilibrium(system, [0.1, 0.1, 0.0])
     whole = ns.manifold(system, saddle, length=0.8, spacing=0.2)
     above = sum(arc.itinerary == "+" for arc in whole.arcs)
-    interrupt_after(monkeypatch, above + more)
+    interrupt(monkeypatch, Follower, "arc", above + more)
     found = ns.manifold(system, saddle, length=0.8, spacing=0.2)
     assert not found.complete and whole.complete and found.dimension == 2
     sheets = [arc.itinerary for arc in found.arcs]
@@ -206,13 +175,13 @@ def test_orbits_of_a_manifold_are_counted(monkeypatch):
         def close(self):
             counted.append("closed")
 
-    asked = []
+    options = []
     module = sys.modules[ns.manifold.__module__]
-    monkeypatch.setattr(module, "progress_bar", lambda *given: asked.append(given) or Bar())
+    monkeypatch.setattr(module, "progress_bar", lambda *given: options.append(given) or Bar())
     system = ns.FilippovSystem([x, y], surface=x + 5, above=[x, -y], below=[x, -y + 0 * x])
     saddle = ns.find_equilibrium(system, [0.1, 0.1])
     ns.manifold(system, saddle, length=1.0, progress=True)
-    assert counted == [1, 1, "closed"] and asked == [(None, True, "orbit")]
+    assert counted == [1, 1, "closed"] and options == [(None, True, "orbit")]
 
 
 def test_backward_a_manifold_ends_where_sliding_begins():
@@ -232,7 +201,7 @@ def test_manifolds_are_saved(tmp_path):
     assert np.array_equal(again.arcs[1].points, found.arcs[1].points)
 
 
-def test_what_has_no_manifold_is_refused():
+def test_points_without_a_manifold_raise():
     node = ns.FilippovSystem([x, y], surface=x - 2, above=[-x, -y], below=[-x, -2 * y])
     found = ns.find_equilibrium(node, [0.1, 0.1], side="-")
     with pytest.raises(ns.DegenerateError, match="unstable directions"):
@@ -343,7 +312,7 @@ def test_what_leaves_a_canard_is_a_surface_too():
     assert all(a.t[-1] > 0 and a.points[0, 1] >= 0 for a in found.arcs)
 
 
-def test_orbits_and_two_folds_without_a_surface_are_refused():
+def test_orbits_and_two_folds_without_a_surface_raise():
     relaxing = ns.FilippovSystem([X, Y], field=[Y, (1 - X * X) * Y - X])
     cycle = ns.periodic_orbit(relaxing, ns.simulate(relaxing, [2.0, 0.0], 40.0))
     with pytest.raises(ns.DegenerateError, match="three dimensions"):

@@ -19,7 +19,7 @@ def orbits(above, below, surface=y, box=(-2.0, 2.0, -2.0, 2.0), t_end=None):
 
 
 @pytest.mark.slow
-def test_an_orbit_is_that_of_simulate_however_often_it_is_looked_at():
+def test_an_orbit_in_chunks_is_that_of_simulate():
     block = orbits([y, -x - 0.4], [y, -x + 0.4], box=(-4.0, 4.0, -4.0, 4.0), t_end=15.0)
     curve = block.follow(np.array([3.0, 0.0]))
     run = ns.simulate(block.scan.where.system, [3.0, 0.0], t_end=15.0, tol=1e-12)
@@ -65,7 +65,7 @@ def test_a_cycle_through_events_is_drawn_once_or_twice():
     assert curve[:, 0].max() == pytest.approx(2.00862, abs=1e-4)
 
 
-def test_no_picture_waits_for_a_compiler_or_for_what_nobody_looks_at(monkeypatch):
+def test_orbits_need_no_compiler_and_few_steps(monkeypatch):
     """Spirals to t = 10000: the orbits are cut where they meet, a few steps at a time."""
     runs = []
 

@@ -69,7 +69,7 @@ def test_an_orbit_comes_to_rest_at_a_node():
     assert_allclose(backward[-1], [1.0, 0.6 / 0.64], atol=1e-7)  # at the frame
 
 
-def test_where_nothing_slides_there_is_no_orbit():
+def test_no_orbit_starts_outside_sliding():
     sliding = two_fold("II-C")
     assert sliding.follow(np.array([0.0, -0.5, 0.5])).shape == (0, 2)
     assert sliding.follow(np.full(3, np.nan)).shape == (0, 2)
@@ -111,7 +111,7 @@ def test_canards_of_a_normal_form_are_its_eigenlines(label):
         assert_allclose(curve[:, 1], slope * curve[:, 0], atol=1e-6)
 
 
-def test_evenly_spaced_orbits_keep_apart_and_say_their_region():
+def test_evenly_spaced_orbits_keep_apart_in_their_regions():
     sliding = two_fold("mix-S")
     curves = list(sliding.spaced(8))
     assert len(curves) > 6

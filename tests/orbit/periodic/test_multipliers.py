@@ -7,12 +7,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow.compiled import find_compiler
-from nonsmooth.flow.compiled.shooting import reduced_map
-from nonsmooth.orbit.periodic import multipliers
-from nonsmooth.orbit.periodic.multipliers import multipliers_of
-
-pytestmark = pytest.mark.skipif(find_compiler() is None, reason="no C compiler")
+from nonsmooth.orbit.periodic.multipliers import reduced_map
 
 
 def random_legs(seed, count, n, s):
@@ -25,12 +20,24 @@ def random_legs(seed, count, n, s):
     return legs, rng
 
 
+def maps_of(legs, wrap):
+    """Maps across the flow from the start of each leg to that of the next."""
+    maps = [g @ (x - np.outer(f, e @ x) / (e @ f)) for x, f, e, g in zip(*legs, strict=True)]
+    if wrap is not None:
+        maps[-1] = wrap @ maps[-1]
+    return np.array(maps)
+
+
+def reduced_of(legs, wrap, units):
+    n, by = legs[0].shape[2], units / units[:, None]
+    return reduced_map(maps_of(legs, wrap) * by, legs[0][:, :n] * by, np.eye(n))
+
+
 def whole_map(legs, wrap):
-    by_start, rate, gradient, after = legs
-    product = np.eye(by_start.shape[2])
-    for x, f, e, g in zip(by_start, rate, gradient, after, strict=True):
-        product = g @ (x - np.outer(f, e @ x) / (e @ f)) @ product
-    return product if wrap is None else wrap @ product
+    product = np.eye(legs[0].shape[2])
+    for step in maps_of(legs, wrap):
+        product = step @ product
+    return product
 
 
 @pytest.mark.parametrize(("count", "n", "s"), [(1, 4, 4), (3, 3, 3), (2, 3, 5), (7, 5, 5)])
@@ -38,7 +45,7 @@ def whole_map(legs, wrap):
 def test_nontrivial_multipliers_are_those_of_the_whole_map(count, n, s, mirrored):
     legs, rng = random_legs(count, count, n, s)
     wrap, units = (rng.normal(size=(n, n)) if mirrored else None), rng.uniform(1e-3, 1e3, n)
-    reduced = reduced_map(legs, wrap, units, np.eye(n), 1e-8, 1e-12)
+    reduced = reduced_of(legs, wrap, units)
     assert reduced.shape == (n - 1, n - 1)
     values, found = np.linalg.eigvals(whole_map(legs, wrap)), np.linalg.eigvals(reduced)
     size = np.abs(values).max()
@@ -50,28 +57,16 @@ def test_nontrivial_multipliers_are_those_of_the_whole_map(count, n, s, mirrored
 def test_what_a_leg_loses_is_no_direction_of_the_reduced_map():
     legs, _ = random_legs(5, 4, 4, 4)
     legs[3][2] = legs[3][2] @ np.diag([1.0, 1.0, 0.0, 0.0])  # of rank two
-    reduced = reduced_map(legs, None, np.ones(4), np.eye(4), 1e-8, 1e-12)
+    reduced = reduced_of(legs, None, np.ones(4))
     assert len(reduced) <= 2
     values = np.sort(np.abs(np.linalg.eigvals(whole_map(legs, None))))[-len(reduced) :]
     np.testing.assert_allclose(np.sort(np.abs(np.linalg.eigvals(reduced))), values, rtol=1e-10)
 
 
-def test_a_grazed_event_has_no_reduced_map():
-    legs, _ = random_legs(1, 2, 3, 3)
-    legs[2][1] -= legs[1][1] * (legs[2][1] @ legs[1][1]) / (legs[1][1] @ legs[1][1])
-    assert reduced_map(legs, None, np.ones(3), np.eye(3), 1e-8, 1e-12) is None
-
-
-def test_multipliers_are_the_same_in_c_and_in_python(monkeypatch):
+def test_multipliers_of_a_half_are_roots_of_those_of_the_whole():
     system = ns.textbook.multi_sliding_relay().system
     orbit = ns.periodic_orbit(system, [0.0, 1.0, 2.57], itinerary=["+", "s"] * 7, symmetry="odd")
-    given = orbit.problem, orbit.evaluation, orbit.parameter_vector
-    compiled = multipliers_of(*given)
-    monkeypatch.setattr(multipliers, "has_interpreter", lambda: False)
-    plain = multipliers_of(*given)
-    assert compiled.zeros == plain.zeros
-    np.testing.assert_allclose(compiled.of_map, plain.of_map, atol=1e-14)
-    np.testing.assert_allclose(compiled.values, compiled.of_map**2, atol=1e-15)
+    np.testing.assert_allclose(orbit.multipliers[1:], orbit.half_multipliers**2, atol=1e-15)
 
 
 @pytest.mark.parametrize("second", [1e-12, 1e-11, 1e-3, 1e6, 1e12])

@@ -79,19 +79,27 @@ def test_r1_the_relay_that_slides_fourteen_times(symmetry) -> None:
 
 def test_r3_stick_slip() -> None:
     values, system = CASES["R3"], stick_slip()
-    orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.4], 30))
-    assert close(orbit.period, values["period"])
-    assert orbit.multipliers.tolist() == [1, 0] and orbit.stability == "superstable"
-    durations = {leg.mode: leg.duration for leg in orbit.legs}
-    assert close(durations["-"], values["slip_time"]) and close(
-        durations["s"], values["stick_time"]
-    )
+    for guess, options in (
+        (ns.simulate(system, [0.3, 0.4], 30), {}),
+        ([1.0, 0.5], {"itinerary": "- s"}),
+    ):
+        orbit = ns.periodic_orbit(system, guess, **options)
+        assert close(orbit.period, values["period"])
+        assert orbit.multipliers.tolist() == [1, 0] and orbit.stability == "superstable"
+        legs = {leg.mode: leg for leg in orbit.legs}
+        assert close(legs["-"].duration, values["slip_time"])
+        assert close(legs["s"].duration, values["stick_time"])
+        assert close(legs["s"].start[0], values["x_restick"])
 
 
 def test_r5_a_nearly_tangent_crossing_keeps_the_multiplier() -> None:
-    orbit = ns.periodic_orbit(welander(), [0.4, 0.3])
-    assert close(orbit.period, CASES["R5"]["period"])
-    assert agree(orbit.multipliers, [1, float(CASES["R5"]["multiplier"])], 1e-14)
+    values, orbit = CASES["R5"], ns.periodic_orbit(welander(), [0.4, 0.3])
+    assert close(orbit.period, values["period"])
+    assert agree(orbit.multipliers, [1, float(values["multiplier"])], 1e-14)
+    legs = {leg.mode: leg for leg in orbit.legs}
+    assert close(legs["+"].duration, values["t_k5"]) and close(legs["-"].duration, values["t_k0"])
+    assert close(legs["+"].start[0], values["T_end_k0"])
+    assert close(legs["-"].start[0], values["T_end_k5"])
 
 
 def test_r6_a_crossing_cycle_around_a_fused_focus() -> None:
@@ -113,6 +121,9 @@ def test_f1_and_f2_a_forced_relay_that_crosses_or_slides() -> None:
     durations = {leg.mode: leg.duration for leg in sliding.legs}
     assert close(durations["+"], CASES["F2"]["flight"])
     assert close(durations["s"], CASES["F2"]["slide"])
+    k = next(i for i, leg in enumerate(sliding.legs) if leg.mode == "+")
+    for i, name in ((k, "exit_time"), ((k + 1) % len(sliding.legs), "landing_time")):
+        assert close(math.remainder(sliding.legs[i].t, 2 * math.pi), CASES["F2"][name])
 
 
 def test_f5_grazing_sliding_on_both_sides() -> None:
@@ -120,8 +131,12 @@ def test_f5_grazing_sliding_on_both_sides() -> None:
     inside = ns.periodic_orbit(system, ns.simulate(system, [0.9, 0.0], 40))
     assert close(inside.period, values["period"])
     assert inside.multipliers.tolist() == [1, 0]
-    durations = {leg.mode: leg.duration for leg in inside.legs}
-    assert close(durations["+"], values["flight"]) and close(durations["s"], values["slide"])
+    legs = {leg.mode: leg for leg in inside.legs}
+    assert close(legs["+"].duration, values["flight"]) and close(
+        legs["s"].duration, values["slide"]
+    )
+    assert close(legs["+"].start[0], values["x_fold"])
+    assert close(legs["s"].start[0], values["x_landing"])
     run = ns.simulate(system, [0.9, 0.0], 40, parameters={"d": 1.1})
     outside = ns.periodic_orbit(system, run)
     assert outside.itinerary == "+" and close(outside.period, values["period_before"])
@@ -136,6 +151,7 @@ def test_i1_bounces_on_a_table_from_two_digits() -> None:
     assert agree(orbit.multipliers, numbers(values["multipliers"]))
     assert close(orbit.legs[0].t, values["phase"])
     assert close(orbit.start[1], values["launch_velocity"])
+    assert close(np.prod(orbit.multipliers).real, values["det"])
 
 
 def test_i2_an_impact_oscillator_whose_orbit_is_unstable() -> None:
@@ -166,6 +182,10 @@ def test_d1_and_d5_forced_friction_with_and_without_a_stick() -> None:
     assert agree(orbit.multipliers, numbers(CASES["D1"]["multipliers"]))
     assert close(orbit.period, CASES["D1"]["period"])
     assert close(abs(orbit.start[0]), CASES["D1"]["x0"])
+    assert close(abs(math.remainder(0.6 * orbit.legs[0].t, math.pi)), CASES["D1"]["phase"])
+    assert close(np.prod(orbit.half_multipliers).real, CASES["D1"]["det_half"])
+    rate = math.log(abs(np.prod(orbit.multipliers))) / orbit.period
+    assert close(rate, CASES["D1"]["lyapunov_sum"])
     run = ns.simulate(system, [1.5, 0.0], 100.0, parameters={"f": 0.6})
     for symmetry in ("odd", None):
         orbit = ns.periodic_orbit(system, run, symmetry=symmetry)
@@ -173,6 +193,11 @@ def test_d1_and_d5_forced_friction_with_and_without_a_stick() -> None:
         durations = {leg.mode: leg.duration for leg in orbit.legs}
         assert close(durations["s"], CASES["D5"]["stick_time"])
         assert close(durations["+"], CASES["D5"]["slip_time"])
+    given = {"symmetry": "odd", "t_start": 0.64, "parameters": {"f": 0.6}}
+    stick = ns.periodic_orbit(system, [1.44, 0.0], itinerary="s -", **given)
+    assert close(abs(stick.start[0]), CASES["D5"]["x_stick"])
+    assert close(0.6 * stick.legs[0].t % math.pi, CASES["D5"]["phase_landing"])
+    assert agree(stick.half_multipliers[:1], float(CASES["D5"]["half_map_derivative"]))
 
 
 def test_k1_an_orbit_of_four_forcing_periods_that_grazes() -> None:
@@ -356,7 +381,7 @@ def test_one_of_a_family_of_orbits() -> None:
 # Bad input ---------------------------------------------------------------------------------------
 
 
-def test_runs_that_do_not_close_are_refused() -> None:
+def test_runs_that_do_not_close_raise() -> None:
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     away = ns.FilippovSystem([x, y], surface=y, above=[1, -x], below=[1, -x])
     with pytest.raises(ns.ConvergenceError, match="does not close"):
@@ -365,7 +390,7 @@ def test_runs_that_do_not_close_are_refused() -> None:
         ns.periodic_orbit(away, [2.0, 1.0], itinerary=[("-", "h0"), ("+", "h0")])
 
 
-def test_virtual_orbits_are_refused_unless_asked_for() -> None:
+def test_virtual_orbits_raise_without_the_option() -> None:
     system = grazing_circle()
     at = {"d": 0.9}
     free = ns.periodic_orbit(system, ns.simulate(system, [0.9, 0.0], 40, parameters={"d": 1.1}))
@@ -376,7 +401,7 @@ def test_virtual_orbits_are_refused_unless_asked_for() -> None:
     assert virtual.is_virtual and str(virtual).startswith("Virtual periodic orbit")
 
 
-def test_what_cannot_be_is_said() -> None:
+def test_invalid_arguments_raise() -> None:
     system = forced_friction()
     run = ns.simulate(system, [1.5, 0.0], 60.0)
     with pytest.raises(ns.ParameterError, match="mu"):
@@ -398,7 +423,7 @@ def test_no_convergence_names_the_leg() -> None:
         )
 
 
-def test_a_guess_that_goes_round_several_times_gives_the_orbit_once() -> None:
+def test_a_guess_of_several_periods_gives_the_prime_period() -> None:
     # Multipliers are a pair at 156 degrees, so a run comes back best after five periods.
     buck = ns.textbook.buck_converter()
     orbit = ns.periodic_orbit(buck.system, buck.run(tol=1e-13))
@@ -408,3 +433,35 @@ def test_a_guess_that_goes_round_several_times_gives_the_orbit_once() -> None:
     run = ns.simulate(forced, [0.0, 0.0], 40.0)
     orbit = ns.periodic_orbit(forced, run)
     assert orbit.problem.periods == 1 and orbit.period == pytest.approx(math.pi, rel=1e-13)
+
+
+def test_legs_and_events_of_an_orbit_have_elements_and_sides():
+    """The same stick-slip orbit, found whole, with a second surface, and as its own run."""
+    expected = [("entry", 0, -1, "h0"), ("exit", 0, -1, "lambda0 = -1")]
+    one = stick_slip()
+    lam, mu = ca.SX.sym("lam"), ca.SX.sym("mu")
+    x, v, f, k, b = (ca.SX.sym(name) for name in "xvfkb")
+    two = ns.FilippovSystem(
+        [x, v],
+        surfaces=[v - b, x - 50],
+        multipliers=[lam, mu],
+        field=[v, -x - lam * f + k * (v - b)],
+        parameters={f: 1, k: 0.2, b: 0.5},
+    )
+    for system in (one, two):
+        orbit = ns.periodic_orbit(system, ns.simulate(system, [0.3, 0.4], 60))
+        legs = [(leg.kind, leg.element, leg.side, leg.event) for leg in orbit.legs]
+        events = [(e.kind, e.element, e.side, e.name) for e in orbit.trajectory.events[:-1]]
+        assert legs == events and sorted(legs) == expected
+
+
+def test_mirrored_legs_have_mirrored_sides():
+    system = forced_friction()
+    half = ns.periodic_orbit(system, ns.simulate(system, [1.5, 0.0], 100.0), symmetry="odd")
+    names = [(leg.kind, leg.element, leg.side, leg.event) for leg in half.legs]
+    count = len(names) // 2
+    assert half.symmetric and names[:count] != names[count:]
+    for (kind, element, side, event), other in zip(names[:count], names[count:], strict=True):
+        assert other[:3] == (kind, element, -side)
+        swapped = {"lambda0 = 1": "lambda0 = -1", "lambda0 = -1": "lambda0 = 1"}
+        assert other[3] == swapped.get(event, event)

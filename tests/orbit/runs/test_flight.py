@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import fixed, watched
+from nonsmooth.flow import fixed
 from nonsmooth.flow.compiled import find_compiler
 from nonsmooth.model.derivatives.variational import guarded_field
 from nonsmooth.orbit.runs import flight
@@ -36,9 +36,9 @@ HIDDEN = ns.FilippovSystem(
     hidden=True,
 )
 MIXED = [
-    Leg("-", "h0", "entry"),
-    Leg("s", "L_F1 h", "exit", 1),
-    Leg("+", "wall", "reset"),
+    Leg("-", "entry", 0, -1),
+    Leg("s", "exit", 0, 1),
+    Leg("+", "reset", 0, -1),
     Leg("-"),
 ]
 
@@ -60,8 +60,8 @@ def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
             [[0.2, 0.1, 0.4], [0.4, 0.3, 0.5], [1, 0.4, 2], [0, -0.5, 1]],
             [1, 0, -0.5, 2],
         ),
-        (HIDDEN, [Leg("s"), Leg("s", "lambda0", "exit", 1)], [[0.1, 0.0], [0.2, 0.0]], [0.3, 0.2]),
-        (HIDDEN, [Leg("s"), Leg("+", "h0", "entry")], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
+        (HIDDEN, [Leg("s"), Leg("s", "exit", 0, 1)], [[0.1, 0.0], [0.2, 0.0]], [0.3, 0.2]),
+        (HIDDEN, [Leg("s"), Leg("+", "entry", 0, 1)], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
     ],
 )
 def test_legs_flown_together_are_those_flown_one_by_one(
@@ -75,7 +75,7 @@ def test_legs_flown_together_are_those_flown_one_by_one(
 
 def test_a_leg_that_fails_is_named():
     system = ns.FilippovSystem([x], surface=x - 9, above=[1], below=[x**2])
-    legs = [Leg("-"), Leg("-", "h0", "crossing")]
+    legs = [Leg("-"), Leg("-", "crossing", 0, -1)]
     with pytest.raises(ns.ConvergenceError, match=r"leg 2 \(-, ended by h0\)"):
         Flights(system, legs)(np.array([[0.1], [1.0]]), np.array([1.0, 2.0]), np.zeros(0))
 
@@ -84,7 +84,9 @@ def test_residuals_have_more_digits_than_doubles():
     """x'' = -4 x, y' = x y from binary numbers, against the closed form with 40 digits."""
     system = ns.FilippovSystem([x, y, z], surface=x, above=[y, -4 * x, x * z], below=[1, 0, 0])
     start, duration = np.array([[0.75, 1.5, 1.25]]), np.array([0.875])
-    found = Flights(system, [Leg("+", "h0", "crossing")]).exact(start, duration, np.zeros(0))
+    found = Flights(system, [Leg("+", "crossing", 0, 1)]).ends(
+        start, duration, np.zeros(0), extended=True
+    )
     if found is None or np.finfo(np.longdouble).eps > 1e-18:
         pytest.skip("no extended precision on this machine")
     after, rest, value = found
@@ -103,17 +105,17 @@ def test_residuals_have_more_digits_than_doubles():
 def test_guards_are_watched_alike_in_c_and_in_python(monkeypatch):
     field, p = guarded_field(BELT, "-"), BELT.parameter_vector()
     start = np.array([0.2, -0.4, 0.1])
-    found = watched.watched(field, start, p, 6.0, 1e-6)
-    passed = watched.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9)
-    monkeypatch.setattr(watched, "has_interpreter", lambda: False)
-    again = watched.watched(field, start, p, 6.0, 1e-6)
+    found = fixed.watched(field, start, p, 6.0, 1e-6)
+    passed = fixed.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9)
+    monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
+    again = fixed.watched(field, start, p, 6.0, 1e-6)
     extrema = [rows[rows[:, 3] != 0.0] for rows in (found, again)]
     assert len(extrema[0]) >= 3
     np.testing.assert_allclose(
         *(rows[np.lexsort(rows.T[:2])] for rows in extrema), rtol=1e-10, atol=1e-11
     )
     assert passed == pytest.approx(
-        watched.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9), rel=1e-13
+        fixed.passing(field, 0, start, p, 9.0, direction=-1, still=1e-9), rel=1e-13
     )
 
 

@@ -5,28 +5,38 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.flow import watched
+from nonsmooth.flow import fixed
+from nonsmooth.flow.names import described
 from nonsmooth.model import Guard
-from nonsmooth.orbit.runs.guards import change_fault, described, faults_along, watch
+from nonsmooth.orbit.runs.guards import change_fault, faults_along, watch
 from nonsmooth.orbit.runs.legs import Leg, fly, leg_name
 
 
 @pytest.mark.parametrize(
     ("guard", "words"),
     [
-        (Guard("surface", 0, 1, "h0"), "h0 > 0"),
-        (Guard("surface", 2, -1, "h2"), "h2 < 0"),
-        (Guard("exit", 0, 1, "L_F1 h"), "the condition L_F1 h <= 0 of sliding"),
-        (Guard("exit", 0, -1, "L_F2 h"), "the condition L_F2 h >= 0 of sliding"),
-        (Guard("exit", 1, 1, "lambda1"), "lambda1 <= 1"),
-        (Guard("exit", 1, -1, "lambda1"), "lambda1 >= -1"),
-        (Guard("impact", 0, 1, "floor"), "the gap of 'floor' >= 0"),
-        (Guard("release", 0, 1, "floor"), "the reaction of 'floor' >= 0"),
-        (Guard("stop", 0, 1, "end"), "end"),
+        (Guard("surface", 0, 1, 0), "h0 > 0"),
+        (Guard("surface", 1, -1, 1), "h1 < 0"),
+        (Guard("exit", 0, 1, 0), "lambda0 <= 1"),
+        (Guard("exit", 0, -1, 0), "lambda0 >= -1"),
+        (Guard("exit", 1, 1, 1), "lambda1 <= 1"),
+        (Guard("exit", 1, -1, 1), "lambda1 >= -1"),
+        (Guard("impact", 0, 1, 2), "the gap of 'floor' >= 0"),
+        (Guard("release", 0, 0, 2), "the reaction of 'floor' >= 0"),
+        (Guard("stop", 0, 1, 0), "end"),
     ],
 )
 def test_a_guard_is_told_as_the_condition_that_holds(guard, words):
-    assert described(guard) == words
+    x, v, lam, kap = (ca.SX.sym(name) for name in ("x", "v", "lam", "kap"))
+    system = ns.FilippovSystem(
+        [x, v],
+        surfaces=[v, v - 1],
+        multipliers=[lam, kap],
+        field=[v, -lam - kap],
+        stops=[ns.Stop(x - 9, name="end")],
+        impacts=[ns.Impact(x, name="floor")],
+    )
+    assert described(system, guard) == words
 
 
 def test_legs_are_judged_together_as_one_by_one(monkeypatch):
@@ -40,10 +50,10 @@ def test_legs_are_judged_together_as_one_by_one(monkeypatch):
         stops=ns.Stop(x - 7.5, 1, "out"),
     )
     legs = [
-        Leg("+", "h0", "crossing"),
-        Leg("-", "h0", "crossing"),
-        Leg("+", "h0", "crossing"),
-        Leg("-", "h0", "crossing"),
+        Leg("+", "crossing", 0, 1),
+        Leg("-", "crossing", 0, -1),
+        Leg("+", "crossing", 0, 1),
+        Leg("-", "crossing", 0, -1),
         Leg("+"),
     ]
     starts = np.array([[0, 0.2, 0.7], [7, -0.3, 0], [0, 0.0, 1], [0, 0.1, -1], [0, 1, 0.0]])
@@ -53,19 +63,19 @@ def test_legs_are_judged_together_as_one_by_one(monkeypatch):
     expected = []
     for i, leg in enumerate(legs):
         if durations[i] <= 0.0:
-            expected.append(f"leg {i + 1} {leg_name(leg)} has the duration 0")
+            expected.append(f"leg {i + 1} {leg_name(system, leg)} has the duration 0")
             continue
         found = watch(system, leg.mode, starts[i], durations[i], p).faults
         j = (i + 1) % len(legs)
         fault = change_fault(system, leg, legs[j].mode, ends[i].end, starts[j], p)
         found += [fault] if fault else []
-        expected += [f"leg {i + 1} {leg_name(leg)}: {fault}" for fault in found]
+        expected += [f"leg {i + 1} {leg_name(system, leg)}: {fault}" for fault in found]
     together = faults_along(system, legs, starts, durations, speeds, p, True)
     assert together == expected and len(together) >= 5
     assert sum("is violated" in fault for fault in together) >= 1
     assert sum("begins after it" in fault for fault in together) >= 1
     assert sum("'out' is met" in fault for fault in together) == 2  # from 7 to 8, and from 0 to 9
-    monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+    monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
     assert faults_along(system, legs, starts, durations, speeds, p, True) == together
 
 
@@ -75,7 +85,7 @@ def test_legs_are_judged_together_as_one_by_one(monkeypatch):
 def test_what_is_passed_inside_a_step_is_seen(monkeypatch, interpreted, kind, duration):
     """x - 0.9 rises all along a leg of one step, x = t or of many: it has no extremum and one zero."""
     if not interpreted:
-        monkeypatch.setattr(watched, "has_interpreter", lambda: False)
+        monkeypatch.setattr(fixed, "has_interpreter", lambda: False)
     x, y = ca.SX.sym("x"), ca.SX.sym("y")
     given = (
         {"stops": ns.Stop(x - 0.9, 1, "out")}

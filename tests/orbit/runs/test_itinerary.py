@@ -18,7 +18,7 @@ def block() -> ns.FilippovSystem:
 
 
 def test_it_ends_where_a_simulation_does(block: ns.FilippovSystem) -> None:
-    arrival = ns.orbit.FixedItinerary(block, "- s", until="L_F2 h").arrive([-1.0, 0.0])
+    arrival = ns.orbit.FixedItinerary(block, "- s", until="lambda0 = -1").arrive([-1.0, 0.0])
     run = ns.simulate(block, [-1.0, 0.0], 9.0, tol=1e-13)
     assert run.itinerary.startswith("- s -") and not arrival.fault
     assert arrival.x == pytest.approx(run.events[1].x, rel=1e-12)
@@ -27,14 +27,14 @@ def test_it_ends_where_a_simulation_does(block: ns.FilippovSystem) -> None:
 
 
 def test_faults_name_the_guard_and_the_leg(block: ns.FilippovSystem) -> None:
-    late = ns.orbit.FixedItinerary(block, "- s", until="L_F2 h").arrive([1.0, -1.2])
+    late = ns.orbit.FixedItinerary(block, "- s", until="lambda0 = -1").arrive([1.0, -1.2])
     assert late.fault == ""
     crossing = ns.orbit.FixedItinerary(block, "- +", until="h0").arrive([-1.0, 0.0])
     assert crossing.fault.startswith("leg 1 (-): where mode '+' begins")
     assert "h0 > 0 fails" in crossing.fault
     # From x = -3 the belt is passed, so it cannot stick.
-    sticking = ns.orbit.FixedItinerary(block, "- s", until="L_F2 h").arrive([-3.0, 0.0])
-    assert "L_F1 h <= 0 of sliding fails" in sticking.fault
+    sticking = ns.orbit.FixedItinerary(block, "- s", until="lambda0 = -1").arrive([-3.0, 0.0])
+    assert "lambda0 <= 1 fails" in sticking.fault
 
 
 def test_its_derivative_is_that_of_the_map_whatever_the_guards_say(block) -> None:
@@ -53,7 +53,7 @@ def test_words_that_do_not_fit_are_refused(block: ns.FilippovSystem) -> None:
     with pytest.raises(ns.OptionError, match="itinerary"):
         ns.orbit.FixedItinerary(block, "- -", until="h0").arrive([-1.0, 0.0])
     with pytest.raises(ns.ConvergenceError, match="leg in mode"):
-        ns.orbit.FixedItinerary(block, "s", until="L_F1 h", t_max=1.0).arrive([0.0, 1.0])
+        ns.orbit.FixedItinerary(block, "s", until="lambda0 = 1", t_max=1.0).arrive([0.0, 1.0])
 
 
 def test_a_word_without_modes_is_refused(block: ns.FilippovSystem) -> None:

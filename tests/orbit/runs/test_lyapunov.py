@@ -1,19 +1,16 @@
 """Lyapunov exponents are those of closed forms: chaotic maps in flows, forced friction, linear decay."""
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.orbit.runs import lyapunov
+from tests.orbit.interrupts import interrupt
+from tests.orbit.periodic_cases import CASES, PARAMETERS
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
-}
 x, y, u, v, t, f, lam = (ca.SX.sym(s) for s in ("x", "y", "u", "v", "t", "f", "lam"))
 
 
@@ -22,7 +19,7 @@ def test_doubling_of_an_angle_by_squaring():
     clock, pull = ns.Clock(1.0, map=[u**2 - v**2, 2 * u * v]), (1 - u**2 - v**2) / 2
     system = ns.FilippovSystem([u, v], field=[u * pull, v * pull], clocks=clock)
     found = ns.lyapunov_spectrum(system, [math.cos(0.7), math.sin(0.7), 0.0], t_end=320.0)
-    truth = [float(value) for value in CASES["L2"]["values"]["spectrum"]]
+    truth = [float(value) for value in CASES["L2"]["spectrum"]]
     assert np.allclose(found.exponents, truth, rtol=0, atol=1e-9)
     assert np.all(found.errors < 1e-7) and found.t == pytest.approx(288.0)
     assert found.sum_check == pytest.approx(sum(truth), abs=1e-9)
@@ -40,7 +37,7 @@ def test_chebyshev_map_at_the_ticks_of_a_clock():
 
 def test_sum_of_forced_friction_is_that_of_its_closed_form():
     """D1: no sticking; the volume shrinks at the reversals only."""
-    p, values = CASES["D1"]["parameters"], CASES["D1"]["values"]
+    p, values = PARAMETERS["D1"], CASES["D1"]
     W = float(p["W"])
     system = ns.FilippovSystem(
         [x, v],
@@ -104,26 +101,16 @@ def test_lyapunov_spectra_are_saved(tmp_path):
         ({"t_end": 3.0}, ns.DegenerateError, "STOPPED"),
     ],
 )
-def test_what_cannot_be_counted_is_refused(options, error, message):
+def test_invalid_options_raise(options, error, message):
     system = ns.FilippovSystem([x], field=[1], stops=ns.Stop(x - 2))
     with pytest.raises(error, match=message):
         ns.lyapunov_spectrum(system, [0.0], **options)
 
 
-def test_interruption_keeps_what_was_counted(monkeypatch):
-    from nonsmooth.orbit.runs import lyapunov
-
+def test_an_interrupt_keeps_the_exponents_so_far(monkeypatch):
     clock = ns.Clock(1.0, map=[x / 2])
     system = ns.FilippovSystem([x], field=[0.0 * x], clocks=clock)
-    calls = iter(range(10**6))
-
-    def fly(*args):
-        if next(calls) > 100:
-            raise KeyboardInterrupt
-        return plain(*args)
-
-    plain = lyapunov.fly
-    monkeypatch.setattr(lyapunov, "fly", fly)
+    interrupt(monkeypatch, lyapunov, "fly", 101)
     found = ns.lyapunov_spectrum(system, [1.0, 0.0], t_end=200.0, transient=40.0, k=2)
     assert not found.complete and 10.0 <= found.t < 160.0 and "interrupted" in repr(found)
     assert np.allclose(np.sort(found.exponents), [-math.log(2), 0.0], atol=1e-9)

@@ -226,7 +226,7 @@ def test_derivatives_are_differences_of_runs(system, start, t_end, itinerary):
     assert of_end == pytest.approx(expected[-1], abs=1e-10)
 
 
-def test_what_has_no_derivative_is_refused():
+def test_accumulating_impacts_raise():
     accumulates = ns.FilippovSystem(
         [Y, W, V1, V2],
         field=[W, -1.0, -0.1 * L1, -0.1 * L2],

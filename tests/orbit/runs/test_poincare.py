@@ -1,25 +1,20 @@
 """Returns to a section and their derivatives are those of closed forms and of differences."""
 
-import json
 import math
-from pathlib import Path
 
 import casadi as ca
 import numpy as np
 import pytest
 
 import nonsmooth as ns
+from tests.orbit.periodic_cases import CASES, PARAMETERS
 
-CASES = {
-    case["id"]: case
-    for case in json.loads((Path(__file__).parents[2] / "data" / "orbits.json").read_text())
-}
 x, y, v, t, k0, s0, lam = (ca.SX.sym(s) for s in ("x", "y", "v", "t", "T", "S", "lam"))
 
 
 def test_welanders_box_returns_with_its_period_and_multiplier():
     """R5: from a start off the orbit; the derivative of a return has the orbit's multiplier and 0."""
-    p, values = CASES["R5"]["parameters"], CASES["R5"]["values"]
+    p, values = PARAMETERS["R5"], CASES["R5"]
     surface = -p["a"] * k0 + s0 - p["eps"]
     half = lambda k: [1 - k0 - k * k0, 0.5 * (1 - s0) - k * s0]
     box = ns.FilippovSystem([k0, s0], surface=surface, above=half(5), below=half(0))
@@ -79,10 +74,12 @@ def test_jacobians_of_returns_multiply():
         assert np.allclose(whole, product, atol=1e-9)
 
 
-def test_a_start_on_the_section_is_no_hit_and_hits_may_be_passed_over():
+def test_a_start_on_the_section_is_no_return_and_returns_can_be_skipped():
     circle = ns.FilippovSystem([x, y], field=[-y, x])
     found = ns.orbit.poincare(circle, y, [1.0, 0.0], count=2, skip=1)
-    assert np.allclose(found.t, [4 * math.pi, 6 * math.pi]) and "2 hits of section" in repr(found)
+    assert np.allclose(found.t, [4 * math.pi, 6 * math.pi]) and "2 returns to section" in repr(
+        found
+    )
     both = ns.orbit.poincare(circle, y, [1.0, 0.0], count=2, direction=0)
     assert np.allclose(both.points[:, 0], [-1.0, 1.0]) and both.run.status == ns.Status.STOPPED
 
@@ -96,7 +93,7 @@ def test_a_period_may_be_an_expression_in_parameters():
     assert np.allclose(found.jacobian(2), [[math.exp(-0.5)]], atol=1e-12)
 
 
-def test_a_run_that_ends_before_has_fewer_hits(tmp_path):
+def test_a_run_that_ends_early_has_fewer_returns(tmp_path):
     away = ns.FilippovSystem([x, y], field=[-y, x], stops=ns.Stop(x + 0.5, -1))
     found = ns.orbit.poincare(away, x, [1.0, 0.0], count=4, direction=0)
     assert len(found.t) == 1 and found.run.events[-1].name == "stop"
@@ -106,3 +103,10 @@ def test_a_run_that_ends_before_has_fewer_hits(tmp_path):
     again = ns.load(tmp_path / "orbit")
     assert np.array_equal(again.points, found.points)
     assert np.array_equal(again.jacobian(0), found.jacobian(0))
+
+
+@pytest.mark.parametrize("name", ["h7", "7", "lambda0"])
+def test_a_stop_may_have_a_name_like_that_of_a_surface(name):
+    system = ns.FilippovSystem([x, v], field=[v, -x], resets=[ns.Reset(x, [x, 0.5 * v], name=name)])
+    found = ns.orbit.poincare(system, name, [1.0, 0.0], count=2)
+    assert np.allclose(found.points[:, 1], [-1.0, 0.5], atol=1e-9)

@@ -74,7 +74,12 @@ def truth():
 def run():
     found = ns.simulate(pushed_block(), [*START.values(), 0.0], 9.0, tol=1e-14)
     kinds = [(event.kind, event.name) for event in found.events[:4]]
-    assert kinds == [("entry", "h0"), ("exit", "L_F1 h"), ("reset", "clock"), ("reset", "wall")]
+    assert kinds == [
+        ("entry", "h0"),
+        ("exit", "lambda0 = 1"),
+        ("reset", "clock"),
+        ("reset", "wall"),
+    ]
     assert found.status is ns.Status.STOPPED
     return found
 

@@ -1,7 +1,6 @@
 """The picture of a run shows its states, modes and events, and refuses what is not a run."""
 
 import casadi as ca
-import matplotlib
 import numpy as np
 import pytest
 from numpy.testing import assert_allclose
@@ -112,16 +111,6 @@ def test_backward_and_empty_runs_are_drawn():
     stuck = ns.simulate(ns.FilippovSystem([x], surface=x, above=[1], below=[-1]), [0.0], t_end=1.0)
     assert stuck.status is ns.Status.NON_UNIQUE
     ns.plot.trajectory(stuck)
-
-
-@pytest.mark.slow
-def test_global_settings_are_left_alone_and_files_are_written(run, tmp_path):
-    before = dict(matplotlib.rcParams)
-    figure = ns.plot.trajectory(run)
-    assert dict(matplotlib.rcParams) == before
-    for suffix, start in (("png", b"\x89PNG"), ("pdf", b"%PDF-"), ("svg", b"<?xml")):
-        figure.savefig(tmp_path / f"run.{suffix}")
-        assert (tmp_path / f"run.{suffix}").read_bytes().startswith(start)
 
 
 def test_wrong_input_is_refused(run):

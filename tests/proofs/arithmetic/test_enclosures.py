@@ -7,7 +7,7 @@ import pytest
 from flint import arb
 
 import nonsmooth as ns
-from nonsmooth.proofs.arithmetic.instructions import Program, Tape
+from nonsmooth.proofs.arithmetic.instructions import ExpressionGraph, Program
 from nonsmooth.proofs.arithmetic.interval_arrays import Intervals, evaluate_many
 from nonsmooth.proofs.arithmetic.intervals import Enclosures, between, ends, exact, precision
 from tests.proofs.random_graphs import Exact, Undefined, expression
@@ -15,12 +15,12 @@ from tests.proofs.random_graphs import Exact, Undefined, expression
 DIGITS = 40
 
 
-def on_tape(f, symbols):
+def program_of(f, symbols):
     """A program of an expression's value and gradient."""
-    tape = Tape()
-    inputs = [tape.symbol(0, i) for i in range(len(symbols))]
-    ((root,),) = tape.insert([f], [ca.vertcat(*symbols)], [inputs])
-    return Program(tape, [[root], tape.gradient(root, inputs)])
+    graph = ExpressionGraph()
+    inputs = [graph.symbol(0, i) for i in range(len(symbols))]
+    ((root,),) = graph.insert([f], [ca.vertcat(*symbols)], [inputs])
+    return Program(graph, [[root], graph.gradient(root, inputs)])
 
 
 def check_random_expressions(seed, graphs, samples):
@@ -30,7 +30,7 @@ def check_random_expressions(seed, graphs, samples):
     slack = mpmath.mpf(10) ** (8 - DIGITS)
     for _ in range(graphs):
         f = expression(rng, symbols)
-        program = on_tape(f, symbols)
+        program = program_of(f, symbols)
         middle, half = rng.normal(size=3), 10.0 ** rng.uniform(-4, 0, size=3)
         low, high = middle - half, middle + half
         box = [between(exact(a), exact(b)) for a, b in zip(low, high, strict=True)]
@@ -72,7 +72,7 @@ def test_gradients_are_those_of_mpmath():
     symbols = [ca.SX.sym(s) for s in "xyz"]
     for _ in range(60):
         f = expression(rng, symbols)
-        program, point = on_tape(f, symbols), rng.normal(size=3)
+        program, point = program_of(f, symbols), rng.normal(size=3)
 
         def value(*p, program=program):
             return program(Exact(list(p)))[0][0]
@@ -95,7 +95,7 @@ def test_gradients_are_those_of_mpmath():
 def test_constants_are_not_folded():
     """CasADi's own derivative of 0.1*(0.3*x*x) is 0.06*x; the true one has the factor 2*0.1*0.3."""
     x = ca.SX.sym("x")
-    program = on_tape(0.1 * (0.3 * x * x), [x])
+    program = program_of(0.1 * (0.3 * x * x), [x])
     with precision(200):
         ((_,), (slope,)) = program(Enclosures([[arb(1)]]))
         truth = 2 * exact(0.1) * exact(0.3)
@@ -106,12 +106,12 @@ def test_constants_are_not_folded():
 
 def test_written_constants_are_decimals():
     x = ca.SX.sym("x")
-    program = on_tape(x - 0.1, [x])
+    program = program_of(x - 0.1, [x])
     with precision(200):
         stored = program(Enclosures([[arb(0)]], "stored"))[0][0]
-        written = program(Enclosures([[arb(0)]], "written"))[0][0]
+        decimal = program(Enclosures([[arb(0)]], "written"))[0][0]
     assert ends(stored) == (-exact(0.1),) * 2
-    low, high = ends(written)
+    low, high = ends(decimal)
     assert low <= exact("-0.1") <= high and not low <= -exact(0.1) <= high
 
 
@@ -139,7 +139,7 @@ def test_jumps_of_parameters_are_refused(op):
 )
 def test_across_a_jump_or_a_pole_nothing_finite_is_returned(f, box):
     x = ca.SX.sym("x")
-    program = on_tape(f(x), [x])
+    program = program_of(f(x), [x])
     (value,), (slope,) = program(Enclosures([[between(*map(exact, box))]]))
     assert not (value.is_finite() and slope.is_finite())
     x = Intervals(np.float64(box[0]), np.float64(box[1]))

@@ -1,4 +1,4 @@
-"""Orbits are proven: closed forms lie in their enclosures, doubtful ones are not proven."""
+"""Proven orbits enclose closed forms; undecided ones are not proven."""
 
 import casadi as ca
 import mpmath
@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from nonsmooth.proofs.orbits.itinerary import Journey
+from nonsmooth.proofs.orbits.itinerary import OrbitEnclosure
 
 x, v, w = (ca.SX.sym(s) for s in ("x", "v", "w"))
 
@@ -180,15 +180,15 @@ def test_a_guard_is_not_followed_over_its_jump():
 
 def test_an_interrupt_ends_the_proof_with_what_was_proven(monkeypatch):
     s = ns.FilippovSystem([x, v], surface=v - 0.5, above=[v, -x - 1], below=[v, 1 - x])
-    journey = Journey
-    travel, calls = journey.travel, []
+    orbit = OrbitEnclosure
+    step_through, calls = orbit.step_through, []
 
     def interrupted(self, t_end):
         calls.append(1)
         if len(calls) == 2:
             raise KeyboardInterrupt
-        return travel(self, t_end)
+        return step_through(self, t_end)
 
-    monkeypatch.setattr(journey, "travel", interrupted)
+    monkeypatch.setattr(orbit, "step_through", interrupted)
     orbit = ns.certify_orbit(s, [0, 0], t_end=3)
     assert len(calls) == 2 and orbit.why == "interrupted" and not orbit.proven

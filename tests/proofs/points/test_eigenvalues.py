@@ -1,4 +1,4 @@
-"""Points of rest get the name of eigenvalues known in closed form, and none where a sign is undecided."""
+"""Equilibria have the kind of eigenvalues known in closed form, and none if a sign is undecided."""
 
 import math
 

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from benchmarks import theorems
+from benchmarks import proof_checks
 
 x, y, z = (ca.SX.sym(s) for s in "xyz")
 BOX = [(-1.5, 1.5), (-1.5, 1.5), (-1.0, 1.0)]
@@ -86,13 +86,13 @@ def test_planar_points():
 
 @pytest.mark.slow
 def test_newton_finds_nothing_that_is_not_proven():
-    assert theorems.lists(seed=3, systems=4, starts=15).sound
+    assert proof_checks.lists(seed=3, systems=4, starts=15).sound
 
 
 @pytest.mark.slow
 def test_newton_finds_nothing_in_60_random_systems():
     """All 500 are in the benchmark: ``python -m benchmarks --only theorems``."""
-    found = theorems.lists(seed=5, systems=60, starts=100)
+    found = proof_checks.lists(seed=5, systems=60, starts=100)
     assert found.sound and found.zeros > 60, found
 
 

@@ -17,6 +17,7 @@ import signal
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -61,7 +62,7 @@ class Compilation:
 
     def __init__(self, quiet: bool = False) -> None:
         self.quiet, self.stopped, self.hangs = quiet, False, False
-        self._process: subprocess.Popen[str] | None = None
+        self._process: subprocess.Popen[bytes] | None = None
 
     def stop(self) -> None:
         """End the compiler that runs, and let none begin."""
@@ -74,33 +75,34 @@ class Compilation:
         if self.stopped:
             return "stopped"
         name = "ziglang" if "ziglang" in command[:3] else command[0]
-        try:
-            process = subprocess.Popen(
-                command,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                stderr=subprocess.PIPE,
-                text=True,
-                errors="replace",
-                start_new_session=True,  # of which all processes can be ended together
-            )
-        except (OSError, ValueError) as error:
-            return str(error)
-        self._process = process
-        with process:
+        with tempfile.TemporaryFile() as errors:
             try:
-                if self.stopped:
-                    self.stop()
-                errors = _errors(process, "" if self.quiet else name)
-            except BaseException as error:
-                _end(process)
-                if not isinstance(error, subprocess.TimeoutExpired):
-                    raise
-                self.hangs = True
-                return _no_end()
-        if not process.returncode:
-            return ""
-        return errors.strip() or f"exit status {process.returncode} and no word about why"
+                process = subprocess.Popen(
+                    command,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    stderr=errors,
+                    start_new_session=True,  # of which all processes can be ended together
+                )
+            except (OSError, ValueError) as error:
+                return str(error)
+            self._process = process
+            with process:
+                try:
+                    if self.stopped:
+                        self.stop()
+                    _wait(process, "" if self.quiet else name)
+                except BaseException as error:
+                    _end(process)
+                    if not isinstance(error, subprocess.TimeoutExpired):
+                        raise
+                    self.hangs = True
+                    return _no_end()
+            if not process.returncode:
+                return ""
+            errors.seek(0)
+            text = errors.read().decode(errors="replace").strip()
+        return text or f"exit status {process.returncode} and no word about why"
 
 
 def library_key(source: str, command: Command, flags: Sequence[str] = ()) -> str:
@@ -212,25 +214,36 @@ def _compile(
         shutil.rmtree(work, ignore_errors=True)
 
 
-def _errors(process: subprocess.Popen[str], name: str) -> str:
-    """What a compiler says; if it has a name and takes long, that is said on stderr."""
+def _wait(process: subprocess.Popen[bytes], name: str) -> None:
+    """Wait for a compiler; if it has a name and takes long, that is said on stderr."""
     if not name:
-        return process.communicate(timeout=_LONGEST)[1]
+        _poll(process, _LONGEST)
+        return
     try:
-        return process.communicate(timeout=_QUIET)[1]
+        _poll(process, _QUIET)
+        return
     except subprocess.TimeoutExpired:
         _say(f"nonsmooth: compiling a fast engine with {name} (once; it is kept) ... ")
     try:
-        return process.communicate(timeout=_LONGEST)[1]
+        _poll(process, _LONGEST)
     finally:
         _say("done\n" if process.returncode == 0 else "failed\n")
+
+
+def _poll(process: subprocess.Popen[bytes], seconds: float) -> None:
+    """Wait for the end of a process; ``Popen.wait`` would delay Ctrl-C by 0.25 s."""
+    end = time.monotonic() + seconds
+    while process.poll() is None:
+        if time.monotonic() > end:
+            raise subprocess.TimeoutExpired(process.args, seconds)
+        time.sleep(0.005)
 
 
 def _no_end() -> str:
     return f"no end within {_LONGEST:g} s"
 
 
-def _end(process: subprocess.Popen[str]) -> None:
+def _end(process: subprocess.Popen[bytes]) -> None:
     """End a compiler and what it has started."""
     try:
         os.killpg(process.pid, signal.SIGKILL)

@@ -83,11 +83,7 @@ def interpreter_source() -> str:
     """C of the interpreter, which knows no system."""
     driver = _driver(f"#define P {MOST_ORDER}\n", "", "")
     flows = [driver_text("interpreter/flow.c"), _extended("programs.h", "flow.c")]
-    own = [
-        driver_text(f"interpreter/{name}")
-        for name in ("fixed.c", "orbit.c", "branches.c", "multipliers.c")
-    ]
-    return "".join([driver, *flows, *own])
+    return "".join([driver, *flows, driver_text("interpreter/fixed.c")])
 
 
 def special_source(tape: Tape, coupled: Coupled, order: int) -> str:

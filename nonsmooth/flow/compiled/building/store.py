@@ -80,7 +80,7 @@ def _fault(folder: Path) -> str:
     facts = os.lstat(folder)
     if not stat.S_ISDIR(facts.st_mode):
         return f"{folder} is no folder"
-    why = files.fault(facts)
+    why = files.writable_by_others(facts)
     if why and facts.st_uid == getattr(os, "geteuid", int)() and _is_ours(folder):
         folder.chmod(0o700)  # of an earlier version, or of a generous umask
         why = ""

@@ -47,7 +47,7 @@ static void count_hit(Run *r, int kind, int guard, int index, int side, const do
   if (r->hits <= o->hit_skip || (r->hits - o->hit_skip) % o->hit_every) return;
   sample(r, r->t, o->hit_after ? r->x : x);
   if (o->hit_count && r->hits >= o->hit_skip + o->hit_every * o->hit_count)
-    finish(r, STOPPED, LOOKED_AT, (int)o->hit_count);
+    finish(r, STOPPED, SAMPLED, (int)o->hit_count);
 }
 
 static void limit_of_events(Run *r);
@@ -83,7 +83,7 @@ static void event(Run *r, int kind, int before, int guard, const double *x) {
   if (r->event_count >= r->o.max_events) finish(r, TOO_MANY_EVENTS, NO_REASON, 0);
 }
 
-/* nonsmooth/flow/reference/bookkeeping.py */
+/* nonsmooth/flow/reference/driver.py */
 static double interval_back(const Run *r, int back) { return r->interval[(r->history - back) % HISTORY]; }
 static int64_t pattern_back(const Run *r, int back) { return r->pattern[(r->history - back) % HISTORY]; }
 

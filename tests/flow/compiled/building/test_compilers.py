@@ -164,9 +164,11 @@ def test_an_interrupt_ends_the_compiler_and_leaves_nothing(monkeypatch, tmp_path
     real = subprocess.Popen
 
     class Interrupted(real):
-        def communicate(self, *args, **options):
-            started.append(self)
-            raise KeyboardInterrupt
+        def poll(self):
+            if self not in started:
+                started.append(self)
+                raise KeyboardInterrupt
+            return super().poll()
 
     monkeypatch.setattr(subprocess, "Popen", Interrupted)
     with pytest.raises(KeyboardInterrupt):

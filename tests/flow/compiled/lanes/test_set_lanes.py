@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
-from benchmarks import space
+from benchmarks import bounces_in_space
 from nonsmooth.flow.compiled.lanes.engine import lanes_for
 from nonsmooth.flow.compiled.tape import tape_for
 from nonsmooth.flow.options import Options
@@ -59,7 +59,7 @@ def test_random_landings_agree_with_the_interpreter():
 @pytest.mark.slow
 @pytest.mark.parametrize("kind", ["linear", "nonlinear"])
 def test_mirror_images_are_mirrored_to_the_bit_and_turned_starts_turn(kind):
-    system, x = space.system(kind), space.starts(400)
+    system, x = bounces_in_space.system(kind), bounces_in_space.starts(400)
     pairs = np.array([[0, 2], [1, 3], [6, 7]])  # places, speeds and slip along the two directions
 
     def turned(x, by):

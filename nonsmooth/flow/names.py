@@ -1,0 +1,50 @@
+"""Names and kinds of events as users see them: made here only, compared whole, never taken apart."""
+
+from __future__ import annotations
+
+from ..model import FilippovSystem, Guard
+
+
+def guard_name(system: FilippovSystem, guard: Guard) -> str:
+    """Name of a guard: of a surface, of an end of sliding, or as the definition names an event."""
+    k, kind = guard.element, guard.kind
+    if kind in ("stop", "reset"):
+        return (system.stops if kind == "stop" else system.resets)[k][0]
+    if kind == "zero":
+        return f"f{k}"
+    if k >= len(system.entries):
+        return system.impacts[k - len(system.entries)]
+    if kind in ("surface", "near"):
+        return f"h{k}"
+    if len(system.entries[k]) > 1:
+        return f"|lambda{k}| = 1"
+    return f"lambda{k} = {guard.side}" if guard.side else "stability of sliding"
+
+
+def described(system: FilippovSystem, guard: Guard) -> str:
+    """A guard's condition in words."""
+    k, name = guard.element, guard_name(system, guard)
+    if guard.kind == "surface":
+        return f"h{k} {'>' if guard.side > 0 else '<'} 0"
+    if guard.kind == "exit":
+        return f"lambda{k} {'<= 1' if guard.side > 0 else '>= -1'}"
+    of = {"impact": "gap", "release": "reaction"}.get(guard.kind)
+    return f"the {of} of {name!r} >= 0" if of else name
+
+
+def event_name(system: FilippovSystem, mode: str, kind: str, element: int, side: int = 0) -> str:
+    """Name of the event of a kind that ends a mode."""
+    if element < 0:
+        return kind
+    guards = {"s": "exit", "+": "surface", "-": "surface", "*": "near"}
+    own = kind if kind in ("stop", "reset") else guards.get(mode[element:][:1], kind)
+    return guard_name(system, Guard(own, element, side, element))
+
+
+def change(before: str, after: str) -> str:
+    """Kind of the event by which one mode follows another."""
+    closed = after.count("c") - before.count("c")
+    if closed:
+        return "contact" if closed > 0 else "release"
+    more = after.count("s") - before.count("s")
+    return "entry" if more > 0 else ("exit" if more < 0 else "crossing")

@@ -1,0 +1,84 @@
+"""Systems derived from a system: with a Poincare section, or reversed in time."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from itertools import chain, count
+from typing import Any
+
+import casadi as ca
+
+from ..cache import Content
+from ..errors import DefinitionError
+from .parse_definition import read_function
+from .system import FilippovSystem
+
+#: Name of the section of a system that was given one.
+SECTION = "section"
+
+
+def _changed(system: FilippovSystem, **changes: Any) -> FilippovSystem:
+    """A system with some parts of its definition replaced."""
+    changed = FilippovSystem.__new__(FilippovSystem)
+    state = replace(system.definition, **changes).state()
+    changed.__setstate__({**state, "lifted": system.lifted})
+    return changed
+
+
+def reversed_system(system: FilippovSystem) -> FilippovSystem:
+    """Return the system with all fields reversed, without its stops."""
+    for what, found in (
+        ("explicit time", system.time_dependent),
+        ("resets", system.resets),
+        ("impacts", system.impacts),
+    ):
+        if found:
+            raise DefinitionError(
+                f"system: {system!r} has {what} and cannot be reversed in time. "
+                "nonsmooth.flow.follow runs one smooth mode backward."
+            )
+    d = system.definition
+    return system.cached(
+        "reversed", lambda: _changed(system, field=-d.field, guards=d.guards[:0], stops=())
+    )
+
+
+def with_section(system: FilippovSystem, function: Any, direction: int) -> FilippovSystem:
+    """Return the system with a last reset, at a function's zeros, that does not change the state."""
+    d = system.definition
+    h = read_function(d, function, SECTION)
+    if not ca.depends_on(h, d.extended_states):
+        raise DefinitionError(f"section: expected a function of the states, received {h}.")
+    known = ca.vertcat(d.extended_states, d.parameters)
+    taken = {*d.impacts, *(n for n, _ in (*d.stops, *d.resets))}
+    numbered = (f"{SECTION} {k}" for k in count(2))
+    name = next(n for n in chain([SECTION], numbered) if n not in taken)
+
+    def build() -> FilippovSystem:
+        guards = ca.vertcat(d.guards, h) if d.guards.numel() else h
+        maps = ca.horzcat(d.maps, d.states) if d.resets else d.states
+        return _changed(system, guards=guards, maps=maps, resets=(*d.resets, (name, direction)))
+
+    return system.cached((SECTION, Content([known], h), direction), build)
+
+
+def surface_of(system: FilippovSystem, function: Any) -> tuple[str, int] | None:
+    """Name of the surface h = 0 with h = +-function, and that sign; components of a set do not count."""
+    for i in range(system.surface_count):
+        if i in system.set_of:
+            continue
+        for sign in (1, -1):
+            h, other = system.surface_function(i), sign * ca.SX(function)
+            if ca.is_equal(h, other, 20) or _vanishes(ca.simplify(h - other)):
+                return system.surface_names[i], sign
+    return None
+
+
+def _vanishes(expression: ca.SX) -> bool:
+    """Whether a linear expression is zero after simplification."""
+    symbols = ca.vertcat(*ca.symvar(expression))
+    if not ca.is_linear(expression, symbols):
+        return False
+    slope = ca.simplify(ca.jacobian(expression, symbols))
+    rest = ca.simplify(ca.substitute(expression, symbols, ca.SX.zeros(symbols.numel(), 1)))
+    return bool(slope.is_zero() or ca.densify(slope).is_zero()) and bool(rest.is_zero())

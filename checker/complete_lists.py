@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from intervals import CheckError, Iv, whole
+from intervals import CheckError, Iv, number, whole
 from special_points import Equations, Matrix, check, inverse, krawczyk
 
 _PIECES, _SMALLEST = 20_000, 1e-9
@@ -14,8 +14,8 @@ _PIECES, _SMALLEST = 20_000, 1e-9
 def check_cover(ranges: list[list[str]], records: list[dict[str, Any]]) -> str:
     """Check that the pieces of the records are the whole of the ranges."""
     # They are where they lie inside, do not overlap, and have its volume.
-    whole_box = [(Fraction(a), Fraction(b)) for a, b in ranges]
-    pieces = [[(Fraction(a), Fraction(b)) for a, b in _ranges(r)] for r in records]
+    whole_box = [(number(a), number(b)) for a, b in ranges]
+    pieces = [[(number(a), number(b)) for a, b in _ranges(r)] for r in records]
     wide = [k for k, (a, b) in enumerate(whole_box) if a < b]
     volume = Fraction(0)
     for n, piece in enumerate(pieces):

@@ -5,7 +5,7 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
-from intervals import CheckError, Iv, whole
+from intervals import CheckError, Iv, number, whole
 from mean_value_forms import States, span
 from modes import Modes
 from polynomials import is_factored
@@ -14,6 +14,9 @@ from zeros import UnsureError, first_zero, passed, slope, value
 
 UNIT = whole(1).a
 _HALVINGS = 40
+
+#: Numbers have no more digits than this.
+_DIGITS = 192
 
 #: Ranges of the start and of the parameters.
 Box = list[tuple[Fraction, Fraction]]
@@ -40,7 +43,7 @@ class Orbit:
         self.modes, self._factored = Modes(record), set[str]()
         self.signs, self.zeros = dict[int, int](), dict[tuple[str, int], int]()
         claimed = [e["t"] for e in record["events"]] + list(record["end"])
-        widths = [Fraction(b) - Fraction(a) for a, b in claimed]
+        widths = [number(b) - number(a) for a, b in claimed]
         self._digits(max((b - a for a, b in box), default=Fraction(0)), widths)
         self.mode = self.modes.start(self.x, self.p, box)
         if self.modes.start_surface is not None and "s" not in self.mode:
@@ -51,7 +54,7 @@ class Orbit:
         """Set tolerance and order of the steps by the digits that are claimed."""
         finest = min([w for w in widths if w > wide / 10**6], default=Fraction(1, 10**20))
         digits = len(str(int(1 / finest)))
-        digits = min(60, max(16, digits + 6)) if not wide else digits + 6
+        digits = min(60, max(16, digits + 6)) if not wide else min(_DIGITS, digits + 6)
         self.tolerance, self.order = 10.0**-digits, max(16, int(0.8 * digits))
 
     @property

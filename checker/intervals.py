@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable
 from fractions import Fraction
 from math import isqrt
@@ -10,9 +11,30 @@ from typing import Any
 BITS = 640
 ONE = 1 << BITS
 
+#: Products and quotients are below two to this power.
+_LARGE = 1 << 16
+_LIMIT = 1 << (_LARGE + BITS)
+_SQUARED = _LIMIT << BITS
+
+#: Numbers in texts; one such as 1e999999999 would fill the memory.
+_NUMBER = re.compile(
+    r"[-+]?[0-9]{1,4000}/[0-9]{1,4000}|[-+]?[0-9]{1,4000}(\.[0-9]{0,4000})?([eE][-+]?[0-9]{1,4})?"
+)
+
 
 class CheckError(Exception):
     """A claim that is false or cannot be checked."""
+
+
+def number(value: Any) -> Fraction:
+    """An exact number of a record: a whole number, a double, or a fraction or decimals as a text."""
+    known = type(value) in (int, float, Fraction)
+    if isinstance(value, str):
+        known = bool(_NUMBER.fullmatch(value))
+    try:
+        return Fraction(value if known else None)
+    except (ArithmeticError, ValueError, TypeError) as error:
+        raise CheckError(f"a number is written as {str(value)[:50]!r}") from error
 
 
 class Iv:
@@ -25,7 +47,9 @@ class Iv:
 
     @staticmethod
     def of(low: Any, high: Any = None) -> Iv:
-        p, q = Fraction(low), Fraction(low if high is None else high)
+        p, q = number(low), number(low if high is None else high)
+        if p > q:
+            raise CheckError("an interval has its ends in the wrong order")
         return Iv(p.numerator * ONE // p.denominator, -(-q.numerator * ONE // q.denominator))
 
     def __add__(self, o: Iv) -> Iv:
@@ -46,17 +70,25 @@ class Iv:
         else:
             p = (a * c, a * d, b * c, b * d)
             low, high = min(p), max(p)
+        if low < -_SQUARED or high > _SQUARED:
+            raise CheckError(f"a number is larger than 2^{_LARGE}")
         return Iv(low >> BITS, -(-high >> BITS))
 
     def __truediv__(self, o: Iv) -> Iv:
         if o.a <= 0 <= o.b:
             raise CheckError("a division by an interval that contains zero")
         p = [(n << BITS, d) for n in (self.a, self.b) for d in (o.a, o.b)]
-        return Iv(min(n // d for n, d in p), max(-(-n // d) for n, d in p))
+        low, high = min(n // d for n, d in p), max(-(-n // d) for n, d in p)
+        if low < -_LIMIT or high > _LIMIT:
+            raise CheckError(f"a number is larger than 2^{_LARGE}")
+        return Iv(low, high)
 
     def sq(self) -> Iv:
         low = 0 if self.a <= 0 <= self.b else min(self.a * self.a, self.b * self.b) >> BITS
-        return Iv(low, -(-max(self.a * self.a, self.b * self.b) >> BITS))
+        high = max(self.a * self.a, self.b * self.b)
+        if high > _SQUARED:
+            raise CheckError(f"a number is larger than 2^{_LARGE}")
+        return Iv(low, -(-high >> BITS))
 
     def sign(self) -> int:
         return 1 if self.a > 0 else -1 if self.b < 0 else 0

@@ -6,11 +6,14 @@ from fractions import Fraction
 from typing import Any
 
 from derivatives import D, run
-from intervals import CheckError, Iv, whole
+from intervals import CheckError, Iv, number, whole
 
 #: States and parameters.
 At = tuple[list[Iv], list[Iv]]
 UNIT = whole(1).a
+
+#: Rational numbers of more bits are not kept.
+_BITS = 1 << 16
 
 
 class Modes:
@@ -202,7 +205,7 @@ def _rational(
     values: list[Fraction | None] = []
     for op, *rest in graph["nodes"]:
         if op == "const":
-            values.append(Fraction(rest[0]))
+            values.append(number(rest[0]))
         elif op == "input":
             values.append(inputs[rest[0]][rest[1]] if rest[0] < 2 else None)
         elif op == "power":
@@ -210,6 +213,9 @@ def _rational(
             values.append(None if a is None else a ** rest[1])
         else:
             values.append(_exactly(op, [values[k] for k in rest]))
+        known = values[-1]
+        if known is not None and max(abs(known.numerator), known.denominator).bit_length() > _BITS:
+            values[-1] = None
     return values
 
 

@@ -7,7 +7,8 @@ from itertools import islice, product
 from typing import Any
 
 from integration import UNIT, Box, Orbit
-from intervals import CheckError, Iv
+from intervals import CheckError, Iv, number
+from records import require_orbit
 
 FORMAT = "nonsmooth orbit 1"
 _STEPS, _PIECES, _PATIENT, _CORNERS = 4000, 64, 4, 8
@@ -24,7 +25,8 @@ def check_orbit(record: dict[str, Any]) -> str:
         raise CheckError(f"expected the format {FORMAT!r}, received {record.get('format')!r}")
     if not record["proven"]:
         raise CheckError("the orbit is not claimed to be proven")
-    box = [(Fraction(a), Fraction(b)) for a, b in (*record["start"], *record["parameters"])]
+    require_orbit(record)
+    box = [(number(a), number(b)) for a, b in (*record["start"], *record["parameters"])]
     if any(a > b for a, b in box):
         raise CheckError("a range is empty")
     todo, pieces, steps = [box], 0, 0
@@ -100,7 +102,7 @@ def _compare(
 
 def _inside(values: list[Iv], claims: list[list[str]], what: str) -> None:
     for v, claim in zip(values, claims, strict=True):
-        low, high = (Fraction(c) for c in claim)
+        low, high = (number(c) for c in claim)
         a, b = Fraction(v.a, UNIT), Fraction(v.b, UNIT)
         if b < low or high < a:
             raise RefutedError(f"{what} is not where it is claimed to be")

@@ -5,6 +5,11 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Any
 
+from intervals import CheckError, number
+
+#: Products of so many terms, and coefficients of so many bits, are not computed.
+_TERMS, _BITS = 1_000_000, 1 << 16
+
 Monomial = tuple[tuple[Any, int], ...]
 Polynomial = dict[Monomial, Fraction]
 
@@ -21,6 +26,8 @@ def add(a: Polynomial, b: Polynomial, sign: int) -> Polynomial:
 
 def times(a: Polynomial, b: Polynomial) -> Polynomial:
     """a b."""
+    if len(a) * len(b) > _TERMS:
+        raise CheckError(f"a polynomial has more than {_TERMS} terms")
     result: Polynomial = {}
     for m, c in a.items():
         for n, d in b.items():
@@ -29,6 +36,8 @@ def times(a: Polynomial, b: Polynomial) -> Polynomial:
                 powers[atom] = powers.get(atom, 0) + k
             key = tuple(sorted(powers.items(), key=repr))
             result[key] = result.get(key, Fraction(0)) + c * d
+            if max(abs(result[key].numerator), result[key].denominator).bit_length() > _BITS:
+                raise CheckError(f"a coefficient has more than {_BITS} bits")
             if result[key] == 0:
                 del result[key]
     return result
@@ -43,7 +52,7 @@ def polynomials(
         if nodes is not None and k not in nodes:
             values.append({})
         elif op == "const" or (op == "input" and rest[0] == 3 and signs):
-            c = Fraction(rest[0]) if op == "const" else Fraction(signs[rest[1]])
+            c = number(rest[0]) if op == "const" else Fraction(signs[rest[1]])
             values.append({(): c} if c else {})
         elif op in ("add", "sub"):
             values.append(add(values[rest[0]], values[rest[1]], 1 if op == "add" else -1))

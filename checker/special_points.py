@@ -7,8 +7,9 @@ from typing import Any
 
 from derivatives import D, run
 from equilibria import equilibrium, pseudo_equilibrium
-from intervals import CheckError, Iv, whole
+from intervals import CheckError, Iv, number, whole
 from polynomials import is_multiple
+from records import require_point
 from series import along_field
 
 FORMAT = "nonsmooth proof 1"
@@ -21,6 +22,7 @@ class Equations:
     def __init__(self, record: dict[str, Any]):
         if record.get("format") != FORMAT:
             raise CheckError(f"expected the format {FORMAT!r}, received {record.get('format')!r}")
+        require_point(record)
         self.record, self.graph = record, record["graph"]
         self.n, self.unknowns = record["states"], [tuple(u) for u in record["unknowns"]]
         self.extra = sum(vector == 2 for vector, _ in self.unknowns)
@@ -216,7 +218,7 @@ def _kind(equations: Equations, record: dict[str, Any], point: list[Iv]) -> None
 def _point(equations: Equations, record: dict[str, Any], box: list[Iv]) -> tuple[list[Iv], bool]:
     """An enclosure of the zero near the claimed one, proven again in a small box around it."""
     claimed = [Iv.of(*pair) for pair in record["point"]]
-    if all(Fraction(a) == Fraction(b) for a, b in record["point"]):
+    if all(number(a) == number(b) for a, b in record["point"]):
         f, _ = equations.system(claimed)
         within = all(b.a <= c.a and c.b <= b.b for c, b in zip(claimed, box, strict=True))
         if within and all(v.zero for v in f):

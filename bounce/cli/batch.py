@@ -15,6 +15,7 @@ from tqdm import tqdm
 
 import nonsmooth as ns
 
+from ..golf.fits.columns import LARGEST
 from ..units import Landing
 from .report import Units, opening, print_json
 from .starts import Start, read_starts
@@ -143,10 +144,15 @@ def _kept(args: argparse.Namespace, starts: Sequence[Start], report: Report) -> 
     """Read the rows of an earlier output; its first and last results must come out again."""
     if not os.path.exists(args.output):
         return _Kept([], [], 0)
-    with open(args.output, newline="", encoding="utf-8") as file:
-        text = file.read()
-    whole = text[: text.rfind("\n") + 1]
-    lines = list(csv.reader(io.StringIO(whole)))
+    try:
+        with open(args.output, newline="", encoding="utf-8") as file:
+            text = file.read(LARGEST + 1)
+        whole = text[: text.rfind("\n") + 1]
+        lines = list(csv.reader(io.StringIO(whole)))
+    except (ValueError, csv.Error) as error:
+        raise _others(args, f"what is no CSV ({error})") from error
+    if len(text) > LARGEST or any(len(line) != len(lines[0]) for line in lines):
+        raise _others(args, f"more than {LARGEST} characters, or rows of different lengths")
     names = lines[0] if lines else []
     if not lines or names == _BARE:  # nothing, or nothing but errors: the names were not known
         return _Kept([], [], 0)

@@ -130,7 +130,18 @@ class Chunk:
 
 
 @dataclass(frozen=True, repr=False)
-class Ensemble(Savable):
+class Ensemble(
+    Savable,
+    x="... n nan",
+    t="... nan",
+    status="... status",
+    itinerary_code="... <itineraries",
+    events="...",
+    event_x="... n nan",
+    event_t="... nan",
+    sample_x="... k n nan",
+    sample_t="... k nan",
+):
     """Results, each of the shape ``(...)`` of the broadcast starts and parameters.
 
     Attributes

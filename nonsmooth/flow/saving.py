@@ -8,38 +8,47 @@ and the classes registered here.
 from __future__ import annotations
 
 import dataclasses
-import io
 import json
+import math
 import os
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any, Self, TypeVar
-from zipfile import BadZipFile
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..model import FilippovSystem, LiftedSwitch, OptionError
-from . import files
+from ..model import FilippovSystem, LiftedSwitch, NonsmoothError, OptionError, instruction_form
+from . import archive, files
+from .schema import Schema, Validator
 from .status import Status
 
-_FORMAT = 1
+_FORMAT = 2
 _FIELDS: dict[str, type[Any]] = {}
+_SCHEMAS: dict[type[Any], Schema] = {}
 C = TypeVar("C", bound=type[Any])
 
+#: Longest axis of an array; one beside an axis of length zero costs nothing else.
+_LONGEST = 1 << 48
 
-def savable(cls: C) -> C:
-    """Register a dataclass whose instances may be part of a saved result."""
-    _FIELDS[cls.__name__] = cls
-    return cls
+
+def savable(*, check: Callable[[Any], None] | None = None, **shapes: str) -> Callable[[C], C]:
+    """Register a dataclass whose instances may be part of a saved result, with the shapes of its fields."""
+    # How shapes are written is in ``schema.py``; ``check`` raises ValueError for what they cannot say.
+
+    def register(cls: C) -> C:
+        _FIELDS[cls.__name__], _SCHEMAS[cls] = cls, Schema(shapes, check)
+        return cls
+
+    return register
 
 
 class Savable:
     """A result that can be written to a file; :func:`load` reads it."""
 
-    def __init_subclass__(cls, **options: Any) -> None:
-        super().__init_subclass__(**options)
-        savable(cls)
+    def __init_subclass__(cls, **schema: Any) -> None:
+        super().__init_subclass__()
+        savable(**schema)(cls)
 
     def save(self, path: str | os.PathLike[str]) -> None:
         """Write the result to a file, with its system; :func:`nonsmooth.load` reads it.
@@ -54,11 +63,12 @@ class Savable:
         OptionError
             It cannot be written.
         """
+        data = _packed(self)
         try:
-            files.replace(Path(path), _packed(self))
-        except OSError as error:
+            files.replace(Path(path), data)
+        except (OSError, TypeError, ValueError) as error:
             raise OptionError(
-                f"path {os.fspath(path)!r} cannot be written ({error}). Choose another folder."
+                f"path {path!r} cannot be written ({error}). Choose another folder."
             ) from error
 
     @classmethod
@@ -84,7 +94,7 @@ def load(path: str | os.PathLike[str]) -> Any:
     Parameters
     ----------
     path : path-like
-        A file that you trust: CasADi reads the system in it.
+        All that is in it is checked, and what a file can make this process allocate is bounded.
 
     Returns
     -------
@@ -108,22 +118,16 @@ def load(path: str | os.PathLike[str]) -> Any:
     >>> again, again.system == run.system
     (Trajectory(t = 0 .. 2, 3 points, 2 events, itinerary '+ s', REACHED_END), True)
     """
+    if not isinstance(path, (str, bytes, os.PathLike)):
+        raise OptionError(
+            f"path is {path!r} ({type(path).__name__}). Give a text or a pathlib.Path."
+        )
     try:
-        with np.load(path, allow_pickle=False) as data:
-            arrays = {name: data[name] for name in data.files}
-        head = json.loads(arrays.pop("tree").tobytes())
-        if head["format"] != _FORMAT:
-            raise ValueError(f"format {head['format']}")
-        systems = [_system(_decoded(s, arrays, [])) for s in head["systems"]]
-        return _decoded(head["result"], arrays, systems)
-    except OSError as error:
-        reason: Exception = error
-    except (ValueError, KeyError, TypeError, IndexError, EOFError, AttributeError) as error:
-        reason = error
-    except (RuntimeError, BadZipFile, RecursionError) as error:  # of CasADi, of the archive
+        return _read(path)
+    except Exception as error:  # whatever a damaged file raises in the readers of its formats
         reason = error
     raise OptionError(
-        f"path {os.fspath(path)!r} is no file written by save ({type(reason).__name__}: {reason}). "
+        f"path {path!r} is no file written by save ({type(reason).__name__}: {reason}). "
         "Save the result again."
     ) from reason
 
@@ -188,46 +192,77 @@ class _Writer:
 def _packed(result: Any) -> bytes:
     writer = _Writer()
     tree = writer.tree(result)
-    systems = [writer.tree(s.__getstate__()) for s in writer.systems]
+    try:
+        systems = [writer.tree(instruction_form.written(s)) for s in writer.systems]
+    except NonsmoothError as error:
+        raise OptionError(f"save: {error}") from error
     head = json.dumps({"format": _FORMAT, "result": tree, "systems": systems}).encode()
-    arrays: dict[str, Any] = {k: np.concatenate(rows) for k, rows in writer.rows.items()}
-    memory = io.BytesIO()
-    np.savez_compressed(memory, tree=np.frombuffer(head, np.uint8), **arrays)
-    return memory.getvalue()
+    return archive.packed(head, {k: np.concatenate(rows) for k, rows in writer.rows.items()})
 
 
 # Reading -----------------------------------------------------------------------------------------
 
 
-def _system(state: dict[str, Any]) -> FilippovSystem:
-    system = FilippovSystem.__new__(FilippovSystem)
-    system.__setstate__(state)
-    return system
+def _read(path: str | bytes | os.PathLike[Any]) -> Any:
+    tree, rows = archive.unpacked(os.fsdecode(path))
+    head = json.loads(tree)
+    if head["format"] != _FORMAT:
+        raise ValueError(f"format {head['format']}, not {_FORMAT}")
+    reader = _Reader(rows)
+    systems = [instruction_form.read_system(reader.value(s)) for s in head["systems"]]
+    reader.systems = systems
+    validator = Validator(_SCHEMAS)
+    for switch in (switch for system in systems for switch in system.lifted):
+        validator.require(switch)
+    result = reader.value(head["result"])
+    if not isinstance(result, Savable):
+        raise ValueError(f"a {type(result).__name__} is no result")
+    validator.require(result)
+    return result
 
 
-def _decoded(tree: Any, arrays: Mapping[str, NDArray[Any]], systems: list[FilippovSystem]) -> Any:
-    again = lambda part: _decoded(part, arrays, systems)
-    if isinstance(tree, list):
-        return [again(part) for part in tree]
-    if not isinstance(tree, dict):
-        return tree
-    if "array" in tree:
-        kind, start, shape = tree["array"]
-        size = int(np.prod(shape, dtype=np.int64))
-        return arrays[kind][start : start + size].reshape(shape).copy()
-    if "tuple" in tree:
-        return tuple(again(part) for part in tree["tuple"])
-    if "mapping" in tree:
-        return {again(key): again(value) for key, value in tree["mapping"]}
-    if "status" in tree:
-        return Status(tree["status"])
-    if "system" in tree:
-        return systems[tree["system"]]
-    cls = _FIELDS[tree["of"]]
-    made = object.__new__(cls)
-    for name, part in tree["fields"].items():
-        object.__setattr__(made, name, again(part))
-    return made
+class _Reader:
+    """Values from a tree and rows of numbers, of which each is used once."""
+
+    def __init__(self, rows: Mapping[str, NDArray[Any]]):
+        self.rows = rows
+        self.left = {kind: row.size for kind, row in rows.items()}
+        self.systems: list[FilippovSystem] = []
+
+    def value(self, tree: Any) -> Any:
+        """Return what a part of the tree stands for."""
+        if isinstance(tree, list):
+            return [self.value(part) for part in tree]
+        if not isinstance(tree, dict):
+            return tree
+        match tree:
+            case {"array": [str(kind), int(start), list(shape)], **rest} if not rest:
+                return self._array(kind, start, shape)
+            case {"tuple": list(parts), **rest} if not rest:
+                return tuple(self.value(part) for part in parts)
+            case {"mapping": list(pairs), **rest} if not rest:
+                return {self.value(key): self.value(part) for key, part in pairs}
+            case {"status": int(status), **rest} if not rest:
+                return Status(status)
+            case {"system": int(number), **rest} if not rest and number >= 0:
+                return self.systems[number]
+            case {"of": str(name), "fields": dict(fields), **rest} if not rest:
+                return self._object(_FIELDS[name], fields)
+        raise ValueError(f"{', '.join(map(repr, tree))} in the tree")
+
+    def _array(self, kind: str, start: int, shape: list[Any]) -> NDArray[Any]:
+        if not all(type(k) is int and 0 <= k <= _LONGEST for k in shape):
+            raise ValueError(f"an array of shape {shape}")
+        size = math.prod(shape)
+        self.left[kind] -= size
+        if start < 0 or start + size > self.rows[kind].size or self.left[kind] < 0:
+            raise ValueError("arrays that are larger than what the file holds")
+        return self.rows[kind][start : start + size].reshape(shape).copy()
+
+    def _object(self, cls: type[Any], fields: dict[str, Any]) -> Any:
+        if {*fields} != {field.name for field in dataclasses.fields(cls)}:
+            raise ValueError(f"a {cls.__name__} with other fields")
+        return cls(**{name: self.value(part) for name, part in fields.items()})
 
 
-savable(LiftedSwitch)
+savable()(LiftedSwitch)

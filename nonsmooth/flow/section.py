@@ -32,7 +32,7 @@ from .trajectory import Event, Trajectory
 KINDS_OF_SECTIONS = KINDS[:-1]
 
 
-@savable
+@savable()
 @dataclass(frozen=True)
 class Section:
     """Where a run is sampled, for Poincare maps, stroboscopic pictures and bifurcation diagrams.

@@ -16,7 +16,7 @@ from .saving import Savable, savable
 from .status import Status
 
 
-@savable
+@savable(x="n", x_after="n")
 @dataclass(frozen=True)
 class Event:
     """Something that happened at one instant.
@@ -61,7 +61,7 @@ class Event:
             object.__setattr__(self, "x_after", self.x)
 
 
-@savable
+@savable()
 @dataclass(frozen=True)
 class Segment:
     """A stretch of motion in one mode, between two events.
@@ -83,7 +83,7 @@ class Segment:
     last: int
 
 
-@savable
+@savable(starts="s", coefficients="s; N *")
 @dataclass(frozen=True)
 class Steps:
     """Accepted steps with the Taylor polynomials of the states.
@@ -124,8 +124,19 @@ class Steps:
         return result
 
 
+def _require_whole(run: Trajectory) -> None:
+    """Raise ValueError where points, steps and segments of a saved run do not belong together."""
+    steps = np.diff(run.t)
+    if not len(run.t) or ((steps < 0).any() and (steps > 0).any()):
+        raise ValueError("Trajectory.t: it is empty or turns back")
+    if any(not 0 <= s.first <= s.last <= len(run.steps) for s in run.segments):
+        raise ValueError("Trajectory.segments: they have other steps than the run")
+
+
 @dataclass(frozen=True, repr=False)
-class Trajectory(Savable):
+class Trajectory(
+    Savable, check=_require_whole, t="m", x="m n", sample_t="k nan", sample_x="k n nan"
+):
     """A solution: call it with times to evaluate its dense output.
 
     Attributes

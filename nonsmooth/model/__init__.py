@@ -2,6 +2,7 @@
 
 from .calls import call
 from .checks import is_real, real, real_array, whole
+from .definition import instruction_form
 from .definition.derived_systems import SECTION, reversed_system, surface_of, with_section
 from .definition.events import Clock, Impact, Reset, Stop
 from .definition.lift import LiftedSwitch
@@ -66,6 +67,7 @@ __all__ = [
     "evaluator",
     "explain",
     "followed",
+    "instruction_form",
     "is_function",
     "is_real",
     "layer_of",

@@ -54,7 +54,7 @@ _FURTHER = 4
 _ROWS = 4096
 
 
-@savable
+@savable(points="* n")
 @dataclass(frozen=True, eq=False, repr=False)
 class Attractor:
     """An attractor, as points of it.
@@ -308,7 +308,7 @@ _NAMES = {
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Basins(Savable):
+class Basins(Savable, labels="...", starts="... n nan", axes="*"):
     """Which attractor each start goes to.
 
     Attributes

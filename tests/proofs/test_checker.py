@@ -112,3 +112,48 @@ def test_every_two_fold_of_random_systems_is_checked(tmp_path):
     path.write_text(json.dumps({"proofs": records}))
     code, words = run(path)
     assert len(records) > 10 and code == 0, words
+
+
+def deep(record):
+    nodes = record["graph"]["nodes"]
+    for k in range(len(nodes), len(nodes) + 20_000):
+        nodes.append(["sin", k - 1])
+
+
+CRAFTED = {
+    "a number that fills the memory": lambda r: r["box"][0].__setitem__(0, "1e999999999"),
+    "a fraction over zero": lambda r: r["box"][0].__setitem__(0, "1/0"),
+    "an interval with its ends exchanged": lambda r: r["box"][0].reverse(),
+    "nested instructions": deep,
+    "a later argument": lambda r: r["graph"]["nodes"].insert(0, ["neg", 0]),
+    "an argument from the end": lambda r: r["graph"]["nodes"].append(["neg", -1]),
+    "an exponent": lambda r: r["graph"]["nodes"].append(["power", 0, 10**9]),
+    "powers of powers": lambda r: r["graph"]["nodes"].extend(
+        [["const", "3"], *(["sq", len(r["graph"]["nodes"]) + k] for k in range(60))]
+    ),
+    "an operation": lambda r: r["graph"]["nodes"].append(["fabs", 0]),
+    "an output": lambda r: r["graph"].update(surface=-1),
+    "states": lambda r: r.update(states=10**9),
+    "an unknown twice": lambda r: r["unknowns"].__setitem__(0, r["unknowns"][1]),
+    "a kind": lambda r: r.update(kind="lie"),
+    "a side": lambda r: r.update(side=""),
+}
+
+
+@pytest.mark.parametrize("what", CRAFTED)
+def test_crafted_records_are_refused_in_words(what, tmp_path):
+    record = json.loads(json.dumps(TRANSCENDENTAL.record))
+    CRAFTED[what](record)
+    path = tmp_path / "crafted.json"
+    path.write_text(json.dumps({"proofs": [record]}))
+    code, words = run(path)
+    assert code == 1 and "NOT CHECKED: CheckError" in words and "Traceback" not in words, words
+
+
+@pytest.mark.parametrize("text", ["", "{", "[]", "3", "{}", '{"proofs": 3}', "[" * 10**5, "\udcff"])
+def test_files_that_claim_nothing_are_refused(text, tmp_path):
+    path = tmp_path / "none.json"
+    path.write_bytes(text.encode(errors="surrogateescape"))
+    for name in (path, tmp_path / "missing", tmp_path, "/dev/zero"):
+        code, words = run(name)
+        assert code == 1 and "NOT CHECKED" in words and "Traceback" not in words, words

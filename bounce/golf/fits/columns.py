@@ -19,6 +19,10 @@ from ...units import MINUS, UNITS
 Array = NDArray[np.float64]
 
 
+#: Bytes of a CSV file that are read; a device may have no end.
+LARGEST = 1 << 28
+
+
 class DataError(ns.NonsmoothError, ValueError):
     """Measurements that cannot be read: missing columns, unknown units, rows that are no bounces."""
 
@@ -160,7 +164,11 @@ def _read_csv(path: Path) -> list[tuple[str, list[str]]]:
 def _csv(path: Path) -> tuple[list[str], list[list[str]]]:
     """Names and rows of a file."""
     try:  # a path with NUL in it is a ValueError
-        text = path.read_text(encoding="utf-8-sig")
+        with path.open("rb") as file:
+            content = file.read(LARGEST + 1)
+        if len(content) > LARGEST:
+            raise ValueError(f"it has more than {LARGEST} bytes")
+        text = content.decode("utf-8-sig")
         lines = [line for line in text.splitlines() if line.strip() and not line.startswith("#")]
         rows = list(csv.reader(lines, strict=True))
     except (OSError, ValueError, csv.Error) as error:

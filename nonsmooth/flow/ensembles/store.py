@@ -117,7 +117,8 @@ class Store:
         try:
             content = json.loads(files.read(head, _PROBLEM) or b"")
             own = {name: content[name] for name in ("format", "problem", "chunk")}
-            whole = content == _sealed(own) and type(own["chunk"]) is int and own["chunk"] > 0
+            whole = content == _sealed(own) and type(own["chunk"]) is int
+            whole = whole and 0 < own["chunk"] < 1 << 62  # NumPy's indices end there
         except (ValueError, KeyError, TypeError, RecursionError):
             own, whole = {}, False
         if own.get("format", _FORMAT) == _FORMAT and not whole:

@@ -169,7 +169,7 @@ def read_definition(
         sizes=sizes if max(sizes, default=1) > 1 else (),
         renamed=renamed,
     )
-    _require_consistent(definition)
+    require_consistent(definition)
     return definition
 
 
@@ -329,7 +329,7 @@ def _reactions(impacts: Sequence[Impact], x: ca.SX, t: ca.SX, field: ca.SX) -> t
 # sets of codimension two and three --------------------------------------------------------------
 
 #: Largest codimension of a set: slip has two components, three with drilling.
-_LARGEST = 3
+LARGEST = 3
 
 
 def _read_entry(value: Any, what: str) -> list[ca.SX]:
@@ -343,9 +343,9 @@ def _read_entry(value: Any, what: str) -> list[ca.SX]:
         raise DefinitionError(
             f"{what}: expected a scalar or a column, received a matrix of shape {value.shape}."
         )
-    if not 1 <= len(entries) <= _LARGEST:
+    if not 1 <= len(entries) <= LARGEST:
         raise DefinitionError(
-            f"{what}: expected a scalar or a vector of at most {_LARGEST} switching functions, "
+            f"{what}: expected a scalar or a vector of at most {LARGEST} switching functions, "
             f"received {len(entries)} of them. A vector is one set, on which all its components "
             "vanish; give surfaces that do not belong together as separate entries."
         )
@@ -387,8 +387,9 @@ def _require_linear_sets(d: Definition) -> None:
 # checks of the whole definition ------------------------------------------------------------------
 
 
-def _require_consistent(d: Definition) -> None:
+def require_consistent(d: Definition, given: bool = True) -> None:
     """Refuse unknown symbols, functions that are not smooth, and multipliers that do not fit."""
+    # Sections of derived systems may have multiple zeros; only ``given`` guards must have simple ones.
     guards = [f"stop {n!r}" for n, _ in d.stops] + [f"reset {n!r}" for n, _ in d.resets]
     named = [("field", d.field, True)]
     named += [(f"surface {i}", e, False) for i, e in enumerate(listed(d.surfaces))]
@@ -410,9 +411,12 @@ def _require_consistent(d: Definition) -> None:
         require_finite(expression, known, what)
         require_smooth(expression, moving, d.parameters, what)
     for i, name in enumerate(guards):
-        _require_zero_set(name, d.guards[i], d.extended_states, d)
+        _require_states(name, d.guards[i], d.extended_states, d)
+        if given:
+            _require_simple(name, d.guards[i], d)
     for i, h in enumerate(listed(d.surfaces)):
-        _require_zero_set(f"surface {i}", h, d.states, d)
+        _require_states(f"surface {i}", h, d.states, d)
+        _require_simple(f"surface {i}", h, d)
     for j in range(len(d.impacts)):
         _check_impact(d, j)
     if not d.hidden:
@@ -422,7 +426,8 @@ def _require_consistent(d: Definition) -> None:
 
 def _check_impact(d: Definition, j: int) -> None:
     what, gap, rate = f"gap of {d.impacts[j]!r}", d.gaps[j], d.gap_rates[j]
-    _require_zero_set(what, gap, d.states, d)
+    _require_states(what, gap, d.states, d)
+    _require_simple(what, gap, d)
     if ca.depends_on(rate, ca.vertcat(d.multipliers, d.reactions)):
         raise DefinitionError(
             f"{what}: the rate {rate} of {gap} contains a multiplier. Forces act on velocities: a "
@@ -470,8 +475,8 @@ def _require_linear(d: Definition) -> None:
             )
 
 
-def _require_zero_set(what: str, function: ca.SX, states: ca.SX, d: Definition) -> None:
-    """Refuse a function that does not depend on the states, or with a visible multiple zero."""
+def _require_states(what: str, function: ca.SX, states: ca.SX, d: Definition) -> None:
+    """Refuse a function that does not depend on the states."""
     if not ca.depends_on(function, states):
         received = f"the constant {function}"
         advice = "A surface is the zero set of a function of the states."
@@ -482,6 +487,10 @@ def _require_zero_set(what: str, function: ca.SX, states: ca.SX, d: Definition) 
             f"{what}: expected a function of the states {tuple(d.names['states'])}, received "
             f"{received}. {advice}"
         )
+
+
+def _require_simple(what: str, function: ca.SX, d: Definition) -> None:
+    """Refuse a function with a visible multiple zero."""
     x = d.extended_states
     for factor, power in powers(function, x, d.parameters):
         if power > 1 and ca.depends_on(factor, x) and ca.is_linear(factor, x):

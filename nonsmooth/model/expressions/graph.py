@@ -65,9 +65,9 @@ class Node:
 
 
 def instructions(
-    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX]
+    inputs: Sequence[ca.SX], outputs: Sequence[ca.SX], merged: bool = True
 ) -> tuple[list[Node], list[list[int]]]:
-    """Value-number the graph of dense ``outputs`` over ``inputs``."""
+    """Value-number the graph of dense ``outputs`` over ``inputs``, unless not ``merged``."""
     function = ca.Function("graph", list(inputs), [_dense(o) for o in outputs])
     nodes: list[Node] = []
     known: dict[Node, int] = {}
@@ -75,7 +75,7 @@ def instructions(
     rows: list[list[int]] = [[-1] * function.numel_out(k) for k in range(function.n_out())]
 
     def number(node: Node) -> int:
-        if node not in known:
+        if not merged or node not in known:
             known[node] = len(nodes)
             nodes.append(node)
         return known[node]

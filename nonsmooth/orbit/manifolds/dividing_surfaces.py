@@ -116,7 +116,7 @@ class Passages(Protocol):
         ...
 
 
-@savable
+@savable(points="k 2", entry="k", t="k", decided="k n", starts="k n | 0 0")
 @dataclass(frozen=True, eq=False, repr=False)
 class DividingArc:
     """Starts of one itinerary on a dividing surface.
@@ -767,7 +767,7 @@ _FIRST, _APART = 0.2, 1e-6
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class DividingCurves(Savable):
+class DividingCurves(Savable, point="n"):
     """Curves in which a plane of starts cuts a dividing surface of two-folds.
 
     Attributes

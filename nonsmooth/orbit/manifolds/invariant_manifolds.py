@@ -57,7 +57,7 @@ _RESTS = 1e-7
 _FINE = 64
 
 
-@savable
+@savable(points="m n", t="m")
 @dataclass(frozen=True, eq=False, repr=False)
 class Arc:
     """A curve along an orbit.
@@ -388,7 +388,7 @@ _FIRST = 16  # arcs of a bundle at the beginning
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class Manifold(Savable):
+class Manifold(Savable, point="n", points="k n | 0 0", triangles="q 3 <points"):
     """A stable or unstable manifold, as curves or a surface of orbits.
 
     Attributes

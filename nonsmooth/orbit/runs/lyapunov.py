@@ -50,7 +50,9 @@ _BLOCKS = 32
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class LyapunovSpectrum(Savable):
+class LyapunovSpectrum(
+    Savable, exponents="k nan", errors="k nan", blocks="b k nan", sum_check="nan"
+):
     """Lyapunov exponents, the largest first.
 
     Attributes

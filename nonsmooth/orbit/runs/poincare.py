@@ -35,7 +35,7 @@ _ENDLESS = 1e12
 
 
 @dataclass(frozen=True, eq=False, repr=False)
-class PoincareOrbit(Savable):
+class PoincareOrbit(Savable, points="m n", t="m"):
     """Successive returns to a section.
 
     Attributes

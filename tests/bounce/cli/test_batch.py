@@ -78,6 +78,24 @@ def test_an_interrupted_table_goes_on_to_the_same_file(command, table, tmp_path,
     assert len(seen) == 2 and out.read_text() == whole.read_text()
 
 
+@pytest.mark.parametrize(
+    "damage",
+    [
+        lambda content: content.replace(b",", b"\xff", 3),
+        lambda content: content + b"9" * 200_000 + b"\n",
+        lambda content: content[:-200] + b"\n3\n",
+        lambda content: content.replace(b"\n", b"\n3,4\n", 2),
+    ],
+    ids=["no text", "a huge field", "cut", "short rows"],
+)
+def test_a_damaged_output_is_not_gone_on_with(damage, command, table, tmp_path):
+    out = tmp_path / "out.csv"
+    command("flight", "--input", table(), "--output", out)
+    out.write_bytes(damage(out.read_bytes()))
+    code, _, err = command("flight", "--input", table(), "--output", out, "--resume")
+    assert code == 2 and "--resume" in err
+
+
 def test_other_inputs_are_refused_and_nothing_is_lost(command, table, tmp_path):
     out = tmp_path / "out.csv"
     command("flight", "--input", table(), "--output", out)

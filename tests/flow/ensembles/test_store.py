@@ -17,6 +17,7 @@ import numpy as np
 import pytest
 
 import nonsmooth as ns
+from nonsmooth.flow.ensembles import store as store_module
 from nonsmooth.flow.ensembles import work as work_module
 from nonsmooth.flow.ensembles.work import size_of_chunk
 
@@ -290,12 +291,24 @@ def a_folder(path):
     path.mkdir()
 
 
+def an_archive(path):
+    with path.open("wb") as file:
+        np.savez(file, t=np.zeros(200))
+
+
+def a_header_that_does_not_close(path):
+    np.save(path, np.zeros(200))
+    path.write_bytes(path.read_bytes().replace(b"'shape': (200,)", b"'shape': ((200,"))
+
+
 ARRAYS = {
     "shape": lambda path: np.save(path, np.zeros(199)),
     "type": lambda path: np.save(path, np.zeros(200, np.float32)),
     "bytes in another order": lambda path: np.save(path, np.zeros(200, ">f8")),
     "text": written(b"no array"),
     "empty": written(b""),
+    "archive": an_archive,
+    "header": a_header_that_does_not_close,
     "pickle": lambda path: np.save(path, np.array([{}] * 200, object), allow_pickle=True),
     "link": linked,
     "folder": a_folder,
@@ -481,7 +494,17 @@ def test_other_numbers_are_another_problem(tmp_path):
         sweep(tmp_path / "sweep", starts=starts)
 
 
+def sealed_anew(chunk):
+    def damage(path):
+        own = {k: v for k, v in json.loads(path.read_text()).items() if k != "seal"}
+        path.write_text(json.dumps(store_module._sealed(own | {"chunk": chunk})))
+
+    return damage
+
+
 HEADS = {
+    "chunk beyond every index": sealed_anew(10**40),
+    "chunk of no rows": sealed_anew(0),
     **{
         f"chunk {c!r}"[:20]: edited(chunk=c)
         for c in (0, -5, 3, 49, 10**9, 10**400, True, 4.0, "4", None, [4])

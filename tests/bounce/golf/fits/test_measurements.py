@@ -171,3 +171,9 @@ def test_files_that_are_no_csv(tmp_path, content, message):
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
     with pytest.raises(bounce.golf.DataError, match=message):
         bounce.golf.read_measurements(path)
+
+
+def test_a_file_without_end_is_refused(monkeypatch):
+    monkeypatch.setattr("bounce.golf.fits.columns.LARGEST", 1 << 16)
+    with pytest.raises(bounce.golf.DataError, match="bytes"):
+        bounce.golf.read_measurements("/dev/zero")

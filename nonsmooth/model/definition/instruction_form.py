@@ -1,0 +1,283 @@
+"""A system as an instruction list: numbers and texts for a file, checked when they are read.
+
+CasADi's own text of a function is not read from files: it is not checked there, and a damaged one can
+end the process.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import casadi as ca
+import numpy as np
+from numpy.typing import NDArray
+
+from ..checks import is_real
+from ..errors import DefinitionError
+from ..expressions.float_arithmetic import BINARY, UNARY
+from ..expressions.graph import Node, evaluate, instructions, operation
+from ..reading import listed
+from ..values import Array
+from .lift import LiftedSwitch
+from .parse_definition import LARGEST, Definition, require_consistent
+from .system import FilippovSystem
+
+#: Operations of an instruction list; a list names those that it uses.
+_OPERATIONS = ("const", "input", *UNARY, *BINARY)
+
+#: Most instructions, and entries, of a system in a file, and most that are nested: CasADi prints nested ones
+#: by recursion.
+MOST, DEEPEST = 200_000, 4_000
+
+_INPUTS = ("states", "time", "parameters", "multipliers", "reactions")
+_OUTPUTS = ("field", "surfaces", "guards", "maps", "gaps", "restitutions")
+
+
+def written(system: FilippovSystem) -> dict[str, Any]:
+    """Return plain values from which ``read_system`` makes an equal system."""
+    d = system.definition
+    inputs, outputs = ([getattr(d, name) for name in names] for names in (_INPUTS, _OUTPUTS))
+    nodes, rows = instructions(inputs, outputs, merged=False)
+    operations = sorted({node.op for node in nodes})
+    size, depth = max(len(nodes), sum(map(len, rows))), _depth(nodes)
+    if size > MOST or depth > DEEPEST:
+        raise DefinitionError(
+            f"system: it has {size} instructions or entries and instructions nested {depth} deep; files have "
+            f"at most {MOST}, nested {DEEPEST} deep. Save the arrays of the result with numpy.savez."
+        )
+    constants = [node.payload for node in nodes if node.op == "const"]
+    args, used = np.zeros((len(nodes), 2), np.int32), 0
+    for k, node in enumerate(nodes):
+        if node.op == "const":
+            args[k, 0], used = used, used + 1
+        else:
+            own = node.source if node.op == "input" else node.args
+            args[k, : len(own)] = own
+    return {
+        "operations": operations,
+        "op": np.array([operations.index(node.op) for node in nodes], np.int32),
+        "args": args,
+        "constants": np.array(constants, float),
+        "outputs": np.array([k for row in rows for k in row], np.int32),
+        "shapes": [list(e.shape) for e in outputs],
+        "names": [[str(s) for s in listed(v)] for v in inputs],
+        "defaults": d.defaults,
+        "events": [[list(e) for e in d.stops], [list(e) for e in d.resets], list(d.impacts)],
+        "hidden": d.hidden,
+        "sizes": list(d.sizes),
+        "renamed": [list(pair) for pair in d.renamed],
+        "lifted": system.lifted,
+    }
+
+
+def read_system(plain: Any) -> FilippovSystem:
+    """Make the system that ``written`` described; DefinitionError for anything else."""
+    _require(isinstance(plain, dict), "a description of a system")
+    names = [_texts(v, "names") for v in _list(plain, "names", len(_INPUTS))]
+    vectors = [_symbols(v) for v in names]
+    expressions = _expressions(plain, vectors)
+    stops, resets, impacts = _list(plain, "events", 3)
+    sizes = [_whole(v, "sizes", 1, LARGEST) for v in _list(plain, "sizes")]
+    definition = Definition(
+        **dict(zip(_INPUTS, vectors, strict=True)),
+        **dict(zip(_OUTPUTS, expressions, strict=True)),
+        stops=_directed(stops),
+        resets=_directed(resets),
+        impacts=tuple(_texts(impacts, "impacts")),
+        defaults=_defaults(plain, names[2]),
+        hidden=_flag(plain.get("hidden")),
+        sizes=tuple(sizes),
+        renamed=tuple((a, b) for a, b in map(_pair, _list(plain, "renamed"))),
+    )
+    _require_shapes(definition)
+    require_consistent(definition, given=False)
+    system = FilippovSystem.__new__(FilippovSystem)
+    system._adopt(definition)
+    system.lifted = _lifted(plain.get("lifted"))
+    return system
+
+
+# Expressions -------------------------------------------------------------------------------------
+
+
+class _Expressions:
+    """Expressions over some vectors of symbols, as an algebra of graphs."""
+
+    def __init__(self, vectors: Sequence[ca.SX]):
+        self.symbols = [listed(v) for v in vectors]
+        self.constant = ca.SX
+        self.apply = operation
+
+    def symbol(self, vector: int, position: int) -> ca.SX:
+        return self.symbols[vector][position]
+
+
+def _symbols(names: Sequence[str]) -> ca.SX:
+    return ca.vertcat(*map(ca.SX.sym, names)) if names else ca.SX(0, 1)
+
+
+def _depth(nodes: Sequence[Node]) -> int:
+    depth: list[int] = []
+    for node in nodes:
+        depth.append(1 + max((depth[k] for k in node.args), default=0))
+    return max(depth, default=0)
+
+
+def _expressions(plain: Mapping[str, Any], vectors: Sequence[ca.SX]) -> list[ca.SX]:
+    nodes = _nodes(plain, [v.numel() for v in vectors])
+    outputs = _array(plain, "outputs", np.int32)
+    shapes = [_shape(s) for s in _list(plain, "shapes", len(_OUTPUTS))]
+    _require(outputs.size <= MOST, f"at most {MOST} outputs")
+    _require(sum(r * c for r, c in shapes) == outputs.size, "as many outputs as shapes have")
+    _require(_within(outputs, len(nodes)), "outputs among the instructions")
+    _require(_depth(nodes) <= DEEPEST, f"at most {DEEPEST} nested instructions")
+    values = evaluate(nodes, _Expressions(vectors))
+    found, first = [], 0
+    for rows, columns in shapes:
+        entries = [values[k] for k in outputs[first : first + rows * columns].tolist()]
+        first += rows * columns
+        flat = ca.vertcat(*entries) if entries else ca.SX(rows, columns)
+        found.append(ca.reshape(flat, rows, columns))
+    return found
+
+
+def _nodes(plain: Mapping[str, Any], lengths: Sequence[int]) -> list[Node]:
+    """The instructions, each of which has arguments before itself."""
+    operations = _texts(plain.get("operations"), "operations")
+    _require({*operations} <= {*_OPERATIONS}, "operations that are known")
+    op, args = _array(plain, "op", np.int32), _array(plain, "args", np.int32)
+    constants: Array = _array(plain, "constants", np.float64)
+    count = len(op)
+    _require(count <= MOST, f"at most {MOST} instructions")
+    _require(op.ndim == constants.ndim == 1 and args.shape == (count, 2), "rows of instructions")
+    _require(_within(op, len(operations)), "operations in their list")
+    arity = np.array([2 if name in BINARY else 1 for name in operations], int)[op]
+    is_input, is_const = (
+        np.array([name == which for name in operations], bool)[op] for which in ("input", "const")
+    )
+    limit = np.arange(count)
+    limit[is_const] = constants.size
+    limit[is_input] = len(lengths)
+    _require(bool(np.all((args[:, 0] >= 0) & (args[:, 0] < limit))), "arguments before their use")
+    limit[is_input] = np.array(lengths)[args[is_input, 0]]
+    two = (arity == 2) | is_input
+    within = (args[:, 1] >= 0) & (args[:, 1] < limit)
+    _require(bool(np.all(within[two])), "arguments before their use")
+    nodes = []
+    for k, row in zip(op.tolist(), args.tolist(), strict=True):
+        name = operations[k]
+        if name == "const":
+            nodes.append(Node(name, (), float(constants[row[0]])))
+        elif name == "input":
+            nodes.append(Node(name, (), tuple(row)))
+        else:
+            nodes.append(Node(name, tuple(row[: 2 if name in BINARY else 1])))
+    return nodes
+
+
+# Parts -------------------------------------------------------------------------------------------
+
+
+def _require(holds: bool, what: str) -> None:
+    if not holds:
+        raise DefinitionError(f"system: expected {what}, received something else.")
+
+
+def _list(plain: Mapping[str, Any], name: str, length: int | None = None) -> list[Any]:
+    value = plain.get(name)
+    fits = isinstance(value, list) and length in (None, len(value))
+    _require(fits, f"a list {name!r}" + ("" if length is None else f" of {length}"))
+    return value  # type: ignore[return-value]
+
+
+def _array(plain: Mapping[str, Any], name: str, kind: type[Any]) -> NDArray[Any]:
+    value = plain.get(name)
+    if not isinstance(value, np.ndarray) or value.dtype != kind:
+        raise DefinitionError(f"system: expected an array {name!r} of {np.dtype(kind)}.")
+    return value
+
+
+def _within(values: NDArray[Any], count: int) -> bool:
+    return values.ndim == 1 and bool(np.all((values >= 0) & (values < count)))
+
+
+def _texts(values: Any, what: str) -> list[str]:
+    _require(isinstance(values, list), f"a list of {what}")
+    for value in values:
+        _require(isinstance(value, str) and "\0" not in value, f"{what} that are texts")
+        value.encode()  # a lone surrogate is none; ValueError
+    return list(values)
+
+
+def _whole(value: Any, what: str, low: int, high: int) -> int:
+    fits = type(value) is int and low <= value <= high
+    _require(fits, f"{what} from {low} to {high}")
+    return int(value)
+
+
+def _flag(value: Any) -> bool:
+    _require(isinstance(value, bool), "hidden as true or false")
+    return bool(value)
+
+
+def _pair(value: Any) -> tuple[str, str]:
+    name, other = value if isinstance(value, list) and len(value) == 2 else (None, None)
+    _texts([name, other], "names")
+    return str(name), str(other)
+
+
+def _directed(values: Any) -> tuple[tuple[str, int], ...]:
+    """Names of stops or resets with their directions."""
+    _require(isinstance(values, list), "lists of events")
+    for value in values:
+        _require(isinstance(value, list) and len(value) == 2, "events with their direction")
+        _texts(value[:1], "names")
+        _whole(value[1], "directions", -1, 1)
+    return tuple((name, direction) for name, direction in values)
+
+
+def _shape(value: Any) -> tuple[int, int]:
+    _require(isinstance(value, list) and len(value) == 2, "shapes of two numbers")
+    rows, columns = (_whole(v, "shapes", 0, MOST) for v in value)
+    return rows, columns
+
+
+def _defaults(plain: Mapping[str, Any], parameters: Sequence[str]) -> dict[str, float | None]:
+    values = plain.get("defaults")
+    fits = isinstance(values, dict) and list(values) == list(parameters)
+    _require(fits, "a default of each parameter, or null")
+    assert isinstance(values, dict)
+    for value in values.values():
+        _require(value is None or is_real(value), "defaults that are finite numbers")
+    return {name: None if v is None else float(v) for name, v in values.items()}
+
+
+def _lifted(value: Any) -> tuple[LiftedSwitch, ...]:
+    fits = isinstance(value, tuple) and all(isinstance(s, LiftedSwitch) for s in value)
+    _require(fits, "switches that were lifted")
+    return tuple(value)
+
+
+def _require_shapes(d: Definition) -> None:
+    """Refuse expressions that are not as many as states, multipliers and events."""
+    n, guards = d.states.numel(), len(d.stops) + len(d.resets)
+    contacts = len(d.impacts)
+    columns = {
+        "field": n,
+        "surfaces": d.multipliers.numel(),
+        "guards": guards,
+        "gaps": contacts,
+        "restitutions": contacts,
+    }
+    _require(n > 0 and d.time.numel() <= 1, "states, and at most one time")
+    _require(d.reactions.numel() == contacts, "a reaction of each impact")
+    for name, rows in columns.items():
+        shape = getattr(d, name).shape
+        _require(shape == (rows, 1) or (not rows and 0 in shape), f"{name} of {rows} rows")
+    k = len(d.resets)
+    _require(d.maps.shape == (n, k) or (not k and 0 in d.maps.shape), f"maps of shape {(n, k)}")
+    sizes = sum(d.sizes) == d.multipliers.numel() and max(d.sizes, default=1) > 1
+    _require(not d.sizes or sizes, "sizes of the sets")
+    names = [*(n for n, _ in (*d.stops, *d.resets)), *d.impacts]
+    _require(len({*names}) == len(names), "events of different names")

@@ -20,7 +20,7 @@ from ...flow.status import Status
 from ...flow.trajectory import Trajectory
 from ...local import Equilibrium, Fold, FoldFold, PseudoEquilibrium
 from ...local.point.regions import Region
-from ...local.point.surface_point import place
+from ...local.point.surface_point import surface_at
 from ...local.searches.find_two_fold import TwoFold
 from ...model import (
     Array,
@@ -274,7 +274,7 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
 def _canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:
     """The canard of a two-fold in attracting (or repelling) sliding, by a parameter in [0, 1]."""
     system = reversed_system(follower.system) if stable else follower.system
-    where, s = place(system, fold.point, follower.parameters)
+    where, s = surface_at(system, fold.point, follower.parameters)
     surfaces = Surfaces(system)
     speed = max(float(np.linalg.norm(f)) for f in where.at(s).fields) or 1.0
     span = 20.0 * follower.length / speed

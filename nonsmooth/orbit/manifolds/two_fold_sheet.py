@@ -23,7 +23,7 @@ import numpy as np
 from ...flow.follow import follow
 from ...flow.names import event_name
 from ...flow.status import Status
-from ...local.point.surface_point import place
+from ...local.point.surface_point import surface_at
 from ...model import Array, ConvergenceError, DegenerateError, FilippovSystem, Parameters, evaluator
 from ..runs.legs import Leg, fly
 
@@ -59,7 +59,7 @@ class TwoFoldSheet:
         self, system: FilippovSystem, fold: Array, size: float, parameters: Parameters | None = None
     ):
         self.system, self.size, self.fold = system, size, fold
-        self.where, _ = place(system, fold, parameters)
+        self.where, _ = surface_at(system, fold, parameters)
         self.parameters = self.where.parameters
         self._values = self.where.values
         self.root = self._root(fold)

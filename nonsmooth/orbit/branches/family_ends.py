@@ -24,7 +24,7 @@ from ...solvers.continuation import Point, Zero
 from ...solvers.newton import Secant, converge
 from ..periodic.boundary_value_problem import BoundaryProblem
 from ..periodic.orbit import PeriodicOrbit
-from ..runs.legs import fly, surface_of
+from ..runs.legs import integrate_leg, surface_of
 from .branch import BranchEvent, FarSide
 from .equilibrium_branches import EquilibriumCurve
 
@@ -78,7 +78,7 @@ def extent(problem: BoundaryProblem, u: Array, p: Array) -> float:
     starts, durations = problem.split(u)
     n, seen = problem.system.dimension, list[Array]()
     for leg, x, duration in zip(problem.legs, starts, durations, strict=True):
-        seen += [x[:n], fly(problem.system, leg, x, 0.5 * float(duration), p).end[:n]]
+        seen += [x[:n], integrate_leg(problem.system, leg, x, 0.5 * float(duration), p).end[:n]]
     states = np.array(seen)
     if problem.symmetry is not None:
         states = np.vstack([states, states @ problem.symmetry.T])

@@ -38,7 +38,7 @@ from ...model import (
 )
 from ..periodic.multipliers import leg_maps
 from ..periodic.orbit import PeriodicOrbit
-from ..runs.legs import fly
+from ..runs.legs import integrate_leg
 from .canards import Slider, paths_from
 from .dividing_surfaces import DividingCurves, dividing_curves, plane_of, read_begin, require_event
 
@@ -266,9 +266,9 @@ def _direction(orbit: PeriodicOrbit, stable: bool) -> tuple[float, Array, Array,
     for step in maps[:best]:
         v = step @ v
     p, half = orbit.parameter_vector, 0.5 * float(at.durations[best])
-    flown = fly(orbit.system, problem.legs[best], at.starts[best], half, p)
-    v = flown.by_start[:n] @ v
-    return float(values[outside][0].real), flown.end[:n], v / np.linalg.norm(v), orbit.period
+    flow = integrate_leg(orbit.system, problem.legs[best], at.starts[best], half, p)
+    v = flow.by_start[:n] @ v
+    return float(values[outside][0].real), flow.end[:n], v / np.linalg.norm(v), orbit.period
 
 
 def _canard_curve(fold: TwoFold, follower: Follower, stable: bool) -> Callable[[float], Array]:

@@ -34,88 +34,6 @@ from ..runs.itinerary import leg_between
 from ..runs.legs import Leg, integrate_leg, surface_of
 from .conditions import Condition, touching
 
-# Guesses for an orbit with new short legs.
-
-
-def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by: float) -> Array:
-    """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
-    # A leg that is added inside a slide begins before the point where the slide touched its boundary
-    # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a leg of the duration t.
-    starts, durations = (np.array(part) for part in problem.split(u))
-    legs = problem.legs
-    for i in fresh:
-        durations[i] = by
-        added = 0 < i < len(legs) - 1 and legs[i].kind == "entry" and legs[i - 1].kind == "exit"
-        if not added or durations[i - 1] < by or durations[i + 1] < by:
-            continue
-        durations[i - 1] -= by / 3
-        durations[i + 1] -= 2 * by / 3
-        for k in (i - 1, i):
-            flow = integrate_leg(problem.system, legs[k], starts[k], float(durations[k]), p)
-            starts[k + 1] = flow.end[: problem.dimension]
-    return problem.pack(starts, durations)
-
-
-# Itineraries next to a corner, where two events occur at one time.
-
-#: Legs that are shorter than this part of the orbit vanish.
-_SHORT = 1e-7
-
-
-def swapped(editor: LegEditor, i: int) -> ChangedItinerary | None:
-    """Two events at one time in the other order."""
-    system, (first, second) = editor.problem.system, editor.legs[i - 1 : i + 1]
-    a, b = surface_of(system, first), surface_of(system, second)
-    if a < 0 or b < 0 or a == b:
-        return None
-    between = with_letter(first.mode, b, mode_after(second)[b])
-    editor.legs[i - 1] = leg_between(system, first.mode, between)
-    editor.legs[i] = leg_between(system, between, with_letter(between, a, second.mode[a]))
-    return editor.done(i)
-
-
-def round_corner(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedItinerary | None:
-    """A second surface is crossed before the crossing that leads to leg ``i``, and back after it."""
-    system, k = editor.problem.system, (i - 1) % len(editor.legs)
-    before, far = editor.legs[k], guard.element
-    if guard.kind != "surface" or before.kind != "crossing":
-        return None
-    flow = integrate_leg(system, before, editor.starts[k], editor.durations[k], p)
-    start = before.at_end(system, flow.end, p).after
-    turned = before.mode[far].translate(TURNED)
-    modes = [before.mode, with_letter(before.mode, far, turned)]
-    modes += [with_letter(mode_after(before), far, turned), mode_after(before)]
-    legs = [leg_between(system, a, b) for a, b in pairwise(modes)]
-    editor.legs[k] = legs[0]
-    editor.insert(k + 1, legs[1], start)
-    editor.insert(k + 2, legs[2], start)
-    return editor.done(k + 1, k + 2)
-
-
-def cut_corner(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:
-    """Two short legs beyond a second surface, left out; None where there are no such two."""
-    system, count = before.problem.system, len(before.problem.legs)
-    durations = before.problem.split(before.u)[1]
-    short = [
-        j for j in ((i + 1) % count, (i - 1) % count) if durations[j] < _SHORT * sum(durations)
-    ]
-    if count < 4 or not short:
-        return None
-    turned = rotated(before, ((i if short[0] == (i + 1) % count else short[0]) - 1) % count, p)
-    editor = LegEditor(turned.problem, turned.u, turned.origin)
-    first, between, last = editor.legs[:3]
-    far, own = surface_of(system, first), surface_of(system, between)
-    crossed = all(leg.kind == "crossing" for leg in (first, between, last))
-    if not crossed or surface_of(system, last) != far or own == far:
-        return None
-    editor.legs[0] = leg_between(system, first.mode, mode_after(last))
-    editor.remove(2)
-    editor.remove(1)
-    guards = guarded_field(system, mode_after(last)).motion.guards
-    guard = next(g for g in guards if g.kind == "surface" and g.element == far)
-    return editor.done(test=Condition("start", 1, guard))
-
-
 # Insertion and removal of legs.
 
 
@@ -439,3 +357,85 @@ def _turned(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary:
     if 0 < i < count - 1 or (count == 2 and i == 1) or count == 1:
         return before
     return rotated(before, 1 if count == 2 else (i - 1) % count, p)
+
+
+# Itineraries next to a corner, where two events occur at one time.
+
+#: Legs that are shorter than this part of the orbit vanish.
+_SHORT = 1e-7
+
+
+def swapped(editor: LegEditor, i: int) -> ChangedItinerary | None:
+    """Two events at one time in the other order."""
+    system, (first, second) = editor.problem.system, editor.legs[i - 1 : i + 1]
+    a, b = surface_of(system, first), surface_of(system, second)
+    if a < 0 or b < 0 or a == b:
+        return None
+    between = with_letter(first.mode, b, mode_after(second)[b])
+    editor.legs[i - 1] = leg_between(system, first.mode, between)
+    editor.legs[i] = leg_between(system, between, with_letter(between, a, second.mode[a]))
+    return editor.done(i)
+
+
+def round_corner(editor: LegEditor, i: int, guard: Guard, p: Array) -> ChangedItinerary | None:
+    """A second surface is crossed before the crossing that leads to leg ``i``, and back after it."""
+    system, k = editor.problem.system, (i - 1) % len(editor.legs)
+    before, far = editor.legs[k], guard.element
+    if guard.kind != "surface" or before.kind != "crossing":
+        return None
+    flow = integrate_leg(system, before, editor.starts[k], editor.durations[k], p)
+    start = before.at_end(system, flow.end, p).after
+    turned = before.mode[far].translate(TURNED)
+    modes = [before.mode, with_letter(before.mode, far, turned)]
+    modes += [with_letter(mode_after(before), far, turned), mode_after(before)]
+    legs = [leg_between(system, a, b) for a, b in pairwise(modes)]
+    editor.legs[k] = legs[0]
+    editor.insert(k + 1, legs[1], start)
+    editor.insert(k + 2, legs[2], start)
+    return editor.done(k + 1, k + 2)
+
+
+def cut_corner(before: ChangedItinerary, i: int, p: Array) -> ChangedItinerary | None:
+    """Two short legs beyond a second surface, left out; None where there are no such two."""
+    system, count = before.problem.system, len(before.problem.legs)
+    durations = before.problem.split(before.u)[1]
+    short = [
+        j for j in ((i + 1) % count, (i - 1) % count) if durations[j] < _SHORT * sum(durations)
+    ]
+    if count < 4 or not short:
+        return None
+    turned = rotated(before, ((i if short[0] == (i + 1) % count else short[0]) - 1) % count, p)
+    editor = LegEditor(turned.problem, turned.u, turned.origin)
+    first, between, last = editor.legs[:3]
+    far, own = surface_of(system, first), surface_of(system, between)
+    crossed = all(leg.kind == "crossing" for leg in (first, between, last))
+    if not crossed or surface_of(system, last) != far or own == far:
+        return None
+    editor.legs[0] = leg_between(system, first.mode, mode_after(last))
+    editor.remove(2)
+    editor.remove(1)
+    guards = guarded_field(system, mode_after(last)).motion.guards
+    guard = next(g for g in guards if g.kind == "surface" and g.element == far)
+    return editor.done(test=Condition("start", 1, guard))
+
+
+# Guesses for an orbit with new short legs.
+
+
+def grown(problem: BoundaryProblem, u: Array, p: Array, fresh: Sequence[int], by: float) -> Array:
+    """Unknowns near an orbit whose legs ``fresh`` last for ``by``."""
+    # A leg that is added inside a slide begins before the point where the slide touched its boundary
+    # and ends after it: h = L11 t^2/2 + L111 t^3/6 with an exit at -t/3 of a leg of the duration t.
+    starts, durations = (np.array(part) for part in problem.split(u))
+    legs = problem.legs
+    for i in fresh:
+        durations[i] = by
+        added = 0 < i < len(legs) - 1 and legs[i].kind == "entry" and legs[i - 1].kind == "exit"
+        if not added or durations[i - 1] < by or durations[i + 1] < by:
+            continue
+        durations[i - 1] -= by / 3
+        durations[i + 1] -= 2 * by / 3
+        for k in (i - 1, i):
+            flow = integrate_leg(problem.system, legs[k], starts[k], float(durations[k]), p)
+            starts[k + 1] = flow.end[: problem.dimension]
+    return problem.pack(starts, durations)

@@ -64,9 +64,7 @@ def together_and_apart(monkeypatch, system, legs, starts, durations, chosen):
         (HIDDEN, [Leg("s"), Leg("+", "entry", 0, 1)], [[0.1, 0.0], [0.2, 0.1]], [0.3, 0.2]),
     ],
 )
-def test_legs_together_equal_legs_one_by_one(
-    monkeypatch, system, legs, starts, durations
-):
+def test_legs_together_equal_legs_one_by_one(monkeypatch, system, legs, starts, durations):
     both = together_and_apart(monkeypatch, system, legs, starts, durations, (0,))
     for name in leg_integration.LegFlows.__dataclass_fields__:
         one, two = (np.asarray(getattr(found, name)) for found in both)
